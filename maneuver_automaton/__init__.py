@@ -1,0 +1,81 @@
+"""Motion planning with symmetry: trims, maneuvers, and the words that join a start to a goal.
+
+>>> import maneuver_automaton as ma
+>>> robot = ma.Automaton.of_controls(ma.Unicycle(), {"ahead": (1, 0), "spin": (0, 1)})
+>>> problem = ma.Problem(robot, [0, 0, 0], [1, 0, 0], cost=ma.Cost(effort=1.0))
+>>> ma.plan(problem).plan.word
+('ahead',)
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from maneuver_automaton import plotting as plotting
+    from maneuver_automaton.automaton import Automaton as Automaton
+    from maneuver_automaton.automaton import Plan as Plan
+    from maneuver_automaton.automaton.library import load_library as load_library
+    from maneuver_automaton.automaton.library import save_library as save_library
+    from maneuver_automaton.costs import Cost as Cost
+    from maneuver_automaton.formats.plan_json import load_plan as load_plan
+    from maneuver_automaton.formats.plan_json import save_plan as save_plan
+    from maneuver_automaton.groups import SE2 as SE2
+    from maneuver_automaton.groups import SE2xR as SE2xR
+    from maneuver_automaton.models import Car as Car
+    from maneuver_automaton.models import Unicycle as Unicycle
+    from maneuver_automaton.planning import PlanResult as PlanResult
+    from maneuver_automaton.planning import PlanStatus as PlanStatus
+    from maneuver_automaton.planning import plan as plan
+    from maneuver_automaton.primitives import Maneuver as Maneuver
+    from maneuver_automaton.primitives import Trim as Trim
+    from maneuver_automaton.problem import Bounds as Bounds
+    from maneuver_automaton.problem import Goal as Goal
+    from maneuver_automaton.problem import Horizon as Horizon
+    from maneuver_automaton.problem import Problem as Problem
+    from maneuver_automaton.problem import SearchSettings as SearchSettings
+    from maneuver_automaton.scenario import load_scenario as load_scenario
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "SE2": "groups",
+    "SE2xR": "groups",
+    "Automaton": "automaton",
+    "Bounds": "problem",
+    "Car": "models",
+    "Cost": "costs",
+    "Goal": "problem",
+    "Horizon": "problem",
+    "Maneuver": "primitives",
+    "Plan": "automaton",
+    "PlanResult": "planning",
+    "PlanStatus": "planning",
+    "Problem": "problem",
+    "SearchSettings": "problem",
+    "Trim": "primitives",
+    "Unicycle": "models",
+    "load_library": "automaton.library",
+    "load_plan": "formats.plan_json",
+    "load_scenario": "scenario",
+    "plan": "planning",
+    "save_library": "automaton.library",
+    "save_plan": "formats.plan_json",
+}
+
+__all__ = [*_HOMES, "plotting"]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "plotting":
+        return importlib.import_module("maneuver_automaton.plotting")
+    if name not in _HOMES:
+        raise AttributeError(f"module 'maneuver_automaton' has no attribute {name!r}")
+    value = getattr(importlib.import_module(f"maneuver_automaton.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

@@ -1,0 +1,72 @@
+"""Array aliases, and the two checks every value makes of its arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+def as_array(name: str, value: ArrayLike, *, last: int | Sequence[int] | None = None) -> Array:
+    """`value` as finite float64 with `last` components in its last axis.
+
+    Parameters
+    ----------
+    name : str
+        What the message calls the value.
+    value : array_like
+        Numbers; anything that NumPy can turn into float64.
+    last : int or sequence of int, optional
+        Admitted lengths of the last axis; `None` admits any shape.
+
+    Returns
+    -------
+    array
+        A float64 array; `value` itself if it is one.
+
+    Raises
+    ------
+    ValueError
+        If `value` holds no numbers, is not finite, or has another last axis.
+
+    Examples
+    --------
+    >>> as_array("pose", [0, 1, 2], last=3)
+    array([0., 1., 2.])
+    """
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name}: got {value!r}, need numbers") from error
+    if last is not None:
+        admitted = (last,) if isinstance(last, int) else tuple(last)
+        if array.ndim == 0 or array.shape[-1] not in admitted:
+            need = " or ".join(str(n) for n in admitted)
+            raise ValueError(f"{name}: got shape {array.shape}, need {need} components last")
+    if not np.isfinite(array).all():
+        bad = array[~np.isfinite(array)].flat[0]
+        raise ValueError(f"{name}: got {bad}, need finite numbers")
+    return array
+
+
+def freeze(instance: Any, name: str, *, last: int | Sequence[int] | None = None) -> None:
+    """Replace the field `name` of a frozen dataclass by a checked, read-only copy."""
+    array = np.array(as_array(name, getattr(instance, name), last=last))
+    array.setflags(write=False)
+    object.__setattr__(instance, name, array)
+
+
+def wrapped(angle: ArrayLike) -> Array:
+    """Angles [rad] modulo a full turn, in [-pi, pi].
+
+    Examples
+    --------
+    >>> float(wrapped(2 * np.pi + 0.25))
+    0.25
+    """
+    return np.asarray(np.remainder(np.asarray(angle) + np.pi, 2 * np.pi) - np.pi, dtype=np.float64)

@@ -1,0 +1,98 @@
+"""The `kernel` decorators: compile a loop once, and never run a stale one.
+
+numba's own cache looks at the file of one function and does not see edits in a file it calls.
+So the compiled code lies in a folder named after a hash of *every* kernel source, inside the
+user's cache folder; where nothing can be written, kernels work without a cache.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, cast
+
+Kernel = Callable[..., Any]
+
+
+def user_cache_folder() -> Path:
+    """Where files that can be made again are kept: the platform's cache folder of this user."""
+    if override := os.environ.get("MANEUVER_AUTOMATON_CACHE_DIR"):
+        return Path(override)
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "maneuver_automaton"
+
+
+def source_hash() -> str:
+    """Hash of every kernel source of the package, 16 hexadecimal digits."""
+    digest = hashlib.sha256()
+    package = Path(__file__).parent
+    for path in sorted([*package.rglob("_kernels*.py"), Path(__file__)]):
+        digest.update(path.relative_to(package).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@functools.cache
+def kernel_folder() -> Path | None:
+    """Folder of the compiled kernels, made if need be; None where nothing can be written."""
+    base = os.environ.get("NUMBA_CACHE_DIR")
+    try:
+        folder = (Path(base) if base else user_cache_folder()) / f"kernels-{source_hash()}"
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except (OSError, RuntimeError):
+        return None  # RuntimeError: no home folder
+    return folder
+
+
+def kernel(function: Kernel) -> Kernel:
+    """Compile `function` with numba: without the GIL, cached on disk, IEEE division.
+
+    Examples
+    --------
+    >>> @kernel
+    ... def double(x):
+    ...     return 2.0 * x
+    >>> double(1.5)
+    3.0
+    """
+    import numba
+
+    folder = kernel_folder()
+    if folder is None:
+        return cast("Kernel", numba.njit(nogil=True, error_model="numpy")(function))
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(folder)  # read while decorating, and only then
+    try:
+        return cast("Kernel", numba.njit(nogil=True, error_model="numpy", cache=True)(function))
+    except RuntimeError:
+        # No source file to hang the cache on: an interactive session, a doctest.
+        return cast("Kernel", numba.njit(nogil=True, error_model="numpy")(function))
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+def inner_kernel(function: Kernel) -> Kernel:
+    """Compile a function that only other kernels call: no wrapper for Python, no file of its own.
+
+    Its code is part of the kernels that call it; without the wrapper it compiles in half the time.
+    """
+    import numba
+
+    return cast(
+        "Kernel",
+        numba.njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(
+            function
+        ),
+    )

@@ -1,0 +1,5 @@
+"""The maneuver automaton, and the plans that are its words."""
+
+from maneuver_automaton.automaton.automaton import Automaton as Automaton
+from maneuver_automaton.automaton.plan import Plan as Plan
+from maneuver_automaton.automaton.plan import Trajectory as Trajectory

@@ -1,0 +1,239 @@
+"""The maneuver automaton: trims as nodes, maneuvers as edges."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from maneuver_automaton._arrays import Array, IntArray, as_array
+from maneuver_automaton.errors import InvalidAutomaton, UnknownTrim
+from maneuver_automaton.models import Model
+from maneuver_automaton.primitives import Maneuver, Trim
+
+if TYPE_CHECKING:
+    import networkx
+
+
+@dataclass(frozen=True, eq=False)
+class Automaton:
+    """Trims of one vehicle, and the maneuvers that join them.
+
+    Trims of equal reduced state form one class; a vehicle switches between them at will, by
+    an *identity maneuver* that is not stored: a kinematic vehicle has one class. `maneuvers`
+    hold what leads from class to class.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.5, 0), "spin": (0, 1)})
+    >>> robot.trim_names
+    ('ahead', 'spin')
+    >>> robot["ahead"].body_velocity.tolist()
+    [1.5, 0.0, 0.0]
+    """
+
+    model: Model
+    trims: tuple[Trim, ...]
+    maneuvers: tuple[Maneuver, ...] = ()
+    name: str = field(default="", kw_only=True)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "trims", tuple(self.trims))
+        object.__setattr__(self, "maneuvers", tuple(self.maneuvers))
+        if not self.trims:
+            raise InvalidAutomaton("automaton: got no trim, need at least one")
+        _check_names(self.trim_names)
+        dof, n_controls = self.model.group.dof, len(self.model.control_names)
+        for trim in self.trims:
+            if trim.body_velocity.shape != (dof,) or trim.control.shape != (n_controls,):
+                raise InvalidAutomaton(
+                    f"trim {trim.name!r}: got twist {trim.body_velocity.shape} and control "
+                    f"{trim.control.shape}, need ({dof},) and ({n_controls},) for the "
+                    f"{self.model.name}"
+                )
+        for maneuver in self.maneuvers:
+            self.index_of(maneuver.source)
+            self.index_of(maneuver.target)
+
+    @classmethod
+    def of_controls(cls, model: Model, controls: Mapping[str, ArrayLike]) -> Automaton:
+        """Automaton of a kinematic `model`, one trim per name and control (n_u,).
+
+        Raises
+        ------
+        InvalidAutomaton
+            If there is no control, or the model has a reduced state.
+        ValueError
+            If a control has the wrong length, is not finite, or exceeds the model's limits.
+        """
+        n_controls = len(model.control_names)
+        if model.reduced_names:
+            raise InvalidAutomaton(
+                f"{model.name}: has the reduced state {', '.join(model.reduced_names)}, "
+                "so a control alone makes no trim"
+            )
+        values = [
+            _checked_control(model, name, as_array(f"trim {name!r}: control", control))
+            for name, control in controls.items()
+        ]
+        table = np.array(values).reshape(len(values), n_controls)
+        twists = model.body_velocity(np.zeros((len(values), 0)), table)
+        return cls(
+            model,
+            tuple(
+                Trim(name=name, body_velocity=twist, control=control)
+                for name, twist, control in zip(controls, twists, table, strict=True)
+            ),
+        )
+
+    @classmethod
+    def of_grid(cls, model: Model, axes: Sequence[ArrayLike]) -> Automaton:
+        """Automaton with one trim per point of the grid of controls spanned by `axes`.
+
+        Trims are named after their controls: ``"speed 0.5, turn_rate -1"``.
+
+        Examples
+        --------
+        >>> from maneuver_automaton.models import Unicycle
+        >>> Automaton.of_grid(Unicycle(), [[0, 1], [-1, 0, 1]]).trim_names[:2]
+        ('speed 0, turn_rate -1', 'speed 0, turn_rate 0')
+        """
+        if len(axes) != len(model.control_names):
+            raise ValueError(
+                f"grid: got {len(axes)} axes, need {len(model.control_names)} for the controls "
+                f"{', '.join(model.control_names)} of the {model.name}"
+            )
+        rows = [as_array(f"grid: axis {k}", axis).ravel() + 0.0 for k, axis in enumerate(axes)]
+        return cls.of_controls(
+            model,
+            {
+                ", ".join(
+                    f"{what} {value:.10g}"
+                    for what, value in zip(model.control_names, point, strict=True)
+                ): point
+                for point in product(*(row.tolist() for row in rows))
+            },
+        )
+
+    def __len__(self) -> int:
+        return len(self.trims)
+
+    def __getitem__(self, name: str) -> Trim:
+        return self.trims[self.index_of(name)]
+
+    @cached_property
+    def trim_names(self) -> tuple[str, ...]:
+        """Names of the trims, in order."""
+        return tuple(trim.name for trim in self.trims)
+
+    @cached_property
+    def _index(self) -> dict[str, int]:
+        return {name: k for k, name in enumerate(self.trim_names)}
+
+    def index_of(self, name: str) -> int:
+        """Position of a trim; raises UnknownTrim (a LookupError)."""
+        if name in self._index:
+            return self._index[name]
+        near = difflib.get_close_matches(name, self.trim_names, n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        shown = ", ".join(self.trim_names[:12]) + (", ..." if len(self) > 12 else "")
+        raise UnknownTrim(f"no trim {name!r} among {shown}{hint}")
+
+    @cached_property
+    def body_velocities(self) -> Array:
+        """Twists of the trims (m, dof), [m/s, m/s, rad/s(, m/s)]."""
+        return _frozen(np.array([trim.body_velocity for trim in self.trims]))
+
+    @cached_property
+    def controls(self) -> Array:
+        """Controls of the trims (m, n_u), the model's units."""
+        return _frozen(np.array([trim.control for trim in self.trims]))
+
+    @cached_property
+    def trim_classes(self) -> IntArray:
+        """Class of each trim (m,): trims of equal reduced state switch freely."""
+        states = np.array([trim.reduced_state for trim in self.trims])
+        if states.shape[1] == 0:
+            return np.zeros(len(self), dtype=np.int64)
+        _, classes = np.unique(states.round(12), axis=0, return_inverse=True)
+        return np.asarray(classes.ravel(), dtype=np.int64)
+
+    @cached_property
+    def twist_groups(self) -> IntArray:
+        """Which trims have equal twists (m,): equal numbers, the first trim's index."""
+        order = np.lexsort(self.body_velocities.T[::-1])
+        sorted_twists = self.body_velocities[order]
+        new = np.append(True, (sorted_twists[1:] != sorted_twists[:-1]).any(axis=1))
+        groups = np.empty(len(self), dtype=np.int64)
+        groups[order] = np.minimum.reduceat(order, np.flatnonzero(new))[np.cumsum(new) - 1]
+        return groups
+
+    @cached_property
+    def rest(self) -> int | None:
+        """Index of the first trim that stands still, None if there is none."""
+        still = np.flatnonzero(~self.body_velocities.any(axis=1))
+        return int(still[0]) if still.size else None
+
+    def graph(self) -> networkx.MultiDiGraph[str]:
+        """The automaton as a graph: trims as nodes, all maneuvers, identity ones too, as edges.
+
+        A class of m trims has m (m - 1) identity maneuvers: ask for it only where that is small.
+        """
+        import networkx
+
+        graph: networkx.MultiDiGraph[str] = networkx.MultiDiGraph(name=self.name)
+        for trim in self.trims:
+            graph.add_node(trim.name, trim=trim)
+        for a, b in product(range(len(self)), repeat=2):
+            if a != b and self.trim_classes[a] == self.trim_classes[b]:
+                graph.add_edge(self.trim_names[a], self.trim_names[b], maneuver=self.switch(a, b))
+        for maneuver in self.maneuvers:
+            graph.add_edge(maneuver.source, maneuver.target, maneuver=maneuver)
+        return graph
+
+    def switch(self, source: int, target: int) -> Maneuver:
+        """The identity maneuver between two trims of one class."""
+        return Maneuver(
+            name="switch",
+            source=self.trim_names[source],
+            target=self.trim_names[target],
+            displacement=np.zeros(self.model.group.dof),
+        )
+
+
+def _frozen(array: Array) -> Array:
+    array.setflags(write=False)
+    return array
+
+
+def _check_names(names: Iterable[str]) -> None:
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            raise InvalidAutomaton(f"trim {name!r}: the name is used twice")
+        seen.add(name)
+
+
+def _checked_control(model: Model, name: str, control: Array) -> Array:
+    if control.shape != (len(model.control_names),):
+        raise ValueError(
+            f"trim {name!r}: control has shape {control.shape}, need {len(model.control_names)} "
+            f"numbers ({', '.join(model.control_names)})"
+        )
+    for value, what, (low, high) in zip(
+        control, model.control_names, model.control_limits, strict=True
+    ):
+        slack = 1e-12 * max(1.0, abs(value))
+        if not low - slack <= value <= high + slack:
+            raise ValueError(
+                f"trim {name!r}: {what} = {value:.6g} is outside the limits "
+                f"[{low:.6g}, {high:.6g}] of the {model.name}"
+            )
+    return control

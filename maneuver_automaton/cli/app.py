@@ -1,0 +1,214 @@
+"""The commands and their options. Nothing heavy is imported before a command runs."""
+
+from __future__ import annotations
+
+import gc
+import sys
+from pathlib import Path
+from typing import Annotated, NoReturn
+
+import typer
+
+from maneuver_automaton.cli.guard import exits
+from maneuver_automaton.errors import InvalidScenario
+
+# Importing libraries makes a million objects and no garbage: look for it less often than usual.
+COLLECT_EVERY = 100_000  # objects
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    help="Exact motion planning with symmetry: trims, maneuvers, and the words that join them.",
+)
+automaton_app = typer.Typer(
+    no_args_is_help=True, rich_markup_mode=None, help="Make, list or draw a library of trims."
+)
+app.add_typer(automaton_app, name="automaton")
+
+File = Annotated[Path, typer.Argument(metavar="FILE", help="Scenario file (YAML).")]
+Library = Annotated[Path, typer.Argument(metavar="FILE", help="Scenario or library file.")]
+Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")]
+TimeLimit = Annotated[
+    float | None,
+    typer.Option("--time-limit", metavar="S", help="Ceiling for search and refinement [s]."),
+]
+Alternatives = Annotated[
+    int, typer.Option("--alternatives", min=0, metavar="K", help="Dearer plans to list as well.")
+]
+Plot = Annotated[bool, typer.Option("--plot/--no-plot", help="Draw the plan.")]
+Animate = Annotated[bool, typer.Option("--animate", help="Animate the plan as well, as a GIF.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")]
+Jobs = Annotated[int, typer.Option("--jobs", min=1, metavar="N", help="Files planned at a time.")]
+With = Annotated[
+    Path | None,
+    typer.Option(
+        "--with", metavar="FILE", help="Scenario for what FILE leaves out (not in this version)."
+    ),
+]
+Case = Annotated[
+    int | None,
+    typer.Option("--case", min=0, metavar="N", help="Which problem of FILE (not in this version)."),
+]
+
+
+def run(argv: list[str]) -> int:
+    """Run the command line with the arguments `argv`, and return the exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")  # names may hold what a terminal cannot show
+    try:
+        app(args=argv, prog_name="maneuver-automaton")
+    except SystemExit as done:
+        return done.code if isinstance(done.code, int) else int(done.code is not None)
+    return 0
+
+
+def main() -> NoReturn:
+    """Entry point of the console script."""
+    gc.set_threshold(COLLECT_EVERY)
+    code = run(sys.argv[1:])
+    gc.freeze()  # or the exit would look through every object of every library once more
+    sys.exit(code)
+
+
+@app.command()
+@exits
+def plan(
+    file: File,
+    out: Out = Path("out"),
+    time_limit: TimeLimit = None,
+    alternatives: Alternatives = 0,
+    plot: Plot = True,
+    animate: Animate = False,
+    quiet: Quiet = False,
+    jobs: Jobs = 1,
+    with_file: With = None,
+    case: Case = None,
+) -> int:
+    """Plan a scenario, or every scenario of a folder."""
+    from maneuver_automaton.cli import plan_command
+
+    if with_file is not None:
+        raise InvalidScenario(
+            "--with: serves formats that state a part of a problem; this version reads "
+            "none, only scenario files, which state all of it"
+        )
+    if case is not None:
+        raise InvalidScenario(
+            "--case: serves files with several problems; this version reads none, only "
+            "scenario files, which hold one"
+        )
+    settings = plan_command.Settings(
+        time_limit=time_limit,
+        alternatives=alternatives,
+        plot=plot,
+        animate=animate,
+        quiet=quiet,
+    )
+    if file.is_dir():
+        return plan_command.plan_folder(file, out, settings=settings, jobs=jobs)
+    return plan_command.plan_file(file, out, settings=settings)
+
+
+@app.command()
+@exits
+def mpc(
+    file: File,
+    steps: Annotated[int | None, typer.Option("--steps", min=1, metavar="N")] = None,
+    seed: Annotated[int | None, typer.Option("--seed", min=0, metavar="N")] = None,
+    out: Out = Path("out"),
+    time_limit: TimeLimit = None,
+    alternatives: Alternatives = 0,
+    plot: Plot = True,
+    animate: Animate = False,
+    quiet: Quiet = False,
+    jobs: Jobs = 1,
+    with_file: With = None,
+    case: Case = None,
+) -> int:
+    """Drive a scenario in closed loop (not in this version)."""
+    raise InvalidScenario("mpc: this version plans in open loop only; use plan")
+
+
+@app.command()
+@exits
+def check(file: File) -> int:
+    """Report symmetry, consistency and feasibility, without a plan."""
+    from maneuver_automaton.cli import check_command
+
+    return check_command.check_file(file)
+
+
+@automaton_app.command("build")
+@exits
+def automaton_build(file: Library, out: Out = Path("out")) -> int:
+    """Write the library of a scenario as a file.
+
+    It is DIR/library.json, or DIR itself if it ends in .json.
+    """
+    from maneuver_automaton.cli import automaton_command
+
+    return automaton_command.build(file, out)
+
+
+@automaton_app.command("show")
+@exits
+def automaton_show(file: Library) -> int:
+    """List the trims of a scenario or a library file."""
+    from maneuver_automaton.cli import automaton_command
+
+    return automaton_command.show(file)
+
+
+@automaton_app.command("draw")
+@exits
+def automaton_draw(file: Library, out: Out = Path("out")) -> int:
+    """Draw the trims of a scenario or a library file.
+
+    The picture is DIR/automaton.png, or DIR itself if it ends in .png, .pdf or .svg.
+    """
+    from maneuver_automaton.cli import automaton_command
+
+    return automaton_command.draw(file, out)
+
+
+@app.command()
+@exits
+def convert(
+    source: Annotated[Path, typer.Argument(metavar="IN")],
+    target: Annotated[Path, typer.Argument(metavar="OUT")],
+) -> int:
+    """Write a scenario again, with its trims listed.
+
+    In this version both files are scenarios, YAML.
+    """
+    from maneuver_automaton.cli import convert_command
+
+    return convert_command.convert(source, target)
+
+
+@app.command()
+@exits
+def plot(
+    file: Annotated[Path, typer.Argument(metavar="PLAN.json")],
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="The picture.")] = None,
+    animate: Animate = False,
+) -> int:
+    """Draw a plan.json again: PLAN.png beside it, or the file given.
+
+    With --animate it is an animation, PLAN.gif.
+    """
+    from maneuver_automaton.cli import convert_command
+
+    return convert_command.plot(file, out, animate=animate)
+
+
+@app.command()
+@exits
+def schema() -> int:
+    """Print the JSON Schema of scenario files, for editors."""
+    from maneuver_automaton.cli import convert_command
+
+    return convert_command.print_schema()

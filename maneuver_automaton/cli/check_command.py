@@ -1,0 +1,230 @@
+"""`check`: what holds of a scenario, as a table; no plan is shown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from maneuver_automaton import analysis, planning
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.analysis import SymmetryReport
+from maneuver_automaton.analysis.report import listed
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.automaton.validation import validate
+from maneuver_automaton.cli.automaton_command import few, report_lines
+from maneuver_automaton.cli.compiling import announced
+from maneuver_automaton.cli.guard import FOUND, NO_PLAN
+from maneuver_automaton.cli.inputs import scenario_of
+from maneuver_automaton.cli.tables import console, table
+from maneuver_automaton.models import Model, rollout, vector_field
+from maneuver_automaton.planning import PlanStatus
+from maneuver_automaton.problem import Bounds, Problem
+
+TRIM_SECONDS = 2.0  # how long every trim is driven by the ODE solver
+TRIM_TOLERANCE = 1e-7  # [m, rad] between trim and ODE solver
+UNDECIDED = (PlanStatus.NO_PLAN, PlanStatus.OUT_OF_BUDGET)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """One line of the report; `holds` is None for what is told but not judged."""
+
+    what: str
+    holds: bool | None
+    worst: float | None = None
+    words: str
+
+
+def check_file(path: Path) -> int:
+    """Print the report of a scenario, and return the exit code."""
+    scenario = scenario_of(path)
+    problem = scenario.problem
+    findings = [
+        *_symmetry(problem),
+        *_automaton(problem.automaton),
+        _lemma(problem),
+        *_feasibility(problem, scenario.time_limit_s),
+    ]
+    signs = {True: "yes", False: "NO", None: "note"}
+    rows = [
+        [
+            finding.what,
+            signs[finding.holds],
+            "" if finding.worst is None else f"{finding.worst:.2g}",
+            finding.words,
+        ]
+        for finding in findings
+    ]
+    console().print(table(scenario.name, ["check", "holds", "worst", "where, why"], rows))
+    return NO_PLAN if any(finding.holds is False for finding in findings) else FOUND
+
+
+def _symmetry(problem: Problem) -> Iterator[Finding]:
+    model = problem.automaton.model
+    region = analysis.Region.of_model(model)
+    yield _found("vector field", analysis.check_vector_field(model))
+    yield _found("flow", analysis.check_flow(model))
+    yield _found("stage cost", analysis.check_stage_cost(_stage_cost(problem), region=region))
+    if constraint := _constraint(problem.bounds):
+        report = analysis.check_constraint(constraint, region=region)
+        yield _told("bounds", report, hint="they do not move with the problem")
+    start, goal = problem.start, problem.goals[0].pose
+
+    def ends(first: Array, last: Array) -> Array:
+        return np.concatenate([first[: start.size] - start, last[: goal.size] - goal])
+
+    report = analysis.check_boundary_condition(ends, region=region)
+    yield _told(
+        "start and goal",
+        report,
+        hint="fixed ends never are; moving both gives an equivalent problem",
+    )
+
+
+def _found(what: str, report: SymmetryReport) -> Finding:
+    return Finding(
+        what=f"symmetry: {what}",
+        holds=report.holds,
+        worst=report.worst_violation,
+        words=f"invariant under {listed(report.intact)}" if report.holds else report.message,
+    )
+
+
+def _told(what: str, report: SymmetryReport, *, hint: str) -> Finding:
+    if report.holds:
+        return _found(what, report)
+    return Finding(
+        what=f"symmetry: {what}",
+        holds=None,
+        worst=report.worst_violation,
+        words=f"not invariant under {listed(report.broken)}: {hint}",
+    )
+
+
+def _stage_cost(problem: Problem) -> Callable[[Array, Array], float]:
+    """The cost as a function of state and control, the body velocity taken from the dynamics."""
+    model = problem.automaton.model
+    field = vector_field(model)
+
+    def cost(state: Array, control: Array) -> float:
+        pose = state[: model.group.dof]
+        twist = model.group(pose).body_twist(field(state, control)[: model.group.dof])
+        return float(problem.cost.rates(control[None], twist[None])[0])
+
+    return cost
+
+
+def _constraint(bounds: Bounds) -> Callable[[Array, Array], Array] | None:
+    """Bounds as ``g(x, u) <= 0``; None where there are none."""
+    pairs = [(k, pair) for k, pair in ((0, bounds.x), (1, bounds.y), (3, bounds.z)) if pair]
+    if not pairs:
+        return None
+
+    def excess(state: Array, control: Array) -> Array:
+        rows = [(low - state[k], state[k] - high) for k, (low, high) in pairs]
+        return np.array(rows).ravel()
+
+    return excess
+
+
+def _automaton(automaton: Automaton) -> Iterator[Finding]:
+    yield _trims(automaton)
+    report = validate(automaton)
+    sound = report.connected and not (report.dead_ends or report.unused)
+    lines = report_lines(report)
+    yield Finding(
+        what="automaton: connected",
+        holds=sound,
+        words="every trim can be reached from every trim" if sound else "; ".join(lines[1:]),
+    )
+    if report.duplicates:
+        words = "; ".join(few(names) for names in report.duplicates[:5])
+        yield Finding(what="automaton: no trim twice", holds=None, words=f"equal twists: {words}")
+    yield Finding(
+        what="automaton: reaches every pose",
+        holds=True if report.controllable else None,
+        words=lines[0],
+    )
+
+
+def _trims(automaton: Automaton) -> Finding:
+    """Every trim, driven by an ODE solver, is where its closed form says."""
+    model, trims = automaton.model, automaton.trims
+    start = np.array([0.3, -0.2, 0.7, 0.1][: model.group.dof])
+    states = np.array([np.concatenate([start, trim.reduced_state]) for trim in trims])
+    driven = _driven(model, states, automaton.controls)
+    coasted = model.group.exp(TRIM_SECONDS * automaton.body_velocities)
+    expected = (model.group(start) @ coasted).pose
+    reduced = states[:, model.group.dof :]
+    defect = np.abs(driven - np.concatenate([expected, reduced], axis=1)).max(axis=1)
+    worst = int(defect.argmax())
+    return Finding(
+        what="automaton: trims follow the model",
+        holds=bool(defect[worst] <= TRIM_TOLERANCE),
+        worst=float(defect[worst]),
+        words=f"{len(trims)} trims driven for {TRIM_SECONDS:g} s by an ODE solver, "
+        f"worst {trims[worst].name!r}",
+    )
+
+
+def _driven(model: Model, states: Array, controls: Array) -> Array:
+    """States after the trims were driven side by side, as one large system."""
+    field = vector_field(model)
+
+    def rates(state: Array, control: Array) -> Array:
+        return field(state.reshape(states.shape), control.reshape(controls.shape)).ravel()
+
+    times = [0.0, TRIM_SECONDS]
+    ends = rollout(rates, states.ravel(), control=controls.ravel(), times=times)
+    return np.asarray(ends[-1].reshape(states.shape))
+
+
+def _lemma(problem: Problem) -> Finding:
+    report = analysis.check_library(
+        problem.automaton.body_velocities[:, :3], max_trims=problem.horizon.max_trims
+    )
+    return Finding(
+        what="library: turn, move, turn",
+        holds=True if report.holds else None,
+        words=report.message
+        if report.holds
+        else f"sufficient, not necessary, to reach every pose: {'; '.join(report.missing)}",
+    )
+
+
+def _feasibility(problem: Problem, time_limit: float) -> Iterator[Finding]:
+    ends = [("start", problem.start), *(("goal", goal.pose) for goal in problem.goals)]
+    bounds = problem.bounds
+    bounded = any(pair is not None for pair in (bounds.x, bounds.y, bounds.z))
+    for what, pose in ends:
+        outside = _outside(bounds, pose)
+        words = "outside in " + ", ".join(outside) if outside else "inside"
+        yield Finding(
+            what=f"{what}: inside the bounds",
+            holds=not outside,
+            worst=max(outside.values()) if outside else None,
+            words=words if bounded else "there are none",
+        )
+    with announced():
+        result = planning.plan(problem, time_limit=time_limit)
+    found = result.status is PlanStatus.FOUND
+    yield Finding(
+        what="goal: can be reached",
+        holds=None if result.status in UNDECIDED else found,
+        words="a plan exists" if found else f"{result.status.value}: {result.reason}",
+    )
+
+
+def _outside(bounds: Bounds, pose: Array) -> dict[str, float]:
+    """How far a pose is outside [m], for each coordinate in which it is."""
+    pairs: dict[str, Any] = {"x": (0, bounds.x), "y": (1, bounds.y), "z": (3, bounds.z)}
+    excess = {
+        name: max(pair[0] - pose[k], pose[k] - pair[1])
+        for name, (k, pair) in pairs.items()
+        if pair is not None
+    }
+    return {name: float(value) for name, value in excess.items() if value > 0.0}

@@ -1,0 +1,33 @@
+"""Say why nothing happens for a while: kernels are compiled when they are used first."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from typing import Any
+
+from maneuver_automaton.cli.guard import complain
+
+COMPILING = "compiling kernels, once after installation: this may take a minute ..."
+
+
+@contextlib.contextmanager
+def announced(*, quiet: bool = False) -> Iterator[None]:
+    """Print one line when the compiler starts to work inside; loading from the cache is silent."""
+    if quiet:
+        yield
+        return
+    from numba.core import event
+
+    class Announcement(event.Listener):  # type: ignore[misc]
+        said = False
+
+        def on_start(self, event: Any) -> None:
+            if not self.said:
+                complain(COMPILING)
+            self.said = True
+
+        def on_end(self, event: Any) -> None: ...
+
+    with event.install_listener("numba:compile", Announcement()):
+        yield

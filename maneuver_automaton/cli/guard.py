@@ -1,0 +1,66 @@
+"""No traceback ever reaches a user: what is wrong is said in one line, with an exit code."""
+
+from __future__ import annotations
+
+import functools
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import ParamSpec
+
+import typer
+
+from maneuver_automaton.errors import ManeuverAutomatonError
+
+DEBUG = "MANEUVER_AUTOMATON_DEBUG"
+FOUND, NO_PLAN, BAD_INPUT = 0, 1, 2
+INTERRUPTED, BROKEN_PIPE = 130, 141  # 128 + the signal, as shells count
+
+P = ParamSpec("P")
+
+
+def complain(line: str) -> None:
+    """Print one line to stderr."""
+    sys.stderr.write(" ".join(line.splitlines()) + "\n")
+
+
+def explained(error: Exception) -> str:
+    """One line for whatever a command raised."""
+    if isinstance(error, ManeuverAutomatonError):
+        return str(error)
+    if os.environ.get(DEBUG):
+        import traceback
+
+        traceback.print_exception(error)
+    return (
+        f"internal error: {type(error).__name__}: {error}; this is a bug of the program, "
+        f"{DEBUG}=1 shows where"
+    )
+
+
+def exits(command: Callable[P, int]) -> Callable[P, None]:
+    """Make a command end with the exit code that it returns, and with words if it raises."""
+
+    @functools.wraps(command)
+    def safe(*args: P.args, **kwargs: P.kwargs) -> None:
+        try:
+            code = command(*args, **kwargs)
+            sys.stdout.flush()
+        except KeyboardInterrupt:
+            code = INTERRUPTED
+        except BrokenPipeError:
+            _close_stdout()
+            code = BROKEN_PIPE
+        except Exception as error:  # noqa: BLE001, the last resort
+            complain(explained(error))
+            code = BAD_INPUT
+        raise typer.Exit(code)
+
+    return safe
+
+
+def _close_stdout() -> None:
+    """Let the flush at exit go nowhere: whoever read our output has left."""
+    with Path(os.devnull).open("w") as nowhere:
+        os.dup2(nowhere.fileno(), sys.stdout.fileno())

@@ -1,0 +1,199 @@
+"""`plan`: a scenario, or every scenario of a folder."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from maneuver_automaton.cli.compiling import announced
+from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
+from maneuver_automaton.cli.inputs import SCENARIO_ENDINGS, make_folder, not_written, scenario_of
+from maneuver_automaton.errors import InvalidScenario
+
+if TYPE_CHECKING:
+    from maneuver_automaton.planning import PlanResult
+    from maneuver_automaton.scenario import Scenario
+
+PICTURES = ("plan.png", "alternatives.png", "plan.gif")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """Options of `plan`, the same for every file of a folder."""
+
+    time_limit: float | None = None  # [s], None: that of the scenario
+    alternatives: int = 0
+    plot: bool = True
+    animate: bool = False
+    quiet: bool = False
+
+    def __post_init__(self) -> None:
+        if self.time_limit is not None and not 0.0 < self.time_limit < math.inf:
+            raise InvalidScenario(
+                f"--time-limit: got {self.time_limit}, need a positive number of seconds"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """How planning one file of a folder ended, for the table at the end."""
+
+    name: str
+    code: int
+    status: str
+    reason: str = ""
+    cost: float | None = None
+    duration: float | None = None
+    search_s: float | None = None
+
+
+def plan_file(path: Path, out: Path, *, settings: Settings) -> int:
+    """Plan one scenario into the folder `out`, print the plan, return the exit code."""
+    scenario = scenario_of(path)
+    make_folder(out)
+    result = _plan(scenario, out, settings)
+    if result.plan is None:
+        complain(f"{path}: {result.status.value}: {result.reason}")
+        return NO_PLAN
+    if not settings.quiet:
+        from maneuver_automaton.cli.tables import print_result
+
+        print_result(scenario.name, result, folder=str(out))
+    return FOUND
+
+
+def plan_folder(folder: Path, out: Path, *, settings: Settings, jobs: int) -> int:
+    """Plan every scenario of a folder into `out`/STEM, print a table, return the exit code."""
+    paths = sorted(path for path in folder.iterdir() if path.suffix in SCENARIO_ENDINGS)
+    if not paths:
+        raise InvalidScenario(f"{folder}: holds no scenario, need a file ending in .yaml or .yml")
+    _check_stems(paths)
+    from joblib import Parallel, delayed
+
+    make_folder(out)
+    jobs = min(jobs, len(paths))
+    if jobs > 1:
+        _compile_first(settings)
+    work = Parallel(n_jobs=jobs, return_as="generator")(
+        delayed(_row)(path, out / path.stem, settings) for path in paths
+    )
+    rows: list[Row] = []
+    with _progress(len(paths), quiet=settings.quiet) as advance:
+        for row in work:
+            rows.append(row)
+            advance()
+    for row in rows:
+        if row.code != FOUND:
+            complain(row.reason)
+    if not settings.quiet:
+        _print_rows(rows)
+    return max(row.code for row in rows)
+
+
+def _plan(scenario: Scenario, out: Path, settings: Settings) -> PlanResult:
+    """Plan and write the files."""
+    from maneuver_automaton import planning
+
+    make_folder(out)
+    with announced(quiet=settings.quiet):
+        result = planning.plan(
+            scenario.problem,
+            time_limit=settings.time_limit or scenario.time_limit_s,
+            alternatives=settings.alternatives,
+        )
+    result = replace(result, timing_s={**scenario.timing_s, **result.timing_s})
+    try:
+        _write(scenario, result, out, settings)
+    except OSError as error:
+        raise not_written(Path(error.filename or out), error) from error
+    return result
+
+
+def _write(scenario: Scenario, result: PlanResult, out: Path, settings: Settings) -> None:
+    from maneuver_automaton.formats.plan_json import save_plan
+
+    save_plan(result, out / "plan.json")
+    for name in PICTURES:
+        (out / name).unlink(missing_ok=True)  # of an earlier plan
+    if not (settings.plot or settings.animate):
+        return
+    from maneuver_automaton import plotting
+
+    footprint = list(scenario.footprint) or None
+    if settings.plot:
+        plotting.save_plan_figure(result, out / "plan.png", footprint=footprint)
+        if result.alternatives:
+            plotting.save_alternatives_figure(result, out / "alternatives.png", footprint=footprint)
+    if settings.animate and result.plan is not None:
+        plotting.save_plan_animation(result.plan, out / "plan.gif", footprint=footprint)
+
+
+def _row(path: Path, out: Path, settings: Settings) -> Row:
+    """Plan one file of a folder; what goes wrong is told in the row."""
+    try:
+        result = _plan(scenario_of(path), out, settings)
+    except Exception as error:  # noqa: BLE001, one bad file must not stop the others
+        return Row(name=path.name, code=BAD_INPUT, status="bad input", reason=explained(error))
+    found = result.plan is not None
+    status = result.status.value
+    return Row(
+        name=path.name,
+        code=FOUND if found else NO_PLAN,
+        status=status,
+        reason="" if found else f"{path}: {status}: {result.reason}",
+        cost=result.cost,
+        duration=None if result.plan is None else result.plan.duration,
+        search_s=result.timing_s.get("search"),
+    )
+
+
+def _compile_first(settings: Settings) -> None:
+    """Have the kernels in the cache, or every process would compile them for itself."""
+    from maneuver_automaton.search.ready import load_insertion_kernels, load_word_kernels
+
+    with announced(quiet=settings.quiet):
+        load_word_kernels(4)
+        load_insertion_kernels()
+
+
+def _check_stems(paths: list[Path]) -> None:
+    seen: dict[str, Path] = {}
+    for path in paths:
+        if path.stem in seen:
+            raise InvalidScenario(
+                f"{path}: has the same name as {seen[path.stem].name}, need another one"
+            )
+        seen[path.stem] = path
+
+
+@contextlib.contextmanager
+def _progress(total: int, *, quiet: bool) -> Iterator[Callable[[], None]]:
+    """A bar on a terminal, nothing elsewhere; yields what to call after each file."""
+    if quiet or not sys.stderr.isatty():
+        yield lambda: None
+        return
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("planning", total=total)
+        yield lambda: bar.advance(task)
+
+
+def _print_rows(rows: list[Row]) -> None:
+    from maneuver_automaton.cli.tables import console, table
+
+    def shown(value: float | None, digits: int) -> str:
+        return "" if value is None else f"{value:.{digits}g}"
+
+    cells = [
+        [row.name, row.status, shown(row.cost, 6), shown(row.duration, 6), shown(row.search_s, 2)]
+        for row in rows
+    ]
+    columns = ["file", "status", "cost", "duration [s]", "search [s]"]
+    console().print(table("", columns, cells, numbers=(2, 3, 4)))

@@ -1,0 +1,96 @@
+"""What the commands print: values in, rich tables out."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+if TYPE_CHECKING:
+    from maneuver_automaton.planning import PlanResult
+
+WIDE = 160  # columns where the output goes to no terminal
+
+
+def console() -> Console:
+    """Standard output, without markup: names are printed as they are."""
+    return Console(
+        file=sys.stdout,
+        width=None if sys.stdout.isatty() else WIDE,
+        markup=False,
+        emoji=False,
+        highlight=False,
+    )
+
+
+def table(
+    title: str,
+    columns: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    *,
+    numbers: Sequence[int] = (),
+) -> Table:
+    """Rows under `columns`; those in `numbers` are aligned to the right."""
+    made = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify="left", title_style="bold")
+    for k, column in enumerate(columns):
+        made.add_column(column, justify="right" if k in numbers else "left", overflow="fold")
+    for row in rows:
+        made.add_row(*(Text(cell) for cell in row))
+    return made
+
+
+def print_result(name: str, result: PlanResult, *, folder: str) -> None:
+    """Word, durations, cost, terminal error and timing of a plan, and its alternatives."""
+    plan, error = result.plan, result.terminal_error
+    if plan is None or result.cost is None or error is None:
+        return
+    out, names = console(), result.problem.automaton.model.control_names
+    rows = [
+        [str(k + 1), trim.name, _numbers(trim.control), f"{duration:.6g}"]
+        for k, (trim, duration) in enumerate(zip(plan.trims, plan.durations, strict=True))
+    ]
+    columns = ["", "trim", ", ".join(names), "duration [s]"]
+    if rows:
+        out.print(table(name, columns, rows, numbers=(0, 2, 3)))
+    else:
+        out.print(Text(f"{name}\n\n  nothing to do: the start is the goal\n"))
+    facts = {
+        "cost": f"{result.cost:.9g}{_bound(result)}",
+        "duration": f"{plan.duration:.9g} s",
+        "terminal error": f"{error.position_m:.2g} m, {error.heading_rad:.2g} rad",
+        "timing": ", ".join(f"{k} {v:.3f} s" for k, v in result.timing_s.items()),
+        "written to": folder,
+    }
+    for what, value in facts.items():
+        out.print(Text(f"  {what + ':':<16}{value}"), soft_wrap=True)
+    if result.alternatives:
+        out.print()
+        _print_alternatives(out, result)
+
+
+def _print_alternatives(out: Console, result: PlanResult) -> None:
+    rows = [
+        [str(k + 1), f"{one.cost:.6g}", f"{one.plan.duration:.6g}", _word(one.plan.word)]
+        for k, one in enumerate(result.alternatives)
+    ]
+    columns = ["", "cost", "duration [s]", "word"]
+    out.print(table("Alternatives", columns, rows, numbers=(0, 1, 2)))
+
+
+def _bound(result: PlanResult) -> str:
+    if result.lower_bound is None or result.gap is None:
+        return ""
+    return f" (at least {result.lower_bound:.9g}, gap {100 * result.gap:.2g} %)"
+
+
+def _word(names: Sequence[str]) -> str:
+    return " - ".join(names) or "(stays)"
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return ", ".join(f"{value:.6g}" for value in values)

@@ -1,0 +1,110 @@
+"""What a plan costs: a rate for every trim, and a price for every switch."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, as_array
+
+NORM_ORDERS = (1.0, 2.0, math.inf)
+
+
+class StageCost(Protocol):
+    """A cost that the symmetry leaves alone: it sees controls and body velocities, not poses."""
+
+    def rates(self, controls: Array, body_velocities: Array) -> Array:
+        """Cost per second (m,) of trims with `controls` (m, n_u), `body_velocities` (m, dof)."""
+        ...
+
+    def switching(self, body_velocities: Array) -> float:
+        """Cost of the switches of a word whose trims have `body_velocities` (n, dof)."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Cost:
+    """``effort |u|_R^2 + norm |||u||| + time`` per second, ``length`` per metre, prices per switch.
+
+    Source: the paper, Sec. 3.3 (c1, c2, c3); the last three terms are ours.
+
+    Examples
+    --------
+    >>> cost = Cost(effort=1.0, norm=0.5)
+    >>> cost.rates(np.array([[1.5, 0.0]]), np.array([[1.5, 0.0, 0.0]])).tolist()
+    [3.0]
+    """
+
+    effort: float = 0.0  # c1
+    norm: float = 0.0  # c2
+    time: float = 0.0  # c3 [1/s]
+    effort_matrix: Array | None = None  # R (n_u, n_u), identity if None
+    norm_order: float = 2.0  # 1, 2 or inf
+    length: float = 0.0  # [1/m]
+    switch: float = 0.0  # per switch of trims
+    direction_change: float = 0.0  # per change between forward and reverse
+
+    def __post_init__(self) -> None:
+        weights = {name: getattr(self, name) for name in WEIGHTS}
+        for name, weight in weights.items():
+            if not (math.isfinite(weight) and weight >= 0.0):
+                raise ValueError(f"cost: {name} must be a number of at least 0, got {weight}")
+        if not any(weights.values()):
+            raise ValueError(f"cost: {', '.join(WEIGHTS)} are all zero, need at least one positive")
+        if self.norm_order not in NORM_ORDERS:
+            raise ValueError(f"cost: norm_order must be 1, 2 or inf, got {self.norm_order}")
+        if self.effort_matrix is not None:
+            object.__setattr__(self, "effort_matrix", _positive_definite(self.effort_matrix))
+
+    def rates(self, controls: Array, body_velocities: Array) -> Array:
+        """Cost per second (m,) of trims with `controls` (m, n_u), `body_velocities` (m, dof)."""
+        n_controls = controls.shape[-1]
+        weight = np.eye(n_controls) if self.effort_matrix is None else self.effort_matrix
+        if weight.shape != (n_controls, n_controls):
+            raise ValueError(
+                f"cost: effort_matrix has shape {weight.shape}, "
+                f"need ({n_controls}, {n_controls}) for {n_controls} controls"
+            )
+        effort = np.einsum("...i,ij,...j->...", controls, weight, controls)
+        norm = np.linalg.norm(controls, ord=self.norm_order, axis=-1)
+        along = [0, 1, *range(3, body_velocities.shape[-1])]
+        driven = np.linalg.norm(body_velocities[..., along], axis=-1)
+        return np.asarray(
+            self.effort * effort + self.norm * norm + self.time + self.length * driven,
+            dtype=np.float64,
+        )
+
+    def switching(self, body_velocities: Array) -> float:
+        """Cost of the switches of a word whose trims have `body_velocities` (n, dof).
+
+        Rest counts as a trim; a direction change is a change of sign of the forward speed
+        between trims that drive.
+        """
+        if not (self.switch or self.direction_change) or len(body_velocities) < 2:
+            return 0.0
+        signs = np.sign(body_velocities[:, 0])
+        driving = signs[signs != 0.0]
+        changes = int(np.count_nonzero(driving[1:] != driving[:-1]))
+        return self.switch * (len(body_velocities) - 1) + self.direction_change * changes
+
+
+WEIGHTS = ("effort", "norm", "time", "length", "switch", "direction_change")
+
+
+def _positive_definite(matrix: Array) -> Array:
+    weight = np.array(as_array("cost: effort_matrix", matrix))
+    if weight.ndim != 2 or weight.shape[0] != weight.shape[1]:
+        raise ValueError(f"cost: effort_matrix has shape {weight.shape}, need a square matrix")
+    if not np.allclose(weight, weight.T, rtol=0.0, atol=1e-12 * np.abs(weight).max()):
+        raise ValueError("cost: effort_matrix is not symmetric")
+    smallest = float(np.linalg.eigvalsh(weight)[0])
+    if not smallest > 0.0:
+        raise ValueError(
+            "cost: effort_matrix must be positive definite, "
+            f"its smallest eigenvalue is {smallest:.3g}"
+        )
+    weight.setflags(write=False)
+    return weight

@@ -1,0 +1,293 @@
+"""plan.json: the answer to a problem as a file, and the plan back from it.
+
+Strict JSON; numbers read back to the last bit. Every key is always there: without a plan the
+numbers are null and the lists empty.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._files import write_text_atomically
+from maneuver_automaton.audit import Audit, TerminalError
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.library import automaton_hash
+from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.groups import group_of
+from maneuver_automaton.planning import Alternative, PlanResult
+from maneuver_automaton.primitives import Trim
+
+SCHEMA = 1
+FAR = 1e6  # [m] from here on poses are written relative to the start
+TIMINGS = ("load", "automaton", "search", "first_plan", "refine", "audit")
+COUNTS = ("expansions", "collision_queries")
+TRAJECTORY = ("origin", "time_s", "pose", "reduced_state", "control")
+SAME_TIME = 1e-9  # [s], relative to the duration, between a switch and its sample
+
+
+def plan_to_dict(result: PlanResult) -> dict[str, Any]:
+    """The content of plan.json, as plain values.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.automaton import Automaton
+    >>> from maneuver_automaton.models import Unicycle
+    >>> from maneuver_automaton.planning import PlanStatus
+    >>> from maneuver_automaton.problem import Problem
+    >>> robot = Automaton.of_controls(Unicycle(), {"spin": (0.0, 1.0)})
+    >>> document = plan_to_dict(
+    ...     PlanResult(
+    ...         problem=Problem(robot, [0, 0, 0], [1, 0, 0]),
+    ...         status=PlanStatus.UNREACHABLE,
+    ...         reason="only spins: the position never changes",
+    ...     )
+    ... )
+    >>> document["status"], document["cost"], document["primitives"]
+    ('unreachable', None, [])
+    """
+    plan = result.plan
+    return {
+        "schema": SCHEMA,
+        "version": package_version(),
+        "automaton_hash": automaton_hash(result.problem.automaton),
+        "status": result.status.value,
+        "reason": result.reason,
+        "cost": _number(result.cost),
+        "duration_s": None if plan is None else plan.duration,
+        "lower_bound": _number(result.lower_bound),
+        "gap": _number(result.gap),
+        "certificate": _number(result.certificate),
+        "primitives": [] if plan is None else _primitives(plan),
+        "terminal_error": _terminal_error(result.terminal_error),
+        "clearance_m": _number(result.clearance_m),
+        "trajectory": {key: [] for key in TRAJECTORY} if plan is None else _trajectory(plan),
+        "audit": _audit(result.audit),
+        "alternatives": [_alternative(one) for one in result.alternatives],
+        "timing_s": {**dict.fromkeys(TIMINGS), **_floats(result.timing_s)},
+        "counts": {**dict.fromkeys(COUNTS, 0), **{k: int(v) for k, v in result.counts.items()}},
+    }
+
+
+def save_plan(result: PlanResult, path: Path | str) -> None:
+    """Write plan.json in one step.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    document = plan_to_dict(result)
+    lines = [f"  {json.dumps(key)}: {_json(key, value)}" for key, value in document.items()]
+    write_text_atomically(Path(path), "{\n" + ",\n".join(lines) + "\n}\n")
+
+
+def read_plan_document(path: Path | str) -> dict[str, Any]:
+    """The content of a plan.json, as plain values.
+
+    Raises
+    ------
+    InvalidScenario
+        If the file cannot be read, or is no plan.json.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise InvalidScenario(f"{path}: is a folder, need a plan.json")
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
+    except FileNotFoundError as error:
+        raise InvalidScenario(f"{path}: no such file") from error
+    except OSError as error:
+        raise InvalidScenario(f"{path}: cannot be read: {error.strerror}") from error
+    except json.JSONDecodeError as error:
+        raise InvalidScenario(f"{path}:{error.lineno}: not valid JSON: {error.msg}") from error
+    except (ValueError, RecursionError) as error:
+        raise InvalidScenario(f"{path}: not valid JSON: {error}") from error
+    needed = ("schema", "status", "primitives", "trajectory")
+    if not isinstance(document, dict) or any(key not in document for key in needed):
+        raise InvalidScenario(f"{path}: is no plan.json, need an object with {', '.join(needed)}")
+    if document["schema"] != SCHEMA:
+        raise InvalidScenario(f"{path}: schema: got {document['schema']!r}, need {SCHEMA}")
+    return document
+
+
+def load_plan(path: Path | str) -> Plan:
+    """The plan of a plan.json; no automaton is needed.
+
+    The body velocity of each trim is taken from the samples: the logarithm of the motion over a
+    stretch of less than half a turn, per second.
+
+    Raises
+    ------
+    InvalidScenario
+        If the file cannot be read, is no plan.json, or holds no plan.
+    """
+    document = read_plan_document(path)
+    if document["status"] != "found":
+        raise InvalidScenario(f"{path}: holds no plan, its status is {document['status']!r}")
+    try:
+        return _plan_of(document)
+    except (ValueError, KeyError, TypeError, IndexError) as error:
+        said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
+        raise InvalidScenario(f"{path}: {said}") from error
+
+
+@functools.cache
+def package_version() -> str:
+    """The version of this package; "0" where it is not installed."""
+    try:
+        return metadata.version("maneuver-automaton")
+    except metadata.PackageNotFoundError:
+        return "0"
+
+
+def _trajectory(plan: Plan) -> dict[str, Any]:
+    """Samples of a plan; far from the origin sampled from (0, 0), so that no digit is lost."""
+    origin = np.zeros(2)
+    samples = plan.sample()
+    if np.abs(samples.pose[:, :2]).max() > FAR:
+        origin = plan.start[:2]
+        start = np.concatenate([np.zeros(2), plan.start[2:]])
+        samples = replace(plan, start=start).sample()
+    return {
+        "origin": origin.tolist(),
+        "time_s": samples.time.tolist(),
+        "pose": samples.pose.tolist(),
+        "reduced_state": samples.reduced_state.tolist(),
+        "control": samples.control.tolist(),
+    }
+
+
+def _primitives(plan: Plan) -> list[dict[str, Any]]:
+    return [
+        {
+            "kind": "trim",
+            "name": trim.name,
+            "control": trim.control.tolist(),
+            "duration_s": float(duration),
+        }
+        for trim, duration in zip(plan.trims, plan.durations, strict=True)
+    ]
+
+
+def _alternative(one: Alternative) -> dict[str, Any]:
+    return {
+        "cost": float(one.cost),
+        "duration_s": one.plan.duration,
+        "word": list(one.plan.word),
+        "primitives": _primitives(one.plan),
+        "terminal_error": _terminal_error(one.terminal_error),
+    }
+
+
+def _terminal_error(error: TerminalError | None) -> dict[str, float | None]:
+    return {
+        "position_m": None if error is None else float(error.position_m),
+        "heading_rad": None if error is None else float(error.heading_rad),
+    }
+
+
+def _audit(audit: Audit | None) -> dict[str, bool | float | None]:
+    if audit is None:
+        keys = ("passed", "max_dynamics_defect", "min_clearance_m")
+        return dict.fromkeys((*keys, "terminal_position_m", "terminal_heading_rad"))
+    return {
+        "passed": bool(audit.passed),
+        "max_dynamics_defect": float(audit.max_dynamics_defect),
+        "min_clearance_m": _number(audit.min_clearance_m),
+        "terminal_position_m": float(audit.terminal_position_m),
+        "terminal_heading_rad": float(audit.terminal_heading_rad),
+    }
+
+
+def _number(value: float | None) -> float | None:
+    """A number, or null where there is none or no limit."""
+    return None if value is None or math.isinf(value) else float(value)
+
+
+def _floats(values: Mapping[str, float]) -> dict[str, float]:
+    return {key: float(value) for key, value in values.items()}
+
+
+def _json(key: str, value: Any) -> str:
+    """A value of the file in one line, but lists of objects one object a line."""
+    if key in ("primitives", "alternatives") and value:
+        rows = ",\n".join(f"    {_json('', row)}" for row in value)
+        return f"[\n{rows}\n  ]"
+    if key == "trajectory":
+        rows = ",\n".join(
+            f"    {json.dumps(name)}: {_json('', row)}" for name, row in value.items()
+        )
+        return "{\n" + rows + "\n  }"
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)
+
+
+def _refuse_constant(word: str) -> float:
+    raise ValueError(f"{word} is no JSON")
+
+
+def _plan_of(document: Mapping[str, Any]) -> Plan:
+    trajectory, primitives = document["trajectory"], document["primitives"]
+    time = as_array("trajectory.time_s", trajectory["time_s"])
+    pose = as_array("trajectory.pose", trajectory["pose"], last=(3, 4))
+    origin = as_array("trajectory.origin", trajectory["origin"], last=2)
+    if time.ndim != 1 or pose.ndim != 2 or len(time) != len(pose) or not len(time):
+        raise ValueError(
+            f"trajectory: got {len(time)} times and {len(pose)} poses, need one pose per time"
+        )
+    reduced = trajectory["reduced_state"]
+    durations = [_duration(k, entry) for k, entry in enumerate(primitives)]
+    switches = _switches(time, durations)
+    trims = tuple(
+        Trim(
+            name=entry["name"],
+            control=entry["control"],
+            body_velocity=_twist(time[begin : end + 1], pose[begin : end + 1]),
+            reduced_state=reduced[begin],
+        )
+        for entry, begin, end in zip(primitives, switches[:-1], switches[1:], strict=True)
+    )
+    start = pose[0].copy()
+    start[:2] += origin
+    return Plan(start, trims, durations=np.array(durations), start_time=float(time[0]))
+
+
+def _duration(k: int, entry: Mapping[str, Any]) -> float:
+    if entry["kind"] != "trim":
+        raise ValueError(f"primitives[{k}].kind: got {entry['kind']!r}, need 'trim'")
+    return float(as_array(f"primitives[{k}].duration_s", entry["duration_s"]))
+
+
+def _switches(time: Array, durations: Sequence[float]) -> list[int]:
+    """Index of the sample at every switching time."""
+    due = time[0] + np.concatenate([[0.0], np.cumsum(durations)])
+    indices = [int(np.abs(time - at).argmin()) for at in due]
+    tolerance = SAME_TIME * max(1.0, float(np.abs(due).max()))
+    if np.abs(time[indices] - due).max() > tolerance or indices[-1] != len(time) - 1:
+        raise ValueError("trajectory: has no sample at a switching time of the primitives")
+    return indices
+
+
+def _twist(time: Array, pose: Array) -> Array:
+    """Body velocity (dof,) of the trim that runs through the samples."""
+    group = group_of(pose.shape[1])
+    span = float(time[-1] - time[0])
+    if span <= 0.0:
+        return np.zeros(group.dof)
+    turned = np.abs(pose[:, 2] - pose[0, 2])
+    last = int(np.flatnonzero(turned < np.pi)[-1])
+    if last == 0:
+        raise ValueError("trajectory: two samples of a trim are half a turn apart, need more")
+    motion = group(pose[0]).inverse() @ group(pose[last])
+    twist = motion.log() / (time[last] - time[0])
+    twist[2] = (pose[-1, 2] - pose[0, 2]) / span  # the longer stretch says it better
+    return np.asarray(twist, dtype=np.float64)

@@ -1,0 +1,34 @@
+"""Planar group formulas that several kernels need, on plain numbers."""
+
+from __future__ import annotations
+
+import math
+
+from maneuver_automaton._compile import inner_kernel
+
+
+@inner_kernel
+def coast(v_x, v_y, turn_rate, duration):
+    """Pose (x, y, heading) reached from the identity by a constant twist.
+
+    Source: Solà, Deray, Atchuthan (2018), Eqs. (156), (158), in half-angle form.
+    """
+    turn = turn_rate * duration
+    half = 0.5 * turn
+    scale = duration if half == 0.0 else duration * (math.sin(half) / half)
+    ahead = scale * math.cos(half)
+    aside = scale * math.sin(half)
+    return ahead * v_x - aside * v_y, aside * v_x + ahead * v_y, turn
+
+
+@inner_kernel
+def compose(x, y, heading, dx, dy, turn):
+    """Do the motion (dx, dy, turn) in the frame of (x, y, heading)."""
+    c, s = math.cos(heading), math.sin(heading)
+    return x + c * dx - s * dy, y + s * dx + c * dy, heading + turn
+
+
+@inner_kernel
+def nearest_turn(angle):
+    """Angle modulo a full turn, in [-pi, pi]."""
+    return angle - 2.0 * math.pi * round(angle / (2.0 * math.pi))

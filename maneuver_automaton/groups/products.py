@@ -1,0 +1,132 @@
+"""Direct products of groups: two motions side by side that do not feel each other."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import ClassVar, Self, cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from maneuver_automaton._arrays import Array, as_array, freeze
+from maneuver_automaton.groups.lie_group import LieGroup
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Product:
+    """A batch of pairs: `pose` is (..., dof), both poses in a row; `product` makes the class."""
+
+    pose: Array
+    first_group: ClassVar[type[LieGroup]]
+    second_group: ClassVar[type[LieGroup]]
+    dof: ClassVar[int]
+    space: ClassVar[int]
+    coordinates: ClassVar[tuple[str, ...]]
+
+    def __post_init__(self) -> None:
+        freeze(self, "pose", last=self.dof)
+
+    @property
+    def first(self) -> LieGroup:
+        """The first of each pair."""
+        return self.first_group(self.pose[..., : self.first_group.dof])
+
+    @property
+    def second(self) -> LieGroup:
+        """The second of each pair."""
+        return self.second_group(self.pose[..., self.first_group.dof :])
+
+    def __matmul__(self, other: Self) -> Self:
+        """Do `other` in the frame of `self`."""
+        first, second = self.first @ other.first, self.second @ other.second
+        return type(self)(_joined(first.pose, second.pose))
+
+    def inverse(self) -> Self:
+        """Motion back."""
+        return type(self)(_joined(self.first.inverse().pose, self.second.inverse().pose))
+
+    @classmethod
+    def identity(cls) -> Self:
+        """Motion that changes nothing."""
+        return cls(np.zeros(cls.dof))
+
+    @classmethod
+    def exp(cls, twist: ArrayLike) -> Self:
+        """Pair reached by a constant body twist (..., dof) after 1 s."""
+        one, two = cls._parts("twist", twist)
+        return cls(_joined(cls.first_group.exp(one).pose, cls.second_group.exp(two).pose))
+
+    def log(self) -> Array:
+        """Constant body twist (..., dof) that leads from the identity here in 1 s."""
+        return _joined(self.first.log(), self.second.log())
+
+    def adjoint(self) -> Array:
+        """Ad (..., dof, dof): ``g @ exp(xi) @ g.inverse() == exp(Ad xi)``; two blocks."""
+        n = self.first_group.dof
+        matrix = np.zeros((*self.pose.shape, self.dof))
+        matrix[..., :n, :n] = self.first.adjoint()
+        matrix[..., n:, n:] = self.second.adjoint()
+        return matrix
+
+    def coadjoint(self) -> Array:
+        """Ad* (..., dof, dof), which moves momenta: ``<Ad* p, Ad xi> == <p, xi>``."""
+        return np.swapaxes(self.inverse().adjoint(), -1, -2)
+
+    def act(self, points: ArrayLike) -> Array:
+        """Points (..., space) [m] of the joint space, each part moved by its own group."""
+        points, n = as_array("points", points, last=self.space), self.first_group.space
+        return _joined(self.first.act(points[..., :n]), self.second.act(points[..., n:]))
+
+    def pose_rates(self, twist: ArrayLike) -> Array:
+        """Time derivative (..., dof) of `pose` while the pair moves with a twist (..., dof)."""
+        one, two = self._parts("twist", twist)
+        return _joined(self.first.pose_rates(one), self.second.pose_rates(two))
+
+    def body_twist(self, rates: ArrayLike) -> Array:
+        """Twist (..., dof) of a pair whose `pose` changes at `rates` (..., dof)."""
+        one, two = self._parts("rates", rates)
+        return _joined(self.first.body_twist(one), self.second.body_twist(two))
+
+    @classmethod
+    def _parts(cls, name: str, value: ArrayLike) -> tuple[Array, Array]:
+        array = as_array(name, value, last=cls.dof)
+        return array[..., : cls.first_group.dof], array[..., cls.first_group.dof :]
+
+
+@functools.cache
+def product(first: type[LieGroup], second: type[LieGroup]) -> type[LieGroup]:
+    """Direct product of two groups, as a class; the same class for the same pair.
+
+    Coordinates whose names occur in both groups get ``_1`` and ``_2`` appended.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.groups import SE2, translations
+    >>> two_robots = product(SE2, SE2)
+    >>> two_robots.exp([1.0, 0.0, 0.0, 2.0, 0.0, 0.0]).pose.tolist()
+    [1.0, 0.0, 0.0, 2.0, 0.0, 0.0]
+    >>> product(SE2, translations(3)).coordinates
+    ('x_1', 'y_1', 'heading', 'x_2', 'y_2', 'z')
+    """
+    shared = set(first.coordinates) & set(second.coordinates)
+    members = {
+        "__slots__": (),
+        "first_group": first,
+        "second_group": second,
+        "dof": first.dof + second.dof,
+        "space": first.space + second.space,
+        "coordinates": (
+            *(f"{name}_1" if name in shared else name for name in first.coordinates),
+            *(f"{name}_2" if name in shared else name for name in second.coordinates),
+        ),
+    }
+    name = f"{first.__name__}x{second.__name__}"
+    return cast(type[LieGroup], type(name, (Product,), members))
+
+
+def _joined(first: Array, second: Array) -> Array:
+    """(..., n) and (..., m) side by side, after broadcasting their batch axes: (..., n + m)."""
+    batch = np.broadcast_shapes(first.shape[:-1], second.shape[:-1])
+    parts = (np.broadcast_to(part, (*batch, part.shape[-1])) for part in (first, second))
+    return np.concatenate([*parts], axis=-1)

@@ -1,0 +1,204 @@
+"""Poses in the plane, SE(2): what moves a vehicle on flat ground."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from maneuver_automaton._arrays import Array, as_array, freeze
+
+# |sin(w/2) / (w/2)| of the float64 nearest to a multiple of a full turn stays below this.
+FULL_TURN = 4 * float(np.finfo(np.float64).eps)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SE2:
+    """A batch of planar poses: `pose` is (..., 3), x [m], y [m], heading [rad].
+
+    The heading is not wrapped: it carries the turns that were made.
+
+    Source: Solà, Deray, Atchuthan (2018), Appendix C; the paper's Prop. 3.
+
+    Examples
+    --------
+    >>> facing_left = SE2([1.0, 0.0, np.pi / 2])
+    >>> (facing_left @ SE2([2.0, 0.0, 0.0])).pose.round(3).tolist()
+    [1.0, 2.0, 1.571]
+    >>> facing_left.inverse().pose.round(3).tolist()
+    [-0.0, 1.0, -1.571]
+    """
+
+    pose: Array
+    dof: ClassVar[int] = 3
+    space: ClassVar[int] = 2
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "heading")
+
+    def __post_init__(self) -> None:
+        freeze(self, "pose", last=3)
+
+    def __matmul__(self, other: SE2) -> SE2:
+        """Do `other` in the frame of `self`."""
+        heading = self.pose[..., 2] + other.pose[..., 2]
+        return SE2(np.concatenate([self.act(other.pose[..., :2]), heading[..., None]], axis=-1))
+
+    def inverse(self) -> SE2:
+        """Motion back."""
+        return SE2(-self.body_twist(self.pose))
+
+    @classmethod
+    def identity(cls) -> SE2:
+        """Motion that changes nothing."""
+        return cls(np.zeros(3))
+
+    @classmethod
+    def exp(cls, twist: ArrayLike) -> SE2:
+        """Pose reached by a constant body twist (..., 3), [m/s, m/s, rad/s], after 1 s.
+
+        Source: Solà, Deray, Atchuthan (2018), Eqs. (156), (158), here in half-angle form.
+
+        Examples
+        --------
+        >>> SE2.exp([np.pi, 0.0, np.pi]).pose.round(3).tolist()
+        [0.0, 2.0, 3.142]
+        """
+        v_x, v_y, turn = np.moveaxis(as_array("twist", twist, last=3), -1, 0)
+        ahead, aside = np.sinc(turn / np.pi), np.sin(turn / 2) * np.sinc(turn / (2 * np.pi))
+        return cls(np.stack([ahead * v_x - aside * v_y, aside * v_x + ahead * v_y, turn], axis=-1))
+
+    def log(self, *, position_tolerance: float = 1e-9) -> Array:
+        """Constant body twist (..., 3) that leads from the identity here in 1 s.
+
+        The heading is taken as it is, so a motion of several turns has a twist of several turns,
+        and `log` inverts `exp` at any turn rate except whole turns per second. There a constant
+        twist closes its circle, so only a pure spin can be undone.
+
+        Source: Solà, Deray, Atchuthan (2018), Eqs. (157), (158), here in half-angle form.
+
+        Parameters
+        ----------
+        position_tolerance : float
+            After whole turns, positions up to this distance from the origin count as zero [m].
+
+        Returns
+        -------
+        (..., 3) array
+            Body twists [m/s, m/s, rad/s].
+
+        Raises
+        ------
+        ValueError
+            If a heading is a nonzero multiple of 2 pi and the position is not zero: no constant
+            twist leads there.
+
+        Examples
+        --------
+        >>> SE2([0.0, 2.0, np.pi]).log().round(3).tolist()
+        [3.142, 0.0, 3.142]
+        >>> SE2([1.0, 0.0, 2 * np.pi]).log()
+        Traceback (most recent call last):
+            ...
+        ValueError: log: pose (1, 0, 6.28319) is 1 m away after 1 full turn, where a constant \
+twist is back at the start; need another heading
+        """
+        x, y, turn = np.moveaxis(self.pose, -1, 0)
+        chord = np.sinc(turn / (2 * np.pi))
+        whole_turns = np.abs(chord) < FULL_TURN
+        self._refuse(whole_turns & (np.hypot(x, y) > position_tolerance))
+        x, y = np.where(whole_turns, 0.0, x), np.where(whole_turns, 0.0, y)
+        ahead, aside = np.cos(turn / 2) / np.where(whole_turns, 1.0, chord), turn / 2
+        return np.stack([ahead * x + aside * y, ahead * y - aside * x, turn], axis=-1)
+
+    def _refuse(self, impossible: Array) -> None:
+        if not np.any(impossible):
+            return
+        x, y, heading = self.pose[impossible][0] if self.pose.ndim > 1 else self.pose
+        turns = abs(round(heading / (2 * np.pi)))
+        raise ValueError(
+            f"log: pose ({x:.6g}, {y:.6g}, {heading:.6g}) is {np.hypot(x, y):.6g} m away after "
+            f"{turns} full turn{'s' if turns > 1 else ''}, where a constant twist is back at the "
+            "start; need another heading"
+        )
+
+    def adjoint(self) -> Array:
+        """Ad (..., 3, 3): ``g @ exp(xi) @ g.inverse() == exp(Ad xi)``.
+
+        Source: Solà, Deray, Atchuthan (2018), Eq. (159).
+
+        Examples
+        --------
+        >>> SE2([1.0, 2.0, 0.0]).adjoint().tolist()
+        [[1.0, -0.0, 2.0], [0.0, 1.0, -1.0], [0.0, 0.0, 1.0]]
+        """
+        matrix = self.matrix()
+        matrix[..., 0, 2], matrix[..., 1, 2] = self.pose[..., 1], -self.pose[..., 0]
+        return matrix
+
+    def coadjoint(self) -> Array:
+        """Ad* (..., 3, 3), which moves momenta: ``<Ad* p, Ad xi> == <p, xi>``.
+
+        Source: Marsden, Ratiu (1999), *Introduction to Mechanics and Symmetry*, Sec. 9.3.
+
+        Examples
+        --------
+        >>> (SE2([1.0, 2.0, 0.0]).coadjoint() @ [1.0, 0.0, 0.0]).tolist()
+        [1.0, 0.0, -2.0]
+        """
+        return np.swapaxes(self.inverse().adjoint(), -1, -2)
+
+    def act(self, points: ArrayLike) -> Array:
+        """Points (..., 2) [m] given in the body frame, seen from the world.
+
+        Examples
+        --------
+        >>> SE2([1.0, 0.0, np.pi / 2]).act([[2.0, 0.0], [0.0, 2.0]]).round(3).tolist()
+        [[1.0, 2.0], [-1.0, 0.0]]
+        """
+        return self.pose[..., :2] + _turned(self.pose[..., 2], as_array("points", points, last=2))
+
+    def pose_rates(self, twist: ArrayLike) -> Array:
+        """Time derivative (..., 3) of `pose` while the body moves with a twist (..., 3).
+
+        Source: g' = g xi, by components.
+
+        Examples
+        --------
+        >>> SE2([5.0, 5.0, np.pi / 2]).pose_rates([1.0, 0.0, 0.3]).round(3).tolist()
+        [0.0, 1.0, 0.3]
+        """
+        return _planar(self.pose[..., 2], as_array("twist", twist, last=3))
+
+    def body_twist(self, rates: ArrayLike) -> Array:
+        """Twist (..., 3) of a body whose `pose` changes at `rates` (..., 3)."""
+        return _planar(-self.pose[..., 2], as_array("rates", rates, last=3))
+
+    def matrix(self) -> Array:
+        """Homogeneous matrices (..., 3, 3), which multiply (x, y, 1).
+
+        Source: Solà, Deray, Atchuthan (2018), Eq. (152).
+
+        Examples
+        --------
+        >>> SE2([1.0, 2.0, 0.0]).matrix().tolist()
+        [[1.0, -0.0, 1.0], [0.0, 1.0, 2.0], [0.0, 0.0, 1.0]]
+        """
+        x, y, heading = np.moveaxis(self.pose, -1, 0)
+        c, s, zero, one = np.cos(heading), np.sin(heading), np.zeros_like(x), np.ones_like(x)
+        rows = [[c, -s, x], [s, c, y], [zero, zero, one]]
+        return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def _turned(angle: Array, vectors: Array) -> Array:
+    """Vectors (..., 2) rotated by angles (...,) [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    x, y = vectors[..., 0], vectors[..., 1]
+    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
+
+
+def _planar(angle: Array, vectors: Array) -> Array:
+    """Vectors (..., 3) of which the first two components are rotated by angles (...,) [rad]."""
+    planar = _turned(angle, vectors[..., :2])
+    last = np.broadcast_to(vectors[..., 2:], (*planar.shape[:-1], 1))
+    return np.concatenate([planar, last], axis=-1)

@@ -1,0 +1,13 @@
+"""Vehicles: how a reduced state and a control become a body velocity."""
+
+from maneuver_automaton.models.car import Car as Car
+from maneuver_automaton.models.model import Model as Model
+from maneuver_automaton.models.rollout import rollout as rollout
+from maneuver_automaton.models.state import VectorField as VectorField
+from maneuver_automaton.models.state import equivariance_defect as equivariance_defect
+from maneuver_automaton.models.state import moved_rates as moved_rates
+from maneuver_automaton.models.state import moved_state as moved_state
+from maneuver_automaton.models.state import vector_field as vector_field
+from maneuver_automaton.models.unicycle import Unicycle as Unicycle
+from maneuver_automaton.models.user import UserModel as UserModel
+from maneuver_automaton.models.user import model_of_vector_field as model_of_vector_field

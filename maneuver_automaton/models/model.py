@@ -1,0 +1,64 @@
+"""The Protocol `Model`: what every room may ask of a vehicle."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.groups import LieGroup
+
+
+class Model(Protocol):
+    """A vehicle whose dynamics look the same at every pose.
+
+    Its state is a pose g and a reduced state z, with ``g' = g xi(z, u)`` and ``z' = f(z, u)``:
+    neither xi nor f sees the pose. Both methods broadcast over batch axes as NumPy does.
+
+    Source: Frazzoli, Dahleh, Feron (2005), Sec. II; reduction by symmetry.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from maneuver_automaton.models import Car
+    >>> car = Car(wheelbase=2.0)
+    >>> car.body_velocity(np.zeros(0), np.array([[4.0, 0.0], [4.0, np.pi / 4]])).round(3).tolist()
+    [[4.0, 0.0, 0.0], [4.0, 0.0, 2.0]]
+    """
+
+    @property
+    def name(self) -> str:
+        """What messages and files call the vehicle."""
+        ...
+
+    @property
+    def group(self) -> type[LieGroup]:
+        """Group that moves it; its elements are the poses."""
+        ...
+
+    @property
+    def control_names(self) -> tuple[str, ...]:
+        """Names of the n_u controls."""
+        ...
+
+    @property
+    def reduced_names(self) -> tuple[str, ...]:
+        """Names of the n_z components of the reduced state; none for a kinematic vehicle."""
+        ...
+
+    @property
+    def control_limits(self) -> Array:
+        """Least and greatest value (n_u, 2) of each control; infinite where there is no limit."""
+        ...
+
+    @property
+    def reduced_limits(self) -> Array:
+        """Least and greatest value (n_z, 2) of each component of the reduced state."""
+        ...
+
+    def body_velocity(self, reduced_state: Array, control: Array) -> Array:
+        """Twist xi(z, u) (..., dof) in the body frame, in the order of the pose."""
+        ...
+
+    def reduced_dynamics(self, reduced_state: Array, control: Array) -> Array:
+        """Rates (..., n_z) of the reduced state per second."""
+        ...

@@ -1,0 +1,104 @@
+"""The whole state of a vehicle: the pose, then the reduced state; the group moves the pose only."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton.groups import LieGroup
+from maneuver_automaton.models.model import Model
+
+VectorField = Callable[[Array, Array], ArrayLike]
+"""``f(x, u)``: rates (n_x,) of one state x (n_x,), pose first, under one control u (n_u,)."""
+
+
+def vector_field(model: Model) -> Callable[[Array, Array], Array]:
+    """Differential equation ``x' = f(x, u)`` of a model, on states (..., dof + n_z).
+
+    Source: g' = g xi(z, u), z' = f(z, u).
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import Unicycle
+    >>> f = vector_field(Unicycle())
+    >>> f(np.array([3.0, 1.0, np.pi / 2]), np.array([2.0, 0.5])).round(3).tolist()
+    [0.0, 2.0, 0.5]
+    """
+    dof = model.group.dof
+    n_states, n_controls = dof + len(model.reduced_names), len(model.control_names)
+
+    def rates(state: Array, control: Array) -> Array:
+        state = as_array("state", state, last=n_states)
+        control = as_array("control", control, last=n_controls)
+        twist = model.body_velocity(state[..., dof:], control)
+        pose_rates = model.group(state[..., :dof]).pose_rates(twist)
+        reduced_rates = model.reduced_dynamics(state[..., dof:], control)
+        batch = pose_rates.shape[:-1]
+        reduced_rates = np.broadcast_to(reduced_rates, (*batch, reduced_rates.shape[-1]))
+        return np.concatenate([pose_rates, reduced_rates], axis=-1)
+
+    return rates
+
+
+def moved_state(by: LieGroup, state: ArrayLike) -> Array:
+    """States (..., n_x) moved by group elements: the action Psi on pose and reduced state.
+
+    Source: the paper, Def. 2; for the mobile robot its Prop. 3.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.groups import SE2
+    >>> moved_state(SE2([1.0, 1.0, np.pi / 2]), [2.0, 0.0, 0.0, 7.0]).round(3).tolist()
+    [1.0, 3.0, 1.571, 7.0]
+    """
+    state = as_array("state", state)
+    pose, rest = np.split(state, [by.dof], axis=-1)
+    moved = (by @ type(by)(pose)).pose
+    return np.concatenate([moved, np.broadcast_to(rest, (*moved.shape[:-1], rest.shape[-1]))], -1)
+
+
+def moved_rates(by: LieGroup, state: ArrayLike, *, rates: ArrayLike) -> Array:
+    """Rates (..., n_x) of a state, seen after the state was moved: the lifted action.
+
+    Source: the paper, remark on an alternative characterization of symmetry groups.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.groups import SE2
+    >>> quarter_turn = SE2([0.0, 0.0, np.pi / 2])
+    >>> moved_rates(quarter_turn, [2.0, 0.0, 0.0], rates=[1.0, 0.0, 0.1]).round(3).tolist()
+    [0.0, 1.0, 0.1]
+    """
+    group, state, rates = type(by), as_array("state", state), as_array("rates", rates)
+    here = group(state[..., : by.dof])
+    pose_rates = (by @ here).pose_rates(here.body_twist(rates[..., : by.dof]))
+    rest = np.broadcast_to(rates[..., by.dof :], (*pose_rates.shape[:-1], rates.shape[-1] - by.dof))
+    return np.concatenate([pose_rates, rest], axis=-1)
+
+
+def equivariance_defect(
+    f: VectorField, by: LieGroup, *, state: ArrayLike, control: ArrayLike
+) -> Array:
+    """How far a vector field is from commuting with a move, at one state: (n_x,), zero if it does.
+
+    It is ``f(Psi_g x, u) - dPsi_g f(x, u)``, in the units of the rates.
+
+    Source: the paper, remark on an alternative characterization of symmetry groups.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.groups import SE2
+    >>> def drifting(x, u):  # a wind of 0.3 m/s along the world's x axis
+    ...     return [u[0] * np.cos(x[2]) + 0.3, u[0] * np.sin(x[2]), u[1]]
+    >>> half_turn = SE2([0.0, 0.0, np.pi])
+    >>> defect = equivariance_defect(drifting, half_turn, state=np.zeros(3), control=[1.0, 0.0])
+    >>> (defect.round(9) + 0.0).tolist()
+    [0.6, 0.0, 0.0]
+    """
+    state, control = as_array("state", state), as_array("control", control)
+    here = as_array("f(x, u)", f(state, control), last=state.size)
+    there = as_array("f(x, u)", f(moved_state(by, state), control), last=state.size)
+    return there - moved_rates(by, state, rates=here)

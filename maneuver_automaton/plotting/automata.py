@@ -1,0 +1,282 @@
+"""Draw an automaton: a graph of small pictures, or points where there are too many trims."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PathCollection, PolyCollection
+from matplotlib.patches import FancyArrowPatch
+from matplotlib.text import Text
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.plotting.colors import GREY, INK, Color, trim_colors, twist_color
+from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
+from maneuver_automaton.plotting.paths import ARC_POINTS, DART
+from maneuver_automaton.plotting.style import TEXT_PT, shortened, tidy
+from maneuver_automaton.primitives import Trim
+
+MOST_NODES = 30
+MOST_LEVEL_NAMES = 12
+NAME_PT, NAME_LENGTH, CHARACTER = 7.5, 24, 0.058  # [pt], characters, [in]
+SHOWN_S = 1.0  # how long each trim is shown [s]
+SPIN_SIZE = 0.45  # of a node, for turns on the spot
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class AutomatonArtists:
+    """What `draw_automaton` has drawn; a graph has no `points`, points have nothing else."""
+
+    nodes: PolyCollection | None = None  # a disc for each trim
+    motions: LineCollection | None = None  # one second of each trim, in its disc
+    switches: LineCollection | None = None  # between trims that switch at will, both ways
+    maneuvers: tuple[FancyArrowPatch, ...] = ()
+    names: tuple[Text, ...] = ()
+    points: PathCollection | None = None  # turn rate and speed of each trim
+
+
+def draw_automaton(ax: Axes, automaton: Automaton) -> AutomatonArtists:
+    """Draw an `automaton` on `ax`.
+
+    Up to thirty trims are nodes of a graph, each with a picture of one second of its motion;
+    thin lines join trims that switch at will, arrows are maneuvers. More trims are points over
+    turn rate and speed.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> from maneuver_automaton.models import Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "ahead": (1, 0)})
+    >>> [text.get_text() for text in draw_automaton(Figure().add_subplot(), robot).names]
+    ['rest', 'ahead']
+    """
+    if len(automaton) > MOST_NODES:
+        return _draw_points(ax, automaton)
+    return _draw_graph(ax, automaton)
+
+
+def draw_motions(ax: Axes, automaton: Automaton) -> LineCollection:
+    """Draw one second of every trim from the same pose, to scale, in the colours of the trims."""
+    many = len(automaton) > MOST_NODES
+    paths = [_motion(trim)[:, :2] for trim in automaton.trims]
+    size = max(float(np.abs(path).max()) for path in paths) or 1.0
+    lines = LineCollection(
+        paths, colors=_colors(automaton), linewidths=0.7 if many else 2.2, zorder=3.0,
+        alpha=0.6 if many else 1.0,
+    )  # fmt: skip
+    ax.add_collection(lines)
+    ax.add_collection(
+        PolyCollection([0.08 * size * DART], facecolors=[INK], linewidths=0.0, zorder=4.0)
+    )
+    ax.update_datalim([(-0.1 * size, -0.1 * size), (0.1 * size, 0.1 * size)])
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.margins(0.08)
+    ax.autoscale_view()
+    tidy(ax, x="x [m]", y="y [m]")
+    return lines
+
+
+def save_automaton_figure(automaton: Automaton, path: str | Path) -> None:
+    """Write a picture of an `automaton`: its graph, and one second of each trim to scale.
+
+    The file is replaced in one step; its ending chooses the format.
+    """
+    points = len(automaton) > MOST_NODES
+    width = height = 4.1 if points or len(automaton) <= MOST_LEVEL_NAMES else 6.1
+    width += 1.0
+    figure = new_figure(width + 4.5, height + 0.8)
+    edge = 0.62 if points else 0.1
+    left = axes_at(
+        figure, left=edge, bottom=0.5 if points else 0.15, width=width - edge,
+        height=height - (0.35 if points else 0.0),
+    )  # fmt: skip
+    right = axes_at(
+        figure, left=width + 0.95, bottom=0.5 + (height - 4.1) / 2.0, width=3.35, height=3.75
+    )
+    draw_automaton(left, automaton)
+    draw_motions(right, automaton)
+    right.set_title("1 s of each trim from the same pose", fontsize=TEXT_PT, color=INK, loc="left")
+    heading_text(figure, [(_summary(automaton), 10.0, "bold")], left=0.62 if points else 0.3)
+    write_figure(figure, path)
+
+
+def _summary(automaton: Automaton) -> str:
+    name = automaton.name or automaton.model.name
+    counts = f"{len(automaton)} trim{'s' if len(automaton) > 1 else ''}"
+    if automaton.maneuvers:
+        many = len(automaton.maneuvers)
+        counts += f", {many} maneuver{'s' if many > 1 else ''}"
+    return f"{shortened(name, 60)}: {counts}"
+
+
+def _colors(automaton: Automaton) -> list[Color]:
+    if len(automaton) > MOST_NODES:
+        return [twist_color(trim.body_velocity) for trim in automaton.trims]
+    named = trim_colors({trim.name: trim.body_velocity for trim in automaton.trims})
+    return [named[name] for name in automaton.trim_names]
+
+
+def _motion(trim: Trim) -> Array:
+    """Poses (n, dof) during the time that is shown."""
+    plan = Plan(np.zeros(trim.body_velocity.size), (trim,), durations=np.array([SHOWN_S]))
+    return plan.pose_at(np.linspace(0.0, SHOWN_S, ARC_POINTS))
+
+
+def _draw_points(ax: Axes, automaton: Automaton) -> AutomatonArtists:
+    twists = automaton.body_velocities
+    points = ax.scatter(
+        twists[:, 2], twists[:, 0], s=min(26.0, 9000.0 / len(automaton)), c=_colors(automaton),
+        linewidths=0.0, zorder=3.0,
+    )  # fmt: skip
+    tidy(ax, x="turn rate [rad/s]", y="speed ahead [m/s]")
+    return AutomatonArtists(points=points)
+
+
+def _draw_graph(ax: Axes, automaton: Automaton) -> AutomatonArtists:
+    centres, radius = _places(automaton)
+    colors = _colors(automaton)
+    classes = automaton.trim_classes
+    nodes = PolyCollection(
+        [centre + radius * _disc() for centre in centres], facecolors="white", edgecolors=colors,
+        linewidths=1.6, zorder=3.0,
+    )  # fmt: skip
+    switches = LineCollection(
+        [
+            centres[[a, b]]
+            for a, b in combinations(range(len(automaton)), 2)
+            if classes[a] == classes[b]
+        ],
+        colors=[GREY], linewidths=0.6,
+        alpha=0.7 if len(automaton) <= MOST_LEVEL_NAMES else 0.25, zorder=1.0,
+    )  # fmt: skip
+    pictures, heads = _pictures(automaton, radius)
+    motions = LineCollection(
+        [picture + centre for picture, centre in zip(pictures, centres, strict=True)],
+        colors=colors, linewidths=1.8, zorder=4.0,
+    )  # fmt: skip
+    for part in (nodes, switches, motions):
+        ax.add_collection(part)
+    ax.add_collection(
+        PolyCollection(
+            [head + centre for head, centre in zip(heads, centres, strict=True)],
+            facecolors=colors, linewidths=0.0, zorder=4.1,
+        )
+    )  # fmt: skip
+    maneuvers = _draw_maneuvers(ax, automaton, centres, radius)
+    names = _draw_names(ax, automaton, centres, radius)
+    _make_room(ax, automaton, radius)
+    ax.set_axis_off()
+    return AutomatonArtists(
+        nodes=nodes, motions=motions, switches=switches, maneuvers=maneuvers, names=names
+    )
+
+
+def _places(automaton: Automaton) -> tuple[Array, float]:
+    """Centres (m, 2) on a circle, classes side by side, and the radius of the nodes."""
+    many = len(automaton)
+    if many == 1:
+        return np.zeros((1, 2)), 0.4
+    order = np.argsort(automaton.trim_classes, kind="stable")
+    angle = np.empty(many)
+    angle[order] = 0.5 * np.pi - 2.0 * np.pi * np.arange(many) / many
+    centres = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    return centres, float(min(0.26, 0.8 * np.sin(np.pi / many)))
+
+
+def _disc() -> Array:
+    angle = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def _pictures(automaton: Automaton, radius: float) -> tuple[list[Array], list[Array]]:
+    """Paths (n, 2) of all trims to one scale, about the centre of their node, and arrow heads.
+
+    Seen with the vehicle heading up. A turn on the spot is an arc, rest a dot.
+    """
+    poses = [_motion(trim) for trim in automaton.trims]
+    lines = [np.stack([-pose[:, 1], pose[:, 0]], axis=-1) for pose in poses]
+    widest = max(float(np.linalg.norm(np.ptp(line, axis=0))) for line in lines)
+    scale = 1.25 * radius / widest if widest > 0.0 else 1.0
+    pictures, heads = [], []
+    for pose, line in zip(poses, lines, strict=True):
+        turn = float(np.clip(pose[-1, 2], -1.8 * np.pi, 1.8 * np.pi))
+        if not line.any() and turn:
+            angle = 0.5 * np.pi + np.linspace(0.0, turn, ARC_POINTS)
+            picture = SPIN_SIZE * radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        elif line.any():
+            picture = scale * (line - 0.5 * (line.min(axis=0) + line.max(axis=0)))
+        else:
+            picture = np.zeros((2, 2))
+        pictures.append(picture)
+        heads.append(_head(picture, radius))
+    return pictures, heads
+
+
+def _head(picture: Array, radius: float) -> Array:
+    """Arrow head at the end of a picture; a dot for one that does not move."""
+    step = picture[-1] - picture[-2]
+    length = float(np.linalg.norm(step))
+    if length == 0.0:
+        return 0.12 * radius * _disc()
+    along = step / length
+    aside = np.array([-along[1], along[0]])
+    tip = picture[-1] + 0.2 * radius * along
+    return np.array([tip, picture[-1] + 0.13 * radius * aside, picture[-1] - 0.13 * radius * aside])
+
+
+def _draw_maneuvers(
+    ax: Axes, automaton: Automaton, centres: Array, radius: float
+) -> tuple[FancyArrowPatch, ...]:
+    """One curved arrow for each ordered pair of trims that a maneuver joins."""
+    arrows = []
+    pairs = dict.fromkeys((maneuver.source, maneuver.target) for maneuver in automaton.maneuvers)
+    for source, target in pairs:
+        begin, end = centres[automaton.index_of(source)], centres[automaton.index_of(target)]
+        apart = end - begin
+        gap = 1.12 * radius * apart / max(float(np.linalg.norm(apart)), 1e-12)
+        arrow = FancyArrowPatch(
+            tuple(begin + gap), tuple(end - gap), connectionstyle="arc3,rad=0.14",
+            arrowstyle="-|>", mutation_scale=9.0, color=INK, linewidth=0.9, shrinkA=0.0,
+            shrinkB=0.0, zorder=2.0,
+        )  # fmt: skip
+        ax.add_patch(arrow)
+        arrows.append(arrow)
+    return tuple(arrows)
+
+
+def _draw_names(ax: Axes, automaton: Automaton, centres: Array, radius: float) -> tuple[Text, ...]:
+    """Names outside the circle; where they are many, they stick out like rays."""
+    names = []
+    for name, (x, y) in zip(automaton.trim_names, centres, strict=True):
+        out = np.array([x, y]) if x or y else np.array([0.0, 1.0])
+        right, up = np.array([x, y]) + 1.18 * radius * out
+        if len(automaton) > MOST_LEVEL_NAMES:
+            side, level = ("left" if x > -1e-9 else "right"), "center"
+            tilt = np.degrees(np.arctan2(y, x)) if x > -1e-9 else np.degrees(np.arctan2(-y, -x))
+        else:
+            side = "center" if abs(out[0]) < 0.2 else "left" if x > 0.0 else "right"
+            level = "center" if abs(out[1]) < 0.5 else "bottom" if out[1] > 0.0 else "top"
+            tilt = 0.0
+        names.append(
+            ax.text(
+                right, up, shortened(name, NAME_LENGTH), fontsize=NAME_PT, color=INK, ha=side,
+                va=level, rotation=tilt, rotation_mode="anchor", parse_math=False, zorder=5.0,
+            )
+        )  # fmt: skip
+    return tuple(names)
+
+
+def _make_room(ax: Axes, automaton: Automaton, radius: float) -> None:
+    """Limits that leave room for the names, as far as the size of the axes tells."""
+    wide, high = ax.bbox.width / ax.figure.dpi, ax.bbox.height / ax.figure.dpi
+    name = CHARACTER * max(min(len(name), NAME_LENGTH) for name in automaton.trim_names) + 0.1
+    above = name if len(automaton) > MOST_LEVEL_NAMES else 0.2
+    reach = (1.0 if len(automaton) > 1 else 0.0) + 1.2 * radius
+    unit = max(min(0.5 * wide - name, 0.5 * high - above), 0.2 * min(wide, high)) / reach  # [in]
+    ax.set_aspect("equal")
+    ax.set_xlim(-0.5 * wide / unit, 0.5 * wide / unit)
+    ax.set_ylim(-0.5 * high / unit, 0.5 * high / unit)

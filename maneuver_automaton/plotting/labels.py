@@ -1,0 +1,78 @@
+"""Words and numbers as the pictures show them."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+
+from maneuver_automaton.plotting.style import shortened
+
+UNITS = {
+    "speed": "m/s",
+    "side_speed": "m/s",
+    "climb_rate": "m/s",
+    "turn_rate": "rad/s",
+    "steering": "rad",
+    "steering_rate": "rad/s",
+    "acceleration": "m/s²",
+    "turn_acceleration": "rad/s²",
+}
+ARROW = " → "
+
+
+def control_labels(names: Sequence[str]) -> list[str]:
+    """Axis labels of controls: words, with the unit of those whose name says what they are.
+
+    Examples
+    --------
+    >>> control_labels(["turn_rate", "thrust"])
+    ['turn rate [rad/s]', 'thrust']
+    """
+    return [
+        name.replace("_", " ") + (f" [{UNITS[name]}]" if name in UNITS else "") for name in names
+    ]
+
+
+def word_text(word: Sequence[str], *, width: int, lines: int) -> str:
+    """A word in at most `lines` of `width` characters, its middle left out if it is longer.
+
+    Examples
+    --------
+    >>> word_text(["spin", "straight", "rest"], width=40, lines=1)
+    'spin → straight → rest'
+    >>> word_text(["left", "right"] * 20, width=40, lines=1)
+    'left → … → left → right (40 trims)'
+    """
+    if not word:
+        return "no motion"
+    names = [shortened(name, 40) for name in word]
+    whole = textwrap.wrap(ARROW.join(names), width, break_long_words=False)
+    if len(whole) <= lines or len(names) < 4:
+        return "\n".join(whole)
+    room, head = width * lines - 16, 1
+    tail = names[-2:]
+    while len(ARROW.join([*names[: head + 1], "…", *tail])) < room and head < len(names) - 3:
+        head += 1
+    cut = ARROW.join([*names[:head], "…", *tail]) + f" ({len(names)} trims)"
+    return "\n".join(textwrap.wrap(cut, width, break_long_words=False))
+
+
+def result_text(
+    *, cost: float | None, duration: float | None, error_m: float | None, error_rad: float | None
+) -> str:
+    """Cost, duration and terminal error in one line; what is None is left out.
+
+    Examples
+    --------
+    >>> result_text(cost=9.75, duration=8.0, error_m=0.0, error_rad=2e-16)
+    'cost 9.75 · 8 s · terminal error 0 m, 2e-16 rad'
+    """
+    parts = []
+    if cost is not None:
+        parts.append(f"cost {cost:.6g}")
+    if duration is not None:
+        parts.append(f"{duration:.5g} s")
+    if error_m is not None:
+        angle = "" if error_rad is None else f", {error_rad:.2g} rad"
+        parts.append(f"terminal error {error_m:.2g} m{angle}")
+    return " · ".join(parts)

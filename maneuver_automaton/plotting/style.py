@@ -1,0 +1,117 @@
+"""The look that all pictures share: sizes, thin axes, and legends that show names as they are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.plotting.colors import GREY, INK, Color
+
+TEXT_PT = 9.0
+SMALL_PT = 8.0
+FAR_M = 1e5  # from here on coordinates are counted from a round number
+NAME_LENGTH = 28  # characters of a name before it is cut
+Corner = Literal["upper left", "upper right", "lower left", "lower right"]
+CORNERS: tuple[Corner, ...] = ("upper left", "upper right", "lower left", "lower right")
+
+
+def tidy(ax: Axes, *, x: str, y: str) -> None:
+    """Label the axes, keep two of the four spines, and draw a faint grid."""
+    ax.set_xlabel(x, fontsize=TEXT_PT, color=INK, parse_math=False)
+    ax.set_ylabel(y, fontsize=TEXT_PT, color=INK, parse_math=False)
+    ax.tick_params(labelsize=SMALL_PT, color=GREY, labelcolor=INK, length=3.0, width=0.6)
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.spines[["left", "bottom"]].set(color=GREY, linewidth=0.6)
+    ax.grid(visible=True, color=GREY, alpha=0.22, linewidth=0.5)
+    ax.set_axisbelow(True)
+
+
+def count_from_near(ax: Axes, place: Array) -> None:
+    """Number far-away axes from a round number near `place` (2,), which their label names."""
+    for axis, coordinate in ((ax.xaxis, place[0]), (ax.yaxis, place[1])):
+        if abs(coordinate) >= FAR_M:
+            origin = float(round(coordinate, -3))
+            axis.set_major_formatter(_counted_from(origin))
+            axis.set_label_text(f"{axis.get_label_text()} from {origin:.0f}")
+
+
+def _counted_from(origin: float) -> FuncFormatter:
+    return FuncFormatter(lambda tick, _: f"{tick - origin:.6g}")
+
+
+def shortened(text: str, length: int = NAME_LENGTH) -> str:
+    """`text`, its middle left out if it is longer than `length`."""
+    if len(text) <= length:
+        return text
+    tail = (length - 1) // 3
+    return f"{text[: length - 1 - tail]}…{text[-tail:]}"
+
+
+def line_handle(color: Color, *, width: float = 2.6, marker: str = "") -> Line2D:
+    """A legend handle: a short line, or a hollow `marker` instead."""
+    if marker:
+        return Line2D(
+            [], [], linestyle="none", marker=marker, markersize=8.0, color=color,
+            markerfacecolor="none", markeredgewidth=1.8,
+        )  # fmt: skip
+    return Line2D([], [], color=color, linewidth=width, solid_capstyle="butt")
+
+
+def plain(legend: Legend, labels: Sequence[str], *, length: int = NAME_LENGTH) -> Legend:
+    """The `legend` with `labels` as they are: no mathematics, no hidden leading underscore."""
+    for text, label in zip(legend.get_texts(), labels, strict=True):
+        text.set_parse_math(False)
+        text.set_text(shortened(label, length))
+    return legend
+
+
+def corner_legend(
+    ax: Axes,
+    handles: Sequence[Artist],
+    labels: Sequence[str],
+    *,
+    points: Array,
+    length: int = NAME_LENGTH,
+) -> Legend:
+    """A legend in the corner of `ax` that covers fewest of the `points` (n, 2)."""
+    legend = ax.legend(
+        handles,
+        [str(k) for k in range(len(labels))],
+        loc=_emptiest_corner(points),
+        fontsize=SMALL_PT,
+        frameon=True,
+        framealpha=0.85,
+        edgecolor="none",
+        borderaxespad=0.3,
+        handlelength=1.6,
+    )
+    return plain(legend, labels, length=length)
+
+
+def _emptiest_corner(points: Array) -> Corner:
+    low, high = points.min(axis=0), points.max(axis=0)
+    at = (points - low) / np.where(high > low, high - low, 1.0)
+    crowds = [
+        np.count_nonzero((abs(at[:, 0] - x) < 0.45) & (abs(at[:, 1] - y) < 0.45))
+        for x, y in ((0.0, 1.0), (1.0, 1.0), (0.0, 0.0), (1.0, 0.0))
+    ]
+    return CORNERS[int(np.argmin(crowds))]
+
+
+def share_limits(column: Sequence[Axes]) -> None:
+    """Give axes below each other the widest limits among them; only the last shows its times."""
+    for get, set_ in (("get_xlim", "set_xlim"), ("get_ylim", "set_ylim")):
+        limits = np.array([getattr(ax, get)() for ax in column])
+        for ax in column:
+            getattr(ax, set_)(limits[:, 0].min(), limits[:, 1].max())
+    for ax in column[:-1]:
+        ax.set_xlabel("")
+        ax.tick_params(labelbottom=False)

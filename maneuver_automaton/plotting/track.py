@@ -1,0 +1,190 @@
+"""What the pictures need of a plan, whether it is a value or a loaded plan.json."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.groups import SE2
+
+CHORD_RAD = 0.03  # [rad] between drawn points of an arc
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Piece:
+    """One trim or maneuver of a plan that takes time, as samples."""
+
+    name: str
+    twist: Array  # (dof,) at its beginning [m/s, m/s, rad/s(, m/s)]
+    time: Array  # (n,) [s]
+    pose: Array  # (n, dof), headings continuous
+    control: Array  # (n, n_u), row i holds from time i on
+
+    @property
+    def drives(self) -> bool:
+        """Whether it leaves its place in the plane."""
+        return bool(np.ptp(self.pose[:, :2], axis=0).max() > 1e-9)
+
+    @property
+    def climb(self) -> float:
+        """Altitude gained [m]; zero in the plane."""
+        return float(self.pose[-1, 3:].sum() - self.pose[0, 3:].sum())
+
+    @property
+    def turn(self) -> float:
+        """Heading gained [rad]."""
+        return float(self.pose[-1, 2] - self.pose[0, 2])
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """A start and the pieces driven from there; no piece if the vehicle is there already."""
+
+    start: Array  # (dof,)
+    pieces: tuple[Piece, ...]
+
+    @property
+    def end(self) -> Array:
+        """Pose (dof,) at the end."""
+        return np.asarray(self.pieces[-1].pose[-1]) if self.pieces else self.start
+
+    @cached_property
+    def pose(self) -> Array:
+        """Poses (n, dof) of all pieces, one after the other."""
+        return np.concatenate([self.start[None], *(piece.pose for piece in self.pieces)])
+
+    @cached_property
+    def switching_times(self) -> Array:
+        """Times (n + 1,) at which pieces begin, and the end [s]; empty without pieces."""
+        if not self.pieces:
+            return np.zeros(0)
+        return np.array([*(piece.time[0] for piece in self.pieces), self.pieces[-1].time[-1]])
+
+    @cached_property
+    def switching_poses(self) -> Array:
+        """Poses (n + 1, dof) where pieces begin, and the end."""
+        return np.array([*(piece.pose[0] for piece in self.pieces), self.end])
+
+    @cached_property
+    def size(self) -> float:
+        """Greatest distance of the path from its start [m]: the symmetry leaves it alone."""
+        return float(np.linalg.norm(self.pose[:, :2] - self.start[:2], axis=1).max())
+
+    @property
+    def twists(self) -> dict[str, Array]:
+        """Twist of every trim by name, in the order in which they appear."""
+        twists: dict[str, Array] = {}
+        for piece in self.pieces:
+            twists.setdefault(piece.name, piece.twist)
+        return twists
+
+    @property
+    def climbs(self) -> bool:
+        """Whether the altitude varies."""
+        return bool(self.start.size > 3 and np.ptp(self.pose[:, 3]) > 1e-9)
+
+    def spread(self, count: int, *, reach: float) -> Array:
+        """Poses (m, dof), about `count`, evenly along the path; `reach` [m] weighs the heading."""
+        steps = np.abs(np.diff(self.pose, axis=0))
+        driven = np.hypot(steps[:, 0], steps[:, 1]) + reach * steps[:, 2]
+        way = np.concatenate([[0.0], np.cumsum(driven)])
+        if not way[-1] > 0.0:
+            return self.pose[:0]
+        at = np.linspace(0.0, way[-1], count + 2)[1:-1]
+        return np.stack([np.interp(at, way, column) for column in self.pose.T], axis=-1)
+
+
+def track_of_plan(plan: Plan) -> Track:
+    """The track of a `plan`."""
+    return Track(
+        plan.start,
+        tuple(
+            _coasted(plan, k, steps=math.ceil(abs(trim.body_velocity[2]) * duration / CHORD_RAD))
+            for k, (trim, duration) in enumerate(zip(plan.trims, plan.durations, strict=True))
+            if duration > 0.0
+        ),
+    )
+
+
+def track_of_document(document: Mapping[str, Any]) -> Track | None:
+    """The track of a loaded plan.json `document`, None if it holds no trajectory.
+
+    Raises
+    ------
+    ValueError
+        If its trajectory holds no numbers, or its columns differ in length.
+    KeyError
+        If a key of the contract is missing.
+    """
+    trajectory, primitives = document["trajectory"], document["primitives"]
+    if not trajectory or not trajectory["time_s"]:
+        return None
+    time = as_array("plan: trajectory.time_s", trajectory["time_s"])
+    pose = as_array("plan: trajectory.pose", trajectory["pose"], last=(3, 4)).copy()
+    if pose.shape[:-1] != time.shape:
+        raise ValueError(f"plan: got {len(pose)} poses for {len(time)} times")
+    pose[:, :2] += as_array(
+        "plan: trajectory.origin", trajectory.get("origin") or (0.0, 0.0), last=2
+    )
+    durations = np.array([primitive["duration_s"] for primitive in primitives], dtype=np.float64)
+    times = time[0] + np.concatenate([[0.0], np.cumsum(durations)])
+    control = as_array("plan: trajectory.control", trajectory["control"]).reshape(len(time), -1)
+    return Track(
+        pose[0],
+        tuple(
+            Piece(
+                name=str(primitive["name"]),
+                twist=_twist(time[rows], pose[rows]),
+                time=time[rows],
+                pose=pose[rows],
+                control=_held(control[rows]),
+            )
+            for primitive, rows in zip(primitives, _rows_between(time, times), strict=True)
+            if rows.size > 1
+        ),
+    )
+
+
+def _coasted(plan: Plan, k: int, *, steps: int) -> Piece:
+    """Trim `k` of a plan, at `steps` steps and at least one."""
+    trim = plan.trims[k]
+    begin, end = plan.switching_times[k : k + 2].tolist()
+    time = np.linspace(begin, end, max(1, steps) + 1)
+    return Piece(
+        name=trim.name,
+        twist=trim.body_velocity,
+        time=time,
+        pose=plan.pose_at(time),
+        control=np.broadcast_to(trim.control, (time.size, trim.control.size)),
+    )
+
+
+def _rows_between(time: Array, switching_times: Array) -> Sequence[np.ndarray[Any, Any]]:
+    """Rows from each switching time to the next, both included; at most one if they coincide."""
+    slack = 1e-9 * max(1.0, float(np.abs(time).max()))
+    rows = []
+    for begin, end in pairwise(switching_times.tolist()):
+        inside = np.flatnonzero((time >= begin - slack) & (time <= end + slack))
+        rows.append(inside if end - begin > slack else inside[:1])
+    return rows
+
+
+def _held(control: Array) -> Array:
+    """Controls of a piece, the last row (that of the next piece) replaced by the one before."""
+    return np.concatenate([control[:-1], control[-2:-1]])
+
+
+def _twist(time: Array, pose: Array) -> Array:
+    """Twist (dof,) over the longest step between samples of one piece."""
+    k = int(np.argmax(np.diff(time)))
+    gained = (SE2(pose[k, :3]).inverse() @ SE2(pose[k + 1, :3])).log()
+    climbed = pose[k + 1, 3:] - pose[k, 3:]
+    return np.asarray(np.concatenate([gained, climbed]) / (time[k + 1] - time[k]))

@@ -1,0 +1,211 @@
+"""All a planner needs: automaton, start, goals, cost, and the limits of the word."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from maneuver_automaton._arrays import Array, as_array, freeze
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.costs import Cost, StageCost
+from maneuver_automaton.errors import InvalidAutomaton
+from maneuver_automaton.groups import SE2, LieGroup, SE2xR
+
+SEARCH_METHODS = ("auto", "words", "insertion")
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Goal:
+    """Where a plan ends: exactly at `pose`, or at any heading there."""
+
+    pose: Array  # (dof,) [m, m, rad(, m)]
+    trim: str | None = None
+    free_heading: bool = False
+    tolerance_m: float = 0.0
+    tolerance_rad: float = 0.0
+
+    if TYPE_CHECKING:  # any numbers will do for the pose
+
+        def __init__(
+            self,
+            *,
+            pose: ArrayLike,
+            trim: str | None = None,
+            free_heading: bool = False,
+            tolerance_m: float = 0.0,
+            tolerance_rad: float = 0.0,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        freeze(self, "pose", last=(3, 4))
+        for name in ("tolerance_m", "tolerance_rad"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ValueError(f"goal: {name} must be a number of at least 0, got {value}")
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Horizon:
+    """How long a plan lasts and how many trims it may have."""
+
+    time: float | None = None  # [s] exactly this long; None: free
+    max_trims: int | None = None  # rest included; None: no limit
+    min_coast: float = 0.0  # [s] of every trim but rest
+    max_time: float | None = None  # [s] at most, with a free final time
+
+    def __post_init__(self) -> None:
+        for name in ("time", "max_time"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0.0):
+                raise ValueError(f"horizon: {name} must be positive, got {value} s")
+        if self.time is not None and self.max_time is not None:
+            raise ValueError("horizon: max_time is for a free final time, but time is fixed")
+        if self.max_trims is not None and self.max_trims < 1:
+            raise ValueError(f"horizon: max_trims must be at least 1, got {self.max_trims}")
+        if not (math.isfinite(self.min_coast) and self.min_coast >= 0.0):
+            raise ValueError(f"horizon: min_coast must be at least 0, got {self.min_coast} s")
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Bounds:
+    """Where the pose may be: closed intervals, None where there is no limit."""
+
+    x: tuple[float, float] | None = None  # [m]
+    y: tuple[float, float] | None = None  # [m]
+    z: tuple[float, float] | None = None  # [m]
+
+    def __post_init__(self) -> None:
+        for name in ("x", "y", "z"):
+            pair = getattr(self, name)
+            if pair is not None and not (len(pair) == 2 and pair[0] < pair[1]):
+                raise ValueError(f"bounds: {name} must be [low, high] with low < high, got {pair}")
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class SearchSettings:
+    """How to search; the defaults suit most problems."""
+
+    method: str = "auto"  # auto | words | insertion
+    max_expansions: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.method not in SEARCH_METHODS:
+            raise ValueError(
+                f"search: method must be one of {', '.join(SEARCH_METHODS)}, got {self.method!r}"
+            )
+        if self.max_expansions is not None and self.max_expansions < 1:
+            raise ValueError(
+                f"search: max_expansions must be at least 1, got {self.max_expansions}"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """From a start pose to a goal with the trims of an automaton, as cheaply as can be.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "spin": (0.0, 1.0)})
+    >>> Problem(robot, [0, 0, 0], [1, 1, 0], cost=Cost(effort=1.0)).goals[0].pose.tolist()
+    [1.0, 1.0, 0.0]
+    """
+
+    automaton: Automaton
+    start: Array  # (dof,) [m, m, rad(, m)]
+    goals: tuple[Goal, ...]  # a Goal, a pose, or several of either
+    cost: StageCost = field(default_factory=lambda: Cost(time=1.0), kw_only=True)
+    horizon: Horizon = field(default_factory=Horizon, kw_only=True)
+    start_trim: str | None = field(default=None, kw_only=True)
+    start_time: float = field(default=0.0, kw_only=True)  # [s]
+    bounds: Bounds = field(default_factory=Bounds, kw_only=True)
+    search: SearchSettings = field(default_factory=SearchSettings, kw_only=True)
+    obstacles: Sequence[Any] = field(default=(), kw_only=True)
+
+    if TYPE_CHECKING:  # numbers, group elements, one goal or several will do
+
+        def __init__(
+            self,
+            automaton: Automaton,
+            start: ArrayLike | SE2 | SE2xR,
+            goals: ArrayLike | SE2 | SE2xR | Goal | Sequence[Goal],
+            *,
+            cost: StageCost = ...,
+            horizon: Horizon = ...,
+            start_trim: str | None = None,
+            start_time: float = 0.0,
+            bounds: Bounds = ...,
+            search: SearchSettings = ...,
+            obstacles: Sequence[Any] = (),
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        _check_automaton(self.automaton)
+        dof = self.automaton.model.group.dof
+        if isinstance(self.start, SE2 | SE2xR):
+            object.__setattr__(self, "start", self.start.pose)
+        freeze(self, "start", last=dof)
+        object.__setattr__(self, "goals", _as_goals(self.goals))
+        for goal in self.goals:
+            if goal.pose.size != dof:
+                raise ValueError(
+                    f"goal: pose has {goal.pose.size} numbers, need {dof} "
+                    f"for the {self.automaton.model.name}"
+                )
+            if goal.trim is not None:
+                self.automaton.index_of(goal.trim)
+        if self.start_trim is not None:
+            self.automaton.index_of(self.start_trim)
+        if not math.isfinite(self.start_time):
+            raise ValueError(f"start: time must be finite, got {self.start_time} s")
+        if len(self.obstacles):
+            raise ValueError("obstacles: this version plans in free space only, and ignores none")
+
+    @property
+    def rates(self) -> Array:
+        """Cost per second of every trim (m,)."""
+        return self.cost.rates(self.automaton.controls, self.automaton.body_velocities)
+
+    def moved(self, by: LieGroup) -> Problem:
+        """The problem with start and goals moved by the group element `by`; bounds must be open."""
+        if any(getattr(self.bounds, name) is not None for name in ("x", "y", "z")):
+            raise ValueError("problem: bounds do not move with the symmetry")
+        group = type(by)
+        return replace(
+            self,
+            start=(by @ group(self.start)).pose,
+            goals=tuple(replace(goal, pose=(by @ group(goal.pose)).pose) for goal in self.goals),
+        )
+
+
+def _check_automaton(automaton: Automaton) -> None:
+    """Trims that cannot be combined at will are refused, not taken for others."""
+    what = "this version plans for kinematic vehicles only"
+    if automaton.trim_classes.any() or automaton.maneuvers:
+        raise InvalidAutomaton(
+            f"automaton: {what}; need trims of one reduced state, and no maneuvers"
+        )
+    for trim in automaton.trims:
+        if math.isfinite(trim.max_duration):
+            raise InvalidAutomaton(
+                f"trim {trim.name!r}: got max_duration {trim.max_duration:g} s, but {what}, "
+                "whose trims last as long as one likes"
+            )
+
+
+def _as_goals(value: Any) -> tuple[Goal, ...]:
+    if isinstance(value, Goal):
+        return (value,)
+    if isinstance(value, SE2 | SE2xR):
+        return tuple(Goal(pose=pose) for pose in np.atleast_2d(value.pose))
+    if isinstance(value, Sequence) and any(isinstance(v, Goal | SE2 | SE2xR) for v in value):
+        return tuple(goal for one in value for goal in _as_goals(one))
+    poses = as_array("goal: pose", value)
+    if poses.ndim not in (1, 2) or poses.size == 0:
+        raise ValueError(f"goal: got shape {poses.shape}, need one pose or a list of poses")
+    return tuple(Goal(pose=pose) for pose in np.atleast_2d(poses))

@@ -1,0 +1,120 @@
+"""From the text of a scenario file to its values, or to one message that says what is wrong."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import ValidationError
+
+from maneuver_automaton.models import Car, Unicycle
+from maneuver_automaton.scenario.schema import ScenarioFile
+from maneuver_automaton.scenario.yaml_source import Document, Where
+
+CONTROL_NAMES: Mapping[str, tuple[str, ...]] = {
+    "unicycle": Unicycle.control_names,
+    "car": Car.control_names,
+}
+OTHER_KINDS: Mapping[str, set[str]] = {  # and what only they have
+    "a library of trims": {"format", "trims"},
+    "a plan": {"status", "primitives"},
+}
+MAX_SHOWN = 60  # characters of a value that a message shows
+
+
+def values_of(document: Document) -> ScenarioFile:
+    """The values of a scenario file.
+
+    Raises
+    ------
+    InvalidScenario
+        If a key is unknown or missing, or holds what it may not: the first one in the file.
+    """
+    _check_schema(document)
+    try:
+        return ScenarioFile.model_validate(document.value, context=_context(document.value))
+    except ValidationError as error:
+        found = [_message(document, item) for item in error.errors(include_url=False)]
+        where, what = min(found, key=lambda item: document.line_of(item[0]))
+        raise document.error(where, what) from error
+
+
+def _check_schema(document: Document) -> None:
+    """A file of another kind or schema is told before its keys are."""
+    if not isinstance(document.value, dict):
+        return
+    for kind, keys in OTHER_KINDS.items():
+        if keys <= document.value.keys():
+            raise document.error((), f"is {kind}, need a scenario")
+    if "schema" not in document.value:
+        raise document.error((), "the key 'schema' is missing: no scenario, need schema: 1")
+    schema = document.value["schema"]
+    if schema != 1 or not isinstance(schema, int) or isinstance(schema, bool):
+        what = "need 1, the schema that this version reads"
+        raise document.error(("schema",), f"got {shown(schema)}, {what}")
+
+
+def shown(value: Any) -> str:
+    """A value as a message shows it, in the words of YAML.
+
+    Examples
+    --------
+    >>> shown("abc"), shown(True), shown(None), shown([1, "a"])
+    ("'abc'", 'true', 'nothing', "[1, 'a']")
+    """
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if value is None:
+        return "nothing"
+    if isinstance(value, list):
+        return _short("[" + ", ".join(shown(item) for item in value[:MAX_SHOWN]) + "]")
+    if isinstance(value, dict):
+        items = (f"{key}: {shown(value[key])}" for key in list(value)[:MAX_SHOWN])
+        return _short("{" + ", ".join(items) + "}")
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return _short(repr(value))
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= MAX_SHOWN else text[: MAX_SHOWN - 3] + "..."
+
+
+def _context(value: Any) -> dict[str, Any]:
+    vehicle = value.get("vehicle") if isinstance(value, dict) else None
+    model = vehicle.get("model") if isinstance(vehicle, dict) else None
+    return {"control_names": CONTROL_NAMES.get(model, ()) if isinstance(model, str) else ()}
+
+
+def _message(document: Document, item: Any) -> tuple[Where, str]:
+    """Place and words of one complaint of pydantic."""
+    where = _place(item["loc"])
+    kind, context = item["type"], item.get("ctx", {})
+    if kind == "unknown_key":
+        what = f"unknown key; did you mean {context['near']!r}? Known keys: {context['known']}"
+        return (*where, context["key"]), what
+    if kind == "missing_key":
+        key = context["key"]
+        return where, f"the key {key!r} is missing, need {key}: {context['what']}"
+    if kind == "at_key":
+        value = _value_at(document.value, where)[context["key"]]
+        return (*where, context["key"]), f"got {shown(value)}, need {context['need']}"
+    if kind == "one_of":
+        return where, f"got {context['given']}, need exactly one of {context['known']}"
+    if kind == "alone":
+        return (*where, context["key"]), f"goes with {context['partners']} only"
+    if kind == "need":
+        return where, f"got {shown(item['input'])}, need {context['need']}"
+    return where, f"got {shown(item['input'])}: {item['msg']}"
+
+
+def _place(loc: tuple[str | int, ...]) -> Where:
+    """The steps of `loc` that exist in the file: the tags of unions, <...>, do not."""
+    return tuple(step for step in loc if isinstance(step, int) or not step.startswith("<"))
+
+
+def _value_at(value: Any, where: Where) -> Any:
+    for step in where:
+        value = value[step]
+    return value

@@ -1,0 +1,347 @@
+"""A scenario: a problem, and what a file says beside it."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.automaton.library import load_library
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.models import Car, Model, Unicycle
+from maneuver_automaton.problem import (
+    SEARCH_METHODS,
+    Bounds,
+    Goal,
+    Horizon,
+    Problem,
+    SearchSettings,
+)
+from maneuver_automaton.scenario.presets import preset_controls
+from maneuver_automaton.scenario.reading import shown, values_of
+from maneuver_automaton.scenario.schema import (
+    Axis,
+    CostPart,
+    GoalPart,
+    Grid,
+    HorizonPart,
+    NamedControl,
+    RecedingHorizonPart,
+    ScenarioFile,
+    Shape,
+)
+from maneuver_automaton.scenario.vehicles import described, model_of
+from maneuver_automaton.scenario.yaml_source import Document, Where, parse, read_text
+
+MAX_GRID_TRIMS = 100_000
+
+Footprint = tuple[Mapping[str, Any], ...]  # shapes, each {rectangle_m, reference_m} and so on
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Scenario:
+    """What a scenario file describes."""
+
+    name: str
+    problem: Problem
+    footprint: Footprint = ()  # in the frame of the vehicle, as the file states it
+    time_limit_s: float = 5.0  # ceiling for search and refinement [s]
+    margin_m: float = 0.0  # distance kept from everything [m]
+    receding_horizon: RecedingHorizonPart | None = None
+    path: Path | None = None
+    timing_s: Mapping[str, float] = field(default_factory=dict)  # load, automaton [s]
+
+
+def load_scenario(path: Path | str) -> Scenario:
+    """The scenario of a file.
+
+    Raises
+    ------
+    InvalidScenario
+        If the file cannot be read or used: one line with file, line, field, the value met, and
+        what would be right.
+    """
+    begin, path = time.perf_counter(), Path(path)
+    return _scenario(parse(read_text(path), name=str(path)), path=path, begin=begin)
+
+
+def scenario_of_text(text: str, *, name: str) -> Scenario:
+    """The scenario of a YAML text; `name` is what messages call it.
+
+    Raises
+    ------
+    InvalidScenario
+        As `load_scenario`.
+
+    Examples
+    --------
+    >>> scenario = scenario_of_text('''
+    ... schema: 1
+    ... vehicle: {model: unicycle}
+    ... automaton: {preset: table2}
+    ... start: {pose: [0, 1, 0]}
+    ... goal: {pose: [0, 0, 0]}
+    ... ''', name="example")
+    >>> scenario.problem.automaton.trim_names
+    ('rest', 'straight', 'clockwise', 'anticlockwise', 'spin')
+    """
+    begin = time.perf_counter()
+    return _scenario(parse(text, name=name), path=None, begin=begin)
+
+
+def _scenario(document: Document, *, path: Path | None, begin: float) -> Scenario:
+    file = values_of(document)
+    _refuse_what_is_not_there(document, file)
+    with _at(document, ("vehicle",)):
+        model = model_of(file.vehicle)
+    read = time.perf_counter()
+    automaton = _automaton(document, file, model, path.parent if path else Path())
+    made = time.perf_counter()
+    problem = _problem(document, file, automaton)
+    return Scenario(
+        name=(path.stem if path else document.name) if file.name is None else file.name,
+        problem=problem,
+        footprint=_plain(file.vehicle.footprint),
+        time_limit_s=file.search.time_limit_s,
+        margin_m=file.margin_m,
+        receding_horizon=file.receding_horizon,
+        path=path,
+        timing_s={"load": read - begin, "automaton": made - read},
+    )
+
+
+def _refuse_what_is_not_there(document: Document, file: ScenarioFile) -> None:
+    """One message for each part of the schema that this version reads but cannot plan with."""
+    if file.obstacles:
+        n = len(file.obstacles)
+        raise document.error(
+            ("obstacles",),
+            f"got {n} obstacle{'s' if n > 1 else ''}, but this version plans in free space only; "
+            "need an empty list",
+        )
+    if file.search.method not in SEARCH_METHODS:
+        raise document.error(
+            ("search", "method"),
+            f"got {file.search.method!r}, which this version does not have; need one of "
+            f"{', '.join(SEARCH_METHODS)}",
+        )
+    if file.search.method == "words":
+        _refuse_long_words(document, file)
+
+
+def _refuse_long_words(document: Document, file: ScenarioFile) -> None:
+    """Exhaustive search is for short words."""
+    from maneuver_automaton.search.words import MOST_TRIMS
+
+    goals = file.goal if isinstance(file.goal, tuple) else (file.goal,)
+    most = MOST_TRIMS - any(goal.heading == "free" for goal in goals)
+    if file.horizon.max_trims is not None and file.horizon.max_trims > most:
+        free = " where a heading is free" if most < MOST_TRIMS else ""
+        raise document.error(
+            ("horizon", "max_trims"),
+            f"got {file.horizon.max_trims} for the method words, need at most {most}{free}; "
+            "the method insertion has no limit",
+        )
+
+
+@contextlib.contextmanager
+def _at(document: Document, where: Where) -> Iterator[None]:
+    """Give what a constructor refuses the file, line and field it comes from."""
+    try:
+        yield
+    except InvalidScenario:
+        raise
+    except (ValueError, LookupError) as error:
+        said = str(error)
+        for step in where:
+            said = said.removeprefix(f"{step}: ").removeprefix(f"{step} ")
+        raise document.error(where, said) from error
+
+
+def _automaton(
+    document: Document, file: ScenarioFile, model: Unicycle | Car, folder: Path
+) -> Automaton:
+    part = file.automaton
+    if part.trims is not None:
+        return _listed(document, part.trims, model)
+    if part.grid is not None:
+        return _grid(document, part.grid, model)
+    if part.file is not None:
+        return _from_library(document, folder / part.file, model)
+    where = ("automaton", "preset")
+    assert part.preset is not None
+    with _at(document, where):
+        return Automaton.of_controls(model, preset_controls(part.preset, model))
+
+
+def _listed(document: Document, trims: tuple[NamedControl, ...], model: Model) -> Automaton:
+    controls: dict[str, Any] = {}
+    for k, trim in enumerate(trims):
+        where = ("automaton", "trims", k)
+        if trim.name in controls:
+            first = document.line_of(("automaton", "trims", list(controls).index(trim.name)))
+            raise document.error(
+                (*where, "name"),
+                f"got {trim.name!r}, the name of another trim in line {first}; need a new name",
+            )
+        controls[trim.name] = trim.control
+        with _at(document, (*where, "control")):
+            Automaton.of_controls(model, {trim.name: trim.control})
+    return Automaton.of_controls(model, controls)
+
+
+def _grid(document: Document, grid: Grid, model: Model) -> Automaton:
+    where: Where = ("automaton", "grid", "control")
+    names = model.control_names
+    if len(grid.control) != len(names):
+        raise document.error(
+            where, f"got {len(grid.control)} axes, need {len(names)} ({', '.join(names)})"
+        )
+    counts = []
+    for k, axis in enumerate(grid.control):
+        if axis.min > axis.max:
+            raise document.error(
+                (*where, k), f"got min {axis.min:g} above max {axis.max:g}, need min <= max"
+            )
+        if axis.count == 1 and axis.min < axis.max:
+            raise document.error(
+                (*where, k, "count"), "got 1 for two different ends, need at least 2"
+            )
+        counts.append(_n_values(axis))
+    if math.prod(counts) > MAX_GRID_TRIMS:
+        raise document.error(
+            where, f"got {math.prod(counts):g} trims, need at most {MAX_GRID_TRIMS}"
+        )
+    with _at(document, where):
+        return Automaton.of_grid(model, [_values(axis) for axis in grid.control])
+
+
+def _n_values(axis: Axis) -> int:
+    if axis.count is not None:
+        return axis.count
+    assert axis.step is not None
+    return int(min((axis.max - axis.min) / axis.step * (1.0 + 1e-12) + 1e-9, 1e12)) + 1
+
+
+def _values(axis: Axis) -> list[float]:
+    """The values of an axis, computed in decimals: 0.3 is 0.3 and the middle is 0."""
+    n, low = _n_values(axis), Decimal(repr(axis.min))
+    if axis.step is not None:
+        step = Decimal(repr(axis.step))
+    else:
+        step = (Decimal(repr(axis.max)) - low) / max(n - 1, 1)
+    return [float(low + k * step) for k in range(n)]
+
+
+def _from_library(document: Document, path: Path, model: Model) -> Automaton:
+    with _at(document, ("automaton", "file")):
+        automaton = load_library(path)
+        if described(automaton.model) != described(model):
+            raise ValueError(
+                f"got a library for {_words(automaton.model)}, but the vehicle is {_words(model)}"
+            )
+    return automaton
+
+
+def _words(model: Model) -> str:
+    return shown(described(model))
+
+
+def _problem(document: Document, file: ScenarioFile, automaton: Automaton) -> Problem:
+    goals = file.goal if isinstance(file.goal, tuple) else (file.goal,)
+    many = isinstance(file.goal, tuple)
+    dof = automaton.model.group.dof
+    _check_pose(document, ("start", "pose"), file.start.pose, dof)
+    _check_trim(document, ("start", "trim"), file.start.trim, automaton)
+    for k, goal in enumerate(goals):
+        where: Where = ("goal", k) if many else ("goal",)
+        _check_pose(document, (*where, "pose"), goal.pose, dof)
+        _check_trim(document, (*where, "trim"), goal.trim, automaton)
+    if file.bounds_m.z is not None and dof == 3:
+        raise document.error(("bounds_m", "z"), f"the {automaton.model.name} has no height")
+    cost, horizon = _cost(document, file.cost, automaton), _horizon(document, file.horizon)
+    with _at(document, ()):
+        return Problem(
+            automaton,
+            file.start.pose,
+            tuple(_goal(goal) for goal in goals),
+            cost=cost,
+            horizon=horizon,
+            start_trim=file.start.trim,
+            start_time=file.start.time_s,
+            bounds=Bounds(x=file.bounds_m.x, y=file.bounds_m.y, z=file.bounds_m.z),
+            search=SearchSettings(
+                method=file.search.method, max_expansions=file.search.max_expansions
+            ),
+        )
+
+
+def _check_pose(document: Document, where: Where, pose: tuple[float, ...], dof: int) -> None:
+    if len(pose) != dof:
+        names = "[x, y, heading]" if dof == 3 else "[x, y, heading, z]"
+        raise document.error(where, f"got {len(pose)} numbers, need {dof}: {names}")
+
+
+def _check_trim(document: Document, where: Where, trim: str | None, automaton: Automaton) -> None:
+    if trim is not None:
+        with _at(document, where):
+            automaton.index_of(trim)
+
+
+def _goal(part: GoalPart) -> Goal:
+    return Goal(
+        pose=part.pose,
+        trim=part.trim,
+        free_heading=part.heading == "free",
+        tolerance_m=part.tolerance_m,
+        tolerance_rad=part.tolerance_rad,
+    )
+
+
+def _cost(document: Document, part: CostPart, automaton: Automaton) -> Cost:
+    matrix = part.effort_matrix
+    where: Where = ("cost",) if matrix is None else ("cost", "effort_matrix")
+    if matrix is not None and len({len(row) for row in matrix} | {len(matrix)}) > 1:
+        rows = ", ".join(str(len(row)) for row in matrix)
+        raise document.error(
+            where, f"got {len(matrix)} rows of {rows} numbers, need a square matrix"
+        )
+    order = math.inf if part.norm_order == "inf" else float(part.norm_order)
+    with _at(document, where):
+        cost = Cost(
+            effort=part.effort,
+            norm=part.norm,
+            time=part.time,
+            effort_matrix=matrix,  # type: ignore[arg-type]
+            norm_order=order,
+            length=part.length,
+            switch=part.switch,
+            direction_change=part.direction_change,
+        )
+        cost.rates(automaton.controls[:1], automaton.body_velocities[:1])
+    return cost
+
+
+def _horizon(document: Document, part: HorizonPart) -> Horizon:
+    fixed = part.time_s != "free" and part.max_time_s is not None
+    with _at(document, ("horizon", "max_time_s") if fixed else ("horizon",)):
+        return Horizon(
+            time=None if part.time_s == "free" else part.time_s,
+            max_trims=part.max_trims,
+            min_coast=part.min_coast_s,
+            max_time=part.max_time_s,
+        )
+
+
+def _plain(footprint: Shape | tuple[Shape, ...] | None) -> Footprint:
+    if footprint is None:
+        return ()
+    shapes = footprint if isinstance(footprint, tuple) else (footprint,)
+    return tuple(shape.model_dump(exclude_none=True) for shape in shapes)

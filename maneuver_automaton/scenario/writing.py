@@ -1,0 +1,173 @@
+"""A scenario as YAML, and the JSON Schema of scenario files."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.costs import WEIGHTS, Cost, StageCost
+from maneuver_automaton.problem import Goal, Horizon, Problem
+from maneuver_automaton.scenario.scenario import Scenario
+from maneuver_automaton.scenario.schema import ScenarioFile
+from maneuver_automaton.scenario.vehicles import described
+from maneuver_automaton.scenario.yaml_source import scalar
+
+_PLAIN = re.compile(r"[A-Za-z][A-Za-z0-9_ ()-]*[A-Za-z0-9_)]|[A-Za-z]")
+_HARD = re.compile(r"[^\x20-\x7e\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]")
+
+
+def to_yaml(scenario: Scenario) -> str:
+    """The scenario as a file that reads back to the same problem, to the last bit.
+
+    The trims are listed, whatever named them before.
+
+    Raises
+    ------
+    ValueError
+        If a scenario file cannot state it: another model or cost, maneuvers, a reduced state.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "spin": (0.0, 1.0)})
+    >>> problem = Problem(robot, [0, 0, 0], [1, 1, 0], cost=Cost(effort=1.0))
+    >>> print(to_yaml(Scenario(name="A first plan", problem=problem)))
+    schema: 1
+    name: A first plan
+    vehicle: {model: unicycle}
+    automaton:
+      trims:
+        - {name: ahead, control: [1.0, 0.0]}
+        - {name: spin, control: [0.0, 1.0]}
+    start: {pose: [0.0, 0.0, 0.0]}
+    goal: {pose: [1.0, 1.0, 0.0]}
+    cost: {effort: 1.0}
+    search: {method: auto, time_limit_s: 5.0}
+    <BLANKLINE>
+    """
+    problem = scenario.problem
+    vehicle = described(problem.automaton.model)
+    if scenario.footprint:
+        shapes = [dict(shape) for shape in scenario.footprint]
+        vehicle["footprint"] = shapes if len(shapes) > 1 else shapes[0]
+    bounds = {name: getattr(problem.bounds, name) for name in ("x", "y", "z")}
+    goals = [_goal(goal) for goal in problem.goals]
+    entries: dict[str, Any] = {
+        "schema": 1,
+        "name": scenario.name,
+        "vehicle": vehicle,
+        "automaton": {"trims": _trims(problem.automaton)},
+        "start": _start(problem),
+        "goal": goals if len(goals) > 1 else goals[0],
+        "cost": _cost(problem.cost),
+        "horizon": _horizon(problem.horizon),
+        "bounds_m": {name: list(pair) for name, pair in bounds.items() if pair is not None},
+        "margin_m": scenario.margin_m or None,
+        "search": {
+            "method": problem.search.method,
+            "time_limit_s": scenario.time_limit_s,
+            **_given(max_expansions=problem.search.max_expansions),
+        },
+        "receding_horizon": scenario.receding_horizon
+        and scenario.receding_horizon.model_dump(exclude_none=True),
+    }
+    return "".join(_block(key, value) for key, value in entries.items() if value not in ({}, None))
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON Schema of scenario files, for editors."""
+    schema = _without_null(ScenarioFile.model_json_schema(by_alias=True))
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def _without_null(schema: Any) -> Any:
+    """The schema without the nulls that stand for a key that is left out."""
+    if isinstance(schema, list):
+        return [_without_null(item) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    kept = {key: _without_null(item) for key, item in schema.items()}
+    if "default" in kept and kept["default"] is None:
+        del kept["default"]
+    if isinstance(kept.get("anyOf"), list):
+        options = [option for option in kept["anyOf"] if option != {"type": "null"}]
+        if len(options) == 1:
+            del kept["anyOf"]
+            return options[0] | kept
+        kept["anyOf"] = options
+    return kept
+
+
+def _trims(automaton: Automaton) -> list[dict[str, Any]]:
+    if automaton.maneuvers or automaton.model.reduced_names:
+        raise ValueError("automaton: a scenario file cannot list maneuvers, save a library instead")
+    for trim in automaton.trims:
+        if math.isfinite(trim.max_duration):
+            raise ValueError(f"trim {trim.name!r}: a scenario file cannot state its max_duration")
+    return [{"name": trim.name, "control": trim.control.tolist()} for trim in automaton.trims]
+
+
+def _start(problem: Problem) -> dict[str, Any]:
+    entry = {"pose": problem.start.tolist(), **_given(trim=problem.start_trim)}
+    return entry | ({"time_s": problem.start_time} if problem.start_time else {})
+
+
+def _goal(goal: Goal) -> dict[str, Any]:
+    entry = {"pose": goal.pose.tolist(), **_given(trim=goal.trim)}
+    if goal.free_heading:
+        entry["heading"] = "free"
+    tolerances = {"tolerance_m": goal.tolerance_m, "tolerance_rad": goal.tolerance_rad}
+    return entry | {key: value for key, value in tolerances.items() if value}
+
+
+def _cost(cost: StageCost) -> dict[str, Any]:
+    if not isinstance(cost, Cost):
+        raise ValueError("cost: a scenario file can state the class Cost only")
+    entry: dict[str, Any] = {name: getattr(cost, name) for name in WEIGHTS if getattr(cost, name)}
+    if cost.effort_matrix is not None:
+        entry["effort_matrix"] = cost.effort_matrix.tolist()
+    if cost.norm_order != 2.0:
+        entry["norm_order"] = 1 if cost.norm_order == 1.0 else "inf"
+    return entry
+
+
+def _horizon(horizon: Horizon) -> dict[str, Any]:
+    entry = _given(time_s=horizon.time, max_trims=horizon.max_trims, max_time_s=horizon.max_time)
+    return entry | ({"min_coast_s": horizon.min_coast} if horizon.min_coast else {})
+
+
+def _given(**entries: Any) -> dict[str, Any]:
+    return {key: value for key, value in entries.items() if value is not None}
+
+
+def _block(key: str, value: Any) -> str:
+    """One key of the file, lists of mappings over several lines."""
+    if key == "automaton":
+        rows = "".join(f"    - {_flow(row)}\n" for row in value["trims"])
+        return f"automaton:\n  trims:\n{rows}"
+    if isinstance(value, list):
+        return f"{key}:\n" + "".join(f"  - {_flow(row)}\n" for row in value)
+    return f"{key}: {_flow(value)}\n"
+
+
+def _flow(value: Any) -> str:
+    """A value in one line of YAML."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key}: {_flow(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_flow(item) for item in value) + "]"
+    if isinstance(value, str):
+        return value if _is_plain(value) else _quoted(value)
+    return repr(value)
+
+
+def _is_plain(text: str) -> bool:
+    return bool(_PLAIN.fullmatch(text)) and isinstance(scalar(text), str)
+
+
+def _quoted(text: str) -> str:
+    return _HARD.sub(lambda bad: f"\\u{ord(bad.group()):04x}", json.dumps(text, ensure_ascii=False))

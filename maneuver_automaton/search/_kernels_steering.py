@@ -1,0 +1,200 @@
+"""The steering function: three coasting times in closed form.
+
+Planar motions are complex numbers: a trim is ``(velocity, turn rate)``, a displacement
+``(position, heading)``.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from maneuver_automaton._compile import inner_kernel, kernel
+
+
+@inner_kernel
+def unit(angle):
+    """Complex number of length one."""
+    return complex(math.cos(angle), math.sin(angle))
+
+
+@inner_kernel
+def phase(z):
+    """Angle of a complex number."""
+    return math.atan2(z.imag, z.real)
+
+
+@inner_kernel
+def turn_time(angle, turn_rate):
+    """Time in [0, one turn) that turns by `angle` modulo a full turn."""
+    full = 2.0 * math.pi
+    angle = math.copysign(1.0, turn_rate) * angle
+    angle -= full * math.floor(angle / full)
+    return angle / abs(turn_rate)
+
+
+@inner_kernel
+def two_circles(a, b, d, tolerance):
+    """Angles (alpha+, beta+, alpha-, beta-) with ``a e^{i alpha} + b e^{i beta} = d``; NaN if none.
+
+    The half-angle of the triangle with sides |a|, |b|, |d|, exact near both tangencies.
+    """
+    length_a, length_b, length_d = abs(a), abs(b), abs(d)
+    scale = length_a + length_b + length_d
+    nothing = (math.nan, math.nan, math.nan, math.nan)
+    if min(length_a, length_b, length_d) <= tolerance * scale:
+        return nothing
+    below = (length_b - length_d + length_a) * (length_b + length_d - length_a)
+    above = (length_d + length_a - length_b) * (length_d + length_a + length_b)
+    slack = -tolerance * scale * scale
+    if below < slack or above < slack:
+        return nothing
+    half = math.atan2(math.sqrt(max(below, 0.0)), math.sqrt(max(above, 0.0)))
+    middle = phase(d) - phase(a)
+    plus, minus = middle + 2.0 * half, middle - 2.0 * half
+    turn_b = phase(b)
+    beta_plus = phase(d - a * unit(plus)) - turn_b
+    beta_minus = phase(d - a * unit(minus)) - turn_b
+    return plus, beta_plus, minus, beta_minus
+
+
+@inner_kernel
+def line_and_circle(point, velocity, radius, tolerance):
+    """Times (later, earlier) at which ``|point - velocity t| = radius``; NaN if never."""
+    speed = abs(velocity)
+    along = (point * velocity.conjugate()).real / speed
+    aside = (point * velocity.conjugate()).imag / speed
+    scale = abs(point) + radius
+    square = (radius - aside) * (radius + aside)
+    if square < -tolerance * scale * scale:
+        return math.nan, math.nan
+    reach = math.sqrt(max(square, 0.0))
+    return (along + reach) / speed, (along - reach) / speed
+
+
+@inner_kernel
+def two_lines(point, first, second, tolerance):
+    """Times (s, t) with ``first s + second t = point``; NaN if the two are parallel."""
+    area = (first.conjugate() * second).imag
+    if abs(area) <= tolerance * abs(first) * abs(second):
+        return math.nan, math.nan
+    return (point.conjugate() * second).imag / area, (first.conjugate() * point).imag / area
+
+
+@inner_kernel
+def steer(a, gap_ab, b, gap_bc, c, goal, tolerance, out):
+    """Fill `out` (2, 3) with the coasting times that carry the identity to `goal`, NaN where none.
+
+    Row 0 and row 1 are two branches, each continuous in all arguments. Turning times lie in
+    [0, one turn); straight times may be negative, which the caller rejects.
+    """
+    v_a, w_a = a
+    d_1, e_1 = gap_ab
+    v_b, w_b = b
+    d_2, e_2 = gap_bc
+    v_c, w_c = c
+    z, heading = goal
+    for row in range(2):
+        for k in range(3):
+            out[row, k] = math.nan
+    turn_1 = unit(e_1) if e_1 != 0.0 else 1.0 + 0j
+    turn_3 = unit(heading)
+    r_a = -1j * v_a / w_a if w_a != 0.0 else 0j
+    r_b = -1j * v_b / w_b if w_b != 0.0 else 0j
+    r_c = -1j * v_c / w_c if w_c != 0.0 else 0j
+    d = z + r_a - r_c * turn_3
+    at_1 = r_a + d_1 - r_b * turn_1  # multiplies e^{i heading after a}
+    at_2 = (
+        r_b + d_2 - r_c * (unit(e_2) if e_2 != 0.0 else 1.0 + 0j)
+    )  # multiplies e^{i heading after b}
+    before_c = heading - e_2
+    if w_a != 0.0 and w_b != 0.0 and w_c != 0.0:
+        plus_1, plus_2, minus_1, minus_2 = two_circles(at_1, at_2, d, tolerance)
+        if not math.isnan(plus_1):
+            out[0, 0] = turn_time(plus_1, w_a)
+            out[0, 1] = turn_time(plus_2 - plus_1 - e_1, w_b)
+            out[0, 2] = turn_time(before_c - plus_2, w_c)
+            out[1, 0] = turn_time(minus_1, w_a)
+            out[1, 1] = turn_time(minus_2 - minus_1 - e_1, w_b)
+            out[1, 2] = turn_time(before_c - minus_2, w_c)
+    elif w_a != 0.0 and w_c != 0.0:  # turn, straight, turn
+        still = at_1 + at_2 * turn_1
+        along = v_b * turn_1
+        if abs(along) > 0.0 and abs(d) > tolerance * (abs(still) + abs(d)):
+            later, earlier = line_and_circle(-still, along, abs(d), tolerance)
+            for row in range(2):
+                time = later if row == 0 else earlier
+                if not math.isnan(time):
+                    angle = phase(d) - phase(still + along * time)
+                    out[row, 0] = turn_time(angle, w_a)
+                    out[row, 1] = time
+                    out[row, 2] = turn_time(before_c - angle - e_1, w_c)
+    elif w_b != 0.0 and w_c != 0.0:  # straight, turn, turn
+        point = d - at_1
+        if abs(v_a) > 0.0 and abs(at_2) > tolerance * (abs(point) + abs(at_2)):
+            later, earlier = line_and_circle(point, v_a, abs(at_2), tolerance)
+            for row in range(2):
+                time = later if row == 0 else earlier
+                if not math.isnan(time):
+                    angle = phase(point - v_a * time) - phase(at_2)
+                    out[row, 0] = time
+                    out[row, 1] = turn_time(angle - e_1, w_b)
+                    out[row, 2] = turn_time(before_c - angle, w_c)
+    elif w_a != 0.0 and w_b != 0.0:  # turn, turn, straight
+        point = d - at_2 * unit(before_c)
+        along = v_c * turn_3
+        if abs(v_c) > 0.0 and abs(at_1) > tolerance * (abs(point) + abs(at_1)):
+            later, earlier = line_and_circle(point, along, abs(at_1), tolerance)
+            for row in range(2):
+                time = later if row == 0 else earlier
+                if not math.isnan(time):
+                    angle = phase(point - along * time) - phase(at_1)
+                    out[row, 0] = turn_time(angle, w_a)
+                    out[row, 1] = turn_time(before_c - angle - e_1, w_b)
+                    out[row, 2] = time
+    elif w_b != 0.0:  # straight, turn, straight
+        point = d - at_1 - at_2 * unit(before_c)
+        if abs(v_a) > 0.0 and abs(v_c) > 0.0:
+            first, last = two_lines(point, v_a, v_c * turn_3, tolerance)
+            if not math.isnan(first):
+                out[0, 0] = first
+                out[0, 1] = turn_time(before_c - e_1, w_b)
+                out[0, 2] = last
+    elif w_c != 0.0:  # straight, straight, turn
+        point = d - at_1 - at_2 * turn_1
+        if abs(v_a) > 0.0 and abs(v_b) > 0.0:
+            first, second = two_lines(point, v_a, v_b * turn_1, tolerance)
+            if not math.isnan(first):
+                out[0, 0] = first
+                out[0, 1] = second
+                out[0, 2] = turn_time(before_c - e_1, w_c)
+    elif w_a != 0.0:  # turn, straight, straight
+        angle = before_c - e_1
+        point = d - at_1 * unit(angle) - at_2 * unit(before_c)
+        if abs(v_b) > 0.0 and abs(v_c) > 0.0:
+            second, last = two_lines(point, v_b * unit(before_c), v_c * turn_3, tolerance)
+            if not math.isnan(second):
+                out[0, 0] = turn_time(angle, w_a)
+                out[0, 1] = second
+                out[0, 2] = last
+
+
+@kernel
+def steer_batch(twists, triples, gaps, goals, tolerance):
+    """Both branches (k, 2, 3) of `steer`: k rows of trims, gaps (k, 2, 3), goals (k, 3)."""
+    k = triples.shape[0]
+    times = np.empty((k, 2, 3))
+    for row in range(k):
+        i, j, l = triples[row, 0], triples[row, 1], triples[row, 2]  # noqa: E741
+        steer(
+            (complex(twists[i, 0], twists[i, 1]), twists[i, 2]),
+            (complex(gaps[row, 0, 0], gaps[row, 0, 1]), gaps[row, 0, 2]),
+            (complex(twists[j, 0], twists[j, 1]), twists[j, 2]),
+            (complex(gaps[row, 1, 0], gaps[row, 1, 1]), gaps[row, 1, 2]),
+            (complex(twists[l, 0], twists[l, 1]), twists[l, 2]),
+            (complex(goals[row, 0], goals[row, 1]), goals[row, 2]),
+            tolerance,
+            times[row],
+        )
+    return times

@@ -1,0 +1,282 @@
+"""Exhaustive search: every word of a given number of trims.
+
+A word of n trims has n - 3 times more than the planar pose fixes. Words of three follow in closed
+form, longer ones are scanned; words that cannot span the plane have closed forms of their own.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from maneuver_automaton._compile import inner_kernel, kernel
+from maneuver_automaton.search._kernels_problem import condition, is_straight, propose, word_extra
+from maneuver_automaton.search._kernels_scan import (
+    choose_triple,
+    levels,
+    scan_one,
+    scan_two,
+    solve_triple,
+)
+from maneuver_automaton.search._kernels_steering import phase, unit
+from maneuver_automaton.switching_times._kernels import least_squares
+
+
+@inner_kernel
+def closed_form_words(problem, candidates, word, n, triple, ceiling):
+    """Words of three trims: isolated solutions."""
+    out = np.empty((2, 3))
+    times = np.zeros(3)
+    solve_triple(problem, candidates, word, n, triple, times, out)
+    for branch in range(2):
+        admissible = not math.isnan(out[branch, 0])
+        cost = problem.pad_cost + word_extra(problem, word, n)
+        for i in range(3):
+            times[i] = out[branch, i]
+            if times[i] <= 1e-9:
+                times[i] += problem.periods[word[i]]  # a full turn instead of none
+            if not 1e-9 < times[i] < np.inf:
+                admissible = False
+                break
+            cost += problem.rates[word[i]] * times[i]
+        if admissible and cost < ceiling:
+            span = np.empty((problem.targets.size, 2))
+            for r in range(problem.targets.size):
+                span[r, 0] = condition(problem, word, n, r, times) - 1e-9
+                span[r, 1] = span[r, 0] + 2e-9
+            levels(problem, candidates, word, n, times, times, times, span)
+
+
+@inner_kernel
+def low_rank_word(problem, candidates, word, n):
+    """Words that cannot reach every pose: one or two subgroups, or straights only.
+
+    The goal must lie where they can go. What each subgroup contributes follows in closed form;
+    the times are then the solution of a square linear system.
+    """
+    m = problem.targets.size
+    straight = True
+    for i in range(n):
+        if not is_straight(problem, word[i]):
+            straight = False
+    split = n  # first position of the second block
+    for i in range(1, n):
+        if not problem.parallel[word[0], word[i]]:
+            split = i
+            break
+    z = complex(problem.goal[0], problem.goal[1])
+    heading = problem.goal[2]
+    full = 2.0 * math.pi
+    if straight:
+        rank = 2 if split < n else 1
+        if n > rank + m or abs(heading - full * round(heading / full)) > 1e-9:
+            return
+        matrix = np.empty((2 + m, n))
+        rhs = np.empty(2 + m)
+        for i in range(n):
+            matrix[0, i] = problem.twists[word[i], 0]
+            matrix[1, i] = problem.twists[word[i], 1]
+            for r in range(m):
+                matrix[2 + r, i] = problem.rows[r, word[i]]
+        rhs[0], rhs[1] = z.real, z.imag
+        for r in range(m):
+            rhs[2 + r] = problem.targets[r]
+        times, found_rank = least_squares(matrix, rhs, 1e-11)
+        if found_rank == n:
+            propose(problem, candidates, word, n, times)
+        return
+    rank = 2 if split < n else 1
+    if n > rank + m:
+        return
+    blocks = np.zeros(2)
+    w_1, w_2 = problem.twists[word[0], 2], 0.0
+    v_1 = complex(problem.twists[word[0], 0], problem.twists[word[0], 1])
+    if rank == 1:
+        blocks[0] = heading
+    else:
+        w_2 = problem.twists[word[split], 2]
+        v_2 = complex(problem.twists[word[split], 0], problem.twists[word[split], 1])
+        if w_1 != 0.0 and w_2 != 0.0:
+            r_1, r_2 = -1j * v_1 / w_1, -1j * v_2 / w_2
+            blocks[0] = phase((z + r_1 - r_2 * unit(heading)) / (r_1 - r_2))
+            blocks[1] = heading - blocks[0]
+        elif w_1 != 0.0:
+            rest = z + 1j * v_1 / w_1 * (unit(heading) - 1.0)
+            blocks[0] = heading
+            blocks[1] = (rest * (v_2 * unit(heading)).conjugate()).real / abs(v_2) ** 2
+        else:
+            rest = z + 1j * v_2 / w_2 * (unit(heading) - 1.0)
+            blocks[0] = (rest * v_1.conjugate()).real / abs(v_1) ** 2
+            blocks[1] = heading
+    blocks[0] = blocks[0] - full * round(blocks[0] / full) if w_1 != 0.0 else blocks[0]
+    blocks[1] = blocks[1] - full * round(blocks[1] / full) if w_2 != 0.0 else blocks[1]
+    fastest = 0.0
+    for i in range(n):
+        fastest = max(fastest, abs(problem.twists[word[i], 2]))
+    most = 1
+    if problem.more_turns == 1 and problem.time_limit < np.inf:
+        most += math.floor(problem.time_limit * fastest / full)
+    for turns_1 in range(-most if w_1 != 0.0 else 0, (most if w_1 != 0.0 else 0) + 1):
+        for turns_2 in range(-most if w_2 != 0.0 else 0, (most if w_2 != 0.0 else 0) + 1):
+            matrix = np.zeros((rank + m, n))
+            rhs = np.empty(rank + m)
+            rhs[0] = blocks[0] + full * turns_1
+            if rank == 2:
+                rhs[1] = blocks[1] + full * turns_2
+            for i in range(n):
+                block = 0 if i < split else 1
+                head = word[0] if i < split else word[split]
+                twist = problem.twists[word[i]]
+                if problem.twists[head, 2] != 0.0:
+                    matrix[block, i] = twist[2]
+                else:
+                    along = problem.twists[head, 0] ** 2 + problem.twists[head, 1] ** 2
+                    matrix[block, i] = (
+                        twist[0] * problem.twists[head, 0] + twist[1] * problem.twists[head, 1]
+                    ) / along
+                for r in range(m):
+                    matrix[rank + r, i] = problem.rows[r, word[i]]
+            for r in range(m):
+                rhs[rank + r] = problem.targets[r]
+            times, found_rank = least_squares(matrix, rhs, 1e-11)
+            positive = found_rank == n
+            for i in range(n):
+                if not times[i] > 1e-9:
+                    positive = False
+            if positive:
+                propose(problem, candidates, word, n, times)
+
+
+@inner_kernel
+def promising(problem, word, n, ceiling):
+    """Whether a word can be cheaper than the dearest of the solutions asked for.
+
+    Lower bounds that hold for any times: way and turn at the best price per metre and radian, and
+    a fixed time at the best price per second.
+    """
+    if ceiling == np.inf:
+        return True
+    per_metre, per_radian, per_second = np.inf, np.inf, np.inf
+    for i in range(n):
+        twist = problem.twists[word[i]]
+        rate = problem.rates[word[i]]
+        if rate < 0.0:
+            return True
+        speed = math.hypot(twist[0], twist[1])
+        if speed > 0.0:
+            per_metre = min(per_metre, rate / speed)
+        if twist[2] != 0.0:
+            per_radian = min(per_radian, rate / abs(twist[2]))
+        per_second = min(per_second, rate)
+    full = 2.0 * math.pi
+    way = math.hypot(problem.goal[0], problem.goal[1])
+    turn = abs(problem.goal[2] - full * round(problem.goal[2] / full))
+    bound = 0.0
+    if way > 0.0:
+        bound = max(bound, way * per_metre)
+    if turn > 0.0:
+        bound = max(bound, turn * per_radian)
+    if problem.targets.size > 0 and problem.pad == 0 and problem.time_limit < np.inf:
+        bound = max(bound, problem.time_limit * per_second)
+    bound += problem.pad_cost + word_extra(problem, word, n)
+    return bound < ceiling
+
+
+@kernel
+def scan_words(problem, candidates, n, first, last, ceiling):
+    """Propose starts for words of `n` trims, at most one time free, number `first` to `last`.
+
+    Returns the number of the word to go on with: before `last` when the buffer is full.
+    """
+    word = np.zeros(n, dtype=np.int64)
+    triple = np.zeros(3, dtype=np.int64)
+    free = np.empty(max(n - 3, 0), dtype=np.int64)
+    for number in range(first, last):
+        if candidates.counter[0] > candidates.words.shape[0] // 2:
+            return number
+        kind = prepare_word(problem, candidates, n, number, word, triple, free, ceiling)
+        if kind == 2 and n == 3:
+            closed_form_words(problem, candidates, word, n, triple, ceiling)
+        elif kind == 2:
+            scan_one(problem, candidates, word, n, triple, free, ceiling)
+    return last
+
+
+@kernel
+def scan_flat_words(problem, candidates, n, first, last, ceiling):
+    """`scan_words` for words that cannot span the plane."""
+    word = np.zeros(n, dtype=np.int64)
+    triple = np.zeros(3, dtype=np.int64)
+    free = np.empty(max(n - 3, 0), dtype=np.int64)
+    for number in range(first, last):
+        if candidates.counter[0] > candidates.words.shape[0] // 2:
+            return number
+        if prepare_word(problem, candidates, n, number, word, triple, free, ceiling) == 1:
+            low_rank_word(problem, candidates, word, n)
+    return last
+
+
+@kernel
+def scan_long_words(problem, candidates, n, first, last, ceiling):
+    """`scan_words` for words that span and have two times free."""
+    word = np.zeros(n, dtype=np.int64)
+    triple = np.zeros(3, dtype=np.int64)
+    free = np.empty(2, dtype=np.int64)
+    for number in range(first, last):
+        if candidates.counter[0] > candidates.words.shape[0] // 2:
+            return number
+        if prepare_word(problem, candidates, n, number, word, triple, free, ceiling) == 2:
+            scan_two(problem, candidates, word, n, triple, free, ceiling)
+    return last
+
+
+@inner_kernel
+def prepare_word(problem, candidates, n, number, word, triple, free, ceiling):
+    """Fill `word`, `triple`, `free`: 0 nothing to do, 1 a word that cannot span, 2 one that can."""
+    n_trims = problem.twists.shape[0]
+    n_chosen = n
+    if problem.tail >= 0:
+        n_trims -= 1
+        n_chosen -= 1
+        word[n - 1] = problem.tail
+    left = number
+    for i in range(n_chosen - 1, -1, -1):
+        word[i] = left % n_trims
+        left //= n_trims
+    blocks = word_blocks(problem, word, n)
+    if blocks == 0:
+        return 0
+    candidates.counter[1] += 1
+    if not promising(problem, word, n, ceiling):
+        return 0
+    if blocks < 0:
+        return 1
+    if not choose_triple(problem, word, n, triple):
+        return 0
+    count = 0
+    for i in range(n):
+        if i != triple[0] and i != triple[1] and i != triple[2]:
+            free[count] = i
+            count += 1
+    return 2
+
+
+@inner_kernel
+def word_blocks(problem, word, n):
+    """Number of runs of parallel trims; negative where the word cannot span, 0 where it is useless.
+
+    Without linear conditions two parallel neighbours are never better than one of them.
+    """
+    blocks = 1
+    straights = 0
+    for i in range(n):
+        straights += is_straight(problem, word[i])
+        if i > 0:
+            if word[i] == word[i - 1]:
+                return 0
+            if not problem.parallel[word[i], word[i - 1]]:
+                blocks += 1
+            elif problem.targets.size == 0:
+                return 0
+    return -blocks if blocks <= 2 or straights == n else blocks

@@ -1,0 +1,307 @@
+"""Search by insertion: libraries of thousands of trims, with a certificate over all of them.
+
+A plan from a small sub-library is improved by inserting whichever trim of the whole library pays
+most, at the moment where it pays most, and solving the coasting times again. The work grows with
+the number of trims, not with its power.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.search.library_arrays import LibraryArrays, library_arrays
+from maneuver_automaton.search.result import SearchResult, SearchStatus, Solution
+from maneuver_automaton.search.setup import SearchSetup, search_setup
+from maneuver_automaton.search.words import in_order, resting, search_setup_words
+
+SEEDS = 10  # cheapest words that are improved, where the library is its own sub-library
+SEEDS_OF_MANY = 4  # the same for larger libraries: insertion makes more of them
+FEW = 14  # a library of up to this many moving trims is its own sub-library
+ACCURACY = 1e-9  # reduced costs above minus this, relative, count as none
+LONGEST = 24  # trims of one word under way
+FIRST_ROUNDS = 4  # insertions into every seed
+FIRST_ROUNDS_OF_MANY = 2
+FULL = 2  # how many of the then cheapest words go on
+FULL_OF_MANY = 1
+ROUNDS = 60  # insertions into these
+CHATTER = 5  # trims of a word in which two may chatter
+
+
+def search_insertion(
+    problem: Problem,
+    goal: Goal,
+    *,
+    alternatives: int = 0,
+    seeds: int | None = None,
+    time_limit: float = math.inf,
+) -> SearchResult:
+    """Improve the cheapest words of a sub-library by insertion from the whole library.
+
+    Parameters
+    ----------
+    problem : Problem
+    goal : Goal
+    alternatives : int
+        How many solutions beside the cheapest, as far as the seeds lead to different words.
+    seeds : int, optional
+        How many words of the sub-library to start from; by default 10, or 4 for large libraries.
+    time_limit : float
+        [s] after which no further seed is begun.
+
+    Returns
+    -------
+    SearchResult
+        Solutions by rising cost; the certificate of each is its smallest reduced cost over the
+        whole library and all times: at least ``-1e-9`` where Pontryagin's condition holds.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.automaton import Automaton
+    >>> from maneuver_automaton.costs import Cost
+    >>> from maneuver_automaton.models import Unicycle
+    >>> speeds = [-2, -1.5, -1, -0.5, 0, 0.5, 1, 1.5, 2]
+    >>> robot = Automaton.of_grid(Unicycle(), [speeds, speeds])
+    >>> from maneuver_automaton.problem import Horizon
+    >>> cost, horizon = Cost(effort=1), Horizon(time=1.25)
+    >>> problem = Problem(robot, [-2, 0, 0], [0, 0, 0], cost=cost, horizon=horizon)
+    >>> best = search_insertion(problem, problem.goals[0]).solutions[0]
+    >>> round(best.cost, 6), best.certificate > -1e-9
+    (3.25, True)
+    """
+    deadline = time.monotonic() + time_limit
+    setup = search_setup(problem, goal)
+    if setup.start_is_goal and (problem.horizon.time is None or setup.rest is not None):
+        return resting(problem, setup)
+    library = library_arrays(problem, setup)
+    many = len(setup.trims) > FEW
+    if seeds is None:
+        seeds = max(SEEDS_OF_MANY if many else SEEDS, alternatives + 1)
+    begun = list(_seeds(problem, setup, library, seeds, deadline))
+    counts = {"expansions": 0, "insertions": 0, "seeds": 0}
+    most = problem.horizon.max_trims or LONGEST
+    limit = problem.search.max_expansions
+    works: list[_Work] = []
+    status = SearchStatus.EXHAUSTED
+    for word, times in begun:
+        if works and (time.monotonic() > deadline or (limit is not None and len(works) >= limit)):
+            status = SearchStatus.OUT_OF_BUDGET
+            break
+        work = _Work(word, times)
+        work.improve(library, most, FIRST_ROUNDS_OF_MANY if many else FIRST_ROUNDS, counts)
+        works.append(work)
+    works = sorted((work for work in works if math.isfinite(work.cost)), key=lambda w: w.cost)
+    for work in works[: max(FULL_OF_MANY if many else FULL, alternatives + 1)]:
+        if work.least < -ACCURACY * library.scale and time.monotonic() < deadline:
+            work.improve(library, most, ROUNDS, counts)
+    for work in works:
+        if work.size - library.tail >= CHATTER:
+            work.calm(library)
+    if time.monotonic() > deadline:
+        status = SearchStatus.OUT_OF_BUDGET
+    counts["expansions"] = counts["seeds"] = len(works)
+    improved = [
+        work.solution(problem, library) for work in works if work.size - library.tail <= most
+    ]
+    solutions = tuple(_distinct(in_order(improved)))[: alternatives + 1]
+    return SearchResult(
+        status=SearchStatus.FOUND if solutions else status,
+        solutions=solutions,
+        complete=False,
+        counts=counts,
+    )
+
+
+class _Work:
+    """A word under way: the buffers that the kernel lengthens in place."""
+
+    def __init__(self, word: IntArray, times: Array) -> None:
+        self.word = np.zeros(LONGEST + 4, dtype=np.int64)
+        self.times = np.zeros(LONGEST + 4)
+        self.size = word.size
+        self.word[: self.size], self.times[: self.size] = word, times
+        self.cost, self.least = math.inf, -math.inf
+
+    def improve(
+        self, library: LibraryArrays, most: int, rounds: int, counts: dict[str, int]
+    ) -> None:
+        """Insert what pays until nothing does, `rounds` times at most."""
+        from maneuver_automaton.search import _kernels_insertion as kernels
+
+        self.size, self.cost, self.least, used = kernels.improve_word(
+            library.twists,
+            library.rates,
+            library.goal,
+            library.rows,
+            library.targets,
+            library.n_priced,
+            library.tail,
+            self.word,
+            self.times,
+            self.size,
+            min(most, LONGEST),
+            ACCURACY * library.scale,
+            rounds,
+        )
+        counts["insertions"] += int(used)
+
+    def calm(self, library: LibraryArrays) -> None:
+        """Shorten runs of trims that chatter."""
+        from maneuver_automaton.search import _kernels_insertion as kernels
+
+        self.size, self.cost, self.least = kernels.calm_word(
+            library.twists,
+            library.rates,
+            library.goal,
+            library.rows,
+            library.targets,
+            library.n_priced,
+            library.tail,
+            self.word,
+            self.times,
+            self.size,
+            self.cost,
+        )
+
+    def solution(self, problem: Problem, library: LibraryArrays) -> Solution:
+        """What it has come to."""
+        kept = slice(0, self.size - library.tail)
+        word = library.trims[self.word[kept]]
+        switching = problem.cost.switching(problem.automaton.body_velocities[word])
+        return Solution(
+            word=word,
+            durations=self.times[kept].copy(),
+            cost=float(self.cost) + library.fixed_cost + switching,
+            certificate=float(self.least),
+        )
+
+
+def _seeds(
+    problem: Problem, setup: SearchSetup, library: LibraryArrays, seeds: int, deadline: float
+) -> Iterator[tuple[IntArray, Array]]:
+    """Cheapest words of the sub-library, in the library's numbers, rest and free turn appended."""
+    small = sub_library(setup)
+    start = _Start(problem, setup, small, library, seeds, deadline)
+    found = start.words(problem)
+    if not found and problem.horizon.time is not None:
+        found = start.fast_words()
+    yield from found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Start:
+    """Where seeds come from."""
+
+    problem: Problem
+    setup: SearchSetup
+    small: SearchSetup
+    library: LibraryArrays
+    seeds: int
+    deadline: float
+
+    def words(self, problem: Problem) -> list[tuple[IntArray, Array]]:
+        """Seeds of `problem` from the sub-library."""
+        solutions = search_setup_words(
+            problem,
+            self.small,
+            alternatives=self.seeds - 1,
+            deadline=self.deadline,
+            spare=True,
+        )
+        return [self._in_library(solution) for solution in solutions]
+
+    def fast_words(self) -> list[tuple[IntArray, Array]]:
+        """For a fixed time that no seed meets: first insert for least time, then pad."""
+        from maneuver_automaton.costs import Cost
+        from maneuver_automaton.problem import Horizon
+
+        limit = self.problem.horizon.time
+        hurry = replace(self.problem, cost=Cost(time=1.0), horizon=Horizon())
+        setup = search_setup(hurry, self.problem.goals[0])
+        setup = replace(setup, goal=self.setup.goal, free_heading=self.setup.free_heading)
+        library = library_arrays(hurry, setup)
+        start = _Start(hurry, setup, sub_library(setup), library, self.seeds, self.deadline)
+        met = []
+        for word, times in start.words(hurry):
+            work = _Work(word, times)
+            work.improve(library, LONGEST, ROUNDS, {"insertions": 0})
+            if not math.isfinite(work.cost):
+                continue
+            quick = work.solution(hurry, library)
+            if limit is not None and quick.duration <= limit + 1e-9:
+                met.append(self._in_library(quick))
+        return met
+
+    def _in_library(self, solution: Solution) -> tuple[IntArray, Array]:
+        word = self.library.number_of[solution.word].tolist()
+        times = solution.durations.tolist()
+        limit = self.problem.horizon.time
+        if limit is not None and self.library.rest is not None and word[-1:] != [self.library.rest]:
+            word.append(self.library.rest)
+            times.append(max(0.0, limit - sum(times)))
+        if self.setup.free_heading:
+            word.append(len(self.library.rates) - 1)
+            times.append(_free_turn(self.library, word[:-1], times))
+        return np.array(word, dtype=np.int64), np.array(times)
+
+
+def _free_turn(library: LibraryArrays, word: list[int], times: list[float]) -> float:
+    """Time of the turn that a free heading needs at the end of a word [s], at 1 rad/s."""
+    turned = float(library.twists[word, 2] @ np.array(times))
+    return float(np.remainder(library.goal[2] - turned, 2.0 * np.pi))
+
+
+def sub_library(setup: SearchSetup) -> SearchSetup:
+    """A few trims that reach far: extreme in eight directions, fast and cheap straights, spins."""
+    m = len(setup.trims)
+    if m <= FEW:
+        return setup
+    twists = setup.twists
+    scaled = twists / np.abs(twists).max(axis=0).clip(min=1e-300)
+    chosen: list[int] = []
+
+    def choose(score: Array, mask: Array) -> None:
+        rows = np.flatnonzero(mask)
+        if rows.size:
+            order = np.lexsort((setup.rates[rows], -score[rows].round(12)))
+            chosen.append(int(rows[order[0]]))
+
+    everything = np.ones(m, dtype=bool)
+    straight = twists[:, 2] == 0.0
+    spin = np.linalg.norm(scaled[:, :2], axis=1) == 0.0
+    speed = np.linalg.norm(twists[:, :2], axis=1)
+    for sign in (1.0, -1.0):
+        forward = sign * twists[:, 0] > 0.0
+        choose(speed, straight & forward)
+        choose(-setup.rates / speed.clip(min=1e-300), straight & forward)
+        choose(sign * twists[:, 2], spin)
+        if twists[:, 1].any():
+            choose(sign * twists[:, 1], straight)
+        if twists[:, 3].any():
+            choose(sign * twists[:, 3], everything)
+    for angle in np.arange(8) * np.pi / 4.0:
+        choose(np.cos(angle) * scaled[:, 0] + np.sin(angle) * scaled[:, 2], everything)
+    rows = np.array(list(dict.fromkeys(chosen)))
+    return replace(
+        setup,
+        trims=setup.trims[rows],
+        twists=twists[rows],
+        rates=setup.rates[rows],
+        periods=setup.periods[rows],
+    )
+
+
+def _distinct(solutions: Iterator[Solution]) -> Iterator[Solution]:
+    """Each word once, with its cheapest times."""
+    seen: set[tuple[int, ...]] = set()
+    for solution in solutions:
+        word = tuple(solution.word.tolist())
+        if word not in seen:
+            seen.add(word)
+            yield solution

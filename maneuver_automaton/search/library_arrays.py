@@ -1,0 +1,79 @@
+"""The whole library of a problem as the arrays that insertion and pricing share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.search.setup import SearchSetup
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class LibraryArrays:
+    """Moving trims, then rest where it pads a fixed time, then the turn of a free heading."""
+
+    trims: IntArray  # (M,) their indices in the automaton, -1 for the free turn
+    number_of: IntArray  # from the automaton's indices to these, -1 where there is none
+    twists: Array  # (M, 4)
+    rates: Array  # (M,) that of rest taken off where it pads
+    rows: Array  # (m, M) altitude, fixed time
+    targets: Array  # (m,)
+    goal: Array  # (4,)
+    rest: int | None  # its number here
+    free_heading: bool
+    n_priced: int  # all but the free turn
+    fixed_cost: float  # of the whole fixed time at rest
+
+    @property
+    def tail(self) -> int:
+        """How many turns of a free heading follow every word: 0 or 1."""
+        return int(self.free_heading)
+
+    @property
+    def scale(self) -> float:
+        """Size of a typical rate."""
+        return max(1.0, float(np.abs(self.rates).max()))
+
+
+def library_arrays(problem: Problem, setup: SearchSetup) -> LibraryArrays:
+    """Arrays of every trim that can be inserted."""
+    limit = problem.horizon.time
+    trims, twists, rates = setup.trims, setup.twists, setup.rates
+    rest = None
+    if limit is not None and setup.rest is not None:
+        rest = len(trims)
+        trims = np.append(trims, setup.rest)
+        twists = np.vstack([twists, np.zeros(4)])
+        rates = np.append(rates - setup.rest_rate, 0.0)
+    weights = np.ones(len(trims))
+    n_priced = len(trims)
+    number_of = np.full(len(problem.automaton), -1, dtype=np.int64)
+    number_of[trims] = np.arange(len(trims))
+    if setup.free_heading:
+        trims = np.append(trims, -1)
+        twists = np.vstack([twists, [0.0, 0.0, 1.0, 0.0]])
+        rates = np.append(rates, 0.0)
+        weights = np.append(weights, 0.0)
+    rows, targets = [], []
+    if setup.climbs:
+        rows.append(twists[:, 3])
+        targets.append(float(setup.goal[3]))
+    if limit is not None:
+        rows.append(weights)
+        targets.append(limit)
+    return LibraryArrays(
+        trims=trims,
+        number_of=number_of,
+        twists=np.ascontiguousarray(twists),
+        rates=np.ascontiguousarray(rates),
+        rows=np.array(rows).reshape(len(rows), len(rates)),
+        targets=np.array(targets, dtype=np.float64),
+        goal=np.array(setup.goal),
+        rest=rest,
+        free_heading=setup.free_heading,
+        n_priced=n_priced,
+        fixed_cost=setup.rest_rate * limit if rest is not None and limit is not None else 0.0,
+    )

@@ -1,0 +1,123 @@
+"""Words whose trims must each last a while: the least coasting time as a fixed displacement."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.groups import SE2xR
+from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.search.result import SearchResult, SearchStatus, Solution
+from maneuver_automaton.search.setup import SearchSetup, search_setup
+from maneuver_automaton.search.words import in_order, resting
+from maneuver_automaton.switching_times import TimesStatus, solve_switching_times
+
+MOST_TRIMS = 4  # moving trims of a word
+RESTARTS = 3  # starts of each word beside the first
+
+
+def search_with_least_times(
+    problem: Problem, goal: Goal, *, alternatives: int | None = 0, time_limit: float = math.inf
+) -> SearchResult:
+    """Words in which every moving trim lasts at least ``horizon.min_coast``.
+
+    What must be coasted at least is a fixed displacement after each trim; what is coasted beyond
+    it is solved for. Each word is solved from several starts, so solutions may be missed.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.automaton import Automaton
+    >>> from maneuver_automaton.models import Unicycle
+    >>> from maneuver_automaton.problem import Horizon
+    >>> controls = {"ahead": (1, 0), "left": (1, 1), "right": (1, -1)}
+    >>> robot = Automaton.of_controls(Unicycle(), controls)
+    >>> problem = Problem(robot, [0, 0, 0], [4, 1, 0], horizon=Horizon(max_trims=3, min_coast=0.5))
+    >>> best = search_with_least_times(problem, problem.goals[0]).solutions[0]
+    >>> bool((best.durations >= 0.5).all()), round(best.cost, 4)
+    (True, 4.3623)
+    """
+    deadline = time.monotonic() + time_limit
+    setup = search_setup(problem, goal)
+    if setup.start_is_goal and (problem.horizon.time is None or setup.rest is not None):
+        return resting(problem, setup)
+    padded = problem.horizon.time is not None and setup.rest is not None
+    most = min(problem.horizon.max_trims or MOST_TRIMS + 1, MOST_TRIMS + int(padded))
+    found: list[Solution] = []
+    words = 0
+    status = SearchStatus.EXHAUSTED
+    for word in _words(setup, most):
+        if time.monotonic() > deadline or words == problem.search.max_expansions:
+            status = SearchStatus.OUT_OF_BUDGET
+            break
+        words += 1
+        for rest in (False, True) if padded else (False,):
+            if len(word) + rest <= most:
+                found += _solved(problem, setup, word, rest=rest)
+    solutions = tuple(in_order(found))
+    if alternatives is not None:
+        solutions = solutions[: alternatives + 1]
+    return SearchResult(
+        status=SearchStatus.FOUND if solutions else status,
+        solutions=solutions,
+        complete=False,
+        counts={"expansions": words},
+    )
+
+
+def _words(setup: SearchSetup, most: int) -> Iterator[tuple[int, ...]]:
+    """Words of moving trims without equal neighbours, shorter ones first."""
+    for n in range(1, most + 1):
+        for word in itertools.product(range(len(setup.trims)), repeat=n):
+            if all(a != b for a, b in itertools.pairwise(word)):
+                yield word
+
+
+def _solved(
+    problem: Problem, setup: SearchSetup, word: tuple[int, ...], *, rest: bool
+) -> list[Solution]:
+    """The word with its best times, if it reaches the goal."""
+    rows = list(word)
+    least = problem.horizon.min_coast
+    twists, rates = setup.twists[rows], setup.rates[rows]
+    floors = np.full(len(rows), least)
+    trims = setup.trims[rows]
+    if rest and setup.rest is not None:
+        twists = np.vstack([twists, np.zeros(4)])
+        rates = np.append(rates, setup.rest_rate)
+        floors = np.append(floors, 0.0)
+        trims = np.append(trims, setup.rest)
+    counted = len(rates)
+    if setup.free_heading:
+        twists = np.vstack([twists, [0.0, 0.0, 1.0, 0.0]])
+        rates, floors = np.append(rates, 0.0), np.append(floors, 0.0)
+    if setup.free_heading and problem.horizon.time is not None:
+        return []  # the turn of a free heading takes no time, which this formulation cannot say
+    total = problem.horizon.time
+    beyond = None if total is None else total - float(floors.sum())
+    if beyond is not None and beyond < 0.0:
+        return []
+    gaps = SE2xR.exp(floors[:, None] * twists).pose
+    solved = solve_switching_times(
+        twists, rates, setup.goal, total=beyond, gaps=gaps, restarts=RESTARTS
+    )
+    if solved.status is TimesStatus.FAILED:
+        return []
+    times = (np.maximum(solved.durations, 0.0) + floors)[:counted]
+    longest = problem.horizon.max_time
+    if longest is not None and times.sum() > longest + 1e-9:
+        return []
+    if rest and times[-1] <= 1e-9:
+        return []  # the same word without rest is tried too
+    return [_priced(problem, Solution(word=trims, durations=times, cost=0.0), rates[:counted])]
+
+
+def _priced(problem: Problem, solution: Solution, rates: Array) -> Solution:
+    velocities = problem.automaton.body_velocities[solution.word]
+    cost = float(rates @ solution.durations) + problem.cost.switching(velocities)
+    return replace(solution, cost=cost)

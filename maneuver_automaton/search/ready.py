@@ -1,0 +1,92 @@
+"""Load or compile the search kernels before the clock runs: a time limit is for searching.
+
+The first time after installation two processes share the compiling: one compiles what scans
+words, the other what refines and prices them, into the cache that both read.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+
+from maneuver_automaton._compile import kernel_folder
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.models import Unicycle
+from maneuver_automaton.problem import Goal, Horizon, Problem
+from maneuver_automaton.search.certificate import certificate
+from maneuver_automaton.search.insertion import search_insertion
+from maneuver_automaton.search.result import Solution
+from maneuver_automaton.search.words import compile_polishing, compile_scanning, search_words
+from maneuver_automaton.switching_times import solve_switching_times
+
+PATIENCE = 120.0  # [s] for the second process
+
+
+@functools.cache
+def load_word_kernels(max_trims: int) -> None:
+    """Have the kernels of exhaustive search ready, for words of up to `max_trims` trims."""
+    problem = replace(_smallest_problem(), horizon=Horizon(max_trims=max_trims))
+    helper = _second_process()
+    if helper is not None:
+        compile_scanning(problem)
+        try:
+            helper.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            helper.kill()  # what it did not compile is compiled here
+    found = search_words(problem, problem.goals[0])
+    certificate(problem, problem.goals[0], found.solutions[0])
+
+
+@functools.cache
+def load_insertion_kernels() -> None:
+    """Have the kernels of insertion ready."""
+    problem = _smallest_problem()
+    search_insertion(problem, problem.goals[0])
+
+
+@functools.cache
+def load_times_kernels() -> None:
+    """Have the kernels that solve the times of a given word ready, and those that price it."""
+    solve_switching_times([[1.0, 0.0, 0.0]], [1.0], [1.0, 0.0, 0.0])
+    problem = _smallest_problem()
+    straight = Solution(word=np.array([0]), durations=np.array([1.0]), cost=1.0)
+    certificate(problem, problem.goals[0], straight)
+
+
+def compile_the_rest() -> None:
+    """What the second process does: compile what refines words and prices them."""
+    problem = _smallest_problem()
+    compile_polishing(problem)
+    straight = Solution(word=np.array([0]), durations=np.array([1.0]), cost=1.0)
+    certificate(problem, problem.goals[0], straight)
+
+
+def _second_process() -> subprocess.Popen[bytes] | None:
+    """A process that compiles its share; None if nothing is to be compiled, or cannot be kept."""
+    folder = kernel_folder()
+    if folder is None or any(folder.rglob("*scan_words*")) or (os.cpu_count() or 1) < 2:
+        return None
+    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+        return None
+    order = f"from {__name__} import compile_the_rest; compile_the_rest()"
+    try:
+        return subprocess.Popen(
+            [sys.executable, "-c", order],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+    except OSError:
+        return None
+
+
+def _smallest_problem() -> Problem:
+    robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "left": (1.0, 1.0)})
+    goal = Goal(pose=np.array([1.0, 0.0, 0.0]))
+    return Problem(robot, np.zeros(3), (goal,), cost=Cost(time=1.0))

@@ -1,0 +1,79 @@
+"""A planning problem as the arrays that search kernels share."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.groups import group_of
+from maneuver_automaton.problem import Goal, Problem
+
+FULL_TURN = 2.0 * np.pi
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class SearchSetup:
+    """The moving trims of a problem, and the goal seen from its start (altitude 0 in the plane)."""
+
+    trims: IntArray  # (M,) their indices in the automaton, of equal twists only the cheapest
+    twists: Array  # (M, 4)
+    rates: Array  # (M,) cost per second
+    periods: Array  # (M,) [s] time of a full turn, inf for straights
+    goal: Array  # (4,) relative to the start
+    free_heading: bool
+    rest: int | None  # index of the cheapest rest
+    rest_rate: float
+    climbs: bool  # whether altitude is a condition
+
+    @property
+    def start_is_goal(self) -> bool:
+        """Whether nothing need be done."""
+        turn = math.remainder(self.goal[2], FULL_TURN)
+        still = np.abs(self.goal[[0, 1, 3]]).max() <= 1e-12
+        return bool(still and (self.free_heading or abs(turn) <= 1e-12))
+
+
+def search_setup(problem: Problem, goal: Goal) -> SearchSetup:
+    """What every search for one goal starts from."""
+    automaton = problem.automaton
+    dof = automaton.model.group.dof
+    twists = np.zeros((len(automaton), 4))
+    twists[:, :dof] = automaton.body_velocities
+    rates = problem.rates
+    still = ~twists.any(axis=1)
+    groups = automaton.twist_groups
+    cheapest = np.ones(len(automaton), dtype=bool)
+    if (groups != np.arange(len(automaton))).any():
+        order = np.lexsort((rates, groups))
+        cheapest[:] = False
+        cheapest[order[np.append(True, np.diff(groups[order]) != 0)]] = True
+    moving = np.flatnonzero(cheapest & ~still)
+    relative = np.zeros(4)
+    relative[:dof] = _seen_from(problem.start, goal.pose)
+    resting = np.flatnonzero(cheapest & still)
+    with np.errstate(divide="ignore"):
+        periods = np.where(twists[:, 2] != 0.0, FULL_TURN / np.abs(twists[:, 2]), np.inf)
+    return SearchSetup(
+        trims=moving.astype(np.int64),
+        twists=twists[moving],
+        rates=rates[moving],
+        periods=periods[moving],
+        goal=relative,
+        free_heading=goal.free_heading,
+        rest=int(resting[0]) if resting.size else None,
+        rest_rate=float(rates[resting[0]]) if resting.size else 0.0,
+        climbs=bool(twists[:, 3].any() or relative[3] != 0.0),
+    )
+
+
+def _seen_from(start: Array, goal: Array) -> Array:
+    """The goal relative to the start: places are subtracted first, so that no digit is lost."""
+    group = group_of(start.size)
+    places = [0, 1, *range(3, start.size)]
+    here, there = np.array(start), np.array(goal)
+    there[places] -= here[places]
+    here[places] = 0.0
+    return (group(here).inverse() @ group(there)).pose

@@ -1,0 +1,322 @@
+"""End of a word, its derivatives, and the Newton iterations on its coasting times.
+
+A word is given by rows: `twists` (n, 4) of (v_x, v_y, turn rate, v_z), `gaps` (n, 4) the
+displacement (x, y, heading, z) after each trim, `goal` (4,) relative to the start. Linear
+conditions ``rows @ times = targets`` carry altitude and fixed time. Times are relative to nothing:
+seconds.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from maneuver_automaton._compile import inner_kernel
+from maneuver_automaton.groups._kernels import coast, compose, nearest_turn
+
+
+@inner_kernel
+def assign(target, source):
+    """``target[:] = source`` in one dimension, as a loop: quicker to compile."""
+    for i in range(target.size):
+        target[i] = source[i]
+
+
+@inner_kernel
+def end_and_columns(twists, gaps, times, columns):
+    """End pose (x, y, heading) of a word; fills `columns` (n, 3) with its derivatives by the times.
+
+    A trim that lasts longer turns all that follows about its own instantaneous centre:
+    column i is ``(R v_i + w_i J (end - p_i), w_i)`` in the world, p_i any point of trim i.
+    """
+    n = times.size
+    x, y, heading = 0.0, 0.0, 0.0
+    for i in range(n):
+        dx, dy, turn = coast(twists[i, 0], twists[i, 1], twists[i, 2], times[i])
+        x, y, heading = compose(x, y, heading, dx, dy, turn)
+        c, s = math.cos(heading), math.sin(heading)
+        columns[i, 0] = c * twists[i, 0] - s * twists[i, 1] + twists[i, 2] * y
+        columns[i, 1] = s * twists[i, 0] + c * twists[i, 1] - twists[i, 2] * x
+        columns[i, 2] = twists[i, 2]
+        x, y, heading = compose(x, y, heading, gaps[i, 0], gaps[i, 1], gaps[i, 2])
+    for i in range(n):
+        columns[i, 0] -= twists[i, 2] * y
+        columns[i, 1] += twists[i, 2] * x
+    return x, y, heading
+
+
+@inner_kernel
+def lagrangian_hessian(columns, p_x, p_y, hessian):
+    """Fill `hessian` (n, n) with second derivatives of ``p . end position`` by the times.
+
+    For i <= j it is ``w_i (p x column_j)``: the earlier trim turns the later one's column.
+    """
+    n = columns.shape[0]
+    for j in range(n):
+        across = p_y * columns[j, 0] - p_x * columns[j, 1]
+        for i in range(j + 1):
+            hessian[i, j] = columns[i, 2] * across
+            hessian[j, i] = hessian[i, j]
+
+
+@inner_kernel
+def least_squares(matrix, rhs, relative_tolerance):
+    """Basic least-squares solution of ``matrix x = rhs`` and the rank; both arguments are spoilt.
+
+    Householder QR with column pivoting (Golub, Van Loan, Matrix Computations, Alg. 5.4.1).
+    """
+    m, n = matrix.shape
+    order = np.arange(n)
+    rank = 0
+    largest = 0.0
+    for k in range(min(m, n)):
+        best, best_norm = k, -1.0
+        for j in range(k, n):
+            norm = 0.0
+            for i in range(k, m):
+                norm += matrix[i, j] * matrix[i, j]
+            if norm > best_norm:
+                best, best_norm = j, norm
+        best_norm = math.sqrt(best_norm)
+        largest = max(largest, best_norm)
+        if best_norm <= relative_tolerance * largest or best_norm == 0.0:
+            break
+        if best != k:
+            for i in range(m):
+                matrix[i, k], matrix[i, best] = matrix[i, best], matrix[i, k]
+            order[k], order[best] = order[best], order[k]
+        head = matrix[k, k]
+        alpha = -best_norm if head >= 0.0 else best_norm
+        v0 = head - alpha
+        scale = 0.0
+        for i in range(k + 1, m):
+            scale += matrix[i, k] * matrix[i, k]
+        scale = v0 * v0 + scale
+        for j in range(k + 1, n):
+            dot = v0 * matrix[k, j]
+            for i in range(k + 1, m):
+                dot += matrix[i, k] * matrix[i, j]
+            factor = 2.0 * dot / scale
+            matrix[k, j] -= factor * v0
+            for i in range(k + 1, m):
+                matrix[i, j] -= factor * matrix[i, k]
+        dot = v0 * rhs[k]
+        for i in range(k + 1, m):
+            dot += matrix[i, k] * rhs[i]
+        factor = 2.0 * dot / scale
+        rhs[k] -= factor * v0
+        for i in range(k + 1, m):
+            rhs[i] -= factor * matrix[i, k]
+        matrix[k, k] = alpha
+        rank += 1
+    solution = np.zeros(n)
+    for k in range(rank - 1, -1, -1):
+        value = rhs[k]
+        for j in range(k + 1, rank):
+            value -= matrix[k, j] * solution[order[j]]
+        solution[order[k]] = value / matrix[k, k]
+    return solution, rank
+
+
+@inner_kernel
+def residual(twists, gaps, times, goal, rows, targets, columns, out):
+    """Fill `out` (3 + m,) with end minus goal and the linear conditions; returns its largest entry.
+
+    The heading is compared modulo a full turn.
+    """
+    x, y, heading = end_and_columns(twists, gaps, times, columns)
+    out[0] = x - goal[0]
+    out[1] = y - goal[1]
+    out[2] = nearest_turn(heading - goal[2])
+    for r in range(targets.size):
+        value = -targets[r]
+        for i in range(times.size):
+            value += rows[r, i] * times[i]
+        out[3 + r] = value
+    worst = 0.0
+    for e in range(out.size):
+        worst = max(worst, abs(out[e]))
+    return worst
+
+
+@inner_kernel
+def jacobian(columns, rows):
+    """Derivatives (3 + m, n) of all conditions by the times."""
+    n = columns.shape[0]
+    matrix = np.empty((3 + rows.shape[0], n))
+    for i in range(n):
+        matrix[0, i] = columns[i, 0]
+        matrix[1, i] = columns[i, 1]
+        matrix[2, i] = columns[i, 2]
+        for r in range(rows.shape[0]):
+            matrix[3 + r, i] = rows[r, i]
+    return matrix
+
+
+@inner_kernel
+def multipliers(matrix, rates):
+    """Multipliers (3 + m,) that best make ``rates + matrix^T multipliers`` vanish."""
+    m, n = matrix.shape
+    transposed = np.empty((n, m))
+    rhs = np.empty(n)
+    for i in range(n):
+        rhs[i] = -rates[i]
+        for e in range(m):
+            transposed[i, e] = matrix[e, i]
+    return least_squares(transposed, rhs, 1e-10)[0]
+
+
+@inner_kernel
+def newton_stationary(rates, twists, gaps, goal, rows, targets, times, iterations):
+    """Newton on ``rates + J^T p = 0, conditions = 0`` without bounds, from `times`, in place.
+
+    Returns the multipliers (3 + m,), the largest condition violated and the largest
+    stationarity violated.
+    """
+    n = times.size
+    n_rows = 3 + targets.size
+    columns = np.empty((n, 3))
+    gap = np.empty(n_rows)
+    hessian = np.empty((n, n))
+    worst = residual(twists, gaps, times, goal, rows, targets, columns, gap)
+    p = multipliers(jacobian(columns, rows), rates)
+    slope = np.inf
+    for _ in range(iterations):
+        matrix = jacobian(columns, rows)
+        lagrangian_hessian(columns, p[0], p[1], hessian)
+        system = np.zeros((n + n_rows, n + n_rows))
+        rhs = np.empty(n + n_rows)
+        slope = 0.0
+        for i in range(n):
+            value = rates[i]
+            for e in range(n_rows):
+                value += matrix[e, i] * p[e]
+                system[i, n + e] = matrix[e, i]
+                system[n + e, i] = matrix[e, i]
+            rhs[i] = -value
+            slope = max(slope, abs(value))
+            for j in range(n):
+                system[i, j] = hessian[i, j]
+        for e in range(n_rows):
+            rhs[n + e] = -gap[e]
+        if worst < 1e-13 and slope < 1e-12:
+            break
+        step, _rank = least_squares(system, rhs, 1e-13)
+        length = 0.0
+        for i in range(n):
+            length = max(length, abs(step[i]))
+        shrink = min(1.0, 0.5 / length) if length > 0.0 else 1.0
+        for i in range(n):
+            times[i] += shrink * step[i]
+        for e in range(n_rows):
+            p[e] += shrink * step[n + e]
+        worst = residual(twists, gaps, times, goal, rows, targets, columns, gap)
+        if length < 1e-15:
+            break
+    return p, worst, slope
+
+
+@inner_kernel
+def newton_feasible(twists, gaps, goal, rows, targets, times, iterations):
+    """Gauss-Newton on the conditions alone, from `times`, in place; the largest one violated."""
+    n = times.size
+    columns = np.empty((n, 3))
+    gap = np.empty(3 + targets.size)
+    best = np.empty(n)
+    assign(best, times)
+    worst = residual(twists, gaps, times, goal, rows, targets, columns, gap)
+    least = worst
+    for _ in range(iterations):
+        if worst < 1e-15:
+            break
+        for e in range(gap.size):
+            gap[e] = -gap[e]
+        step, _rank = least_squares(jacobian(columns, rows), gap, 1e-11)
+        for i in range(n):
+            times[i] += step[i]
+        worst = residual(twists, gaps, times, goal, rows, targets, columns, gap)
+        if worst < least:
+            least = worst
+            assign(best, times)
+        elif worst > 0.5 * least and least < 1e-12:
+            break
+    assign(times, best)
+    return least
+
+
+@inner_kernel
+def curvature(rates, twists, gaps, goal, rows, targets, times, p):
+    """Smallest pivot of the Lagrangian's Hessian on the null space of the conditions.
+
+    Positive: no small feasible change of the times is cheaper. `inf` where nothing can change.
+    """
+    n = times.size
+    columns = np.empty((n, 3))
+    gap = np.empty(3 + targets.size)
+    residual(twists, gaps, times, goal, rows, targets, columns, gap)
+    hessian = np.empty((n, n))
+    lagrangian_hessian(columns, p[0], p[1], hessian)
+    basis = null_space(jacobian(columns, rows))
+    d = basis.shape[1]
+    if d == 0:
+        return np.inf
+    reduced = np.zeros((d, d))
+    for k in range(d):
+        for q in range(d):
+            for i in range(n):
+                for j in range(n):
+                    reduced[k, q] += basis[i, k] * hessian[i, j] * basis[j, q]
+    smallest = np.inf
+    for k in range(d):  # LDL^T without pivoting: enough for the sign
+        pivot = reduced[k, k]
+        smallest = min(smallest, pivot)
+        if pivot <= 0.0:
+            break
+        for i in range(k + 1, d):
+            factor = reduced[i, k] / pivot
+            for j in range(k, d):
+                reduced[i, j] -= factor * reduced[k, j]
+    return smallest
+
+
+@inner_kernel
+def null_space(matrix):
+    """Basis (n, n - rank) of what `matrix` (m, n) maps to zero; Gauss-Jordan, full pivoting."""
+    m, n = matrix.shape
+    work = np.empty((m, n))
+    order = np.arange(n)
+    rank = 0
+    largest = 0.0
+    for i in range(m):
+        for j in range(n):
+            work[i, j] = matrix[i, j]
+            largest = max(largest, abs(work[i, j]))
+    for k in range(min(m, n)):
+        best_i, best_j, best = k, k, 0.0
+        for i in range(k, m):
+            for j in range(k, n):
+                if abs(work[i, j]) > best:
+                    best_i, best_j, best = i, j, abs(work[i, j])
+        if best <= 1e-11 * largest or best == 0.0:
+            break
+        for j in range(n):
+            work[k, j], work[best_i, j] = work[best_i, j], work[k, j]
+        for i in range(m):
+            work[i, k], work[i, best_j] = work[i, best_j], work[i, k]
+        order[k], order[best_j] = order[best_j], order[k]
+        pivot = work[k, k]
+        for j in range(n):
+            work[k, j] /= pivot
+        for i in range(m):
+            if i != k:
+                factor = work[i, k]
+                for j in range(n):
+                    work[i, j] -= factor * work[k, j]
+        rank += 1
+    basis = np.zeros((n, n - rank))
+    for free in range(n - rank):
+        basis[order[rank + free], free] = 1.0
+        for k in range(rank):
+            basis[order[k], free] = -work[k, rank + free]
+    return basis

@@ -1,0 +1,347 @@
+"""The best coasting times of a fixed word: a primal-dual interior-point Newton method.
+
+Minimise ``rates . times`` subject to ``end = goal``, linear conditions, and ``times >= 0``, with
+exact second derivatives (Nocedal, Wright, Numerical Optimization, 2nd ed., Sec. 19.3).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from maneuver_automaton._compile import inner_kernel, kernel
+from maneuver_automaton.switching_times._kernels import (
+    assign,
+    jacobian,
+    lagrangian_hessian,
+    least_squares,
+    multipliers,
+    newton_feasible,
+    newton_stationary,
+    residual,
+)
+
+SOLVED, FEASIBLE, FAILED = 0, 1, 2
+
+
+@inner_kernel
+def merit(rates, times, barrier, gap, weight):
+    """Cost with a logarithmic barrier and an exact penalty."""
+    value = 0.0
+    for i in range(times.size):
+        value += rates[i] * times[i] - barrier * math.log(times[i])
+    for e in range(gap.size):
+        value += weight * abs(gap[e])
+    return value
+
+
+@inner_kernel
+def interior_point(rates, twists, gaps, goal, rows, targets, times, barrier, iterations):
+    """Primal-dual Newton from `times` > 0, in place; returns (converged, slack of each bound)."""
+    n = times.size
+    n_rows = 3 + targets.size
+    columns = np.empty((n, 3))
+    gap = np.empty(n_rows)
+    trial_gap = np.empty(n_rows)
+    hessian = np.empty((n, n))
+    trial = np.empty(n)
+    slack = np.empty(n)
+    for i in range(n):
+        slack[i] = barrier / times[i]
+        trial[i] = rates[i] - slack[i]
+    worst = residual(twists, gaps, times, goal, rows, targets, columns, gap)
+    p = multipliers(jacobian(columns, rows), trial)
+    system = np.empty((n + n_rows, n + n_rows))
+    rhs = np.empty(n + n_rows)
+    for _ in range(iterations):
+        matrix = jacobian(columns, rows)
+        lagrangian_hessian(columns, p[0], p[1], hessian)
+        slope = 0.0
+        complementarity = 0.0
+        centring = 0.0
+        for i in range(n):
+            value = rates[i] - slack[i]
+            for e in range(n_rows):
+                value += matrix[e, i] * p[e]
+            rhs[i] = value
+            slope = max(slope, abs(value))
+            complementarity = max(complementarity, abs(times[i] * slack[i]))
+            centring = max(centring, abs(times[i] * slack[i] - barrier))
+        if worst < 1e-11 and slope < 1e-9 and complementarity < 1e-10:
+            return True, slack
+        while max(worst, slope, centring) < 10.0 * barrier and barrier > 1e-13:
+            barrier = max(1e-13, min(0.1 * barrier, barrier**1.5))
+            centring = 0.0
+            for i in range(n):
+                centring = max(centring, abs(times[i] * slack[i] - barrier))
+        damping = 0.0
+        step = np.zeros(n + n_rows)
+        for _attempt in range(8):
+            for i in range(n + n_rows):
+                for j in range(n + n_rows):
+                    system[i, j] = 0.0
+            for i in range(n):
+                value = rates[i] - barrier / times[i]
+                for e in range(n_rows):
+                    value += matrix[e, i] * p[e]
+                    system[i, n + e] = matrix[e, i]
+                    system[n + e, i] = matrix[e, i]
+                rhs[i] = -value
+                for j in range(n):
+                    system[i, j] = hessian[i, j]
+                system[i, i] += slack[i] / times[i] + damping
+            for e in range(n_rows):
+                rhs[n + e] = -gap[e]
+            step = least_squares(system, rhs, 1e-13)[0]
+            bend = 0.0
+            size = 0.0
+            for i in range(n):
+                size += step[i] * step[i]
+                bend += step[i] * step[i] * (slack[i] / times[i] + damping)
+                for j in range(n):
+                    bend += step[i] * hessian[i, j] * step[j]
+            if bend > 1e-10 * size:
+                break
+            damping = max(10.0 * damping, 1e-2)
+        longest = 1.0
+        longest_dual = 1.0
+        for i in range(n):
+            if step[i] < 0.0:
+                longest = min(longest, -0.995 * times[i] / step[i])
+            change = (barrier - slack[i] * step[i]) / times[i] - slack[i]
+            if change < 0.0:
+                longest_dual = min(longest_dual, -0.995 * slack[i] / change)
+        for i in range(n):  # a turn is not crossed in one step
+            if abs(step[i] * twists[i, 2]) > 1.0:
+                longest = min(longest, 1.0 / abs(step[i] * twists[i, 2]))
+        weight = 1.0
+        for e in range(n_rows):
+            weight = max(weight, 2.0 * abs(p[e] + step[n + e]))
+        before = merit(rates, times, barrier, gap, weight)
+        share = longest
+        for _attempt in range(10):
+            for i in range(n):
+                trial[i] = times[i] + share * step[i]
+            worst = residual(twists, gaps, trial, goal, rows, targets, columns, trial_gap)
+            if merit(rates, trial, barrier, trial_gap, weight) <= before + 1e-12 * abs(before):
+                break
+            share *= 0.5
+        for i in range(n):
+            change = (barrier - slack[i] * step[i]) / times[i] - slack[i]
+            slack[i] += longest_dual * change
+        assign(times, trial)
+        assign(gap, trial_gap)
+        for e in range(n_rows):
+            p[e] += share * step[n + e]
+        for i in range(n):  # keep the slacks near the central path
+            slack[i] = min(max(slack[i], barrier / (1e10 * times[i])), 1e10 * barrier / times[i])
+    return False, slack
+
+
+@inner_kernel
+def levenberg_marquardt(twists, gaps, goal, rows, targets, times, iterations):
+    """Feasible times near `times`, in place, by projected Levenberg-Marquardt; what is violated."""
+    n = times.size
+    n_rows = 3 + targets.size
+    columns = np.empty((n, 3))
+    gap = np.empty(n_rows)
+    trial = np.empty(n)
+    worst = residual(twists, gaps, times, goal, rows, targets, columns, gap)
+    square = 0.0
+    for e in range(n_rows):
+        square += gap[e] * gap[e]
+    damping = 1e-2
+    for _ in range(iterations):
+        if worst < 1e-13:
+            break
+        residual(twists, gaps, times, goal, rows, targets, columns, gap)
+        matrix = jacobian(columns, rows)
+        system = np.zeros((n_rows + n, n))
+        rhs = np.zeros(n_rows + n)
+        for i in range(n):
+            pinned = times[i] <= 0.0
+            if pinned:  # does the gradient push it further below zero?
+                push = 0.0
+                for e in range(n_rows):
+                    push += matrix[e, i] * gap[e]
+                pinned = push >= 0.0
+            if not pinned:
+                for e in range(n_rows):
+                    system[e, i] = matrix[e, i]
+            system[n_rows + i, i] = math.sqrt(damping)
+        for e in range(n_rows):
+            rhs[e] = -gap[e]
+        step = least_squares(system, rhs, 1e-14)[0]
+        for i in range(n):
+            trial[i] = max(0.0, times[i] + step[i])
+        after = residual(twists, gaps, trial, goal, rows, targets, columns, gap)
+        square_after = 0.0
+        for e in range(n_rows):
+            square_after += gap[e] * gap[e]
+        if square_after < square:
+            assign(times, trial)
+            worst, square = after, square_after
+            damping = max(0.2 * damping, 1e-14)
+        else:
+            damping *= 5.0
+            if damping > 1e8:
+                break
+    return worst
+
+
+@inner_kernel
+def finish_with_gaps(rates, twists, gaps, goal, rows, targets, times, keep):
+    """Refine the times at the positions `keep`, the others stay zero; returned as by `finish`."""
+    n, count, n_rows = times.size, keep.size, 3 + targets.size
+    columns = np.empty((n, 3))
+    gap = np.empty(n_rows)
+    some = np.empty((n_rows, count))
+    worst = np.inf
+    for step_number in range(11):
+        worst = residual(twists, gaps, times, goal, rows, targets, columns, gap)
+        matrix = jacobian(columns, rows)
+        for e in range(n_rows):
+            gap[e] = -gap[e]
+            for k in range(count):
+                some[e, k] = matrix[e, keep[k]]
+        if worst < 1e-15 or step_number == 10:
+            break
+        work = np.empty((n_rows, count))
+        for e in range(n_rows):
+            assign(work[e], some[e])
+        step = least_squares(work, gap, 1e-11)[0]
+        for k in range(count):
+            times[keep[k]] += step[k]
+    some_rates = np.empty(count)
+    for k in range(count):
+        some_rates[k] = rates[keep[k]]
+    p = multipliers(some, some_rates)
+    slope = 0.0
+    for k in range(count):
+        value = some_rates[k]
+        for e in range(n_rows):
+            value += some[e, k] * p[e]
+        slope = max(slope, abs(value))
+        if times[keep[k]] < 0.0:
+            worst = np.inf
+    return worst, slope, p
+
+
+@inner_kernel
+def finish(rates, twists, gaps, goal, rows, targets, times, slack, keep):
+    """Set vanishing times to zero and refine the others, in place.
+
+    Returns (largest violation, largest stationarity violated, multipliers).
+    """
+    n = times.size
+    m = targets.size
+    count = 0
+    for i in range(n):
+        if times[i] < 1e-9 or (times[i] < 1e-4 and slack[i] > 1e2 * times[i]):
+            times[i] = 0.0
+        else:
+            keep[count] = i
+            count += 1
+    some_twists = np.empty((count, 4))
+    some_gaps = np.zeros((count, 4))
+    some_rates = np.empty(count)
+    some_rows = np.empty((m, count))
+    some_times = np.empty(count)
+    fixed_gaps = False
+    for i in range(n):
+        for k in range(4):
+            fixed_gaps = fixed_gaps or gaps[i, k] != 0.0
+    if fixed_gaps:  # maneuvers stay where they are, whether their trims last or not
+        return finish_with_gaps(rates, twists, gaps, goal, rows, targets, times, keep[:count])
+    for k in range(count):
+        assign(some_twists[k], twists[keep[k]])
+        some_rates[k] = rates[keep[k]]
+        some_times[k] = times[keep[k]]
+        for r in range(m):
+            some_rows[r, k] = rows[r, keep[k]]
+    p = np.zeros(3 + m)
+    slope = 0.0
+    if count > 3 + m:
+        p, worst, slope = newton_stationary(
+            some_rates, some_twists, some_gaps, goal, some_rows, targets, some_times, 20
+        )
+    worst = newton_feasible(some_twists, some_gaps, goal, some_rows, targets, some_times, 10)
+    if count <= 3 + m:
+        columns = np.empty((count, 3))
+        residual(
+            some_twists, some_gaps, some_times, goal, some_rows, targets, columns, np.empty(3 + m)
+        )
+        matrix = jacobian(columns, some_rows)
+        p = multipliers(matrix, some_rates)
+        for k in range(count):
+            value = some_rates[k]
+            for e in range(3 + m):
+                value += matrix[e, k] * p[e]
+            slope = max(slope, abs(value))
+    for k in range(count):
+        if some_times[k] < -1e-12:
+            worst = np.inf
+        times[keep[k]] = max(0.0, some_times[k])
+    return worst, slope, p
+
+
+@inner_kernel
+def solve_from(rates, twists, gaps, goal, rows, targets, times, barrier):
+    """Interior point, then refinement; `times` in place. Returns (status, multipliers, slope)."""
+    n = times.size
+    start = np.empty(n)
+    for i in range(n):
+        times[i] = max(times[i], 30.0 * barrier)
+        start[i] = times[i]
+    keep = np.empty(n, dtype=np.int64)
+    _, slack = interior_point(rates, twists, gaps, goal, rows, targets, times, barrier, 60)
+    inner = np.empty(n)
+    assign(inner, times)
+    worst, slope, p = finish(rates, twists, gaps, goal, rows, targets, times, slack, keep)
+    if worst < 1e-10 and slope < 1e-7:
+        return 0, p, slope
+    for i in range(n):  # the refinement went astray: feasibility alone, from where it began
+        times[i] = inner[i] if math.isfinite(inner[i]) else start[i]
+    worst = levenberg_marquardt(twists, gaps, goal, rows, targets, times, 60)
+    if worst > 1e-10:
+        assign(times, start)
+        worst = levenberg_marquardt(twists, gaps, goal, rows, targets, times, 100)
+    columns = np.empty((n, 3))
+    residual(twists, gaps, times, goal, rows, targets, columns, np.empty(3 + targets.size))
+    p = multipliers(jacobian(columns, rows), rates)
+    return (1 if worst < 1e-10 else 2), p, np.inf
+
+
+@kernel
+def solve_times(rates, twists, gaps, goal, rows, targets, starts, best_times):
+    """Best of several starts (k, n), into `best_times`; returns (status, cost, multipliers, slope).
+
+    Stops at the first start that is solved; later ones are restarts.
+    """
+    n = best_times.size
+    times = np.empty(n)
+    best_cost = np.inf
+    best_status = 2
+    best_p = np.zeros(3 + targets.size)
+    best_slope = np.inf
+    for k in range(starts.shape[0]):
+        assign(times, starts[k])
+        scale = 0.0
+        for i in range(n):
+            scale = max(scale, abs(rates[i]))
+        status, p, slope = solve_from(
+            rates, twists, gaps, goal, rows, targets, times, 1e-2 * max(scale, 1e-3)
+        )
+        if status == 2:
+            continue
+        cost = 0.0
+        for i in range(n):
+            cost += rates[i] * times[i]
+        if status < best_status or (status == best_status and cost < best_cost):
+            best_status, best_cost, best_slope = status, cost, slope
+            best_p = p
+            assign(best_times, times)
+        if status == 0:
+            break
+    return best_status, best_cost, best_p, best_slope

@@ -1,0 +1,189 @@
+"""Libraries as files: exact, versioned, and guarded by a hash."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.automaton.library import automaton_hash, load_library, save_library
+from maneuver_automaton.errors import InvalidLibrary
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.models import Car, Unicycle, UserModel
+from maneuver_automaton.primitives import Maneuver, Trim
+
+ROBOT = Automaton.of_controls(Unicycle(max_speed=2.0), {"ahead": (1.5, 0.0), "spin": (0.0, 1.0)})
+
+
+@pytest.fixture
+def path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A library in the current folder."""
+    monkeypatch.chdir(tmp_path)
+    save_library(ROBOT, "robot.json")
+    return Path("robot.json")
+
+
+def edit(path: Path, **changes: object) -> None:
+    """Change keys of a library; None removes one. The hash goes too."""
+    document = json.loads(path.read_text()) | {"hash": None} | changes
+    path.write_text(json.dumps({k: v for k, v in document.items() if v is not None}))
+
+
+@given(
+    controls=st.dictionaries(
+        st.text(min_size=1).filter(str.strip),
+        st.tuples(st.floats(-2.0, 2.0), st.floats(-9.0, 9.0)),
+        min_size=1,
+    )
+)
+def test_reads_back_to_the_last_bit(tmp_path_factory, controls):
+    robot = Automaton.of_controls(Unicycle(max_speed=2.0), controls)
+    path = tmp_path_factory.getbasetemp() / "library.json"
+    save_library(robot, path)
+    read = load_library(path)
+    assert read.trim_names == robot.trim_names
+    assert np.array_equal(read.controls, robot.controls)
+    assert np.array_equal(read.body_velocities, robot.body_velocities)
+    assert read.model == robot.model
+    assert automaton_hash(read) == automaton_hash(robot)
+
+
+def test_maneuvers_and_limits_of_trims_are_kept(path):
+    trims = (
+        Trim(name="a", body_velocity=[1.0, 0.0, 0.0], control=[1.0, 0.0], max_duration=3.0),
+        Trim(name="b", body_velocity=[0.0, 0.0, 1.0], control=[0.0, 1.0]),
+    )
+    hop = Maneuver(name="hop", source="a", target="b", displacement=[0.1, 0.0, 0.2], duration=0.3)
+    save_library(Automaton(Unicycle(), trims, (hop,), name="hops"), path)
+    read = load_library(path)
+    assert read.name == "hops"
+    assert read["a"].max_duration == 3.0
+    assert read.maneuvers[0].displacement.tolist() == [0.1, 0.0, 0.2]
+    assert read.maneuvers[0].duration == 0.3
+
+
+def test_a_car_is_kept(path):
+    car = Automaton.of_controls(Car(wheelbase=2.8, max_steering=0.6), {"left": (1.0, 0.6)})
+    save_library(car, path)
+    assert load_library(path).model == car.model
+
+
+def test_name_and_comment_do_not_count(path):
+    document = json.loads(path.read_text())
+    path.write_text(json.dumps(document | {"name": "another", "comment": "made by hand"}))
+    assert automaton_hash(load_library(path)) == automaton_hash(ROBOT)
+
+
+def test_the_hash_sees_a_change(path):
+    path.write_text(path.read_text().replace("1.5", "1.25"))
+    changed = Automaton.of_controls(
+        Unicycle(max_speed=2.0), {"ahead": (1.25, 0.0), "spin": (0.0, 1.0)}
+    )
+    with pytest.raises(InvalidLibrary) as error:
+        load_library(path)
+    assert str(error.value) == (
+        f"robot.json: hash: got {automaton_hash(ROBOT)!r}, but the content has "
+        f"{automaton_hash(changed)!r}: the file was changed after it was written; to accept it as "
+        'it is, delete the line "hash"'
+    )
+    edit(path)
+    assert automaton_hash(load_library(path)) == automaton_hash(changed)
+
+
+def test_hashes_differ_by_model_and_control():
+    others = [
+        Automaton.of_controls(Unicycle(), {"ahead": (1.5, 0.0), "spin": (0.0, 1.0)}),
+        Automaton.of_controls(Unicycle(max_speed=2.0), {"ahead": (1.5, 0.0), "spin": (0.0, 2.0)}),
+    ]
+    assert len({automaton_hash(one) for one in (ROBOT, *others)}) == 3
+
+
+def test_a_model_that_no_file_can_state_has_a_hash_but_no_file(tmp_path):
+    boat = UserModel(
+        name="boat", group=SE2, control_names=("push",), velocity=lambda z, u: [u[0], 0.0, 0.0]
+    )
+    library = Automaton.of_controls(boat, {"ahead": [1.0]})
+    assert len(automaton_hash(library)) == 64
+    with pytest.raises(InvalidLibrary) as error:
+        save_library(library, tmp_path / "boat.json")
+    assert str(error.value) == "model: a file cannot state 'boat', only unicycle, car"
+
+
+AHEAD = {"name": "ahead", "control": [1.5, 0.0], "body_velocity": [1.5, 0.0, 0.0]}
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {"format": "something"},
+            ': is not a library, need an object with "format": "maneuver-automaton library"',
+        ),
+        ({"schema": 2}, ": schema: got 2, need 1"),
+        ({"colour": "red"}, ": library: unknown key 'colour', need format, schema, name, comment, "
+                            "hash, model, trims, maneuvers"),
+        ({"trims": None}, ": library: the key 'trims' is missing"),
+        ({"trims": []}, ": automaton: got no trim, need at least one"),
+        ({"trims": {}}, ": trims: got {}, need a list"),
+        ({"trims": [5]}, ": trims[0]: got 5, need an object"),
+        ({"trims": [AHEAD | {"control": "abc"}]},
+         ": trims[0]: control: got 'abc', need a list of numbers"),
+        ({"trims": [AHEAD | {"control": [True, 0.0]}]},
+         ": trims[0]: control: got True, need a number"),
+        ({"trims": [AHEAD | {"control": [1.5]}]},
+         ": trim 'ahead': got twist (3,) and control (1,), need (3,) and (2,) for the unicycle"),
+        ({"trims": [AHEAD, AHEAD]}, ": trim 'ahead': the name is used twice"),
+        ({"trims": [AHEAD | {"body_velocity": [1.0, 0.0, 0.0]}]},
+         ": trims[0] 'ahead': got the body velocity [1.0, 0.0, 0.0], but the unicycle moves with "
+         "[1.5, 0.0, 0.0] under this control"),
+        ({"trims": [AHEAD | {"control": [3.0, 0.0], "body_velocity": [3.0, 0.0, 0.0]}]},
+         ": trims[0] 'ahead': speed = 3 is outside the limits [-2, 2] of the unicycle"),
+        ({"trims": [AHEAD | {"max_duration": -1}]},
+         ": trim 'ahead': max_duration must be positive, got -1.0 s"),
+        ({"model": {"kind": "tank"}}, ": model: got the kind 'tank', need one of unicycle, car"),
+        ({"model": {"kind": "car"}}, ": model: the key 'wheelbase' is missing"),
+        ({"model": {"kind": "car", "wheelbase": -1}},
+         ": car: wheelbase must be positive, got -1.0 m"),
+        ({"maneuvers": [{"name": "m", "source": "ahead", "target": "spinn",
+                         "displacement": [0, 0, 0], "duration": 0}]},
+         ": no trim 'spinn' among ahead, spin; did you mean 'spin'?"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said(path, changes, message):
+    edit(path, **changes)
+    with pytest.raises(InvalidLibrary) as error:
+        load_library(path)
+    assert str(error.value) == f"robot.json{message}"
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"{", ":1: not valid JSON: Expecting property name enclosed in double quotes"),
+        (b"\xff\xfe\x00", ": is not a text file in UTF-8"),
+        (b'{"a": 1, "a": 2}', ": not valid JSON: the key 'a' stands twice"),
+        (b"[1]", ': is not a library, need an object with "format": "maneuver-automaton library"'),
+    ],
+)
+def test_files_that_are_no_library(path, content, message):
+    path.write_bytes(content)
+    with pytest.raises(InvalidLibrary) as error:
+        load_library(path)
+    assert str(error.value) == f"robot.json{message}"
+
+
+def test_deep_nonsense(path):
+    path.write_text("[" * 100_000)
+    with pytest.raises(InvalidLibrary, match=r"^robot\.json: not valid JSON: "):
+        load_library(path)
+
+
+def test_no_file(tmp_path):
+    with pytest.raises(InvalidLibrary) as error:
+        load_library(tmp_path / "nowhere.json")
+    assert str(error.value) == f"{tmp_path / 'nowhere.json'}: no such file"

@@ -1,0 +1,212 @@
+"""Plans: poses and controls at every time, samples, and the law that moves them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.groups import SE2, SE2xR
+from maneuver_automaton.primitives import Trim
+
+AHEAD = Trim(name="ahead", body_velocity=[2.0, 0.0, 0.0], control=[2.0, 0.0])
+LEFT = Trim(name="left", body_velocity=[1.0, 0.0, 1.0], control=[1.0, 1.0])
+BACK = Trim(name="back", body_velocity=[-1.0, 0.0, -0.5], control=[-1.0, -0.5])
+SPIN = Trim(name="spin", body_velocity=[0.0, 0.0, -2.0], control=[0.0, -2.0])
+REST = Trim(name="rest", body_velocity=[0.0, 0.0, 0.0], control=[0.0, 0.0])
+PLANAR = (AHEAD, LEFT, BACK, SPIN, REST)
+CLIMB = Trim(name="climb", body_velocity=[1.0, 0.0, 0.5, 1.0], control=[1.0])
+SINK = Trim(name="sink", body_velocity=[2.0, 0.0, -0.5, -0.25], control=[2.0])
+
+PIECES = st.lists(
+    st.tuples(st.sampled_from(PLANAR), st.floats(0.0, 10.0) | st.just(0.0)), max_size=5
+)
+STARTS = arrays(np.float64, 3, elements=st.floats(-100.0, 100.0))
+QUARTER = math.pi / 2
+
+
+def plan_of(pieces, start=(0.0, 0.0, 0.0), **more):
+    trims = tuple(trim for trim, _ in pieces)
+    return Plan(start, trims, durations=[time for _, time in pieces], **more)
+
+
+TURN = plan_of([(AHEAD, 1.0), (LEFT, QUARTER), (AHEAD, 0.5)], start_time=10.0)
+
+
+@pytest.mark.parametrize(
+    ("time", "pose"),
+    [
+        (-5.0, (0.0, 0.0, 0.0)),
+        (10.0, (0.0, 0.0, 0.0)),
+        (10.25, (0.5, 0.0, 0.0)),
+        (11.0, (2.0, 0.0, 0.0)),
+        (11.0 + QUARTER / 2, (2.0 + math.sqrt(0.5), 1.0 - math.sqrt(0.5), QUARTER / 2)),
+        (11.0 + QUARTER, (3.0, 1.0, QUARTER)),
+        (11.25 + QUARTER, (3.0, 1.5, QUARTER)),
+        (11.5 + QUARTER, (3.0, 2.0, QUARTER)),
+        (1e9, (3.0, 2.0, QUARTER)),
+    ],
+)
+def test_poses_by_hand(time, pose):
+    np.testing.assert_allclose(TURN.pose_at(time), pose, atol=1e-14)
+
+
+def test_words_and_times_by_hand():
+    assert TURN.word == ("ahead", "left", "ahead")
+    assert TURN.duration == 1.5 + QUARTER
+    assert TURN.switching_times.tolist() == [10.0, 11.0, 11.0 + QUARTER, 11.5 + QUARTER]
+    np.testing.assert_allclose(TURN.end, [3.0, 2.0, QUARTER], atol=1e-15)
+    np.testing.assert_array_equal(TURN.end, TURN.switching_poses[-1])
+
+
+@pytest.mark.parametrize(
+    ("time", "control"),
+    [
+        (0.0, AHEAD.control),
+        (10.999, AHEAD.control),
+        (11.0, LEFT.control),
+        (11.0 + QUARTER, AHEAD.control),
+        (99.0, AHEAD.control),
+    ],
+)
+def test_at_a_switch_the_control_is_that_of_the_trim_that_begins(time, control):
+    assert TURN.control_at(time).tolist() == control.tolist()
+
+
+def test_times_may_be_a_batch():
+    times = np.array([[9.0, 10.5, 11.0], [11.5, 12.9, 20.0]])
+    poses, controls = TURN.pose_at(times), TURN.control_at(times)
+    assert poses.shape == (2, 3, 3)
+    assert controls.shape == (2, 3, 2)
+    for index in np.ndindex(times.shape):
+        assert poses[index].tolist() == TURN.pose_at(times[index]).tolist()
+        assert controls[index].tolist() == TURN.control_at(times[index]).tolist()
+
+
+@given(pieces=PIECES, start=STARTS, start_time=st.floats(-100.0, 100.0))
+def test_samples_are_close_and_hold_every_switch(pieces, start, start_time):
+    plan = plan_of(pieces, start, start_time=start_time)
+    samples = plan.sample()
+    steps = np.diff(samples.pose, axis=0)
+    assert (np.hypot(steps[:, 0], steps[:, 1]) <= 0.05 * (1 + 1e-9)).all()
+    assert (np.abs(steps[:, 2]) <= 0.05 * (1 + 1e-9)).all()
+    assert (np.diff(samples.time) >= 0.0).all()
+    assert set(plan.switching_times) <= set(samples.time)
+    np.testing.assert_allclose(samples.pose[0], plan.start, atol=1e-12)
+    assert samples.pose[-1].tolist() == plan.end.tolist()
+    np.testing.assert_allclose(samples.pose, plan.pose_at(samples.time), atol=1e-12)
+    assert len(samples.time) == len(samples.control) == len(samples.reduced_state)
+
+
+@given(pieces=PIECES.filter(bool))
+def test_between_two_samples_the_control_drives_from_one_to_the_other(pieces):
+    plan = plan_of(pieces)
+    samples = plan.sample()
+    # both planar trims of a unicycle: (v, omega) is its control
+    twists = np.insert(samples.control, 1, 0.0, axis=1)
+    held = np.diff(samples.time)[:, None] * twists[:-1]
+    reached = SE2(samples.pose[:-1]) @ SE2.exp(held)
+    np.testing.assert_allclose(reached.pose, samples.pose[1:], atol=1e-11)
+    assert samples.control[-1].tolist() == plan.trims[-1].control.tolist()
+
+
+@pytest.mark.parametrize("step", [0.01, 0.3])
+def test_the_steps_can_be_chosen(step):
+    samples = plan_of([(AHEAD, 1.0), (SPIN, 1.0)]).sample(max_step_m=step, max_step_rad=2 * step)
+    moved = np.diff(samples.pose, axis=0)
+    assert (np.abs(moved[:, 0]) <= step * (1 + 1e-9)).all()
+    assert (np.abs(moved[:, 2]) <= 2 * step * (1 + 1e-9)).all()
+    needed = math.ceil(2.0 / step) + math.ceil(1.0 / step)
+    assert needed <= len(samples.time) <= needed + 3
+
+
+def test_headings_go_on_over_several_turns():
+    samples = plan_of([(SPIN, 4 * math.pi), (LEFT, 6 * math.pi)]).sample()
+    assert samples.pose[:, 2].min() == pytest.approx(-8 * math.pi)
+    assert samples.pose[-1, 2] == pytest.approx(-2 * math.pi)
+    assert np.abs(np.diff(samples.pose[:, 2])).max() <= 0.05 * (1 + 1e-9)
+
+
+@given(pieces=PIECES, start=STARTS, by=STARTS)
+def test_a_moved_plan_is_moved_at_every_time(pieces, start, by):
+    plan, group_element = plan_of(pieces, start, start_time=2.0), SE2(by)
+    moved = plan.moved(group_element)
+    assert moved.word == plan.word
+    assert moved.start_time == plan.start_time
+    assert moved.durations.tolist() == plan.durations.tolist()
+    times = np.linspace(0.0, plan.duration + 4.0, 30)
+    there = group_element @ SE2(plan.pose_at(times))
+    np.testing.assert_allclose(moved.pose_at(times), there.pose, atol=1e-9)
+
+
+def test_a_plan_with_height_moves_too():
+    plan = plan_of([(CLIMB, 2.0), (SINK, 4.0)], start=(1.0, 2.0, 0.5, 3.0))
+    assert plan.end[3] == 3.0 + 2.0 - 1.0
+    by = SE2xR([5.0, -1.0, 2.0, 7.0])
+    np.testing.assert_allclose(plan.moved(by).end, (by @ SE2xR(plan.end)).pose, atol=1e-13)
+    steps = np.diff(plan.sample().pose, axis=0)[:, [0, 1, 3]]
+    assert (np.linalg.norm(steps, axis=1) <= 0.05 * (1 + 1e-9)).all()
+
+
+@given(pieces=PIECES, start=STARTS)
+def test_the_way_back_is_the_plan_of_the_opposite_trims(pieces, start):
+    plan = plan_of(pieces, start)
+    opposite = [
+        Trim(name=trim.name, body_velocity=-trim.body_velocity, control=-trim.control)
+        for trim in reversed(plan.trims)
+    ]
+    back = Plan(plan.end, opposite, durations=plan.durations[::-1])
+    np.testing.assert_allclose(back.end, plan.start, atol=1e-10)
+
+
+def test_an_empty_plan_stays_where_it_is():
+    plan = Plan([1.0, 2.0, 3.0], (), durations=[], start_time=5.0)
+    assert plan.word == ()
+    assert plan.duration == 0.0
+    assert plan.switching_times.tolist() == [5.0]
+    assert plan.end.tolist() == [1.0, 2.0, 3.0]
+    assert plan.pose_at([[0.0], [9.0]]).tolist() == [[[1.0, 2.0, 3.0]]] * 2
+    samples = plan.sample()
+    assert samples.time.tolist() == [5.0]
+    assert samples.pose.tolist() == [[1.0, 2.0, 3.0]]
+    assert samples.control.shape == samples.reduced_state.shape == (1, 0)
+    assert plan.moved(SE2([1.0, 0.0, 0.0])).end.tolist() == [2.0, 2.0, 3.0]
+    with pytest.raises(ValueError, match=r"^plan: an empty word has no control$"):
+        plan.control_at(5.0)
+
+
+def test_a_trim_of_no_duration_changes_no_pose():
+    plan = plan_of([(AHEAD, 1.0), (SPIN, 0.0), (LEFT, 1.0)])
+    without = plan_of([(AHEAD, 1.0), (LEFT, 1.0)])
+    times = np.linspace(0.0, 2.0, 21)
+    np.testing.assert_array_equal(plan.pose_at(times), without.pose_at(times))
+    assert plan.control_at(1.0).tolist() == LEFT.control.tolist()
+
+
+def test_a_waiting_plan_has_its_two_ends_as_samples():
+    samples = plan_of([(REST, 3.0)], start=(1.0, 0.0, 0.0)).sample()
+    assert samples.time.tolist() == [0.0, 3.0]
+    assert samples.pose.tolist() == [[1.0, 0.0, 0.0]] * 2
+
+
+@pytest.mark.parametrize(
+    ("start", "durations", "message"),
+    [
+        ([0.0, 0.0], [1.0], "start: got shape (2,), need 3 or 4 components last"),
+        ([0.0, 0.0, math.nan], [1.0], "start: got nan, need finite numbers"),
+        ([0.0, 0.0, 0.0], [], "plan: got (0,) durations for 1 trims"),
+        ([0.0, 0.0, 0.0], [1.0, 2.0], "plan: got (2,) durations for 1 trims"),
+        ([0.0, 0.0, 0.0], [[1.0]], "plan: got (1, 1) durations for 1 trims"),
+        ([0.0, 0.0, 0.0], [-0.5], "plan: durations must not be negative, got -0.5 s"),
+        ([0.0, 0.0, 0.0], [math.inf], "durations: got inf, need finite numbers"),
+    ],
+)
+def test_what_is_wrong_is_said(start, durations, message):
+    with pytest.raises(ValueError) as error:
+        Plan(start, (AHEAD,), durations=durations)
+    assert str(error.value) == message

@@ -1,0 +1,98 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.models import Unicycle
+from maneuver_automaton.plotting import (
+    draw_automaton,
+    draw_motions,
+    save_automaton_figure,
+    trim_colors,
+)
+from maneuver_automaton.primitives import Maneuver, Trim
+from tests.plotting.cases import ROBOT, assert_picture
+
+GRID = Automaton.of_grid(Unicycle(), [np.linspace(-2, 2, 9), np.linspace(-2, 2, 9)])
+
+
+def with_inertia():
+    speeds = (0.0, 1.0, 2.0)
+    trims = tuple(
+        Trim(
+            name=f"speed {v:g}",
+            body_velocity=np.array([v, 0.0, 0.0]),
+            control=np.zeros(2),
+            reduced_state=np.array([v]),
+        )
+        for v in speeds
+    )
+    maneuvers = tuple(
+        Maneuver(
+            name=f"{a:g} to {b:g}",
+            source=f"speed {a:g}",
+            target=f"speed {b:g}",
+            displacement=np.array([1.0, 0.0, 0.0]),
+            duration=1.0,
+        )
+        for a, b in ((0.0, 1.0), (1.0, 2.0), (2.0, 1.0), (1.0, 0.0))
+    )
+    return Automaton(Unicycle(), trims, maneuvers, name="with inertia")
+
+
+def test_trims_are_nodes_and_free_switches_are_lines():
+    artists = draw_automaton(Figure().add_subplot(), ROBOT)
+    assert [text.get_text() for text in artists.names] == list(ROBOT.trim_names)
+    assert len(artists.nodes.get_paths()) == 5
+    assert len(artists.switches.get_segments()) == 10
+    assert artists.maneuvers == ()
+    colors = trim_colors({trim.name: trim.body_velocity for trim in ROBOT.trims})
+    assert [to_rgb(color) for color in artists.motions.get_colors()] == list(colors.values())
+
+
+def test_maneuvers_are_arrows_and_classes_do_not_switch():
+    artists = draw_automaton(Figure().add_subplot(), with_inertia())
+    assert len(artists.maneuvers) == 4
+    assert len(artists.switches.get_segments()) == 0
+
+
+def test_many_trims_are_points_over_turn_rate_and_speed():
+    ax = Figure().add_subplot()
+    artists = draw_automaton(ax, GRID)
+    assert artists.nodes is None
+    np.testing.assert_array_equal(artists.points.get_offsets(), GRID.body_velocities[:, [2, 0]])
+    assert ax.get_xlabel() == "turn rate [rad/s]"
+
+
+def test_motions_last_a_second_and_are_to_scale():
+    ax = Figure().add_subplot()
+    segments = draw_motions(ax, ROBOT).get_segments()
+    np.testing.assert_allclose(segments[1][[0, -1]], [[0.0, 0.0], [1.5, 0.0]])
+    end = ROBOT["anticlockwise"].coast(_origin(), 1.0).pose
+    np.testing.assert_allclose(segments[3][-1], end[:2], atol=1e-12)
+    assert ax.get_aspect() == 1.0
+
+
+@pytest.mark.parametrize(
+    "automaton",
+    [
+        ROBOT,
+        with_inertia(),
+        GRID,
+        Automaton.of_grid(Unicycle(), [[-1, 0, 1], np.linspace(-2, 2, 9)]),
+        Automaton.of_controls(Unicycle(), {"rest": (0, 0)}),
+        Automaton.of_controls(
+            Unicycle(), {f"a trim with a rather long name {k}": (1, k) for k in range(9)}
+        ),
+    ],
+)
+def test_pictures_of_all_sizes_are_written(automaton, tmp_path):
+    save_automaton_figure(automaton, tmp_path / "automaton.png")
+    assert_picture(tmp_path / "automaton.png")
+
+
+def _origin():
+    return Unicycle().group.identity()

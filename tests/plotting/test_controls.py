@@ -1,0 +1,95 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+
+from maneuver_automaton.plotting import draw_altitude, draw_controls, draw_plan
+from maneuver_automaton.plotting.controls import draw_track_controls
+from maneuver_automaton.plotting.track import track_of_document
+from tests.plotting.cases import document_of, flight_plan, parking_plan, plan_of
+
+
+def test_controls_are_steps_between_the_switching_times():
+    plan = plan_of(["spin", "straight"], [1.0, 2.0], start_time=10.0)
+    speed, turn_rate = Figure().subplots(2, 1)
+    drawn = draw_controls([speed, turn_rate], plan, labels=["speed [m/s]", "turn rate [rad/s]"])
+    steps = [np.array(artists.steps.get_segments()) for artists in drawn]
+    np.testing.assert_array_equal(steps[0], [[[10, 0], [11, 0]], [[11, 1.5], [13, 1.5]]])
+    np.testing.assert_array_equal(steps[1], [[[10, 1], [11, 1]], [[11, 0], [13, 0]]])
+    np.testing.assert_array_equal(drawn[0].jumps.get_segments(), [[[11, 0], [11, 1.5]]])
+    times = [line[0][0] for line in drawn[0].switches.get_segments()]
+    assert times == [10.0, 11.0, 13.0]
+    assert speed.get_ylabel() == "speed [m/s]"
+    assert turn_rate.get_xlabel() == "time [s]"
+
+
+def test_the_colours_are_those_of_the_path():
+    plan = plan_of(["straight", "clockwise"], [1.0, 2.0])
+    axes = Figure().subplots(3, 1)
+    path = draw_plan(axes[0], plan).path
+    for artists in draw_controls(axes[1:], plan):
+        assert [to_rgb(c) for c in artists.steps.get_colors()] == [
+            to_rgb(c) for c in path.get_colors()
+        ]
+
+
+def test_one_axes_takes_all_controls_in_different_styles():
+    ax = Figure().add_subplot()
+    drawn = draw_controls(ax, parking_plan(), labels=["speed", "turn rate"])
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["speed", "turn rate"]
+    dashes = [str(artists.steps.get_linestyle()[0]) for artists in drawn]
+    assert dashes[0] != dashes[1]
+    low, high = ax.get_ylim()
+    assert low < -0.25
+    assert high > 1.5
+
+
+def test_all_values_are_in_view_with_zero_where_it_is_near():
+    axes = Figure().subplots(2, 1)
+    draw_controls(axes, plan_of(["straight", "clockwise"], [1.0, 1.0]))
+    assert axes[0].get_ylim()[0] < -0.25
+    assert axes[0].get_ylim()[1] > 1.5
+    assert axes[1].get_ylim()[0] < -1.0
+    assert axes[1].get_ylim()[1] > 0.0
+
+
+def test_a_plan_without_motion_leaves_empty_axes():
+    axes = Figure().subplots(2, 1)
+    drawn = draw_controls(axes, plan_of([], []))
+    assert [len(artists.steps.get_segments()) for artists in drawn] == [0, 0]
+    axes[0].figure.canvas.draw()
+
+
+def test_a_maneuver_has_a_step_for_each_change():
+    document = document_of(plan_of(["straight"], [1.0]), rate=4.0)
+    document["trajectory"]["control"] = [[0, 0], [1, 0], [1, 0], [3, 0], [3, 0]]
+    track = track_of_document(document)
+    speed, _ = draw_track_controls(
+        Figure().add_subplot(), track, labels=(), colors={"straight": (0.0, 0.0, 0.0)}
+    )
+    np.testing.assert_allclose(
+        speed.steps.get_segments()[0],
+        [[0, 0], [0.25, 0], [0.25, 1], [0.75, 1], [0.75, 3], [1, 3]],
+    )
+
+
+def test_the_altitude_is_a_line_over_time():
+    ax = Figure().add_subplot()
+    artists = draw_altitude(ax, flight_plan())
+    ends = np.array([segment[[0, -1]] for segment in artists.steps.get_segments()])
+    np.testing.assert_allclose(ends, [[[0, 0], [3, 6]], [[3, 6], [7, 10]], [[7, 10], [12, 2.5]]])
+    assert ax.get_ylabel() == "z [m]"
+
+
+def test_a_planar_plan_has_no_altitude():
+    with pytest.raises(ValueError, match="lies in the plane"):
+        draw_altitude(Figure().add_subplot(), parking_plan())
+
+
+def test_axes_and_labels_must_match_the_controls():
+    with pytest.raises(ValueError, match="got 3 axes and 0 labels, need 1 or 2 axes"):
+        draw_controls(Figure().subplots(3, 1), parking_plan())
+    with pytest.raises(ValueError, match="1 labels"):
+        draw_controls(Figure().subplots(2, 1), parking_plan(), labels=["speed"])

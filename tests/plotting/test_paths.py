@@ -1,0 +1,185 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.plotting import draw_plan, trim_colors
+from tests.plotting.cases import flight_plan, parking_plan, plan_of, plan_of_trims
+
+FOOTPRINT = {"rectangle_m": [0.6, 0.4], "reference_m": [-0.1, 0.0]}
+
+
+def drawn(plan, **options):
+    ax = Figure().add_subplot()
+    return ax, draw_plan(ax, plan, **options)
+
+
+def outlines(collection):
+    return [path.vertices for path in collection.get_paths()]
+
+
+def names(legend):
+    return [text.get_text() for text in legend.get_texts()]
+
+
+def test_the_path_has_a_segment_per_trim_that_drives():
+    plan = parking_plan()
+    ax, artists = drawn(plan)
+    first, second = artists.path.get_segments()
+    np.testing.assert_allclose(first[[0, -1]], plan.switching_poses[[1, 2], :2], atol=1e-12)
+    np.testing.assert_allclose(second[[0, -1]], plan.switching_poses[[2, 3], :2], atol=1e-12)
+    np.testing.assert_array_equal(artists.start.get_offsets()[0], plan.start[:2])
+    np.testing.assert_allclose(artists.goal.get_offsets()[0], plan.end[:2])
+    assert ax.get_aspect() == 1.0
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("x [m]", "y [m]")
+
+
+def test_a_trim_has_its_colour_everywhere():
+    plan = plan_of(["spin", "straight", "clockwise", "straight"], [1.0, 1.0, 1.0, 1.0])
+    colors = trim_colors({trim.name: trim.body_velocity for trim in plan.trims})
+    _, artists = drawn(plan)
+    path = [to_rgb(color) for color in artists.path.get_colors()]
+    assert path == [colors["straight"], colors["clockwise"], colors["straight"]]
+    assert to_rgb(artists.spins.get_colors()[0]) == colors["spin"]
+    handles = artists.legend.legend_handles
+    assert [to_rgb(handle.get_color()) for handle in handles[:3]] == list(colors.values())
+
+
+def test_the_legend_names_the_trims_of_the_plan_once():
+    _, artists = drawn(plan_of(["straight", "spin", "straight", "rest"], [1.0, 1.0, 1.0, 1.0]))
+    assert names(artists.legend) == ["straight", "spin", "rest", "start", "goal"]
+    assert drawn(parking_plan(), legend=False)[1].legend is None
+
+
+def test_twelve_trims_have_twelve_colours_and_names():
+    _, artists = drawn(plan_of_trims(12))
+    assert len(np.unique(artists.path.get_colors(), axis=0)) == 12
+    assert len(names(artists.legend)) == 14
+
+
+def test_turns_on_the_spot_are_arcs_about_their_place():
+    plan = plan_of(["straight", "spin", "spin"], [2.0, 1.0, 3.0])
+    _, artists = drawn(plan)
+    first, second = artists.spins.get_segments()
+    for arc, begin, turn in ((first, 0.0, 1.0), (second, 1.0, 3.0)):
+        spokes = arc - plan.end[:2]
+        angles = np.unwrap(np.arctan2(spokes[:, 1], spokes[:, 0]))
+        assert angles[0] == pytest.approx(begin)
+        assert angles[-1] - angles[0] == pytest.approx(turn)
+    radii = [np.linalg.norm(arc[0] - plan.end[:2]) for arc in (first, second)]
+    assert radii[1] > 1.2 * radii[0]  # they do not cover each other
+
+
+def test_rest_is_a_marker():
+    plan = parking_plan()
+    _, artists = drawn(plan)
+    (ring,) = artists.still
+    np.testing.assert_allclose(ring.get_offsets()[0], plan.end[:2])
+
+
+def test_a_climb_on_the_spot_is_a_marker():
+    _, artists = drawn(flight_plan())
+    assert len(artists.still) == 1
+    assert len(artists.path.get_segments()) == 2
+
+
+def test_the_body_is_drawn_at_every_switching_time():
+    plan = parking_plan()
+    _, artists = drawn(plan, footprint=FOOTPRINT)
+    bodies = outlines(artists.switch_bodies)
+    assert len(bodies) == len(plan.switching_times)
+    corners = SE2(plan.switching_poses[2]).act([[-0.2, -0.2], [0.4, -0.2], [0.4, 0.2], [-0.2, 0.2]])
+    np.testing.assert_allclose(bodies[2][:4], corners, atol=1e-12)
+    assert len(outlines(artists.bodies)) > 5
+
+
+def test_without_a_footprint_a_dart_grows_with_the_path():
+    sizes = []
+    for duration in (1.0, 10.0):
+        plan = plan_of(["straight", "clockwise"], [duration, duration])
+        _, artists = drawn(plan)
+        sizes.append(np.ptp(outlines(artists.switch_bodies)[0], axis=0).max())
+    assert sizes[1] > 5.0 * sizes[0]
+
+
+@pytest.mark.parametrize("footprint", [None, FOOTPRINT])
+@settings(max_examples=30)
+@given(by=st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0), st.floats(-3.0, 3.0)))
+def test_a_moved_plan_has_moved_artists(footprint, by):
+    plan, move = parking_plan(), SE2(np.array(by))
+    _, here = drawn(plan, footprint=footprint)
+    _, there = drawn(plan.moved(move), footprint=footprint)
+    pairs = [
+        (here.path.get_segments(), there.path.get_segments()),
+        (here.spins.get_segments(), there.spins.get_segments()),
+        (outlines(here.bodies), outlines(there.bodies)),
+        (outlines(here.switch_bodies), outlines(there.switch_bodies)),
+        (outlines(here.spin_heads), outlines(there.spin_heads)),
+        ([here.start.get_offsets()], [there.start.get_offsets()]),
+        ([here.goal.get_offsets()], [there.goal.get_offsets()]),
+    ]
+    for before, after in pairs:
+        assert len(before) == len(after)
+        for points, moved in zip(before, after, strict=True):
+            np.testing.assert_allclose(move.act(np.asarray(points)), moved, atol=1e-9)
+    np.testing.assert_array_equal(here.path.get_colors(), there.path.get_colors())
+    tips = [np.stack([quiver.U, quiver.V], axis=-1) for quiver in (here.headings, there.headings)]
+    turn = SE2(np.array([0.0, 0.0, by[2]]))
+    np.testing.assert_allclose(turn.act(tips[0]), tips[1], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "plan",
+    [
+        plan_of([], []),
+        plan_of(["rest"], [8.0]),
+        plan_of(["spin"], [9.0]),
+        plan_of(["straight"], [1e-6]),
+        plan_of(["straight"], [1e4], start=(5e5, 4e6, 1.0)),
+        plan_of(["straight", "rest"], [1.0, 0.0]),
+    ],
+)
+def test_small_and_still_plans_are_drawn(plan):
+    ax, artists = drawn(plan)
+    ax.figure.canvas.draw()
+    limits = np.array([*ax.get_xlim(), *ax.get_ylim()])
+    assert np.isfinite(limits).all()
+    assert limits[0] < plan.start[0] < limits[1]
+    assert limits[2] < plan.start[1] < limits[3]
+    assert np.isfinite(artists.goal.get_offsets()).all()
+
+
+def test_far_away_axes_are_counted_from_a_round_number():
+    ax, _ = drawn(plan_of(["straight"], [10.0], start=(5e5, 4000012.0, 1.0)))
+    ax.figure.canvas.draw()
+    assert ax.get_xlabel() == "x [m] from 500000"
+    assert ax.get_ylabel() == "y [m] from 4000000"
+    assert all(len(tick.get_text()) < 5 for tick in ax.get_yticklabels())
+
+
+def test_names_are_shown_as_they_are():
+    plan = plan_of_trims(2)
+    named = [
+        type(trim)(name=name, body_velocity=trim.body_velocity, control=trim.control)
+        for trim, name in zip(plan.trims, ["$x_1", "_hidden"], strict=True)
+    ]
+    ax, artists = drawn(type(plan)(plan.start, tuple(named), durations=plan.durations))
+    ax.figure.canvas.draw()
+    assert names(artists.legend)[:2] == ["$x_1", "_hidden"]
+
+
+def test_axes_may_be_shared():
+    axes = Figure().subplots(1, 2, sharex=True, sharey=True)
+    for ax in axes:
+        draw_plan(ax, parking_plan())
+    axes[0].figure.canvas.draw()
+
+
+def test_a_goal_of_the_wrong_size_is_refused():
+    with pytest.raises(ValueError, match="goal: got shape"):
+        drawn(parking_plan(), goal=[0.0, 1.0])

@@ -1,0 +1,121 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from maneuver_automaton.planning import PlanResult, PlanStatus
+from maneuver_automaton.plotting import (
+    save_alternatives_figure,
+    save_plan_figure,
+    save_plan_file_figure,
+)
+from maneuver_automaton.plotting.labels import word_text
+from maneuver_automaton.problem import Goal, Problem
+from tests.plotting.cases import (
+    ROBOT,
+    assert_picture,
+    document_of,
+    flight_plan,
+    parking_plan,
+    plan_of,
+    plan_of_trims,
+    result_of,
+)
+
+CAR = {"rectangle_m": [0.9, 0.5], "reference_m": [-0.2, 0.0]}
+
+
+@pytest.mark.parametrize("footprint", [None, CAR, [{"disc_m": 0.2}, CAR]])
+@pytest.mark.parametrize(
+    "plan",
+    [
+        parking_plan(),
+        plan_of([], []),
+        plan_of(["rest"], [8.0]),
+        plan_of(["spin"], [2.0]),
+        plan_of_trims(12),
+        plan_of(["straight", "clockwise"] * 40, [0.5] * 80),
+    ],
+)
+def test_plans_are_written(plan, footprint, tmp_path):
+    save_plan_figure(result_of(plan), tmp_path / "plan.png", footprint=footprint)
+    assert_picture(tmp_path / "plan.png")
+
+
+def test_a_result_without_a_plan_is_written(tmp_path):
+    result = PlanResult(
+        problem=Problem(ROBOT, [0, 0, 0], [3, 1, 0]),
+        status=PlanStatus.OUT_OF_BUDGET,
+        reason="no plan within 5 s",
+    )
+    save_plan_figure(result, tmp_path / "plan.png")
+    assert_picture(tmp_path / "plan.png")
+    with pytest.raises(ValueError, match="holds no plan: no plan within 5 s"):
+        save_alternatives_figure(result, tmp_path / "alternatives.png")
+
+
+def test_a_goal_of_free_heading_is_written(tmp_path):
+    plan = parking_plan()
+    goal = Goal(pose=np.array([*plan.end[:2], 99.0]), free_heading=True)
+    problem = Problem(ROBOT, plan.start, goal)
+    result = dataclasses.replace(result_of(plan), problem=problem)
+    save_plan_figure(result, tmp_path / "plan.png")
+    assert_picture(tmp_path / "plan.png")
+
+
+@pytest.mark.parametrize("plan", [parking_plan(), plan_of_trims(50), flight_plan()])
+def test_files_are_drawn_without_anything_else(plan, tmp_path):
+    save_plan_file_figure(document_of(plan), tmp_path / "plan.png")
+    assert_picture(tmp_path / "plan.png")
+
+
+def test_a_file_without_a_plan_is_drawn(tmp_path):
+    document = document_of(parking_plan())
+    document |= {"status": "no_plan", "reason": "all tried", "cost": None, "terminal_error": None}
+    document["trajectory"] = {key: [] for key in document["trajectory"]}
+    save_plan_file_figure(document, tmp_path / "plan.png")
+    assert_picture(tmp_path / "plan.png")
+
+
+@pytest.mark.parametrize("count", [0, 1, 12])
+def test_alternatives_are_written(count, tmp_path):
+    others = [plan_of(["spin", "straight", "spin"], [0.5 + 0.2 * k, 1, 1]) for k in range(count)]
+    result = result_of(parking_plan(), others=others)
+    save_alternatives_figure(result, tmp_path / "alternatives.png", footprint={"disc_m": 0.1})
+    assert_picture(tmp_path / "alternatives.png")
+
+
+def test_the_ending_chooses_the_format(tmp_path):
+    save_plan_figure(result_of(parking_plan()), tmp_path / "plan.pdf")
+    assert (tmp_path / "plan.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_an_old_file_is_replaced_whole_or_not_at_all(tmp_path):
+    path = tmp_path / "plan.png"
+    path.write_bytes(b"old")
+    save_plan_figure(result_of(parking_plan()), path)
+    assert_picture(path)
+    other = tmp_path / "plan.nonsense"
+    other.write_bytes(b"old")
+    with pytest.raises(ValueError, match="nonsense"):
+        save_plan_figure(result_of(parking_plan()), other)
+    assert other.read_bytes() == b"old"
+
+
+def test_names_in_any_script_raise_no_warning(tmp_path):
+    plan = parking_plan()
+    trims = tuple(
+        dataclasses.replace(trim, name=name)
+        for trim, name in zip(plan.trims, ["日本語", "$x_1", "_hidden", "a" * 200], strict=True)
+    )
+    save_plan_figure(result_of(dataclasses.replace(plan, trims=trims)), tmp_path / "plan.png")
+    assert_picture(tmp_path / "plan.png")
+
+
+@pytest.mark.parametrize("length", [1, 4, 12, 200])
+def test_words_keep_within_their_lines(length):
+    text = word_text(["anticlockwise", "straight"] * length, width=100, lines=2)
+    assert text.count("\n") <= 1
+    assert all(len(line) <= 100 for line in text.split("\n"))

@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from maneuver_automaton.plotting.colors import trim_colors
+from maneuver_automaton.plotting.track import track_of_document, track_of_plan
+from tests.plotting.cases import document_of, flight_plan, parking_plan, plan_of, plan_of_trims
+
+
+@pytest.mark.parametrize("plan", [parking_plan(), flight_plan(), plan_of_trims(12)])
+def test_a_file_gives_the_track_of_its_plan(plan):
+    of_plan, of_file = track_of_plan(plan), track_of_document(document_of(plan))
+    assert [piece.name for piece in of_file.pieces] == [piece.name for piece in of_plan.pieces]
+    np.testing.assert_allclose(of_file.switching_times, of_plan.switching_times)
+    np.testing.assert_allclose(of_file.switching_poses, plan.switching_poses, atol=1e-12)
+    assert of_file.size == pytest.approx(of_plan.size, rel=1e-3)
+    for piece, trim in zip(of_file.pieces, plan.trims, strict=True):
+        np.testing.assert_allclose(piece.twist, trim.body_velocity, atol=1e-10)
+        np.testing.assert_array_equal(
+            piece.control, np.broadcast_to(trim.control, (len(piece.time), trim.control.size))
+        )
+    colors = trim_colors(of_plan.twists)
+    for name, color in trim_colors(of_file.twists).items():
+        np.testing.assert_allclose(color, colors[name], atol=2e-4)
+
+
+def test_trims_of_no_duration_are_left_out():
+    plan = plan_of(["straight", "spin", "straight"], [1.0, 0.0, 2.0])
+    assert [piece.name for piece in track_of_plan(plan).pieces] == ["straight", "straight"]
+    assert [piece.name for piece in track_of_document(document_of(plan)).pieces] == [
+        "straight",
+        "straight",
+    ]
+
+
+def test_the_origin_of_a_file_is_added():
+    document = document_of(parking_plan())
+    document["trajectory"]["origin"] = [4e6, -5.0]
+    track = track_of_document(document)
+    np.testing.assert_allclose(track.start, [4e6, -4.0, 0.0])
+
+
+def test_a_file_without_a_trajectory_has_no_track():
+    document = document_of(parking_plan())
+    document["trajectory"] = {key: [] for key in document["trajectory"]}
+    assert track_of_document(document) is None
+
+
+def test_a_maneuver_in_a_file_keeps_its_varying_control():
+    document = document_of(plan_of(["straight"], [1.0]), rate=4.0)
+    document["primitives"][0]["kind"] = "maneuver"
+    document["trajectory"]["control"] = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [9.0, 0.0]]
+    (piece,) = track_of_document(document).pieces
+    assert piece.control[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 3.0]
+
+
+def test_columns_of_different_length_are_refused():
+    document = document_of(parking_plan())
+    document["trajectory"]["pose"].pop()
+    with pytest.raises(ValueError, match="poses for"):
+        track_of_document(document)

@@ -1,0 +1,54 @@
+"""Maneuvers: what they hold, and which of them change nothing."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from maneuver_automaton.primitives import Maneuver
+
+
+def maneuver(**changes):
+    values = {"name": "brake", "source": "cruise", "target": "rest", "displacement": np.zeros(3)}
+    return Maneuver(**(values | changes))
+
+
+@pytest.mark.parametrize(
+    ("changes", "identity"),
+    [
+        ({}, True),
+        ({"displacement": np.zeros(4)}, True),
+        ({"displacement": [-0.0, 0.0, 0.0]}, True),
+        ({"duration": 0.5}, False),
+        ({"displacement": [0.0, 0.0, 1e-12]}, False),
+        ({"displacement": [0.0, 0.0, 0.0, 1.0]}, False),
+    ],
+)
+def test_only_what_changes_nothing_is_an_identity(changes, identity):
+    assert maneuver(**changes).is_identity is identity
+
+
+def test_the_displacement_is_a_read_only_copy():
+    gained = np.array([2.0, 0.0, 0.0])
+    brake = maneuver(displacement=gained)
+    gained[0] = 5.0
+    assert brake.displacement.tolist() == [2.0, 0.0, 0.0]
+    with pytest.raises(ValueError, match="read-only"):
+        brake.displacement[0] = 1.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"duration": -0.5}, "maneuver 'brake': duration must not be negative, got -0.5 s"),
+        ({"duration": math.nan}, "maneuver 'brake': duration must not be negative, got nan s"),
+        ({"displacement": [1.0]}, "displacement: got shape (1,), need 3 or 4 components last"),
+        ({"displacement": [0, 0, math.inf]}, "displacement: got inf, need finite numbers"),
+    ],
+)
+def test_what_is_wrong_is_said(changes, message):
+    with pytest.raises(ValueError) as error:
+        maneuver(**changes)
+    assert str(error.value) == message

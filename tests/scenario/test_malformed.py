@@ -1,0 +1,582 @@
+"""Files that cannot be used: one line names file, line, field, value, and what would be right."""
+
+from __future__ import annotations
+
+import pytest
+
+from maneuver_automaton.cli import run
+from maneuver_automaton.costs import WEIGHTS
+from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.scenario import load_scenario, scenario_of_text
+from tests.scenario.files import SCENARIO, TRIMS, automaton, but, grid
+
+UNIT = "{min: -1, max: 1, step: 1}"
+TOP = (
+    "schema, name, vehicle, automaton, start, goal, cost, horizon, bounds_m, margin_m, obstacles, "
+    "search, receding_horizon"
+)
+LAUGHS = "".join(
+    f"l{i}: &l{i} [{', '.join([f'*l{i - 1}'] * 9) if i else 'lol'}]\n" for i in range(9)
+)
+
+
+def goal(text: str) -> str:
+    """The scenario with another goal."""
+    return but("goal: {pose: [1.0, 1.0, 0.0]}", f"goal:{text}")
+
+
+def pose(text: str) -> str:
+    """The scenario with another pose of the goal."""
+    return goal(f" {{pose: {text}}}")
+
+
+def horizon(text: str) -> str:
+    """The scenario with another horizon."""
+    return but("time_s: free, max_trims: 4", text)
+
+
+def search(text: str) -> str:
+    """The scenario with other settings of the search."""
+    return but("time_limit_s: 5.0", text)
+
+
+def two_axes(text: str) -> str:
+    """The scenario over a grid with one odd axis."""
+    return grid(f"[{text}, {UNIT}]")
+
+
+def car(scenario: str) -> str:
+    """A scenario with a car in place of the unicycle."""
+    return scenario.replace("{model: unicycle}", "{model: car, wheelbase_m: 2.5}")
+
+
+def vehicle(text: str) -> str:
+    """The scenario with another vehicle."""
+    return but("{model: unicycle}", text)
+
+
+def cost(text: str) -> str:
+    """The scenario with another cost."""
+    return but("effort: 1.0", text)
+
+
+def footprint(text: str) -> str:
+    """The scenario with a footprint."""
+    return vehicle(f"{{model: unicycle, footprint: {text}}}")
+
+
+def obstacle(text: str) -> str:
+    """The scenario with one obstacle."""
+    return f"{SCENARIO}obstacles:\n  - {text}\n"
+
+
+# What the file says, and the message, without the name of the file.
+MALFORMED: dict[str, tuple[str | bytes, str]] = {
+    "unknown key at the top": (
+        but("name: A case", "nam: A case"),
+        f":2: nam: unknown key; did you mean 'name'? Known keys: {TOP}",
+    ),
+    "unknown key inside": (
+        horizon("time_s: free, max_trim: 4"),
+        ":12: horizon.max_trim: unknown key; did you mean 'max_trims'? Known keys: "
+        "time_s, max_trims, min_coast_s, max_time_s",
+    ),
+    "unknown key of a trim": (
+        but("{name: spin, control: [0.0, 1.0]}", "{name: spin, contrl: [0.0, 1.0]}"),
+        ":8: automaton.trims[2].contrl: unknown key; did you mean 'control'? Known "
+        "keys: name, control",
+    ),
+    "missing schema": (
+        but("schema: 1\nname: A case", "name: A case"),
+        ":1: the key 'schema' is missing: no scenario, need schema: 1",
+    ),
+    "wrong schema": (
+        but("schema: 1", "schema: 2"),
+        ":1: schema: got 2, need 1, the schema that this version reads",
+    ),
+    "schema true": (
+        but("schema: 1", "schema: true"),
+        ":1: schema: got true, need 1, the schema that this version reads",
+    ),
+    "missing goal": (
+        but("goal: {pose: [1.0, 1.0, 0.0]}\ncost: {effort: 1.0}", "cost: {effort: 1.0}"),
+        ":1: the key 'goal' is missing, need goal: a mapping {pose, ...}, or a list of these",
+    ),
+    "missing pose": (
+        goal(" {tolerance_m: 0.1}"),
+        ":10: goal: the key 'pose' is missing, need pose: [x, y, heading]",
+    ),
+    "wrong type": (
+        but("{name: spin, control: [0.0, 1.0]}", "{name: spin, control: abc}"),
+        ":8: automaton.trims[2].control: got 'abc', need a list of 2 numbers (speed, turn_rate)",
+    ),
+    "list with a word": (
+        but("{name: spin, control: [0.0, 1.0]}", "{name: spin, control: [0.0, abc]}"),
+        ":8: automaton.trims[2].control[1]: got 'abc', need a finite number",
+    ),
+    "control too long": (
+        but("{name: spin, control: [0.0, 1.0]}", "{name: spin, control: [0.0, 1.0, 2.0]}"),
+        ":8: automaton.trims[2].control: got [0.0, 1.0, 2.0], need a list of 2 "
+        "numbers (speed, turn_rate)",
+    ),
+    "string as number": (
+        cost("effort: '1.0'"),
+        ":11: cost.effort: got '1.0', need a finite number of at least 0",
+    ),
+    "bool as number": (
+        cost("effort: true"),
+        ":11: cost.effort: got true, need a finite number of at least 0",
+    ),
+    "yes is a word": (
+        cost("effort: yes"),
+        ":11: cost.effort: got 'yes', need a finite number of at least 0",
+    ),
+    "bool as pose": (pose("[1.0, true, 0.0]"), ":10: goal.pose[1]: got true, need a finite number"),
+    "nan": (pose("[.nan, 1.0, 0.0]"), ":10: goal.pose[0]: got nan, need a finite number"),
+    "infinite": (pose("[1.0, -.inf, 0.0]"), ":10: goal.pose[1]: got -inf, need a finite number"),
+    "overflow": (pose("[1.0, 1e999, 0.0]"), ":10: goal.pose[1]: got inf, need a finite number"),
+    "pose too short": (
+        pose("[1.0, 1.0]"),
+        ":10: goal.pose: got [1.0, 1.0], need a pose [x, y, heading], a list of 3 numbers",
+    ),
+    "pose with height": (
+        pose("[1.0, 1.0, 0.0, 2.0]"),
+        ":10: goal.pose: got 4 numbers, need 3: [x, y, heading]",
+    ),
+    "pose is a number": (
+        pose("1.0"),
+        ":10: goal.pose: got 1.0, need a pose [x, y, heading], a list of 3 numbers",
+    ),
+    "goal nothing": (
+        goal(""),
+        ":10: goal: got nothing, need a mapping {pose, ...}, or a list of these",
+    ),
+    "goal empty list": (
+        goal(" []"),
+        ":10: goal: got [], need a goal or a list of at least one goal",
+    ),
+    "goal is a word": (
+        goal(" home"),
+        ":10: goal: got 'home', need a mapping with the keys pose, trim, heading, "
+        "tolerance_m, tolerance_rad",
+    ),
+    "second goal bad": (
+        goal("\n  - {pose: [1.0, 1.0, 0.0]}\n  - {pose: [1.0, x, 0.0]}"),
+        ":12: goal[1].pose[1]: got 'x', need a finite number",
+    ),
+    "heading": (
+        goal(" {pose: [1.0, 1.0, 0.0], heading: any}"),
+        ":10: goal.heading: got 'any', need free, or no such key",
+    ),
+    "tolerance negative": (
+        goal(" {pose: [1.0, 1.0, 0.0], tolerance_m: -0.1}"),
+        ":10: goal.tolerance_m: got -0.1, need a finite number of at least 0",
+    ),
+    "unknown goal trim": (
+        goal(" {pose: [1.0, 1.0, 0.0], trim: spinn}"),
+        ":10: goal.trim: no trim 'spinn' among rest, ahead, spin; did you mean 'spin'?",
+    ),
+    "unknown start trim": (
+        but("start: {pose: [0.0, 0.0, 0.0]}", "start: {pose: [0.0, 0.0, 0.0], trim: cruise}"),
+        ":9: start.trim: no trim 'cruise' among rest, ahead, spin",
+    ),
+    "duplicate names": (
+        but("{name: spin, control: [0.0, 1.0]}", "{name: ahead, control: [0.0, 1.0]}"),
+        ":8: automaton.trims[2].name: got 'ahead', the name of another trim in line "
+        "7; need a new name",
+    ),
+    "empty name": (
+        but("{name: spin, control: [0.0, 1.0]}", "{name: '', control: [0.0, 1.0]}"),
+        ":8: automaton.trims[2].name: got '', need a name, a text that is not empty",
+    ),
+    "number as name": (
+        but("{name: spin, control: [0.0, 1.0]}", "{name: 5, control: [0.0, 1.0]}"),
+        ":8: automaton.trims[2].name: got 5, need a name, a text that is not empty",
+    ),
+    "two kinds of automaton": (
+        but("  trims:", "  preset: dubins\n  trims:"),
+        ":4: automaton: got trims and preset, need exactly one of trims, grid, file, preset",
+    ),
+    "no kind of automaton": (
+        but("automaton:\n" + TRIMS, "automaton: {}\n"),
+        ":4: automaton: got none, need exactly one of trims, grid, file, preset",
+    ),
+    "unknown preset": (
+        automaton("preset: dubbins"),
+        ":5: automaton.preset: got 'dubbins', need one of table2, reeds_shepp, dubins",
+    ),
+    "preset of another vehicle": (
+        car(automaton("preset: table2")),
+        ":5: automaton.preset: got 'table2', which is for the unicycle, not the car",
+    ),
+    "preset without limit": (
+        car(automaton("preset: dubins")),
+        ":5: automaton.preset: needs the tightest circle of the car, state "
+        "vehicle.max_steering_rad",
+    ),
+    "missing library": (
+        automaton("file: nowhere.json"),
+        ":5: automaton.file: nowhere.json: no such file",
+    ),
+    "unknown model": (
+        vehicle("{model: tank}"),
+        ":3: vehicle.model: got 'tank', need one of unicycle, car",
+    ),
+    "later model": (
+        vehicle("{model: hovercraft}"),
+        ":3: vehicle.model: got 'hovercraft', need one of unicycle, car (it is not "
+        "in this version)",
+    ),
+    "no model": (
+        vehicle("{}"),
+        ":3: vehicle: the key 'model' is missing, need model: one of unicycle, car",
+    ),
+    "model nothing": (
+        vehicle("{model: }"),
+        ":3: vehicle.model: got nothing, need one of unicycle, car",
+    ),
+    "model list": (
+        vehicle("{model: [unicycle]}"),
+        ":3: vehicle.model: got ['unicycle'], need one of unicycle, car",
+    ),
+    "car without wheelbase": (
+        vehicle("{model: car}"),
+        ":3: vehicle: the key 'wheelbase_m' is missing, need wheelbase_m: distance "
+        "of the axles, a positive number",
+    ),
+    "car steering too sharp": (
+        vehicle("{model: car, wheelbase_m: 2.5, max_steering_rad: 1.6}"),
+        ":3: vehicle.max_steering_rad: got 1.6, need an angle between 0 and pi / 2, 1.5708",
+    ),
+    "key of another model": (
+        vehicle("{model: unicycle, wheelbase_m: 2.5}"),
+        ":3: vehicle.wheelbase_m: unknown key; did you mean 'max_speed_m_s'? Known "
+        "keys: model, max_speed_m_s, max_turn_rate_rad_s, footprint",
+    ),
+    "negative wheelbase": (
+        vehicle("{model: car, wheelbase_m: -2.5}"),
+        ":3: vehicle.wheelbase_m: got -2.5, need a positive number",
+    ),
+    "beyond the limits": (
+        vehicle("{model: unicycle, max_speed_m_s: 0.5}"),
+        ":7: automaton.trims[1].control: trim 'ahead': speed = 1 is outside the "
+        "limits [-0.5, 0.5] of the unicycle",
+    ),
+    "footprint empty": (
+        footprint("[]"),
+        ":3: vehicle.footprint: got [], need a shape or a list of at least one shape",
+    ),
+    "footprint two kinds": (
+        footprint("{disc_m: 1, rectangle_m: [1, 1]}"),
+        ":3: vehicle.footprint: got rectangle_m and disc_m, need exactly one of "
+        "rectangle_m, polygon_m, disc_m",
+    ),
+    "footprint flat": (
+        footprint("{rectangle_m: [1, 0]}"),
+        ":3: vehicle.footprint.rectangle_m[1]: got 0, need a positive number",
+    ),
+    "footprint reference": (
+        footprint("[{disc_m: 1, reference_m: [0, 0]}]"),
+        ":3: vehicle.footprint[0].reference_m: goes with rectangle_m only",
+    ),
+    "polygon of two": (
+        footprint("{polygon_m: [[0, 0], [1, 1]]}"),
+        ":3: vehicle.footprint.polygon_m: got [[0, 0], [1, 1]], need a list of at "
+        "least 3 points [x, y]",
+    ),
+    "negative weight": (
+        cost("effort: -1.0"),
+        ":11: cost.effort: got -1.0, need a finite number of at least 0",
+    ),
+    "all weights zero": (
+        cost("effort: 0.0"),
+        f":11: cost: {', '.join(WEIGHTS)} are all zero, need at least one positive",
+    ),
+    "cost empty": (
+        cost(""),
+        f":11: cost: {', '.join(WEIGHTS)} are all zero, need at least one positive",
+    ),
+    "cost nothing": (
+        but("cost: {effort: 1.0}", "cost:"),
+        ":11: cost: got nothing, need a value, or no such key",
+    ),
+    "matrix not square": (
+        cost("effort: 1.0, effort_matrix: [[1, 0], [0]]"),
+        ":11: cost.effort_matrix: got 2 rows of 2, 1 numbers, need a square matrix",
+    ),
+    "matrix of another size": (
+        cost("effort: 1.0, effort_matrix: [[1]]"),
+        ":11: cost.effort_matrix: has shape (1, 1), need (2, 2) for 2 controls",
+    ),
+    "matrix indefinite": (
+        cost("effort: 1.0, effort_matrix: [[1, 0], [0, -1]]"),
+        ":11: cost.effort_matrix: must be positive definite, its smallest eigenvalue is -1",
+    ),
+    "matrix not symmetric": (
+        cost("effort: 1.0, effort_matrix: [[1, 1], [0, 1]]"),
+        ":11: cost.effort_matrix: is not symmetric",
+    ),
+    "norm order": (
+        cost("effort: 1.0, norm_order: 3"),
+        ":11: cost.norm_order: got 3, need 1, 2 or inf",
+    ),
+    "time zero": (
+        horizon("time_s: 0, max_trims: 4"),
+        ":12: horizon.time_s: got 0, need a positive number of seconds, or free",
+    ),
+    "time word": (
+        horizon("time_s: fre, max_trims: 4"),
+        ":12: horizon.time_s: got 'fre', need a positive number of seconds, or free",
+    ),
+    "time negative": (
+        horizon("time_s: -8.0, max_trims: 4"),
+        ":12: horizon.time_s: got -8.0, need a positive number of seconds, or free",
+    ),
+    "max_time with time": (
+        horizon("time_s: 8.0, max_time_s: 9.0, max_trims: 4"),
+        ":12: horizon.max_time_s: max_time is for a free final time, but time is fixed",
+    ),
+    "max_trims zero": (
+        horizon("time_s: free, max_trims: 0"),
+        ":12: horizon.max_trims: got 0, need a whole number of at least 1",
+    ),
+    "max_trims fraction": (
+        horizon("time_s: free, max_trims: 2.5"),
+        ":12: horizon.max_trims: got 2.5, need a whole number of at least 1",
+    ),
+    "min_coast negative": (
+        horizon("time_s: free, min_coast_s: -1"),
+        ":12: horizon.min_coast_s: got -1, need a finite number of at least 0",
+    ),
+    "time limit zero": (
+        search("time_limit_s: 0"),
+        ":13: search.time_limit_s: got 0, need a positive number",
+    ),
+    "method": (
+        search("method: astar"),
+        ":13: search.method: got 'astar', need auto, words, insertion or lattice",
+    ),
+    "lattice": (
+        search("method: lattice, cell_m: 0.5"),
+        ":13: search.method: got 'lattice', which this version does not have; need "
+        "one of auto, words, insertion",
+    ),
+    "long words": (
+        search("method: words").replace("max_trims: 4", "max_trims: 6"),
+        ":12: horizon.max_trims: got 6 for the method words, need at most 5; "
+        "the method insertion has no limit",
+    ),
+    "long words, heading free": (
+        search("method: words")
+        .replace("max_trims: 4", "max_trims: 5")
+        .replace("0.0]}\ncost", "0.0], heading: free}\ncost"),
+        ":12: horizon.max_trims: got 5 for the method words, need at most 4 where a heading is "
+        "free; the method insertion has no limit",
+    ),
+    "bounds reversed": (
+        SCENARIO + "bounds_m: {x: [5, -5]}\n",
+        ":14: bounds_m.x: got [5, -5], need an interval [low, high] with low < high",
+    ),
+    "bounds z": (
+        SCENARIO + "bounds_m: {z: [0, 5]}\n",
+        ":14: bounds_m.z: the unicycle has no height",
+    ),
+    "bounds key": (
+        SCENARIO + "bounds_m: {w: [0, 5]}\n",
+        ":14: bounds_m.w: unknown key; did you mean 'z'? Known keys: x, y, z",
+    ),
+    "margin": (
+        SCENARIO + "margin_m: -1\n",
+        ":14: margin_m: got -1, need a finite number of at least 0",
+    ),
+    "obstacles": (
+        obstacle("{disc_m: {center: [3, 0], radius: 0.5}}"),
+        ":14: obstacles: got 1 obstacle, but this version plans in free space only; "
+        "need an empty list",
+    ),
+    "obstacle bad": (
+        obstacle("{disc_m: {center: [3, 0], radius: 0}}"),
+        ":15: obstacles[0].disc_m.radius: got 0, need a positive number",
+    ),
+    "obstacle two kinds": (
+        obstacle("{disc_m: {center: [3, 0], radius: 1}, map: a.yaml}"),
+        ":15: obstacles[0]: got disc_m and map, need exactly one of polygon_m, disc_m, box_m, map",
+    ),
+    "obstacle motion backwards": (
+        obstacle("{polygon_m: [[1, 1], [2, 1], [2, 2]], motion: [[0, 0, 0, 0], [0, 1, 0, 0]]}"),
+        ":15: obstacles[0].motion: got [[0, 0, 0, 0], [0, 1, 0, 0]], need poses "
+        "[time, x, y, heading] whose times rise",
+    ),
+    "obstacles no list": (
+        SCENARIO + "obstacles: none\n",
+        ":14: obstacles: got 'none', need a list of obstacles",
+    ),
+    "receding horizon": (
+        SCENARIO + "receding_horizon: {steps: 12}\n",
+        ":14: receding_horizon: the key 'step_s' is missing, need step_s: time between two plans",
+    ),
+    "duplicate key": (
+        SCENARIO + "name: again\n",
+        ":14: name: the key stands twice, first in line 2",
+    ),
+    "tab": (but("  trims:", "\ttrims:"), ":5: not valid YAML: a tab stands where only spaces may"),
+    "tag": (
+        but("name: A case", "name: !!python/object/apply:os.system [ls]"),
+        ":2: the tag 'tag:yaml.org,2002:python/object/apply:os.system' is not "
+        "admitted, need plain values",
+    ),
+    "own tag": (
+        pose("!mine [1.0, 1.0, 0.0]"),
+        ":10: the tag '!mine' is not admitted, need plain values",
+    ),
+    "standard tag": (
+        cost("effort: !!float '1.0'"),
+        ":11: the tag 'tag:yaml.org,2002:float' is not admitted, need plain values",
+    ),
+    "two documents": (
+        SCENARIO + "---\nschema: 1\n",
+        ":14: a second document begins here, need one",
+    ),
+    "list at the top": ("- 1\n- 2\n", f":1: got [1, 2], need a mapping with the keys {TOP}"),
+    "word at the top": ("hello\n", f":1: got 'hello', need a mapping with the keys {TOP}"),
+    "complex key": (
+        SCENARIO + "? [a, b]\n: 1\n",
+        ":14: a list or mapping is used as a key, need a word",
+    ),
+    "recursive alias": (
+        but("name: A case", "name: &a [*a]"),
+        ":2: the alias *a stands for nothing that ends before it",
+    ),
+    "unknown alias": (
+        but("name: A case", "name: *a"),
+        ":2: the alias *a stands for nothing that ends before it",
+    ),
+    "merge key": (
+        cost("<<: {effort: 1.0}"),
+        ":11: cost.<<: unknown key; did you mean 'time'? Known keys: effort, norm, "
+        "time, effort_matrix, norm_order, length, switch, direction_change",
+    ),
+    "empty": ("", ": is empty, need a scenario"),
+    "comments only": ("# nothing\n", ": is empty, need a scenario"),
+    "null": ("null\n", ": is empty, need a scenario"),
+    "grid nan": (
+        two_axes("{min: .nan, max: 1, step: 1}"),
+        ":5: automaton.grid.control[0].min: got nan, need a finite number",
+    ),
+    "grid step zero": (
+        two_axes("{min: 0, max: 1, step: 0}"),
+        ":5: automaton.grid.control[0].step: got 0, need a positive number",
+    ),
+    "grid step negative": (
+        two_axes("{min: 0, max: 1, step: -0.1}"),
+        ":5: automaton.grid.control[0].step: got -0.1, need a positive number",
+    ),
+    "grid min above max": (
+        two_axes("{min: 1, max: 0, step: 0.1}"),
+        ":5: automaton.grid.control[0]: got min 1 above max 0, need min <= max",
+    ),
+    "grid huge": (
+        grid("[{min: -1, max: 1, count: 100000}, {min: -1, max: 1, step: 0.0002}]"),
+        ":5: automaton.grid.control: got 1.0001e+09 trims, need at most 100000",
+    ),
+    "grid beyond huge": (
+        two_axes("{min: -1e300, max: 1e300, step: 1e-300}"),
+        ":5: automaton.grid.control: got 3e+12 trims, need at most 100000",
+    ),
+    "grid step and count": (
+        two_axes("{min: 0, max: 1, step: 1, count: 2}"),
+        ":5: automaton.grid.control[0]: got step and count, need exactly one of step, count",
+    ),
+    "grid one axis": (
+        grid(f"[{UNIT}]"),
+        ":5: automaton.grid.control: got 1 axes, need 2 (speed, turn_rate)",
+    ),
+    "grid count one": (
+        two_axes("{min: 0, max: 1, count: 1}"),
+        ":5: automaton.grid.control[0].count: got 1 for two different ends, need at least 2",
+    ),
+    "grid no list": (
+        grid("{min: -1, max: 1, step: 1}"),
+        ":5: automaton.grid.control: got {min: -1, max: 1, step: 1}, need a list "
+        "with one axis per control",
+    ),
+    "grid missing max": (
+        two_axes("{min: 0, step: 1}"),
+        ":5: automaton.grid.control[0]: the key 'max' is missing, need max: largest value",
+    ),
+    "empty trims": (
+        automaton("trims: []"),
+        ":5: automaton.trims: got [], need a list of at least one trim",
+    ),
+    "billion laughs": (
+        SCENARIO + LAUGHS,
+        ":18: aliases multiply to more than 10000 values",
+    ),
+    "deep nesting": (
+        SCENARIO + f"deep: {'[' * 5000}{']' * 5000}\n",
+        ":14: lists and mappings are nested more than 40 deep",
+    ),
+    "binary": (bytes(range(256)), ":2: is not a text file in UTF-8"),
+    "another encoding": (
+        but("A case", "caf\xe9").encode("latin-1"),
+        ":2: is not a text file in UTF-8",
+    ),
+    "control character": (
+        but("A case", "A\x07case"),
+        ":2: is not a text file: it has the character '\\x07'",
+    ),
+    "ten megabytes": (
+        "schema: 1\n" + "# nonsense\n" * 1_000_000,
+        ": is longer than 5 MB, too long for a scenario",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", MALFORMED)
+def test_one_line_names_file_line_field_value_and_what_would_be_right(
+    what, tmp_path, monkeypatch, capsys
+):
+    content, message = MALFORMED[what]
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "x.yaml").write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(InvalidScenario) as error:
+        load_scenario("x.yaml")
+    assert str(error.value) == f"x.yaml{message}"
+    assert run(["plan", "x.yaml", "--out", "out"]) == 2
+    printed = capsys.readouterr()
+    assert printed.err == f"x.yaml{message}\n"
+    assert printed.out == ""
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_file_that_is_not_closed_names_its_line():
+    text = pose("[1.0, 1.0, 0.0")
+    with pytest.raises(InvalidScenario, match=r"^x\.yaml:1\d: not valid YAML: "):
+        scenario_of_text(text, name="x.yaml")
+
+
+def test_missing_file(capsys):
+    assert run(["plan", "nowhere.yaml"]) == 2
+    assert capsys.readouterr().err == "nowhere.yaml: no such file\n"
+
+
+def test_a_folder_is_no_file(tmp_path):
+    with pytest.raises(InvalidScenario) as error:
+        load_scenario(tmp_path)
+    assert str(error.value) == f"{tmp_path}: is a folder, need a file"
+
+
+def test_the_parser_in_python_reads_the_same(monkeypatch):
+    import yaml
+
+    from maneuver_automaton.scenario import yaml_source
+
+    fast = yaml_source.parse(SCENARIO, name="x")
+    monkeypatch.setattr(yaml_source, "_PARSER", yaml.SafeLoader)
+    slow = yaml_source.parse(SCENARIO, name="x")
+    assert (slow.value, slow.lines) == (fast.value, fast.lines)
+    for what in ("tab", "tag", "duplicate key", "billion laughs", "deep nesting"):
+        content, message = MALFORMED[what]
+        with pytest.raises(InvalidScenario) as error:
+            yaml_source.parse(str(content), name="x.yaml")
+        assert str(error.value) == f"x.yaml{message}"

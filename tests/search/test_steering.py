@@ -1,0 +1,336 @@
+"""Three coasting times in closed form, and four with a climb."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from maneuver_automaton.groups import SE2, SE2xR
+from maneuver_automaton.search import steer, steer_climbing
+from maneuver_automaton.search._kernels_steering import steer_batch
+from tests import reference
+
+LEFT, RIGHT, AHEAD, BACK = [1.0, 0, 1.0], [1.0, 0, -1.0], [1.0, 0, 0], [-1.0, 0, 0]
+SPIN, SPIN_BACK = [0.0, 0, 1.0], [0.0, 0, -1.0]
+UP, RISE = [0.0, 0, 0, 0.5], [1.0, 0, 0, 0.5]
+TURN = 2.0 * np.pi
+SIZEABLE = st.sampled_from([-1.0, 0.0, 1.0]) | st.floats(0.1, 2.0) | st.floats(-2.0, -0.1)
+
+# turn or straight, for each of three trims; three straights never span
+KINDS = [kind for kind in itertools.product((1.0, 0.0), repeat=3) if any(kind)]
+
+
+def planted(rng, kinds, *, sideways, gaps):
+    """Random trims (n, 3), times and gaps (n, 2, 3) for each row of `kinds`, and their ends."""
+    n = len(kinds)
+    twists = rng.uniform(0.2, 2.0, (n, 3, 3)) * rng.choice([-1.0, 1.0], (n, 3, 3))
+    twists[:, :, 1] *= sideways
+    twists[:, :, 2] *= kinds
+    between = gaps * rng.uniform(-1.0, 1.0, (n, 2, 3))
+    with np.errstate(divide="ignore"):
+        longest = np.minimum(TURN / np.abs(twists[:, :, 2]), 4.0)
+    times = rng.uniform(0.02, 0.98, (n, 3)) * longest
+    end = SE2(np.zeros((n, 3)))
+    for k in range(3):
+        end = end @ SE2.exp(times[:, k, None] * twists[:, k])
+        if k < 2:
+            end = end @ SE2(between[:, k])
+    return twists, between, times, end.pose
+
+
+@pytest.mark.parametrize("gaps", [0.0, 1.0], ids=["joined", "gaps"])
+@pytest.mark.parametrize("sideways", [0.0, 1.0], ids=["ahead", "sideways"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_planted_times_are_found(kind, sideways, gaps):
+    if sum(kind) == 1.0 and not (gaps or sideways) and kind != (0.0, 1.0, 0.0):
+        pytest.skip("neighbouring straights ahead are parallel: no isolated solution")
+    rng = np.random.default_rng(1)
+    n = 400
+    twists, between, times, goals = planted(
+        rng, np.tile(kind, (n, 1)), sideways=sideways, gaps=gaps
+    )
+    found = np.array(
+        [
+            steer_batch(twists[i], np.arange(3)[None], between[i : i + 1], goals[i : i + 1], 1e-12)
+            for i in range(n)
+        ]
+    )[:, 0]
+    off = np.abs(found - times[:, None, :]).max(axis=2)
+    assert np.nanmin(off, axis=1).max() < 1e-6
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_triple_of_times_ends_at_the_goal(kind):
+    rng = np.random.default_rng(2)
+    n = 12
+    twists, between, times, goals = planted(rng, np.tile(kind, (n, 1)), sideways=1.0, gaps=1.0)
+    for row, gap, known, goal in zip(twists, between, times, goals, strict=True):
+        found = steer(row, goal, gaps=gap)
+        assert 1 <= len(found) <= 2
+        assert np.abs(found - known).max(axis=1).min() < 1e-6
+        for solution in found:
+            assert solution.min() >= 0.0
+            end = reference.word_end(row, solution, gap)
+            assert np.abs(reference.off_goal(end, goal)).max() < 1e-9
+
+
+@settings(max_examples=40)
+@given(
+    arrays(np.float64, (3, 3), elements=st.sampled_from([-1.0, 0.0, 0.5, 1.0]) | st.floats(-2, 2)),
+    arrays(np.float64, 3, elements=st.sampled_from([0.0, 1.0, 2.0, np.pi]) | st.floats(-4, 4)),
+)
+def test_whatever_is_returned_ends_at_the_goal(twists, goal):
+    for solution in steer(twists, goal):
+        assert solution.min() >= 0.0
+        end = reference.plain_end(twists, solution)
+        assert np.abs(reference.off_goal(end, goal)).max() < 1e-9
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_root_finding_from_many_starts_finds_nothing_else(kind):
+    rng = np.random.default_rng(4)
+    twists, between, _, goals = planted(rng, np.tile(kind, (3, 1)), sideways=1.0, gaps=1.0)
+    for row, gap, goal in zip(twists, between, goals, strict=True):
+        found = steer(row, goal, gaps=gap)
+        for root in reference.steering_roots(row, goal, gap, starts=12, longest=8.0, rng=rng):
+            assert np.abs(found - root).max(axis=1).min() < 1e-4
+
+
+@settings(max_examples=40)
+@given(
+    arrays(np.float64, (3, 3), elements=SIZEABLE),
+    *(arrays(np.float64, 3, elements=SIZEABLE) for _ in range(2)),
+    arrays(np.float64, 3, elements=st.floats(-50.0, 50.0)),
+)
+def test_a_moved_start_and_goal_have_the_same_times(twists, start, goal, by):
+    begin, end, motion = SE2(start), SE2(goal), SE2(by)
+    relative = (begin.inverse() @ end).pose
+    here = steer(twists, relative)
+    there = steer(twists, ((motion @ begin).inverse() @ (motion @ end)).pose)
+    for times in there:
+        off = reference.off_goal(reference.plain_end(twists, times), relative)
+        assert np.abs(off).max() < 1e-8
+    if len(here) == len(there):  # two solutions at a tangency come and go with rounding
+        for times in there:  # of equal sums, either may come first
+            assert np.abs(here - times).max(axis=1).min() < 1e-4
+
+
+def test_moved_problems_have_the_same_times_to_nine_digits():
+    rng = np.random.default_rng(6)
+    kinds = np.array(KINDS)[rng.integers(len(KINDS), size=100)]
+    twists, between, _, goals = planted(rng, kinds, sideways=1.0, gaps=1.0)
+    for row, gap, goal in zip(twists, between, goals, strict=True):
+        by, start = SE2(rng.uniform(-20, 20, 3)), SE2(rng.uniform(-5, 5, 3))
+        moved = (by @ start).inverse() @ (by @ start @ SE2(goal))
+        here, there = steer(row, goal, gaps=gap), steer(row, moved.pose, gaps=gap)
+        assert there == pytest.approx(here, abs=1e-9)
+
+
+# By hand.
+
+
+def test_dubins_words():
+    half_oval = steer([LEFT, AHEAD, LEFT], [0.0, 5.0, np.pi])
+    assert half_oval == pytest.approx(np.array([[np.pi / 2, 3.0, np.pi / 2]]))
+    lane_change = steer([LEFT, AHEAD, RIGHT], [4.0, 2.0, 0.0])
+    assert lane_change == pytest.approx(np.array([[np.pi / 6, 2 * np.sqrt(3), np.pi / 6]]))
+    three_turns = steer([RIGHT, LEFT, RIGHT], [0.0, 0.0, np.pi])
+    assert np.array([np.pi / 3, 5 * np.pi / 3, np.pi / 3]) == pytest.approx(three_turns[0])
+
+
+def test_reeds_shepp_three_point_turn():
+    # on the spot by half a turn, forward, back and forward: a third of a half turn each
+    turn = steer([LEFT, [-1.0, 0, 1.0], LEFT], [0, 0, np.pi])
+    assert turn[0] == pytest.approx([np.pi / 3] * 3)
+
+
+def test_turn_move_turn():
+    found = steer([SPIN, AHEAD, SPIN], [1.0, 1.0, np.pi / 2])
+    assert found == pytest.approx(np.array([[np.pi / 4, np.sqrt(2), np.pi / 4]]))
+    backwards = steer([SPIN, BACK, SPIN], [-1.0, -1.0, np.pi / 2])
+    assert backwards == pytest.approx(found)
+
+
+def test_headings_count_modulo_a_turn():
+    for turns in (-2, 1, 5):
+        found = steer([SPIN, AHEAD, SPIN], [1.0, 1.0, np.pi / 2 + turns * TURN])
+        assert found == pytest.approx(np.array([[np.pi / 4, np.sqrt(2), np.pi / 4]]))
+
+
+# Degenerate triples.
+
+
+def test_nothing_to_do_takes_no_time():
+    for triple in ([LEFT, AHEAD, RIGHT], [AHEAD, LEFT, [1.0, 0, 0.5]], [SPIN, AHEAD, LEFT]):
+        found = steer(triple, [0, 0, 0])
+        assert any(not times.any() for times in found)
+
+
+def test_a_goal_straight_ahead_leaves_the_turns_no_time():
+    found = steer([LEFT, AHEAD, RIGHT], [3.0, 0, 0])
+    assert [0.0, 3.0, 0.0] in found.tolist()
+    assert [0.0, 3.0, 0.0] in steer([LEFT, AHEAD, LEFT], [3.0, 0, 0]).tolist()
+
+
+def test_equal_radii():
+    # both turns about one centre: the goal is met never, or by any share of the two
+    assert steer([LEFT, LEFT, RIGHT], [1.0, 0.5, 0.2]).shape == (0, 3)
+    assert steer([LEFT, LEFT, RIGHT], reference.word_end([LEFT, RIGHT], [1, 1])).shape == (0, 3)
+    # first and last: a translation of the circle, still an isolated solution
+    assert len(steer([LEFT, AHEAD, LEFT], [4.0, 1.0, 0.5])) == 1
+    twice_as_fast = [2.0, 0, 2.0]
+    assert steer([LEFT, twice_as_fast, RIGHT], [1.0, 0.5, 0.2]).shape == (0, 3)
+
+
+def test_parallel_straights():
+    assert steer([AHEAD, [2.0, 0, 0], LEFT], [3.0, 1.0, 1.0]).shape == (0, 3)
+    assert steer([LEFT, AHEAD, BACK], [3.0, 1.0, 1.0]).shape == (0, 3)
+    assert steer([AHEAD, LEFT, AHEAD], [3.0, 1.0, 0.0]).shape == (0, 3)
+    crab = steer([AHEAD, [0, 1.0, 0], LEFT], [3.0, 1.0, 0.0])
+    assert crab == pytest.approx(np.array([[3.0, 1.0, 0.0]]))
+    assert steer([AHEAD, BACK, [0, 1.0, 0]], [1.0, 1.0, 0.0]).shape == (0, 3)
+
+
+def test_rest_has_no_time_of_its_own():
+    assert steer([LEFT, [0, 0, 0], RIGHT], [1.0, 0.5, 0.2]).shape == (0, 3)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_tangent_circles(sign):
+    # the goal is as far as the turns reach: two solutions become one
+    known = np.array([1.0, np.pi, 0.7])
+    goal = reference.word_end([LEFT, RIGHT, LEFT], known)
+    found = steer([LEFT, RIGHT, LEFT], goal)
+    assert len(found) == 1
+    assert found[0] == pytest.approx(known, abs=1e-6)
+    outward = goal[:2] + np.array(
+        [-np.sin(goal[2]), np.cos(goal[2]) - 1.0]
+    )  # from centre to centre
+    shift = np.append(1e-6 * outward / np.linalg.norm(outward), 0.0)
+    assert len(steer([LEFT, RIGHT, LEFT], goal + sign * shift)) == (0 if sign > 0 else 2)
+
+
+def test_a_tangent_straight_of_no_length():
+    goal = reference.word_end([LEFT, RIGHT, AHEAD], [1.0, 2.0, 0.0])
+    found = steer([LEFT, RIGHT, AHEAD], goal)
+    assert found[np.abs(found - [1.0, 2.0, 0.0]).max(axis=1).argmin()][2] == 0.0
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e3])
+def test_scaling_lengths_scales_straights_and_keeps_angles(size):
+    scale = np.array([size, size, 1.0])
+    here = steer([LEFT, AHEAD, RIGHT], [4.0, 2.0, 0.3])
+    there = steer(np.array([LEFT, AHEAD, RIGHT]) * scale, np.array([4.0, 2.0, 0.3]) * scale)
+    assert there == pytest.approx(here, abs=1e-7)
+
+
+# With a climb.
+
+
+def climbing(rng, *, fourth):
+    """Four trims whose times are known; the last one vertical, straight, or a turn."""
+    twists = rng.uniform(0.2, 2.0, (4, 4)) * rng.choice([-1.0, 1.0], (4, 4))
+    twists[int(rng.integers(3)), 2] = 0.0
+    if fourth == "vertical":
+        twists[3, :3] = 0.0
+    elif fourth == "straight":
+        twists[3, 2] = 0.0
+    gaps = rng.uniform(-1.0, 1.0, (3, 4)) * rng.integers(2)
+    with np.errstate(divide="ignore"):
+        longest = np.minimum(TURN / np.abs(twists[:, 2]), 3.0)
+    times = rng.uniform(0.05, 0.95, 4) * longest
+    return twists, gaps, times, reference.word_end(twists, times, gaps)
+
+
+@pytest.mark.parametrize("fourth", ["vertical", "straight", "turn"])
+def test_planted_climbs_are_found(fourth):
+    rng = np.random.default_rng(10)
+    for _ in range(25):
+        twists, gaps, times, goal = climbing(rng, fourth=fourth)
+        found = steer_climbing(twists, goal, gaps=gaps)
+        assert np.abs(found - times).max(axis=1).min() < 1e-6
+        for solution in found:
+            assert solution.min() >= 0.0
+            end = reference.word_end(twists, solution, gaps)
+            assert np.abs(reference.off_goal(end, goal)).max() < 1e-9
+
+
+def test_a_moved_climb_has_the_same_times():
+    rng = np.random.default_rng(11)
+    twists, gaps, _, goal = climbing(rng, fourth="turn")
+    for _ in range(5):
+        by = SE2xR(rng.uniform(-20, 20, 4))
+        moved = (by.inverse() @ (by @ SE2xR(goal))).pose
+        here, there = (steer_climbing(twists, end, gaps=gaps) for end in (goal, moved))
+        assert there == pytest.approx(here, abs=1e-9)
+
+
+def test_climbs_by_hand():
+    spin, ahead = [*SPIN, 0.0], [*AHEAD, 0.0]
+    lift = steer_climbing([spin, ahead, spin, UP], [1.0, 1.0, np.pi / 2, 2.0])
+    assert lift == pytest.approx(np.array([[np.pi / 4, np.sqrt(2), np.pi / 4, 4.0]]))
+    # two metres up take four seconds of the rising straight, at the end
+    rise = steer_climbing([spin, ahead, spin, RISE], [6.0, 0.0, 0.0, 2.0])
+    assert np.array([0.0, 2.0, 0.0, 4.0]) == pytest.approx(rise[0], abs=1e-9)
+    # one turn of a helix
+    helix = steer_climbing([spin, ahead, spin, [1.0, 0, 1.0, 1.0]], [0, 0, 0, 3.0])
+    assert helix[:, 3] == pytest.approx([3.0])
+    down = steer_climbing([spin, ahead, spin, UP], [1.0, 1.0, np.pi / 2, -2.0])
+    assert down.shape == (0, 4)
+
+
+def test_longest_limits_the_fourth_time():
+    trims = [[*SPIN, 0.0], [*AHEAD, 0.0], [*SPIN, 0.0], RISE]
+    assert steer_climbing(trims, [6.0, 0, 0, 2.0], longest=3.0).shape == (0, 4)
+    assert len(steer_climbing(trims, [6.0, 0, 0, 2.0], longest=5.0)) > 0
+
+
+def test_what_leaves_the_altitude_open_gives_none():
+    flat = [[*LEFT, 0.0], [*AHEAD, 0.0], [*RIGHT, 0.0], [1.0, 0, 0.5, 0.0]]
+    assert steer_climbing(flat, [4.0, 2.0, 0, 0]).shape == (0, 4)
+    assert steer_climbing(flat, [4.0, 2.0, 0, 1.0]).shape == (0, 4)
+    assert steer_climbing([*flat[:3], [0, 0, 0, 0]], [4.0, 2.0, 0, 0]).shape == (0, 4)
+
+
+@pytest.mark.parametrize(
+    ("twists", "goal", "options", "message"),
+    [
+        ([LEFT, AHEAD], [1, 0, 0], {}, r"twists: got shape \(2, 3\), need \(3, 3\)"),
+        ([[1, 0]] * 3, [1, 0, 0], {}, r"twists: got shape \(3, 2\), need 3 components last"),
+        ([LEFT, AHEAD, [np.nan] * 3], [1, 0, 0], {}, "twists: got nan, need finite numbers"),
+        ([LEFT] * 3, [[1, 0, 0]], {}, r"goal: got shape \(1, 3\), need \(3,\)"),
+        ([LEFT] * 3, [1, 0, 0, 0], {}, r"goal: got shape \(4,\), need 3 components last"),
+        ([LEFT] * 3, [1, 0, 0], {"gaps": [[0, 0, 0]]}, r"gaps: got shape \(1, 3\), need \(2, 3\)"),
+        ([LEFT] * 3, [1, 0, 0], {"tolerance": 0.0}, "tolerance: got 0.0, need a positive number"),
+        (
+            [LEFT] * 3,
+            [1, 0, 0],
+            {"tolerance": np.inf},
+            "tolerance: got inf, need a positive number",
+        ),
+    ],
+)
+def test_wrong_input(twists, goal, options, message):
+    with pytest.raises(ValueError, match=message):
+        steer(twists, goal, **options)
+
+
+@pytest.mark.parametrize(
+    ("twists", "goal", "options", "message"),
+    [
+        ([RISE] * 3, [1, 0, 0, 0], {}, r"twists: got shape \(3, 4\), need \(4, 4\)"),
+        ([RISE] * 4, [1, 0, 0], {}, r"goal: got shape \(3,\), need 4 components last"),
+        ([RISE] * 4, [1, 0, 0, 0], {"gaps": [RISE]}, r"gaps: got shape \(1, 4\), need \(3, 4\)"),
+        ([RISE] * 4, [1, 0, 0, 0], {"longest": -1.0}, "longest: got -1.0, need a positive number"),
+        ([RISE] * 4, [1, 0, 0, 0], {"nodes": 0}, "nodes: got 0, need at least 1"),
+        ([RISE] * 4, [1, 0, 0, 0], {"tolerance": -1}, "tolerance: got -1, need a positive number"),
+    ],
+)
+def test_wrong_climbing_input(twists, goal, options, message):
+    with pytest.raises(ValueError, match=message):
+        steer_climbing(twists, goal, **options)

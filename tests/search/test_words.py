@@ -1,0 +1,510 @@
+"""Exhaustive search over words, on the paper's parking problem and on small libraries."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.groups import SE2, SE2xR
+from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
+from maneuver_automaton.search import SearchStatus, search_words
+from tests.reference import Word, words_of
+from tests.search.cases import (
+    INTERPRETED,
+    REVERSED_SPIN,
+    TABLE_2,
+    compiled_only,
+    end_off_goal,
+    helicopter,
+    names,
+    parking,
+    reference_word,
+    robot,
+    without_rest,
+)
+
+MINIMUM_TIME = Cost(time=1.0)
+
+
+def search(problem, **options):
+    return search_words(problem, problem.goals[0], **options)
+
+
+def best(problem, **options):
+    return search(problem, **options).solutions[0]
+
+
+def listed(result):
+    """Words with their times, as plain numbers."""
+    return [(tuple(s.word.tolist()), s.durations, s.cost) for s in result.solutions]
+
+
+def assert_same_solutions(one, other, *, atol=1e-9):
+    """The same words, times and costs, in the same order."""
+    assert [word for word, _, _ in listed(one)] == [word for word, _, _ in listed(other)]
+    for (_, times, cost), (_, again, cost_again) in zip(listed(one), listed(other), strict=True):
+        assert again == pytest.approx(times, abs=1e-6)
+        assert cost_again == pytest.approx(cost, abs=atol, rel=atol)
+
+
+def assert_valid(problem, solution):
+    """Ends at the goal, times positive and in sum as asked for, cost as it is defined."""
+    distance, angle = end_off_goal(problem, solution)
+    assert distance < 1e-9
+    assert angle < 1e-9 or problem.goals[0].free_heading
+    assert solution.durations.min(initial=1.0) > 0.0
+    horizon = problem.horizon
+    if horizon.time is not None:
+        assert solution.duration == pytest.approx(horizon.time, abs=1e-9)
+    if horizon.max_time is not None:
+        assert solution.duration <= horizon.max_time + 1e-9
+    if horizon.max_trims is not None:
+        assert len(solution.word) <= horizon.max_trims
+    twists = problem.automaton.body_velocities[solution.word]
+    expected = problem.rates[solution.word] @ solution.durations + problem.cost.switching(twists)
+    assert solution.cost == pytest.approx(expected, abs=1e-9)
+
+
+# The paper's parking problem.
+
+
+def test_parking_with_four_trims():
+    problem = parking()
+    solution = best(problem)
+    assert names(problem, solution) == ("cw", "straight", "spin", "rest")
+    # two turns by arccos(0.2) with a straight between them, by hand
+    angle = np.arccos(0.2)
+    straight = np.sqrt(2.0 / 3.0)
+    expected = [angle, straight, angle, 8.0 - straight - 2.0 * angle]
+    assert solution.durations == pytest.approx(expected)
+    rates = problem.rates[solution.word]
+    assert solution.cost == pytest.approx(rates @ solution.durations, abs=1e-12)
+    assert solution.cost == pytest.approx(6.664468057636666, abs=1e-9)
+    word, times = reference_word(problem, solution)
+    again = word.slsqp(times)
+    assert word.cost(again) == pytest.approx(solution.cost, abs=1e-6)
+
+
+def test_with_the_spin_reversed_the_papers_sequence_is_best():
+    problem = parking(REVERSED_SPIN)
+    solution = best(problem)
+    assert names(problem, solution) == ("spin", "straight", "acw", "rest")
+    assert solution.cost == pytest.approx(best(parking()).cost, abs=1e-9)
+
+
+def test_slsqp_finds_nothing_cheaper_on_a_few_words():
+    problem = parking()
+    cheapest = best(problem).cost
+    rng = np.random.default_rng(0)
+    twists, rates = problem.automaton.body_velocities[1:], problem.rates[1:]
+    for word in [(1, 0, 3), (1, 0, 2), (2, 0, 3), (3, 0, 2), (2, 1), (3, 0, 3), (0, 3, 0)]:
+        one = Word(twists[list(word)], rates[list(word)], np.array([0.0, -1.0, 0.0]), at_most=8.0)
+        optima = one.local_optima(starts=8, longest=7.0, rng=rng)
+        assert all(one.cost(times) > cheapest - 1e-6 for times in optima)
+
+
+@pytest.mark.parametrize("controls", [TABLE_2, REVERSED_SPIN], ids=["table 2", "reversed spin"])
+def test_the_complete_list_holds_only_solutions(controls):
+    problem = parking(controls)
+    result = search(problem, alternatives=None)
+    assert result.status is SearchStatus.FOUND
+    assert result.complete
+    assert result.exhaustive
+    assert len(result.solutions) >= 73
+    costs = [solution.cost for solution in result.solutions]
+    assert all(b > a - 1e-9 * (1.0 + a) for a, b in itertools.pairwise(costs))
+    for solution in result.solutions:
+        assert_valid(problem, solution)
+    seen = {(word, tuple(times.round(5))) for word, times, _ in listed(result)}
+    assert len(seen) == len(result.solutions)
+
+
+def test_slsqp_confirms_the_complete_list():
+    problem = parking()
+    for solution in search(problem, alternatives=None).solutions:
+        word, times = reference_word(problem, solution)
+        again = word.slsqp(times)
+        assert again is not None
+        assert word.cost(again) == pytest.approx(solution.cost, abs=1e-6)
+
+
+# numbers in the library without its rest; all of three, and a few of four that take the whole time
+SUBSET = [*list(words_of(4, 3))[::4], (2, 1, 0, 2), (0, 3, 0, 3), (1, 3, 0, 2), (3, 0, 1, 3)]
+
+
+def test_brute_force_finds_nothing_else():
+    problem = parking()
+    result = search(problem, alternatives=None)
+    twists, rates = problem.automaton.body_velocities[1:], problem.rates[1:]
+    rng = np.random.default_rng(1)
+    for word in SUBSET:
+        limit = {"total": 8.0} if len(word) == 4 else {"at_most": 8.0}
+        one = Word(twists[list(word)], rates[list(word)], np.array([0.0, -1.0, 0.0]), **limit)
+        optima = one.local_optima(starts=15, longest=8.0, rng=rng)
+        moving = tuple(k + 1 for k in word)
+        admitted = (moving, (*moving, 0))  # as it is, or padded by rest
+        ours = [times[: len(word)] for w, times, _ in listed(result) if w in admitted]
+        for times in optima:
+            assert any(np.abs(times - mine).max() < 1e-4 for mine in ours), (word, times)
+
+
+def test_a_solution_whose_straights_are_antiparallel():
+    # half a turn, ahead, half a turn back, ahead: straights at opposite headings
+    problem = parking()
+    wait = (8.0 - 2.0 * np.pi) / 2.0
+    expected = {"acw", "straight", "cw"}
+    found = [
+        solution
+        for solution in search(problem, alternatives=None).solutions
+        if names(problem, solution) == ("acw", "straight", "cw", "straight")
+    ]
+    assert expected
+    assert any(
+        np.abs(solution.durations - [np.pi, wait, np.pi, wait]).max() < 1e-6 for solution in found
+    )
+
+
+@pytest.mark.parametrize("alternatives", [0, 3, 20])
+@pytest.mark.parametrize("controls", [TABLE_2, REVERSED_SPIN], ids=["table 2", "reversed spin"])
+def test_the_pruned_search_is_the_head_of_the_complete_list(controls, alternatives):
+    problem = parking(controls)
+    pruned = search(problem, alternatives=alternatives)
+    assert not pruned.complete
+    assert len(pruned.solutions) == alternatives + 1
+    complete = search(problem, alternatives=None)
+    head = replace(complete, solutions=complete.solutions[: alternatives + 1])
+    assert_same_solutions(pruned, head)
+
+
+def test_results_are_the_same_in_every_run():
+    first, second = (search(parking(), alternatives=None) for _ in range(2))
+    assert [t.tolist() for _, t, _ in listed(first)] == [t.tolist() for _, t, _ in listed(second)]
+
+
+def test_small_buffers_change_nothing(monkeypatch):
+    expected = search(parking(), alternatives=None)
+    monkeypatch.setattr("maneuver_automaton.search.words.CAPACITY", 40)
+    assert_same_solutions(expected, search(parking(), alternatives=None), atol=0.0)
+
+
+def test_ties_go_to_fewer_trims_then_to_the_smaller_word():
+    twins = robot({"b": (0.0, 1.0), "a": (1.0, 0.0), "c": (0.0, -1.0)})
+    problem = Problem(twins, [0, 0, 0], [-1.0, 0.0, np.pi], horizon=Horizon(max_trims=3))
+    words = [names(problem, s) for s in search(problem, alternatives=3).solutions]
+    assert words[:2] == [("b", "a"), ("c", "a")]  # half a turn either way, in the library's order
+    assert words == [names(problem, s) for s in search(problem, alternatives=3).solutions]
+
+
+def test_of_equal_trims_the_cheapest_is_taken():
+    library = robot({"ahead": (1.0, 0.0), "also": (1.0, 0.0), "left": (0.0, 1.0)})
+    problem = Problem(library, [0, 0, 0], [2.0, 0, 0], horizon=Horizon(max_trims=3))
+    assert names(problem, best(problem, alternatives=None)) == ("ahead",)
+
+
+@compiled_only
+def test_five_trims_do_better():
+    four, five = parking(), parking(max_trims=5)
+    solution = best(five)
+    assert len(solution.word) == 5
+    assert_valid(five, solution)
+    assert solution.cost < best(four).cost - 0.1
+    word, times = reference_word(five, solution)
+    assert word.is_local_optimum(times, np.random.default_rng(0))
+
+
+# Minimum time, limits, prices.
+
+
+def test_minimum_time():
+    problem = parking(cost=MINIMUM_TIME, time=None)
+    solution = best(problem)
+    assert_valid(problem, solution)
+    assert solution.cost == pytest.approx(solution.duration, abs=1e-12)
+    assert names(problem, solution) == ("cw", "straight", "spin", "acw")
+    word, times = reference_word(problem, solution)
+    assert word.is_local_optimum(times, np.random.default_rng(0))
+    assert solution.cost < best(parking(cost=MINIMUM_TIME, time=None, max_trims=3)).cost
+
+
+def test_minimum_time_agrees_with_brute_force_on_a_few_words():
+    problem = parking(cost=MINIMUM_TIME, time=None)
+    complete = listed(search(problem, alternatives=None))
+    twists, rates = problem.automaton.body_velocities[1:], problem.rates[1:]
+    rng = np.random.default_rng(2)
+    for word in [(1, 0, 3, 2), (2, 1, 3, 1), (1, 0, 2), (3, 2, 1, 2), (0, 2, 1, 3), (2, 0, 2, 1)]:
+        one = Word(twists[list(word)], rates[list(word)], np.array([0.0, -1.0, 0.0]))
+        ours = [times for w, times, _ in complete if w == tuple(k + 1 for k in word)]
+        for times in one.local_optima(starts=15, longest=6.0, rng=rng):
+            with np.errstate(divide="ignore"):
+                turn = 2.0 * np.pi / np.abs(one.twists[:, 2])
+            if (times < turn - 1e-3).all():
+                assert any(np.abs(times - mine).max() < 1e-3 for mine in ours), (word, times)
+
+
+def test_longest_time():
+    fast = best(parking(cost=Cost(effort=1.0), time=None, max_time=3.39))
+    slow = best(parking(cost=Cost(effort=1.0), time=None))
+    assert fast.duration <= 3.39 + 1e-9
+    assert slow.duration > 3.39
+    assert fast.cost > slow.cost
+    never = search(parking(time=None, max_time=1.0))
+    assert never.status is SearchStatus.EXHAUSTED
+    assert never.solutions == ()
+
+
+@pytest.mark.xfail(strict=True, reason="the sign of the price of time is not looked at")
+def test_with_a_longest_time_every_solution_is_a_local_optimum():
+    problem = parking(time=None, max_time=3.8)
+    for solution in search(problem, alternatives=None).solutions:
+        word, times = reference_word(problem, solution)
+        assert word.cost(word.slsqp(times)) > solution.cost - 1e-6, names(problem, solution)
+
+
+def test_least_coasting_time():
+    problem = parking(min_coast=1.0)
+    result = search(problem, alternatives=None)
+    assert result.solutions
+    for solution in result.solutions:
+        moving = problem.automaton.body_velocities[solution.word].any(axis=1)
+        assert solution.durations[moving].min() >= 1.0 - 1e-9
+        assert_valid(problem, solution)
+
+
+@compiled_only
+def test_free_heading():
+    problem = parking()
+    problem = replace(problem, goals=(Goal(pose=[0.0, 0.0, 0.0], free_heading=True),))
+    solution = best(problem)
+    assert_valid(problem, solution)
+    assert solution.cost < best(parking()).cost
+    assert names(problem, solution) == ("cw", "straight", "rest")
+    # turn towards the goal, then drive there
+    spin = Problem(
+        robot({"ahead": (1.0, 0.0), "spin": (0.0, 1.0)}),
+        [0, 0, 0],
+        replace(problem.goals[0], pose=[1.0, 1.0, 2.0]),
+    )
+    turned = best(spin)
+    assert names(spin, turned) == ("spin", "ahead")
+    assert turned.durations == pytest.approx([np.pi / 4, np.sqrt(2)])
+
+
+def test_price_of_a_switch():
+    priced = parking(cost=Cost(effort=1.0, norm=0.5, switch=2.0))
+    result = search(priced, alternatives=None)
+    for solution in result.solutions:
+        assert_valid(priced, solution)
+    plain = search(parking(), alternatives=None)
+    assert result.solutions[0].cost == pytest.approx(plain.solutions[0].cost + 6.0, abs=1e-9)
+    dear = search(parking(cost=Cost(effort=1.0, norm=0.5, switch=20.0)))
+    assert names(priced, dear.solutions[0]) == ("acw", "cw", "rest")  # fewest switches
+
+
+def test_price_of_a_direction_change():
+    priced = parking(cost=Cost(effort=1.0, norm=0.5, direction_change=5.0))
+    result = search(priced, alternatives=10)
+    for solution in result.solutions:
+        assert_valid(priced, solution)
+    assert names(priced, result.solutions[0]) == ("acw", "cw", "rest")  # in reverse all the way
+    third = search(parking(), alternatives=2).solutions[2]
+    assert result.solutions[0].cost == pytest.approx(third.cost)
+
+
+@pytest.mark.parametrize("price", [{"switch": 1.0}, {"direction_change": 1.0}])
+@compiled_only
+def test_pruning_knows_the_prices(price):
+    problem = parking(cost=Cost(effort=1.0, norm=0.5, **price))
+    complete = search(problem, alternatives=None)
+    assert_same_solutions(
+        search(problem, alternatives=9), replace(complete, solutions=complete.solutions[:10])
+    )
+
+
+def test_a_limit_on_words_ends_the_search():
+    limited = replace(parking(), search=SearchSettings(max_expansions=1))
+    result = search(limited, alternatives=None)
+    assert not result.complete
+    assert not result.exhaustive
+    assert len(result.solutions) < 73
+    nothing = search(
+        replace(parking(time=None, max_time=0.5), search=SearchSettings(max_expansions=1))
+    )
+    assert nothing.status is SearchStatus.OUT_OF_BUDGET
+
+
+def test_no_time_to_search():
+    result = search(parking(), time_limit=0.0, alternatives=None)
+    assert not result.complete
+    assert result.status in (SearchStatus.FOUND, SearchStatus.OUT_OF_BUDGET)
+
+
+# Libraries without rest, goals at the start, words that do not span.
+
+
+def test_a_fixed_time_without_rest_is_met_exactly():
+    problem = parking(without_rest(TABLE_2))
+    result = search(problem, alternatives=None)
+    for solution in result.solutions:
+        assert_valid(problem, solution)
+    with_rest = search(parking(), alternatives=None)
+    full = [s.cost for s in with_rest.solutions if 0 not in s.word]
+    assert [s.cost for s in result.solutions] == pytest.approx(full, abs=1e-9)
+
+
+def test_start_equal_to_goal():
+    still = replace(parking(), start=np.zeros(3))
+    rest = best(still)
+    assert names(still, rest) == ("rest",)
+    assert rest.durations.tolist() == [8.0]
+    assert rest.cost == 0.0
+    free = best(replace(parking(time=None), start=np.zeros(3)))
+    assert free.word.size == 0
+    assert free.cost == 0.0
+    whole_turn = replace(parking(time=None), start=np.array([0.0, 0.0, -4.0 * np.pi]))
+    assert best(whole_turn).word.size == 0
+
+
+def test_start_equal_to_goal_without_rest_moves_for_the_whole_time():
+    problem = replace(parking(without_rest(TABLE_2)), start=np.zeros(3))
+    result = search(problem)
+    assert result.status is SearchStatus.FOUND
+    assert_valid(problem, result.solutions[0])
+
+
+def test_only_straights():
+    library = robot({"slow": (1.0, 0.0), "fast": (2.0, 0.0), "back": (-1.0, 0.0)})
+    ahead = Problem(library, [0, 0, 0], [4.0, 0, 0])
+    assert [names(ahead, s) for s in search(ahead, alternatives=None).solutions] == [
+        ("fast",), ("slow",),
+    ]  # fmt: skip
+    in_time = replace(ahead, horizon=Horizon(time=3.0, max_trims=2))
+    mixed = best(in_time)
+    assert names(in_time, mixed) == ("slow", "fast")
+    assert mixed.durations == pytest.approx([2.0, 1.0])
+    assert search(Problem(library, [0, 0, 0], [4.0, 1.0, 0])).status is SearchStatus.EXHAUSTED
+
+
+def test_only_spins():
+    library = robot({"slow": (0.0, 1.0), "fast": (0.0, 2.0), "back": (0.0, -1.0)})
+    problem = Problem(library, [0, 0, 0], [0, 0, 2.0])
+    found = search(problem, alternatives=None).solutions
+    assert names(problem, found[0]) == ("fast",)
+    assert [round(s.cost, 9) for s in found] == [
+        1.0, 2.0, round(2 * np.pi - 2.0, 9),
+    ]  # fmt: skip
+    in_time = replace(problem, horizon=Horizon(time=1.5, max_trims=2))
+    assert best(in_time).durations == pytest.approx([1.0, 0.5])
+    aside = replace(problem, goals=(Goal(pose=[1.0, 0, 0]),))
+    assert search(aside).status is SearchStatus.EXHAUSTED
+
+
+def test_table_1_of_the_paper():
+    # 1.62 m in one second with controls in steps of 0.1: between 1.6 and 1.7
+    library = robot({f"{v:.1f}": (v, 0.0) for v in np.arange(0.0, 2.05, 0.1).round(1)})
+    problem = Problem(
+        library, [-1.62, 0, 0], [0, 0, 0], cost=Cost(effort=1.0),
+        horizon=Horizon(time=1.0, max_trims=2),
+    )  # fmt: skip
+    solution = best(problem)
+    assert set(names(problem, solution)) == {"1.6", "1.7"}
+    assert solution.cost == pytest.approx(2.626, abs=1e-9)
+
+
+def test_a_full_circle_is_found_as_an_alternative():
+    library = robot({"rest": (0.0, 0.0), "circle": (1.0, 1.0)})
+    problem = Problem(
+        library, [0, 0, 0], SE2.exp([0.5, 0.0, 0.5]).pose, cost=MINIMUM_TIME,
+        horizon=Horizon(time=10.0, max_trims=2),
+    )  # fmt: skip
+    found = [s.durations[0] for s in search(problem, alternatives=None).solutions]
+    assert found == pytest.approx([0.5, 0.5 + 2.0 * np.pi])
+
+
+# Climbing.
+
+
+@compiled_only
+def test_climbing_words_end_at_the_altitude():
+    problem = Problem(
+        helicopter(), [0, 0, 0, 0], [6.0, 3.0, 1.0, 2.0], horizon=Horizon(max_trims=4)
+    )
+    result = search(problem, alternatives=5)
+    for solution in result.solutions:
+        assert_valid(problem, solution)
+        word, times = reference_word(problem, solution)
+        again = word.slsqp(times)
+        assert word.cost(again) == pytest.approx(solution.cost, abs=1e-6)
+
+
+@compiled_only
+def test_a_climb_in_a_fixed_time():
+    problem = Problem(
+        helicopter(), [0, 0, 0, 0], [6.0, 3.0, 1.0, 2.0], cost=Cost(effort=1.0),
+        horizon=Horizon(time=9.0, max_trims=5),
+    )  # fmt: skip
+    solution = best(problem)
+    assert_valid(problem, solution)
+    assert "hover" in names(problem, solution)
+
+
+# A moved problem has the moved plan.
+
+
+def moves(n, dof=3, seed=5):
+    rng = np.random.default_rng(seed)
+    group = SE2 if dof == 3 else SE2xR
+    far = np.array([100.0, 100.0, 7.0, 50.0])[:dof]
+    return [group(rng.uniform(-1.0, 1.0, dof) * far) for _ in range(n)]
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [parking(), parking(REVERSED_SPIN), parking(cost=MINIMUM_TIME, time=None)],
+    ids=["table 2", "reversed spin", "minimum time"],
+)
+def test_a_moved_problem_has_the_same_words(problem):
+    here = search(problem, alternatives=1)
+    for by in moves(1 if INTERPRETED else 4):
+        assert_same_solutions(here, search(problem.moved(by), alternatives=1))
+
+
+@pytest.mark.parametrize("start", [[0.3, 1.2, 0.4], [-2.1, 0.57, 2.9]])
+def test_a_moved_problem_has_the_same_alternatives(start):
+    problem = replace(parking(), start=np.array(start))
+    here = search(problem, alternatives=8)
+    for by in moves(1 if INTERPRETED else 3):
+        assert_same_solutions(here, search(problem.moved(by), alternatives=8))
+
+
+@pytest.mark.xfail(strict=True, reason="rounding gives neighbours of a tangent word a moment each")
+def test_a_moved_problem_with_a_tangent_solution_has_the_same_alternatives():
+    # acw, cw are tangent circles here: words with one trim more touch the goal for no time at all
+    problem = parking()
+    here = search(problem, alternatives=5)
+    for by in moves(4):
+        assert_same_solutions(here, search(problem.moved(by), alternatives=5))
+
+
+@compiled_only
+def test_a_moved_climb_has_the_same_words():
+    problem = Problem(
+        helicopter(), [0, 0, 0, 0], [6.0, 3.0, 1.0, 2.0], horizon=Horizon(max_trims=4)
+    )
+    here = search(problem)
+    for by in moves(3, dof=4):
+        assert_same_solutions(here, search(problem.moved(by)))
+
+
+@pytest.mark.parametrize(
+    ("problem", "most"),
+    [(parking(max_trims=6), 5), (parking(max_trims=40, time=None), 5)],
+    ids=["fixed", "free"],
+)
+def test_too_many_trims_are_refused(problem, most):
+    message = rf"max_trims is \d+, need at most {most}; use insertion for more"
+    with pytest.raises(ValueError, match=message):
+        search(problem)

@@ -1,0 +1,148 @@
+"""End of a word and its derivatives, against matrix exponentials and differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from maneuver_automaton._arrays import wrapped
+from maneuver_automaton._compile import kernel
+from maneuver_automaton.groups import group_of
+from maneuver_automaton.switching_times import end_pose, end_twists
+from maneuver_automaton.switching_times._kernels import (
+    end_and_columns,
+    lagrangian_hessian,
+    least_squares,
+    null_space,
+)
+from tests import reference
+
+EVERYDAY = st.floats(-3.0, 3.0)
+TINY = st.floats(-1e-7, 1e-7)
+SPECIAL = st.sampled_from([0.0, 1.0, -1.0, 1e-300, np.pi])
+
+
+@kernel
+def derivatives(twists, gaps, times, p_x, p_y):
+    """End, columns and Hessian of a word, as the kernels compute them."""
+    n = times.size
+    columns = np.empty((n, 3))
+    hessian = np.empty((n, n))
+    end = end_and_columns(twists, gaps, times, columns)
+    lagrangian_hessian(columns, p_x, p_y, hessian)
+    return end, columns, hessian
+
+
+@kernel
+def solved_and_free(matrix, rhs):
+    """Least-squares solution, rank, null space."""
+    basis = null_space(matrix)
+    solution, rank = least_squares(matrix.copy(), rhs.copy(), 1e-11)
+    return solution, rank, basis
+
+
+@st.composite
+def words(draw, dof=4, least=1):
+    """Twists (n, dof), times (n,) and gaps (n, dof) of up to six trims."""
+    n = draw(st.integers(least, 6))
+    numbers = EVERYDAY | TINY | SPECIAL
+    twists = draw(arrays(np.float64, (n, dof), elements=numbers))
+    times = draw(arrays(np.float64, n, elements=st.floats(0.0, 4.0) | st.just(0.0)))
+    gaps = draw(arrays(np.float64, (n, dof), elements=EVERYDAY | st.just(0.0)))
+    return twists, times, gaps
+
+
+@pytest.mark.parametrize("dof", [3, 4])
+@settings(max_examples=50)
+@given(data=st.data())
+def test_end_is_the_product_of_exponentials(dof, data):
+    twists, times, _ = data.draw(words(dof))
+    off = reference.off_goal(end_pose(twists, times), reference.word_end(twists, times))
+    assert np.abs(off).max() < 1e-11
+
+
+@settings(max_examples=50)
+@given(words())
+def test_kernel_agrees_on_the_end_with_gaps(word):
+    twists, times, gaps = word
+    end, _, _ = derivatives(twists, gaps, times, 0.0, 0.0)
+    off = np.array(end) - reference.word_end(twists[:, :3], times, gaps[:, :3])
+    off[2] = wrapped(off[2])
+    assert np.abs(off).max() < 1e-11
+    off = reference.plain_end(twists, times, gaps) - reference.word_end(twists, times, gaps)
+    off[2] = wrapped(off[2])
+    assert np.abs(off).max() < 1e-11
+
+
+def test_the_least_of_all_turn_rates_is_a_straight():
+    end, _, _ = derivatives(
+        np.array([[1.0, 0, 5e-324, 0]]), np.zeros((1, 4)), np.array([1.5]), 0, 0
+    )
+    assert end[0] == 1.5
+
+
+@settings(max_examples=50)
+@given(words())
+def test_columns_are_the_derivatives_of_the_end(word):
+    twists, times, gaps = word
+    _, columns, _ = derivatives(twists, gaps, times, 0.0, 0.0)
+    expected = reference.jacobian(twists[:, :3], times, gaps[:, :3])
+    assert np.abs(columns.T - expected).max() < 1e-6
+
+
+@settings(max_examples=15)
+@given(words(), st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
+def test_hessian_is_the_derivative_of_the_columns(word, p_x, p_y):
+    twists, times, gaps = word
+    _, _, hessian = derivatives(twists, gaps, times, p_x, p_y)
+    expected = reference.hessian(twists[:, :3], times, [p_x, p_y, 0.0], gaps[:, :3])
+    assert hessian == pytest.approx(expected, abs=1e-3)
+
+
+@pytest.mark.parametrize("dof", [3, 4])
+@settings(max_examples=30)
+@given(data=st.data())
+def test_end_twists_are_the_derivatives_seen_from_the_end(dof, data):
+    twists, times, _ = data.draw(words(dof))
+    end = group_of(dof)(end_pose(twists, times))
+    rates = np.array([end.pose_rates(twist) for twist in end_twists(twists, times)])
+    assert np.abs(rates.T - reference.jacobian(twists, times)).max() < 1e-6
+
+
+@given(words(dof=3), st.floats(0.0, 1.0))
+def test_a_trim_cut_in_two_ends_in_the_same_place(word, share):
+    twists, times, _ = word
+    cut = np.concatenate([[share * times[0], (1.0 - share) * times[0]], times[1:]])
+    twice = np.vstack([twists[:1], twists])
+    assert end_pose(twice, cut) == pytest.approx(end_pose(twists, times), abs=1e-11)
+
+
+@given(arrays(np.float64, (4, 5), elements=st.integers(-2, 2).map(float)))
+def test_least_squares_and_null_space_find_the_rank(matrix):
+    rhs = matrix @ np.arange(5.0)
+    solution, rank, basis = solved_and_free(matrix, rhs)
+    assert rank == np.linalg.matrix_rank(matrix)
+    assert basis.shape == (5, 5 - rank)
+    assert matrix @ solution == pytest.approx(rhs, abs=1e-9)
+    assert np.abs(matrix @ basis).max(initial=0.0) < 1e-9
+    assert np.linalg.matrix_rank(basis) == 5 - rank
+
+
+def test_by_hand():
+    quarter = np.pi / 2
+    assert end_pose([[1, 0, 1], [2, 0, 0]], [quarter, 3.0]) == pytest.approx([1.0, 7.0, quarter])
+    assert end_twists([[0, 0, 1], [1, 0, 0]], [0.0, 2.0]).tolist() == [[0, 2, 1], [1, 0, 0]]
+    assert end_pose(np.zeros((0, 3)), []).tolist() == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("function", [end_pose, end_twists])
+def test_wrong_input(function):
+    with pytest.raises(ValueError, match=r"got shape \(1,\) for twists of shape \(2, 3\)"):
+        function([[1, 0, 0], [0, 0, 1]], [1.0])
+    with pytest.raises(ValueError, match=r"twists: got shape \(1, 2\), need 3 or 4"):
+        function([[1, 0]], [1.0])
+    with pytest.raises(ValueError, match="durations: got nan, need finite numbers"):
+        function([[1, 0, 0]], [np.nan])

@@ -1,0 +1,470 @@
+"""The command line against its contract: files, exit codes, one line for what is wrong."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+
+from maneuver_automaton import planning
+from maneuver_automaton.automaton.library import automaton_hash, load_library, save_library
+from maneuver_automaton.cli import run
+from maneuver_automaton.cli.compiling import COMPILING
+from maneuver_automaton.formats import load_plan
+from maneuver_automaton.models import rollout
+from maneuver_automaton.planning import PlanResult, PlanStatus
+from maneuver_automaton.scenario import load_scenario
+from tests.scenario.files import SCENARIO, automaton, but
+
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
+AHEAD_ONLY = but("    - {name: spin, control: [0.0, 1.0]}\n", "")
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, with a scenario in it."""
+    monkeypatch.chdir(tmp_path)
+    Path("x.yaml").write_text(SCENARIO)
+    return tmp_path
+
+
+def result_file(out: str = "out") -> dict[str, object]:
+    """The content of plan.json."""
+    return json.loads((Path(out) / "plan.json").read_text())  # type: ignore[no-any-return]
+
+
+def test_plan_writes_files_and_prints_tables(folder, capsys):
+    assert run(["plan", "x.yaml"]) == 0
+    assert sorted(path.name for path in Path("out").iterdir()) == ["plan.json", "plan.png"]
+    printed = capsys.readouterr().out
+    document = result_file()
+    for primitive in document["primitives"]:
+        assert primitive["name"] in printed
+    assert f"{document['cost']:.9g}" in printed
+    assert "terminal error" in printed
+    assert set(document["timing_s"]) >= {
+        "load",
+        "automaton",
+        "search",
+        "first_plan",
+        "refine",
+        "audit",
+    }
+    assert document["timing_s"]["load"] > 0.0
+    assert document["status"] == "found"
+    assert document["reason"] == ""
+    assert document["audit"]["passed"] is True
+    assert document["terminal_error"]["position_m"] <= 1e-9
+    assert document["alternatives"] == []
+
+
+def test_the_plan_leads_to_the_goal_by_an_ode_solver(folder):
+    assert run(["plan", "x.yaml", "--no-plot", "--quiet"]) == 0
+    problem = load_scenario("x.yaml").problem
+    state = np.array(problem.start)
+    document = result_file()
+    for primitive in document["primitives"]:
+        times = [0.0, primitive["duration_s"]]
+        state = rollout(problem.automaton.model, state, control=primitive["control"], times=times)[
+            -1
+        ]
+    assert np.abs(state[:2] - problem.goals[0].pose[:2]).max() <= 1e-7
+    assert abs(np.sin((state[2] - problem.goals[0].pose[2]) / 2)) <= 1e-7
+    assert load_plan("out/plan.json").word == tuple(p["name"] for p in document["primitives"])
+    total = sum(primitive["duration_s"] for primitive in document["primitives"])
+    assert total == pytest.approx(document["duration_s"], rel=1e-12)
+
+
+def test_quiet_prints_nothing(folder, capsys):
+    assert run(["plan", "x.yaml", "--quiet", "--no-plot", "--out", "here"]) == 0
+    printed = capsys.readouterr()
+    assert (printed.out, printed.err) == ("", "")
+    assert [path.name for path in Path("here").iterdir()] == ["plan.json"]
+
+
+def test_alternatives_are_listed_and_drawn(folder, capsys):
+    assert run(["plan", str(SCENARIOS / "parking.yaml"), "--alternatives", "3"]) == 0
+    assert "Alternatives" in capsys.readouterr().out
+    alternatives = result_file()["alternatives"]
+    assert 1 <= len(alternatives) <= 3
+    assert set(alternatives[0]) == {
+        "cost",
+        "duration_s",
+        "word",
+        "primitives",
+        "terminal_error",
+    }
+    costs = [result_file()["cost"], *(one["cost"] for one in alternatives)]
+    assert costs == sorted(costs)
+    assert Path("out/alternatives.png").exists()
+    assert run(["plan", "x.yaml", "--quiet"]) == 0
+    assert not Path("out/alternatives.png").exists()  # that of the earlier plan is gone
+
+
+@pytest.mark.parametrize(
+    ("text", "status"),
+    [
+        (SCENARIO + "bounds_m: {x: [1, 5]}\n", "start_blocked"),
+        (SCENARIO + "bounds_m: {y: [-1, 0.5]}\n", "goal_blocked"),
+        (AHEAD_ONLY, "unreachable"),
+        (but("time_s: free, max_trims: 4", "time_s: 0.001"), "unreachable"),
+    ],
+)
+def test_no_plan_is_one_line_and_exit_code_1(folder, capsys, text, status):
+    Path("x.yaml").write_text(text)
+    assert run(["plan", "x.yaml", "--no-plot", "--quiet"]) == 1
+    document = result_file()
+    printed = capsys.readouterr()
+    assert document["status"] == status
+    assert document["reason"]
+    assert printed.err == f"x.yaml: {status}: {document['reason']}\n"
+    assert printed.out == ""
+    assert document["cost"] is None
+    assert document["primitives"] == []
+
+
+def test_start_equal_to_goal_is_an_empty_word(folder):
+    Path("x.yaml").write_text(but("[1.0, 1.0, 0.0]", f"[0.0, 0.0, {2 * np.pi}]"))
+    assert run(["plan", "x.yaml"]) == 0
+    document = result_file()
+    assert document["duration_s"] == 0.0
+    assert document["cost"] == 0.0
+    assert document["primitives"] == []
+    assert len(document["trajectory"]["pose"]) == 1
+    assert load_plan("out/plan.json").duration == 0.0
+
+
+def test_start_equal_to_goal_for_a_fixed_time_is_rest(folder):
+    text = but("[1.0, 1.0, 0.0]", "[0.0, 0.0, 0.0]").replace("time_s: free", "time_s: 3.0")
+    Path("x.yaml").write_text(text)
+    assert run(["plan", "x.yaml", "--no-plot", "--quiet"]) == 0
+    document = result_file()
+    assert document["duration_s"] == pytest.approx(3.0, abs=1e-12)
+    assert [primitive["name"] for primitive in document["primitives"]] == ["rest"]
+
+
+@pytest.mark.parametrize("name", sorted(path.name for path in SCENARIOS.glob("*.yaml")))
+def test_every_shipped_scenario_plans(folder, name):
+    assert run(["plan", str(SCENARIOS / name), "--no-plot", "--quiet"]) == 0
+    document = result_file()
+    assert document["audit"]["passed"] is True
+    assert document["terminal_error"]["position_m"] <= 1e-9
+    assert document["terminal_error"]["heading_rad"] <= 1e-9
+
+
+def test_the_shifted_example_has_the_same_plan(folder):
+    for name in ("example10", "example10_shifted"):
+        assert run(["plan", str(SCENARIOS / f"{name}.yaml"), "--out", name, "--no-plot"]) == 0
+    one, two = result_file("example10"), result_file("example10_shifted")
+    assert [p["name"] for p in one["primitives"]] == ["slow"]
+    for key in ("primitives", "cost", "duration_s"):
+        assert one[key] == two[key]
+
+
+class TestFolder:
+    def test_table_and_exit_code_0(self, folder, capsys):
+        Path("many").mkdir()
+        Path("many/a.yaml").write_text(SCENARIO)
+        Path("many/b.yml").write_text(SCENARIO)
+        Path("many/notes.txt").write_text("nothing to plan")
+        assert run(["plan", "many", "--no-plot"]) == 0
+        printed = capsys.readouterr().out
+        assert "a.yaml" in printed
+        assert "b.yml" in printed
+        assert "notes" not in printed
+        assert sorted(path.name for path in Path("out").iterdir()) == ["a", "b"]
+        assert result_file("out/a")["status"] == "found"
+
+    def test_some_without_a_plan(self, folder, capsys):
+        Path("many").mkdir()
+        Path("many/a.yaml").write_text(SCENARIO)
+        Path("many/b.yaml").write_text(AHEAD_ONLY)
+        assert run(["plan", "many", "--no-plot", "--quiet"]) == 1
+        reason = result_file("out/b")["reason"]
+        printed = capsys.readouterr()
+        assert printed.err == f"{Path('many/b.yaml')}: unreachable: {reason}\n"
+        assert printed.out == ""
+
+    def test_some_bad(self, folder, capsys):
+        Path("many").mkdir()
+        Path("many/a.yaml").write_text("schema: 2\n")
+        Path("many/b.yaml").write_text(AHEAD_ONLY)
+        Path("many/c.yaml").write_text(SCENARIO)
+        assert run(["plan", "many", "--no-plot", "--jobs", "2"]) == 2
+        printed = capsys.readouterr()
+        message = (
+            f"{Path('many/a.yaml')}:1: schema: got 2, need 1, the schema that this version reads"
+        )
+        assert message in printed.err.splitlines()
+        assert "bad input" in printed.out
+        assert result_file("out/c")["status"] == "found"
+        assert not Path("out/a").exists()
+
+    def test_nothing_in_it(self, folder, capsys):
+        Path("none").mkdir()
+        assert run(["plan", "none"]) == 2
+        message = "none: holds no scenario, need a file ending in .yaml or .yml\n"
+        assert capsys.readouterr().err == message
+
+    def test_two_files_of_one_name(self, folder, capsys):
+        Path("many").mkdir()
+        for name in ("a.yaml", "a.yml"):
+            Path("many", name).write_text(SCENARIO)
+        assert run(["plan", "many"]) == 2
+        message = f"{Path('many/a.yml')}: has the same name as a.yaml, need another one\n"
+        assert capsys.readouterr().err == message
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["plan", "x.yaml", "--time-limit", "0"],
+         "--time-limit: got 0.0, need a positive number of seconds"),
+        (["plan", "x.yaml", "--time-limit", "nan"],
+         "--time-limit: got nan, need a positive number of seconds"),
+        (["plan", "x.yaml", "--with", "x.yaml"],
+         "--with: serves formats that state a part of a problem; this version reads none, only "
+         "scenario files, which state all of it"),
+        (["plan", "x.yaml", "--case", "1"],
+         "--case: serves files with several problems; this version reads none, only scenario "
+         "files, which hold one"),
+        (["plan", "case.csv"],
+         "case.csv: TPCAP files are not read in this version, only scenario files (.yaml, .yml)"),
+        (["mpc", "x.yaml", "--steps", "3", "--seed", "1"],
+         "mpc: this version plans in open loop only; use plan"),
+        (["plan", "x.yaml", "--out", "x.yaml"], "x.yaml: cannot be written: File exists"),
+        (["convert", "x.yaml", "x.csv"],
+         "x.csv: TPCAP files are not read in this version, only scenario files (.yaml, .yml)"),
+        (["convert", "x.yaml", "x.txt"],
+         "x.txt: is in no format that this version writes, need a scenario file (.yaml, .yml)"),
+        (["plot", "plan.json"], "plan.json: no such file"),
+        (["check", "nowhere.yaml"], "nowhere.yaml: no such file"),
+        (["automaton", "show", "nowhere.json"], "nowhere.json: no such file"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_done_is_said_in_one_line(folder, capsys, arguments, message):
+    assert run(arguments) == 2
+    printed = capsys.readouterr()
+    assert printed.err == f"{message}\n"
+    assert printed.out == ""
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [[], ["plam"], ["plan"], ["plan", "x.yaml", "--jobs", "0"], ["plan", "x.yaml", "--bad"]],
+)
+def test_wrong_usage_is_exit_code_2(folder, arguments):
+    assert run(arguments) == 2
+
+
+@pytest.mark.parametrize("command", [[], ["plan"], ["mpc"], ["automaton", "build"], ["schema"]])
+def test_help(capsys, command):
+    assert run([*command, "--help"]) == 0
+    assert "Usage" in capsys.readouterr().out
+
+
+class TestAutomaton:
+    def test_build_show_draw(self, folder, capsys):
+        assert run(["automaton", "build", "x.yaml"]) == 0
+        library = load_library("out/library.json")
+        assert automaton_hash(library) == automaton_hash(load_scenario("x.yaml").problem.automaton)
+        assert automaton_hash(library) in capsys.readouterr().out
+        assert run(["automaton", "show", "out/library.json"]) == 0
+        printed = capsys.readouterr().out
+        assert all(name in printed for name in ("rest", "ahead", "spin"))
+        assert "every pose can be reached" in printed
+        assert run(["automaton", "draw", "out/library.json", "--out", "trims.png"]) == 0
+        assert Path("trims.png").stat().st_size > 1000
+
+    def test_a_scenario_plans_with_its_library(self, folder):
+        assert run(["automaton", "build", "x.yaml", "--out", "robot.json"]) == 0
+        Path("y.yaml").write_text(automaton("file: robot.json"))
+        for name in ("x", "y"):
+            assert run(["plan", f"{name}.yaml", "--out", name, "--no-plot", "--quiet"]) == 0
+        assert result_file("x")["automaton_hash"] == result_file("y")["automaton_hash"]
+        assert result_file("x")["primitives"] == result_file("y")["primitives"]
+
+    def test_a_long_library_is_cut(self, folder, capsys):
+        assert run(["automaton", "show", str(SCENARIOS / "grid_1681.yaml")]) == 0
+        printed = capsys.readouterr().out
+        assert "and 1481 more" in printed
+
+
+class TestCheck:
+    def test_all_holds(self, folder, capsys):
+        assert run(["check", "x.yaml"]) == 0
+        printed = capsys.readouterr().out
+        for what in (
+            "symmetry: vector field",
+            "symmetry: flow",
+            "symmetry: stage cost",
+            "symmetry: start and goal",
+            "automaton: trims follow the model",
+            "automaton: connected",
+            "library: turn, move, turn",
+            "start: inside the bounds",
+            "goal: can be reached",
+        ):
+            assert what in printed
+        assert "NO" not in printed
+
+    @pytest.mark.parametrize(
+        "text", [AHEAD_ONLY, SCENARIO + "bounds_m: {x: [0.5, 5]}\n"], ids=["ahead", "bounds"]
+    )
+    def test_something_does_not(self, folder, capsys, text):
+        Path("x.yaml").write_text(text)
+        assert run(["check", "x.yaml"]) == 1
+        assert "NO" in capsys.readouterr().out
+
+    def test_a_library_of_1681_trims(self, folder):
+        assert run(["check", str(SCENARIOS / "grid_1681.yaml")]) == 0
+
+
+def test_convert_lists_the_trims(folder):
+    assert run(["convert", str(SCENARIOS / "parking_min_time.yaml"), "new/y.yaml"]) == 0
+    assert "{name: spin, control: [0.0, 1.0]}" in Path("new/y.yaml").read_text()
+    assert len(load_scenario("new/y.yaml").problem.automaton) == 5
+
+
+def test_plot_draws_from_the_file_alone(folder):
+    assert run(["plan", "x.yaml", "--no-plot", "--quiet"]) == 0
+    Path("x.yaml").unlink()
+    assert run(["plot", "out/plan.json"]) == 0
+    assert Path("out/plan.png").exists()
+    assert run(["plot", "out/plan.json", "--out", "a/b.svg"]) == 0
+    assert Path("a/b.svg").exists()
+    assert run(["plot", "out/plan.json", "--out", "a", "--animate"]) == 0
+    assert Path("a/plan.gif").exists()
+
+
+def test_an_animation_on_demand(folder):
+    assert run(["plan", "x.yaml", "--quiet", "--animate", "--no-plot"]) == 0
+    assert sorted(path.name for path in Path("out").iterdir()) == ["plan.gif", "plan.json"]
+    Path("x.yaml").write_text(AHEAD_ONLY)
+    assert run(["plan", "x.yaml", "--quiet", "--animate", "--no-plot"]) == 1
+    assert [path.name for path in Path("out").iterdir()] == ["plan.json"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--out", "a.jpg"], "a.jpg: is no picture that this version draws, need an ending of "
+         ".png, .pdf, .svg"),
+        (["--out", "a.png", "--animate"], "a.png: is no animation that this version draws, need "
+         "an ending of .gif"),
+    ],
+)  # fmt: skip
+def test_a_picture_has_an_ending_of_one(folder, capsys, options, message):
+    run(["plan", "x.yaml", "--no-plot", "--quiet"])
+    assert run(["plot", "out/plan.json", *options]) == 2
+    assert capsys.readouterr().err == f"{message}\n"
+
+
+def test_schema_is_json(capsys):
+    assert run(["schema"]) == 0
+    assert json.loads(capsys.readouterr().out)["title"] == "ScenarioFile"
+
+
+@pytest.fixture
+def stand_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A planner that runs out of time."""
+
+    def plan(problem: object, *, time_limit: float = 5.0, alternatives: int = 0) -> PlanResult:
+        assert (time_limit, alternatives) == (0.25, 2)
+        return PlanResult(
+            problem=problem,  # type: ignore[arg-type]
+            status=PlanStatus.OUT_OF_BUDGET,
+            reason="no plan within 0.25 s",
+        )
+
+    monkeypatch.setattr(planning, "plan", plan)
+
+
+@pytest.mark.usefixtures("stand_in")
+def test_options_reach_the_planner(folder, capsys):
+    arguments = ["plan", "x.yaml", "--time-limit", "0.25", "--alternatives", "2", "--quiet"]
+    assert run(arguments) == 1
+    assert capsys.readouterr().err == "x.yaml: out_of_budget: no plan within 0.25 s\n"
+
+
+def test_compiling_is_announced(folder, capsys, monkeypatch):
+    plan = planning.plan
+
+    def plan_compiling(*args: Any, **kwargs: Any) -> PlanResult:
+        for k in range(2):
+            numba.njit(lambda x: x + k)(1.0)  # noqa: B023
+        return plan(*args, **kwargs)
+
+    run(["plan", "x.yaml", "--no-plot", "--quiet"])  # the kernels are ready now
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(planning, "plan", plan_compiling)
+    for command in (["plan", "x.yaml", "--no-plot"], ["check", "x.yaml"]):
+        assert run(command) == 0
+        assert capsys.readouterr().err == f"{COMPILING}\n"
+    assert run(["plan", "x.yaml", "--no-plot", "--quiet"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("raised", "code", "printed"),
+    [
+        (KeyboardInterrupt(), 130, ""),
+        (
+            ZeroDivisionError("division\nby zero"),
+            2,
+            "internal error: ZeroDivisionError: division by zero; this is a bug of the program, "
+            "MANEUVER_AUTOMATON_DEBUG=1 shows where\n",
+        ),
+    ],
+)
+def test_no_traceback_reaches_a_user(folder, capsys, monkeypatch, raised, code, printed):
+    def plan(*args: object, **kwargs: object) -> None:
+        raise raised
+
+    monkeypatch.setattr(planning, "plan", plan)
+    assert run(["plan", "x.yaml", "--quiet"]) == code
+    assert capsys.readouterr().err == printed
+
+
+def test_details_of_a_bug_on_demand(folder, capsys, monkeypatch):
+    def plan(*args: object, **kwargs: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(planning, "plan", plan)
+    monkeypatch.setenv("MANEUVER_AUTOMATON_DEBUG", "1")
+    assert run(["plan", "x.yaml", "--quiet"]) == 2
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_whoever_stops_reading_gets_no_traceback(folder):
+    command = f"{sys.executable} -m maneuver_automaton schema | head -c 10"
+    root = str(Path(__file__).parents[1])
+    done = subprocess.run(
+        command,
+        shell=True,
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | {"PYTHONPATH": root},
+    )
+    assert done.stderr == ""
+
+
+def test_a_library_in_the_place_of_a_scenario(folder, capsys):
+    save_library(load_scenario("x.yaml").problem.automaton, "robot.json")
+    assert run(["plan", "robot.json"]) == 2
+    assert capsys.readouterr().err == "robot.json:1: is a library of trims, need a scenario\n"
+
+
+def test_a_plan_in_the_place_of_a_scenario(folder, capsys):
+    run(["plan", "x.yaml", "--no-plot", "--quiet"])
+    assert run(["check", "out/plan.json"]) == 2
+    message = f"{Path('out/plan.json')}:1: is a plan, need a scenario\n"
+    assert capsys.readouterr().err == message

@@ -1,0 +1,204 @@
+"""Compiled kernels: cached by their sources, and at work where nothing can be written."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from maneuver_automaton import _compile
+
+EXAMPLE = """
+from maneuver_automaton._compile import inner_kernel, kernel
+
+
+@inner_kernel
+def reciprocal(x):
+    return 1.0 / x
+
+
+@kernel
+def reciprocals(x):
+    for i in range(x.size):
+        x[i] = reciprocal(x[i])
+    return x
+"""
+
+CALL = """
+import json
+import numba
+import numpy as np
+from maneuver_automaton._compile import kernel_folder
+before = numba.config.CACHE_DIR
+import example_kernels
+result = example_kernels.reciprocals(np.array([4.0, 0.0])).tolist()
+hits = getattr(example_kernels.reciprocals, "stats", None)
+print(json.dumps({
+    "result": [str(x) for x in result],
+    "folder": str(kernel_folder()),
+    "hits": sum(hits.cache_hits.values()) if hits else 0,
+    "gil": not getattr(example_kernels.reciprocals, "targetoptions", {}).get("nogil", True),
+    "kept": numba.config.CACHE_DIR == before,
+}))
+"""
+
+PLAN = """
+import json
+import maneuver_automaton as ma
+robot = ma.Automaton.of_controls(ma.Unicycle(), {"ahead": (1, 0), "left": (0, 1), "right": (0, -1)})
+results = [
+    ma.plan(ma.Problem(robot, [0, 0, 0], [1, 1, 0], horizon=ma.Horizon(max_trims=most)))
+    for most in (3, None)
+]
+print(json.dumps([[r.plan.word, r.plan.durations.tolist(), r.audit.passed] for r in results]))
+"""
+
+
+def run(code, folder, **environment):
+    """What a fresh Python process prints, as JSON."""
+    names = ("NUMBA_CACHE_DIR", "NUMBA_DISABLE_JIT", "MANEUVER_AUTOMATON_CACHE_DIR")
+    kept = {key: value for key, value in os.environ.items() if key not in names}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=folder,
+        env=kept | {key: str(value) for key, value in environment.items()},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.fixture
+def example(tmp_path):
+    """A folder with kernels of its own."""
+    (tmp_path / "example_kernels.py").write_text(EXAMPLE)
+    return tmp_path
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """A small package as `_compile` sees it."""
+    for name, text in {
+        "_compile.py": "decorators",
+        "other.py": "no kernel",
+        "search/_kernels.py": "one",
+        "search/_kernels_words.py": "two",
+    }.items():
+        path = tmp_path / "package" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    monkeypatch.setattr(_compile, "__file__", str(tmp_path / "package" / "_compile.py"))
+    return tmp_path / "package"
+
+
+def test_the_folder_is_named_after_all_kernel_sources():
+    number = _compile.source_hash()
+    assert len(number) == 16
+    assert int(number, 16) >= 0
+    assert number == _compile.source_hash()
+    assert _compile.kernel_folder().name == f"kernels-{number}"
+
+
+def test_the_hash_sees_every_kernel_source_and_nothing_else(package):
+    before = _compile.source_hash()
+    (package / "other.py").write_text("changed")
+    (package / "search" / "notes.txt").write_text("new")
+    assert _compile.source_hash() == before
+    seen = {before}
+    for name in ("_compile.py", "search/_kernels.py", "search/_kernels_words.py"):
+        (package / name).write_text("changed")
+        seen.add(_compile.source_hash())
+    (package / "search" / "_kernels_words.py").rename(package / "search" / "_kernels_letters.py")
+    seen.add(_compile.source_hash())
+    (package / "search" / "_kernels_more.py").write_text("new")
+    seen.add(_compile.source_hash())
+    assert len(seen) == 6
+
+
+@pytest.mark.parametrize(
+    ("platform", "variable", "expected"),
+    [
+        ("linux", "XDG_CACHE_HOME", "maneuver_automaton"),
+        ("win32", "LOCALAPPDATA", "maneuver_automaton"),
+        ("linux", "MANEUVER_AUTOMATON_CACHE_DIR", ""),
+        ("darwin", "MANEUVER_AUTOMATON_CACHE_DIR", ""),
+    ],
+)
+def test_where_the_user_s_cache_is(tmp_path, monkeypatch, platform, variable, expected):
+    for name in ("XDG_CACHE_HOME", "LOCALAPPDATA", "MANEUVER_AUTOMATON_CACHE_DIR"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(sys, "platform", platform)
+    monkeypatch.setenv(variable, str(tmp_path))
+    assert _compile.user_cache_folder() == tmp_path / expected
+
+
+@pytest.mark.parametrize(
+    ("platform", "expected"),
+    [
+        ("linux", ".cache/maneuver_automaton"),
+        ("darwin", "Library/Caches/maneuver_automaton"),
+        ("win32", "AppData/Local/maneuver_automaton"),
+    ],
+)
+def test_without_a_word_it_is_in_the_home_folder(tmp_path, monkeypatch, platform, expected):
+    for name in ("XDG_CACHE_HOME", "LOCALAPPDATA", "MANEUVER_AUTOMATON_CACHE_DIR"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(sys, "platform", platform)
+    monkeypatch.setattr(Path, "home", lambda: tmp_path)
+    assert _compile.user_cache_folder() == tmp_path / expected
+
+
+@pytest.mark.parametrize("variable", ["NUMBA_CACHE_DIR", "MANEUVER_AUTOMATON_CACHE_DIR"])
+def test_kernels_are_compiled_once_and_kept_where_it_is_said(example, variable):
+    first = run(CALL, example, **{variable: example / "cache"})
+    again = run(CALL, example, **{variable: example / "cache"})
+    folder = example / "cache" / f"kernels-{_compile.source_hash()}"
+    assert first["folder"] == again["folder"] == str(folder)
+    assert (first["hits"], again["hits"]) == (0, 1)
+    assert first["result"] == again["result"] == ["0.25", "inf"]  # division is IEEE's
+    assert not first["gil"]
+    assert first["kept"]  # the caller's own cache is left as it was
+    assert len(list(folder.rglob("*.nbc"))) == 1
+    assert not list(example.rglob("__pycache__/*.nb?"))
+
+
+@pytest.mark.parametrize("variable", ["NUMBA_CACHE_DIR", "MANEUVER_AUTOMATON_CACHE_DIR"])
+def test_kernels_work_where_nothing_can_be_written(example, variable):
+    (example / "file").write_text("in the way")
+    ran = run(CALL, example, **{variable: example / "file" / "cache"})
+    assert ran["folder"] == "None"
+    assert ran["result"] == ["0.25", "inf"]
+    assert ran["hits"] == 0
+    assert not list(example.rglob("*.nb?"))
+
+
+def test_kernels_work_without_a_home_folder(monkeypatch):
+    def nowhere():
+        raise RuntimeError("Could not determine home directory.")
+
+    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "MANEUVER_AUTOMATON_CACHE_DIR"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setattr(Path, "home", nowhere)
+    assert _compile.kernel_folder.__wrapped__() is None
+
+
+def test_kernels_of_an_interactive_session_work(tmp_path):
+    code = "from maneuver_automaton._compile import kernel\nexec(compile('def f(x): return 2 * x', "
+    code += "'<stdin>', 'exec'))\nprint(kernel(f)(1.5))"
+    assert run(code, tmp_path, NUMBA_CACHE_DIR=tmp_path) == 3.0
+
+
+def test_plans_are_the_same_without_a_compiler_and_without_a_cache(tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    words = run(PLAN, tmp_path, NUMBA_DISABLE_JIT=1, NUMBA_CACHE_DIR=tmp_path / "file")
+    for word, durations, passed in words:
+        assert word == ["left", "ahead", "right"]
+        assert durations == pytest.approx([0.785398163397, 1.414213562373, 0.785398163397])
+        assert passed

@@ -1,0 +1,36 @@
+"""A file is whole or not there."""
+
+from __future__ import annotations
+
+import pytest
+
+from maneuver_automaton._files import write_bytes_atomically, write_text_atomically
+
+
+def test_makes_folders_and_replaces(tmp_path):
+    path = tmp_path / "a" / "b" / "x.txt"
+    write_text_atomically(path, "Größe\n")
+    assert path.read_bytes() == "Größe\n".encode()
+    path.chmod(0o640)
+    write_bytes_atomically(path, b"2")
+    assert path.read_bytes() == b"2"
+    assert path.stat().st_mode & 0o777 == 0o640
+    assert [file.name for file in path.parent.iterdir()] == ["x.txt"]
+
+
+def test_a_failure_leaves_the_old_file(tmp_path):
+    path = tmp_path / "x.txt"
+    path.write_text("old")
+    with pytest.raises(TypeError):
+        write_bytes_atomically(path, "no bytes")  # type: ignore[arg-type]
+    assert path.read_text() == "old"
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_a_link_stays_a_link(tmp_path):
+    path, link = tmp_path / "x.txt", tmp_path / "link.txt"
+    path.write_text("old")
+    link.symlink_to(path)
+    write_text_atomically(link, "new")
+    assert link.is_symlink()
+    assert path.read_text() == "new"

@@ -1,0 +1,70 @@
+"""The package as a whole: quick to import, and every name is where it is said to be."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import subprocess
+import sys
+
+import pytest
+
+import maneuver_automaton as ma
+
+HEAVY = ("numba", "scipy", "networkx", "matplotlib", "fcl", "casadi", "pydantic", "shapely", "yaml")
+
+
+def modules_after(code):
+    """Names of the modules that a fresh Python process has after running some code."""
+    show = "\nimport json, sys\nprint(json.dumps(sorted(sys.modules)))"
+    done = subprocess.run(
+        [sys.executable, "-c", code + show], capture_output=True, text=True, check=True
+    )
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import maneuver_automaton",
+        "import maneuver_automaton; dir(maneuver_automaton)",
+        "from maneuver_automaton import SE2, Automaton, Bounds, Car, Cost, Goal, Horizon, Plan, "
+        "Problem, Trim, Unicycle",
+    ],
+)
+def test_importing_is_light(code):
+    loaded = {name.partition(".")[0] for name in modules_after(code)}
+    assert loaded.isdisjoint(HEAVY)
+
+
+@pytest.mark.parametrize("name", ma.__all__)
+def test_every_name_is_there(name):
+    assert getattr(ma, name) is not None
+    assert name in dir(ma)
+
+
+def test_a_star_brings_every_name_once():
+    assert len(set(ma.__all__)) == len(ma.__all__)
+    namespace = {}
+    exec("from maneuver_automaton import *", namespace)
+    assert set(ma.__all__) <= set(namespace)
+
+
+def test_values_are_those_of_their_rooms():
+    from maneuver_automaton.groups import SE2
+    from maneuver_automaton.planning import plan
+
+    assert ma.SE2 is SE2
+    assert ma.plan is plan
+
+
+def test_an_unknown_name_is_an_attribute_error():
+    with pytest.raises(AttributeError) as error:
+        _ = ma.Problme
+    assert str(error.value) == "module 'maneuver_automaton' has no attribute 'Problme'"
+    with pytest.raises(ImportError, match="cannot import name 'Problme'"):
+        from maneuver_automaton import Problme  # noqa: F401
+
+
+def test_the_version_is_that_of_the_distribution():
+    assert ma.__version__ == importlib.metadata.version("maneuver-automaton")

@@ -1,0 +1,103 @@
+"""README.md: its Python runs, its commands run, its tables know every key."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from maneuver_automaton.cli import run
+from maneuver_automaton.formats.plan_json import plan_to_dict
+from maneuver_automaton.planning import PlanStatus, plan
+from maneuver_automaton.scenario import json_schema, load_scenario
+
+ROOT = Path(__file__).parents[1]
+TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    """The fenced blocks of a language."""
+    return re.findall(rf"^```{language}\n(.*?)^```", TEXT, flags=re.DOTALL | re.MULTILINE)
+
+
+def first_words(text: str) -> str:
+    """What names a block in the list of tests."""
+    return next(line for line in text.splitlines() if "import" not in line and line)[:40]
+
+
+@pytest.fixture
+def clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with the scenarios in it, as in a clone; the current one."""
+    shutil.copytree(ROOT / "scenarios", tmp_path / "scenarios")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("code", blocks("python"), ids=first_words)
+def test_python_runs(clone, code):
+    exec(compile(code, "README.md", "exec"), {"__name__": "__main__"})
+
+
+def test_the_first_plan_is_short_and_prints_what_it_says(clone, capsys):
+    code = blocks("python")[0]
+    assert len(code.splitlines()) <= 15
+    exec(compile(code, "README.md", "exec"), {})
+    printed = capsys.readouterr().out.splitlines()
+    assert f"# {printed[0]}" in code.splitlines()
+
+
+COMMANDS = [
+    line
+    for block in blocks("sh")
+    for line in block.splitlines()
+    if line.startswith("maneuver-automaton ")
+]
+
+
+def test_commands_run(clone):
+    assert len(COMMANDS) >= 4
+    for line in COMMANDS:
+        assert run(shlex.split(line, comments=True)[1:]) == 0, line
+    for name in ("plan.png", "alternatives.png", "plan.gif"):
+        assert (Path("out") / name).exists() == (name != "alternatives.png")
+
+
+def test_the_yaml_is_that_of_the_scenario():
+    (text,) = blocks("yaml")
+    assert (ROOT / "scenarios" / "parking.yaml").read_text(encoding="utf-8").endswith(text)
+
+
+def keys_of(schema: Any) -> set[str]:
+    """Names of all properties in a JSON Schema."""
+    if isinstance(schema, list):
+        return set().union(*map(keys_of, schema))
+    if not isinstance(schema, dict):
+        return set()
+    return set(schema.get("properties", {})).union(*map(keys_of, schema.values()))
+
+
+def test_every_key_of_a_scenario_is_explained():
+    """Those of obstacles are not: this version refuses them."""
+    schema = json_schema()
+    for name in ("Obstacle", "Disc", "Box"):
+        del schema["$defs"][name]
+    words = set(re.findall(r"[a-z_0-9]+", " ".join(re.findall(r"`[^`\n]+`", TEXT))))
+    assert keys_of(schema) <= words
+
+
+def test_every_key_of_a_plan_and_every_status_is_explained():
+    document = plan_to_dict(plan(load_scenario(ROOT / "scenarios" / "parking.yaml").problem))
+    for key in [*document, *document["trajectory"], *(status.value for status in PlanStatus)]:
+        assert f"`{key}`" in TEXT
+
+
+def test_every_link_and_picture_is_there():
+    for target in re.findall(r"\]\(([^)#]+)\)", TEXT):
+        assert (ROOT / target).is_file(), target
+    for picture in (ROOT / "scenarios" / "pictures").iterdir():
+        assert picture.stat().st_size < 120_000
+        assert picture.name in TEXT

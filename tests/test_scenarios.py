@@ -1,0 +1,101 @@
+"""Every scenario of the repository: it plans, ends where it must, and survives its file."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import maneuver_automaton as ma
+from maneuver_automaton.audit import audit_plan
+from maneuver_automaton.formats import plan_to_dict
+
+FOLDER = Path(__file__).parent.parent / "scenarios"
+FILES = sorted(FOLDER.glob("*.yaml"))
+
+
+@pytest.fixture(scope="module", params=FILES, ids=[path.stem for path in FILES])
+def planned(request):
+    """A scenario and its plan; a generous limit, for machines that are busy."""
+    scenario = ma.load_scenario(request.param)
+    return scenario, ma.plan(scenario.problem, time_limit=60.0)
+
+
+def test_there_are_scenarios():
+    assert FILES
+
+
+def test_it_says_what_it_shows(planned):
+    scenario, _ = planned
+    assert scenario.name
+    first = Path(scenario.path).read_text(encoding="utf-8").splitlines()[0]
+    assert first.startswith("# ")
+
+
+def test_a_plan_is_found_and_passes_its_audit(planned):
+    _, result = planned
+    assert result.status is ma.PlanStatus.FOUND
+    assert result.reason == ""
+    assert result.audit.passed
+    assert result.audit.max_dynamics_defect < 1e-7
+
+
+def test_it_ends_at_the_goal(planned):
+    scenario, result = planned
+    goal = scenario.problem.goals[result.goal_index]
+    off = result.plan.end - goal.pose
+    assert np.linalg.norm(off[[0, 1, *range(3, off.size)]]) <= goal.tolerance_m + 1e-9
+    if not goal.free_heading:
+        assert abs(math.remainder(off[2], 2 * math.pi)) <= goal.tolerance_rad + 1e-9
+    assert result.terminal_error.position_m <= goal.tolerance_m + 1e-9
+
+
+def test_it_keeps_to_the_horizon(planned):
+    scenario, result = planned
+    horizon = scenario.problem.horizon
+    if horizon.time is not None:
+        assert result.plan.duration == pytest.approx(horizon.time, abs=1e-9)
+    if horizon.max_time is not None:
+        assert result.plan.duration <= horizon.max_time + 1e-9
+    if horizon.max_trims is not None:
+        assert len(result.plan.word) <= horizon.max_trims
+    assert (result.plan.durations > 0.0).all()
+
+
+def test_its_cost_is_that_of_its_word(planned):
+    scenario, result = planned
+    problem, plan = scenario.problem, result.plan
+    rows = [problem.automaton.index_of(name) for name in plan.word]
+    switching = problem.cost.switching(problem.automaton.body_velocities[rows])
+    assert result.cost == pytest.approx(problem.rates[rows] @ plan.durations + switching)
+    assert result.lower_bound <= result.cost
+
+
+def test_the_plan_comes_back_from_its_file(planned, tmp_path):
+    _, result = planned
+    ma.save_plan(result, tmp_path / "plan.json")
+    read = ma.load_plan(tmp_path / "plan.json")
+    assert read.word == result.plan.word
+    assert read.durations.tolist() == result.plan.durations.tolist()
+    assert read.start.tolist() == result.plan.start.tolist()
+    times = np.linspace(0.0, read.duration, 40)
+    np.testing.assert_allclose(read.pose_at(times), result.plan.pose_at(times), atol=1e-9)
+    np.testing.assert_array_equal(read.control_at(times), result.plan.control_at(times))
+
+
+def test_the_plan_from_the_file_passes_the_audit_again(planned, tmp_path):
+    scenario, result = planned
+    ma.save_plan(result, tmp_path / "plan.json")
+    goal = scenario.problem.goals[result.goal_index]
+    read = ma.load_plan(tmp_path / "plan.json")
+    assert audit_plan(read, goal, scenario.problem.automaton.model).passed
+
+
+def test_planning_again_writes_the_same(planned):
+    scenario, result = planned
+    document = plan_to_dict(result)
+    again = plan_to_dict(ma.plan(scenario.problem, time_limit=60.0))
+    for key in document.keys() - {"timing_s"}:
+        assert again[key] == document[key], key
