@@ -12,22 +12,12 @@ import numpy as np
 
 from maneuver_automaton.audit import Audit, TerminalError, audit_plan, terminal_error
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.problem import Goal, Horizon, Problem
-from maneuver_automaton.search import SearchResult, SearchStatus, Solution
+from maneuver_automaton.problem import Horizon, Problem
+from maneuver_automaton.search import SearchStatus, Solution
 from maneuver_automaton.search.certificate import certificate
-from maneuver_automaton.search.insertion import search_insertion
+from maneuver_automaton.search.choose import load_search, search_goal
 from maneuver_automaton.search.inside import outside, stays_inside
 from maneuver_automaton.search.limits import closed_bound, why_impossible
-from maneuver_automaton.search.min_coast import search_with_least_times
-from maneuver_automaton.search.ready import (
-    load_insertion_kernels,
-    load_times_kernels,
-    load_word_kernels,
-)
-from maneuver_automaton.search.words import MOST_TRIMS, search_words
-
-AFFORDABLE = 2.0  # [s] an exhaustive search may be expected to take when the method is `auto`
-SECONDS_PER_WORD = (0.0, 1e-6, 1e-6, 1e-6, 5e-5, 2e-3)  # by moving trims, measured, generous
 
 
 class PlanStatus(enum.Enum):
@@ -109,7 +99,7 @@ def plan(problem: Problem, *, time_limit: float = 5.0, alternatives: int = 0) ->
     blocked = _blocked(problem)
     if blocked is not None:
         return blocked
-    _load_kernels(problem)
+    load_search(problem)
     began = time.monotonic()
     found = _search_goals(problem, alternatives, began + time_limit)
     searched = time.monotonic()
@@ -153,19 +143,6 @@ def plan(problem: Problem, *, time_limit: float = 5.0, alternatives: int = 0) ->
         timing_s=timing,
         counts=counts,
     )
-
-
-def _load_kernels(problem: Problem) -> None:
-    """Compile or load what the search will need: that does not count as searching."""
-    if problem.horizon.min_coast > 0.0:
-        load_times_kernels()
-        return
-    affordable = all(_affordable(problem, goal) for goal in problem.goals)
-    if problem.search.method == "words" or (problem.search.method == "auto" and affordable):
-        load_word_kernels(min(problem.horizon.max_trims or MOST_TRIMS, MOST_TRIMS))
-    else:
-        load_word_kernels(4)
-        load_insertion_kernels()
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -234,7 +211,9 @@ def _search_goals(problem: Problem, alternatives: int, deadline: float) -> _Foun
         if outside(goal.pose, problem.bounds):
             continue
         left = max(deadline - time.monotonic(), 1e-3)
-        results = _search(problem, goal, None if bounded else alternatives, left)
+        results = search_goal(
+            problem, goal, alternatives=None if bounded else alternatives, time_limit=left
+        )
         if math.isnan(first_plan) and any(result.solutions for result in results):
             first_plan = time.monotonic() - began
         proven = proven and any(result.exhaustive for result in results)
@@ -275,44 +254,6 @@ def _distinct(candidates: Iterable[_Candidate]) -> list[_Candidate]:
         else:
             kept.append(candidate)
     return kept
-
-
-def _search(
-    problem: Problem, goal: Goal, alternatives: int | None, time_limit: float
-) -> list[SearchResult]:
-    """The method asked for; `auto`: exhaustive where affordable, otherwise insertion, or both."""
-    method = problem.search.method
-    if problem.horizon.min_coast > 0.0:
-        return [
-            search_with_least_times(problem, goal, alternatives=alternatives, time_limit=time_limit)
-        ]
-    if method == "words" or (method == "auto" and _affordable(problem, goal)):
-        return [search_words(problem, goal, alternatives=alternatives, time_limit=time_limit)]
-    results = [
-        search_insertion(
-            problem,
-            goal,
-            alternatives=10 if alternatives is None else alternatives,
-            time_limit=time_limit,
-        )
-    ]
-    if method == "auto":  # short words too, where they are few: alternatives, and a second opinion
-        few = replace(problem, horizon=replace(problem.horizon, max_trims=4 - goal.free_heading))
-        if (problem.horizon.max_trims or math.inf) > 4 and _affordable(few, goal):
-            short = search_words(few, goal, alternatives=alternatives, time_limit=time_limit)
-            results.append(replace(short, exhaustive=False))
-    return results
-
-
-def _affordable(problem: Problem, goal: Goal) -> bool:
-    """Whether every admitted word can be searched in a moment."""
-    most = problem.horizon.max_trims
-    if most is None or most > MOST_TRIMS - int(goal.free_heading):
-        return False
-    moving = int(problem.automaton.body_velocities.any(axis=1).sum())
-    tail = int(goal.free_heading)
-    seconds = sum(moving**n * SECONDS_PER_WORD[n + tail] for n in range(1, most + 1))
-    return bool(seconds <= AFFORDABLE)
 
 
 def _as_plan(problem: Problem, solution: Solution) -> Plan:
@@ -392,7 +333,7 @@ def _least_time(problem: Problem) -> tuple[PlanStatus, str] | None:
     quickest = [
         (solution.duration, index, solution, result.exhaustive)
         for index, goal in enumerate(problem.goals)
-        for result in _search(hurry, goal, 0, 5.0)
+        for result in search_goal(hurry, goal, alternatives=0, time_limit=5.0)
         for solution in result.solutions
     ]
     if not quickest:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, freeze
-from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.errors import InvalidAutomaton
 from maneuver_automaton.groups import SE2, LieGroup, SE2xR
@@ -170,6 +170,15 @@ class Problem:
     def rates(self) -> Array:
         """Cost per second of every trim (m,)."""
         return self.cost.rates(self.automaton.controls, self.automaton.body_velocities)
+
+    def cost_of(self, plan: Plan) -> float:
+        """Cost of a plan, whatever trims it uses: their rates, and the prices of its switches."""
+        if not plan.trims:
+            return 0.0
+        controls = np.array([trim.control for trim in plan.trims])
+        body_velocities = np.array([trim.body_velocity for trim in plan.trims])
+        rates = self.cost.rates(controls, body_velocities)
+        return float(rates @ plan.durations) + self.cost.switching(body_velocities)
 
     def moved(self, by: LieGroup) -> Problem:
         """The problem with start and goals moved by the group element `by`; bounds must be open."""

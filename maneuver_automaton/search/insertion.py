@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.automaton import Plan
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.library_arrays import LibraryArrays, library_arrays
 from maneuver_automaton.search.result import SearchResult, SearchStatus, Solution
@@ -41,6 +42,7 @@ def search_insertion(
     alternatives: int = 0,
     seeds: int | None = None,
     time_limit: float = math.inf,
+    known: Plan | None = None,
 ) -> SearchResult:
     """Improve the cheapest words of a sub-library by insertion from the whole library.
 
@@ -54,6 +56,8 @@ def search_insertion(
         How many words of the sub-library to start from; by default 10, or 4 for large libraries.
     time_limit : float
         [s] after which no further seed is begun.
+    known : Plan, optional
+        A plan of this library from start to goal, improved before any seed.
 
     Returns
     -------
@@ -84,6 +88,8 @@ def search_insertion(
     if seeds is None:
         seeds = max(SEEDS_OF_MANY if many else SEEDS, alternatives + 1)
     begun = list(_seeds(problem, setup, library, seeds, deadline))
+    if known is not None:
+        begun.insert(0, _as_seed(problem, library, known))
     counts = {"expansions": 0, "insertions": 0, "seeds": 0}
     most = problem.horizon.max_trims or LONGEST
     limit = problem.search.max_expansions
@@ -116,6 +122,13 @@ def search_insertion(
         complete=False,
         counts=counts,
     )
+
+
+def _as_seed(problem: Problem, library: LibraryArrays, known: Plan) -> tuple[IntArray, Array]:
+    """A plan in the library's numbers, rest and free turn appended."""
+    automaton = problem.automaton
+    word = np.array([automaton.index_of(trim.name) for trim in known.trims], dtype=np.int64)
+    return _in_library(problem, library, word, known.durations)
 
 
 class _Work:
@@ -214,7 +227,10 @@ class _Start:
             deadline=self.deadline,
             spare=True,
         )
-        return [self._in_library(solution) for solution in solutions]
+        return [self._in_library(solution.word, solution.durations) for solution in solutions]
+
+    def _in_library(self, word: IntArray, durations: Array) -> tuple[IntArray, Array]:
+        return _in_library(self.problem, self.library, word, durations)
 
     def fast_words(self) -> list[tuple[IntArray, Array]]:
         """For a fixed time that no seed meets: first insert for least time, then pad."""
@@ -235,20 +251,24 @@ class _Start:
                 continue
             quick = work.solution(hurry, library)
             if limit is not None and quick.duration <= limit + 1e-9:
-                met.append(self._in_library(quick))
+                met.append(self._in_library(quick.word, quick.durations))
         return met
 
-    def _in_library(self, solution: Solution) -> tuple[IntArray, Array]:
-        word = self.library.number_of[solution.word].tolist()
-        times = solution.durations.tolist()
-        limit = self.problem.horizon.time
-        if limit is not None and self.library.rest is not None and word[-1:] != [self.library.rest]:
-            word.append(self.library.rest)
-            times.append(max(0.0, limit - sum(times)))
-        if self.setup.free_heading:
-            word.append(len(self.library.rates) - 1)
-            times.append(_free_turn(self.library, word[:-1], times))
-        return np.array(word, dtype=np.int64), np.array(times)
+
+def _in_library(
+    problem: Problem, library: LibraryArrays, trims: IntArray, durations: Array
+) -> tuple[IntArray, Array]:
+    """A word of the automaton in the library's numbers, rest and free turn appended."""
+    word = library.number_of[trims].tolist()
+    times = durations.tolist()
+    limit = problem.horizon.time
+    if limit is not None and library.rest is not None and word[-1:] != [library.rest]:
+        word.append(library.rest)
+        times.append(max(0.0, limit - sum(times)))
+    if library.free_heading:
+        word.append(len(library.rates) - 1)
+        times.append(_free_turn(library, word[:-1], times))
+    return np.array(word, dtype=np.int64), np.array(times)
 
 
 def _free_turn(library: LibraryArrays, word: list[int], times: list[float]) -> float:

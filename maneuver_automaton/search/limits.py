@@ -69,3 +69,11 @@ def closed_bound(problem: Problem, goal: Goal) -> float:
     if limit is not None and setup.rest is None:
         bound = max(bound, limit * float(rates.min()))
     return padded + (bound if math.isfinite(bound) else 0.0)
+
+
+def rest_rate(problem: Problem) -> float | None:
+    """Cost per second of the cheapest rest where it pads a fixed time; None if nothing pads."""
+    if problem.horizon.time is None:
+        return None
+    still = ~problem.automaton.body_velocities.any(axis=1)
+    return float(problem.rates[still].min()) if still.any() else None

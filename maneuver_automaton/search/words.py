@@ -32,6 +32,7 @@ def search_words(
     alternatives: int | None = 0,
     time_limit: float = math.inf,
     nodes: int = NODES,
+    ceiling: float = math.inf,
 ) -> SearchResult:
     """Search every word of at most ``max_trims`` trims for its locally optimal coasting times.
 
@@ -51,6 +52,8 @@ def search_words(
         [s] after which the search ends with what it has.
     nodes : int
         Grid nodes per scanned time.
+    ceiling : float
+        Cost of a plan that is known: what is dearer may be left out, and so there may be none.
 
     Returns
     -------
@@ -87,7 +90,15 @@ def search_words(
         return resting(problem, setup)
     capacity = CAPACITY
     while True:
-        job = _Job(problem, setup, most, alternatives, capacity=capacity, nodes=nodes)
+        job = _Job(
+            problem,
+            setup,
+            most,
+            alternatives,
+            capacity=capacity,
+            nodes=nodes,
+            ceiling=ceiling + TIE * (1.0 + abs(ceiling)),
+        )
         finished = job.run(deadline, problem.search.max_expansions)
         if job.n_found <= capacity:
             break
@@ -102,7 +113,7 @@ def search_words(
     return SearchResult(
         status=status,
         solutions=solutions,
-        complete=alternatives is None and finished,
+        complete=alternatives is None and finished and ceiling == math.inf,
         exhaustive=finished and problem.horizon.max_trims is not None and not job.gridded,
         counts={"expansions": job.n_words, "steering_calls": job.n_steering},
     )
@@ -188,6 +199,7 @@ class _Job:
         capacity: int = CAPACITY,
         nodes: int = NODES,
         spare: bool = False,
+        ceiling: float = math.inf,
     ) -> None:
         from maneuver_automaton.search import _kernels_polish, _kernels_problem, _kernels_words
 
@@ -203,8 +215,8 @@ class _Job:
         # a user's own price of switches is added afterwards, so nothing is pruned by it
         self.own_prices = not isinstance(problem.cost, Cost)
         if self.own_prices:
-            alternatives = None
-        self.pruned = alternatives is not None
+            alternatives, ceiling = None, math.inf
+        self.pruned = alternatives is not None or ceiling < math.inf
         asked = capacity if alternatives is None else alternatives + 1
         self.candidates = _kernels_problem.Candidates(
             words=np.zeros((CAPACITY, width), dtype=np.int64),
@@ -220,7 +232,7 @@ class _Job:
             times=np.zeros((capacity, width)),
             costs=np.zeros(capacity),
             counter=np.zeros(1, dtype=np.int64),
-            best=np.full(asked, np.inf),
+            best=np.full(asked, ceiling),
         )
 
     @property

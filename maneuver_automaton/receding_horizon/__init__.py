@@ -1,0 +1,13 @@
+"""Receding horizon: plan, drive a little, and plan again."""
+
+from maneuver_automaton.receding_horizon.controller import RecedingHorizon as RecedingHorizon
+from maneuver_automaton.receding_horizon.controller import within as within
+from maneuver_automaton.receding_horizon.guarantees import Promises as Promises
+from maneuver_automaton.receding_horizon.guarantees import promises as promises
+from maneuver_automaton.receding_horizon.log import ClosedLoop as ClosedLoop
+from maneuver_automaton.receding_horizon.log import Guarantee as Guarantee
+from maneuver_automaton.receding_horizon.log import Origin as Origin
+from maneuver_automaton.receding_horizon.log import Step as Step
+from maneuver_automaton.receding_horizon.log import Violation as Violation
+from maneuver_automaton.receding_horizon.simulation import Disturbance as Disturbance
+from maneuver_automaton.receding_horizon.simulation import simulate as simulate

@@ -1,0 +1,147 @@
+"""What the paper proves of the closed loop, checked while it runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.receding_horizon.log import Guarantee, Step, Violation
+from maneuver_automaton.search.limits import rest_rate
+
+ACCURACY = 1e-9  # relative, of values
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Promises:
+    """The constants of the paper's bounds for one problem, per second beyond what rest costs."""
+
+    least_rate: float  # min l over the trims that move; 0 if there is none
+    rest_rate: float  # what a second of rest costs where it pads a fixed time, else 0
+    time_rate: float  # c3, with a free final time
+    effort: float  # c1 lambda_min(R), with a fixed time; 0 if the bound does not apply
+    horizon: float | None  # T [s], None if free
+    step: float  # delta [s]
+
+    def most_steps(self, value: float) -> int | None:
+        """The paper's bound on the number of steps from a state of that value; None if none.
+
+        V(x0) / (delta min l) for finite control sets, V(x0) / (delta c3) for penalised time: the
+        smaller one. With a fixed time what rest costs is taken off first.
+
+        Source: the paper, Sec. 4.2 and 4.3.
+        """
+        if self.horizon is not None:
+            value -= self.rest_rate * self.horizon
+        rate = max(self.least_rate, self.time_rate)
+        if not rate > 0.0:
+            return None
+        return math.ceil(max(value, 0.0) / (self.step * rate) * (1.0 - ACCURACY))
+
+    def effort_decrease(self, pose: Array, goal: Goal) -> float:
+        """lambda_R c1 delta |x|^2 / T^2: what continuous controls decrease the value by.
+
+        Source: the paper, Theorem 17.
+        """
+        if self.horizon is None:
+            return 0.0
+        places = [0, 1, *range(3, pose.size)]
+        way = float(np.sum((pose[places] - goal.pose[places]) ** 2))
+        turn = 0.0 if goal.free_heading else math.remainder(pose[2] - goal.pose[2], 2.0 * math.pi)
+        return self.effort * self.step * (way + turn**2) / self.horizon**2
+
+
+def promises(problem: Problem, *, step: float) -> Promises:
+    """The constants of a problem whose loop closes every `step` seconds.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.automaton import Automaton
+    >>> from maneuver_automaton.models import Unicycle
+    >>> from maneuver_automaton.problem import Horizon
+    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "slow": (0.5, 0), "on": (1, 0)})
+    >>> cost = Cost(effort=1.0)
+    >>> problem = Problem(robot, [-2, 0, 0], [0, 0, 0], cost=cost, horizon=Horizon(time=4.0))
+    >>> promises(problem, step=0.1).most_steps(1.0)
+    40
+    """
+    moving = problem.automaton.body_velocities.any(axis=1)
+    rates = problem.rates
+    rest = rest_rate(problem) or 0.0
+    least = float(rates[moving].min()) - rest if moving.any() else 0.0
+    cost = problem.cost
+    fixed = problem.horizon.time is not None
+    effort = 0.0
+    if fixed and isinstance(cost, Cost):
+        weight = cost.effort_matrix
+        smallest = 1.0 if weight is None else float(np.linalg.eigvalsh(weight)[0])
+        effort = cost.effort * smallest
+    return Promises(
+        least_rate=max(least, 0.0),
+        rest_rate=rest,
+        time_rate=cost.time if isinstance(cost, Cost) and not fixed else 0.0,
+        effort=effort,
+        horizon=problem.horizon.time,
+        step=step,
+    )
+
+
+def broken(
+    promised: Promises, goal: Goal, last: Step, now: Step, *, most_steps: int | None, uniform: bool
+) -> Iterator[Violation]:
+    """The guarantees that the step from `last` to `now` broke, each with the reason.
+
+    `uniform`: the controls are continuous and the effort is uniform, so that the paper's decrease
+    by the effort is promised too.
+    """
+    off = now.off_plan or 0.0
+    why = f"the state was measured {off:.3g} off the plan" if off > 0.0 else "the plan was followed"
+    tolerance = ACCURACY * (1.0 + abs(last.value))
+    if now.shifted_value is None:
+        yield Violation(
+            guarantee=Guarantee.FEASIBILITY,
+            reason=f"the rest of the last plan does not lead to the goal in time; {why}",
+        )
+    padding = promised.rest_rate * last.applied
+    allowed = last.value - last.applied_cost + padding
+    if now.value > allowed + tolerance:
+        yield Violation(
+            guarantee=Guarantee.DECREASE,
+            reason=f"the value is {now.value:.9g}, need at most {allowed:.9g}; {why}",
+        )
+    elif uniform and off == 0.0:
+        least = promised.effort_decrease(last.pose, goal)
+        if last.value - now.value < least - tolerance:
+            yield Violation(
+                guarantee=Guarantee.EFFORT,
+                reason=f"the value fell by {last.value - now.value:.9g}, need {least:.9g}",
+            )
+    if most_steps is not None and now.number > most_steps and not now.arrived:
+        yield Violation(
+            guarantee=Guarantee.STEPS,
+            reason=f"step {now.number} is not the goal, need it within {most_steps}; {why}",
+        )
+
+
+def too_cheap(promised: Promises, now: Step) -> Iterator[Violation]:
+    """Whether the piece applied costs less than the cheapest motion, without arriving."""
+    moves = promised.step - ACCURACY
+    needed = (promised.least_rate + promised.rest_rate) * promised.step
+    resting = now.plan.trims and not now.plan.trims[0].body_velocity.any()
+    ends = _time_moving(now) <= moves
+    if resting or (not ends and now.applied_cost < needed - ACCURACY * (1.0 + needed)):
+        yield Violation(
+            guarantee=Guarantee.LEAST_COST,
+            reason=f"the step costs {now.applied_cost:.9g}, need at least {needed:.9g}: it rests "
+            "before the goal",
+        )
+
+
+def _time_moving(step: Step) -> float:
+    moving = [trim.body_velocity.any() for trim in step.plan.trims]
+    return float(step.plan.durations[moving].sum()) if moving else 0.0

@@ -1,0 +1,151 @@
+"""What a closed loop did, step by step, as values."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton.audit import Audit
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.problem import Problem
+
+
+class Guarantee(enum.Enum):
+    """What the paper promises of every step; the values are those of closed_loop.json."""
+
+    FEASIBILITY = "recursive feasibility"
+    DECREASE = "value decrease"
+    LEAST_COST = "least cost per step"
+    STEPS = "number of steps"
+    EFFORT = "decrease by the effort"
+    HORIZON = "horizon"
+    BUDGET = "time budget"
+    BOUNDS = "bounds"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Violation:
+    """A guarantee that a step broke, and why."""
+
+    guarantee: Guarantee
+    reason: str  # one line, with the numbers
+
+    def __str__(self) -> str:
+        return f"{self.guarantee.value}: {self.reason}"
+
+
+class Origin(enum.Enum):
+    """Where the plan of a step comes from."""
+
+    FIRST = "first"  # there was no plan before
+    SHIFTED = "shifted"  # the rest of the last plan
+    REANCHORED = "reanchored"  # the rest of the last plan, made to meet the goal from elsewhere
+    SEARCHED = "searched"  # found anew
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Step:
+    """One step: where the vehicle was, what was planned from there, and what of it is applied."""
+
+    time: float  # [s]
+    pose: Array  # (dof,) the plan starts here [m, m, rad(, m)]
+    plan: Plan  # from `pose` to the goal
+    goal_index: int  # which of the problem's goals it reaches
+    value: float  # cost of the whole plan
+    applied: float  # [s] until the next step
+    applied_cost: float
+    accumulated_cost: float  # of all steps before
+    origin: Origin
+    replanned: bool  # the word is not the rest of the previous one
+    shifted_value: float | None  # cost of the rest of the last plan, None if it has none here
+    off_plan: float | None  # [m or rad] between `pose` and what the last plan had said
+    lower_bound: float
+    exhaustive: bool  # every admitted word was searched
+    solve_s: float
+    number: int  # 0 for the first
+    arrived: bool = False  # nothing remains to be done but to rest
+    violations: tuple[Violation, ...] = ()
+
+    def __post_init__(self) -> None:
+        freeze(self, "pose", last=(3, 4))
+
+    @property
+    def control(self) -> Array | None:
+        """Control (n_u,) that holds from `time`; None if there is nothing to do."""
+        return self.plan.trims[0].control if self.plan.trims else None
+
+    @property
+    def piece(self) -> Plan:
+        """What is applied of the plan, until the next step."""
+        return first_part(self.plan, self.applied)
+
+    @property
+    def predicted(self) -> Array:
+        """Pose (dof,) at the next step if nothing disturbs."""
+        return self.plan.pose_at(self.plan.start_time + self.applied)
+
+    @property
+    def gap(self) -> float:
+        """How far the plan may be from the best one, relative to its value."""
+        return 0.0 if self.value <= self.lower_bound else 1.0 - self.lower_bound / self.value
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ClosedLoop:
+    """A closed loop from its start to where it ended."""
+
+    problem: Problem
+    step: float  # [s]
+    steps: tuple[Step, ...]  # one per step applied
+    poses: Array  # (n + 1, dof) where the vehicle was, the last one where it ended
+    times: Array  # (n + 1,) [s]
+    reached: bool
+    status: str  # reached | steps_spent | no_plan
+    reason: str  # one line; empty if reached
+    cost: float  # accumulated over the steps applied
+    value: float  # cost of the plan at the end, 0 at the goal
+    driven: tuple[Plan, ...] = ()  # what was driven of each plan, from where the vehicle was
+    audits: tuple[Audit, ...] = ()  # of the pieces driven
+    inside: tuple[bool, ...] = ()  # (n + 1) whether each pose is within the goal's tolerance
+    steps_bound: int | None = None  # the paper's bound on the number of steps
+    counts: dict[str, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        freeze(self, "poses", last=(3, 4))
+        freeze(self, "times")
+
+    @property
+    def violations(self) -> Iterator[tuple[int, Violation]]:
+        """Number of the step and the guarantee it broke, in order."""
+        for step in self.steps:
+            for violation in step.violations:
+                yield step.number, violation
+
+    @property
+    def solve_s(self) -> Array:
+        """Time (n,) that every step took to decide [s]."""
+        return np.array([step.solve_s for step in self.steps])
+
+
+def first_part(plan: Plan, until: float) -> Plan:
+    """The first `until` seconds of a plan.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.primitives import Trim
+    >>> ahead = Trim(name="ahead", body_velocity=[1, 0, 0], control=[1, 0])
+    >>> first_part(Plan([0, 0, 0], (ahead,), durations=[2.0]), 0.5).end.tolist()
+    [0.5, 0.0, 0.0]
+    """
+    kept, durations, left = [], [], until
+    for trim, duration in zip(plan.trims, plan.durations.tolist(), strict=True):
+        if left <= 0.0:
+            break
+        kept.append(trim)
+        durations.append(min(duration, left))
+        left -= duration
+    return Plan(plan.start, tuple(kept), durations=durations, start_time=plan.start_time)

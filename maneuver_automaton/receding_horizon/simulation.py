@@ -1,0 +1,249 @@
+"""The closed loop in simulation: what disturbs it, and how it went."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton.audit import Audit, audit_plan
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.groups import group_of
+from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.receding_horizon.controller import RecedingHorizon, within
+from maneuver_automaton.receding_horizon.log import ClosedLoop, Step
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Disturbance:
+    """What a real vehicle does beside its plan; every random number comes from `seed`.
+
+    Noise shifts the pose after every step, as a person's push would: the place by a normal number
+    per axis, the heading by another. Measurement errors are seen by the controller alone. A push
+    is a displacement in the vehicle's own frame after the step of that number. A vehicle that
+    differs from its model has other body velocities: `twist_scale` times those of the library.
+    With `delay` 1 the controller sees every pose a step late, and plans from where the piece under
+    way will have led.
+    """
+
+    position_m: float = 0.0  # standard deviation per axis and step
+    heading_rad: float = 0.0  # standard deviation per step
+    measured_position_m: float = 0.0  # standard deviation of the measurement
+    measured_heading_rad: float = 0.0
+    twist_scale: tuple[float, ...] | None = None  # (dof,) none if None
+    pushes: Mapping[int, tuple[float, ...]] = field(default_factory=lambda: MappingProxyType({}))
+    delay: int = 0  # steps, 0 or 1
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("position_m", "heading_rad", "measured_position_m", "measured_heading_rad"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ValueError(f"disturbance: {name} must be at least 0, got {value}")
+        if self.delay not in (0, 1):
+            raise ValueError(f"disturbance: delay must be 0 or 1 steps, got {self.delay}")
+        if self.seed < 0:
+            raise ValueError(f"disturbance: seed must be at least 0, got {self.seed}")
+
+
+def simulate(
+    problem: Problem,
+    *,
+    step: float,
+    steps: int = 100,
+    disturbance: Disturbance | None = None,
+    margin: float = 0.0,
+    time_limit: float = 5.0,
+    last: Step | None = None,
+    stay: bool = False,
+    audit: bool = True,
+    progress: Callable[[Step], None] | None = None,
+) -> ClosedLoop:
+    """Close the loop until the goal is reached, or `steps` steps are spent.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its start is where the vehicle is; with tolerances, the goal is a set.
+    step : float
+        delta [s].
+    steps : int
+        At most so many.
+    disturbance : Disturbance, optional
+        None: the vehicle does what its model says.
+    margin, time_limit
+        As in `RecedingHorizon`.
+    last : Step, optional
+        To go on from the last step of another loop; the problem's start is where that led.
+    stay : bool
+        Go on for all steps after the goal's set is reached, and try to stay in it.
+    audit : bool
+        Have an ODE solver drive every piece again that was applied.
+    progress : callable, optional
+        Called with every step.
+
+    Returns
+    -------
+    ClosedLoop
+
+    Raises
+    ------
+    ValueError
+        If a number is out of range.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Cost, Horizon, Problem, Unicycle
+    >>> speeds = [0.1 * k for k in range(-20, 21)]
+    >>> robot = Automaton.of_controls(Unicycle(), {f"{v:.1f}": (v, 0.0) for v in speeds})
+    >>> problem = Problem(
+    ...     robot, [-2, 0, 0], [0, 0, 0], cost=Cost(effort=1.0), horizon=Horizon(time=1.0)
+    ... )
+    >>> loop = simulate(problem, step=0.1)
+    >>> loop.reached, len(loop.steps), round(loop.cost, 3)
+    (True, 35, 2.182)
+    """
+    if steps < 1:
+        raise ValueError(f"steps must be at least 1, got {steps}")
+    upset = Disturbance() if disturbance is None else disturbance
+    random = _draws(upset, problem.start.size)
+    controller = RecedingHorizon(
+        problem, step=step, margin=margin, time_limit=time_limit, last=last, hold=stay
+    )
+    first = 0 if last is None else last.number + 1
+    for _ in range(first):  # the numbers that the steps before have used
+        next(random)
+    where = np.array(problem.start)
+    measured_late = where
+    log: list[Step] = []
+    poses, times, driven, audits = [where], [_begin(problem, last)], [], []
+    inside: list[bool] = [_inside(problem, where)]
+    for number in range(first, first + steps):
+        if inside[-1] and not stay:
+            break
+        draw = next(random)
+        measured = where + draw.measurement
+        seen = measured
+        if upset.delay and log:  # a step late: what has been applied since is a group element
+            seen = _after(log[-1], measured_late)
+        measured_late = measured
+        _, now = controller.step(seen)
+        log.append(now)
+        if progress is not None:
+            progress(now)
+        if not math.isfinite(now.value):
+            break
+        piece = replace(now.piece, start=where)
+        if audit and piece.trims:
+            audits.append(_audited(problem, piece))
+        driven.append(_as_driven(piece, upset))
+        where = np.array(driven[-1].end) + draw.noise
+        if number in upset.pushes:
+            group = group_of(where.size)
+            push = as_array("disturbance: push", upset.pushes[number], last=where.size)
+            where = np.array((group(where) @ group(push)).pose)
+        poses.append(where)
+        times.append(now.time + now.applied)
+        inside.append(_inside(problem, where))
+    return _closed_loop(
+        problem, controller, log, poses, times, driven, audits, inside, step=step, stay=stay
+    )
+
+
+def _closed_loop(
+    problem: Problem,
+    controller: RecedingHorizon,
+    log: list[Step],
+    poses: list[Array],
+    times: list[float],
+    driven: list[Plan],
+    audits: list[Audit],
+    inside: list[bool],
+    *,
+    step: float,
+    stay: bool,
+) -> ClosedLoop:
+    helpless = bool(log) and not math.isfinite(log[-1].value)
+    applied = log[:-1] if helpless else log
+    reached = any(inside) if stay else inside[-1]
+    cost = applied[-1].accumulated_cost + applied[-1].applied_cost if applied else 0.0
+    value, reason, status = 0.0, "", "reached"
+    if helpless:
+        value, status = log[-1].lower_bound, "no_plan"
+        reason = str(log[-1].violations[0])
+    elif not inside[-1]:
+        if applied:  # what would have come next
+            controller.last = applied[-1]
+            value = controller.step(poses[-1])[1].value
+            controller.last = applied[-1]
+        if not reached:
+            status = "steps_spent"
+            reason = f"the goal is not reached after {len(applied)} steps"
+    return ClosedLoop(
+        problem=problem,
+        step=step,
+        steps=tuple(applied),
+        poses=np.array(poses),
+        times=np.array(times),
+        reached=reached,
+        status=status,
+        reason=reason,
+        cost=cost,
+        value=value,
+        driven=tuple(driven),
+        audits=tuple(audits),
+        inside=tuple(inside),
+        steps_bound=controller.most_steps,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Draw:
+    """The random numbers of one step."""
+
+    noise: Array
+    measurement: Array
+
+
+def _draws(upset: Disturbance, dof: int) -> Iterator[_Draw]:
+    """Numbers for step after step: the same for a seed, whatever the loop does with them."""
+    rng = np.random.default_rng(upset.seed)
+    spread = np.full(dof, upset.position_m)
+    spread[2] = upset.heading_rad
+    blur = np.full(dof, upset.measured_position_m)
+    blur[2] = upset.measured_heading_rad
+    while True:
+        numbers = rng.standard_normal((2, dof))
+        yield _Draw(spread * numbers[0], blur * numbers[1])
+
+
+def _as_driven(piece: Plan, upset: Disturbance) -> Plan:
+    """What the vehicle makes of a piece of plan."""
+    if upset.twist_scale is None:
+        return piece
+    scale = as_array("disturbance: twist_scale", upset.twist_scale, last=piece.start.size)
+    trims = tuple(replace(trim, body_velocity=trim.body_velocity * scale) for trim in piece.trims)
+    return replace(piece, trims=trims)
+
+
+def _after(step: Step, start: Array) -> Array:
+    """Where the piece of a step leads from `start`."""
+    return np.array(replace(step.piece, start=start).end)
+
+
+def _audited(problem: Problem, piece: Plan) -> Audit:
+    """The piece against the model's equations; it need not end at the goal."""
+    return audit_plan(piece, Goal(pose=piece.end), problem.automaton.model)
+
+
+def _inside(problem: Problem, pose: Array) -> bool:
+    return any(within(pose, goal) for goal in problem.goals)
+
+
+def _begin(problem: Problem, last: Step | None) -> float:
+    return problem.start_time if last is None else last.time + last.applied
+

@@ -1,0 +1,104 @@
+"""Which search suits a problem, and that search."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.search.insertion import search_insertion
+from maneuver_automaton.search.min_coast import search_with_least_times
+from maneuver_automaton.search.ready import (
+    load_insertion_kernels,
+    load_times_kernels,
+    load_word_kernels,
+)
+from maneuver_automaton.search.result import SearchResult
+from maneuver_automaton.search.words import MOST_TRIMS, search_words
+
+AFFORDABLE = 2.0  # [s] an exhaustive search may be expected to take when the method is `auto`
+SECONDS_PER_WORD = (0.0, 1e-6, 1e-6, 1e-6, 5e-5, 2e-3)  # by moving trims, measured, generous
+
+
+def load_search(problem: Problem) -> None:
+    """Compile or load what the search will need: that does not count as searching."""
+    if problem.horizon.min_coast > 0.0:
+        load_times_kernels()
+        return
+    affordable = all(_affordable(problem, goal) for goal in problem.goals)
+    if problem.search.method == "words" or (problem.search.method == "auto" and affordable):
+        load_word_kernels(min(problem.horizon.max_trims or MOST_TRIMS, MOST_TRIMS))
+    else:
+        load_word_kernels(4)
+        load_insertion_kernels()
+
+
+def search_goal(
+    problem: Problem,
+    goal: Goal,
+    *,
+    alternatives: int | None,
+    time_limit: float,
+    known: Plan | None = None,
+) -> list[SearchResult]:
+    """The method asked for; `auto`: exhaustive where affordable, otherwise insertion, or both.
+
+    Parameters
+    ----------
+    problem : Problem
+    goal : Goal
+        One of the problem's goals.
+    alternatives : int, optional
+        How many solutions beside the cheapest; None asks for the complete list.
+    time_limit : float
+        [s] after which the search ends with what it has.
+    known : Plan, optional
+        A plan from the problem's start to the goal. Exhaustive search then lists only what is at
+        least as cheap (it may find nothing); insertion improves it beside its own seeds.
+
+    Returns
+    -------
+    list of SearchResult
+        One per method that was tried.
+    """
+    method = problem.search.method
+    if problem.horizon.min_coast > 0.0:
+        return [
+            search_with_least_times(problem, goal, alternatives=alternatives, time_limit=time_limit)
+        ]
+    ceiling = math.inf if known is None else problem.cost_of(known)
+    if method == "words" or (method == "auto" and _affordable(problem, goal)):
+        return [
+            search_words(
+                problem, goal, alternatives=alternatives, time_limit=time_limit, ceiling=ceiling
+            )
+        ]
+    results = [
+        search_insertion(
+            problem,
+            goal,
+            alternatives=10 if alternatives is None else alternatives,
+            time_limit=time_limit,
+            known=known,
+        )
+    ]
+    if method == "auto":  # short words too, where they are few: alternatives, and a second opinion
+        few = replace(problem, horizon=replace(problem.horizon, max_trims=4 - goal.free_heading))
+        if (problem.horizon.max_trims or math.inf) > 4 and _affordable(few, goal):
+            short = search_words(
+                few, goal, alternatives=alternatives, time_limit=time_limit, ceiling=ceiling
+            )
+            results.append(replace(short, exhaustive=False))
+    return results
+
+
+def _affordable(problem: Problem, goal: Goal) -> bool:
+    """Whether every admitted word can be searched in a moment."""
+    most = problem.horizon.max_trims
+    if most is None or most > MOST_TRIMS - int(goal.free_heading):
+        return False
+    moving = int(problem.automaton.body_velocities.any(axis=1).sum())
+    tail = int(goal.free_heading)
+    seconds = sum(moving**n * SECONDS_PER_WORD[n + tail] for n in range(1, most + 1))
+    return bool(seconds <= AFFORDABLE)
