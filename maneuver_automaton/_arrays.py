@@ -70,3 +70,16 @@ def wrapped(angle: ArrayLike) -> Array:
     0.25
     """
     return np.asarray(np.remainder(np.asarray(angle) + np.pi, 2 * np.pi) - np.pi, dtype=np.float64)
+
+
+def vector_text(vector: Array) -> str:
+    """Numbers in a row, with 4 significant digits.
+
+    Examples
+    --------
+    >>> vector_text(np.array([1.23456, -2e-9]))
+    '(1.235, -2e-09)'
+    """
+    if vector.ndim > 1:
+        return ", then ".join(vector_text(row) for row in vector)
+    return f"({', '.join(f'{value:.4g}' for value in vector)})"

@@ -14,7 +14,12 @@ NORM_ORDERS = (1.0, 2.0, math.inf)
 
 
 class StageCost(Protocol):
-    """A cost that the symmetry leaves alone: it sees controls and body velocities, not poses."""
+    """A cost that the symmetry leaves alone: it sees controls and body velocities, not poses.
+
+    A value that can be hashed: what follows from it is computed once.
+    """
+
+    def __hash__(self) -> int: ...
 
     def rates(self, controls: Array, body_velocities: Array) -> Array:
         """Cost per second (m,) of trims with `controls` (m, n_u), `body_velocities` (m, dof)."""

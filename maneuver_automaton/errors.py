@@ -34,3 +34,7 @@ class BrokenSymmetry(ManeuverAutomatonError, ValueError):
 
 class NotATrim(ManeuverAutomatonError, ValueError):
     """A reduced state and control are no equilibrium of the reduced dynamics."""
+
+
+class MissingExtra(ManeuverAutomatonError, ImportError):
+    """A library of an optional extra is not installed: the message names the extra."""

@@ -9,9 +9,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._arrays import Array, as_array, vector_text
 from maneuver_automaton.analysis.region import Region
-from maneuver_automaton.analysis.report import SymmetryReport, listed, motion_of, vector_text
+from maneuver_automaton.analysis.report import SymmetryReport, listed, motion_of
 from maneuver_automaton.groups import LieGroup
 
 Draw = Callable[[np.random.Generator], tuple[Array, Array]]

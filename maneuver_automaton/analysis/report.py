@@ -73,17 +73,3 @@ def listed(motions: Sequence[str]) -> str:
     if len(motions) < 2:
         return "".join(motions)
     return f"{', '.join(motions[:-1])} and {motions[-1]}"
-
-
-def vector_text(vector: Array) -> str:
-    """Numbers in a row, with 4 significant digits.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> vector_text(np.array([1.23456, -2e-9]))
-    '(1.235, -2e-09)'
-    """
-    if vector.ndim > 1:
-        return ", then ".join(vector_text(row) for row in vector)
-    return f"({', '.join(f'{value:.4g}' for value in vector)})"

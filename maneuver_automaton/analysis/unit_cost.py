@@ -7,8 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array
-from maneuver_automaton.analysis.report import vector_text
+from maneuver_automaton._arrays import Array, as_array, vector_text
 from maneuver_automaton.errors import BrokenSymmetry, NotATrim
 from maneuver_automaton.models import Model
 

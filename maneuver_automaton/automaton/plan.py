@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.groups import LieGroup, group_of
+from maneuver_automaton.groups.chain import chained
 from maneuver_automaton.primitives import Trim
 
 
@@ -41,6 +43,17 @@ class Plan:
     durations: Array = field(kw_only=True)  # (n,) [s]
     start_time: float = field(default=0.0, kw_only=True)  # [s]
 
+    if TYPE_CHECKING:  # any numbers will do
+
+        def __init__(
+            self,
+            start: ArrayLike,
+            trims: Sequence[Trim],
+            *,
+            durations: ArrayLike,
+            start_time: float = 0.0,
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         freeze(self, "start", last=(3, 4))
         object.__setattr__(self, "trims", tuple(self.trims))
@@ -70,11 +83,11 @@ class Plan:
     @cached_property
     def switching_poses(self) -> Array:
         """Poses (n + 1, dof) at the switching times."""
-        group = group_of(self.start.size)
-        poses = [group(self.start)]
-        for trim, duration in zip(self.trims, self.durations, strict=True):
-            poses.append(trim.coast(poses[-1], duration))
-        return np.array([pose.pose for pose in poses])
+        if not self.trims:
+            return self.start[None].copy()
+        twists = np.array([trim.body_velocity for trim in self.trims])
+        steps = group_of(self.start.size).exp(self.durations[:, None] * twists)
+        return chained(self.start, steps.pose)
 
     @property
     def end(self) -> Array:

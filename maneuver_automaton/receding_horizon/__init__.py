@@ -11,3 +11,6 @@ from maneuver_automaton.receding_horizon.log import Step as Step
 from maneuver_automaton.receding_horizon.log import Violation as Violation
 from maneuver_automaton.receding_horizon.simulation import Disturbance as Disturbance
 from maneuver_automaton.receding_horizon.simulation import simulate as simulate
+from maneuver_automaton.receding_horizon.statistics import Outcome as Outcome
+from maneuver_automaton.receding_horizon.statistics import Statistics as Statistics
+from maneuver_automaton.receding_horizon.statistics import simulate_many as simulate_many

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.primitives import Trim
-from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.problem import Goal, Horizon, Problem
 from maneuver_automaton.receding_horizon.guarantees import broken, promises, too_cheap
 from maneuver_automaton.receding_horizon.log import (
     Guarantee,
@@ -22,6 +22,7 @@ from maneuver_automaton.receding_horizon.log import (
     Violation,
     first_part,
 )
+from maneuver_automaton.receding_horizon.pace import at_best_pace, base_name, is_uniform
 from maneuver_automaton.receding_horizon.reanchoring import (
     distance,
     missed,
@@ -35,15 +36,16 @@ from maneuver_automaton.search.choose import load_search, search_goal
 from maneuver_automaton.search.inside import outside, stays_inside
 from maneuver_automaton.search.limits import closed_bound
 from maneuver_automaton.search.ready import load_times_kernels
-from maneuver_automaton.search.result import SearchStatus
+from maneuver_automaton.search.result import SearchStatus, Solution
 from maneuver_automaton.search.words import TIE
 
+MOST_HOLDING = 4  # steps that a plan within the goal's set may take
+HOLDING = 5  # dearer plans among which one may stay in the set, or be cheaper at another pace
 EXACT = 1e-9  # [m, rad] a pose this close to a goal is the goal; to a plan, on it
-TIES = 3  # dearer plans asked for, which may turn out to cost the same
 
 
 class RecedingHorizon:
-    """Model predictive control with trims: plan to the goal, apply the first `step` seconds, repeat.
+    """Model predictive control with trims: plan to the goal, apply the beginning, plan again.
 
     Every step shifts the last plan, which always leads to the goal, looks for a cheaper one, and
     checks what the paper proves of the loop; what is broken stands in the log with the reason.
@@ -64,8 +66,13 @@ class RecedingHorizon:
         [s] per step for the search; what is best by then is applied.
     last : Step, optional
         To go on from: the last step of a log.
+    retimed : bool
+        Drive every plan at the pace that makes its effort uniform: the controls are then
+        continuous, multiples of those of the library. Needs a fixed horizon, a cost with effort,
+        and a vehicle whose body velocity scales with its control.
     hold : bool
-        Within the goal's tolerance, move only along plans that stay within it; otherwise rest.
+        Within the goal's tolerance, correct what is left within a few steps, along plans that stay
+        within it if there are such; otherwise rest.
 
     Raises
     ------
@@ -77,7 +84,11 @@ class RecedingHorizon:
     >>> from maneuver_automaton import Automaton, Cost, Horizon, Problem, Unicycle
     >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "ahead": (1, 0), "spin": (0, 1)})
     >>> problem = Problem(
-    ...     robot, [-1, 0, 0], [0, 0, 0], cost=Cost(effort=1.0), horizon=Horizon(time=2.0, max_trims=4)
+    ...     robot,
+    ...     [-1, 0, 0],
+    ...     [0, 0, 0],
+    ...     cost=Cost(effort=1.0),
+    ...     horizon=Horizon(time=2.0, max_trims=4),
     ... )
     >>> controller = RecedingHorizon(problem, step=0.5)
     >>> control, log = controller.step([-1, 0, 0])
@@ -97,6 +108,7 @@ class RecedingHorizon:
         time_limit: float = 5.0,
         last: Step | None = None,
         hold: bool = False,
+        retimed: bool = False,
     ) -> None:
         for name, value in (("step", step), ("time_limit", time_limit)):
             if not value > 0.0:
@@ -115,11 +127,16 @@ class RecedingHorizon:
                 raise ValueError(
                     f"receding horizon: step is {step:g} s, need at most the horizon, {horizon:g} s"
                 )
+        if retimed and (horizon is None or not getattr(problem.cost, "effort", 0.0) > 0.0):
+            raise ValueError(
+                "receding horizon: retimed plans need a fixed horizon and a cost with effort"
+            )
         self.problem = problem
         self.step_s = step
         self.margin = margin
         self.time_limit = time_limit
         self.hold = hold
+        self.retimed = retimed
         self.last = last
         self.promises = promises(problem, step=step)
         self.most_steps: int | None = None
@@ -186,7 +203,7 @@ class RecedingHorizon:
         plan, goal = chosen.plan, here.goals[chosen.goal_index]
         applied = min(self.step_s, plan.duration) if plan.trims else self.step_s
         piece = first_part(plan, applied)
-        left = rest_of(plan, applied)
+        left = rest_of(plan, applied, start=plan.start)
         switches = here.cost.switching(_twists(plan)) - here.cost.switching(_twists(left))
         rates = _rates(here, piece)
         now = Step(
@@ -209,13 +226,18 @@ class RecedingHorizon:
             arrived=chosen.arrived,
         )
         if last is None:
-            self.most_steps = self.promises.most_steps(now.value)
+            self.most_steps = None if self.retimed else self.promises.most_steps(now.value)
         found = list(chosen.violations)
         if last is not None and math.isfinite(now.value):
             found += broken(
-                self.promises, goal, last, now, most_steps=self.most_steps, uniform=False
+                self.promises,
+                goal,
+                last,
+                now,
+                most_steps=None if self.retimed else self.most_steps,
+                uniform=self.retimed and is_uniform(now.plan, here.cost),
             )
-        if not now.arrived and math.isfinite(now.value):
+        if not (now.arrived or self.retimed) and math.isfinite(now.value):
             found += too_cheap(self.promises, now)
         return replace(now, violations=tuple(found))
 
@@ -280,15 +302,57 @@ class _Decision:
         arrived = self._arrived()
         if arrived is not None:
             return arrived
+        inside = self._goal_within(self.here.start) if self.loop.hold else None
+        if inside is not None:
+            return self._holding(inside) or self._resting(inside)
         kept = self._kept()
         searched = self._searched(None if kept is None else kept.plan)
         best = self._best(kept, searched) or self._late()
         if best is None:
             return self._helpless()
-        inside = self._goal_within(self.here.start)
-        if self.loop.hold and inside is not None and not self._stays_within(best.plan, inside):
-            return self._resting(inside)
         return self._as_chosen(best, None if kept is None else kept.cost)
+
+    def _holding(self, index: int) -> _Chosen | None:
+        """In a goal's set: a plan to its middle within a step or a few, so as to stay in it.
+
+        The cheapest that stays in the set all along, otherwise one that is inside whenever the
+        loop closes; None if there is neither.
+        """
+        here, goal = self.here, self.here.goals[index]
+        middle = replace(goal, tolerance_m=0.0, tolerance_rad=0.0)
+        second: _Candidate | None = None
+        for steps in range(1, MOST_HOLDING + 1):
+            limit = steps * self.loop.step_s
+            pads = here.horizon.time is not None and self.loop.pad is not None
+            soon = Horizon(time=limit) if pads else Horizon(max_time=limit)
+            near = replace(
+                here,
+                goals=(middle,),
+                horizon=soon,
+                search=replace(here.search, method="auto"),
+            )
+            found = [
+                self._candidate(_as_plan(near, solution), index, Origin.SEARCHED)
+                for result in search_goal(
+                    near, middle, alternatives=HOLDING, time_limit=self.loop.time_limit
+                )
+                for solution in result.solutions
+            ]
+            for one in sorted(found, key=lambda candidate: candidate.cost):
+                if self._stays_within(one.plan, index):
+                    return self._held(one)
+                if second is None and self._inside_at_steps(one.plan, index):
+                    second = one
+        return None if second is None else self._held(second)
+
+    def _held(self, one: _Candidate) -> _Chosen:
+        chosen = self._as_chosen(one, one.cost)
+        return replace(chosen, arrived=True, violations=())
+
+    def _inside_at_steps(self, plan: Plan, index: int) -> bool:
+        goal, step = self.here.goals[index], self.loop.step_s
+        times = plan.start_time + step * np.arange(1, math.ceil(plan.duration / step) + 1)
+        return all(within(pose, goal) for pose in plan.pose_at(times))
 
     def _as_chosen(self, best: _Candidate, shifted_value: float | None) -> _Chosen:
         return _Chosen(
@@ -348,7 +412,7 @@ class _Decision:
         plans: list[tuple[Plan, Origin]] = []
         if self.off_plan == 0.0 and missed(self.rest, goal) <= EXACT:
             plans.append((self.rest, Origin.SHIFTED))
-            solved = same_word(here, self.rest, goal, pad=pad)
+            solved = same_word(here, self.rest, goal, pad=pad) if self.loop.margin else None
             if solved is not None:
                 plans.append((solved, Origin.REANCHORED))
         else:
@@ -377,20 +441,20 @@ class _Decision:
                 self._over_budget()
                 break
             results = search_goal(
-                here, goal, alternatives=TIES, time_limit=max(left, 1e-6), known=to_known
+                here,
+                goal,
+                alternatives=HOLDING if self.loop.retimed else 0,
+                time_limit=max(left, 1e-6),
+                known=None if self.loop.retimed else to_known,
+                ties=True,
             )
-            self.exhaustive = self.exhaustive and any(one.exhaustive for one in results)
+            proven = any(one.exhaustive for one in results) and not self.loop.retimed
+            self.exhaustive = self.exhaustive and proven
             if any(one.status is SearchStatus.OUT_OF_BUDGET for one in results):
                 self._over_budget()
-            trims = here.automaton.trims
             for result in results:
                 for solution in result.solutions:
-                    plan = Plan(
-                        here.start,
-                        tuple(trims[k] for k in solution.word),
-                        durations=solution.durations,
-                        start_time=here.start_time,
-                    )
+                    plan = _as_plan(here, solution)
                     if self._allowed(plan):
                         found.append(self._candidate(plan, index, Origin.SEARCHED))
         return found
@@ -419,6 +483,8 @@ class _Decision:
 
     def _candidate(self, plan: Plan, index: int, origin: Origin) -> _Candidate:
         here = self.here
+        if self.loop.retimed:
+            plan = at_best_pace(here, plan)
         cost = here.cost_of(plan)
         ordered = costliest_first(plan, _rates(here, plan))
         if ordered is not plan:
@@ -441,9 +507,9 @@ class _Decision:
     def _helpless(self) -> _Chosen:
         """Nothing leads to the goal: rest, and say so."""
         here, pad = self.here, self.loop.pad
-        rest = Plan(here.start, (), durations=[], start_time=here.start_time)
-        if pad is not None:
-            rest = replace(rest, trims=(pad,), durations=[self.loop.step_s])
+        trims = () if pad is None else (pad,)
+        lasting = [self.loop.step_s] * len(trims)
+        rest = Plan(here.start, trims, durations=lasting, start_time=here.start_time)
         self.violations.append(
             Violation(
                 guarantee=Guarantee.FEASIBILITY,
@@ -464,15 +530,7 @@ class _Decision:
             nothing = Plan(here.start, (), durations=[], start_time=here.start_time)
             plans = list(rejoining(hurry, self.rest or nothing, goal, pad=None))
             for result in search_goal(hurry, goal, alternatives=0, time_limit=self.loop.time_limit):
-                plans += [
-                    Plan(
-                        here.start,
-                        tuple(here.automaton.trims[k] for k in solution.word),
-                        durations=solution.durations,
-                        start_time=here.start_time,
-                    )
-                    for solution in result.solutions
-                ]
+                plans += [_as_plan(here, solution) for solution in result.solutions]
             found += [
                 self._candidate(plan, index, Origin.SEARCHED)
                 for plan in plans
@@ -514,6 +572,16 @@ def within(pose: Array, goal: Goal) -> bool:
     return way <= goal.tolerance_m + EXACT and heading
 
 
+def _as_plan(problem: Problem, solution: Solution) -> Plan:
+    trims = problem.automaton.trims
+    return Plan(
+        problem.start,
+        tuple(trims[k] for k in solution.word),
+        durations=solution.durations,
+        start_time=problem.start_time,
+    )
+
+
 def _preference(one: _Candidate) -> tuple[float, bool, int, tuple[str, ...]]:
     """Greatest cost on [0, delta) first, then the known word, then fewer trims, then by name."""
     known = one.origin is not Origin.SEARCHED
@@ -528,7 +596,7 @@ def _is_rest_of(plan: Plan, rest: Plan | None) -> bool:
 
 
 def _moving(plan: Plan) -> list[str]:
-    return [trim.name for trim in plan.trims if trim.body_velocity.any()]
+    return [base_name(trim.name) for trim in plan.trims if trim.body_velocity.any()]
 
 
 def _pad(problem: Problem) -> Trim | None:

@@ -109,7 +109,7 @@ def broken(
         )
     padding = promised.rest_rate * last.applied
     allowed = last.value - last.applied_cost + padding
-    if now.value > allowed + tolerance:
+    if now.value > allowed + tolerance and not (now.arrived or last.arrived):
         yield Violation(
             guarantee=Guarantee.DECREASE,
             reason=f"the value is {now.value:.9g}, need at most {allowed:.9g}; {why}",
@@ -121,10 +121,15 @@ def broken(
                 guarantee=Guarantee.EFFORT,
                 reason=f"the value fell by {last.value - now.value:.9g}, need {least:.9g}",
             )
-    if most_steps is not None and now.number > most_steps and not now.arrived:
+    if (
+        most_steps is not None
+        and now.number > most_steps
+        and off == 0.0
+        and not (now.arrived or last.arrived)
+    ):
         yield Violation(
             guarantee=Guarantee.STEPS,
-            reason=f"step {now.number} is not the goal, need it within {most_steps}; {why}",
+            reason=f"step {now.number} is not the goal, need it within {most_steps}",
         )
 
 

@@ -72,12 +72,16 @@ def merged(
     for trim, duration in zip(trims, durations, strict=True):
         if duration <= NOTHING:
             continue
-        if word and word[-1].name == trim.name:
+        if word and _same(word[-1], trim):
             times[-1] += duration
         else:
             word.append(trim)
             times.append(duration)
     return tuple(word), times
+
+
+def _same(one: Trim, other: Trim) -> bool:
+    return one.name == other.name and bool((one.body_velocity == other.body_velocity).all())
 
 
 def costliest_first(plan: Plan, rates: Array) -> Plan:
@@ -92,8 +96,8 @@ def costliest_first(plan: Plan, rates: Array) -> Plan:
     if len(plan.trims) < 2:
         return plan
     twists = np.array([trim.body_velocity for trim in plan.trims])
-    still = ~twists.any(axis=1)
-    moving = [k for k in range(len(twists)) if not still[k]]
+    moves = [bool(twist.any()) for twist in twists]
+    moving = [k for k, move in enumerate(moves) if move]
     order: list[int] = []
     block: list[int] = []
     for k in moving:
@@ -102,7 +106,7 @@ def costliest_first(plan: Plan, rates: Array) -> Plan:
             block = []
         block.append(k)
     order += sorted(block, key=lambda i: -rates[i])
-    order += [k for k in range(len(twists)) if still[k]]
+    order += [k for k, move in enumerate(moves) if not move]
     if order == list(range(len(twists))):
         return plan
     word, times = merged([plan.trims[k] for k in order], plan.durations[order].tolist())

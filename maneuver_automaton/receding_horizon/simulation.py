@@ -60,6 +60,7 @@ def simulate(
     time_limit: float = 5.0,
     last: Step | None = None,
     stay: bool = False,
+    retimed: bool = False,
     audit: bool = True,
     progress: Callable[[Step], None] | None = None,
 ) -> ClosedLoop:
@@ -75,7 +76,7 @@ def simulate(
         At most so many.
     disturbance : Disturbance, optional
         None: the vehicle does what its model says.
-    margin, time_limit
+    margin, time_limit, retimed
         As in `RecedingHorizon`.
     last : Step, optional
         To go on from the last step of another loop; the problem's start is where that led.
@@ -112,7 +113,13 @@ def simulate(
     upset = Disturbance() if disturbance is None else disturbance
     random = _draws(upset, problem.start.size)
     controller = RecedingHorizon(
-        problem, step=step, margin=margin, time_limit=time_limit, last=last, hold=stay
+        problem,
+        step=step,
+        margin=margin,
+        time_limit=time_limit,
+        last=last,
+        hold=stay,
+        retimed=retimed,
     )
     first = 0 if last is None else last.number + 1
     for _ in range(first):  # the numbers that the steps before have used
@@ -246,4 +253,3 @@ def _inside(problem: Problem, pose: Array) -> bool:
 
 def _begin(problem: Problem, last: Step | None) -> float:
     return problem.start_time if last is None else last.time + last.applied
-

@@ -41,6 +41,7 @@ def search_goal(
     alternatives: int | None,
     time_limit: float,
     known: Plan | None = None,
+    ties: bool = False,
 ) -> list[SearchResult]:
     """The method asked for; `auto`: exhaustive where affordable, otherwise insertion, or both.
 
@@ -56,6 +57,8 @@ def search_goal(
     known : Plan, optional
         A plan from the problem's start to the goal. Exhaustive search then lists only what is at
         least as cheap (it may find nothing); insertion improves it beside its own seeds.
+    ties : bool
+        Whether exhaustive search lists all that cost as much as the last solution asked for.
 
     Returns
     -------
@@ -71,7 +74,12 @@ def search_goal(
     if method == "words" or (method == "auto" and _affordable(problem, goal)):
         return [
             search_words(
-                problem, goal, alternatives=alternatives, time_limit=time_limit, ceiling=ceiling
+                problem,
+                goal,
+                alternatives=alternatives,
+                time_limit=time_limit,
+                ceiling=ceiling,
+                ties=ties,
             )
         ]
     results = [
@@ -87,7 +95,12 @@ def search_goal(
         few = replace(problem, horizon=replace(problem.horizon, max_trims=4 - goal.free_heading))
         if (problem.horizon.max_trims or math.inf) > 4 and _affordable(few, goal):
             short = search_words(
-                few, goal, alternatives=alternatives, time_limit=time_limit, ceiling=ceiling
+                few,
+                goal,
+                alternatives=alternatives,
+                time_limit=time_limit,
+                ceiling=ceiling,
+                ties=ties,
             )
             results.append(replace(short, exhaustive=False))
     return results

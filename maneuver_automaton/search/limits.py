@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.costs import StageCost
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.setup import SearchSetup, search_setup
+from maneuver_automaton.search.setup import SearchSetup, moving_library, search_setup
 
 
 def why_impossible(problem: Problem) -> str:
@@ -42,33 +46,79 @@ def _impossible(problem: Problem, setup: SearchSetup) -> str:
 
 
 def closed_bound(problem: Problem, goal: Goal) -> float:
-    """Way and turn at the best price per metre and radian; a fixed time at the best per second.
+    """No plan to `goal` is cheaper, whatever its word.
 
-    Holds for every plan, whatever its word.
+    The largest of: the way at the best price per metre, the turn at the best price per radian, a
+    fixed time at the best price per second, and, for a fixed time T, ``k (way^2 + turn^2) / T``
+    with the largest k for which no trim costs less than ``k (speed^2 + turn rate^2)`` per second.
+    The last one is the paper's bound on the effort, with k = c1 lambda_min(R) for the unicycle.
+
+    Source: the paper, Appendix; Cauchy-Schwarz.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.automaton import Automaton
+    >>> from maneuver_automaton.costs import Cost
+    >>> from maneuver_automaton.models import Unicycle
+    >>> from maneuver_automaton.problem import Horizon
+    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "on": (0.5, 0), "spin": (0, 2)})
+    >>> cost, horizon = Cost(effort=1.0), Horizon(time=8.0)
+    >>> problem = Problem(robot, [-2, 0, 0], [0, 0, 0], cost=cost, horizon=horizon)
+    >>> closed_bound(problem, problem.goals[0])
+    1.0
     """
     setup = search_setup(problem, goal)
     if setup.start_is_goal or not len(setup.rates):
         return 0.0
     limit = problem.horizon.time
-    rest = setup.rest_rate if limit is not None and setup.rest is not None else 0.0
-    padded = rest * limit if limit is not None and setup.rest is not None else 0.0
-    rates = setup.rates - rest
-    if (rates < 0.0).any():
+    pads = limit is not None and setup.rest is not None
+    prices = _prices(problem.automaton, problem.cost, pads)
+    if prices is None:
         return 0.0
-    speeds = np.linalg.norm(setup.twists[:, [0, 1, 3]], axis=1)
-    turns = np.abs(setup.twists[:, 2])
-    way = float(np.linalg.norm(setup.goal[[0, 1, 3]]))
-    turn = 0.0 if goal.free_heading else abs(math.remainder(setup.goal[2], 2.0 * math.pi))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        per_metre = float(np.min(np.where(speeds > 0.0, rates / speeds, np.inf)))
-        per_radian = float(np.min(np.where(turns > 0.0, rates / turns, np.inf)))
+    x, y, _, z = setup.goal.tolist()
+    way = math.sqrt(x * x + y * y + z * z)
+    turn = 0.0 if goal.free_heading else abs(math.remainder(float(setup.goal[2]), 2.0 * math.pi))
     bound = max(
-        way * per_metre if way > 0.0 else 0.0,
-        turn * per_radian if turn > 0.0 else 0.0,
+        way * prices.per_metre if way > 0.0 else 0.0,
+        turn * prices.per_radian if turn > 0.0 else 0.0,
     )
-    if limit is not None and setup.rest is None:
-        bound = max(bound, limit * float(rates.min()))
+    padded = 0.0
+    if limit is not None:
+        bound = max(bound, prices.per_square * (way * way + turn * turn) / limit)
+        if pads:
+            padded = setup.rest_rate * limit
+        else:
+            bound = max(bound, limit * prices.per_second)
     return padded + (bound if math.isfinite(bound) else 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Prices:
+    """Best prices of a library; what rest costs is taken off where it pads."""
+
+    per_metre: float
+    per_radian: float
+    per_second: float
+    per_square: float  # per (m/s)^2 + (rad/s)^2 and second
+
+
+@functools.lru_cache(maxsize=8)
+def _prices(automaton: Automaton, cost: StageCost, pads: bool) -> _Prices | None:
+    """None where a trim is cheaper than the rest that pads."""
+    library = moving_library(automaton, cost)
+    rates = library.rates - (library.rest_rate if pads else 0.0)
+    if (rates < 0.0).any():
+        return None
+    squares = library.speeds**2 + library.turn_rates**2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return _Prices(
+            per_metre=float(np.min(np.where(library.speeds > 0.0, rates / library.speeds, np.inf))),
+            per_radian=float(
+                np.min(np.where(library.turn_rates > 0.0, rates / library.turn_rates, np.inf))
+            ),
+            per_second=float(rates.min()),
+            per_square=float(np.min(rates / squares)),
+        )
 
 
 def rest_rate(problem: Problem) -> float | None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.costs import StageCost
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.problem import Goal, Problem
 
@@ -36,13 +39,48 @@ class SearchSetup:
         return bool(still and (self.free_heading or abs(turn) <= 1e-12))
 
 
+@functools.lru_cache(maxsize=8)
 def search_setup(problem: Problem, goal: Goal) -> SearchSetup:
     """What every search for one goal starts from."""
-    automaton = problem.automaton
+    library = moving_library(problem.automaton, problem.cost)
+    relative = np.zeros(4)
+    relative[: problem.start.size] = _seen_from(problem.start, goal.pose)
+    relative.setflags(write=False)
+    return SearchSetup(
+        trims=library.trims,
+        twists=library.twists,
+        rates=library.rates,
+        periods=library.periods,
+        goal=relative,
+        free_heading=goal.free_heading,
+        rest=library.rest,
+        rest_rate=library.rest_rate,
+        climbs=bool(library.climbs or relative[3] != 0.0),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class MovingLibrary:
+    """The part of a search that symmetry makes the same for every start and goal."""
+
+    trims: IntArray  # (M,)
+    twists: Array  # (M, 4)
+    rates: Array  # (M,)
+    periods: Array  # (M,) [s]
+    rest: int | None
+    rest_rate: float
+    climbs: bool
+    speeds: Array  # (M,) [m/s] climb included
+    turn_rates: Array  # (M,) [rad/s] without sign
+
+
+@functools.lru_cache(maxsize=8)
+def moving_library(automaton: Automaton, cost: StageCost) -> MovingLibrary:
+    """Moving trims of an automaton with what they cost, of equal twists only the cheapest."""
     dof = automaton.model.group.dof
     twists = np.zeros((len(automaton), 4))
     twists[:, :dof] = automaton.body_velocities
-    rates = problem.rates
+    rates = cost.rates(automaton.controls, automaton.body_velocities)
     still = ~twists.any(axis=1)
     groups = automaton.twist_groups
     cheapest = np.ones(len(automaton), dtype=bool)
@@ -51,21 +89,29 @@ def search_setup(problem: Problem, goal: Goal) -> SearchSetup:
         cheapest[:] = False
         cheapest[order[np.append(True, np.diff(groups[order]) != 0)]] = True
     moving = np.flatnonzero(cheapest & ~still)
-    relative = np.zeros(4)
-    relative[:dof] = _seen_from(problem.start, goal.pose)
     resting = np.flatnonzero(cheapest & still)
     with np.errstate(divide="ignore"):
         periods = np.where(twists[:, 2] != 0.0, FULL_TURN / np.abs(twists[:, 2]), np.inf)
-    return SearchSetup(
-        trims=moving.astype(np.int64),
-        twists=twists[moving],
-        rates=rates[moving],
-        periods=periods[moving],
-        goal=relative,
-        free_heading=goal.free_heading,
+    arrays = (
+        moving.astype(np.int64),
+        twists[moving],
+        rates[moving],
+        periods[moving],
+        np.linalg.norm(twists[moving][:, [0, 1, 3]], axis=1),
+        np.abs(twists[moving][:, 2]),
+    )
+    for array in arrays:
+        array.setflags(write=False)
+    return MovingLibrary(
+        trims=arrays[0],
+        twists=arrays[1],
+        rates=arrays[2],
+        periods=arrays[3],
         rest=int(resting[0]) if resting.size else None,
         rest_rate=float(rates[resting[0]]) if resting.size else 0.0,
-        climbs=bool(twists[:, 3].any() or relative[3] != 0.0),
+        climbs=bool(twists[:, 3].any()),
+        speeds=arrays[4],
+        turn_rates=arrays[5],
     )
 
 

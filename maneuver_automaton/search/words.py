@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.costs import Cost
@@ -24,6 +25,8 @@ TOLERANCE = 1e-12  # relative, for tangent circles and parallel lines
 TIE = 1e-9  # costs closer than this, relative, are equal
 CAPACITY = 4096
 
+BoolArray = NDArray[np.bool_]
+
 
 def search_words(
     problem: Problem,
@@ -33,6 +36,7 @@ def search_words(
     time_limit: float = math.inf,
     nodes: int = NODES,
     ceiling: float = math.inf,
+    ties: bool = False,
 ) -> SearchResult:
     """Search every word of at most ``max_trims`` trims for its locally optimal coasting times.
 
@@ -54,6 +58,8 @@ def search_words(
         Grid nodes per scanned time.
     ceiling : float
         Cost of a plan that is known: what is dearer may be left out, and so there may be none.
+    ties : bool
+        Whether to list, beside the solutions asked for, all that cost as much as the last of them.
 
     Returns
     -------
@@ -97,15 +103,19 @@ def search_words(
             alternatives,
             capacity=capacity,
             nodes=nodes,
-            ceiling=ceiling + TIE * (1.0 + abs(ceiling)),
+            ceiling=ceiling,
         )
         finished = job.run(deadline, problem.search.max_expansions)
         if job.n_found <= capacity:
             break
         capacity = 2 * job.n_found
     solutions = tuple(in_order(job.solutions()))
-    if alternatives is not None:
-        solutions = solutions[: alternatives + 1]
+    if alternatives is not None and len(solutions) > alternatives + 1:
+        asked = solutions[: alternatives + 1]
+        most_tied = _tied(asked[-1].cost) if ties else -math.inf
+        solutions = asked + tuple(
+            one for one in solutions[alternatives + 1 :] if one.cost <= most_tied
+        )
     if solutions:
         status = SearchStatus.FOUND
     else:
@@ -184,6 +194,7 @@ class _Mode:
 
     kernel_problem: Any
     most_moving: int
+    at_least: float = -math.inf  # cost of the whole time at the cheapest trim, where it is fixed
 
 
 class _Job:
@@ -210,6 +221,7 @@ class _Job:
         self.most = most
         self.nodes = nodes
         self.spare = spare
+        self.tables = _tables(setup)
         self._gridded = False
         width = MOST_TRIMS + 1
         # a user's own price of switches is added afterwards, so nothing is pruned by it
@@ -258,7 +270,7 @@ class _Job:
         tail = 1 if self.setup.free_heading else 0
         for n in range(1, self.most + 1):
             for mode in modes:
-                if n > mode.most_moving:
+                if n > mode.most_moving or mode.at_least > _tied(float(self.found.best[-1])):
                     continue
                 calls = self.n_steering
                 for scan, chunk in self._scans(n + tail, mode):
@@ -282,7 +294,7 @@ class _Job:
         number, last = 0, len(self.setup.trims) ** n
         while number < last:
             until = min(number + chunk, last)
-            ceiling = self.found.best[-1]
+            ceiling = _tied(float(self.found.best[-1]))
             number = scan(mode.kernel_problem, self.candidates, n + tail, number, until, ceiling)
             self.polish(mode.kernel_problem, self.candidates, self.found, self.most)
             if time.monotonic() > deadline:
@@ -314,22 +326,17 @@ class _Job:
             yield _Mode(self._kernel_problem(horizon.time, pad=True, fixed=False), self.most - 1)
         if exact is not None:
             most = min(2, self.most) if self.spare else self.most
-            yield _Mode(self._kernel_problem(exact, pad=False, fixed=True), most)
+            at_least = exact * float(setup.rates.min()) if len(setup.rates) else math.inf
+            yield _Mode(self._kernel_problem(exact, pad=False, fixed=True), most, at_least)
 
     def _kernel_problem(self, limit: float | None, *, pad: bool, fixed: bool) -> Any:
         from maneuver_automaton.search._kernels_problem import WordProblem
 
-        setup, cost = self.setup, self.problem.cost
-        twists, rates, periods = setup.twists, setup.rates, setup.periods
-        weights = np.ones(len(rates))
-        if setup.free_heading:
-            twists = np.vstack([twists, [0.0, 0.0, 1.0, 0.0]])
-            rates = np.append(rates, 0.0)
-            periods = np.append(periods, 2.0 * np.pi)
-            weights = np.append(weights, 0.0)
+        setup, cost, tables = self.setup, self.problem.cost, self.tables
+        rates, weights = tables.rates, tables.weights
         rows, targets = [], []
         if setup.climbs:
-            rows.append(twists[:, 3])
+            rows.append(tables.twists[:, 3])
             targets.append(setup.goal[3])
         if fixed:
             rows.append(weights)
@@ -339,15 +346,15 @@ class _Job:
         bounded = math.inf if limit is None else limit
         fixed_time = self.problem.horizon.time is not None
         return WordProblem(
-            twists=np.ascontiguousarray(twists),
-            rates=np.ascontiguousarray(rates),
+            twists=tables.twists,
+            rates=rates,
             rows=np.array(rows).reshape(len(rows), len(rates)),
             targets=np.array(targets, dtype=np.float64),
-            periods=periods,
-            reaches=_reaches(setup, twists, periods, bounded),
-            parallel=_parallel(twists),
+            periods=tables.periods,
+            reaches=np.minimum(tables.reaches, bounded),
+            parallel=tables.parallel,
             weights=weights,
-            goal=np.array(setup.goal),
+            goal=setup.goal,
             time_limit=float(bounded),
             pad=int(pad),
             pad_cost=float(setup.rest_rate * bounded) if pad else 0.0,
@@ -386,23 +393,61 @@ class _Job:
         return Solution(word=word, durations=times, cost=cost)
 
 
-def _reaches(setup: SearchSetup, twists: Array, periods: Array, limit: float) -> Array:
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Tables:
+    """What a kernel needs of every trim, the turn of a free heading last."""
+
+    twists: Array  # (M, 4)
+    rates: Array  # (M,)
+    periods: Array  # (M,) [s]
+    weights: Array  # (M,) 0 for the free turn, otherwise 1
+    parallel: BoolArray  # (M, M)
+    reaches: Array  # (M,) [s]
+
+
+def _tables(setup: SearchSetup) -> _Tables:
+    twists, rates, periods = np.array(setup.twists), np.array(setup.rates), np.array(setup.periods)
+    weights = np.ones(len(rates))
+    if setup.free_heading:
+        twists = np.vstack([twists, [0.0, 0.0, 1.0, 0.0]])
+        rates = np.append(rates, 0.0)
+        periods = np.append(periods, 2.0 * np.pi)
+        weights = np.append(weights, 0.0)
+    return _Tables(
+        twists=twists,
+        rates=rates,
+        periods=periods,
+        weights=weights,
+        parallel=_parallel(twists),
+        reaches=_reaches(setup, twists, periods),
+    )
+
+
+def _reaches(setup: SearchSetup, twists: Array, periods: Array) -> Array:
     """Longest time of interest per trim: a full turn, or a way well beyond the goal."""
     turning = twists[:, 2] != 0.0
-    speeds = np.linalg.norm(twists[:, :2], axis=1)
+    speeds = np.sqrt(twists[:, 0] ** 2 + twists[:, 1] ** 2)
     radii = speeds[turning] / np.abs(twists[turning, 2])
-    way = 2.0 * (np.linalg.norm(setup.goal[:2]) + 4.0 * radii.max(initial=0.0)) + abs(setup.goal[3])
+    place = math.hypot(float(setup.goal[0]), float(setup.goal[1]))
+    way = 2.0 * (place + 4.0 * radii.max(initial=0.0)) + abs(setup.goal[3])
     pace = np.maximum(speeds, np.abs(twists[:, 3]))
     with np.errstate(divide="ignore"):
         straight = np.where(pace > 0.0, max(way, 1e-3) / pace, 0.0)
-    return np.minimum(np.where(turning, periods, straight), limit)
+    return np.where(turning, periods, straight)
 
 
-def _parallel(twists: Array) -> Any:
+def _parallel(twists: Array) -> BoolArray:
     """Which pairs of twists span one line only (M, M), altitude aside."""
-    plane = twists[:, :3] / np.linalg.norm(twists[:, :3], axis=1, keepdims=True).clip(min=1e-300)
-    cross = np.cross(plane[:, None], plane[None])
-    return np.linalg.norm(cross, axis=-1) < 1e-9
+    lengths = np.sqrt((twists[:, :3] ** 2).sum(axis=1)).clip(min=1e-300)
+    a, b, c = (twists[:, :3] / lengths[:, None]).T
+    minors = [np.outer(p, q) for p, q in ((a, b), (b, c), (c, a))]
+    square = sum((minor - minor.T) ** 2 for minor in minors)
+    return np.asarray(np.sqrt(square) < 1e-9)
+
+
+def _tied(cost: float) -> float:
+    """The largest cost that counts as equal."""
+    return cost + TIE * (1.0 + abs(cost))
 
 
 def in_order(solutions: Iterable[Solution]) -> Iterator[Solution]:

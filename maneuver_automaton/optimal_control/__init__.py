@@ -1,0 +1,24 @@
+"""Optimal control by direct transcription: the one room that imports CasADi, when it is used."""
+
+from maneuver_automaton.optimal_control.problem import Grid as Grid
+from maneuver_automaton.optimal_control.problem import Guess as Guess
+from maneuver_automaton.optimal_control.problem import (
+    OptimalControlProblem as OptimalControlProblem,
+)
+from maneuver_automaton.optimal_control.problem import straight_guess as straight_guess
+from maneuver_automaton.optimal_control.solution import (
+    OptimalControlSolution as OptimalControlSolution,
+)
+from maneuver_automaton.optimal_control.solution import SolveStatus as SolveStatus
+from maneuver_automaton.optimal_control.solution import dynamics_defect as dynamics_defect
+from maneuver_automaton.optimal_control.transcription import SolverSettings as SolverSettings
+from maneuver_automaton.optimal_control.transcription import Transcription as Transcription
+from maneuver_automaton.optimal_control.transcription import solve as solve
+from maneuver_automaton.optimal_control.transcription import transcribe as transcribe
+from maneuver_automaton.optimal_control.uniform_effort import (
+    UniformEffortExample as UniformEffortExample,
+)
+from maneuver_automaton.optimal_control.uniform_effort import (
+    solve_uniform_effort_example as solve_uniform_effort_example,
+)
+from maneuver_automaton.optimal_control.vehicles import moving_frame as moving_frame

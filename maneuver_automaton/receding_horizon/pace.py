@@ -1,0 +1,60 @@
+"""Continuous controls: the trims of a library at whatever pace costs least."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+
+from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.costs import Cost, StageCost
+from maneuver_automaton.primitives import Trim
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.refinement.effort import effort_report
+from maneuver_automaton.refinement.retiming import retime
+
+PACE = re.compile(r"( x[-+.e0-9]+)+$")
+UNIFORM = 1e-9  # relative spread of an effort that counts as uniform
+
+
+def at_best_pace(problem: Problem, plan: Plan) -> Plan:
+    """The same path in the same time with uniform effort, as far as limits allow.
+
+    Source: the paper, Prop. 15 and Cor. 19.
+    """
+    moving = [bool(trim.body_velocity.any()) for trim in plan.trims]
+    if not any(moving) or not isinstance(problem.cost, Cost):
+        return plan
+    better = retime(plan, problem.automaton.model, cost=problem.cost)
+    if not better.saving > 0.0:
+        return plan
+    trims = tuple(_named(problem.automaton, trim) for trim in better.after.trims)
+    return replace(better.after, trims=trims)
+
+
+def base_name(name: str) -> str:
+    """Name of the trim of the library that a trim at another pace comes from.
+
+    Examples
+    --------
+    >>> base_name("spin x0.5 x0.25"), base_name("ahead")
+    ('spin', 'ahead')
+    """
+    return PACE.sub("", name)
+
+
+def _named(automaton: Automaton, trim: Trim) -> Trim:
+    """The trim, named after the one of the library and how much faster it is."""
+    base = base_name(trim.name)
+    own = automaton.trims[automaton.index_of(base)].body_velocity
+    pace = float(trim.body_velocity @ own) / float(own @ own)
+    return replace(trim, name=base if pace == 1.0 else f"{base} x{pace:.6g}")
+
+
+def is_uniform(plan: Plan, cost: StageCost) -> bool:
+    """Whether a plan has the same quadratic effort all along."""
+    if not isinstance(cost, Cost) or not plan.trims:
+        return False
+    report = effort_report(plan, cost.effort_matrix)
+    return bool(report.spread <= UNIFORM) and bool(np.isfinite(report.mean))

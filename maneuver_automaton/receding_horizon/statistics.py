@@ -1,0 +1,249 @@
+"""Many closed loops: the same problem from many starts, or with many seeds, in parallel."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from maneuver_automaton._arrays import Array, as_array, freeze
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.receding_horizon.log import ClosedLoop, Violation
+from maneuver_automaton.receding_horizon.simulation import Disturbance, simulate
+
+CHUNKS = 4  # per worker, so that a slow one is not waited for
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Outcome:
+    """How one closed loop went, in a few numbers."""
+
+    start: Array  # (dof,)
+    seed: int
+    reached: bool
+    arrived_after: int | None  # steps until the goal, or its set, was first reached
+    stayed: bool  # in the goal's set from then on
+    share_inside: float  # of the steps after the first arrival, 1 if there is none
+    steps: int
+    cost: float
+    first_value: float
+    violations: tuple[tuple[int, Violation], ...]
+    audits_failed: int
+    reason: str  # why the goal was not reached, or not kept; empty if all is well
+    solve_s: Array  # (steps,)
+
+    def __post_init__(self) -> None:
+        freeze(self, "start", last=(3, 4))
+        freeze(self, "solve_s")
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Statistics:
+    """What many closed loops came to."""
+
+    outcomes: tuple[Outcome, ...]
+
+    @property
+    def reached(self) -> float:
+        """Share that reached the goal."""
+        return float(np.mean([one.reached for one in self.outcomes]))
+
+    @property
+    def stayed(self) -> float:
+        """Share that reached the goal's set and stayed in it."""
+        return float(np.mean([one.reached and one.stayed for one in self.outcomes]))
+
+    @property
+    def broken(self) -> int:
+        """Number of steps that broke a guarantee."""
+        return sum(len({step for step, _ in one.violations}) for one in self.outcomes)
+
+    @property
+    def solve_s(self) -> Array:
+        """Times of all steps of all loops [s]."""
+        return np.concatenate([one.solve_s for one in self.outcomes])
+
+
+def simulate_many(
+    problem: Problem,
+    *,
+    starts: ArrayLike | None = None,
+    seeds: Sequence[int] = (0,),
+    step: float,
+    steps: int = 100,
+    disturbance: Disturbance | None = None,
+    margin: float = 0.0,
+    time_limit: float = 5.0,
+    stay: bool = False,
+    audit: bool = False,
+    jobs: int = 1,
+    scheduler: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Statistics:
+    """Close the loop from every start with every seed.
+
+    Parameters
+    ----------
+    problem : Problem
+    starts : (n, dof) array_like, optional
+        Poses to start from; the problem's own start if omitted.
+    seeds : sequence of int
+        Each start is tried with each of them.
+    step, steps, disturbance, margin, time_limit, stay, audit
+        As in `simulate`; the seed of `disturbance` is replaced.
+    jobs : int
+        Processes at a time.
+    scheduler : str, optional
+        Address of a Dask scheduler ("tcp://host:8786"), or "local" for a cluster on this machine:
+        the same work is sent there. Needs the package ``distributed``.
+    progress : callable, optional
+        Called with the number of loops done and their total.
+
+    Returns
+    -------
+    Statistics
+        In the order of starts, then seeds, whatever ran where.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of range, or Dask is asked for and not installed.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Cost, Horizon, Problem, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "ahead": (1, 0), "spin": (0, 1)})
+    >>> problem = Problem(
+    ...     robot, [0, 0, 0], [0, 0, 0], cost=Cost(effort=1.0), horizon=Horizon(max_trims=3)
+    ... )
+    >>> simulate_many(problem, starts=[[-1, 0, 0], [0, 1, 1]], step=1.0).reached
+    1.0
+    """
+    dof = problem.start.size
+    poses = as_array("starts", problem.start if starts is None else starts, last=dof)
+    cases = [(pose, seed) for pose in np.atleast_2d(poses) for seed in seeds]
+    if jobs < 1:
+        raise ValueError(f"jobs must be at least 1, got {jobs}")
+    n_chunks = 1 if jobs == 1 and scheduler is None and progress is None else CHUNKS * max(jobs, 4)
+    chunks = [chunk for chunk in _chunks(cases, n_chunks) if chunk]
+    settings = _Settings(
+        step=step,
+        steps=steps,
+        disturbance=Disturbance() if disturbance is None else disturbance,
+        margin=margin,
+        time_limit=time_limit,
+        stay=stay,
+        audit=audit,
+    )
+    done: list[Outcome] = []
+    for outcomes in _run(problem, chunks, settings, jobs, scheduler):
+        done += outcomes
+        if progress is not None:
+            progress(len(done), len(cases))
+    return Statistics(outcomes=tuple(done))
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Settings:
+    step: float
+    steps: int
+    disturbance: Disturbance
+    margin: float
+    time_limit: float
+    stay: bool
+    audit: bool
+
+
+Case = tuple[Array, int]
+
+
+def _chunks(cases: Sequence[Case], n: int) -> Iterator[list[Case]]:
+    for indices in np.array_split(np.arange(len(cases)), min(n, max(len(cases), 1))):
+        yield [cases[k] for k in indices]
+
+
+def _run(
+    problem: Problem,
+    chunks: Sequence[list[Case]],
+    settings: _Settings,
+    jobs: int,
+    scheduler: str | None,
+) -> Iterator[list[Outcome]]:
+    if jobs == 1 and scheduler is None:
+        for chunk in chunks:
+            yield _outcomes(problem, chunk, settings)
+        return
+    from joblib import Parallel, delayed
+
+    with _backend(scheduler, jobs):
+        ordered = "generator" if scheduler is None else "list"
+        work = Parallel(n_jobs=jobs if scheduler is None else -1, return_as=ordered)
+        yield from work(delayed(_outcomes)(problem, chunk, settings) for chunk in chunks)
+
+
+@contextlib.contextmanager
+def _backend(scheduler: str | None, jobs: int) -> Iterator[None]:
+    """Where joblib sends the work: processes on this machine, or a Dask cluster."""
+    if scheduler is None:
+        yield
+        return
+    try:
+        from dask.distributed import Client
+    except ImportError as error:
+        raise ValueError(
+            f"scheduler: got {scheduler!r}, but Dask is not installed; need `pip install "
+            "distributed`"
+        ) from error
+    from joblib import parallel_config
+
+    local = {"n_workers": jobs, "threads_per_worker": 1, "dashboard_address": None}
+    with Client(**local) if scheduler == "local" else Client(scheduler), parallel_config("dask"):
+        yield
+
+
+def _outcomes(problem: Problem, cases: Sequence[Case], settings: _Settings) -> list[Outcome]:
+    return [_outcome(problem, pose, seed, settings) for pose, seed in cases]
+
+
+def _outcome(problem: Problem, pose: Array, seed: int, settings: _Settings) -> Outcome:
+    loop = simulate(
+        replace(problem, start=pose),
+        step=settings.step,
+        steps=settings.steps,
+        disturbance=replace(settings.disturbance, seed=seed),
+        margin=settings.margin,
+        time_limit=settings.time_limit,
+        stay=settings.stay,
+        audit=settings.audit,
+    )
+    return outcome_of(loop, seed=seed)
+
+
+def outcome_of(loop: ClosedLoop, *, seed: int = 0) -> Outcome:
+    """A closed loop in a few numbers."""
+    inside = np.array(loop.inside)
+    arrived = np.flatnonzero(inside)
+    first = int(arrived[0]) if arrived.size else None
+    after = inside[first:] if first is not None else inside[:0]
+    reason = loop.reason
+    if not reason and not after.all():
+        out = int(np.flatnonzero(~after)[0]) + (first or 0)
+        reason = f"reached after {first} steps, outside again after {out}"
+    return Outcome(
+        start=loop.poses[0],
+        seed=seed,
+        reached=loop.reached,
+        arrived_after=first,
+        stayed=first is not None and bool(after.all()),
+        share_inside=float(after.mean()) if after.size else 1.0,
+        steps=len(loop.steps),
+        cost=loop.cost,
+        first_value=loop.steps[0].value if loop.steps else 0.0,
+        violations=tuple(loop.violations),
+        audits_failed=sum(not audit.passed for audit in loop.audits),
+        reason=reason,
+        solve_s=loop.solve_s,
+    )

@@ -1,0 +1,6 @@
+"""What makes a found plan better."""
+
+from maneuver_automaton.refinement.effort import EffortReport as EffortReport
+from maneuver_automaton.refinement.effort import effort_report as effort_report
+from maneuver_automaton.refinement.retiming import Retiming as Retiming
+from maneuver_automaton.refinement.retiming import retime as retime
