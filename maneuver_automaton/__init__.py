@@ -35,6 +35,9 @@ if TYPE_CHECKING:
     from maneuver_automaton.problem import Horizon as Horizon
     from maneuver_automaton.problem import Problem as Problem
     from maneuver_automaton.problem import SearchSettings as SearchSettings
+    from maneuver_automaton.receding_horizon import Disturbance as Disturbance
+    from maneuver_automaton.receding_horizon import RecedingHorizon as RecedingHorizon
+    from maneuver_automaton.receding_horizon import simulate as simulate
     from maneuver_automaton.scenario import load_scenario as load_scenario
 
 __version__ = "0.1.0"
@@ -46,6 +49,7 @@ _HOMES = {
     "Bounds": "problem",
     "Car": "models",
     "Cost": "costs",
+    "Disturbance": "receding_horizon",
     "Goal": "problem",
     "Horizon": "problem",
     "Maneuver": "primitives",
@@ -53,6 +57,7 @@ _HOMES = {
     "PlanResult": "planning",
     "PlanStatus": "planning",
     "Problem": "problem",
+    "RecedingHorizon": "receding_horizon",
     "SearchSettings": "problem",
     "Trim": "primitives",
     "Unicycle": "models",
@@ -62,6 +67,7 @@ _HOMES = {
     "plan": "planning",
     "save_library": "automaton.library",
     "save_plan": "formats.plan_json",
+    "simulate": "receding_horizon",
 }
 
 __all__ = [*_HOMES, "plotting"]

@@ -1,5 +1,12 @@
 """The paper's checks, for any model and for a user's own functions."""
 
+from maneuver_automaton.analysis.feasible import FeasibleSet as FeasibleSet
+from maneuver_automaton.analysis.feasible import feasible_set as feasible_set
+from maneuver_automaton.analysis.feasible import least_times as least_times
+from maneuver_automaton.analysis.growth import GrowthBound as GrowthBound
+from maneuver_automaton.analysis.growth import growth_bound as growth_bound
+from maneuver_automaton.analysis.growth import growth_of_values as growth_of_values
+from maneuver_automaton.analysis.growth import ring_poses as ring_poses
 from maneuver_automaton.analysis.invariance import (
     check_boundary_condition as check_boundary_condition,
 )
@@ -22,6 +29,18 @@ from maneuver_automaton.analysis.shift import (
 from maneuver_automaton.analysis.shift import shifted_cost as shifted_cost
 from maneuver_automaton.analysis.shift import shifted_function as shifted_function
 from maneuver_automaton.analysis.shift import shifted_problem as shifted_problem
+from maneuver_automaton.analysis.stability import CertifiedHorizon as CertifiedHorizon
+from maneuver_automaton.analysis.stability import ClosedLoopCheck as ClosedLoopCheck
+from maneuver_automaton.analysis.stability import certified_horizon as certified_horizon
+from maneuver_automaton.analysis.stability import certified_intervals as certified_intervals
+from maneuver_automaton.analysis.stability import check_closed_loop as check_closed_loop
+from maneuver_automaton.analysis.suboptimality import continuous_index as continuous_index
+from maneuver_automaton.analysis.suboptimality import discrete_index as discrete_index
 from maneuver_automaton.analysis.symmetry import check_flow as check_flow
 from maneuver_automaton.analysis.symmetry import check_vector_field as check_vector_field
 from maneuver_automaton.analysis.unit_cost import unit_cost as unit_cost
+from maneuver_automaton.refinement.effort import EffortReport as EffortReport
+from maneuver_automaton.refinement.effort import effort_report as effort_report
+from maneuver_automaton.refinement.effort import effort_threshold as effort_threshold
+from maneuver_automaton.refinement.retiming import Retiming as Retiming
+from maneuver_automaton.refinement.retiming import retime as retime

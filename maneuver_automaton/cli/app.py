@@ -73,6 +73,19 @@ def main() -> NoReturn:
     sys.exit(code)
 
 
+def _refuse_parts(with_file: Path | None, case: int | None) -> None:
+    if with_file is not None:
+        raise InvalidScenario(
+            "--with: serves formats that state a part of a problem; this version reads "
+            "none, only scenario files, which state all of it"
+        )
+    if case is not None:
+        raise InvalidScenario(
+            "--case: serves files with several problems; this version reads none, only "
+            "scenario files, which hold one"
+        )
+
+
 @app.command()
 @exits
 def plan(
@@ -90,16 +103,7 @@ def plan(
     """Plan a scenario, or every scenario of a folder."""
     from maneuver_automaton.cli import plan_command
 
-    if with_file is not None:
-        raise InvalidScenario(
-            "--with: serves formats that state a part of a problem; this version reads "
-            "none, only scenario files, which state all of it"
-        )
-    if case is not None:
-        raise InvalidScenario(
-            "--case: serves files with several problems; this version reads none, only "
-            "scenario files, which hold one"
-        )
+    _refuse_parts(with_file, case)
     settings = plan_command.Settings(
         time_limit=time_limit,
         alternatives=alternatives,
@@ -116,8 +120,16 @@ def plan(
 @exits
 def mpc(
     file: File,
-    steps: Annotated[int | None, typer.Option("--steps", min=1, metavar="N")] = None,
-    seed: Annotated[int | None, typer.Option("--seed", min=0, metavar="N")] = None,
+    steps: Annotated[
+        int | None,
+        typer.Option(
+            "--steps", min=1, metavar="N", help="Steps at most (default: the scenario's)."
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option("--seed", min=0, metavar="N", help="Seed of the disturbance."),
+    ] = None,
     out: Out = Path("out"),
     time_limit: TimeLimit = None,
     alternatives: Alternatives = 0,
@@ -127,9 +139,41 @@ def mpc(
     jobs: Jobs = 1,
     with_file: With = None,
     case: Case = None,
+    seeds: Annotated[
+        int | None,
+        typer.Option(
+            "--seeds", min=1, metavar="K", help="Statistics over K seeds instead of one loop."
+        ),
+    ] = None,
+    dask: Annotated[
+        str | None,
+        typer.Option("--dask", metavar="ADDRESS", help="Dask scheduler for --seeds, or local."),
+    ] = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option("--resume", metavar="LOG", help="Go on from a closed_loop.json."),
+    ] = None,
 ) -> int:
-    """Drive a scenario in closed loop (not in this version)."""
-    raise InvalidScenario("mpc: this version plans in open loop only; use plan")
+    """Drive a scenario in closed loop: plan, drive a step, plan again."""
+    from maneuver_automaton.cli import mpc_command, plan_command
+
+    _refuse_parts(with_file, case)
+    plan_command.Settings(time_limit=time_limit, alternatives=alternatives)  # checked alike
+    settings = mpc_command.Settings(
+        steps=steps,
+        seed=seed,
+        seeds=seeds,
+        jobs=jobs,
+        scheduler=dask,
+        resume=resume,
+        time_limit=time_limit,
+        plot=plot,
+        animate=animate,
+        quiet=quiet,
+    )
+    if file.is_dir():
+        return mpc_command.drive_folder(file, out, settings=settings)
+    return mpc_command.drive_file(file, out, settings=settings)
 
 
 @app.command()

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
-import sys
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +10,7 @@ from typing import TYPE_CHECKING
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
 from maneuver_automaton.cli.inputs import SCENARIO_ENDINGS, make_folder, not_written, scenario_of
+from maneuver_automaton.cli.progress import progress_bar
 from maneuver_automaton.errors import InvalidScenario
 
 if TYPE_CHECKING:
@@ -83,7 +81,7 @@ def plan_folder(folder: Path, out: Path, *, settings: Settings, jobs: int) -> in
         delayed(_row)(path, out / path.stem, settings) for path in paths
     )
     rows: list[Row] = []
-    with _progress(len(paths), quiet=settings.quiet) as advance:
+    with progress_bar("planning", len(paths), quiet=settings.quiet) as advance:
         for row in work:
             rows.append(row)
             advance()
@@ -169,20 +167,6 @@ def _check_stems(paths: list[Path]) -> None:
                 f"{path}: has the same name as {seen[path.stem].name}, need another one"
             )
         seen[path.stem] = path
-
-
-@contextlib.contextmanager
-def _progress(total: int, *, quiet: bool) -> Iterator[Callable[[], None]]:
-    """A bar on a terminal, nothing elsewhere; yields what to call after each file."""
-    if quiet or not sys.stderr.isatty():
-        yield lambda: None
-        return
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("planning", total=total)
-        yield lambda: bar.advance(task)
 
 
 def _print_rows(rows: list[Row]) -> None:

@@ -99,9 +99,25 @@ def read_plan_document(path: Path | str) -> dict[str, Any]:
     InvalidScenario
         If the file cannot be read, or is no plan.json.
     """
+    needed = ("schema", "status", "primitives", "trajectory")
+    document = read_json(path, needed=needed, kind="plan")
+    if document["schema"] != SCHEMA:
+        raise InvalidScenario(f"{path}: schema: got {document['schema']!r}, need {SCHEMA}")
+    return document
+
+
+def read_json(path: Path | str, *, needed: Sequence[str], kind: str) -> dict[str, Any]:
+    """The object of a strict JSON file that has the keys `needed`.
+
+    Raises
+    ------
+    InvalidScenario
+        If the file cannot be read, or is no such object; `kind` is what it should be.
+    """
     path = Path(path)
+    name = f"{kind.replace(' ', '_')}.json"
     if path.is_dir():
-        raise InvalidScenario(f"{path}: is a folder, need a plan.json")
+        raise InvalidScenario(f"{path}: is a folder, need a {name}")
     try:
         document = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
     except FileNotFoundError as error:
@@ -112,11 +128,8 @@ def read_plan_document(path: Path | str) -> dict[str, Any]:
         raise InvalidScenario(f"{path}:{error.lineno}: not valid JSON: {error.msg}") from error
     except (ValueError, RecursionError) as error:
         raise InvalidScenario(f"{path}: not valid JSON: {error}") from error
-    needed = ("schema", "status", "primitives", "trajectory")
     if not isinstance(document, dict) or any(key not in document for key in needed):
-        raise InvalidScenario(f"{path}: is no plan.json, need an object with {', '.join(needed)}")
-    if document["schema"] != SCHEMA:
-        raise InvalidScenario(f"{path}: schema: got {document['schema']!r}, need {SCHEMA}")
+        raise InvalidScenario(f"{path}: is no {name}, need an object with {', '.join(needed)}")
     return document
 
 

@@ -5,16 +5,45 @@ from maneuver_automaton.plotting.animation import save_plan_animation as save_pl
 from maneuver_automaton.plotting.automata import draw_automaton as draw_automaton
 from maneuver_automaton.plotting.automata import draw_motions as draw_motions
 from maneuver_automaton.plotting.automata import save_automaton_figure as save_automaton_figure
+from maneuver_automaton.plotting.closed_loop import (
+    save_closed_loop_figure as save_closed_loop_figure,
+)
+from maneuver_automaton.plotting.closed_loop_animation import (
+    save_closed_loop_animation as save_closed_loop_animation,
+)
+from maneuver_automaton.plotting.closed_loop_plane import draw_closed_loop as draw_closed_loop
+from maneuver_automaton.plotting.closed_loop_time import draw_solve_times as draw_solve_times
+from maneuver_automaton.plotting.closed_loop_time import draw_value as draw_value
 from maneuver_automaton.plotting.colors import trim_colors as trim_colors
 from maneuver_automaton.plotting.controls import draw_altitude as draw_altitude
 from maneuver_automaton.plotting.controls import draw_controls as draw_controls
+from maneuver_automaton.plotting.effort import draw_efforts as draw_efforts
+from maneuver_automaton.plotting.effort import draw_node_efforts as draw_node_efforts
+from maneuver_automaton.plotting.effort import save_retiming_figure as save_retiming_figure
+from maneuver_automaton.plotting.effort import (
+    save_uniform_effort_figure as save_uniform_effort_figure,
+)
+from maneuver_automaton.plotting.feasible import draw_feasible_slice as draw_feasible_slice
+from maneuver_automaton.plotting.feasible import save_feasible_figure as save_feasible_figure
 from maneuver_automaton.plotting.footprint import footprint_polygons as footprint_polygons
 from maneuver_automaton.plotting.labels import control_labels as control_labels
 from maneuver_automaton.plotting.lessons import figure_shift as figure_shift
 from maneuver_automaton.plotting.lessons import figure_symmetry as figure_symmetry
+from maneuver_automaton.plotting.library_size import LibrarySizes as LibrarySizes
+from maneuver_automaton.plotting.library_size import draw_library_sizes as draw_library_sizes
+from maneuver_automaton.plotting.library_size import (
+    save_library_size_figure as save_library_size_figure,
+)
 from maneuver_automaton.plotting.paths import draw_plan as draw_plan
 from maneuver_automaton.plotting.plan_figures import (
     save_alternatives_figure as save_alternatives_figure,
 )
 from maneuver_automaton.plotting.plan_figures import save_plan_figure as save_plan_figure
 from maneuver_automaton.plotting.plan_figures import save_plan_file_figure as save_plan_file_figure
+from maneuver_automaton.plotting.stability import CertificateCurve as CertificateCurve
+from maneuver_automaton.plotting.stability import DrivenLoop as DrivenLoop
+from maneuver_automaton.plotting.stability import draw_distances as draw_distances
+from maneuver_automaton.plotting.stability import draw_growth as draw_growth
+from maneuver_automaton.plotting.stability import draw_indices as draw_indices
+from maneuver_automaton.plotting.stability import draw_loops as draw_loops
+from maneuver_automaton.plotting.stability import save_stability_figure as save_stability_figure

@@ -2,28 +2,20 @@
 
 from __future__ import annotations
 
-import io
-import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
-from PIL import Image
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton._files import write_bytes_atomically
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.plotting.colors import INK, trim_colors
+from maneuver_automaton.plotting.film import Film, picture_times, write_film
 from maneuver_automaton.plotting.footprint import footprint_polygons, placed
 from maneuver_automaton.plotting.pages import axes_at, new_figure
 from maneuver_automaton.plotting.paths import draw_plan
 
-FRAMES_PER_SECOND = 15
-MOST_FRAMES = 150  # longer plans are shown faster
-PAUSE_S = 1.0  # on the last frame
-PALETTE, MOST_SAMPLES = 128, 16  # colours, and pictures that they are taken from
 WIDTH, HEIGHT = 6.4, 4.8  # [in]
 
 
@@ -49,10 +41,8 @@ def save_plan_animation(plan: Plan, path: str | Path, *, footprint: Any = None) 
     target = Path(path)
     if target.suffix.lower() != ".gif":
         raise ValueError(f"animation: got the file name {target.name}, need one ending in .gif")
-    frames = max(1, min(MOST_FRAMES, math.ceil(plan.duration * FRAMES_PER_SECOND) + 1))
-    times = plan.start_time + np.linspace(0.0, plan.duration, frames)
+    times = picture_times(plan.start_time, plan.start_time + plan.duration)
     figure = new_figure(WIDTH, HEIGHT)
-    canvas: Any = FigureCanvasAgg(figure)  # Matplotlib leaves its drawing calls without types
     ax = axes_at(figure, left=0.75, bottom=0.55, width=WIDTH - 0.95, height=HEIGHT - 0.95)
     draw_plan(ax, plan, footprint=footprint)
     size = 0.05 * float(np.ptp([ax.get_xlim(), ax.get_ylim()], axis=1).max())
@@ -61,32 +51,18 @@ def save_plan_animation(plan: Plan, path: str | Path, *, footprint: Any = None) 
     body = PolyCollection([], closed=True, edgecolor=INK, linewidth=1.2, zorder=10)
     ax.add_collection(body, autolim=False)
     clock = figure.text(0.75 / WIDTH, 1.0 - 0.25 / HEIGHT, "", fontsize=10, color=INK)
-    canvas.draw()
-    still = canvas.copy_from_bbox(figure.bbox)  # what does not move is drawn once
 
-    def picture(time: float) -> Array:
-        canvas.restore_region(still)
+    def show(time: float) -> None:
         body.set_verts(placed(outlines, plan.pose_at(time)[None]))
         body.set_facecolor((*_color_at(plan, time, colors), 0.55))
         clock.set_text(f"{time:.2f} s")
-        ax.draw_artist(body)
-        figure.draw_artist(clock)
-        return np.array(canvas.buffer_rgba())[..., :3]
 
-    # one palette for all, from one picture of each trim: its colour is in none of the others
+    # one picture of each trim: its colour is in none of the others
     first = {trim.name: time for trim, time in zip(plan.trims, plan.switching_times, strict=False)}
-    samples = [picture(time) for time in list(first.values())[:MOST_SAMPLES] or [times[0]]]
-    palette = Image.fromarray(np.concatenate(samples)).quantize(colors=PALETTE)
-    images = [
-        Image.fromarray(picture(time)).quantize(palette=palette, dither=Image.Dither.NONE)
-        for time in times
-    ]
-    stream = io.BytesIO()
-    lasts = [round(1000.0 / FRAMES_PER_SECOND)] * (frames - 1) + [round(1000.0 * PAUSE_S)]
-    images[0].save(
-        stream, format="GIF", save_all=True, append_images=images[1:], duration=lasts, loop=0
+    samples = list(first.values()) or [float(times[0])]
+    write_film(
+        Film(figure=figure, moving=[body, clock], show=show, times=times, samples=samples), target
     )
-    write_bytes_atomically(target, stream.getvalue())
 
 
 def _color_at(plan: Plan, time: float, colors: Any) -> tuple[float, float, float]:

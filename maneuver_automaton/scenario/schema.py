@@ -358,11 +358,31 @@ class SearchPart(Part):
     ) = Field(None, description="lattice: weight of the cost to go")
 
 
-class Disturbance(Part):
-    """Random shifts of the measured pose, one per step."""
+class PushPart(Part):
+    """A displacement in the vehicle's own frame, as by a hand."""
 
-    position_m: NotNegative = Field(0.0, description="standard deviation")
-    heading_rad: NotNegative = Field(0.0, description="standard deviation")
+    after_step: Annotated[int, Strict(), Ge(0), Need("a whole number of at least 0")] = Field(
+        description="number of the step, the first is 0"
+    )
+    by: Pose = Field(description="[x, y, heading] seen from the vehicle")
+
+
+class Disturbance(Part):
+    """What the vehicle does beside its plan; random numbers come from the seed."""
+
+    position_m: NotNegative = Field(0.0, description="standard deviation per axis and step")
+    heading_rad: NotNegative = Field(0.0, description="standard deviation per step")
+    measured_position_m: NotNegative = Field(0.0, description="standard deviation, seen alone")
+    measured_heading_rad: NotNegative = Field(0.0, description="standard deviation, seen alone")
+    twist_scale: Pose | None = Field(
+        None, description="true over nominal body velocity, per component"
+    )
+    pushes: Annotated[tuple[PushPart, ...], Several("a list of pushes", at_least=0)] = Field(
+        (), description="a list of {after_step, by}"
+    )
+    delay_steps: Annotated[Literal[0, 1], Need("0 or 1")] = Field(
+        0, description="how late the controller sees the pose"
+    )
     seed: Annotated[int, Strict(), Ge(0), Need("a whole number of at least 0")] = Field(
         0, description="seed of the random numbers"
     )
@@ -372,8 +392,15 @@ class RecedingHorizonPart(Part):
     """Closed loop, for mpc."""
 
     step_s: Positive = Field(description="time between two plans")
-    steps: Count | None = Field(None, description="largest number of steps")
-    disturbance: Disturbance | None = Field(None, description="{position_m, heading_rad, seed}")
+    steps: Count | None = Field(None, description="largest number of steps; left out: 100")
+    margin: NotNegative = Field(
+        0.0, description="a new word must be cheaper by more than this; 0: the optimum"
+    )
+    retimed: bool = Field(False, description="drive plans at the pace of uniform effort")
+    stay: bool = Field(False, description="go on within the goal's tolerance for all steps")
+    disturbance: Disturbance | None = Field(
+        None, description="{position_m, heading_rad, seed, ...}"
+    )
 
 
 class ScenarioFile(Part):

@@ -1,0 +1,205 @@
+"""`mpc`: a scenario in closed loop, once or with many seeds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from maneuver_automaton.cli.compiling import announced
+from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
+from maneuver_automaton.cli.inputs import SCENARIO_ENDINGS, make_folder, not_written, scenario_of
+from maneuver_automaton.cli.progress import progress_bar
+from maneuver_automaton.errors import InvalidScenario
+
+if TYPE_CHECKING:
+    from maneuver_automaton.receding_horizon import ClosedLoop, Disturbance, Statistics
+    from maneuver_automaton.scenario import Scenario
+
+STEPS = 100  # at most, where neither file nor option says
+PICTURES = ("closed_loop.png", "closed_loop.gif")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """Options of `mpc`."""
+
+    steps: int | None = None  # None: those of the scenario
+    seed: int | None = None
+    seeds: int | None = None  # how many seeds in a row, for statistics
+    jobs: int = 1
+    scheduler: str | None = None
+    resume: Path | None = None
+    time_limit: float | None = None  # [s] per step
+    plot: bool = True
+    animate: bool = False
+    quiet: bool = False
+
+
+def drive_file(path: Path, out: Path, *, settings: Settings) -> int:
+    """Close the loop of one scenario into the folder `out`, print it, return the exit code."""
+    scenario = scenario_of(path)
+    if scenario.receding_horizon is None:
+        raise InvalidScenario(
+            f"{path}: receding_horizon: missing, need {{step_s: ...}}, the time between two plans"
+        )
+    make_folder(out)
+    if settings.seeds is not None:
+        return _statistics(path, scenario, out, settings)
+    loop = _loop(path, scenario, settings)
+    try:
+        _write(scenario, loop, out, settings)
+    except OSError as error:
+        raise not_written(Path(error.filename or out), error) from error
+    if not settings.quiet:
+        from maneuver_automaton.cli.loop_tables import print_loop
+
+        print_loop(scenario.name, loop, folder=str(out))
+    for number, violation in loop.violations:
+        complain(f"{path}: step {number} broke a guarantee: {violation}")
+    if not loop.reached:
+        complain(f"{path}: {loop.status}: {loop.reason}")
+    return FOUND if loop.reached else NO_PLAN
+
+
+def drive_folder(folder: Path, out: Path, *, settings: Settings) -> int:
+    """Close the loop of every scenario of a folder that has one, each into `out`/STEM."""
+    from maneuver_automaton.cli.guard import BAD_INPUT, explained
+
+    paths = sorted(path for path in folder.iterdir() if path.suffix in SCENARIO_ENDINGS)
+    if not paths:
+        raise InvalidScenario(f"{folder}: holds no scenario, need a file ending in .yaml or .yml")
+    codes = []
+    for path in paths:
+        try:
+            codes.append(drive_file(path, out / path.stem, settings=settings))
+        except Exception as error:  # noqa: BLE001, one bad file must not stop the others
+            complain(explained(error))
+            codes.append(BAD_INPUT)
+    return max(codes)
+
+
+def _loop(path: Path, scenario: Scenario, settings: Settings) -> ClosedLoop:
+    from maneuver_automaton.receding_horizon import simulate
+
+    part, problem, last = scenario.receding_horizon, scenario.problem, None
+    assert part is not None
+    steps = settings.steps or part.steps or STEPS
+    if settings.resume is not None:
+        from maneuver_automaton.formats.closed_loop_json import load_steps
+
+        done, poses = load_steps(settings.resume, problem.automaton)
+        if done:
+            last, problem = done[-1], replace(problem, start=poses[-1])
+    with (
+        announced(quiet=settings.quiet),
+        progress_bar("steps", steps, quiet=settings.quiet) as advance,
+    ):
+        try:
+            return simulate(
+                problem,
+                step=part.step_s,
+                steps=steps,
+                disturbance=_disturbance(part.disturbance, settings.seed),
+                margin=part.margin,
+                time_limit=settings.time_limit or scenario.time_limit_s,
+                last=last,
+                stay=part.stay,
+                retimed=part.retimed,
+                progress=lambda _: advance(),
+            )
+        except ValueError as error:
+            raise _in_file(path, error) from error
+
+
+def _statistics(path: Path, scenario: Scenario, out: Path, settings: Settings) -> int:
+    """The same loop with seed after seed: a table, and statistics.json."""
+    from maneuver_automaton.formats.statistics_json import save_statistics
+    from maneuver_automaton.receding_horizon import simulate_many
+
+    part = scenario.receding_horizon
+    assert part is not None
+    assert settings.seeds is not None
+    first = settings.seed or 0
+    with (
+        announced(quiet=settings.quiet),
+        progress_bar("loops", settings.seeds, quiet=settings.quiet) as advance,
+    ):
+        done = 0
+
+        def count(n: int, _total: int) -> None:
+            nonlocal done
+            advance(n - done)
+            done = n
+
+        try:
+            statistics = simulate_many(
+                scenario.problem,
+                seeds=range(first, first + settings.seeds),
+                step=part.step_s,
+                steps=settings.steps or part.steps or STEPS,
+                disturbance=_disturbance(part.disturbance, None),
+                margin=part.margin,
+                time_limit=settings.time_limit or scenario.time_limit_s,
+                stay=part.stay,
+                jobs=settings.jobs,
+                scheduler=settings.scheduler,
+                progress=count,
+            )
+        except ValueError as error:
+            raise _in_file(path, error) from error
+    try:
+        save_statistics(statistics, out / "statistics.json")
+    except OSError as error:
+        raise not_written(Path(error.filename or out), error) from error
+    if not settings.quiet:
+        from maneuver_automaton.cli.loop_tables import print_statistics
+
+        print_statistics(scenario.name, statistics, folder=str(out))
+    return FOUND if _all_reached(statistics) else NO_PLAN
+
+
+def _all_reached(statistics: Statistics) -> bool:
+    return all(one.reached for one in statistics.outcomes)
+
+
+def _in_file(path: Path, error: ValueError) -> InvalidScenario:
+    if isinstance(error, InvalidScenario):
+        return error
+    said = str(error).removeprefix("receding horizon: ")
+    return InvalidScenario(f"{path}: receding_horizon: {said}")
+
+
+def _disturbance(part: Any, seed: int | None) -> Disturbance | None:
+    """What a file says of disturbances, with another seed if one is given."""
+    from maneuver_automaton.receding_horizon import Disturbance
+
+    if part is None:
+        return None
+    return Disturbance(
+        position_m=part.position_m,
+        heading_rad=part.heading_rad,
+        measured_position_m=part.measured_position_m,
+        measured_heading_rad=part.measured_heading_rad,
+        twist_scale=part.twist_scale,
+        pushes={push.after_step: push.by for push in part.pushes},
+        delay=part.delay_steps,
+        seed=part.seed if seed is None else seed,
+    )
+
+
+def _write(scenario: Scenario, loop: ClosedLoop, out: Path, settings: Settings) -> None:
+    from maneuver_automaton.formats.closed_loop_json import save_closed_loop
+
+    save_closed_loop(loop, out / "closed_loop.json")
+    for name in PICTURES:
+        (out / name).unlink(missing_ok=True)  # of an earlier loop
+    if not (settings.plot or settings.animate):
+        return
+    from maneuver_automaton import plotting
+
+    footprint = list(scenario.footprint) or None
+    if settings.plot:
+        plotting.save_closed_loop_figure(loop, out / "closed_loop.png", footprint=footprint)
+    if settings.animate:
+        plotting.save_closed_loop_animation(loop, out / "closed_loop.gif", footprint=footprint)

@@ -1,0 +1,38 @@
+"""A bar on a terminal, nothing elsewhere."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Iterator
+from typing import Protocol
+
+
+class Advance(Protocol):
+    """What to call after each piece of work, or after several."""
+
+    def __call__(self, n: int = 1) -> None:
+        """Move the bar on by `n` pieces."""
+        ...
+
+
+def _nothing(n: int = 1) -> None:
+    """Where there is no terminal."""
+
+
+@contextlib.contextmanager
+def progress_bar(what: str, total: int, *, quiet: bool) -> Iterator[Advance]:
+    """A bar for `total` pieces of work; yields what to call after each."""
+    if quiet or not sys.stderr.isatty():
+        yield _nothing
+        return
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(what, total=total)
+
+        def advance(n: int = 1) -> None:
+            bar.advance(task, n)
+
+        yield advance

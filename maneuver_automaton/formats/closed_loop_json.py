@@ -1,0 +1,224 @@
+"""closed_loop.json: what a closed loop did, and the loop taken up again from it.
+
+Strict JSON; numbers read back to the last bit, so a loop that was stopped goes on as if it had
+not been. One entry per step applied, and a last one where the vehicle ended.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._files import write_text_atomically
+from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.automaton.library import automaton_hash
+from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.plan_json import package_version, read_json
+from maneuver_automaton.primitives import Trim
+from maneuver_automaton.receding_horizon import ClosedLoop, Guarantee, Origin, Step, Violation
+
+SCHEMA = 1
+NOT_APPLIED = ("control", "word", "plan", "replanned", "solve_s")
+
+
+def closed_loop_to_dict(loop: ClosedLoop) -> dict[str, Any]:
+    """The content of closed_loop.json, as plain values.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Cost, Horizon, Problem, Unicycle
+    >>> from maneuver_automaton.receding_horizon import simulate
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0)})
+    >>> loop = simulate(Problem(robot, [-1, 0, 0], [0, 0, 0]), step=0.5)
+    >>> document = closed_loop_to_dict(loop)
+    >>> document["reached"], document["cost"], [step["value"] for step in document["steps"]]
+    (True, 1.0, [1.0, 0.5, 0.0])
+    """
+    return {
+        "schema": SCHEMA,
+        "version": package_version(),
+        "automaton_hash": automaton_hash(loop.problem.automaton),
+        "status": loop.status,
+        "reason": loop.reason,
+        "reached": loop.reached,
+        "cost": loop.cost,
+        "duration_s": float(loop.times[-1] - loop.times[0]),
+        "step_s": loop.step,
+        "steps_bound": loop.steps_bound,
+        "audit": {
+            "pieces": len(loop.audits),
+            "failed": sum(not audit.passed for audit in loop.audits),
+            "max_dynamics_defect": max(
+                (float(audit.max_dynamics_defect) for audit in loop.audits), default=None
+            ),
+        },
+        "broken_guarantees": [
+            {"step": number, "guarantee": one.guarantee.value, "reason": one.reason}
+            for number, one in loop.violations
+        ],
+        "steps": [
+            *(
+                _step(step, where.tolist())
+                for step, where in zip(loop.steps, loop.poses, strict=False)
+            ),
+            _last(loop),
+        ],
+    }
+
+
+def save_closed_loop(loop: ClosedLoop, path: Path | str) -> None:
+    """Write closed_loop.json in one step.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    document = closed_loop_to_dict(loop)
+    lines = [f"  {json.dumps(key)}: {_json(key, value)}" for key, value in document.items()]
+    write_text_atomically(Path(path), "{\n" + ",\n".join(lines) + "\n}\n")
+
+
+def load_steps(path: Path | str, automaton: Automaton) -> tuple[tuple[Step, ...], Array]:
+    """The steps of a closed_loop.json, and where the vehicle was before each and at the end.
+
+    Any of the steps is what a `RecedingHorizon` goes on from, with the pose after it.
+
+    Parameters
+    ----------
+    path : Path or str
+    automaton : Automaton
+        The library that the loop was planned with.
+
+    Returns
+    -------
+    steps : tuple of Step
+    poses : (n + 1, dof) array
+
+    Raises
+    ------
+    InvalidScenario
+        If the file cannot be read, is no closed_loop.json, or belongs to another library.
+    """
+    document = read_json(path, needed=("schema", "reached", "steps", "step_s"), kind="closed loop")
+    if document["schema"] != SCHEMA:
+        raise InvalidScenario(f"{path}: schema: got {document['schema']!r}, need {SCHEMA}")
+    if document["automaton_hash"] != automaton_hash(automaton):
+        raise InvalidScenario(f"{path}: automaton_hash: this loop was planned with another library")
+    try:
+        steps = tuple(
+            _step_of(number, entry, automaton)
+            for number, entry in enumerate(document["steps"][:-1])
+        )
+        poses = np.array([entry["vehicle_pose"] for entry in document["steps"]], dtype=np.float64)
+    except (ValueError, KeyError, TypeError, IndexError) as error:
+        said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
+        raise InvalidScenario(f"{path}: {said}") from error
+    return steps, poses
+
+
+def _step(step: Step, vehicle_pose: list[float]) -> dict[str, Any]:
+    return {
+        "time_s": step.time,
+        "pose": step.pose.tolist(),
+        "value": step.value,
+        "accumulated_cost": step.accumulated_cost,
+        "control": None if step.control is None else step.control.tolist(),
+        "word": list(step.plan.word),
+        "plan": [
+            {
+                "kind": "trim",
+                "name": trim.name,
+                "control": trim.control.tolist(),
+                "duration_s": float(duration),
+            }
+            for trim, duration in zip(step.plan.trims, step.plan.durations, strict=True)
+        ],
+        "replanned": step.replanned,
+        "solve_s": step.solve_s,
+        "number": step.number,
+        "vehicle_pose": vehicle_pose,
+        "goal": step.goal_index,
+        "applied_s": step.applied,
+        "applied_cost": step.applied_cost,
+        "origin": step.origin.value,
+        "value_of_the_rest": step.shifted_value,
+        "off_plan": step.off_plan,
+        "lower_bound": step.lower_bound,
+        "gap": step.gap,
+        "exhaustive": step.exhaustive,
+        "arrived": step.arrived,
+        "broken_guarantees": [
+            {"guarantee": one.guarantee.value, "reason": one.reason} for one in step.violations
+        ],
+    }
+
+
+def _last(loop: ClosedLoop) -> dict[str, Any]:
+    pose = loop.poses[-1].tolist()
+    return {
+        "time_s": float(loop.times[-1]),
+        "pose": pose,
+        "value": loop.value if math.isfinite(loop.value) else 0.0,
+        "accumulated_cost": loop.cost,
+        **dict.fromkeys(NOT_APPLIED),
+        "vehicle_pose": pose,
+    }
+
+
+def _step_of(number: int, entry: Mapping[str, Any], automaton: Automaton) -> Step:
+    where = f"steps[{number}]"
+    pose = as_array(f"{where}.pose", entry["pose"], last=automaton.model.group.dof)
+    plan = Plan(
+        pose,
+        tuple(_trim(one, automaton) for one in entry["plan"]),
+        durations=[one["duration_s"] for one in entry["plan"]],
+        start_time=float(entry["time_s"]),
+    )
+    return Step(
+        time=float(entry["time_s"]),
+        pose=pose,
+        plan=plan,
+        goal_index=int(entry["goal"]),
+        value=float(entry["value"]),
+        applied=float(entry["applied_s"]),
+        applied_cost=float(entry["applied_cost"]),
+        accumulated_cost=float(entry["accumulated_cost"]),
+        origin=Origin(entry["origin"]),
+        replanned=bool(entry["replanned"]),
+        shifted_value=entry["value_of_the_rest"],
+        off_plan=entry["off_plan"],
+        lower_bound=float(entry["lower_bound"]),
+        exhaustive=bool(entry["exhaustive"]),
+        solve_s=float(entry["solve_s"]),
+        number=int(entry["number"]),
+        arrived=bool(entry["arrived"]),
+        violations=tuple(
+            Violation(guarantee=Guarantee(one["guarantee"]), reason=one["reason"])
+            for one in entry["broken_guarantees"]
+        ),
+    )
+
+
+def _trim(entry: Mapping[str, Any], automaton: Automaton) -> Trim:
+    """The trim of the library; one at another pace is made from its control."""
+    name, control = entry["name"], entry["control"]
+    if name in automaton.trim_names:
+        trim = automaton.trims[automaton.index_of(name)]
+        if trim.control.tolist() == control:
+            return trim
+    return Automaton.of_controls(automaton.model, {name: control}).trims[0]
+
+
+def _json(key: str, value: Any) -> str:
+    """A value of the file in one line, but a list of objects one object a line."""
+    if key in ("steps", "broken_guarantees") and value:
+        rows = ",\n".join(f"    {_json('', row)}" for row in value)
+        return f"[\n{rows}\n  ]"
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)
