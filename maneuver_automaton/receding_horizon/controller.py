@@ -66,6 +66,8 @@ class RecedingHorizon:
         [s] per step for the search; what is best by then is applied.
     last : Step, optional
         To go on from: the last step of a log.
+    first : Plan, optional
+        What the first step applies, instead of searching: a plan from there to the goal.
     retimed : bool
         Drive every plan at the pace that makes its effort uniform: the controls are then
         continuous, multiples of those of the library. Needs a fixed horizon, a cost with effort,
@@ -107,6 +109,7 @@ class RecedingHorizon:
         margin: float = 0.0,
         time_limit: float = 5.0,
         last: Step | None = None,
+        first: Plan | None = None,
         hold: bool = False,
         retimed: bool = False,
     ) -> None:
@@ -138,6 +141,7 @@ class RecedingHorizon:
         self.hold = hold
         self.retimed = retimed
         self.last = last
+        self.first = first
         self.promises = promises(problem, step=step)
         self.most_steps: int | None = None
         if last is not None:  # the bound counts from the first step
@@ -305,12 +309,26 @@ class _Decision:
         inside = self._goal_within(self.here.start) if self.loop.hold else None
         if inside is not None:
             return self._holding(inside) or self._resting(inside)
+        if self.last is None and self.loop.first is not None:
+            return self._given(self.loop.first)
         kept = self._kept()
         searched = self._searched(None if kept is None else kept.plan)
         best = self._best(kept, searched) or self._late()
         if best is None:
             return self._helpless()
         return self._as_chosen(best, None if kept is None else kept.cost)
+
+    def _given(self, first: Plan) -> _Chosen:
+        """The plan that the first step was told to apply."""
+        here = self.here
+        plan = replace(first, start=here.start, start_time=here.start_time)
+        for index, goal in enumerate(here.goals):
+            if missed(plan, goal) <= EXACT * (1.0 + float(np.abs(here.start).max())):
+                return self._as_chosen(self._candidate(plan, index, Origin.FIRST), None)
+        raise ValueError(
+            f"receding horizon: first ends at {plan.end.round(9).tolist()}, need a plan that ends "
+            "at the goal"
+        )
 
     def _holding(self, index: int) -> _Chosen | None:
         """In a goal's set: a plan to its middle within a step or a few, so as to stay in it.

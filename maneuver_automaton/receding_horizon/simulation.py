@@ -59,6 +59,7 @@ def simulate(
     margin: float = 0.0,
     time_limit: float = 5.0,
     last: Step | None = None,
+    first: Plan | None = None,
     stay: bool = False,
     retimed: bool = False,
     audit: bool = True,
@@ -76,7 +77,7 @@ def simulate(
         At most so many.
     disturbance : Disturbance, optional
         None: the vehicle does what its model says.
-    margin, time_limit, retimed
+    margin, time_limit, first, retimed
         As in `RecedingHorizon`.
     last : Step, optional
         To go on from the last step of another loop; the problem's start is where that led.
@@ -118,18 +119,19 @@ def simulate(
         margin=margin,
         time_limit=time_limit,
         last=last,
+        first=first,
         hold=stay,
         retimed=retimed,
     )
-    first = 0 if last is None else last.number + 1
-    for _ in range(first):  # the numbers that the steps before have used
+    begin = 0 if last is None else last.number + 1
+    for _ in range(begin):  # the numbers that the steps before have used
         next(random)
     where = np.array(problem.start)
     measured_late = where
     log: list[Step] = []
     poses, times, driven, audits = [where], [_begin(problem, last)], [], []
     inside: list[bool] = [_inside(problem, where)]
-    for number in range(first, first + steps):
+    for number in range(begin, begin + steps):
         if inside[-1] and not stay:
             break
         draw = next(random)
