@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -15,6 +16,7 @@ from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.errors import InvalidAutomaton
 from maneuver_automaton.groups import SE2, LieGroup, SE2xR
+from maneuver_automaton.primitives import Trim
 
 SEARCH_METHODS = ("auto", "words", "insertion")
 
@@ -43,6 +45,8 @@ class Goal:
 
     def __post_init__(self) -> None:
         freeze(self, "pose", last=(3, 4))
+        if self.pose.ndim != 1:
+            raise ValueError(f"goal: pose has shape {self.pose.shape}, need one pose")
         for name in ("tolerance_m", "tolerance_rad"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
@@ -150,6 +154,8 @@ class Problem:
         if isinstance(self.start, SE2 | SE2xR):
             object.__setattr__(self, "start", self.start.pose)
         freeze(self, "start", last=dof)
+        if self.start.ndim != 1:
+            raise ValueError(f"start: pose has shape {self.start.shape}, need one pose")
         object.__setattr__(self, "goals", _as_goals(self.goals))
         for goal in self.goals:
             if goal.pose.size != dof:
@@ -171,14 +177,23 @@ class Problem:
         """Cost per second of every trim (m,)."""
         return self.cost.rates(self.automaton.controls, self.automaton.body_velocities)
 
+    def rates_of(self, plan: Plan) -> Array:
+        """Cost per second (n,) of the trims of a plan, which may be others than the library's."""
+        if not plan.trims:
+            return np.zeros(0)
+        known = _known_rates(self.automaton, self.cost)
+        rates = [known[trim.name][1] for trim in plan.trims if _is_known(trim, known)]
+        if len(rates) == len(plan.trims):
+            return np.array(rates)
+        controls = np.array([trim.control for trim in plan.trims])
+        return self.cost.rates(controls, np.array([trim.body_velocity for trim in plan.trims]))
+
     def cost_of(self, plan: Plan) -> float:
         """Cost of a plan, whatever trims it uses: their rates, and the prices of its switches."""
         if not plan.trims:
             return 0.0
-        controls = np.array([trim.control for trim in plan.trims])
-        body_velocities = np.array([trim.body_velocity for trim in plan.trims])
-        rates = self.cost.rates(controls, body_velocities)
-        return float(rates @ plan.durations) + self.cost.switching(body_velocities)
+        velocities = np.array([trim.body_velocity for trim in plan.trims])
+        return float(self.rates_of(plan) @ plan.durations) + self.cost.switching(velocities)
 
     def moved(self, by: LieGroup) -> Problem:
         """The problem with start and goals moved by the group element `by`; bounds must be open."""
@@ -192,6 +207,21 @@ class Problem:
         )
 
 
+@functools.lru_cache(maxsize=8)
+def _known_rates(automaton: Automaton, cost: StageCost) -> dict[str, tuple[Trim, float]]:
+    """Every trim of a library with its cost per second, by name."""
+    rates = cost.rates(automaton.controls, automaton.body_velocities)
+    return {
+        trim.name: (trim, rate) for trim, rate in zip(automaton.trims, rates.tolist(), strict=True)
+    }
+
+
+def _is_known(trim: Trim, known: dict[str, tuple[Trim, float]]) -> bool:
+    entry = known.get(trim.name)
+    return entry is not None and entry[0] is trim
+
+
+@functools.lru_cache(maxsize=8)
 def _check_automaton(automaton: Automaton) -> None:
     """Trims that cannot be combined at will are refused, not taken for others."""
     what = "this version plans for kinematic vehicles only"

@@ -38,7 +38,9 @@ Alternatives = Annotated[
     int, typer.Option("--alternatives", min=0, metavar="K", help="Dearer plans to list as well.")
 ]
 Plot = Annotated[bool, typer.Option("--plot/--no-plot", help="Draw the plan.")]
-Animate = Annotated[bool, typer.Option("--animate", help="Animate the plan as well, as a GIF.")]
+Animate = Annotated[
+    bool, typer.Option("--animate", help="Animate it as well (plan: GIF; mpc: GIF and HTML).")
+]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")]
 Jobs = Annotated[int, typer.Option("--jobs", min=1, metavar="N", help="Files planned at a time.")]
 With = Annotated[

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from maneuver_automaton.scenario import Scenario
 
 STEPS = 100  # at most, where neither file nor option says
-PICTURES = ("closed_loop.png", "closed_loop.gif")
+FILMS = ("closed_loop.gif", "closed_loop.html")
+PICTURES = ("closed_loop.png", *FILMS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -202,4 +203,5 @@ def _write(scenario: Scenario, loop: ClosedLoop, out: Path, settings: Settings) 
     if settings.plot:
         plotting.save_closed_loop_figure(loop, out / "closed_loop.png", footprint=footprint)
     if settings.animate:
-        plotting.save_closed_loop_animation(loop, out / "closed_loop.gif", footprint=footprint)
+        for name in FILMS:
+            plotting.save_closed_loop_animation(loop, out / name, footprint=footprint)

@@ -24,6 +24,7 @@ from maneuver_automaton.primitives import Trim
 from maneuver_automaton.receding_horizon import ClosedLoop, Guarantee, Origin, Step, Violation
 
 SCHEMA = 1
+NEEDED = ("schema", "automaton_hash", "reached", "steps", "step_s")
 NOT_APPLIED = ("control", "word", "plan", "replanned", "solve_s")
 
 
@@ -106,7 +107,7 @@ def load_steps(path: Path | str, automaton: Automaton) -> tuple[tuple[Step, ...]
     InvalidScenario
         If the file cannot be read, is no closed_loop.json, or belongs to another library.
     """
-    document = read_json(path, needed=("schema", "reached", "steps", "step_s"), kind="closed loop")
+    document = read_json(path, needed=NEEDED, kind="closed loop")
     if document["schema"] != SCHEMA:
         raise InvalidScenario(f"{path}: schema: got {document['schema']!r}, need {SCHEMA}")
     if document["automaton_hash"] != automaton_hash(automaton):
@@ -117,7 +118,8 @@ def load_steps(path: Path | str, automaton: Automaton) -> tuple[tuple[Step, ...]
             for number, entry in enumerate(document["steps"][:-1])
         )
         poses = np.array([entry["vehicle_pose"] for entry in document["steps"]], dtype=np.float64)
-    except (ValueError, KeyError, TypeError, IndexError) as error:
+        as_array("vehicle_pose", poses, last=automaton.model.group.dof)
+    except (ValueError, KeyError, TypeError, IndexError, OverflowError) as error:
         said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
         raise InvalidScenario(f"{path}: {said}") from error
     return steps, poses

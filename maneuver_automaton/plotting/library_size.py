@@ -12,7 +12,6 @@ from matplotlib.ticker import (
     FixedLocator,
     FuncFormatter,
     LogLocator,
-    MaxNLocator,
     NullFormatter,
     NullLocator,
 )
@@ -26,6 +25,10 @@ WIDTH, LEFT, RIGHT, HEIGHT, BETWEEN = 9.6, 0.8, 0.2, 2.9, 0.95  # [in]
 COST, MEDIAN, SLOWEST = SEQUENCE[0], SEQUENCE[2], SEQUENCE[1]
 LEAST_GAP = 0.09  # between numbers of trims, of the axis
 NARROW = 10.0  # costs within this factor are numbered by round numbers, not by decades
+
+
+ROUND = (1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)  # costs numbered in every decade
+FINE = tuple(k / 20.0 for k in range(20, 200))  # where the costs are very near each other
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -154,7 +157,9 @@ def _number_costs(ax: Axes, costs: Array) -> None:
     room = (high / low) ** 0.1 if high > low else 1.5
     ax.set_ylim(low / room, high * room)
     if high / low < NARROW:
-        ticks = np.asarray(MaxNLocator(6).tick_values(low / room, high * room))
+        steps = ROUND if high / low > 1.6 else FINE
+        decades = 10.0 ** np.arange(np.floor(np.log10(low)) - 1, np.ceil(np.log10(high)) + 1)
+        ticks = np.multiply.outer(decades, steps).ravel()
         inside = ticks[(ticks >= low / room) & (ticks <= high * room)]
         ax.yaxis.set_major_locator(FixedLocator(inside.tolist()))
         ax.yaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))

@@ -9,8 +9,22 @@ from maneuver_automaton.receding_horizon.log import Guarantee as Guarantee
 from maneuver_automaton.receding_horizon.log import Origin as Origin
 from maneuver_automaton.receding_horizon.log import Step as Step
 from maneuver_automaton.receding_horizon.log import Violation as Violation
+from maneuver_automaton.receding_horizon.mixed_order_cost import MixedOrderCost as MixedOrderCost
 from maneuver_automaton.receding_horizon.simulation import Disturbance as Disturbance
 from maneuver_automaton.receding_horizon.simulation import simulate as simulate
 from maneuver_automaton.receding_horizon.statistics import Outcome as Outcome
 from maneuver_automaton.receding_horizon.statistics import Statistics as Statistics
 from maneuver_automaton.receding_horizon.statistics import simulate_many as simulate_many
+from maneuver_automaton.receding_horizon.unconstrained import FixedHorizon as FixedHorizon
+from maneuver_automaton.receding_horizon.unconstrained import HorizonPlan as HorizonPlan
+from maneuver_automaton.receding_horizon.unconstrained import HorizonSearch as HorizonSearch
+from maneuver_automaton.receding_horizon.unconstrained import (
+    UnconstrainedProblem as UnconstrainedProblem,
+)
+from maneuver_automaton.receding_horizon.unconstrained import search_horizon as search_horizon
+from maneuver_automaton.receding_horizon.unconstrained_loop import (
+    UnconstrainedLoop as UnconstrainedLoop,
+)
+from maneuver_automaton.receding_horizon.unconstrained_loop import (
+    simulate_unconstrained as simulate_unconstrained,
+)

@@ -31,7 +31,7 @@ from maneuver_automaton.receding_horizon.reanchoring import (
     rejoining,
     same_word,
 )
-from maneuver_automaton.receding_horizon.shifting import costliest_first, rest_of
+from maneuver_automaton.receding_horizon.shifting import costliest_first, merged, rest_of
 from maneuver_automaton.search.choose import load_search, search_goal
 from maneuver_automaton.search.inside import outside, stays_inside
 from maneuver_automaton.search.limits import closed_bound
@@ -39,8 +39,10 @@ from maneuver_automaton.search.ready import load_times_kernels
 from maneuver_automaton.search.result import SearchStatus, Solution
 from maneuver_automaton.search.words import TIE
 
+SECOND_OPINION = 0.02  # [s] for short words beside insertion
 MOST_HOLDING = 4  # steps that a plan within the goal's set may take
-HOLDING = 5  # dearer plans among which one may stay in the set, or be cheaper at another pace
+HOLDING = 1  # dearer plans, of which one may stay in the set
+PACES = 5  # dearer plans, which may be cheaper at another pace
 EXACT = 1e-9  # [m, rad] a pose this close to a goal is the goal; to a plan, on it
 
 
@@ -144,7 +146,7 @@ class RecedingHorizon:
         self.first = first
         self.promises = promises(problem, step=step)
         self.most_steps: int | None = None
-        if last is not None:  # the bound counts from the first step
+        if last is not None and not retimed:  # the bound counts from the first step
             bound = self.promises.most_steps(last.value)
             self.most_steps = None if bound is None else bound + last.number
         load_search(problem)
@@ -186,8 +188,10 @@ class RecedingHorizon:
         began = time.monotonic()
         last = self.last
         passed = 0.0 if last is None else (last.applied if elapsed is None else elapsed)
-        if passed < 0.0:
+        if not 0.0 <= passed < math.inf:
             raise ValueError(f"elapsed must be at least 0, got {passed} s")
+        if last is not None and passed != last.applied:
+            last = self._cut(last, passed)
         at = self.problem.start_time if last is None else last.time + passed
         here = replace(self.problem, start=pose, start_time=at)
         chosen = _Decision(self, here, last, passed, began).chosen()
@@ -203,13 +207,17 @@ class RecedingHorizon:
         """The cheapest rest of the library."""
         return self._pad
 
+    def _cut(self, last: Step, passed: float) -> Step:
+        """The last step as it was driven, for `passed` seconds; one cut short is not counted."""
+        if passed < last.applied and self.most_steps is not None:
+            self.most_steps += 1
+        return replace(
+            last, applied=passed, applied_cost=_cost_until(self.problem, last.plan, passed)
+        )
+
     def _logged(self, chosen: _Chosen, here: Problem, last: Step | None, began: float) -> Step:
         plan, goal = chosen.plan, here.goals[chosen.goal_index]
         applied = min(self.step_s, plan.duration) if plan.trims else self.step_s
-        piece = first_part(plan, applied)
-        left = rest_of(plan, applied, start=plan.start)
-        switches = here.cost.switching(_twists(plan)) - here.cost.switching(_twists(left))
-        rates = _rates(here, piece)
         now = Step(
             time=here.start_time,
             pose=here.start,
@@ -217,7 +225,7 @@ class RecedingHorizon:
             goal_index=chosen.goal_index,
             value=chosen.value,
             applied=applied,
-            applied_cost=float(rates @ piece.durations) + switches,
+            applied_cost=_cost_until(here, plan, applied),
             accumulated_cost=0.0 if last is None else last.accumulated_cost + last.applied_cost,
             origin=chosen.origin,
             replanned=last is not None and not _is_rest_of(plan, chosen.rest),
@@ -229,8 +237,9 @@ class RecedingHorizon:
             number=0 if last is None else last.number + 1,
             arrived=chosen.arrived,
         )
-        if last is None:
-            self.most_steps = None if self.retimed else self.promises.most_steps(now.value)
+        if (last is None or now.off_plan) and not self.retimed:  # from here on, undisturbed
+            bound = self.promises.most_steps(now.value)
+            self.most_steps = None if bound is None else bound + now.number
         found = list(chosen.violations)
         if last is not None and math.isfinite(now.value):
             found += broken(
@@ -294,12 +303,14 @@ class _Decision:
         self.bound = -math.inf
         self.off_plan: float | None = None
         self.rest: Plan | None = None
+        self.planned: Plan | None = None  # the same from where the last plan had said
         if last is not None:
             goal = Goal(pose=last.plan.pose_at(last.time + passed))
             off = distance(here.start, goal)
             self.off_plan = 0.0 if off <= EXACT * (1.0 + float(np.abs(here.start).max())) else off
             pad = None if here.horizon.time is None else loop.pad
             self.rest = rest_of(last.plan, passed, start=here.start, pad=pad)
+            self.planned = rest_of(last.plan, passed, pad=pad)
 
     def chosen(self) -> _Chosen:
         """The plan to apply."""
@@ -321,7 +332,7 @@ class _Decision:
     def _given(self, first: Plan) -> _Chosen:
         """The plan that the first step was told to apply."""
         here = self.here
-        plan = replace(first, start=here.start, start_time=here.start_time)
+        plan = self._filled(replace(first, start=here.start, start_time=here.start_time))
         for index, goal in enumerate(here.goals):
             if missed(plan, goal) <= EXACT * (1.0 + float(np.abs(here.start).max())):
                 return self._as_chosen(self._candidate(plan, index, Origin.FIRST), None)
@@ -329,6 +340,25 @@ class _Decision:
             f"receding horizon: first ends at {plan.end.round(9).tolist()}, need a plan that ends "
             "at the goal"
         )
+
+    def _filled(self, plan: Plan) -> Plan:
+        """A plan that takes no longer than it may, with rest for what is left of a fixed time."""
+        horizon = self.here.horizon
+        limit = horizon.time if horizon.time is not None else horizon.max_time
+        if limit is not None and plan.duration > limit * (1.0 + EXACT):
+            raise ValueError(
+                f"receding horizon: first takes {plan.duration:g} s, need at most {limit:g} s"
+            )
+        return self._padded(plan)
+
+    def _padded(self, plan: Plan) -> Plan:
+        """The plan, then rest for what is left of a fixed time."""
+        horizon, pad = self.here.horizon, self.loop.pad
+        if horizon.time is None or pad is None:
+            return plan
+        left = max(0.0, horizon.time - plan.duration)
+        word, times = merged((*plan.trims, pad), [*plan.durations.tolist(), left])
+        return replace(plan, trims=word, durations=np.array(times))
 
     def _holding(self, index: int) -> _Chosen | None:
         """In a goal's set: a plan to its middle within a step or a few, so as to stay in it.
@@ -347,7 +377,7 @@ class _Decision:
                 here,
                 goals=(middle,),
                 horizon=soon,
-                search=replace(here.search, method="auto"),
+                search=replace(here.search, method="insertion"),
             )
             found = [
                 self._candidate(_as_plan(near, solution), index, Origin.SEARCHED)
@@ -422,7 +452,7 @@ class _Decision:
 
     def _kept(self) -> _Candidate | None:
         """The rest of the last plan from here: as it is, or made to meet the goal again."""
-        if self.rest is None or self.last is None:
+        if self.rest is None or self.planned is None or self.last is None:
             return None
         here, index = self.here, self.last.goal_index
         goal = here.goals[index]
@@ -434,7 +464,7 @@ class _Decision:
             if solved is not None:
                 plans.append((solved, Origin.REANCHORED))
         else:
-            around = reanchored(here, self.rest, goal, pad=pad)
+            around = reanchored(here, self.planned, goal, pad=pad)
             first = next(around, None)
             if first is not None:
                 plans.append((first, Origin.REANCHORED))
@@ -451,6 +481,8 @@ class _Decision:
         here = self.here
         found: list[_Candidate] = []
         self.exhaustive = True
+        bounded = any(getattr(here.bounds, name) is not None for name in ("x", "y", "z"))
+        alternatives = None if bounded else PACES if self.loop.retimed else 0
         for index, goal in enumerate(here.goals):
             left = self.began + self.loop.time_limit - time.monotonic()
             to_known = known if self.last is None or index == self.last.goal_index else None
@@ -461,13 +493,14 @@ class _Decision:
             results = search_goal(
                 here,
                 goal,
-                alternatives=HOLDING if self.loop.retimed else 0,
+                alternatives=alternatives,
                 time_limit=max(left, 1e-6),
                 known=None if self.loop.retimed else to_known,
                 ties=True,
+                second_opinion=SECOND_OPINION,
             )
-            proven = any(one.exhaustive for one in results) and not self.loop.retimed
-            self.exhaustive = self.exhaustive and proven
+            proven = any(one.exhaustive for one in results)
+            self.exhaustive = self.exhaustive and proven and not (self.loop.retimed or bounded)
             if any(one.status is SearchStatus.OUT_OF_BUDGET for one in results):
                 self._over_budget()
             for result in results:
@@ -504,7 +537,7 @@ class _Decision:
         if self.loop.retimed:
             plan = at_best_pace(here, plan)
         cost = here.cost_of(plan)
-        ordered = costliest_first(plan, _rates(here, plan))
+        ordered = costliest_first(plan, here.rates_of(plan))
         if ordered is not plan:
             dearer = here.cost_of(ordered)
             if dearer <= cost + TIE * (1.0 + abs(cost)) and self._allowed(ordered):
@@ -515,7 +548,7 @@ class _Decision:
             cost=cost,
             goal_index=index,
             origin=origin,
-            at_first=float(_rates(here, piece) @ piece.durations),
+            at_first=float(here.rates_of(piece) @ piece.durations),
         )
 
     def _allowed(self, plan: Plan) -> bool:
@@ -546,11 +579,11 @@ class _Decision:
         found: list[_Candidate] = []
         for index, goal in enumerate(here.goals):
             nothing = Plan(here.start, (), durations=[], start_time=here.start_time)
-            plans = list(rejoining(hurry, self.rest or nothing, goal, pad=None))
+            plans = list(rejoining(hurry, self.planned or nothing, goal, pad=None))
             for result in search_goal(hurry, goal, alternatives=0, time_limit=self.loop.time_limit):
                 plans += [_as_plan(here, solution) for solution in result.solutions]
             found += [
-                self._candidate(plan, index, Origin.SEARCHED)
+                self._candidate(self._padded(plan), index, Origin.SEARCHED)
                 for plan in plans
                 if self._allowed(plan)
             ]
@@ -630,8 +663,9 @@ def _twists(plan: Plan) -> Array:
     return np.array([trim.body_velocity for trim in plan.trims]).reshape(-1, dof)
 
 
-def _rates(problem: Problem, plan: Plan) -> Array:
-    if not plan.trims:
-        return np.zeros(0)
-    controls = np.array([trim.control for trim in plan.trims])
-    return problem.cost.rates(controls, _twists(plan))
+def _cost_until(problem: Problem, plan: Plan, until: float) -> float:
+    """What the first `until` seconds of a plan cost, the switches in them included."""
+    piece = first_part(plan, until)
+    left = rest_of(plan, until, start=plan.start)
+    switches = problem.cost.switching(_twists(plan)) - problem.cost.switching(_twists(left))
+    return float(problem.rates_of(piece) @ piece.durations) + switches

@@ -39,7 +39,7 @@ class Promises:
         if self.horizon is not None:
             value -= self.rest_rate * self.horizon
         rate = max(self.least_rate, self.time_rate)
-        if not rate > 0.0:
+        if not (rate > 0.0 and math.isfinite(value)):
             return None
         return math.ceil(max(value, 0.0) / (self.step * rate) * (1.0 - ACCURACY))
 

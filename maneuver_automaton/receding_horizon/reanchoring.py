@@ -20,6 +20,7 @@ from maneuver_automaton.search.words import search_setup_words
 from maneuver_automaton.switching_times import TimesStatus, solve_switching_times
 
 LOOK_AHEAD = 3  # joints of a plan that steering tries to rejoin
+NEAR = 1e-9  # [m, rad] a plan that ends so close to the goal leads there
 FIRST = 1  # of the cheapest connections to each
 
 
@@ -81,19 +82,25 @@ def same_word(problem: Problem, plan: Plan, goal: Goal, *, pad: Trim | None) -> 
 def rejoining(problem: Problem, plan: Plan, goal: Goal, *, pad: Trim | None) -> Iterator[Plan]:
     """Three trims to a joint of `plan` or to its end, then what follows there, then rest."""
     moving = [k for k, trim in enumerate(plan.trims) if trim.body_velocity.any()]
-    joints = [k + 1 for k in moving[:LOOK_AHEAD]]
+    leads_there = missed(plan, goal) <= NEAR * (1.0 + float(np.abs(plan.start).max()))
+    joints = [k + 1 for k in moving[:LOOK_AHEAD]] if leads_there else []
     hurry = replace(problem, horizon=Horizon(), search=replace(problem.search, method="auto"))
     end = moving[-1] + 1 if moving else 0
     for joint in dict.fromkeys([*joints, end]):
         ahead = plan.switching_poses[joint]
         last = joint == end
         target = goal if last else Goal(pose=ahead)
-        for first in _connections(replace(hurry, goals=(target,)), target):
-            trims = (*first.trims, *(() if last else plan.trims[joint:end]))
-            times = [*first.durations.tolist(), *(() if last else plan.durations[joint:end])]
-            padded = _in_time(problem, trims, times, pad)
-            if padded is not None:
-                yield padded
+        for way in (hurry, quickest(hurry)):
+            found = False
+            for first in _connections(replace(way, goals=(target,)), target):
+                trims = (*first.trims, *(() if last else plan.trims[joint:end]))
+                times = [*first.durations.tolist(), *(() if last else plan.durations[joint:end])]
+                padded = _in_time(problem, trims, times, pad)
+                if padded is not None:
+                    found = True
+                    yield padded
+            if found:
+                break  # otherwise the quickest connection may be in time
 
 
 def _connections(problem: Problem, goal: Goal) -> Iterator[Plan]:

@@ -101,7 +101,7 @@ def costliest_first(plan: Plan, rates: Array) -> Plan:
     order: list[int] = []
     block: list[int] = []
     for k in moving:
-        if block and not commute(twists[block[-1]], twists[k]):
+        if not all(commute(twists[j], twists[k]) for j in block):  # a climb commutes with both
             order += sorted(block, key=lambda i: -rates[i])
             block = []
         block.append(k)
@@ -124,5 +124,5 @@ def commute(one: Array, other: Array) -> bool:
     False
     """
     bracket = one[2] * other[:2] - other[2] * one[:2]
-    scale = 1.0 + float(np.abs(one).max() * np.abs(other).max())
+    scale = float(np.abs(one).max() * np.abs(other).max())
     return bool(np.abs(bracket).max() <= 1e-12 * scale)

@@ -46,8 +46,10 @@ class Disturbance:
                 raise ValueError(f"disturbance: {name} must be at least 0, got {value}")
         if self.delay not in (0, 1):
             raise ValueError(f"disturbance: delay must be 0 or 1 steps, got {self.delay}")
-        if self.seed < 0:
-            raise ValueError(f"disturbance: seed must be at least 0, got {self.seed}")
+        if not (isinstance(self.seed, int | np.integer) and self.seed >= 0):
+            raise ValueError(
+                f"disturbance: seed must be a whole number of at least 0, got {self.seed}"
+            )
 
 
 def simulate(
@@ -112,6 +114,7 @@ def simulate(
     if steps < 1:
         raise ValueError(f"steps must be at least 1, got {steps}")
     upset = Disturbance() if disturbance is None else disturbance
+    upset = _checked(upset, problem.start.size)
     random = _draws(upset, problem.start.size)
     controller = RecedingHorizon(
         problem,
@@ -179,8 +182,8 @@ def _closed_loop(
     helpless = bool(log) and not math.isfinite(log[-1].value)
     applied = log[:-1] if helpless else log
     reached = any(inside) if stay else inside[-1]
-    cost = applied[-1].accumulated_cost + applied[-1].applied_cost if applied else 0.0
-    value, reason, status = 0.0, "", "reached"
+    cost = log[-1].accumulated_cost if helpless else _spent(controller.last)
+    value, reason, status, bound = 0.0, "", "reached", controller.most_steps
     if helpless:
         value, status = log[-1].lower_bound, "no_plan"
         reason = str(log[-1].violations[0])
@@ -206,8 +209,12 @@ def _closed_loop(
         driven=tuple(driven),
         audits=tuple(audits),
         inside=tuple(inside),
-        steps_bound=controller.most_steps,
+        steps_bound=bound,
     )
+
+
+def _spent(last: Step | None) -> float:
+    return 0.0 if last is None else last.accumulated_cost + last.applied_cost
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -216,6 +223,15 @@ class _Draw:
 
     noise: Array
     measurement: Array
+
+
+def _checked(upset: Disturbance, dof: int) -> Disturbance:
+    """The disturbance, if it has as many components as the pose."""
+    if upset.twist_scale is not None:
+        as_array("disturbance: twist_scale", upset.twist_scale, last=dof)
+    for after, push in upset.pushes.items():
+        as_array(f"disturbance: push after step {after}", push, last=dof)
+    return upset
 
 
 def _draws(upset: Disturbance, dof: int) -> Iterator[_Draw]:

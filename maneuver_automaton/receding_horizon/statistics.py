@@ -123,8 +123,12 @@ def simulate_many(
     1.0
     """
     dof = problem.start.size
-    poses = as_array("starts", problem.start if starts is None else starts, last=dof)
-    cases = [(pose, seed) for pose in np.atleast_2d(poses) for seed in seeds]
+    poses = np.atleast_2d(as_array("starts", problem.start if starts is None else starts, last=dof))
+    if poses.ndim != 2:
+        raise ValueError(f"starts: got shape {poses.shape}, need (n, {dof})")
+    cases = [(pose, seed) for pose in poses for seed in seeds]
+    if not cases:
+        raise ValueError(f"got {len(poses)} starts and {len(seeds)} seeds, need one of each")
     if jobs < 1:
         raise ValueError(f"jobs must be at least 1, got {jobs}")
     n_chunks = 1 if jobs == 1 and scheduler is None and progress is None else CHUNKS * max(jobs, 4)

@@ -42,6 +42,7 @@ def search_goal(
     time_limit: float,
     known: Plan | None = None,
     ties: bool = False,
+    second_opinion: float = AFFORDABLE,
 ) -> list[SearchResult]:
     """The method asked for; `auto`: exhaustive where affordable, otherwise insertion, or both.
 
@@ -59,6 +60,8 @@ def search_goal(
         least as cheap (it may find nothing); insertion improves it beside its own seeds.
     ties : bool
         Whether exhaustive search lists all that cost as much as the last solution asked for.
+    second_opinion : float
+        [s] that exhaustive search of short words may be expected to take beside insertion.
 
     Returns
     -------
@@ -93,7 +96,10 @@ def search_goal(
     ]
     if method == "auto":  # short words too, where they are few: alternatives, and a second opinion
         few = replace(problem, horizon=replace(problem.horizon, max_trims=4 - goal.free_heading))
-        if (problem.horizon.max_trims or math.inf) > 4 and _affordable(few, goal):
+        best = min((one.cost for one in results[0].solutions), default=math.inf)
+        if alternatives == 0:
+            ceiling = min(ceiling, best)
+        if (problem.horizon.max_trims or math.inf) > 4 and _affordable(few, goal, second_opinion):
             short = search_words(
                 few,
                 goal,
@@ -106,7 +112,7 @@ def search_goal(
     return results
 
 
-def _affordable(problem: Problem, goal: Goal) -> bool:
+def _affordable(problem: Problem, goal: Goal, most_seconds: float = AFFORDABLE) -> bool:
     """Whether every admitted word can be searched in a moment."""
     most = problem.horizon.max_trims
     if most is None or most > MOST_TRIMS - int(goal.free_heading):
@@ -114,4 +120,4 @@ def _affordable(problem: Problem, goal: Goal) -> bool:
     moving = int(problem.automaton.body_velocities.any(axis=1).sum())
     tail = int(goal.free_heading)
     seconds = sum(moving**n * SECONDS_PER_WORD[n + tail] for n in range(1, most + 1))
-    return bool(seconds <= AFFORDABLE)
+    return bool(seconds <= most_seconds)

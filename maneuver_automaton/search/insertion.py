@@ -7,6 +7,7 @@ the number of trims, not with its power.
 
 from __future__ import annotations
 
+import functools
 import math
 import time
 from collections.abc import Iterator
@@ -16,10 +17,12 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.library_arrays import LibraryArrays, library_arrays
 from maneuver_automaton.search.result import SearchResult, SearchStatus, Solution
-from maneuver_automaton.search.setup import SearchSetup, search_setup
+from maneuver_automaton.search.setup import MovingLibrary, SearchSetup, search_setup
+from maneuver_automaton.search.shortening import shortened
 from maneuver_automaton.search.words import in_order, resting, search_setup_words
 
 SEEDS = 10  # cheapest words that are improved, where the library is its own sub-library
@@ -32,6 +35,8 @@ FIRST_ROUNDS_OF_MANY = 2
 FULL = 2  # how many of the then cheapest words go on
 FULL_OF_MANY = 1
 ROUNDS = 60  # insertions into these
+GROWN = 2  # seeds that may grow beyond the limit before they are shortened
+SHORTENED = 3  # words that are tried with fewer trims where switches cost
 CHATTER = 5  # trims of a word in which two may chatter
 
 
@@ -89,7 +94,7 @@ def search_insertion(
         seeds = max(SEEDS_OF_MANY if many else SEEDS, alternatives + 1)
     begun = list(_seeds(problem, setup, library, seeds, deadline))
     if known is not None:
-        begun.insert(0, _as_seed(problem, library, known))
+        begun = [*_as_seed(problem, library, known), *begun]
     counts = {"expansions": 0, "insertions": 0, "seeds": 0}
     most = problem.horizon.max_trims or LONGEST
     limit = problem.search.max_expansions
@@ -102,6 +107,7 @@ def search_insertion(
         work = _Work(word, times)
         work.improve(library, most, FIRST_ROUNDS_OF_MANY if many else FIRST_ROUNDS, counts)
         works.append(work)
+    counts["expansions"] = counts["seeds"] = len(works)
     works = sorted((work for work in works if math.isfinite(work.cost)), key=lambda w: w.cost)
     for work in works[: max(FULL_OF_MANY if many else FULL, alternatives + 1)]:
         if work.least < -ACCURACY * library.scale and time.monotonic() < deadline:
@@ -109,9 +115,13 @@ def search_insertion(
     for work in works:
         if work.size - library.tail >= CHATTER:
             work.calm(library)
+    binding = not works or min(works, key=lambda w: w.cost).least < -ACCURACY * library.scale
+    if most < LONGEST and binding and not library.free_heading and time.monotonic() < deadline:
+        works += _from_longer(library, begun, most, counts)
+    if _prices_switches(problem) and time.monotonic() < deadline:
+        works += _with_fewer_switches(library, works)
     if time.monotonic() > deadline:
         status = SearchStatus.OUT_OF_BUDGET
-    counts["expansions"] = counts["seeds"] = len(works)
     improved = [
         work.solution(problem, library) for work in works if work.size - library.tail <= most
     ]
@@ -124,11 +134,70 @@ def search_insertion(
     )
 
 
-def _as_seed(problem: Problem, library: LibraryArrays, known: Plan) -> tuple[IntArray, Array]:
-    """A plan in the library's numbers, rest and free turn appended."""
+def compile_calming(problem: Problem) -> None:
+    """Have the kernel that shortens chattering words compiled, for any problem like this one."""
+    library = library_arrays(problem, search_setup(problem, problem.goals[0]))
+    work = _Work(np.array([0]), np.array([1.0]))
+    work.cost = 1.0
+    work.calm(library)
+
+
+def _from_longer(
+    library: LibraryArrays,
+    begun: list[tuple[IntArray, Array]],
+    most: int,
+    counts: dict[str, int],
+) -> Iterator[_Work]:
+    """What becomes of the cheapest seed if it may grow first, and is shortened afterwards."""
+    grown = []
+    for word, times in begun[:GROWN]:
+        work = _Work(word, times)
+        work.improve(library, LONGEST, ROUNDS, counts)
+        if work.size >= CHATTER:
+            work.calm(library)
+        grown.append(work)
+    longer = [work for work in grown if math.isfinite(work.cost) and work.size > most]
+    for work in sorted(longer, key=lambda one: one.cost)[:1]:
+        short = shortened(library, work.word[: work.size], work.times[: work.size], most)
+        if short is not None and short.word.size <= most:
+            again = _Work(short.word, short.times)
+            again.improve(library, most, ROUNDS, counts)
+            if math.isfinite(again.cost) and again.size <= most:
+                yield again
+
+
+def _prices_switches(problem: Problem) -> bool:
+    """Whether a switch of trims costs something by itself."""
+    cost = problem.cost
+    return not isinstance(cost, Cost) or cost.switch > 0.0 or cost.direction_change > 0.0
+
+
+def _with_fewer_switches(library: LibraryArrays, works: list[_Work]) -> Iterator[_Work]:
+    """The words found with fewer and fewer trims: where switches cost, these may pay."""
+    if library.free_heading:
+        return
+    for work in works[:SHORTENED]:
+        word, times = work.word[: work.size], work.times[: work.size]
+        for most in range(work.size - 1, 0, -1):
+            short = shortened(library, word, times, most)
+            if short is None:
+                break
+            again = _Work(short.word, short.times)
+            again.cost = short.cost
+            yield again
+            word, times = short.word, short.times
+
+
+def _as_seed(
+    problem: Problem, library: LibraryArrays, known: Plan
+) -> Iterator[tuple[IntArray, Array]]:
+    """A plan in the library's numbers, rest and free turn appended; none if a trim is not there."""
     automaton = problem.automaton
-    word = np.array([automaton.index_of(trim.name) for trim in known.trims], dtype=np.int64)
-    return _in_library(problem, library, word, known.durations)
+    names = set(automaton.trim_names)
+    if all(trim.name in names for trim in known.trims):
+        word = np.array([automaton.index_of(trim.name) for trim in known.trims], dtype=np.int64)
+        if not word.size or (library.number_of[word] >= 0).all():
+            yield _in_library(problem, library, word, known.durations)
 
 
 class _Work:
@@ -234,7 +303,6 @@ class _Start:
 
     def fast_words(self) -> list[tuple[IntArray, Array]]:
         """For a fixed time that no seed meets: first insert for least time, then pad."""
-        from maneuver_automaton.costs import Cost
         from maneuver_automaton.problem import Horizon
 
         limit = self.problem.horizon.time
@@ -279,27 +347,39 @@ def _free_turn(library: LibraryArrays, word: list[int], times: list[float]) -> f
 
 def sub_library(setup: SearchSetup) -> SearchSetup:
     """A few trims that reach far: extreme in eight directions, fast and cheap straights, spins."""
-    m = len(setup.trims)
-    if m <= FEW:
+    if len(setup.trims) <= FEW:
         return setup
-    twists = setup.twists
+    rows = _far_reaching(setup.library)
+    return replace(
+        setup,
+        trims=setup.trims[rows],
+        twists=setup.twists[rows],
+        rates=setup.rates[rows],
+        periods=setup.periods[rows],
+    )
+
+
+@functools.lru_cache(maxsize=8)
+def _far_reaching(library: MovingLibrary) -> IntArray:
+    """The trims of a sub-library: the same for every start and goal."""
+    twists, rates = library.twists, library.rates
     scaled = twists / np.abs(twists).max(axis=0).clip(min=1e-300)
     chosen: list[int] = []
 
     def choose(score: Array, mask: Array) -> None:
         rows = np.flatnonzero(mask)
         if rows.size:
-            order = np.lexsort((setup.rates[rows], -score[rows].round(12)))
+            order = np.lexsort((rates[rows], -score[rows].round(12)))
             chosen.append(int(rows[order[0]]))
 
-    everything = np.ones(m, dtype=bool)
+    everything = np.ones(len(twists), dtype=bool)
     straight = twists[:, 2] == 0.0
     spin = np.linalg.norm(scaled[:, :2], axis=1) == 0.0
     speed = np.linalg.norm(twists[:, :2], axis=1)
     for sign in (1.0, -1.0):
         forward = sign * twists[:, 0] > 0.0
         choose(speed, straight & forward)
-        choose(-setup.rates / speed.clip(min=1e-300), straight & forward)
+        choose(-rates / speed.clip(min=1e-300), straight & forward)
         choose(sign * twists[:, 2], spin)
         if twists[:, 1].any():
             choose(sign * twists[:, 1], straight)
@@ -307,14 +387,7 @@ def sub_library(setup: SearchSetup) -> SearchSetup:
             choose(sign * twists[:, 3], everything)
     for angle in np.arange(8) * np.pi / 4.0:
         choose(np.cos(angle) * scaled[:, 0] + np.sin(angle) * scaled[:, 2], everything)
-    rows = np.array(list(dict.fromkeys(chosen)))
-    return replace(
-        setup,
-        trims=setup.trims[rows],
-        twists=twists[rows],
-        rates=setup.rates[rows],
-        periods=setup.periods[rows],
-    )
+    return np.array(list(dict.fromkeys(chosen)))
 
 
 def _distinct(solutions: Iterator[Solution]) -> Iterator[Solution]:

@@ -67,8 +67,8 @@ def library_arrays(problem: Problem, setup: SearchSetup) -> LibraryArrays:
     return LibraryArrays(
         trims=trims,
         number_of=number_of,
-        twists=np.ascontiguousarray(twists),
-        rates=np.ascontiguousarray(rates),
+        twists=np.array(twists, order="C"),  # kernels are compiled for arrays that can be written
+        rates=np.array(rates),
         rows=np.array(rows).reshape(len(rows), len(rates)),
         targets=np.array(targets, dtype=np.float64),
         goal=np.array(setup.goal),

@@ -20,7 +20,7 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.problem import Goal, Horizon, Problem
 from maneuver_automaton.search.certificate import certificate
-from maneuver_automaton.search.insertion import search_insertion
+from maneuver_automaton.search.insertion import compile_calming, search_insertion
 from maneuver_automaton.search.result import Solution
 from maneuver_automaton.search.words import compile_polishing, compile_scanning, search_words
 from maneuver_automaton.switching_times import solve_switching_times
@@ -48,6 +48,7 @@ def load_insertion_kernels() -> None:
     """Have the kernels of insertion ready."""
     problem = _smallest_problem()
     search_insertion(problem, problem.goals[0])
+    compile_calming(problem)
 
 
 @functools.cache

@@ -30,6 +30,7 @@ class SearchSetup:
     rest: int | None  # index of the cheapest rest
     rest_rate: float
     climbs: bool  # whether altitude is a condition
+    library: MovingLibrary  # where the trims come from
 
     @property
     def start_is_goal(self) -> bool:
@@ -56,6 +57,7 @@ def search_setup(problem: Problem, goal: Goal) -> SearchSetup:
         rest=library.rest,
         rest_rate=library.rest_rate,
         climbs=bool(library.climbs or relative[3] != 0.0),
+        library=library,
     )
 
 

@@ -354,7 +354,7 @@ class _Job:
             reaches=np.minimum(tables.reaches, bounded),
             parallel=tables.parallel,
             weights=weights,
-            goal=setup.goal,
+            goal=np.array(setup.goal),
             time_limit=float(bounded),
             pad=int(pad),
             pad_cost=float(setup.rest_rate * bounded) if pad else 0.0,
@@ -369,11 +369,14 @@ class _Job:
         )
 
     def solutions(self) -> Iterator[Solution]:
-        """What was found, by rising cost, then fewer trims, then word; rest last."""
+        """What was found by rising cost, rest last; if pruned, what was asked for, and ties."""
         n = self.n_found
         costs = self.found.costs[:n]
         rows = []
+        dearest = math.inf if self.own_prices else _tied(float(self.found.best[-1]))
         for k in np.argsort(costs, kind="stable"):
+            if self.pruned and costs[k] > dearest:
+                break
             size = int(np.count_nonzero(self.found.words[k] >= 0))
             if self.setup.free_heading:
                 size -= 1

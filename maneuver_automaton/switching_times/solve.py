@@ -129,6 +129,8 @@ def _starts(n: int, total: float | None, guesses: Sequence[ArrayLike], restarts:
     for guess in first:
         if guess.shape != (n,):
             raise ValueError(f"guesses: got shape {guess.shape}, need ({n},)")
+    if restarts == 0:
+        return np.vstack([*first, even])
     rng = np.random.default_rng(0)  # restarts: the same in every call
     scales = rng.exponential(1.0, size=(restarts, n))
     if total is not None:

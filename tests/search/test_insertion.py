@@ -242,7 +242,6 @@ def test_finer_grids_are_no_dearer():
     assert costs[1] >= costs[2] - 1e-9
 
 
-@pytest.mark.xfail(strict=True, reason="a full word takes in no further trim, not even for another")
 @compiled_only
 def test_finer_grids_are_no_dearer_with_few_trims():
     horizon = Horizon(time=8.0, max_trims=6)

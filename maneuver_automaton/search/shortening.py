@@ -1,0 +1,150 @@
+"""From a word with more trims than are admitted to the best short one that resembles it.
+
+Insertion under a limit fills the word with what pays first, and stops. It is better to let it grow,
+and to take out again what is missed least.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.search.library_arrays import LibraryArrays
+from maneuver_automaton.switching_times import TimesStatus, solve_switching_times
+
+AT_ONCE = 4  # of the shortest trims, how many are tried to be left out
+LAST = 2  # trims too many, from when on everything is tried
+JOINED = 5  # trims near the mean of two that may stand for both
+NEAR = 4  # trims of similar twist that one trim is exchanged for
+SWEEPS = 3  # over all trims of a word, at most
+GAIN = 1e-9  # relative, what an exchange must gain
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Short:
+    """A word in the numbers of a library, with its times and cost."""
+
+    word: IntArray
+    times: Array
+    cost: float
+
+
+def shortened(library: LibraryArrays, word: IntArray, times: Array, most: int) -> Short | None:
+    """A word of at most `most` trims, made from a longer one; None if none is found.
+
+    Trims are taken out one at a time, the one whose absence costs least, and the times are solved
+    again; then each trim is exchanged for similar ones as long as that pays. Not for goals with a
+    free heading.
+    """
+    if library.free_heading:
+        return None
+    best = _solved(library, word, times)
+    while best is not None and best.word.size > most:
+        fewer = _some_less(library, best, most)
+        best = fewer if fewer is not None else _one_less(library, best, most)
+    return None if best is None else _exchanged(library, best)
+
+
+def _some_less(library: LibraryArrays, now: Short, most: int) -> Short | None:
+    """The word without a third of what is too much, the shortest trims; None near the end."""
+    many = (now.word.size - most) // 3
+    if now.word.size <= most + LAST or many < 2:
+        return None
+    kept = np.sort(_by_size(now.times)[many:])
+    left = float(now.times.sum() - now.times[kept].sum())
+    return _solved(library, now.word[kept], _spread(now.times[kept], left))
+
+
+def _one_less(library: LibraryArrays, now: Short, most: int) -> Short | None:
+    """The cheapest word with one trim less: one left out, or two neighbours made one."""
+    order = _by_size(now.times)
+    trials = [_without(library, now, k) for k in order[:AT_ONCE]]
+    if now.word.size <= most + LAST or all(one is None for one in trials):
+        trials += [_without(library, now, k) for k in order[AT_ONCE:]]
+        for k in range(now.word.size - 1):
+            trials += list(_joined(library, now, k))
+    found = [one for one in trials if one is not None and one.word.size < now.word.size]
+    return min(found, key=lambda one: float(f"{one.cost:.9g}"), default=None)
+
+
+def _without(library: LibraryArrays, now: Short, k: int) -> Short | None:
+    times = _spread(np.delete(now.times, k), now.times[k])
+    return _solved(library, np.delete(now.word, k), times)
+
+
+def _joined(library: LibraryArrays, now: Short, k: int) -> Iterator[Short | None]:
+    """Trims `k` and `k + 1` as one of the library near their mean."""
+    pair = slice(k, k + 2)
+    lasting = now.times[pair].sum()
+    mean = now.times[pair] @ library.twists[now.word[pair]] / lasting
+    word, times = np.delete(now.word, k), np.delete(now.times, k)
+    times[k] = lasting
+    for other in _similar(library, mean)[:JOINED]:
+        word[k] = other
+        yield _solved(library, word.copy(), times)
+
+
+def _similar(library: LibraryArrays, twist: Array) -> IntArray:
+    """Trims by how far they are from a twist, the nearest first."""
+    scale = np.abs(library.twists).max(axis=0).clip(min=1e-300)
+    away = (np.abs(library.twists - twist) / scale).sum(axis=1)
+    return _by_size(away)
+
+
+def _by_size(values: Array) -> IntArray:
+    """Indices by rising value; what differs by rounding only keeps its order."""
+    return np.argsort(values.round(9), kind="stable")
+
+
+def _spread(times: Array, left: float) -> Array:
+    """Times that take over what a trim left out has lasted."""
+    return np.asarray(times + left / max(times.size, 1))
+
+
+def _exchanged(library: LibraryArrays, now: Short) -> Short:
+    """Each trim exchanged for one of similar twist as long as that pays."""
+    for _ in range(SWEEPS):
+        before = now.cost
+        for k in range(now.word.size):
+            if k >= now.word.size:
+                break
+            for other in _similar(library, library.twists[now.word[k]])[1 : NEAR + 1]:
+                word = now.word.copy()
+                word[k] = other
+                trial = _solved(library, word, now.times)
+                if trial is not None and trial.cost < now.cost - GAIN * (1.0 + abs(now.cost)):
+                    now = trial
+                    break
+        if now.cost >= before - GAIN * (1.0 + abs(before)):
+            break
+    return now
+
+
+def _solved(library: LibraryArrays, word: IntArray, times: Array) -> Short | None:
+    """The best times of a word; trims that last no time are left out."""
+    if not word.size:
+        return None
+    total = None
+    if library.targets.size and library.rows[-1].all():
+        total = float(library.targets[-1])
+    solved = solve_switching_times(
+        library.twists[word],
+        library.rates[word],
+        library.goal,
+        total=total,
+        guesses=[times],
+        restarts=0,
+    )
+    if solved.status is TimesStatus.FAILED or not math.isfinite(solved.cost):
+        return None
+    used = solved.durations > 1e-9
+    kept, lasting = word[used], solved.durations[used]
+    same = np.append(False, kept[1:] == kept[:-1]) if kept.size else np.zeros(0, dtype=bool)
+    if same.any():
+        starts = np.flatnonzero(~same)
+        kept, lasting = kept[starts], np.add.reduceat(lasting, starts)
+    return Short(kept, lasting, solved.cost)
