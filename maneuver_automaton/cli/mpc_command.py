@@ -44,6 +44,8 @@ def drive_file(path: Path, out: Path, *, settings: Settings) -> int:
         raise InvalidScenario(
             f"{path}: receding_horizon: missing, need {{step_s: ...}}, the time between two plans"
         )
+    if settings.seeds is not None and settings.resume is not None:
+        raise InvalidScenario("--resume: goes on with one loop, and --seeds runs many; need one")
     make_folder(out)
     if settings.seeds is not None:
         return _statistics(path, scenario, out, settings)
@@ -66,17 +68,23 @@ def drive_file(path: Path, out: Path, *, settings: Settings) -> int:
 def drive_folder(folder: Path, out: Path, *, settings: Settings) -> int:
     """Close the loop of every scenario of a folder that has one, each into `out`/STEM."""
     from maneuver_automaton.cli.guard import BAD_INPUT, explained
+    from maneuver_automaton.cli.plan_command import _check_stems
 
     paths = sorted(path for path in folder.iterdir() if path.suffix in SCENARIO_ENDINGS)
     if not paths:
         raise InvalidScenario(f"{folder}: holds no scenario, need a file ending in .yaml or .yml")
+    _check_stems(paths)
     codes = []
     for path in paths:
         try:
+            if scenario_of(path).receding_horizon is None:
+                continue  # for plan, not for mpc
             codes.append(drive_file(path, out / path.stem, settings=settings))
         except Exception as error:  # noqa: BLE001, one bad file must not stop the others
             complain(explained(error))
             codes.append(BAD_INPUT)
+    if not codes:
+        raise InvalidScenario(f"{folder}: no scenario in it has a receding_horizon, need one")
     return max(codes)
 
 

@@ -1,7 +1,7 @@
 """Receding horizon: plan, drive a little, and plan again."""
 
+from maneuver_automaton.receding_horizon.candidates import within as within
 from maneuver_automaton.receding_horizon.controller import RecedingHorizon as RecedingHorizon
-from maneuver_automaton.receding_horizon.controller import within as within
 from maneuver_automaton.receding_horizon.guarantees import Promises as Promises
 from maneuver_automaton.receding_horizon.guarantees import promises as promises
 from maneuver_automaton.receding_horizon.log import ClosedLoop as ClosedLoop

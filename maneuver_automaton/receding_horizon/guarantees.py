@@ -27,6 +27,7 @@ class Promises:
     effort: float  # c1 lambda_min(R), with a fixed time; 0 if the bound does not apply
     horizon: float | None  # T [s], None if free
     step: float  # delta [s]
+    switch: float = 0.0  # what it costs to switch to the rest that fills a fixed time
 
     def most_steps(self, value: float) -> int | None:
         """The paper's bound on the number of steps from a state of that value; None if none.
@@ -88,6 +89,7 @@ def promises(problem: Problem, *, step: float) -> Promises:
         effort=effort,
         horizon=problem.horizon.time,
         step=step,
+        switch=cost.switch if isinstance(cost, Cost) and fixed else 0.0,
     )
 
 
@@ -108,6 +110,8 @@ def broken(
             reason=f"the rest of the last plan does not lead to the goal in time; {why}",
         )
     padding = promised.rest_rate * last.applied
+    if last.plan.trims and last.plan.trims[-1].body_velocity.any():  # rest is a new switch
+        padding += promised.switch
     allowed = last.value - last.applied_cost + padding
     if now.value > allowed + tolerance and not (now.arrived or last.arrived):
         yield Violation(
@@ -123,7 +127,7 @@ def broken(
             )
     if (
         most_steps is not None
-        and now.number > most_steps
+        and now.number >= most_steps
         and off == 0.0
         and not (now.arrived or last.arrived)
     ):

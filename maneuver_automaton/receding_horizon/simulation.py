@@ -14,7 +14,8 @@ from maneuver_automaton.audit import Audit, audit_plan
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.receding_horizon.controller import RecedingHorizon, within
+from maneuver_automaton.receding_horizon.candidates import within
+from maneuver_automaton.receding_horizon.controller import RecedingHorizon
 from maneuver_automaton.receding_horizon.log import ClosedLoop, Step
 
 

@@ -20,6 +20,7 @@ from pydantic import (
     Strict,
     Tag,
     ValidationInfo,
+    field_validator,
 )
 from pydantic_core import PydanticCustomError
 
@@ -386,6 +387,13 @@ class Disturbance(Part):
     seed: Annotated[int, Strict(), Ge(0), Need("a whole number of at least 0")] = Field(
         0, description="seed of the random numbers"
     )
+
+    @field_validator("pushes")
+    @classmethod
+    def _one_push_a_step(cls, pushes: tuple[PushPart, ...]) -> tuple[PushPart, ...]:
+        if len({push.after_step for push in pushes}) < len(pushes):
+            raise need("pushes after different steps")
+        return pushes
 
 
 class RecedingHorizonPart(Part):

@@ -1,0 +1,126 @@
+"""Plans that a step may apply, and what they are compared by."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.primitives import Trim
+from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.receding_horizon.log import Origin, first_part
+from maneuver_automaton.receding_horizon.pace import at_best_pace, base_name
+from maneuver_automaton.receding_horizon.shifting import costliest_first, rest_of
+from maneuver_automaton.search.inside import outside, stays_inside
+from maneuver_automaton.search.result import Solution
+from maneuver_automaton.search.words import TIE
+
+EXACT = 1e-9  # [m, rad] a pose this close to a goal is the goal; to a plan, on it
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Settings:
+    """How a loop is closed."""
+
+    step: float  # delta [s]
+    margin: float = 0.0
+    time_limit: float = 5.0  # [s] per step
+    first: Plan | None = None
+    hold: bool = False
+    retimed: bool = False
+    pad: Trim | None = None  # the rest that prolongs a plan
+
+    def pad_of(self, problem: Problem) -> Trim | None:
+        """The rest that fills a fixed time; None where time is free."""
+        return None if problem.horizon.time is None else self.pad
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Candidate:
+    """A plan that may be applied."""
+
+    plan: Plan
+    cost: float
+    goal_index: int
+    origin: Origin
+    at_first: float  # what it costs until the next step
+
+    @property
+    def preference(self) -> tuple[float, bool, int, tuple[str, ...]]:
+        """Greatest cost on [0, delta) first, then the known word, then fewer trims, then by name.
+
+        Source: the paper, Sec. 5.1.
+        """
+        known = self.origin is not Origin.SEARCHED
+        return -float(f"{self.at_first:.9g}"), not known, len(self.plan.trims), self.plan.word
+
+
+def candidate(
+    here: Problem, settings: Settings, plan: Plan, *, goal_index: int, origin: Origin
+) -> Candidate:
+    """A plan at its best pace, if that is asked for, and in the order that costs most at first."""
+    if settings.retimed:
+        plan = at_best_pace(here, plan)
+    cost = here.cost_of(plan)
+    ordered = costliest_first(plan, here.rates_of(plan))
+    if ordered is not plan:
+        dearer = here.cost_of(ordered)
+        if dearer <= cost + TIE * (1.0 + abs(cost)) and allowed(here, ordered):
+            plan, cost = ordered, dearer
+    piece = first_part(plan, settings.step)
+    return Candidate(
+        plan=plan,
+        cost=cost,
+        goal_index=goal_index,
+        origin=origin,
+        at_first=float(here.rates_of(piece) @ piece.durations),
+    )
+
+
+def allowed(here: Problem, plan: Plan) -> bool:
+    """Whether a plan stays inside the bounds, unless the vehicle is outside of them already."""
+    return bool(outside(here.start, here.bounds)) or stays_inside(plan, here.bounds)
+
+
+def as_plan(problem: Problem, solution: Solution) -> Plan:
+    """What a search found, as a plan from the problem's start."""
+    trims = problem.automaton.trims
+    return Plan(
+        problem.start,
+        tuple(trims[k] for k in solution.word),
+        durations=solution.durations,
+        start_time=problem.start_time,
+    )
+
+
+def cost_until(problem: Problem, plan: Plan, until: float) -> float:
+    """What the first `until` seconds of a plan cost, the switches in them included."""
+    piece = first_part(plan, until)
+    left = rest_of(plan, until, start=plan.start)
+    switches = problem.cost.switching(_twists(plan)) - problem.cost.switching(_twists(left))
+    return float(problem.rates_of(piece) @ piece.durations) + switches
+
+
+def is_rest_of(plan: Plan, rest: Plan | None) -> bool:
+    """Whether the word of `plan` is the rest of the last one, with or without a rest to pad it."""
+    return rest is not None and _moving(plan) == _moving(rest)
+
+
+def within(pose: Array, goal: Goal) -> bool:
+    """Whether a pose is a goal, to within its tolerances (1e-9 where they are 0)."""
+    places = [0, 1, *range(3, pose.size)]
+    way = float(np.linalg.norm(pose[places] - goal.pose[places]))
+    turn = abs(math.remainder(float(pose[2] - goal.pose[2]), 2.0 * math.pi))
+    heading = goal.free_heading or turn <= goal.tolerance_rad + EXACT
+    return way <= goal.tolerance_m + EXACT and heading
+
+
+def _moving(plan: Plan) -> list[str]:
+    return [base_name(trim.name) for trim in plan.trims if trim.body_velocity.any()]
+
+
+def _twists(plan: Plan) -> Array:
+    return np.array([trim.body_velocity for trim in plan.trims]).reshape(-1, plan.start.size)

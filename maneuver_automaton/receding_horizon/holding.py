@@ -1,0 +1,74 @@
+"""In the set that is the goal: correct what pushes the vehicle out, and stay."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.problem import Goal, Horizon, Problem
+from maneuver_automaton.receding_horizon.candidates import (
+    Candidate,
+    Settings,
+    as_plan,
+    candidate,
+    within,
+)
+from maneuver_automaton.receding_horizon.log import Origin
+from maneuver_automaton.search.choose import search_goal
+
+MOST_STEPS = 4  # that a plan within the goal's set may take
+ALTERNATIVES = 1  # dearer plans, of which one may stay in the set
+FINE = 0.01  # [m, rad] between the poses that are looked at
+
+
+def holding(here: Problem, settings: Settings, goal_index: int) -> Candidate | None:
+    """A plan to the middle of a goal's set within a step or a few.
+
+    The cheapest that stays in the set all along, otherwise one that is inside whenever the loop
+    closes; None if there is neither.
+    """
+    goal = here.goals[goal_index]
+    middle = replace(goal, tolerance_m=0.0, tolerance_rad=0.0)
+    second: Candidate | None = None
+    for steps in range(1, MOST_STEPS + 1):
+        limit = steps * settings.step
+        fixed = settings.pad_of(here) is not None
+        near = replace(
+            here,
+            goals=(middle,),
+            horizon=Horizon(time=limit) if fixed else Horizon(max_time=limit),
+            search=replace(here.search, method="insertion"),
+        )
+        results = search_goal(
+            near, middle, alternatives=ALTERNATIVES, time_limit=settings.time_limit
+        )
+        found = [
+            candidate(
+                near,
+                settings,
+                as_plan(near, solution),
+                goal_index=goal_index,
+                origin=Origin.SEARCHED,
+            )
+            for result in results
+            for solution in result.solutions
+        ]
+        for one in sorted(found, key=lambda candidate: candidate.cost):
+            if _stays(one.plan, goal):
+                return one
+            if second is None and _inside_at_steps(one.plan, goal, settings.step):
+                second = one
+    return second
+
+
+def _stays(plan: Plan, goal: Goal) -> bool:
+    samples = plan.sample(max_step_m=FINE, max_step_rad=FINE)
+    return all(within(pose, goal) for pose in samples.pose)
+
+
+def _inside_at_steps(plan: Plan, goal: Goal, step: float) -> bool:
+    times = plan.start_time + step * np.arange(1, math.ceil(plan.duration / step) + 1)
+    return all(within(pose, goal) for pose in plan.pose_at(times))

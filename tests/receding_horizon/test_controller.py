@@ -1,0 +1,431 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
+from maneuver_automaton.receding_horizon import Guarantee, Origin, RecedingHorizon, within
+from maneuver_automaton.receding_horizon.reanchoring import distance, missed
+from tests.receding_horizon.loops import AHEAD, EFFORT, NEAR, SPIN_TOO, parking_loop, straight
+from tests.search.cases import REEDS_SHEPP, TABLE_2, helicopter, robot, without_rest
+
+FREE = Horizon(max_trims=4)
+PAIR = {"rest": (0.0, 0.0), "slow": (0.5, 0.0), "fast": (1.0, 0.0)}
+
+
+def controller(problem=None, *, step=1.0, **settings) -> RecedingHorizon:
+    return RecedingHorizon(problem or parking_loop(), step=step, **settings)
+
+
+class TestOneStep:
+    def test_the_first_plans_the_second_shifts(self):
+        loop = controller(straight())
+        control, first = loop.step([-2.0, 0.0, 0.0])
+        assert control.tolist() == [1.0, 0.0]
+        assert (first.origin, first.number, first.shifted_value) == (Origin.SEARCHED, 0, None)
+        assert (first.value, first.applied, first.applied_cost) == (2.0, 1.0, 1.0)
+        assert (first.off_plan, first.replanned) == (None, False)
+        control, second = loop.step(first.predicted)
+        assert (second.value, second.accumulated_cost, second.time) == (1.0, 1.0, 1.0)
+        assert (second.shifted_value, second.off_plan) == (1.0, 0.0)
+        assert second.plan.word == ("ahead", "rest")
+        assert second.plan.duration == pytest.approx(4.0)  # T, as before
+        assert not second.replanned
+        assert second.violations == ()
+
+    def test_at_the_goal_it_rests(self):
+        loop = controller(straight())
+        control, step = loop.step([0.0, 0.0, 2.0 * math.pi])
+        assert control.tolist() == [0.0, 0.0]
+        assert step.arrived
+        assert (step.value, step.plan.word, step.plan.duration) == (0.0, ("rest",), 4.0)
+
+    def test_at_the_goal_without_rest_there_is_no_control(self):
+        problem = straight(controls={"ahead": (1.0, 0.0)}, horizon=Horizon())
+        control, step = controller(problem).step([0.0, 0.0, 0.0])
+        assert control is None
+        assert step.control is None
+        assert (step.value, step.plan.word, step.applied) == (0.0, (), 1.0)
+
+    def test_the_best_of_several_goals(self):
+        goals = [Goal(pose=[-9.0, 0.0, 0.0]), Goal(pose=[0.0, 0.0, 0.0])]
+        problem = Problem(
+            robot(AHEAD), [-2.0, 0.0, 0.0], goals, cost=EFFORT, horizon=Horizon(time=4.0)
+        )
+        loop = controller(problem)
+        for pose in ([-2.0, 0.0, 0.0], [-1.0, 0.0, 0.0]):
+            _, step = loop.step(pose)
+            assert step.goal_index == 1
+            assert missed(step.plan, goals[1]) <= 1e-9
+
+    @pytest.mark.parametrize("turns", [1, -3, 1000])
+    def test_headings_count_modulo_a_turn(self, turns):
+        loop = controller()
+        _, step = loop.step([0.0, 1.0, 2.0 * math.pi * turns])
+        assert step.value == pytest.approx(4.6615840195, abs=1e-9)
+        _, step = loop.step(step.predicted - [0.0, 0.0, 2.0 * math.pi * turns])
+        assert step.off_plan == pytest.approx(0.0, abs=1e-9)
+        assert not step.replanned
+        assert step.violations == ()
+
+    def test_the_certificate_of_an_exhaustive_search(self):
+        _, step = controller().step([0.0, 1.0, 0.0])
+        assert step.exhaustive
+        assert step.lower_bound == step.value
+        assert step.gap == 0.0
+
+    def test_the_tie_rule_within_a_word(self):
+        # 1.7 for 0.2 s and 1.6 for 0.8 s: either order is optimal, the dearer one comes first
+        problem = Problem(
+            robot({"rest": (0.0, 0.0), "slow": (1.6, 0.0), "fast": (1.7, 0.0)}),
+            [-1.62, 0.0, 0.0],
+            [0.0, 0.0, 0.0],
+            cost=EFFORT,
+            horizon=Horizon(time=1.0),
+        )
+        _, step = controller(problem, step=0.1).step(problem.start)
+        assert step.plan.word == ("fast", "slow")
+        assert step.plan.durations.tolist() == pytest.approx([0.2, 0.8])
+        assert step.applied_cost == pytest.approx(0.289)
+
+
+class TestElapsed:
+    @pytest.mark.parametrize("elapsed", [0.0, 0.25, 0.5, 1.0, 1.5, 1.9])
+    def test_the_plan_followed_for_longer_or_shorter_breaks_nothing(self, elapsed):
+        loop = controller(straight())
+        _, first = loop.step([-2.0, 0.0, 0.0])
+        _, second = loop.step(first.plan.pose_at(elapsed), elapsed=elapsed)
+        assert second.time == elapsed
+        assert second.value == pytest.approx(2.0 - elapsed)
+        assert second.accumulated_cost == pytest.approx(elapsed)
+        assert second.violations == ()
+        assert not second.replanned
+
+    @pytest.mark.parametrize("elapsed", [4.0, 7.5, 100.0])
+    def test_longer_than_the_plan(self, elapsed):
+        loop = controller(straight())
+        _, first = loop.step([-2.0, 0.0, 0.0])
+        control, second = loop.step(first.plan.pose_at(elapsed), elapsed=elapsed)
+        assert control.tolist() == [0.0, 0.0]
+        assert second.arrived
+        assert (second.value, second.accumulated_cost) == (0.0, 2.0)
+        assert second.violations == ()
+
+    @pytest.mark.parametrize("elapsed", [0.5, 100.0])
+    def test_the_vehicle_stood_still_meanwhile(self, elapsed):
+        loop = controller()
+        loop.step([0.0, 1.0, 0.0])
+        _, second = loop.step([0.0, 1.0, 0.0], elapsed=elapsed)
+        assert missed(second.plan, loop.problem.goals[0]) <= 1e-9
+        assert second.plan.duration == pytest.approx(8.0)
+        assert second.value == pytest.approx(4.6615840195)
+        assert [one.guarantee for one in second.violations] == [Guarantee.DECREASE]
+
+    def test_many_short_steps_keep_the_bound_on_their_number(self):
+        loop = controller(straight(1.0), step=0.5)
+        pose = np.array([-1.0, 0.0, 0.0])
+        _, step = loop.step(pose)
+        while not step.arrived:
+            _, step = loop.step(step.plan.pose_at(step.time + 0.05), elapsed=0.05)
+            assert step.violations == ()
+
+    @pytest.mark.parametrize("elapsed", [-0.1, math.nan, math.inf])
+    def test_no_time(self, elapsed):
+        loop = controller(straight())
+        loop.step([-2.0, 0.0, 0.0])
+        with pytest.raises(ValueError, match=rf"elapsed must be at least 0, got {elapsed} s"):
+            loop.step([-1.0, 0.0, 0.0], elapsed=elapsed)
+
+
+class TestWrongInput:
+    @pytest.mark.parametrize(
+        ("state", "message"),
+        [
+            ([0.0, 1.0, math.nan], "measured_state: got nan, need finite numbers"),
+            ([0.0, math.inf, 0.0], "measured_state: got inf, need finite numbers"),
+            ([0.0, 1.0], r"measured_state: got shape \(2,\), need 3 components last"),
+            ([0.0, 1.0, 0.0, 0.0], r"measured_state: got shape \(4,\), need 3 components last"),
+            ([[0.0, 1.0, 0.0]], r"measured_state: got shape \(1, 3\), need \(3,\)"),
+            ("here", "measured_state: got 'here', need numbers"),
+        ],
+    )
+    def test_no_pose(self, state, message):
+        with pytest.raises(ValueError, match=message):
+            controller().step(state)
+
+    @pytest.mark.parametrize(
+        ("settings", "message"),
+        [
+            ({"step": 0.0}, "step must be positive, got 0.0 s"),
+            ({"step": math.nan}, "step must be positive, got nan s"),
+            ({"step": 8.1}, "step is 8.1 s, need at most the horizon, 8 s"),
+            ({"time_limit": 0.0}, "time_limit must be positive, got 0.0 s"),
+            ({"margin": -1.0}, "margin must be at least 0, got -1.0"),
+            ({"margin": math.nan}, "margin must be at least 0, got nan"),
+        ],
+    )
+    def test_settings(self, settings, message):
+        with pytest.raises(ValueError, match=rf"^receding horizon: {message}$"):
+            controller(**settings)
+
+    def test_a_fixed_time_needs_a_rest(self):
+        problem = parking_loop(without_rest(TABLE_2))
+        with pytest.raises(ValueError, match="a fixed time needs a rest trim"):
+            controller(problem)
+        controller(replace(problem, horizon=FREE))  # a free one does not
+
+    @pytest.mark.parametrize(
+        "problem", [straight(horizon=Horizon()), straight(cost=Cost(time=1.0))]
+    )
+    def test_retiming_needs_time_and_effort(self, problem):
+        with pytest.raises(ValueError, match="need a fixed horizon and a cost with effort"):
+            controller(problem, retimed=True)
+
+    def test_a_first_plan_that_ends_elsewhere(self):
+        problem = straight()
+        first = Plan(problem.start, (problem.automaton.trims[1],), durations=[1.0])
+        with pytest.raises(ValueError, match=r"first ends at \[-1.0, 0.0, 0.0\], need a plan"):
+            controller(problem, first=first).step(problem.start)
+
+    def test_a_first_plan_that_takes_too_long(self):
+        problem = straight(horizon=Horizon(time=1.5))
+        first = Plan(problem.start, (problem.automaton.trims[1],), durations=[2.0])
+        with pytest.raises(ValueError, match=r"first takes 2 s, need at most 1\.5 s"):
+            controller(problem, first=first).step(problem.start)
+
+
+def test_a_first_plan_is_filled_with_rest():
+    problem = straight()
+    first = Plan(problem.start, (problem.automaton.trims[1],), durations=[2.0])
+    _, step = controller(problem, first=first).step(problem.start)
+    assert step.plan.word == ("ahead", "rest")
+    assert step.plan.durations.tolist() == [2.0, 2.0]
+    assert step.origin is Origin.FIRST
+
+
+def test_a_step_longer_than_the_plan_applies_all_of_it():
+    loop = controller(straight(horizon=Horizon()), step=50.0)
+    _, step = loop.step([-2.0, 0.0, 0.0])
+    assert (step.applied, step.applied_cost) == (2.0, 2.0)
+    assert step.predicted.tolist() == [0.0, 0.0, 0.0]
+
+
+def test_a_step_as_long_as_the_horizon():
+    loop = controller(straight(), step=4.0)
+    _, step = loop.step([-2.0, 0.0, 0.0])
+    assert step.applied == 4.0
+    assert step.predicted.tolist() == [0.0, 0.0, 0.0]
+    _, step = loop.step(step.predicted)
+    assert step.arrived
+
+
+class TestMargin:
+    def value_of_second(self, margin):
+        # from a metre, all fast for a second costs 1.0; slow for two seconds costs 0.5
+        problem = straight(1.0, controls=PAIR)
+        fast = Plan(problem.start, (problem.automaton.trims[2],), durations=[1.0])
+        loop = controller(problem, step=0.5, margin=margin, first=fast)
+        _, step = loop.step(problem.start)
+        _, step = loop.step(step.predicted)
+        return step
+
+    def test_a_new_word_must_be_cheaper_by_more(self):
+        kept = self.value_of_second(0.3)
+        assert kept.plan.word == ("fast", "rest")
+        assert (kept.value, kept.replanned) == (0.5, False)
+
+    @pytest.mark.parametrize("margin", [0.0, 0.2])
+    def test_otherwise_it_is_taken(self, margin):
+        taken = self.value_of_second(margin)
+        assert taken.plan.word == ("slow", "rest")
+        assert (taken.value, taken.replanned) == (0.25, True)
+        assert taken.shifted_value == 0.5
+
+
+class TestBudget:
+    @pytest.mark.parametrize("horizon", [Horizon(time=8.0, max_trims=4), FREE, Horizon(time=8.0)])
+    def test_never_nothing(self, horizon):
+        loop = controller(parking_loop(horizon=horizon), time_limit=1e-9)
+        pose = np.array([0.0, 1.0, 0.0])
+        for _ in range(4):
+            _, step = loop.step(pose)
+            assert math.isfinite(step.value)
+            assert missed(step.plan, loop.problem.goals[0]) <= 1e-9
+            assert {one.guarantee for one in step.violations} <= {Guarantee.BUDGET}
+            pose = step.predicted
+
+    def test_it_is_said(self):
+        loop = controller(time_limit=1e-9)
+        loop.step([0.0, 1.0, 0.0])
+        _, step = loop.step(loop.last.predicted)
+        assert not step.exhaustive
+        assert [str(one) for one in step.violations] == [
+            "time budget: the search was cut short after 1e-09 s; the best plan so far is kept"
+        ]
+
+
+class TestBounds:
+    def test_the_plan_stays_inside(self):
+        bounds = Bounds(x=(-0.15, 1.0))
+        problem = parking_loop(bounds=bounds)
+        free_value = controller().step([0.0, 1.0, 0.0])[1].value
+        _, step = controller(problem).step([0.0, 1.0, 0.0])
+        assert step.value > free_value
+        assert step.plan.sample().pose[:, 0].min() >= -0.15 - 1e-9
+        assert step.lower_bound <= step.value
+
+    def test_pushed_outside_it_comes_back(self):
+        problem = parking_loop(bounds=Bounds(x=(-0.5, 0.5), y=(-0.5, 1.5)))
+        loop = controller(problem)
+        loop.step([0.0, 1.0, 0.0])
+        _, step = loop.step([-0.7, 1.0, 0.0])
+        assert missed(step.plan, problem.goals[0]) <= 1e-9
+
+
+class TestHopeless:
+    def test_no_word_leads_there(self):
+        control, step = controller(parking_loop(AHEAD)).step([0.0, 1.0, 0.0])
+        assert control.tolist() == [0.0, 0.0]
+        assert step.value == math.inf
+        assert [one.guarantee for one in step.violations] == [Guarantee.FEASIBILITY]
+
+    def test_and_then_one_does(self):
+        loop = controller(parking_loop(AHEAD))
+        loop.step([0.0, 1.0, 0.0])
+        control, step = loop.step([-1.0, 0.0, 0.0])
+        assert control.tolist() == [1.0, 0.0]
+        assert step.value == 1.0
+
+    def test_out_of_time_the_quickest_is_applied(self):
+        loop = controller(straight(9.0))
+        _, step = loop.step([-9.0, 0.0, 0.0])
+        assert step.plan.duration == pytest.approx(9.0)
+        assert [str(one) for one in step.violations] == [
+            "horizon: no plan was found that takes at most 4 s; the one applied takes 9 s"
+        ]
+
+    def test_exactly_the_least_time_is_enough(self):
+        loop = controller(straight(4.0))
+        _, step = loop.step([-4.0, 0.0, 0.0])
+        assert step.violations == ()
+        assert step.plan.durations.tolist() == [4.0]
+
+    def test_every_plan_that_is_late_is_flagged(self):
+        loop = controller(straight(9.0))
+        _, step = loop.step([-9.0, 0.0, 0.0])
+        _, step = loop.step(step.predicted)
+        assert step.plan.durations[0] == pytest.approx(8.0)
+        assert Guarantee.HORIZON in [one.guarantee for one in step.violations]
+
+
+class TestHold:
+    def test_within_the_goal_it_stays_within(self):
+        loop = controller(parking_loop(goal=NEAR), hold=True)
+        _, step = loop.step([0.1, 0.05, 0.05])
+        assert step.arrived
+        samples = step.plan.sample(max_step_m=0.005, max_step_rad=0.005).pose
+        ends = step.plan.pose_at(step.plan.start_time + np.arange(1, 6) * loop.settings.step)
+        inside = [within(pose, NEAR) for pose in samples]
+        assert all(inside) or all(within(pose, NEAR) for pose in ends)
+
+    @pytest.mark.parametrize(
+        ("pose", "expected"),
+        [
+            ((0.15, 0.0, 0.15), True),
+            ((0.0, -0.15, 2.0 * math.pi), True),
+            ((0.16, 0.0, 0.0), False),
+            ((0.11, 0.11, 0.0), False),  # a disc, no square
+            ((0.0, 0.0, 0.16), False),
+        ],
+    )
+    def test_within(self, pose, expected):
+        assert within(np.array(pose), NEAR) is expected
+
+
+class TestSpace:
+    """A helicopter: SE(2) x R."""
+
+    @pytest.mark.parametrize(
+        ("horizon", "cost"),
+        [(Horizon(), Cost(time=1.0)), (Horizon(time=10.0), EFFORT)],
+        ids=["free", "fixed"],
+    )
+    def test_it_gets_there(self, horizon, cost):
+        problem = Problem(helicopter(), [0.0] * 4, [5.0, 3.0, 1.0, 2.0], cost=cost, horizon=horizon)
+        loop = controller(problem, step=2.0)
+        pose = problem.start
+        for _ in range(6):
+            _, step = loop.step(pose)
+            assert missed(step.plan, problem.goals[0]) <= 1e-9 * 10
+            assert step.violations == ()
+            if step.arrived:
+                break
+            pose = step.predicted
+        assert step.arrived
+
+
+class TestHuge:
+    @pytest.mark.parametrize("far", [1e6, -1e6])
+    def test_a_million_metres_away(self, far):
+        problem = parking_loop(start=(far, 1.0 - far, 0.0), goal=(far, -far, 0.0))
+        loop = controller(problem)
+        pose = problem.start
+        for _ in range(4):
+            _, step = loop.step(pose)
+            assert step.violations == ()
+            pose = step.predicted
+        assert distance(pose, problem.goals[0]) <= 1e-9
+        assert loop.last.accumulated_cost + loop.last.applied_cost == pytest.approx(
+            4.6615840195, abs=1e-8
+        )
+
+
+class TestSwitches:
+    COST = Cost(length=1.0, switch=0.1, direction_change=0.3)
+
+    def test_their_price_is_paid_when_they_are_driven(self):
+        problem = Problem(
+            robot(REEDS_SHEPP),
+            [0.0, 1.0, 0.0],
+            [0.0, 0.0, 0.0],
+            cost=self.COST,
+            horizon=Horizon(max_trims=5),
+        )
+        loop = controller(problem, step=0.3)
+        _, first = loop.step(problem.start)
+        step, spent = first, 0.0
+        while not step.arrived:
+            assert step.accumulated_cost == pytest.approx(spent)
+            assert spent + step.value <= first.value + 1e-9
+            assert step.violations == ()
+            spent += step.applied_cost
+            _, step = loop.step(step.predicted)
+        assert spent <= first.value + 1e-9
+
+    def test_rest_appended_for_the_price_of_a_switch(self):
+        cost = Cost(effort=1.0, switch=0.2)
+        loop = controller(straight(4.0, cost=cost))
+        _, step = loop.step([-4.0, 0.0, 0.0])
+        _, step = loop.step(step.predicted)
+        assert step.violations == ()
+
+
+def test_spin_library_turns_the_long_way_round_if_it_must():
+    problem = Problem(robot(SPIN_TOO), [0.0, 0.0, 1.0], [0.0, 0.0, 0.0], cost=EFFORT)
+    _, step = controller(problem).step(problem.start)
+    assert step.value == pytest.approx(2.0 * math.pi - 1.0)
+
+
+def test_going_on_from_a_step():
+    whole = controller()
+    _, first = whole.step([0.0, 1.0, 0.0])
+    _, second = whole.step(first.predicted)
+    again = controller(last=first)
+    _, other = again.step(first.predicted)
+    assert other.plan.durations.tolist() == second.plan.durations.tolist()
+    assert (other.number, other.value, other.origin) == (1, second.value, second.origin)

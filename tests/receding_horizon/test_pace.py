@@ -1,0 +1,87 @@
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.planning import plan
+from maneuver_automaton.receding_horizon import Guarantee, promises, simulate
+from maneuver_automaton.receding_horizon.pace import at_best_pace, base_name, is_uniform
+from tests.receding_horizon.loops import EFFORT, off_goal, parking_loop, straight, totals
+
+
+@pytest.mark.parametrize(
+    ("name", "base"),
+    [
+        ("spin", "spin"),
+        ("spin x0.5", "spin"),
+        ("spin x0.5 x1.25e-05", "spin"),
+        ("x2", "x2"),
+        ("a x b", "a x b"),
+        ("route x66", "route"),
+    ],
+)
+def test_base_name(name, base):
+    assert base_name(name) == base
+
+
+def test_the_same_path_with_uniform_effort_costs_less():
+    problem = parking_loop()
+    best = plan(problem).plan
+    better = at_best_pace(problem, best)
+    assert better.duration == pytest.approx(8.0)
+    assert better.end == pytest.approx(best.end, abs=1e-9)
+    assert problem.cost_of(better) < problem.cost_of(best)
+    assert is_uniform(better, EFFORT)
+    assert not is_uniform(best, EFFORT)
+    assert [base_name(name) for name in better.word] == ["cw", "straight", "spin"]
+    again = at_best_pace(problem, better)
+    assert problem.cost_of(again) == pytest.approx(problem.cost_of(better), rel=1e-12)
+
+
+def test_names_tell_the_pace():
+    problem = straight(2.0)
+    better = at_best_pace(problem, plan(problem).plan)
+    assert better.word == ("ahead x0.5",)
+    assert better.trims[0].control.tolist() == pytest.approx([0.5, 0.0])
+    assert better.durations.tolist() == pytest.approx([4.0])
+
+
+def test_what_does_not_move_or_is_uniform_already_is_left_alone():
+    problem = parking_loop()
+    nothing = Plan([0.0, 0.0, 0.0], (problem.automaton.trims[0],), durations=[8.0])
+    assert at_best_pace(problem, nothing) is nothing
+    uniform = at_best_pace(problem, plan(problem).plan)
+    assert problem.cost_of(at_best_pace(problem, uniform)) <= problem.cost_of(uniform) + 1e-12
+    assert not is_uniform(Plan([0.0, 0.0, 0.0], (), durations=[]), EFFORT)
+
+
+def test_in_closed_loop_the_value_falls_by_the_square_of_the_way():
+    problem = parking_loop()
+    loop = simulate(problem, step=0.5, steps=30, retimed=True)
+    assert list(loop.violations) == []
+    promised = promises(problem, step=0.5)
+    for now, after in itertools.pairwise(loop.steps):
+        least = promised.effort_decrease(now.pose, problem.goals[0])
+        assert now.value - after.value >= least - 1e-12
+        assert is_uniform(now.plan, EFFORT)
+        assert now.plan.duration == pytest.approx(8.0)
+        assert off_goal(loop, now) <= 1e-9
+    assert (totals(loop)[1:-1] <= totals(loop)[:-2] + 1e-9).all()
+    assert all(audit.passed for audit in loop.audits)
+    # asymptotically, not in finite time: the paper's Theorem 17
+    assert loop.steps_bound is None
+    assert not loop.reached
+    assert loop.steps[-1].value < 0.1 * loop.steps[0].value
+
+
+def test_a_straight_by_hand():
+    # x' = -x / T at every step: after n steps of delta, x0 (1 - delta / T)^n, and V = x^2 / T
+    loop = simulate(straight(2.0), step=1.0, steps=5, retimed=True)
+    ways = 2.0 * 0.75 ** np.arange(6)
+    assert -loop.poses[:, 0] == pytest.approx(ways, rel=1e-9)
+    assert [step.value for step in loop.steps] == pytest.approx(ways[:-1] ** 2 / 4.0, rel=1e-9)
+    assert not any(step.violations for step in loop.steps)
+    assert {one.guarantee for _, one in loop.violations} <= {Guarantee.EFFORT}

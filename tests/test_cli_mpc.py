@@ -1,0 +1,320 @@
+"""`maneuver-automaton mpc` against its contract: files, exit codes, one line for what is wrong."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from maneuver_automaton.cli import run
+from tests.scenario.files import SCENARIO, but
+
+LOOP = SCENARIO + "receding_horizon: {step_s: 0.5}\n"
+NOISE = "disturbance: {position_m: 0.01, heading_rad: 0.01, seed: 1}"
+SHAKEN = (
+    but("pose: [1.0, 1.0, 0.0]", "pose: [1.0, 1.0, 0.0], tolerance_m: 0.2, tolerance_rad: 0.2")
+    + f"receding_horizon: {{step_s: 0.5, steps: 40, {NOISE}}}\n"
+)
+AHEAD_ONLY = LOOP.replace("    - {name: spin, control: [0.0, 1.0]}\n", "")
+QUICK = ["--no-plot", "--quiet"]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, with a scenario in it."""
+    monkeypatch.chdir(tmp_path)
+    Path("x.yaml").write_text(LOOP)
+    return tmp_path
+
+
+def log(out: str = "out") -> dict[str, Any]:
+    """The content of closed_loop.json."""
+    return json.loads((Path(out) / "closed_loop.json").read_text())  # type: ignore[no-any-return]
+
+
+def untimed(document: dict[str, Any]) -> dict[str, Any]:
+    """What does not depend on how fast the machine is."""
+    steps = [{k: v for k, v in step.items() if k != "solve_s"} for step in document["steps"]]
+    return document | {"steps": steps}
+
+
+def files(out: str = "out") -> list[str]:
+    return sorted(path.name for path in Path(out).iterdir())
+
+
+def test_it_drives_to_the_goal(folder, capsys):
+    assert run(["mpc", "x.yaml"]) == 0
+    assert files() == ["closed_loop.json", "closed_loop.png"]
+    printed = capsys.readouterr()
+    assert "reached" in printed.out
+    assert "hold in every step" in printed.out
+    assert "broke" not in printed.err
+    document = log()
+    assert (document["status"], document["reached"]) == ("reached", True)
+    assert document["steps"][-1]["pose"] == pytest.approx([1.0, 1.0, 6.283185307], abs=1e-8)
+    assert document["cost"] == pytest.approx(document["steps"][0]["value"])
+    assert document["audit"]["failed"] == 0
+    assert document["audit"]["pieces"] == len(document["steps"]) - 1
+
+
+def test_quiet_prints_nothing(folder, capsys):
+    assert run(["mpc", "x.yaml", *QUICK, "--out", "here"]) == 0
+    printed = capsys.readouterr()
+    assert (printed.out, printed.err) == ("", "")
+    assert files("here") == ["closed_loop.json"]
+
+
+def test_pictures_of_an_earlier_loop_are_removed(folder):
+    assert run(["mpc", "x.yaml", "--quiet"]) == 0
+    assert run(["mpc", "x.yaml", *QUICK]) == 0
+    assert files() == ["closed_loop.json"]
+
+
+def test_steps(folder, capsys):
+    assert run(["mpc", "x.yaml", "--steps", "3", *QUICK]) == 1
+    document = log()
+    assert len(document["steps"]) == 4
+    assert (document["status"], document["reached"]) == ("steps_spent", False)
+    message = "x.yaml: steps_spent: the goal is not reached after 3 steps\n"
+    assert capsys.readouterr().err == message
+    first, last = document["steps"][0], document["steps"][-1]
+    assert last["value"] + last["accumulated_cost"] == pytest.approx(first["value"])
+
+
+def test_nothing_leads_there(folder, capsys):
+    Path("x.yaml").write_text(AHEAD_ONLY)
+    assert run(["mpc", "x.yaml", *QUICK]) == 1
+    document = log()
+    assert document["status"] == "no_plan"
+    assert len(document["steps"]) == 1
+    assert capsys.readouterr().err.startswith("x.yaml: no_plan: recursive feasibility: no plan")
+
+
+def test_the_start_is_the_goal(folder, capsys):
+    Path("x.yaml").write_text(LOOP.replace("[1.0, 1.0, 0.0]", "[0.0, 0.0, 0.0]"))
+    assert run(["mpc", "x.yaml"]) == 0
+    assert "nothing to do: the start is the goal" in capsys.readouterr().out
+    assert len(log()["steps"]) == 1
+
+
+class TestSeed:
+    def test_the_same_repeats_and_another_differs(self, folder, capsys):
+        Path("x.yaml").write_text(SHAKEN)
+        for name, seed in (("a", "3"), ("b", "3"), ("c", "4")):
+            run(["mpc", "x.yaml", "--seed", seed, "--out", name, *QUICK])
+        assert untimed(log("a")) == untimed(log("b"))
+        assert log("a")["steps"][1]["pose"] != log("c")["steps"][1]["pose"]
+
+    def test_that_of_the_file_unless_told(self, folder, capsys):
+        Path("x.yaml").write_text(SHAKEN)
+        run(["mpc", "x.yaml", "--out", "a", *QUICK])
+        run(["mpc", "x.yaml", "--out", "b", "--seed", "1", *QUICK])
+        assert untimed(log("a")) == untimed(log("b"))
+
+    def test_what_was_broken_is_said(self, folder, capsys):
+        Path("x.yaml").write_text(SHAKEN)
+        run(["mpc", "x.yaml", *QUICK])
+        lines = capsys.readouterr().err.splitlines()
+        broken = log()["broken_guarantees"]
+        assert broken
+        assert lines[: len(broken)] == [
+            f"x.yaml: step {one['step']} broke a guarantee: {one['guarantee']}: {one['reason']}"
+            for one in broken
+        ]
+
+
+class TestStatistics:
+    def test_over_seeds(self, folder, capsys):
+        Path("x.yaml").write_text(SHAKEN)
+        code = run(["mpc", "x.yaml", "--seeds", "3", "--seed", "5"])
+        assert files() == ["statistics.json"]
+        document = json.loads(Path("out/statistics.json").read_text())
+        assert [row["seed"] for row in document["loops"]] == [5, 6, 7]
+        assert code == (0 if document["reached"] == 1.0 else 1)
+        assert "loops:" in capsys.readouterr().out
+
+    def test_each_is_the_loop_of_its_seed(self, folder):
+        Path("x.yaml").write_text(SHAKEN)
+        run(["mpc", "x.yaml", "--seeds", "2", *QUICK])
+        run(["mpc", "x.yaml", "--seed", "1", "--out", "one", *QUICK])
+        rows = json.loads(Path("out/statistics.json").read_text())["loops"]
+        assert rows[1]["cost"] == log("one")["cost"]
+        assert rows[1]["steps"] == len(log("one")["steps"]) - 1
+
+    @pytest.mark.skipif(
+        importlib.util.find_spec("distributed") is not None, reason="Dask is installed"
+    )
+    @pytest.mark.parametrize("address", ["local", "tcp://host:8786"])
+    def test_without_dask(self, folder, capsys, address):
+        assert run(["mpc", "x.yaml", "--seeds", "2", "--dask", address, *QUICK]) == 2
+        assert capsys.readouterr().err == (
+            f"x.yaml: receding_horizon: scheduler: got '{address}', but Dask is not installed; "
+            "need `pip install distributed`\n"
+        )
+
+
+class TestResume:
+    def test_it_goes_on_as_if_it_had_not_stopped(self, folder):
+        Path("x.yaml").write_text(SHAKEN)
+        code = run(["mpc", "x.yaml", "--out", "whole", *QUICK])
+        run(["mpc", "x.yaml", "--out", "half", "--steps", "4", *QUICK])
+        resume = ["--resume", "half/closed_loop.json"]
+        assert run(["mpc", "x.yaml", "--out", "rest", "--steps", "36", *resume, *QUICK]) == code
+        whole, half, rest = (untimed(log(name)) for name in ("whole", "half", "rest"))
+        assert half["steps"][:4] == whole["steps"][:4]
+        for one, other in zip(rest["steps"], whole["steps"][4:], strict=True):
+            assert one == other
+        assert rest["cost"] == whole["cost"]
+
+    def test_at_the_goal_there_is_nothing_left(self, folder):
+        run(["mpc", "x.yaml", *QUICK])
+        cost = log()["cost"]
+        assert run(["mpc", "x.yaml", "--resume", "out/closed_loop.json", *QUICK]) == 0
+        assert len(log()["steps"]) == 1
+        assert log()["cost"] == cost
+
+    @pytest.mark.parametrize(
+        ("make", "message"),
+        [
+            (lambda path: None, "old.json: no such file"),
+            (lambda path: path.write_text("{"), "old.json:1: not valid JSON: Expecting property"),
+            (lambda path: path.write_text("{}"), "old.json: is no closed_loop.json, need"),
+            (lambda path: path.mkdir(), "old.json: is a folder, need a closed_loop.json"),
+        ],
+    )
+    def test_from_no_log(self, folder, capsys, make, message):
+        make(Path("old.json"))
+        assert run(["mpc", "x.yaml", "--resume", "old.json", *QUICK]) == 2
+        assert capsys.readouterr().err.startswith(message)
+
+    def test_from_a_log_of_another_library(self, folder, capsys):
+        run(["mpc", "x.yaml", *QUICK])
+        Path("x.yaml").write_text(LOOP.replace("control: [1.0, 0.0]", "control: [0.5, 0.0]"))
+        assert run(["mpc", "x.yaml", "--resume", "out/closed_loop.json", *QUICK]) == 2
+        assert capsys.readouterr().err == (
+            f"{Path('out/closed_loop.json')}: automaton_hash: this loop was planned with another "
+            "library\n"
+        )
+
+    def test_from_a_log_towards_a_goal_that_is_not_there(self, folder, capsys):
+        run(["mpc", "x.yaml", "--steps", "2", *QUICK])
+        capsys.readouterr()
+        text = Path("out/closed_loop.json").read_text().replace('"goal": 0', '"goal": 7')
+        Path("old.json").write_text(text)
+        assert run(["mpc", "x.yaml", "--resume", "old.json", *QUICK]) == 2
+        assert capsys.readouterr().err == (
+            "x.yaml: receding_horizon: the last step leads to goal 7, need one of the 1, counted "
+            "from 0\n"
+        )
+
+
+class TestFolder:
+    def test_each_scenario_into_its_own(self, folder):
+        Path("many").mkdir()
+        for name in ("a.yaml", "b.yml"):
+            Path("many", name).write_text(LOOP)
+        Path("many/notes.txt").write_text("no scenario")
+        assert run(["mpc", "many", *QUICK]) == 0
+        assert files() == ["a", "b"]
+        assert log("out/a")["reached"] is True
+
+    def test_one_bad_file_does_not_stop_the_others(self, folder, capsys):
+        Path("many").mkdir()
+        Path("many/a.yaml").write_text("schema: 1\n")
+        Path("many/b.yaml").write_text(AHEAD_ONLY)
+        Path("many/c.yaml").write_text(LOOP)
+        assert run(["mpc", "many", *QUICK]) == 2
+        assert log("out/c")["reached"] is True
+        lines = capsys.readouterr().err.splitlines()
+        assert lines[0].startswith(f"{Path('many/a.yaml')}:1: ")
+        assert "no_plan" in lines[1]
+
+    def test_nothing_in_it(self, folder, capsys):
+        Path("none").mkdir()
+        assert run(["mpc", "none"]) == 2
+        assert capsys.readouterr().err == (
+            "none: holds no scenario, need a file ending in .yaml or .yml\n"
+        )
+
+    def test_two_files_of_one_name(self, folder, capsys):
+        Path("many").mkdir()
+        for name in ("a.yaml", "a.yml"):
+            Path("many", name).write_text(LOOP)
+        assert run(["mpc", "many", *QUICK]) == 2
+        message = f"{Path('many/a.yml')}: has the same name as a.yaml, need another one\n"
+        assert capsys.readouterr().err == message
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            SCENARIO,
+            "x.yaml: receding_horizon: missing, need {step_s: ...}, the time between two plans",
+        ),
+        (
+            LOOP.replace("time_s: free", "time_s: 8.0").replace("step_s: 0.5", "step_s: 9"),
+            "x.yaml: receding_horizon: step is 9 s, need at most the horizon, 8 s",
+        ),
+        (
+            LOOP.replace("time_s: free", "time_s: 8.0").replace(
+                "    - {name: rest, control: [0.0, 0.0]}\n", ""
+            ),
+            "x.yaml: receding_horizon: a fixed time needs a rest trim, which prolongs the last "
+            "plan; the library has none",
+        ),
+        (
+            LOOP.replace("step_s: 0.5", "step_s: 0.5, retimed: true"),
+            "x.yaml: receding_horizon: retimed plans need a fixed horizon and a cost with effort",
+        ),
+        (
+            LOOP.replace("step_s: 0.5", "step_s: 0.5, disturbance: {twist_scale: [1, 1, 1, 1]}"),
+            "x.yaml: receding_horizon: disturbance: twist_scale: got shape (4,), need 3 "
+            "components last",
+        ),
+    ],
+)
+def test_what_does_not_fit_is_said_in_one_line(folder, capsys, text, message):
+    Path("x.yaml").write_text(text)
+    assert run(["mpc", "x.yaml", *QUICK]) == 2
+    printed = capsys.readouterr()
+    assert printed.err == f"{message}\n"
+    assert printed.out == ""
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["nowhere.yaml"], "nowhere.yaml: no such file"),
+        (["x.yaml", "--out", "x.yaml"], "x.yaml: cannot be written: File exists"),
+        (["x.yaml", "--time-limit", "0"], "--time-limit: got 0.0, need a positive number of "
+         "seconds"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_done_is_said_in_one_line(folder, capsys, options, message):
+    assert run(["mpc", *options]) == 2
+    assert capsys.readouterr().err == f"{message}\n"
+
+
+@pytest.mark.parametrize(
+    "options",
+    [[], ["--steps", "0"], ["--seed", "-1"], ["--seeds", "0"], ["--jobs", "0"], ["--stpes", "3"]],
+)
+def test_wrong_usage_is_exit_code_2(folder, options):
+    assert run(["mpc", *(["x.yaml"] if options else []), *options]) == 2
+
+
+def test_a_tiny_budget_still_arrives(folder):
+    assert run(["mpc", "x.yaml", "--time-limit", "1e-9", *QUICK]) == 0
+    kinds = {one["guarantee"] for one in log()["broken_guarantees"]}
+    assert kinds <= {"time budget"}
+
+
+def test_an_animation_on_demand(folder):
+    Path("x.yaml").write_text(LOOP.replace("step_s: 0.5", "step_s: 2.0"))
+    assert run(["mpc", "x.yaml", "--quiet", "--no-plot", "--animate"]) == 0
+    assert {"closed_loop.gif", "closed_loop.json"} <= set(files())
+    assert "closed_loop.png" not in files()
