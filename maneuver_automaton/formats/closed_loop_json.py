@@ -146,6 +146,7 @@ def _step(step: Step, vehicle_pose: list[float]) -> dict[str, Any]:
         "solve_s": step.solve_s,
         "number": step.number,
         "vehicle_pose": vehicle_pose,
+        "measured_pose": None if step.measured is None else step.measured.tolist(),
         "goal": step.goal_index,
         "applied_s": step.applied,
         "applied_cost": step.applied_cost,
@@ -201,6 +202,7 @@ def _step_of(number: int, entry: Mapping[str, Any], automaton: Automaton) -> Ste
         solve_s=float(entry["solve_s"]),
         number=int(entry["number"]),
         arrived=bool(entry["arrived"]),
+        measured=None if entry["measured_pose"] is None else np.array(entry["measured_pose"]),
         violations=tuple(
             Violation(guarantee=Guarantee(one["guarantee"]), reason=one["reason"])
             for one in entry["broken_guarantees"]

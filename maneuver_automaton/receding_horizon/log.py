@@ -69,6 +69,7 @@ class Step:
     number: int  # 0 for the first
     arrived: bool = False  # nothing remains to be done but to rest
     violations: tuple[Violation, ...] = ()
+    measured: Array | None = None  # (dof,) what was seen meanwhile, if it is used a step later
 
     def __post_init__(self) -> None:
         freeze(self, "pose", last=(3, 4))

@@ -131,7 +131,9 @@ def simulate(
     for _ in range(begin):  # the numbers that the steps before have used
         next(random)
     where = np.array(problem.start)
-    measured_late = where
+    before, measured_late = last, where
+    if last is not None and last.measured is not None:
+        measured_late = last.measured
     log: list[Step] = []
     poses, times, driven, audits = [where], [_begin(problem, last)], [], []
     inside: list[bool] = [_inside(problem, where)]
@@ -141,10 +143,13 @@ def simulate(
         draw = next(random)
         measured = where + draw.measurement
         seen = measured
-        if upset.delay and log:  # a step late: what has been applied since is a group element
-            seen = _after(log[-1], measured_late)
+        if upset.delay and before is not None:  # what has been applied since is a group element
+            seen = _after(before, measured_late)
         measured_late = measured
         _, now = controller.step(seen)
+        if upset.delay:
+            now = replace(now, measured=measured)
+        before = now
         log.append(now)
         if progress is not None:
             progress(now)

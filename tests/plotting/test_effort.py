@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from maneuver_automaton.analysis.retiming import retime
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.optimal_control import (
     OptimalControlSolution,
@@ -25,6 +24,7 @@ from maneuver_automaton.plotting.effort import (
     draw_paces,
     draw_spreads,
 )
+from maneuver_automaton.refinement.retiming import retime
 from tests.plotting.cases import assert_picture, parking_plan, plan_of
 
 

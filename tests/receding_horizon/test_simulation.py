@@ -388,7 +388,6 @@ class TestRestart:
             assert again.cost == whole.cost
             assert again.reached == whole.reached
 
-    @pytest.mark.xfail(reason="what was measured before the last step is not in a Step")
     def test_also_where_the_pose_is_seen_late(self):
         problem = parking_loop(goal=NEAR)
         upset = Disturbance(position_m=0.02, heading_rad=0.02, delay=1, seed=3)
