@@ -19,6 +19,7 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.search.exact_end import corrected, with_fewer_digits
 from maneuver_automaton.search.library_arrays import LibraryArrays, library_arrays
 from maneuver_automaton.search.result import SearchResult, SearchStatus, Solution
 from maneuver_automaton.search.setup import MovingLibrary, SearchSetup, search_setup
@@ -88,6 +89,7 @@ def search_insertion(
     setup = search_setup(problem, goal)
     if setup.start_is_goal and (problem.horizon.time is None or setup.rest is not None):
         return resting(problem, setup)
+    exact, setup = setup.goal, with_fewer_digits(setup)
     library = library_arrays(problem, setup)
     many = len(setup.trims) > FEW
     if seeds is None:
@@ -123,7 +125,10 @@ def search_insertion(
     if time.monotonic() > deadline:
         status = SearchStatus.OUT_OF_BUDGET
     improved = [
-        work.solution(problem, library) for work in works if work.size - library.tail <= most
+        solution
+        for work in works
+        if work.size - library.tail <= most
+        for solution in work.solutions(problem, library, exact)
     ]
     solutions = tuple(_distinct(in_order(improved)))[: alternatives + 1]
     return SearchResult(
@@ -251,15 +256,22 @@ class _Work:
             self.cost,
         )
 
-    def solution(self, problem: Problem, library: LibraryArrays) -> Solution:
-        """What it has come to."""
+    def solutions(
+        self, problem: Problem, library: LibraryArrays, goal: Array
+    ) -> Iterator[Solution]:
+        """What it has come to, ending at `goal` itself; none if it cannot."""
+        word = self.word[: self.size]
+        times = corrected(library, word, self.times[: self.size], goal)
+        if times is None:
+            return
+        cost = float(self.cost) + float(library.rates[word] @ (times - self.times[: self.size]))
         kept = slice(0, self.size - library.tail)
-        word = library.trims[self.word[kept]]
-        switching = problem.cost.switching(problem.automaton.body_velocities[word])
-        return Solution(
-            word=word,
-            durations=self.times[kept].copy(),
-            cost=float(self.cost) + library.fixed_cost + switching,
+        trims = library.trims[word[kept]]
+        switching = problem.cost.switching(problem.automaton.body_velocities[trims])
+        yield Solution(
+            word=trims,
+            durations=times[kept],
+            cost=cost + library.fixed_cost + switching,
             certificate=float(self.least),
         )
 
@@ -317,8 +329,8 @@ class _Start:
             work.improve(library, LONGEST, ROUNDS, {"insertions": 0})
             if not math.isfinite(work.cost):
                 continue
-            quick = work.solution(hurry, library)
-            if limit is not None and quick.duration <= limit + 1e-9:
+            quick = next(work.solutions(hurry, library, library.goal), None)
+            if quick is not None and limit is not None and quick.duration <= limit + 1e-9:
                 met.append(self._in_library(quick.word, quick.durations))
         return met
 

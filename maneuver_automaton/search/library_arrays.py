@@ -24,6 +24,7 @@ class LibraryArrays:
     goal: Array  # (4,)
     rest: int | None  # its number here
     free_heading: bool
+    climbs: bool  # whether the first row is altitude
     n_priced: int  # all but the free turn
     fixed_cost: float  # of the whole fixed time at rest
 
@@ -74,6 +75,7 @@ def library_arrays(problem: Problem, setup: SearchSetup) -> LibraryArrays:
         goal=np.array(setup.goal),
         rest=rest,
         free_heading=setup.free_heading,
+        climbs=setup.climbs,
         n_priced=n_priced,
         fixed_cost=setup.rest_rate * limit if rest is not None and limit is not None else 0.0,
     )

@@ -379,3 +379,20 @@ def test_interpreted_kernels_give_the_compiled_results():
         assert again == word
         assert later == pytest.approx(times, abs=1e-8)
         assert price == pytest.approx(cost, abs=1e-10)
+
+
+@compiled_only
+@pytest.mark.parametrize("most", [4, 6])
+@pytest.mark.parametrize("start", [[0.0, 1.0, 0.0], [0.0, 0.5, 0.0], [-1.2, 0.7, 2.0]])
+def test_a_moved_problem_has_the_moved_word_under_a_limit(start, most):
+    """Mirrored words cost the same: which one is found must not hang on the last bit."""
+    horizon = Horizon(time=8.0, max_trims=most)
+    library = Automaton.of_grid(Unicycle(), [AXIS, AXIS])
+    problem = Problem(library, start, [0.0, 0.0, 0.0], cost=Cost(effort=1.0), horizon=horizon)
+    here = search_insertion(problem, problem.goals[0]).solutions[0]
+    for by in ([3.0, -2.0, 0.7], [40.0, 7.0, -2.9]):
+        moved = problem.moved(SE2(by))
+        there = search_insertion(moved, moved.goals[0]).solutions[0]
+        assert there.word.tolist() == here.word.tolist()
+        assert there.cost == pytest.approx(here.cost, abs=1e-9)
+        np.testing.assert_allclose(there.durations, here.durations, atol=1e-7)

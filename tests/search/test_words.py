@@ -480,7 +480,6 @@ def test_a_moved_problem_has_the_same_alternatives(start):
         assert_same_solutions(here, search(problem.moved(by), alternatives=8))
 
 
-@pytest.mark.xfail(strict=True, reason="rounding gives neighbours of a tangent word a moment each")
 def test_a_moved_problem_with_a_tangent_solution_has_the_same_alternatives():
     # acw, cw are tangent circles here: words with one trim more touch the goal for no time at all
     problem = parking()
