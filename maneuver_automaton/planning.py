@@ -18,6 +18,7 @@ from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.choose import load_search, search_goal
 from maneuver_automaton.search.inside import outside, stays_inside
 from maneuver_automaton.search.limits import closed_bound, why_impossible
+from maneuver_automaton.search.result import plan_of
 
 
 class PlanStatus(enum.Enum):
@@ -222,7 +223,7 @@ def _search_goals(problem: Problem, alternatives: int, deadline: float) -> _Foun
             for name, value in result.counts.items():
                 counts[name] = counts.get(name, 0) + value
             candidates += [
-                _Candidate(goal_index=index, solution=solution, plan=_as_plan(problem, solution))
+                _Candidate(goal_index=index, solution=solution, plan=plan_of(problem, solution))
                 for solution in result.solutions
             ]
     order = sorted(candidates, key=_order)
@@ -254,16 +255,6 @@ def _distinct(candidates: Iterable[_Candidate]) -> list[_Candidate]:
         else:
             kept.append(candidate)
     return kept
-
-
-def _as_plan(problem: Problem, solution: Solution) -> Plan:
-    trims = problem.automaton.trims
-    return Plan(
-        problem.start,
-        tuple(trims[k] for k in solution.word),
-        durations=solution.durations,
-        start_time=problem.start_time,
-    )
 
 
 def _audited(problem: Problem, candidates: Sequence[_Candidate], alternatives: int) -> _Chosen:

@@ -238,7 +238,7 @@ class TestFolder:
         (["plan", "case.csv"],
          "case.csv: TPCAP files are not read in this version, only scenario files (.yaml, .yml)"),
         (["mpc", "x.yaml", "--steps", "3", "--seed", "1"],
-         "mpc: this version plans in open loop only; use plan"),
+         "x.yaml: receding_horizon: missing, need {step_s: ...}, the time between two plans"),
         (["plan", "x.yaml", "--out", "x.yaml"], "x.yaml: cannot be written: File exists"),
         (["convert", "x.yaml", "x.csv"],
          "x.csv: TPCAP files are not read in this version, only scenario files (.yaml, .yml)"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -78,7 +79,7 @@ def plan_folder(folder: Path, out: Path, *, settings: Settings, jobs: int) -> in
     if jobs > 1:
         _compile_first(settings)
     work = Parallel(n_jobs=jobs, return_as="generator")(
-        delayed(_row)(path, out / path.stem, settings) for path in paths
+        delayed(_row)(path, out / path.stem, settings, Path.cwd()) for path in paths
     )
     rows: list[Row] = []
     with progress_bar("planning", len(paths), quiet=settings.quiet) as advance:
@@ -131,10 +132,14 @@ def _write(scenario: Scenario, result: PlanResult, out: Path, settings: Settings
         plotting.save_plan_animation(result.plan, out / "plan.gif", footprint=footprint)
 
 
-def _row(path: Path, out: Path, settings: Settings) -> Row:
-    """Plan one file of a folder; what goes wrong is told in the row."""
+def _row(path: Path, out: Path, settings: Settings, folder: Path) -> Row:
+    """Plan one file of a folder; what goes wrong is told in the row.
+
+    Paths are relative to `folder`: a process that works for others may have begun elsewhere.
+    """
     try:
-        result = _plan(scenario_of(path), out, settings)
+        with contextlib.chdir(folder):
+            result = _plan(scenario_of(path), out, settings)
     except Exception as error:  # noqa: BLE001, one bad file must not stop the others
         return Row(name=path.name, code=BAD_INPUT, status="bad input", reason=explained(error))
     found = result.plan is not None

@@ -15,7 +15,6 @@ from maneuver_automaton.receding_horizon.log import Origin, first_part
 from maneuver_automaton.receding_horizon.pace import at_best_pace, base_name
 from maneuver_automaton.receding_horizon.shifting import costliest_first, rest_of
 from maneuver_automaton.search.inside import outside, stays_inside
-from maneuver_automaton.search.result import Solution
 from maneuver_automaton.search.words import TIE
 
 EXACT = 1e-9  # [m, rad] a pose this close to a goal is the goal; to a plan, on it
@@ -83,17 +82,6 @@ def candidate(
 def allowed(here: Problem, plan: Plan) -> bool:
     """Whether a plan stays inside the bounds, unless the vehicle is outside of them already."""
     return bool(outside(here.start, here.bounds)) or stays_inside(plan, here.bounds)
-
-
-def as_plan(problem: Problem, solution: Solution) -> Plan:
-    """What a search found, as a plan from the problem's start."""
-    trims = problem.automaton.trims
-    return Plan(
-        problem.start,
-        tuple(trims[k] for k in solution.word),
-        durations=solution.durations,
-        start_time=problem.start_time,
-    )
 
 
 def cost_until(problem: Problem, plan: Plan, until: float) -> float:

@@ -17,7 +17,6 @@ from maneuver_automaton.receding_horizon.candidates import (
     Candidate,
     Settings,
     allowed,
-    as_plan,
     candidate,
     within,
 )
@@ -33,7 +32,7 @@ from maneuver_automaton.receding_horizon.reanchoring import (
 )
 from maneuver_automaton.receding_horizon.shifting import merged, rest_of
 from maneuver_automaton.search.choose import search_goal
-from maneuver_automaton.search.result import SearchStatus
+from maneuver_automaton.search.result import SearchStatus, plan_of
 from maneuver_automaton.search.words import TIE
 
 SECOND_OPINION = 0.02  # [s] for short words beside insertion
@@ -239,7 +238,7 @@ class Decision:
                 self._over_budget()
             for result in results:
                 for solution in result.solutions:
-                    plan = as_plan(here, solution)
+                    plan = plan_of(here, solution)
                     if allowed(here, plan):
                         found.append(self._candidate(plan, index, Origin.SEARCHED))
         return found
@@ -305,7 +304,7 @@ class Decision:
             for result in search_goal(
                 hurry, goal, alternatives=0, time_limit=self.settings.time_limit
             ):
-                plans += [as_plan(here, solution) for solution in result.solutions]
+                plans += [plan_of(here, solution) for solution in result.solutions]
             found += [
                 self._candidate(self._padded(plan), index, Origin.SEARCHED)
                 for plan in plans

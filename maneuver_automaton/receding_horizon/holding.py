@@ -12,12 +12,12 @@ from maneuver_automaton.problem import Goal, Horizon, Problem
 from maneuver_automaton.receding_horizon.candidates import (
     Candidate,
     Settings,
-    as_plan,
     candidate,
     within,
 )
 from maneuver_automaton.receding_horizon.log import Origin
 from maneuver_automaton.search.choose import search_goal
+from maneuver_automaton.search.result import plan_of
 
 MOST_STEPS = 4  # that a plan within the goal's set may take
 ALTERNATIVES = 1  # dearer plans, of which one may stay in the set
@@ -49,7 +49,7 @@ def holding(here: Problem, settings: Settings, goal_index: int) -> Candidate | N
             candidate(
                 near,
                 settings,
-                as_plan(near, solution),
+                plan_of(near, solution),
                 goal_index=goal_index,
                 origin=Origin.SEARCHED,
             )

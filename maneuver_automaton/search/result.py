@@ -6,6 +6,8 @@ import enum
 from dataclasses import dataclass, field
 
 from maneuver_automaton._arrays import Array, IntArray, freeze
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.problem import Problem
 
 
 class SearchStatus(enum.Enum):
@@ -43,3 +45,14 @@ class SearchResult:
     complete: bool  # every locally optimal solution within the limits is listed
     exhaustive: bool = False  # every admitted word was searched, so the first solution is the best
     counts: dict[str, int] = field(default_factory=dict)
+
+
+def plan_of(problem: Problem, solution: Solution) -> Plan:
+    """What a search found, as a plan from the problem's start."""
+    trims = problem.automaton.trims
+    return Plan(
+        problem.start,
+        tuple(trims[k] for k in solution.word),
+        durations=solution.durations,
+        start_time=problem.start_time,
+    )
