@@ -76,14 +76,13 @@ class Decision:
         self.bound = -math.inf
         self.off_plan: float | None = None
         self.rest: Plan | None = None
-        self.planned: Plan | None = None  # the same from where the last plan had said
+        self.passed = passed
         if last is not None:
             goal = Goal(pose=last.plan.pose_at(last.time + passed))
             off = distance(here.start, goal)
             self.off_plan = 0.0 if off <= EXACT * (1.0 + float(np.abs(here.start).max())) else off
             pad = settings.pad_of(here)
             self.rest = rest_of(last.plan, passed, start=here.start, pad=pad)
-            self.planned = rest_of(last.plan, passed, pad=pad)
 
     def chosen(self) -> Chosen:
         """The plan to apply."""
@@ -183,9 +182,15 @@ class Decision:
             violations=(),
         )
 
+    def _planned(self) -> Plan:
+        """The rest of the last plan from where it had said the vehicle would be."""
+        if self.last is None:
+            return Plan(self.here.start, (), durations=[], start_time=self.here.start_time)
+        return rest_of(self.last.plan, self.passed, pad=self.settings.pad_of(self.here))
+
     def _kept(self) -> Candidate | None:
         """The rest of the last plan from here: as it is, or made to meet the goal again."""
-        if self.rest is None or self.planned is None or self.last is None:
+        if self.rest is None or self.last is None:
             return None
         here, index = self.here, self.last.goal_index
         goal = here.goals[index]
@@ -197,7 +202,7 @@ class Decision:
             if solved is not None:
                 plans.append((solved, Origin.REANCHORED))
         else:
-            around = reanchored(here, self.planned, goal, pad=pad)
+            around = reanchored(here, self._planned(), goal, pad=pad)
             first = next(around, None)
             if first is not None:
                 plans.append((first, Origin.REANCHORED))
@@ -299,8 +304,7 @@ class Decision:
         hurry = quickest(here)
         found: list[Candidate] = []
         for index, goal in enumerate(here.goals):
-            nothing = Plan(here.start, (), durations=[], start_time=here.start_time)
-            plans = list(rejoining(hurry, self.planned or nothing, goal, pad=None))
+            plans = list(rejoining(hurry, self._planned(), goal, pad=None))
             for result in search_goal(
                 hurry, goal, alternatives=0, time_limit=self.settings.time_limit
             ):

@@ -296,7 +296,8 @@ class _Job:
             until = min(number + chunk, last)
             ceiling = _tied(float(self.found.best[-1]))
             number = scan(mode.kernel_problem, self.candidates, n + tail, number, until, ceiling)
-            self.polish(mode.kernel_problem, self.candidates, self.found, self.most)
+            if self.candidates.counter[0]:
+                self.polish(mode.kernel_problem, self.candidates, self.found, self.most)
             if time.monotonic() > deadline:
                 return False
             if max_words is not None and self.n_words >= max_words:
