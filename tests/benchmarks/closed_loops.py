@@ -77,8 +77,8 @@ def report(name: str, statistics: Statistics, seconds: float, *, noise: bool) ->
     )
     for cause, count in causes.most_common():
         print(f"    {count} x {cause}")
-    unreached = [one for one in outcomes if not one.reached]
-    for one in unreached[:10]:
+    unhappy = [one for one in outcomes if not one.reached or (noise and not one.stayed)]
+    for one in unhappy[:10]:
         print(f"    from {one.start.round(4).tolist()}: {one.reason}")
     if not noise:
         for one in outcomes:
