@@ -10,6 +10,7 @@ import numpy as np
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.problem import Goal, Horizon, Problem
 from maneuver_automaton.receding_horizon.candidates import (
+    EXACT,
     Candidate,
     Settings,
     candidate,
@@ -21,14 +22,15 @@ from maneuver_automaton.search.result import plan_of
 
 MOST_STEPS = 4  # that a plan within the goal's set may take
 ALTERNATIVES = 1  # dearer plans, of which one may stay in the set
+CALM = 0.5  # share of the tolerance that a plan of several steps may use up at the next step
 FINE = 0.01  # [m, rad] between the poses that are looked at
 
 
 def holding(here: Problem, settings: Settings, goal_index: int) -> Candidate | None:
     """A plan to the middle of a goal's set within a step or a few.
 
-    The cheapest that stays in the set all along, otherwise one that is inside whenever the loop
-    closes; None if there is neither.
+    The cheapest that stays in the set all along and does not linger at its edge, otherwise one that
+    is inside whenever the loop closes; None if there is neither.
     """
     goal = here.goals[goal_index]
     middle = replace(goal, tolerance_m=0.0, tolerance_rad=0.0)
@@ -57,11 +59,24 @@ def holding(here: Problem, settings: Settings, goal_index: int) -> Candidate | N
             for solution in result.solutions
         ]
         for one in sorted(found, key=lambda candidate: candidate.cost):
-            if _stays(one.plan, goal):
+            calm = steps == 1 or _share(one.plan, goal, settings.step) <= CALM
+            if calm and _stays(one.plan, goal):
                 return one
             if second is None and _inside_at_steps(one.plan, goal, settings.step):
                 second = one
     return second
+
+
+def _share(plan: Plan, goal: Goal, step: float) -> float:
+    """How much of the tolerance is used up at the next step, 1 at the edge of the set."""
+    pose = plan.pose_at(plan.start_time + step)
+    places = [0, 1, *range(3, pose.size)]
+    way = float(np.linalg.norm(pose[places] - goal.pose[places]))
+    turn = abs(math.remainder(float(pose[2] - goal.pose[2]), 2.0 * math.pi))
+    shares = [way / max(goal.tolerance_m, EXACT)]
+    if not goal.free_heading:
+        shares.append(turn / max(goal.tolerance_rad, EXACT))
+    return max(shares)
 
 
 def _stays(plan: Plan, goal: Goal) -> bool:
