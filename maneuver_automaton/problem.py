@@ -52,6 +52,19 @@ class Goal:
             if not (math.isfinite(value) and value >= 0.0):
                 raise ValueError(f"goal: {name} must be a number of at least 0, got {value}")
 
+    def off(self, pose: Array) -> tuple[float, float]:
+        """How far a pose (dof,) is from this one: way [m] and turn [rad], 0 if any heading will do.
+
+        Examples
+        --------
+        >>> Goal(pose=[1.0, 0.0, 0.0]).off(np.array([1.0, 2.0, 2 * np.pi]))
+        (2.0, 0.0)
+        """
+        places = [0, 1, *range(3, self.pose.size)]
+        way = float(np.linalg.norm(pose[places] - self.pose[places]))
+        turn = math.remainder(float(pose[2] - self.pose[2]), 2.0 * math.pi)
+        return way, 0.0 if self.free_heading else abs(turn)
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Horizon:
@@ -153,6 +166,11 @@ class Problem:
         dof = self.automaton.model.group.dof
         if isinstance(self.start, SE2 | SE2xR):
             object.__setattr__(self, "start", self.start.pose)
+        if type(self.cost).__hash__ is None:
+            raise ValueError(
+                f"cost: {type(self.cost).__name__} has no hash; need a value that does not change, "
+                "such as a frozen dataclass"
+            )
         freeze(self, "start", last=dof)
         if self.start.ndim != 1:
             raise ValueError(f"start: pose has shape {self.start.shape}, need one pose")

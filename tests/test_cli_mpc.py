@@ -19,6 +19,7 @@ SHAKEN = (
     + f"receding_horizon: {{step_s: 0.5, steps: 40, {NOISE}}}\n"
 )
 AHEAD_ONLY = LOOP.replace("    - {name: spin, control: [0.0, 1.0]}\n", "")
+SEEDS = ["--seeds", "2"]
 QUICK = ["--no-plot", "--quiet"]
 
 
@@ -127,6 +128,12 @@ class TestSeed:
 
 
 class TestStatistics:
+    def test_it_is_the_loop_that_the_file_describes(self, folder, capsys):
+        Path("x.yaml").write_text(SCENARIO + "receding_horizon: {step_s: 0.5, retimed: true}\n")
+        said = [(run(["mpc", "x.yaml", *more]), capsys.readouterr().err) for more in ([], SEEDS)]
+        assert said[0] == said[1]
+        assert "retimed plans need a fixed horizon" in said[0][1]
+
     def test_over_seeds(self, folder, capsys):
         Path("x.yaml").write_text(SHAKEN)
         code = run(["mpc", "x.yaml", "--seeds", "3", "--seed", "5"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -310,3 +311,12 @@ def test_only_what_combines_at_will_is_planned_with():
     short = Trim(name="short", body_velocity=[1, 0, 0], control=[1, 0], max_duration=0.5)
     with pytest.raises(InvalidAutomaton, match=r"^trim 'short': got max_duration 0.5 s, but this"):
         Problem(Automaton(Unicycle(), (short,)), [0, 0, 0], [1, 0, 0])
+
+
+def test_a_cost_is_a_value():
+    @dataclass
+    class Changing:
+        weight: float = 1.0
+
+    with pytest.raises(ValueError, match="Changing has no hash; need a value"):
+        problem([0, 0, 0], [1, 2, 3], cost=Changing())

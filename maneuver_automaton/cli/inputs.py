@@ -31,6 +31,21 @@ def scenario_of(path: Path) -> Scenario:
     return load_scenario(path)
 
 
+def scenarios_in(folder: Path) -> list[Path]:
+    """Every scenario of a folder; InvalidScenario if there is none, or two have one name."""
+    paths = sorted(path for path in folder.iterdir() if path.suffix in SCENARIO_ENDINGS)
+    if not paths:
+        raise InvalidScenario(f"{folder}: holds no scenario, need a file ending in .yaml or .yml")
+    seen: dict[str, Path] = {}
+    for path in paths:
+        if path.stem in seen:
+            raise InvalidScenario(
+                f"{path}: has the same name as {seen[path.stem].name}, need another one"
+            )
+        seen[path.stem] = path
+    return paths
+
+
 def automaton_of(path: Path) -> Automaton:
     """The automaton of a library (.json) or of a scenario."""
     from maneuver_automaton.automaton.library import load_library

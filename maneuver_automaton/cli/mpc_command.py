@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
-from maneuver_automaton.cli.inputs import SCENARIO_ENDINGS, make_folder, not_written, scenario_of
+from maneuver_automaton.cli.inputs import make_folder, not_written, scenario_of, scenarios_in
 from maneuver_automaton.cli.progress import progress_bar
 from maneuver_automaton.errors import InvalidScenario
 
@@ -68,14 +68,9 @@ def drive_file(path: Path, out: Path, *, settings: Settings) -> int:
 def drive_folder(folder: Path, out: Path, *, settings: Settings) -> int:
     """Close the loop of every scenario of a folder that has one, each into `out`/STEM."""
     from maneuver_automaton.cli.guard import BAD_INPUT, explained
-    from maneuver_automaton.cli.plan_command import _check_stems
 
-    paths = sorted(path for path in folder.iterdir() if path.suffix in SCENARIO_ENDINGS)
-    if not paths:
-        raise InvalidScenario(f"{folder}: holds no scenario, need a file ending in .yaml or .yml")
-    _check_stems(paths)
     codes = []
-    for path in paths:
+    for path in scenarios_in(folder):
         try:
             if scenario_of(path).receding_horizon is None:
                 continue  # for plan, not for mpc
@@ -151,6 +146,7 @@ def _statistics(path: Path, scenario: Scenario, out: Path, settings: Settings) -
                 margin=part.margin,
                 time_limit=settings.time_limit or scenario.time_limit_s,
                 stay=part.stay,
+                retimed=part.retimed,
                 jobs=settings.jobs,
                 scheduler=settings.scheduler,
                 progress=count,

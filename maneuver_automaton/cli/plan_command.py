@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
-from maneuver_automaton.cli.inputs import SCENARIO_ENDINGS, make_folder, not_written, scenario_of
+from maneuver_automaton.cli.inputs import make_folder, not_written, scenario_of, scenarios_in
 from maneuver_automaton.cli.progress import progress_bar
 from maneuver_automaton.errors import InvalidScenario
 
@@ -68,10 +68,7 @@ def plan_file(path: Path, out: Path, *, settings: Settings) -> int:
 
 def plan_folder(folder: Path, out: Path, *, settings: Settings, jobs: int) -> int:
     """Plan every scenario of a folder into `out`/STEM, print a table, return the exit code."""
-    paths = sorted(path for path in folder.iterdir() if path.suffix in SCENARIO_ENDINGS)
-    if not paths:
-        raise InvalidScenario(f"{folder}: holds no scenario, need a file ending in .yaml or .yml")
-    _check_stems(paths)
+    paths = scenarios_in(folder)
     from joblib import Parallel, delayed
 
     make_folder(out)
@@ -162,16 +159,6 @@ def _compile_first(settings: Settings) -> None:
     with announced(quiet=settings.quiet):
         load_word_kernels(4)
         load_insertion_kernels()
-
-
-def _check_stems(paths: list[Path]) -> None:
-    seen: dict[str, Path] = {}
-    for path in paths:
-        if path.stem in seen:
-            raise InvalidScenario(
-                f"{path}: has the same name as {seen[path.stem].name}, need another one"
-            )
-        seen[path.stem] = path
 
 
 def _print_rows(rows: list[Row]) -> None:

@@ -28,6 +28,7 @@ NARROW = 10.0  # costs within this factor are numbered by round numbers, not by 
 
 
 ROUND = (1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)  # costs numbered in every decade
+CLOSE = (*(k / 20.0 for k in range(20, 60, 4)), *(k / 4.0 for k in range(12, 40)))
 FINE = tuple(k / 20.0 for k in range(20, 200))  # where the costs are very near each other
 
 
@@ -157,7 +158,7 @@ def _number_costs(ax: Axes, costs: Array) -> None:
     room = (high / low) ** 0.1 if high > low else 1.5
     ax.set_ylim(low / room, high * room)
     if high / low < NARROW:
-        steps = ROUND if high / low > 1.6 else FINE
+        steps = ROUND if high / low > 2.5 else CLOSE if high / low > 1.3 else FINE
         decades = 10.0 ** np.arange(np.floor(np.log10(low)) - 1, np.ceil(np.log10(high)) + 1)
         ticks = np.multiply.outer(decades, steps).ravel()
         inside = ticks[(ticks >= low / room) & (ticks <= high * room)]

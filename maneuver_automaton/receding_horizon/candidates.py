@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,11 +98,8 @@ def is_rest_of(plan: Plan, rest: Plan | None) -> bool:
 
 def within(pose: Array, goal: Goal) -> bool:
     """Whether a pose is a goal, to within its tolerances (1e-9 where they are 0)."""
-    places = [0, 1, *range(3, pose.size)]
-    way = float(np.linalg.norm(pose[places] - goal.pose[places]))
-    turn = abs(math.remainder(float(pose[2] - goal.pose[2]), 2.0 * math.pi))
-    heading = goal.free_heading or turn <= goal.tolerance_rad + EXACT
-    return way <= goal.tolerance_m + EXACT and heading
+    way, turn = goal.off(pose)
+    return way <= goal.tolerance_m + EXACT and turn <= goal.tolerance_rad + EXACT
 
 
 def _moving(plan: Plan) -> list[str]:

@@ -188,6 +188,7 @@ class RecedingHorizon:
 
     def _logged(self, chosen: Chosen, here: Problem, last: Step | None, began: float) -> Step:
         plan, goal = chosen.plan, here.goals[chosen.goal_index]
+        retimed = self.settings.retimed
         applied = min(self.settings.step, plan.duration) if plan.trims else self.settings.step
         now = Step(
             time=here.start_time,
@@ -202,15 +203,13 @@ class RecedingHorizon:
             replanned=last is not None and not is_rest_of(plan, chosen.rest),
             shifted_value=chosen.shifted_value,
             off_plan=chosen.off_plan,
-            lower_bound=min(chosen.value, max(chosen.bound, closed_bound(here, goal))),
+            lower_bound=min(chosen.value, self._bound(chosen, here)),
             exhaustive=chosen.exhaustive,
             solve_s=time.monotonic() - began,
             number=0 if last is None else last.number + 1,
             arrived=chosen.arrived,
         )
-        if (
-            last is None or now.off_plan
-        ) and not self.settings.retimed:  # from here on, undisturbed
+        if (last is None or now.off_plan) and not retimed:  # from here on, undisturbed
             bound = self.promises.most_steps(now.value)
             self.most_steps = None if bound is None else bound + now.number
         found = list(chosen.violations)
@@ -220,12 +219,20 @@ class RecedingHorizon:
                 goal,
                 last,
                 now,
-                most_steps=None if self.settings.retimed else self.most_steps,
-                uniform=self.settings.retimed and is_uniform(now.plan, here.cost),
+                most_steps=None if retimed else self.most_steps,
+                uniform=retimed and is_uniform(now.plan, here.cost),
             )
-        if not (now.arrived or self.settings.retimed) and math.isfinite(now.value):
+        if not (now.arrived or retimed) and math.isfinite(now.value):
             found += too_cheap(self.promises, now)
         return replace(now, violations=tuple(found))
+
+    def _bound(self, chosen: Chosen, here: Problem) -> float:
+        """No plan to any goal costs less."""
+        if chosen.exhaustive:
+            return chosen.value
+        if self.settings.retimed:  # trims at another pace may cost less than those of the library
+            return min(self.promises.effort_bound(here.start, goal) for goal in here.goals)
+        return min(closed_bound(here, goal) for goal in here.goals)
 
 
 def _check_horizon(problem: Problem, step: float, pad: Trim | None, *, retimed: bool) -> None:

@@ -50,7 +50,6 @@ class Chosen:
     rest: Plan | None  # of the last plan
     shifted_value: float | None
     off_plan: float | None
-    bound: float
     exhaustive: bool
     arrived: bool
     violations: tuple[Violation, ...]
@@ -73,7 +72,6 @@ class Decision:
         self.began = began
         self.violations: list[Violation] = []
         self.exhaustive = False
-        self.bound = -math.inf
         self.off_plan: float | None = None
         self.rest: Plan | None = None
         self.passed = passed
@@ -143,7 +141,6 @@ class Decision:
             rest=self.rest,
             shifted_value=shifted_value,
             off_plan=self.off_plan,
-            bound=best.cost if self.exhaustive else self.bound,
             exhaustive=self.exhaustive,
             arrived=False,
             violations=tuple(self.violations),
@@ -176,7 +173,6 @@ class Decision:
             rest=plan if self.rest is None else self.rest,
             shifted_value=shifted,
             off_plan=self.off_plan,
-            bound=value,
             exhaustive=True,
             arrived=True,
             violations=(),
@@ -270,6 +266,7 @@ class Decision:
             and least >= kept.cost - self.settings.margin
             and self.settings.margin > 0.0
         ):
+            self.exhaustive = self.exhaustive and least == kept.cost
             return kept
         tied = [one for one in everything if one.cost <= least + TIE * (1.0 + abs(least))]
         return min(tied, key=lambda one: one.preference)

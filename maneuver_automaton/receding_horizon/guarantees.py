@@ -24,7 +24,7 @@ class Promises:
     least_rate: float  # min l over the trims that move; 0 if there is none
     rest_rate: float  # what a second of rest costs where it pads a fixed time, else 0
     time_rate: float  # c3, with a free final time
-    effort: float  # c1 lambda_min(R), with a fixed time; 0 if the bound does not apply
+    effort: float  # c1 lambda_min(R), or less where speeds are no controls; 0 if time is free
     horizon: float | None  # T [s], None if free
     step: float  # delta [s]
     switch: float = 0.0  # what it costs to switch to the rest that fills a fixed time
@@ -44,17 +44,22 @@ class Promises:
             return None
         return math.ceil(max(value, 0.0) / (self.step * rate) * (1.0 - ACCURACY))
 
+    def effort_bound(self, pose: Array, goal: Goal) -> float:
+        """lambda_R c1 |x|^2 / T: no plan costs less, at whatever pace its trims are driven.
+
+        Source: the paper, Appendix.
+        """
+        if self.horizon is None:
+            return 0.0
+        way, turn = goal.off(pose)
+        return self.effort * (way**2 + turn**2) / self.horizon
+
     def effort_decrease(self, pose: Array, goal: Goal) -> float:
         """lambda_R c1 delta |x|^2 / T^2: what continuous controls decrease the value by.
 
         Source: the paper, Theorem 17.
         """
-        if self.horizon is None:
-            return 0.0
-        places = [0, 1, *range(3, pose.size)]
-        way = float(np.sum((pose[places] - goal.pose[places]) ** 2))
-        turn = 0.0 if goal.free_heading else math.remainder(pose[2] - goal.pose[2], 2.0 * math.pi)
-        return self.effort * self.step * (way + turn**2) / self.horizon**2
+        return self.effort_bound(pose, goal) * self.step / (self.horizon or math.inf)
 
 
 def promises(problem: Problem, *, step: float) -> Promises:
@@ -79,9 +84,7 @@ def promises(problem: Problem, *, step: float) -> Promises:
     fixed = problem.horizon.time is not None
     effort = 0.0
     if fixed and isinstance(cost, Cost):
-        weight = cost.effort_matrix
-        smallest = 1.0 if weight is None else float(np.linalg.eigvalsh(weight)[0])
-        effort = cost.effort * smallest
+        effort = _least_effort(problem, cost)
     return Promises(
         least_rate=max(least, 0.0),
         rest_rate=rest,
@@ -91,6 +94,22 @@ def promises(problem: Problem, *, step: float) -> Promises:
         step=step,
         switch=cost.switch if isinstance(cost, Cost) and fixed else 0.0,
     )
+
+
+def _least_effort(problem: Problem, cost: Cost) -> float:
+    """c1 lambda_min(R), the paper's constant for the unicycle, whose controls are its speeds.
+
+    For other vehicles at most what a trim of the library spends per (m/s)^2 + (rad/s)^2.
+    """
+    weight = cost.effort_matrix
+    smallest = 1.0 if weight is None else float(np.linalg.eigvalsh(weight)[0])
+    squares = (problem.automaton.body_velocities**2).sum(axis=1)
+    moving = squares > 0.0
+    if not (cost.effort > 0.0 and moving.any()):
+        return 0.0
+    effort = Cost(effort=cost.effort, effort_matrix=weight)
+    rates = effort.rates(problem.automaton.controls, problem.automaton.body_velocities)
+    return min(cost.effort * smallest, float((rates[moving] / squares[moving]).min()))
 
 
 def broken(

@@ -69,14 +69,8 @@ def holding(here: Problem, settings: Settings, goal_index: int) -> Candidate | N
 
 def _share(plan: Plan, goal: Goal, step: float) -> float:
     """How much of the tolerance is used up at the next step, 1 at the edge of the set."""
-    pose = plan.pose_at(plan.start_time + step)
-    places = [0, 1, *range(3, pose.size)]
-    way = float(np.linalg.norm(pose[places] - goal.pose[places]))
-    turn = abs(math.remainder(float(pose[2] - goal.pose[2]), 2.0 * math.pi))
-    shares = [way / max(goal.tolerance_m, EXACT)]
-    if not goal.free_heading:
-        shares.append(turn / max(goal.tolerance_rad, EXACT))
-    return max(shares)
+    way, turn = goal.off(plan.pose_at(plan.start_time + step))
+    return max(way / max(goal.tolerance_m, EXACT), turn / max(goal.tolerance_rad, EXACT))
 
 
 def _stays(plan: Plan, goal: Goal) -> bool:

@@ -15,6 +15,7 @@ from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Horizon, Problem
 from maneuver_automaton.receding_horizon.shifting import merged
 from maneuver_automaton.search.insertion import sub_library
+from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.setup import search_setup
 from maneuver_automaton.search.words import search_setup_words
 from maneuver_automaton.switching_times import TimesStatus, solve_switching_times
@@ -110,17 +111,11 @@ def _connections(problem: Problem, goal: Goal) -> Iterator[Plan]:
         yield Plan(problem.start, (), durations=[], start_time=problem.start_time)
         return
     small = sub_library(setup)
-    trims = problem.automaton.trims
     solutions = search_setup_words(
         problem, small, alternatives=FIRST - 1, deadline=math.inf, spare=True
     )
     for solution in solutions:
-        yield Plan(
-            problem.start,
-            tuple(trims[k] for k in solution.word),
-            durations=solution.durations,
-            start_time=problem.start_time,
-        )
+        yield plan_of(problem, solution)
 
 
 def _in_time(
@@ -156,8 +151,4 @@ def missed(plan: Plan, goal: Goal) -> float:
 
 def distance(pose: Array, goal: Goal) -> float:
     """Largest of distance [m] and heading error [rad] between a pose and a goal."""
-    places = [0, 1, *range(3, pose.size)]
-    way = float(np.linalg.norm(pose[places] - goal.pose[places]))
-    if goal.free_heading:
-        return way
-    return max(way, abs(math.remainder(float(pose[2] - goal.pose[2]), 2.0 * math.pi)))
+    return max(goal.off(pose))

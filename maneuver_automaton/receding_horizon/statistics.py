@@ -78,6 +78,7 @@ def simulate_many(
     margin: float = 0.0,
     time_limit: float = 5.0,
     stay: bool = False,
+    retimed: bool = False,
     audit: bool = False,
     jobs: int = 1,
     scheduler: str | None = None,
@@ -92,7 +93,7 @@ def simulate_many(
         Poses to start from; the problem's own start if omitted.
     seeds : sequence of int
         Each start is tried with each of them.
-    step, steps, disturbance, margin, time_limit, stay, audit
+    step, steps, disturbance, margin, time_limit, stay, retimed, audit
         As in `simulate`; the seed of `disturbance` is replaced.
     jobs : int
         Processes at a time.
@@ -140,6 +141,7 @@ def simulate_many(
         margin=margin,
         time_limit=time_limit,
         stay=stay,
+        retimed=retimed,
         audit=audit,
     )
     done: list[Outcome] = []
@@ -158,6 +160,7 @@ class _Settings:
     margin: float
     time_limit: float
     stay: bool
+    retimed: bool
     audit: bool
 
 
@@ -221,6 +224,7 @@ def _outcome(problem: Problem, pose: Array, seed: int, settings: _Settings) -> O
         margin=settings.margin,
         time_limit=settings.time_limit,
         stay=settings.stay,
+        retimed=settings.retimed,
         audit=settings.audit,
     )
     return outcome_of(loop, seed=seed)

@@ -19,6 +19,8 @@ from maneuver_automaton.search.library_arrays import LibraryArrays
 from maneuver_automaton.search.setup import SearchSetup
 
 DIGITS = 9  # of the goal that is searched for, after the point [m, rad]
+UNUSUAL = 1.7  # keeps steps in the number of digits away from the sizes people choose
+TINY = 1e-12  # [m, rad] below this start and goal are one
 CORRECTIONS = 6  # at most
 RANK = 1e-11  # singular values below this, relative, count as none
 MET = 1e-9  # [m, rad, s] the largest condition that may be left violated
@@ -26,7 +28,10 @@ MET = 1e-9  # [m, rad, s] the largest condition that may be left violated
 
 def with_fewer_digits(setup: SearchSetup) -> SearchSetup:
     """The setup with its goal rounded; as it is where start and goal would become one."""
-    goal = setup.goal.round(DIGITS) + 0.0  # no negative zeros
+    x, y, turn, z = setup.goal.tolist()
+    size = max(abs(x), abs(y), abs(z), abs(math.remainder(turn, 2.0 * math.pi)), TINY)
+    finer = max(0, math.ceil(-math.log10(UNUSUAL * size)))
+    goal = setup.goal.round(DIGITS + finer) + 0.0  # no negative zeros
     rounded = replace(setup, goal=goal)
     return setup if rounded.start_is_goal else rounded
 
@@ -34,7 +39,7 @@ def with_fewer_digits(setup: SearchSetup) -> SearchSetup:
 def corrected(library: LibraryArrays, word: IntArray, times: Array, goal: Array) -> Array | None:
     """Times (n,) near `times` with which the word ends at `goal`; None if there are none.
 
-    The smallest change, by Gauss-Newton: the goal is less than 1e-9 away.
+    The smallest change, by Gauss-Newton: the goal is less than 1e-9 away, and less for small ones.
     """
     twists, rows = library.twists[word], library.rows[:, word]
     best, least = times, math.inf

@@ -129,7 +129,7 @@ def _solved(library: LibraryArrays, word: IntArray, times: Array) -> Short | Non
     if not word.size:
         return None
     total = None
-    if library.targets.size and library.rows[-1].all():
+    if library.targets.size > int(library.climbs):
         total = float(library.targets[-1])
     solved = solve_switching_times(
         library.twists[word],

@@ -8,6 +8,7 @@ import pytest
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.costs import Cost
+from maneuver_automaton.planning import plan
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
 from maneuver_automaton.receding_horizon import Guarantee, Origin, RecedingHorizon, within
 from maneuver_automaton.receding_horizon.reanchoring import distance, missed
@@ -429,3 +430,25 @@ def test_going_on_from_a_step():
     _, other = again.step(first.predicted)
     assert other.plan.durations.tolist() == second.plan.durations.tolist()
     assert (other.number, other.value, other.origin) == (1, second.value, second.origin)
+
+
+class TestLowerBound:
+    """A lower bound is below every plan, also below those that were found and not taken."""
+
+    def test_a_margin_keeps_a_dearer_plan_and_does_not_call_it_the_best(self):
+        problem = parking_loop()
+        dearer = plan(problem, alternatives=1).alternatives[0]
+        loop = controller(problem, step=0.5, first=dearer.plan, margin=1.0)
+        _, step = loop.step(problem.start)
+        _, kept = loop.step(step.predicted)
+        _, best = controller(replace(problem, start=step.predicted), step=0.5).step(step.predicted)
+        assert not kept.replanned
+        assert best.value < kept.value - 1e-6
+        assert kept.lower_bound <= best.value + 1e-12
+        assert not kept.exhaustive
+
+    def test_at_another_pace_trims_cost_less_than_in_the_library(self):
+        problem = straight(2.0)
+        _, step = controller(problem, retimed=True).step(problem.start)
+        assert step.value == pytest.approx(1.0)  # 2 m in 4 s, the least effort there is
+        assert step.lower_bound == pytest.approx(1.0)

@@ -14,11 +14,15 @@ import pytest
 
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.groups import SE2
-from maneuver_automaton.models import Unicycle
+from maneuver_automaton.groups import SE2, SE2xR
+from maneuver_automaton.models import Unicycle, UserModel
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.search import SearchStatus, search_insertion, search_words
 from maneuver_automaton.search.certificate import certificate
+from maneuver_automaton.search.library_arrays import library_arrays
+from maneuver_automaton.search.setup import search_setup
+from maneuver_automaton.search.shortening import shortened
+from maneuver_automaton.switching_times.end_pose import end_pose
 from tests import reference
 from tests.search.cases import (
     DUBINS,
@@ -396,3 +400,35 @@ def test_a_moved_problem_has_the_moved_word_under_a_limit(start, most):
         assert there.word.tolist() == here.word.tolist()
         assert there.cost == pytest.approx(here.cost, abs=1e-9)
         np.testing.assert_allclose(there.durations, here.durations, atol=1e-7)
+
+
+@compiled_only
+@pytest.mark.parametrize("size", [1.0, 1e-4, 1e-7])
+def test_the_end_is_exact_however_near_the_goal(size):
+    goal = np.array([0.3, 0.2, 0.5]) * size
+    library = Automaton.of_grid(Unicycle(), [AXIS, AXIS])
+    problem = Problem(library, [0, 0, 0], goal, cost=Cost(effort=1.0, time=1.0))
+    found = search_insertion(problem, problem.goals[0]).solutions[0]
+    twists = library.body_velocities[found.word]
+    np.testing.assert_allclose(end_pose(twists, found.durations), goal, atol=1e-14)
+
+
+def test_only_a_fixed_time_fixes_the_time_of_a_shorter_word():
+    """Where every trim climbs, altitude is a condition on all of them, and still no time."""
+    climbing = [[1, 0, 0, 0.5], [1, 0, 1, 0.5], [1, 0, -1, 0.5], [2, 0, 1, 1.0]]
+    model = UserModel(
+        name="glider",
+        group=SE2xR,
+        control_names=("a", "b", "c", "d"),
+        velocity=lambda _, u: np.asarray(u),
+    )
+    library = Automaton.of_controls(model, {str(k): row for k, row in enumerate(climbing)})
+    goal = end_pose(climbing[1:3] + climbing[:1], [0.5, 0.4, 1.0])
+    problem = Problem(library, [0, 0, 0, 0], goal)
+    setup = search_setup(problem, problem.goals[0])
+    arrays = library_arrays(problem, setup)
+    word = arrays.number_of[[1, 2, 0]]
+    short = shortened(arrays, word, np.array([0.5, 0.4, 1.0]), 3)
+    assert short is not None
+    end = end_pose(arrays.twists[short.word], short.times)
+    np.testing.assert_allclose(end, goal, atol=1e-9)
