@@ -18,6 +18,12 @@ if TYPE_CHECKING:
     from maneuver_automaton.automaton import Plan as Plan
     from maneuver_automaton.automaton.library import load_library as load_library
     from maneuver_automaton.automaton.library import save_library as save_library
+    from maneuver_automaton.collision import Box as Box
+    from maneuver_automaton.collision import Disc as Disc
+    from maneuver_automaton.collision import Motion as Motion
+    from maneuver_automaton.collision import Obstacle as Obstacle
+    from maneuver_automaton.collision import OccupancyMap as OccupancyMap
+    from maneuver_automaton.collision import Polygon as Polygon
     from maneuver_automaton.costs import Cost as Cost
     from maneuver_automaton.formats.plan_json import load_plan as load_plan
     from maneuver_automaton.formats.plan_json import save_plan as save_plan
@@ -47,15 +53,21 @@ _HOMES = {
     "SE2xR": "groups",
     "Automaton": "automaton",
     "Bounds": "problem",
+    "Box": "collision",
     "Car": "models",
     "Cost": "costs",
+    "Disc": "collision",
     "Disturbance": "receding_horizon",
     "Goal": "problem",
     "Horizon": "problem",
     "Maneuver": "primitives",
+    "Motion": "collision",
+    "Obstacle": "collision",
+    "OccupancyMap": "collision",
     "Plan": "automaton",
     "PlanResult": "planning",
     "PlanStatus": "planning",
+    "Polygon": "collision",
     "Problem": "problem",
     "RecedingHorizon": "receding_horizon",
     "SearchSettings": "problem",

@@ -13,12 +13,13 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, freeze
 from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.collision import AnyObstacle, Obstacle, Shape, as_footprint, as_obstacles
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.errors import InvalidAutomaton
 from maneuver_automaton.groups import SE2, LieGroup, SE2xR
 from maneuver_automaton.primitives import Trim
 
-SEARCH_METHODS = ("auto", "words", "insertion")
+SEARCH_METHODS = ("auto", "words", "insertion", "lattice")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -107,8 +108,11 @@ class Bounds:
 class SearchSettings:
     """How to search; the defaults suit most problems."""
 
-    method: str = "auto"  # auto | words | insertion
-    max_expansions: int | None = None
+    method: str = "auto"  # auto | words | insertion | lattice
+    max_expansions: int | None = None  # of nodes, by the lattice; the same plan at every call
+    cell: float | None = None  # [m] of the lattice, scaled to the vehicle if None
+    headings: int | None = None  # of the lattice, 72 if None
+    weight: float | None = None  # of the cost to go in the first pass, 2 if None
 
     def __post_init__(self) -> None:
         if self.method not in SEARCH_METHODS:
@@ -119,6 +123,12 @@ class SearchSettings:
             raise ValueError(
                 f"search: max_expansions must be at least 1, got {self.max_expansions}"
             )
+        if self.cell is not None and not (math.isfinite(self.cell) and self.cell > 0.0):
+            raise ValueError(f"search: cell must be positive, got {self.cell} m")
+        if self.headings is not None and self.headings < 1:
+            raise ValueError(f"search: headings must be at least 1, got {self.headings}")
+        if self.weight is not None and not (math.isfinite(self.weight) and self.weight >= 1.0):
+            raise ValueError(f"search: weight must be at least 1, got {self.weight}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +152,9 @@ class Problem:
     start_time: float = field(default=0.0, kw_only=True)  # [s]
     bounds: Bounds = field(default_factory=Bounds, kw_only=True)
     search: SearchSettings = field(default_factory=SearchSettings, kw_only=True)
-    obstacles: Sequence[Any] = field(default=(), kw_only=True)
+    obstacles: tuple[AnyObstacle, ...] = field(default=(), kw_only=True)
+    footprint: tuple[Shape, ...] = field(default=(), kw_only=True)  # empty: the vehicle is a point
+    margin: float = field(default=0.0, kw_only=True)  # [m] distance kept from every obstacle
 
     if TYPE_CHECKING:  # numbers, group elements, one goal or several will do
 
@@ -158,7 +170,9 @@ class Problem:
             start_time: float = 0.0,
             bounds: Bounds = ...,
             search: SearchSettings = ...,
-            obstacles: Sequence[Any] = (),
+            obstacles: AnyObstacle | Shape | Sequence[AnyObstacle | Shape] = (),
+            footprint: Shape | Sequence[Shape] = (),
+            margin: float = 0.0,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -187,8 +201,12 @@ class Problem:
             self.automaton.index_of(self.start_trim)
         if not math.isfinite(self.start_time):
             raise ValueError(f"start: time must be finite, got {self.start_time} s")
-        if len(self.obstacles):
-            raise ValueError("obstacles: this version plans in free space only, and ignores none")
+        object.__setattr__(self, "obstacles", as_obstacles(self.obstacles))
+        object.__setattr__(self, "footprint", as_footprint(self.footprint))
+        if not (math.isfinite(self.margin) and self.margin >= 0.0):
+            raise ValueError(f"margin must be a number of at least 0, got {self.margin} m")
+        if self.obstacles and dof != 3:
+            raise ValueError("obstacles: this version knows them for vehicles in the plane only")
 
     @property
     def rates(self) -> Array:
@@ -214,7 +232,7 @@ class Problem:
         return float(self.rates_of(plan) @ plan.durations) + self.cost.switching(velocities)
 
     def moved(self, by: LieGroup) -> Problem:
-        """The problem with start and goals moved by the group element `by`; bounds must be open."""
+        """The problem moved by the group element `by`, obstacles too; bounds must be open."""
         if any(getattr(self.bounds, name) is not None for name in ("x", "y", "z")):
             raise ValueError("problem: bounds do not move with the symmetry")
         group = type(by)
@@ -222,7 +240,13 @@ class Problem:
             self,
             start=(by @ group(self.start)).pose,
             goals=tuple(replace(goal, pose=(by @ group(goal.pose)).pose) for goal in self.goals),
+            obstacles=tuple(obstacle.moved(by) for obstacle in self.obstacles),
         )
+
+    @property
+    def moves(self) -> bool:
+        """Whether an obstacle moves."""
+        return any(isinstance(o, Obstacle) and o.motion is not None for o in self.obstacles)
 
 
 @functools.lru_cache(maxsize=8)

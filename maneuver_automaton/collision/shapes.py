@@ -1,0 +1,292 @@
+"""Shapes as values: bodies of vehicles, obstacles, occupancy maps, things that move.
+
+All are solids, and closed: to touch one is to collide with it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from maneuver_automaton._arrays import Array, as_array, freeze
+from maneuver_automaton.groups import SE2, LieGroup
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Polygon:
+    """A polygon, concave or with holes if need be, its corners in either order.
+
+    Examples
+    --------
+    >>> Polygon([[0, 0], [4, 0], [4, 2]]).moved(SE2([1.0, 0.0, 0.0])).corners.tolist()
+    [[1.0, 0.0], [5.0, 0.0], [5.0, 2.0]]
+    """
+
+    corners: Array  # (n, 2) [m]
+    holes: tuple[Array, ...] = ()  # (n, 2) each [m]
+
+    if TYPE_CHECKING:
+
+        def __init__(self, corners: ArrayLike, holes: Sequence[ArrayLike] = ()) -> None: ...
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "corners", _ring("polygon: corners", self.corners))
+        rings = tuple(_ring("polygon: a hole", hole) for hole in self.holes)
+        object.__setattr__(self, "holes", rings)
+
+    def moved(self, by: LieGroup) -> Polygon:
+        """The shape moved by a planar pose."""
+        return Polygon(_acted(by, self.corners), tuple(_acted(by, ring) for ring in self.holes))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Disc:
+    """A disc.
+
+    Examples
+    --------
+    >>> Disc(0.5).moved(SE2([1.0, 2.0, 0.3])).center.tolist()
+    [1.0, 2.0]
+    """
+
+    radius: float  # [m]
+    center: Array = field(default_factory=lambda: np.zeros(2))  # (2,) [m]
+
+    if TYPE_CHECKING:
+
+        def __init__(self, radius: float, center: ArrayLike = ...) -> None: ...
+
+    def __post_init__(self) -> None:
+        freeze(self, "center", last=2)
+        if not (math.isfinite(self.radius) and self.radius > 0.0):
+            raise ValueError(f"disc: radius must be positive, got {self.radius} m")
+
+    def moved(self, by: LieGroup) -> Disc:
+        """The shape moved by a planar pose."""
+        return Disc(self.radius, _acted(by, self.center))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Box:
+    """A rectangle: its size [length, width], its center, and the direction of its length.
+
+    Examples
+    --------
+    >>> Box([4.0, 2.0]).corners.tolist()
+    [[-2.0, -1.0], [2.0, -1.0], [2.0, 1.0], [-2.0, 1.0]]
+    """
+
+    size: Array  # (2,) [m]
+    center: Array = field(default_factory=lambda: np.zeros(2))  # (2,) [m]
+    heading: float = 0.0  # [rad]
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self, size: ArrayLike, center: ArrayLike = ..., heading: float = 0.0
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        freeze(self, "size", last=2)
+        freeze(self, "center", last=2)
+        if not (self.size > 0.0).all():
+            raise ValueError(f"box: size must be positive, got {self.size.tolist()} m")
+        if not math.isfinite(self.heading):
+            raise ValueError(f"box: heading must be finite, got {self.heading} rad")
+
+    @property
+    def corners(self) -> Array:
+        """Corners (4, 2) counter-clockwise, the first behind on the right [m]."""
+        signs = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+        return _acted(SE2(np.append(self.center, self.heading)), signs * self.size)
+
+    def moved(self, by: LieGroup) -> Box:
+        """The shape moved by a planar pose."""
+        return Box(self.size, _acted(by, self.center), self.heading + float(_planar(by).pose[2]))
+
+
+Shape: TypeAlias = Polygon | Disc | Box
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """Poses in time, linear between (the heading too), still before and after.
+
+    Examples
+    --------
+    >>> Motion([0.0, 2.0], [[0, 0, 0], [4, 0, 0]]).at(0.5).tolist()
+    [1.0, 0.0, 0.0]
+    """
+
+    time: Array  # (n,) [s], rising
+    pose: Array  # (n, 3) [m, m, rad]
+
+    if TYPE_CHECKING:
+
+        def __init__(self, time: ArrayLike, pose: ArrayLike) -> None: ...
+
+    def __post_init__(self) -> None:
+        freeze(self, "time")
+        freeze(self, "pose", last=3)
+        if self.time.ndim != 1 or self.pose.shape != (self.time.size, 3) or not self.time.size:
+            raise ValueError(
+                f"motion: got {self.time.shape} times and poses {self.pose.shape}, "
+                "need (n,) and (n, 3) with n >= 1"
+            )
+        if not (np.diff(self.time) > 0.0).all():
+            raise ValueError(f"motion: times must rise, got {self.time.tolist()} s")
+
+    def at(self, time: ArrayLike) -> Array:
+        """Poses (..., 3) at `time` (...,) [s]."""
+        times = np.asarray(time, dtype=np.float64)
+        return np.stack([np.interp(times, self.time, self.pose[:, k]) for k in range(3)], axis=-1)
+
+    def moved(self, by: LieGroup) -> Motion:
+        """The motion moved by a planar pose."""
+        return Motion(self.time, (_planar(by) @ SE2(self.pose)).pose)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Obstacle:
+    """A shape in the world, or, with a motion, a shape in a frame that moves.
+
+    Examples
+    --------
+    >>> crossing = Obstacle(Disc(0.3), motion=Motion([0.0, 1.0], [[0, 0, 0], [2, 0, 0]]))
+    >>> crossing.at(0.5).center.tolist()
+    [1.0, 0.0]
+    """
+
+    shape: Shape
+    height: tuple[float, float] | None = field(default=None, kw_only=True)  # [m]; None: any
+    motion: Motion | None = field(default=None, kw_only=True)
+    name: str = field(default="", kw_only=True)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.shape, Polygon | Disc | Box):
+            raise ValueError(f"obstacle: got {self.shape!r}, need a Polygon, a Disc or a Box")
+        if self.height is not None and not (
+            len(self.height) == 2
+            and all(math.isfinite(z) for z in self.height)
+            and self.height[0] < self.height[1]
+        ):
+            raise ValueError(
+                f"obstacle: height must be [low, high] with low < high, got {self.height}"
+            )
+
+    def at(self, time: float) -> Shape:
+        """The shape where it is at `time` [s]."""
+        return self.shape if self.motion is None else self.shape.moved(SE2(self.motion.at(time)))
+
+    def moved(self, by: LieGroup) -> Obstacle:
+        """The obstacle moved by a planar pose."""
+        if self.motion is not None:
+            return replace(self, motion=self.motion.moved(by))
+        return replace(self, shape=self.shape.moved(by))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OccupancyMap:
+    """Square cells, each blocked or free; what is outside the map is free.
+
+    Examples
+    --------
+    >>> room = OccupancyMap([[1, 1], [0, 1]], resolution=0.5, origin=[2.0, 0.0, 0.0])
+    >>> int(room.blocked.sum()), room.extent.tolist()
+    (3, [1.0, 1.0])
+    """
+
+    blocked: NDArray[np.bool_]  # (rows, columns), row 0 at the origin, rows along its y
+    resolution: float = field(kw_only=True)  # [m] size of a cell
+    origin: Array = field(default_factory=lambda: np.zeros(3), kw_only=True)  # (3,) pose of the
+    #   corner of cell (0, 0) [m, m, rad]
+    name: str = field(default="map", kw_only=True)
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            blocked: ArrayLike,
+            *,
+            resolution: float,
+            origin: ArrayLike = ...,
+            name: str = "map",
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        cells = np.array(self.blocked, dtype=np.bool_)
+        if cells.ndim != 2 or cells.size == 0:
+            raise ValueError(f"map: cells have shape {cells.shape}, need (rows, columns)")
+        cells.setflags(write=False)
+        object.__setattr__(self, "blocked", cells)
+        freeze(self, "origin", last=3)
+        if not (math.isfinite(self.resolution) and self.resolution > 0.0):
+            raise ValueError(f"map: resolution must be positive, got {self.resolution} m")
+
+    @property
+    def extent(self) -> Array:
+        """Size (2,) along the map's own x and y [m]."""
+        rows, columns = self.blocked.shape
+        return self.resolution * np.array([columns, rows], dtype=np.float64)
+
+    def moved(self, by: LieGroup) -> OccupancyMap:
+        """The map moved by a planar pose."""
+        return replace(self, origin=(_planar(by) @ SE2(self.origin)).pose)
+
+
+AnyObstacle: TypeAlias = Obstacle | OccupancyMap
+
+
+def as_obstacles(value: object) -> tuple[AnyObstacle, ...]:
+    """Obstacles from obstacles, maps and bare shapes, or one of these.
+
+    Raises
+    ------
+    ValueError
+        If it holds anything else.
+    """
+    if isinstance(value, Obstacle | OccupancyMap):
+        return (value,)
+    if isinstance(value, Polygon | Disc | Box):
+        return (Obstacle(value),)
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return tuple(one for part in value for one in as_obstacles(part))
+    raise ValueError(
+        f"obstacles: got {value!r}, need Obstacle, OccupancyMap, Polygon, Disc or Box"
+    )
+
+
+def as_footprint(value: object) -> tuple[Shape, ...]:
+    """Parts of a body from one shape or several; empty for a vehicle that is a point.
+
+    Raises
+    ------
+    ValueError
+        If it holds anything else.
+    """
+    if isinstance(value, Polygon | Disc | Box):
+        return (value,)
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return tuple(one for part in value for one in as_footprint(part))
+    raise ValueError(f"footprint: got {value!r}, need Polygon, Disc or Box, or several")
+
+
+def _ring(name: str, corners: ArrayLike) -> Array:
+    ring = np.array(as_array(name, corners))
+    if ring.ndim != 2 or ring.shape[1] != 2 or len(ring) < 3:
+        raise ValueError(f"{name}: got shape {ring.shape}, need (n, 2) with n >= 3")
+    ring.setflags(write=False)
+    return ring
+
+
+def _planar(by: LieGroup) -> SE2:
+    return SE2(by.pose[..., :3])
+
+
+def _acted(by: LieGroup, points: Array) -> Array:
+    return np.asarray(_planar(by).act(points))
