@@ -256,9 +256,7 @@ def as_obstacles(value: object) -> tuple[AnyObstacle, ...]:
         return (Obstacle(value),)
     if isinstance(value, Sequence) and not isinstance(value, str):
         return tuple(one for part in value for one in as_obstacles(part))
-    raise ValueError(
-        f"obstacles: got {value!r}, need Obstacle, OccupancyMap, Polygon, Disc or Box"
-    )
+    raise ValueError(f"obstacles: got {value!r}, need Obstacle, OccupancyMap, Polygon, Disc or Box")
 
 
 def as_footprint(value: object) -> tuple[Shape, ...]:
