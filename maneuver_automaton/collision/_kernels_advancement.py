@@ -1,0 +1,135 @@
+"""Certified conservative advancement: a proof that a whole motion is free, not a sample of it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from maneuver_automaton._compile import inner_kernel, kernel
+from maneuver_automaton.collision._kernels_gap import NEAR, piece_gap, still_gap
+from maneuver_automaton.groups._kernels import coast, compose
+
+
+@inner_kernel
+def mover_pose(movers, m, time):
+    """Pose (x, y, heading) of an obstacle that moves, held before its first knot and after."""
+    k_0, k_1 = movers.first_knot[m], movers.first_knot[m + 1]
+    if time <= movers.time[k_0]:
+        return movers.pose[k_0, 0], movers.pose[k_0, 1], movers.pose[k_0, 2]
+    if time >= movers.time[k_1 - 1]:
+        k = k_1 - 1
+        return movers.pose[k, 0], movers.pose[k, 1], movers.pose[k, 2]
+    low, high = k_0, k_1 - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if movers.time[middle] <= time:
+            low = middle
+        else:
+            high = middle
+    share = (time - movers.time[low]) / (movers.time[high] - movers.time[low])
+    x = movers.pose[low, 0] + share * (movers.pose[high, 0] - movers.pose[low, 0])
+    y = movers.pose[low, 1] + share * (movers.pose[high, 1] - movers.pose[low, 1])
+    heading = movers.pose[low, 2] + share * (movers.pose[high, 2] - movers.pose[low, 2])
+    return x, y, heading
+
+
+@inner_kernel
+def mover_gap(movers, m, body, x, y, heading, time, enough):
+    """Gap to one obstacle that moves, at `time`; a lower bound, not exact above `enough`."""
+    o_x, o_y, o_heading = mover_pose(movers, m, time)
+    c, s = math.cos(o_heading), math.sin(o_heading)
+    d_x, d_y = x - o_x, y - o_y
+    r_x, r_y = c * d_x + s * d_y, c * d_y - s * d_x  # the vehicle seen from the obstacle
+    turn = heading - o_heading
+    c, s = math.cos(turn), math.sin(turn)
+    m_x = r_x + c * body.middle_x - s * body.middle_y - movers.middle[m, 0]
+    m_y = r_y + s * body.middle_x + c * body.middle_y - movers.middle[m, 1]
+    best = math.sqrt(m_x * m_x + m_y * m_y) - body.reach - movers.reach[m]
+    if best > enough:
+        return best
+    best = math.inf
+    near = NEAR * (body.reach + movers.reach[m])
+    for p in range(movers.first_piece[m], movers.first_piece[m + 1]):
+        for b in range(body.first.shape[0] - 1):
+            best = min(best, piece_gap(body, b, r_x, r_y, c, s, movers.solids, p, near, best))
+            if best <= 0.0:
+                return best
+    return best
+
+
+@inner_kernel
+def free_time(
+    world, body, x, y, heading, v_x, v_y, turn_rate, speed, duration, keep, margin, clock
+):
+    """How long the motion from (x, y, heading) is proven free, at most `duration`.
+
+    No point of the body is faster than `speed`. The clearance is more than `keep + margin` wherever
+    it is looked at, and more than `keep` in between. The world's time at the start is `clock`; a
+    negative `duration` drives, and dates, the motion backwards.
+    """
+    sign = 1.0 if duration >= 0.0 else -1.0
+    length = abs(duration)
+    n_movers = world.movers.speed.shape[0]
+    t = 0.0
+    while True:
+        d_x, d_y, turn = coast(v_x, v_y, turn_rate, sign * t)
+        p_x, p_y, p_heading = compose(x, y, heading, d_x, d_y, turn)
+        c, s = math.cos(p_heading), math.sin(p_heading)
+        gap = still_gap(world, body, p_x, p_y, c, s) - keep
+        if gap <= margin:
+            return t
+        step = gap / speed if speed > 0.0 else math.inf
+        for m in range(n_movers):
+            fast = speed + world.movers.speed[m]
+            time = clock + sign * t
+            enough = keep + margin + fast * step
+            gap = mover_gap(world.movers, m, body, p_x, p_y, p_heading, time, enough) - keep
+            if gap <= margin:
+                return t
+            if fast > 0.0:
+                step = min(step, gap / fast)
+        if t >= length:
+            return length
+        t = t + step
+        if t >= length:
+            t = length
+            if step < math.inf:  # the end has to be looked at as every pose
+                continue
+            return length
+
+
+@kernel
+def free_times(world, body, poses, twists, speeds, durations, keep, margin, clocks):
+    """`free_time` of many motions (k,)."""
+    free = np.empty(durations.shape[0])
+    for k in range(durations.shape[0]):
+        free[k] = free_time(
+            world,
+            body,
+            poses[k, 0],
+            poses[k, 1],
+            poses[k, 2],
+            twists[k, 0],
+            twists[k, 1],
+            twists[k, 2],
+            speeds[k],
+            durations[k],
+            keep,
+            margin,
+            clocks[k],
+        )
+    return free
+
+
+@kernel
+def gaps(world, body, poses, times):
+    """Clearance (k,) at poses (k, 3): a lower bound, exact near contact, at most the field's cap."""
+    out = np.empty(poses.shape[0])
+    for k in range(poses.shape[0]):
+        x, y, heading = poses[k, 0], poses[k, 1], poses[k, 2]
+        best = still_gap(world, body, x, y, math.cos(heading), math.sin(heading))
+        for m in range(world.movers.speed.shape[0]):
+            best = min(best, mover_gap(world.movers, m, body, x, y, heading, times[k], best))
+        out[k] = best
+    return out

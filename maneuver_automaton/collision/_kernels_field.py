@@ -1,0 +1,137 @@
+"""Write the field of distances and the buckets of a world, piece by piece."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from maneuver_automaton._compile import inner_kernel, kernel
+from maneuver_automaton.collision._kernels_gap import point_to_segment
+
+
+@inner_kernel
+def distance_to_piece(x, y, corners, first, last):
+    """Distance of a point to a convex polygon, its corners counter-clockwise; 0 inside."""
+    best = math.inf
+    inside = last - first > 2
+    before = last - 1
+    for k in range(first, last):
+        a_x, a_y = corners[before, 0], corners[before, 1]
+        b_x, b_y = corners[k, 0], corners[k, 1]
+        best = min(best, point_to_segment(x, y, a_x, a_y, b_x, b_y))
+        inside = inside and (b_x - a_x) * (y - a_y) - (b_y - a_y) * (x - a_x) >= 0.0
+        before = k
+    return 0.0 if inside else math.sqrt(best)
+
+
+@kernel
+def write_pieces(distance, origin_x, origin_y, cell, cap, edges, first, plates, n):
+    """Lower the field `distance` to that of each of `n` pieces, as far as `cap` reaches."""
+    rows, columns = distance.shape
+    for p in range(n):
+        i_0 = max(0, int((plates[p, 0] - cap - origin_x) / cell))
+        i_1 = min(columns, int((plates[p, 2] + cap - origin_x) / cell) + 1)
+        j_0 = max(0, int((plates[p, 1] - cap - origin_y) / cell))
+        j_1 = min(rows, int((plates[p, 3] + cap - origin_y) / cell) + 1)
+        for j in range(j_0, j_1):
+            y = origin_y + (j + 0.5) * cell
+            d_y = max(max(plates[p, 1] - y, y - plates[p, 3]), 0.0)
+            for i in range(i_0, i_1):
+                x = origin_x + (i + 0.5) * cell
+                d_x = max(max(plates[p, 0] - x, x - plates[p, 2]), 0.0)
+                known = distance[j, i]
+                if d_x * d_x + d_y * d_y >= known * known:
+                    continue
+                value = distance_to_piece(x, y, edges, first[p], first[p + 1]) - plates[p, 4]
+                distance[j, i] = min(known, max(value, 0.0))
+
+
+@kernel
+def write_map(distance, origin_x, origin_y, cell, cap, blocked, resolution, m_x, m_y, c, s):
+    """Lower the field to the exact distance of the blocked cells of a map at (m_x, m_y, c, s).
+
+    Two passes: along each column of the map the rows to the nearest blocked cell, then along rows
+    the least hypotenuse, with distances to the cells' edges.
+    """
+    n_rows, n_columns = blocked.shape
+    far = n_rows + n_columns
+    up = np.full((n_rows, n_columns), far, dtype=np.int32)
+    for i in range(n_columns):
+        last = -far
+        for j in range(n_rows):
+            if blocked[j, i]:
+                last = j
+            up[j, i] = min(j - last, far)
+        last = 2 * far
+        for j in range(n_rows - 1, -1, -1):
+            if blocked[j, i]:
+                last = j
+            up[j, i] = min(up[j, i], last - j)
+    most = int(cap / resolution) + 2
+    rows, columns = distance.shape
+    for j in range(rows):
+        w_y = origin_y + (j + 0.5) * cell
+        for i in range(columns):
+            w_x = origin_x + (i + 0.5) * cell
+            d_x, d_y = w_x - m_x, w_y - m_y
+            x, y = (c * d_x + s * d_y) / resolution, (c * d_y - s * d_x) / resolution
+            row = min(max(int(math.floor(y)), 0), n_rows - 1)
+            column = min(max(int(math.floor(x)), 0), n_columns - 1)
+            best = min(most, distance[j, i] / resolution)
+            best = best * best
+            reach = 0
+            while True:  # columns ever further away, as long as they can be nearer
+                ended = True
+                for side in range(2):
+                    k = column + reach if side == 0 else column - reach
+                    if (side == 1 and reach == 0) or k < 0 or k >= n_columns:
+                        continue
+                    a_x = max(max(k - x, x - k - 1.0), 0.0)
+                    if a_x * a_x >= best:
+                        continue
+                    ended = False
+                    rise = up[row, k]
+                    if rise >= far:
+                        continue
+                    # the nearest blocked cell of this column is `rise` rows up or down
+                    for sign in range(2):
+                        r = row + rise if sign == 0 else row - rise
+                        if r < 0 or r >= n_rows or not blocked[r, k]:
+                            continue
+                        a_y = max(max(r - y, y - r - 1.0), 0.0)
+                        best = min(best, a_x * a_x + a_y * a_y)
+                if ended and reach > 0:
+                    break
+                reach += 1
+                if reach > n_columns:
+                    break
+            distance[j, i] = min(distance[j, i], resolution * math.sqrt(best))
+
+
+@kernel
+def count_buckets(start, plates, origin_x, origin_y, cell, columns, rows, reach):
+    """How many pieces each bucket holds, one place late: `start[k + 1]`."""
+    for p in range(plates.shape[0]):
+        i_0 = max(0, int(math.floor((plates[p, 0] - reach - origin_x) / cell)))
+        i_1 = min(columns - 1, int(math.floor((plates[p, 2] + reach - origin_x) / cell)))
+        j_0 = max(0, int(math.floor((plates[p, 1] - reach - origin_y) / cell)))
+        j_1 = min(rows - 1, int(math.floor((plates[p, 3] + reach - origin_y) / cell)))
+        for j in range(j_0, j_1 + 1):
+            for i in range(i_0, i_1 + 1):
+                start[j * columns + i + 1] += 1
+
+
+@kernel
+def fill_buckets(start, items, plates, origin_x, origin_y, cell, columns, rows, reach):
+    """Write the pieces of each bucket; `start` is moved on by the count, and must be moved back."""
+    for p in range(plates.shape[0]):
+        i_0 = max(0, int(math.floor((plates[p, 0] - reach - origin_x) / cell)))
+        i_1 = min(columns - 1, int(math.floor((plates[p, 2] + reach - origin_x) / cell)))
+        j_0 = max(0, int(math.floor((plates[p, 1] - reach - origin_y) / cell)))
+        j_1 = min(rows - 1, int(math.floor((plates[p, 3] + reach - origin_y) / cell)))
+        for j in range(j_0, j_1 + 1):
+            for i in range(i_0, i_1 + 1):
+                k = j * columns + i
+                items[start[k]] = p
+                start[k] += 1

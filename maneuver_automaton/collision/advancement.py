@@ -1,0 +1,92 @@
+"""The proof along a trim, for callers outside the search: how long a motion is free."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton.collision import _kernels_advancement
+from maneuver_automaton.collision.body import fastest_points
+from maneuver_automaton.collision.world import World
+
+
+def free_times(
+    world: World,
+    poses: ArrayLike,
+    *,
+    twists: ArrayLike,
+    durations: ArrayLike,
+    margin: float,
+    keep: float = 0.0,
+    times: ArrayLike = 0.0,
+) -> Array:
+    """How long motions are proven free, at most as long as they last.
+
+    Parameters
+    ----------
+    world : World
+    poses : (k, 3) array
+        Where the motions begin, seen from the world's frame [m, m, rad].
+    twists : (k, 3) array
+        Constant body velocities [m/s, m/s, rad/s].
+    durations : (k,) array
+        [s]; a negative one is driven backwards, into the past.
+    margin : float
+        Clearance beyond `keep` that every pose looked at has, positive [m].
+    keep : float
+        Distance kept from everything, also between the poses looked at [m].
+    times : (k,) array
+        Time of the world at the beginning [s].
+
+    Returns
+    -------
+    (k,) array
+        [s]; 0 where the motion begins too near to something.
+
+    Raises
+    ------
+    ValueError
+        If the margin is not positive.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.collision import Box, Disc, Obstacle
+    >>> from maneuver_automaton.collision.world import world_of
+    >>> wall = Obstacle(Box([1.0, 4.0], [5.5, 0.0]))
+    >>> world = world_of((wall,), (Disc(1.0),), (0.0, 0.0, 0.0))
+    >>> ahead = {"twists": [[2.0, 0.0, 0.0]], "margin": 0.01}
+    >>> free = free_times(world, [[0, 0, 0]], durations=[5.0], **ahead)
+    >>> bool(1.9 < free[0] <= 2.0)
+    True
+    """
+    if not margin > 0.0:
+        raise ValueError(f"margin must be positive, got {margin} m")
+    starts = np.atleast_2d(as_array("poses", poses, last=3))
+    velocities = np.atleast_2d(as_array("twists", twists, last=3))
+    n = len(starts)
+    lasting = np.array(np.broadcast_to(as_array("durations", durations), n))
+    clocks = np.array(np.broadcast_to(as_array("times", times), n))
+    free: Array = _kernels_advancement.free_times(
+        world.arrays,
+        world.body,
+        np.array(starts),
+        np.array(velocities),
+        fastest_points(world.body, velocities),
+        lasting,
+        keep,
+        margin,
+        clocks,
+    )
+    return free
+
+
+def clearances(world: World, poses: ArrayLike, *, times: ArrayLike = 0.0) -> Array:
+    """Clearance (k,) at poses (k, 3) seen from the world's frame: a lower bound [m].
+
+    Exact near contact, and capped where nothing is near; not positive only on contact.
+    """
+    places = np.atleast_2d(as_array("poses", poses, last=3))
+    clocks = np.array(np.broadcast_to(as_array("times", times), len(places)))
+    gaps: Array = _kernels_advancement.gaps(world.arrays, world.body, np.array(places), clocks)
+    return gaps

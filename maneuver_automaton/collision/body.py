@@ -1,0 +1,115 @@
+"""The body of a vehicle as the kernels know it."""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.collision.convex import convex_pieces, solids_of
+from maneuver_automaton.collision.shapes import Shape
+
+MOST_DISCS = 6  # that cover one piece
+
+
+class Body(NamedTuple):
+    """Convex pieces in the frame of the vehicle, discs that cover them, and sizes."""
+
+    edges: Array  # (V, 5) as in `Solids`
+    first: IntArray  # (P + 1,)
+    radius: Array  # (P,)
+    discs: Array  # (D, 3) x, y, radius: they cover the body
+    middle_x: float  # [m] of a disc that holds the body ...
+    middle_y: float
+    reach: float  # ... and its radius
+    inscribed: float  # [m] radius of the largest disc around the pose inside the body
+    half_width: float  # [m] of the narrowest piece
+
+
+@functools.lru_cache(maxsize=16)
+def body_of(footprint: tuple[Shape, ...]) -> Body:
+    """Arrays of a footprint; a point if it is empty.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.collision.shapes import Box
+    >>> body = body_of((Box([4.0, 2.0]),))
+    >>> len(body.discs), round(body.reach, 3), body.inscribed, body.half_width
+    (3, 2.236, 1.0, 1.0)
+    """
+    pieces = [piece for shape in footprint for piece in convex_pieces(shape)]
+    if not pieces:
+        pieces = [(np.zeros((1, 2)), 0.0)]
+    solids = solids_of(pieces)
+    low, high = solids.plates[:, :2].min(axis=0), solids.plates[:, 2:4].max(axis=0)
+    middle = 0.5 * (low + high)
+    reach = max(
+        float(np.hypot(*(ring - middle).T).max()) + rounding for ring, rounding in pieces
+    )
+    covers = [_cover(ring, rounding) for ring, rounding in pieces]
+    return Body(
+        edges=solids.edges,
+        first=solids.first,
+        radius=solids.plates[:, 4].copy(),
+        discs=np.concatenate([discs for discs, _ in covers]),
+        middle_x=float(middle[0]),
+        middle_y=float(middle[1]),
+        reach=reach,
+        inscribed=_inscribed(footprint),
+        half_width=min(width for _, width in covers),
+    )
+
+
+def fastest_points(body: Body, twists: Array) -> Array:
+    """Greatest speed (m,) [m/s] of any point of the body under each twist (m, 3 or more)."""
+    v_x, v_y, turn = twists[:, 0, None], twists[:, 1, None], twists[:, 2, None]
+    rounding = np.repeat(body.radius, np.diff(body.first))
+    speed = np.hypot(v_x - turn * body.edges[:, 1], v_y + turn * body.edges[:, 0])
+    return np.asarray((speed + np.abs(turn) * rounding).max(axis=1))
+
+
+def _cover(ring: Array, rounding: float) -> tuple[Array, float]:
+    """Discs (n, 3) along the narrowest rectangle around a piece, and half its width."""
+    import shapely
+
+    if len(ring) == 1:
+        return np.array([[*ring[0], rounding]]), rounding
+    around = shapely.get_coordinates(shapely.MultiPoint(ring).minimum_rotated_rectangle)
+    if len(around) < 4:  # all corners on a line
+        ends = ring[[np.argmin(ring @ [1.0, 1e-3]), np.argmax(ring @ [1.0, 1e-3])]]
+        a, along, across = ends[0], ends[1] - ends[0], np.zeros(2)
+    else:
+        a, along, across = around[0], around[1] - around[0], around[3] - around[0]
+        if np.hypot(*along) < np.hypot(*across):
+            along, across = across, along
+    length, width = float(np.hypot(*along)), float(np.hypot(*across))
+    thick = max(width + 2.0 * rounding, length / MOST_DISCS)
+    n = min(MOST_DISCS, max(1, math.ceil(1.5 * length / thick)))
+    radius = math.hypot(0.5 * length / n, 0.5 * width) * (1.0 + 1e-12) + rounding
+    centers = a + 0.5 * across + np.outer((np.arange(n) + 0.5) / n, along)
+    return np.column_stack([centers, np.full(n, radius)]), 0.5 * width + rounding
+
+
+def _inscribed(footprint: tuple[Shape, ...]) -> float:
+    """Radius of the largest disc around the pose inside the body; 0 if the pose is not inside."""
+    import shapely
+
+    from maneuver_automaton.collision.shapes import Disc
+
+    parts = []
+    best = 0.0
+    for shape in footprint:
+        if isinstance(shape, Disc):
+            best = max(best, shape.radius - float(np.hypot(*shape.center)))
+        else:
+            parts += [
+                shapely.Polygon(ring) for ring, _ in convex_pieces(shape) if len(ring) >= 3
+            ]
+    if parts:
+        union, pose = shapely.union_all(parts), shapely.Point(0.0, 0.0)
+        if union.contains(pose):
+            best = max(best, float(union.boundary.distance(pose)))
+    return best

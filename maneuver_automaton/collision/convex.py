@@ -1,0 +1,165 @@
+"""Shapes as convex pieces with rounded corners: what the kernels know."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.collision.shapes import Box, Disc, Polygon, Shape
+
+
+class Solids(NamedTuple):
+    """Convex polygons, counter-clockwise, each rounded by a radius; one corner makes a disc."""
+
+    edges: Array  # (V, 5) a corner, the outward normal of the edge that ends there, its offset
+    first: IntArray  # (P + 1,) where each piece begins among the edges
+    plates: Array  # (P, 5) [low x, low y, high x, high y], rounding included, and the rounding
+
+
+def convex_pieces(shape: Shape) -> list[tuple[Array, float]]:
+    """Convex pieces (corners counter-clockwise, rounding) that together are the shape.
+
+    Examples
+    --------
+    >>> [(len(corners), r) for corners, r in convex_pieces(Box([2.0, 1.0]))]
+    [(4, 0.0)]
+    >>> corner = Polygon([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]])
+    >>> len(convex_pieces(corner))
+    2
+    """
+    if isinstance(shape, Disc):
+        return [(shape.center[None].copy(), shape.radius)]
+    if isinstance(shape, Box):
+        return [(shape.corners, 0.0)]
+    if not shape.holes and len(simple := _simple(shape.corners)) >= 3 and _is_convex(simple):
+        return [(simple, 0.0)]
+    return [(piece, 0.0) for piece in _decomposed(shape)]
+
+
+def solids_of(pieces: Iterable[tuple[Array, float]]) -> Solids:
+    """Arrays of pieces for the kernels."""
+    rings, rounding = [], []
+    for ring, radius in pieces:
+        rings.append(ring)
+        rounding.append(radius)
+    counts = np.array([len(ring) for ring in rings], dtype=np.int64)
+    first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    corners = np.concatenate([np.zeros((0, 2)), *rings])
+    radius = np.array(rounding, dtype=np.float64)
+    if not rings:
+        return Solids(np.zeros((0, 5)), first, np.zeros((0, 5)))
+    before = np.arange(len(corners)) - 1
+    before[first[:-1]] = first[1:] - 1
+    edge = corners - corners[before]
+    length = np.hypot(edge[:, 0], edge[:, 1])
+    single = np.repeat(counts == 1, counts)
+    if not (length[~single] > 0.0).all():
+        raise ValueError("a convex piece repeats a corner")
+    normal = np.stack([edge[:, 1], -edge[:, 0]], axis=1) / np.where(single, 1.0, length)[:, None]
+    low = np.minimum.reduceat(corners, first[:-1]) - radius[:, None]
+    high = np.maximum.reduceat(corners, first[:-1]) + radius[:, None]
+    offset = np.einsum("ij,ij->i", normal, corners)
+    return Solids(
+        edges=np.column_stack([corners, normal, offset]),
+        first=first,
+        plates=np.column_stack([low, high, radius]),
+    )
+
+
+def _simple(ring: Array) -> Array:
+    """Counter-clockwise, without repeated corners."""
+    after = _next(ring)
+    differs = (ring != after).any(axis=1)
+    if not differs.all():
+        ring = ring[differs]
+        after = _next(ring) if len(ring) else ring
+    area = float(ring[:, 0] @ after[:, 1] - ring[:, 1] @ after[:, 0])
+    return ring if area >= 0.0 else ring[::-1].copy()
+
+
+def _next(ring: Array) -> Array:
+    """The corner after each corner."""
+    return np.concatenate([ring[1:], ring[:1]])
+
+
+def _is_convex(ring: Array) -> bool:
+    """Whether a counter-clockwise ring turns left everywhere, once around."""
+    edge = _next(ring) - ring
+    after = _next(edge)
+    cross = edge[:, 0] * after[:, 1] - edge[:, 1] * after[:, 0]
+    if (cross < 0.0).any() or not (cross > 0.0).any():
+        return False
+    turns = np.arctan2(cross, np.einsum("ij,ij->i", edge, after))
+    return bool(turns.sum() < 3.0 * math.pi)
+
+
+def _decomposed(shape: Polygon) -> list[Array]:
+    """Pieces of a polygon that is concave, has holes, or is none: nothing solid is lost."""
+    import shapely
+
+    polygon = shapely.Polygon(shape.corners, shape.holes)
+    if not polygon.is_valid:
+        polygon = shapely.make_valid(polygon)
+    pieces: list[Array] = []
+    for part in shapely.get_parts(polygon, return_index=False):
+        if part.geom_type == "Polygon" and part.area > 0.0:
+            triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(part))
+            pieces += _merged([_simple(_ring_of(triangle)) for triangle in triangles])
+        elif part.geom_type in ("LineString", "LinearRing", "Polygon", "MultiLineString"):
+            for line in shapely.get_parts(part):
+                points = shapely.get_coordinates(line)
+                pieces += [
+                    np.stack([a, b])
+                    for a, b in zip(points[:-1], points[1:], strict=True)
+                    if (a != b).any()
+                ]
+        elif part.geom_type == "MultiPolygon":
+            for polygon_part in shapely.get_parts(part):
+                triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon_part))
+                pieces += _merged([_simple(_ring_of(triangle)) for triangle in triangles])
+        else:
+            pieces += [point[None] for point in shapely.get_coordinates(part)]
+    return [piece for piece in pieces if len(piece)]
+
+
+def _ring_of(triangle: object) -> Array:
+    import shapely
+
+    return shapely.get_coordinates(triangle)[:-1]
+
+
+def _merged(pieces: list[Array]) -> list[Array]:
+    """Join neighbours across an edge as long as what comes out is convex."""
+    pieces = [piece for piece in pieces if len(piece) >= 3]
+    joined = True
+    while joined:
+        joined = False
+        edges: dict[tuple[tuple[float, ...], tuple[float, ...]], int] = {}
+        for k, piece in enumerate(pieces):
+            for a, b in zip(piece, np.roll(piece, -1, axis=0), strict=True):
+                edges[(tuple(a), tuple(b))] = k
+        for (a, b), k in edges.items():
+            other = edges.get((b, a))
+            if other is None or other == k:
+                continue
+            union = _joined(pieces[k], pieces[other], a, b)
+            if union is not None and _is_convex(union):
+                pieces = [p for i, p in enumerate(pieces) if i not in (k, other)] + [union]
+                joined = True
+                break
+    return pieces
+
+
+def _joined(one: Array, other: Array, a: tuple[float, ...], b: tuple[float, ...]) -> Array | None:
+    """Ring of two pieces that share the edge from `a` to `b`."""
+    begin = next(i for i, corner in enumerate(one) if tuple(corner) == b)
+    first = np.roll(one, -begin, axis=0)  # b ... a
+    begin = next(i for i, corner in enumerate(other) if tuple(corner) == a)
+    second = np.roll(other, -begin, axis=0)  # a ... b
+    if tuple(first[-1]) != a or tuple(second[-1]) != b:
+        return None
+    return np.concatenate([first, second[1:-1]])

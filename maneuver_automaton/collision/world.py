@@ -1,0 +1,276 @@
+"""What surrounds a vehicle, prepared once for one body: solids, buckets, a field of distances.
+
+Everything is seen from a frame that moves with the obstacles, so that a moved world is the same
+world to the last bit (coordinates are rounded to 1e-9 m, far below every proven margin).
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.collision import _kernels_field
+from maneuver_automaton.collision.body import Body, body_of
+from maneuver_automaton.collision.convex import Solids, convex_pieces, solids_of
+from maneuver_automaton.collision.rectangles import blocked_rectangles
+from maneuver_automaton.collision.shapes import (
+    AnyObstacle,
+    Box,
+    Disc,
+    Motion,
+    Obstacle,
+    OccupancyMap,
+    Shape,
+)
+from maneuver_automaton.groups import SE2
+
+DIGITS = 9  # decimals of coordinates [m, rad]
+MOST_FIELD_CELLS = 60_000
+MOST_MAP_CELLS = 250_000  # of the field over an occupancy map, where a cell costs less
+MOST_BUCKETS = 100_000
+
+
+class Field(NamedTuple):
+    """Distances to the nearest solid at cell centres, capped."""
+
+    distance: Array  # (rows, columns) [m]
+    origin_x: float
+    origin_y: float
+    cell: float  # [m]
+    outside: float  # [m] distance that holds outside the field
+
+
+class Buckets(NamedTuple):
+    """Solids near each place: those left out are at least `reach` from a body in the middle."""
+
+    start: IntArray  # (rows * columns + 1,)
+    items: IntArray
+    origin_x: float
+    origin_y: float
+    cell: float  # [m]
+    columns: int
+    rows: int
+    reach: float  # [m]
+
+
+class Movers(NamedTuple):
+    """Obstacles that move: each a range of solids in its own frame, and knots in time."""
+
+    solids: Solids
+    first_piece: IntArray  # (M + 1,)
+    first_knot: IntArray  # (M + 1,)
+    time: Array  # (K,) [s]
+    pose: Array  # (K, 3)
+    speed: Array  # (M,) [m/s] greatest of any of its points
+    middle: Array  # (M, 2) of a disc around it, in its frame
+    reach: Array  # (M,) radius of that disc
+
+
+class WorldArrays(NamedTuple):
+    """What the kernels see."""
+
+    solids: Solids
+    buckets: Buckets
+    field: Field
+    movers: Movers
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class World:
+    """Obstacles around one body, seen from `frame`."""
+
+    frame: Array  # (3,) pose of the world's own frame in the coordinates of the problem
+    body: Body
+    arrays: WorldArrays
+    box: Array  # (4,) [low x, low y, high x, high y] of what stands still, and where movers go
+    last_event: float  # [s] after it nothing moves
+
+    def into(self, pose: Array) -> Array:
+        """A pose (..., 3) seen from the world's frame: places first, so that no digit is lost."""
+        near = np.array(pose, dtype=np.float64)
+        near[..., :2] -= self.frame[:2]
+        turned = SE2(np.array([0.0, 0.0, -self.frame[2]])) @ SE2(near)
+        return np.round(turned.pose, DIGITS)
+
+
+@functools.lru_cache(maxsize=8)
+def world_of(
+    obstacles: tuple[AnyObstacle, ...], footprint: tuple[Shape, ...], frame: tuple[float, ...]
+) -> World:
+    """The world of obstacles around a footprint, seen from the pose `frame`.
+
+    Examples
+    --------
+    >>> world = world_of((Obstacle(Box([1.0, 1.0])),), (Disc(0.5),), (0.0, 0.0, 0.0))
+    >>> len(world.arrays.solids.radius), world.arrays.movers.speed.size
+    (1, 0)
+    """
+    body = body_of(footprint)
+    pose = np.array(frame)
+    pose.setflags(write=False)
+    still = [o for o in obstacles if isinstance(o, Obstacle) and o.motion is None]
+    moving = [o for o in obstacles if isinstance(o, Obstacle) and o.motion is not None]
+    maps = [_seen_map(o, pose) for o in obstacles if isinstance(o, OccupancyMap)]
+    pieces = [piece for o in still for piece in _seen(convex_pieces(o.shape), pose)]
+    listed = len(pieces)
+    pieces += [(ring, 0.0) for one in maps for ring in _cells(one)]
+    solids = solids_of([(np.round(ring, DIGITS), r) for ring, r in pieces])
+    movers = _movers(moving, pose)
+    box = _box(solids.plates[:, :4], movers)
+    arrays = WorldArrays(
+        solids=solids,
+        buckets=_buckets(solids.plates, body),
+        field=_field(solids, listed, maps, body),
+        movers=movers,
+    )
+    return World(
+        frame=pose,
+        body=body,
+        arrays=arrays,
+        box=box,
+        last_event=float(movers.time.max()) if movers.time.size else -math.inf,
+    )
+
+
+def own_frame(obstacles: tuple[AnyObstacle, ...], otherwise: Array) -> tuple[float, ...]:
+    """A pose that moves with the obstacles: at the first that stands still and has a direction.
+
+    The pose `otherwise` (3,) where there is none.
+    """
+    for obstacle in obstacles:
+        if isinstance(obstacle, OccupancyMap):
+            return tuple(obstacle.origin.tolist())
+        if obstacle.motion is not None or isinstance(obstacle.shape, Disc):
+            continue
+        if isinstance(obstacle.shape, Box):
+            return (*obstacle.shape.center.tolist(), obstacle.shape.heading)
+        ring = obstacle.shape.corners
+        edge = np.roll(ring, -1, axis=0) - ring
+        length = np.hypot(edge[:, 0], edge[:, 1])
+        longest = int(np.argmax(np.round(length / length.max(), 6))) if length.max() > 0.0 else -1
+        if longest >= 0:
+            return (*ring[0].tolist(), math.atan2(edge[longest, 1], edge[longest, 0]))
+    return tuple(otherwise[:3].tolist())
+
+
+def _seen(pieces: list[tuple[Array, float]], frame: Array) -> list[tuple[Array, float]]:
+    """Pieces seen from a frame: places first, so that no digit is lost."""
+    c, s = math.cos(frame[2]), math.sin(frame[2])
+    turn = np.array([[c, -s], [s, c]])
+    return [((ring - frame[:2]) @ turn, rounding) for ring, rounding in pieces]
+
+
+def _seen_map(one: OccupancyMap, frame: Array) -> OccupancyMap:
+    there = one.moved(SE2(np.array([-frame[0], -frame[1], 0.0])))
+    return there.moved(SE2(np.array([0.0, 0.0, -frame[2]])))
+
+
+def _cells(one: OccupancyMap) -> list[Array]:
+    """Corners (4, 2) of the blocked rectangles of a map."""
+    boxes = one.resolution * blocked_rectangles(one.blocked).astype(np.float64)
+    rings = boxes[:, [[0, 1], [2, 1], [2, 3], [0, 3]]]
+    return list(np.asarray(SE2(one.origin).act(rings.reshape(-1, 2))).reshape(-1, 4, 2))
+
+
+def _box(boxes: Array, movers: Movers) -> Array:
+    rows = [boxes] if len(boxes) else []
+    for k in range(len(movers.speed)):
+        knots = movers.pose[movers.first_knot[k] : movers.first_knot[k + 1]]
+        middles = np.asarray(SE2(knots).act(movers.middle[k]))
+        rows.append(np.hstack([middles - movers.reach[k], middles + movers.reach[k]]))
+    if not rows:
+        return np.array([math.inf, math.inf, -math.inf, -math.inf])
+    every = np.concatenate(rows)
+    return np.concatenate([every[:, :2].min(axis=0), every[:, 2:].max(axis=0)])
+
+
+def _field(solids: Solids, listed: int, maps: list[OccupancyMap], body: Body) -> Field:
+    """Distances: polygons one by one, maps by a transform of their cells."""
+    if not len(solids.plates):
+        return Field(np.zeros((0, 0)), 0.0, 0.0, 1.0, math.inf)
+    low, high = solids.plates[:, :2].min(axis=0), solids.plates[:, 2:4].max(axis=0)
+    width = high - low
+    most = MOST_MAP_CELLS if maps else MOST_FIELD_CELLS
+    scale = body.half_width or 0.25 * float(np.median(solids.plates[:, 2:4] - solids.plates[:, :2]))
+    cell = max(0.25 * scale, math.sqrt(max(float(width.prod()), 1e-12) / most), width.max() / most)
+    cap = max(4.0 * body.half_width, 8.0 * cell)
+    columns, rows = np.ceil((width + 2.0 * cap) / cell).astype(int)
+    distance = np.full((rows, columns), cap)
+    origin = low - cap
+    where = (distance, float(origin[0]), float(origin[1]), cell, cap)
+    _kernels_field.write_pieces(*where, solids.edges, solids.first, solids.plates, listed)
+    for one in maps:
+        x, y, heading = one.origin.tolist()
+        c, s = math.cos(heading), math.sin(heading)
+        _kernels_field.write_map(*where, one.blocked, one.resolution, x, y, c, s)
+    return Field(distance, float(origin[0]), float(origin[1]), cell, cap)
+
+
+def _buckets(plates: Array, body: Body) -> Buckets:
+    reach = 0.15 * body.reach if body.reach else 0.25
+    if not len(plates):
+        empty = np.zeros(1, dtype=np.int64)
+        return Buckets(empty, empty[:0], 0.0, 0.0, 1.0, 0, 0, math.inf)
+    around = body.reach + reach
+    low, high = plates[:, :2].min(axis=0) - around, plates[:, 2:4].max(axis=0) + around
+    width = high - low
+    cell = max(0.4 * around, math.sqrt(float(width.prod()) / MOST_BUCKETS))
+    columns, rows = (int(n) for n in np.ceil(width / cell))
+    start = np.zeros(rows * columns + 1, dtype=np.int64)
+    where = (plates, float(low[0]), float(low[1]), cell, columns, rows, around)
+    _kernels_field.count_buckets(start, *where)
+    start = np.cumsum(start)
+    items = np.empty(int(start[-1]), dtype=np.int64)
+    _kernels_field.fill_buckets(start[:-1].copy(), items, *where)
+    return Buckets(start, items, float(low[0]), float(low[1]), cell, columns, rows, reach)
+
+
+def _movers(moving: list[Obstacle], frame: Array) -> Movers:
+    pieces: list[tuple[Array, float]] = []
+    first_piece, first_knot = [0], [0]
+    times, poses, speeds, middles, reaches = [], [], [], [], []
+    for obstacle in moving:
+        assert obstacle.motion is not None
+        own = convex_pieces(obstacle.shape)
+        pieces += own
+        first_piece.append(len(pieces))
+        low = np.min([ring.min(axis=0) - r for ring, r in own], axis=0)
+        high = np.max([ring.max(axis=0) + r for ring, r in own], axis=0)
+        middle = 0.5 * (low + high)
+        motion = _seen_motion(obstacle.motion, frame)
+        times.append(motion.time)
+        poses.append(motion.pose)
+        first_knot.append(first_knot[-1] + motion.time.size)
+        middles.append(middle)
+        reaches.append(max(float(np.hypot(*(ring - middle).T).max()) + r for ring, r in own))
+        speeds.append(_speed(motion, own))
+    return Movers(
+        solids=solids_of(pieces),
+        first_piece=np.array(first_piece, dtype=np.int64),
+        first_knot=np.array(first_knot, dtype=np.int64),
+        time=np.concatenate([np.zeros(0), *times]),
+        pose=np.concatenate([np.zeros((0, 3)), *poses]),
+        speed=np.array(speeds, dtype=np.float64),
+        middle=np.array(middles, dtype=np.float64).reshape(-1, 2),
+        reach=np.array(reaches, dtype=np.float64),
+    )
+
+
+def _seen_motion(motion: Motion, frame: Array) -> Motion:
+    there = motion.moved(SE2(np.array([-frame[0], -frame[1], 0.0])))
+    turned = there.moved(SE2(np.array([0.0, 0.0, -frame[2]])))
+    return Motion(turned.time, np.round(turned.pose, DIGITS))
+
+
+def _speed(motion: Motion, pieces: list[tuple[Array, float]]) -> float:
+    """No point of the obstacle is ever faster."""
+    if motion.time.size < 2:
+        return 0.0
+    step = np.diff(motion.pose, axis=0) / np.diff(motion.time)[:, None]
+    far = max(float(np.hypot(*ring.T).max()) + r for ring, r in pieces)
+    return float((np.hypot(step[:, 0], step[:, 1]) + far * np.abs(step[:, 2])).max())
