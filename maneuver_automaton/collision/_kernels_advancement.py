@@ -62,7 +62,7 @@ def mover_gap(movers, m, body, x, y, heading, time, enough):
 def free_time(
     world, body, x, y, heading, v_x, v_y, turn_rate, speed, duration, keep, margin, clock
 ):
-    """How long the motion from (x, y, heading) is proven free, at most `duration`.
+    """How long the motion from (x, y, heading) is proven free, at most `duration`; the last gap.
 
     No point of the body is faster than `speed`. The clearance is more than `keep + margin` wherever
     it is looked at, and more than `keep` in between. The world's time at the start is `clock`; a
@@ -71,14 +71,15 @@ def free_time(
     sign = 1.0 if duration >= 0.0 else -1.0
     length = abs(duration)
     n_movers = world.movers.speed.shape[0]
-    t = 0.0
+    t, nearest = 0.0, math.inf
     while True:
         d_x, d_y, turn = coast(v_x, v_y, turn_rate, sign * t)
         p_x, p_y, p_heading = compose(x, y, heading, d_x, d_y, turn)
         c, s = math.cos(p_heading), math.sin(p_heading)
         gap = still_gap(world, body, p_x, p_y, c, s) - keep
         if gap <= margin:
-            return t
+            return t, gap
+        nearest = gap
         step = gap / speed if speed > 0.0 else math.inf
         for m in range(n_movers):
             fast = speed + world.movers.speed[m]
@@ -86,17 +87,13 @@ def free_time(
             enough = keep + margin + fast * step
             gap = mover_gap(world.movers, m, body, p_x, p_y, p_heading, time, enough) - keep
             if gap <= margin:
-                return t
+                return t, gap
+            nearest = min(nearest, gap)
             if fast > 0.0:
                 step = min(step, gap / fast)
-        if t >= length:
-            return length
-        t = t + step
-        if t >= length:
-            t = length
-            if step < math.inf:  # the end has to be looked at as every pose
-                continue
-            return length
+        if t >= length or step == math.inf:
+            return length, nearest
+        t = min(t + step, length)  # the end has to be looked at as every pose
 
 
 @kernel
@@ -104,7 +101,7 @@ def free_times(world, body, poses, twists, speeds, durations, keep, margin, cloc
     """`free_time` of many motions (k,)."""
     free = np.empty(durations.shape[0])
     for k in range(durations.shape[0]):
-        free[k] = free_time(
+        free[k], _ = free_time(
             world,
             body,
             poses[k, 0],

@@ -1,0 +1,357 @@
+"""FCL, the authority: every motion of a finished plan is checked here.
+
+A motion is free if the solids its slices sweep touch nothing. Where one does, the pose in its
+middle decides that it is hit, or else halves of it are tried, until they stand out by less than
+what counts.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import threading
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from maneuver_automaton._arrays import Array, IntArray, as_array
+from maneuver_automaton.collision.shapes import AnyObstacle, Motion, Obstacle, Shape
+from maneuver_automaton.collision.solids import Skin, body_skin, joined, obstacle_skin
+from maneuver_automaton.collision.spacetime import Mover, Rover, meet
+from maneuver_automaton.collision.swept import (
+    STANDING,
+    Body,
+    Twist,
+    Windows,
+    body_of,
+    fastest,
+    halves,
+    slice_excess,
+    slice_hulls,
+    windows,
+)
+from maneuver_automaton.groups import SE2
+
+_ONE_AT_A_TIME = threading.Lock()  # objects are shared, and moved before they are asked
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FclChecker:
+    """A body among obstacles, by the Flexible Collision Library; a `CollisionChecker`.
+
+    What touches an obstacle, or comes closer to it than `margin`, is never reported free. What is
+    reported as hit comes closer than ``margin + proven``.
+
+    Parameters
+    ----------
+    footprint : tuple of Shape
+        Parts of the body; empty for a point.
+    obstacles : tuple of Obstacle or OccupancyMap
+        What the body must not touch.
+    margin : float
+        Distance to keep [m].
+    origin : (2,) sequence
+        Where to count from [m]: poses and obstacles near it lose no digit.
+    proven : float
+        Greatest distance [m] beyond the margin at which a motion may still count as hit.
+
+    Raises
+    ------
+    ValueError
+        If a polygon has no area, or a number is out of range.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.collision import Box
+    >>> wall = Obstacle(Box([0.1, 8.0], center=[5.0, 0.0]))
+    >>> checker = FclChecker((Box([4.0, 2.0]),), (wall,))
+    >>> checker.pose_hit([2.0, 0.0, 0.0]), checker.pose_hit([4.0, 0.0, 0.0])
+    (None, 0)
+    >>> checker.motion_hit([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], 2.9)
+    >>> checker.motion_hit([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], 12.0)
+    0
+    >>> round(checker.clearance([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]), 9)
+    0.95
+    """
+
+    footprint: tuple[Shape, ...]
+    obstacles: tuple[AnyObstacle, ...]
+    margin: float = field(default=0.0, kw_only=True)  # [m]
+    origin: tuple[float, float] = field(default=(0.0, 0.0), kw_only=True)  # [m]
+    proven: float = field(default=1e-3, kw_only=True)  # [m]
+    _body: Body = field(init=False, repr=False)
+    _bare: Body = field(init=False, repr=False)
+    _ground: Any = field(init=False, repr=False)
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            footprint: tuple[Shape, ...],
+            obstacles: tuple[AnyObstacle, ...],
+            *,
+            margin: float = 0.0,
+            origin: tuple[float, float] = (0.0, 0.0),
+            proven: float = 1e-3,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.margin) and self.margin >= 0.0):
+            raise ValueError(f"margin must be a number of at least 0, got {self.margin} m")
+        if not (math.isfinite(self.proven) and self.proven > 0.0):
+            raise ValueError(f"proven must be a positive number, got {self.proven} m")
+        x, y = as_array("origin", self.origin, last=2).tolist()
+        excess = 0.25 * self.proven  # of round corners, on either side; the rest is for slices
+        object.__setattr__(self, "origin", (x, y))
+        object.__setattr__(self, "_body", body_of(self.footprint, self.margin, excess))
+        object.__setattr__(self, "_bare", body_of(self.footprint, 0.0, excess))
+        object.__setattr__(self, "_ground", _ground_of(self.obstacles, (x, y), excess))
+
+    def pose_hit(self, pose: ArrayLike, *, time: float = 0.0) -> int | None:
+        """Which obstacle the body touches at a pose (3,) and a time [s]; None if it is free."""
+        here = self._seen("pose", pose)
+        hit = self._still_hit(here[None])
+        if hit is not None:
+            return hit
+        for mover in self._ground.movers:
+            _place(mover.object, mover.motion.at(time))
+            if _touching(_standing(self._body), here[None], mover.object):
+                return mover.owner
+        return None
+
+    def motion_hit(
+        self,
+        start: ArrayLike,
+        body_velocity: ArrayLike,
+        duration: float,
+        *,
+        start_time: float = 0.0,
+    ) -> int | None:
+        """Which obstacle the body touches while it coasts from a pose; None if the way is free.
+
+        Coasting is ``start @ exp(t * body_velocity)`` for t from 0 to `duration` [s]; it begins at
+        `start_time` [s] of the world's clock.
+
+        Raises
+        ------
+        ValueError
+            If a number is not finite, or the duration negative.
+        """
+        here = self._seen("start", start)
+        v_x, v_y, turn_rate = as_array("body_velocity", body_velocity, last=3).tolist()
+        if not (math.isfinite(duration) and duration >= 0.0):
+            raise ValueError(f"duration must be a number of at least 0, got {duration} s")
+        twist = (v_x, v_y, turn_rate)
+        hit = self._still_hit_on_way(here, twist, duration)
+        return self._meets(here, twist, duration, start_time) if hit is None else hit
+
+    def clearance(self, poses: ArrayLike, *, times: ArrayLike | None = None) -> float:
+        """Least distance [m] to any obstacle at poses (n, 3) and times (n,) [s], 0 if none given.
+
+        The margin is not taken off. Zero on contact, infinite without obstacles; round shapes
+        may be taken for larger by a quarter of `proven` each.
+        """
+        seen = np.atleast_2d(self._seen("poses", poses))
+        clock = np.broadcast_to(0.0 if times is None else as_array("times", times), len(seen))
+        least = math.inf
+        if self._ground.still is not None:
+            still = _Moving(self._ground.still, _NOWHERE, 0.0, -1)
+            least = _least_distance(self._bare, seen, still, clock, least)
+        for mover in self._ground.movers:
+            least = _least_distance(self._bare, seen, mover, clock, least)
+        return least
+
+    def _seen(self, name: str, poses: ArrayLike) -> Array:
+        """Poses counted from the origin; not finite, they would be free in the eyes of FCL."""
+        near = np.array(as_array(name, poses, last=3))
+        near[..., :2] -= self.origin
+        return near
+
+    def _still_hit(self, poses: Array) -> int | None:
+        """An obstacle that stands still and is touched at one of the poses (n, 3)."""
+        if self._ground.still is None:
+            return None
+        hits = _touching(_standing(self._body), poses, self._ground.still, most=1)
+        return self._ground.owner_of(hits)
+
+    def _still_hit_on_way(self, start: Array, twist: Twist, duration: float) -> int | None:
+        """An obstacle that stands still and is touched on the way."""
+        if self._ground.still is None:
+            return None
+        if fastest(self._body, twist) * duration <= STANDING:
+            return self._still_hit(start[None])
+        once = 2.0 * math.pi / abs(twist[2]) if twist[2] else math.inf  # then it is where it began
+        parts = windows(twist, min(duration, once))
+        while True:
+            solid = _sliced(self._body, twist, parts.level)
+            hits = _touching(solid.object, _along(start, twist, parts.begins), self._ground.still)
+            if not hits or solid.excess <= 0.5 * self.proven:
+                return self._ground.owner_of(hits)
+            parts = Windows(parts.level, parts.begins[list(hits)])
+            middles = _along(start, twist, parts.begins + 0.5 * parts.length)
+            hit = self._still_hit(middles)
+            if hit is not None:
+                return hit
+            parts = halves(parts)
+
+    def _meets(self, start: Array, twist: Twist, duration: float, time: float) -> int | None:
+        """An obstacle that moves and is touched on the way."""
+        rover = Rover(start, twist, self._body.middle, self._body.reach)
+        for mover in self._ground.movers:
+            path = Mover.of(mover.motion, mover.reach, start_time=time)
+            gap = functools.partial(_distance, _standing(self._body), mover.object)
+            if meet(rover, path, duration=duration, distance=gap, contact=0.5 * self.proven):
+                return mover.owner
+        return None
+
+
+class _Moving(NamedTuple):
+    """An obstacle that moves."""
+
+    object: Any
+    motion: Motion
+    reach: float  # [m] no point is further from the origin of its frame
+    owner: int
+
+
+class _Ground(NamedTuple):
+    """Obstacles as FCL sees them."""
+
+    still: Any  # one object for all that stands still, None without
+    owners: IntArray  # which obstacle each of its triangles belongs to
+    movers: tuple[_Moving, ...]
+
+    def owner_of(self, hits: dict[int, int]) -> int | None:
+        """Which obstacle the first of the triangles hit belongs to."""
+        return int(self.owners[next(iter(hits.values()))]) if hits else None
+
+
+class _Sliced(NamedTuple):
+    """What a body sweeps in one slice."""
+
+    object: Any
+    excess: float  # [m]
+
+
+_NOWHERE = Motion([0.0], [[0.0, 0.0, 0.0]])
+
+
+@functools.lru_cache(maxsize=8)
+def _ground_of(
+    obstacles: tuple[AnyObstacle, ...], origin: tuple[float, float], excess: float
+) -> _Ground:
+    to_origin = SE2([-origin[0], -origin[1], 0.0])
+    skins: list[Skin] = []
+    owners: list[int] = []
+    movers: list[_Moving] = []
+    for index, far in enumerate(obstacles):
+        obstacle = far.moved(to_origin)
+        skin = obstacle_skin(obstacle, excess=excess)
+        if isinstance(obstacle, Obstacle) and obstacle.motion is not None:
+            reach = float(np.hypot(*skin.vertices[:, :2].T).max())
+            movers.append(_Moving(_object(skin), obstacle.motion, reach, index))
+        elif len(skin.triangles):
+            skins.append(skin)
+            owners += [index] * len(skin.triangles)
+    still = _object(joined(skins)) if skins else None
+    return _Ground(still, np.array(owners, dtype=np.int64), tuple(movers))
+
+
+@functools.lru_cache(maxsize=32)
+def _standing(body: Body) -> Any:
+    """The body at rest."""
+    return _object(body_skin(body.pieces))
+
+
+@functools.lru_cache(maxsize=4096)
+def _sliced(body: Body, twist: Twist, level: int) -> _Sliced:
+    duration = math.ldexp(1.0, -level)
+    hulls = slice_hulls(body, twist, duration)
+    return _Sliced(_object(body_skin(hulls)), slice_excess(body, twist, duration))
+
+
+def _along(start: Array, twist: Twist, times: Array) -> Array:
+    """Poses (n, 3) of a coast after `times` (n,) [s]."""
+    return (SE2(start) @ SE2.exp(np.multiply.outer(times, twist))).pose
+
+
+def _object(skin: Skin) -> Any:
+    """A skin as FCL holds it; it is never empty, and its indices are right."""
+    import fcl
+
+    model = fcl.BVHModel()
+    model.beginModel(len(skin.triangles), len(skin.vertices))
+    model.addSubModel(skin.vertices, skin.triangles)
+    model.endModel()
+    return fcl.CollisionObject(model)
+
+
+def _turns(poses: Array) -> Array:
+    """Rotation matrices (n, 3, 3) about the vertical."""
+    turns = np.zeros((len(poses), 3, 3))
+    turns[:, 0, 0] = turns[:, 1, 1] = np.cos(poses[:, 2])
+    turns[:, 1, 0] = np.sin(poses[:, 2])
+    turns[:, 0, 1] = -turns[:, 1, 0]
+    turns[:, 2, 2] = 1.0
+    return turns
+
+
+def _place(one: Any, pose: Array) -> None:
+    """Put an object at a pose (3,)."""
+    one.setRotation(_turns(pose[None])[0])
+    one.setTranslation(np.array([pose[0], pose[1], 0.0]))
+
+
+def _touching(one: Any, poses: Array, other: Any, *, most: int | None = None) -> dict[int, int]:
+    """At which of the poses (n, 3) an object touches another, and which of its triangles."""
+    import fcl
+
+    request = fcl.CollisionRequest(num_max_contacts=1, enable_contact=False)
+    places = np.column_stack([poses[:, :2], np.zeros(len(poses))])
+    hits: dict[int, int] = {}
+    for k, (turn, place) in enumerate(zip(_turns(poses), places, strict=True)):
+        one.setRotation(turn)
+        one.setTranslation(place)
+        result = fcl.CollisionResult()
+        if fcl.collide(one, other, request, result):
+            hits[k] = result.contacts[0].b2
+            if len(hits) == most:
+                break
+    return hits
+
+
+def _distance(one: Any, other: Any, here: Array, there: Array) -> float:
+    """Distance [m] of two objects at two poses (3,), zero on contact."""
+    import fcl
+
+    _place(one, here)
+    _place(other, there)
+    return max(0.0, float(fcl.distance(one, other, fcl.DistanceRequest(), fcl.DistanceResult())))
+
+
+def _least_distance(body: Body, poses: Array, mover: _Moving, times: Array, least: float) -> float:
+    """Least of `least` and the distances [m] at the poses (n, 3) and times (n,).
+
+    Where the last distance, less what both have moved since, is no smaller, none is computed.
+    """
+    others = mover.motion.at(times)
+    moved = _travel(poses, body.middle, body.reach)
+    moved += _travel(others, np.zeros(2), mover.reach)
+    bound = -math.inf
+    for here, there, way in zip(poses, others, moved, strict=True):
+        bound -= way
+        if bound >= least:
+            continue
+        bound = _distance(_standing(body), mover.object, here, there)
+        least = min(least, bound)
+    return least
+
+
+def _travel(poses: Array, middle: Array, reach: float) -> Array:
+    """How far (n,) any point of a disc can have moved since the pose before [m]."""
+    places = SE2(poses).act(middle)
+    ways = np.hypot(*np.diff(places, axis=0).T)
+    turns = 2.0 * reach * np.abs(np.sin(0.5 * np.diff(poses[:, 2])))
+    return np.concatenate([[0.0], ways + turns])

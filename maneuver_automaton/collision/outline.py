@@ -1,0 +1,72 @@
+"""Polygons as shapely knows them: valid, and with nothing solid lost."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.collision.shapes import Box, Polygon
+
+
+def outlines(shape: Polygon | Box) -> list[Any]:
+    """Valid shapely polygons that together are the shape.
+
+    A ring that crosses or touches itself is cut into its faces: those it runs around are solid,
+    once or several times, in either direction. Repeated corners and spikes without width vanish.
+
+    Raises
+    ------
+    ValueError
+        If the polygon has no area.
+
+    Examples
+    --------
+    >>> knot = Polygon([[0, 0], [2, 2], [2, 0], [0, 2]])
+    >>> [part.area for part in outlines(knot)]
+    [1.0, 1.0]
+    """
+    import shapely
+
+    if isinstance(shape, Box):
+        return [shapely.Polygon(shape.corners)]
+    whole = shapely.Polygon(shape.corners, shape.holes)
+    if not whole.is_valid:
+        whole = shapely.union_all(_faces(shape.corners))
+        for hole in shape.holes:
+            whole = shapely.difference(whole, shapely.union_all(_faces(hole)))
+    parts = shapely.get_parts(whole)
+    solid = [part for part in parts if part.geom_type == "Polygon" and part.area > 0.0]
+    if not solid:
+        raise ValueError(
+            f"polygon: got {len(shape.corners)} corners around no area, near "
+            f"({shape.corners[0, 0]:.6g}, {shape.corners[0, 1]:.6g}); need corners that are not "
+            "all on one line"
+        )
+    return solid
+
+
+def rings_of(polygon: Any) -> list[Array]:
+    """Corners (n, 2) of the outer ring of a valid polygon, then of its holes, none repeated."""
+    import shapely
+
+    return [shapely.get_coordinates(ring)[:-1] for ring in (polygon.exterior, *polygon.interiors)]
+
+
+def _faces(ring: Array) -> list[Any]:
+    """Faces of the plane that a closed line runs around at least once."""
+    import shapely
+
+    line = shapely.LineString(np.vstack([ring, ring[:1]]))
+    cut = shapely.node(line)
+    faces = shapely.get_parts(shapely.polygonize(shapely.get_parts(cut)))
+    return [face for face in faces if _turns_around(ring, face.representative_point()) != 0]
+
+
+def _turns_around(ring: Array, point: Any) -> int:
+    """How often a closed line runs around a point that is not on it."""
+    to = ring - [point.x, point.y]
+    after = np.roll(to, -1, axis=0)
+    cross = to[:, 0] * after[:, 1] - to[:, 1] * after[:, 0]
+    return round(float(np.arctan2(cross, (to * after).sum(axis=1)).sum() / (2.0 * np.pi)))

@@ -1,0 +1,130 @@
+"""Obstacle-aware distance in the plane, grown from its seeds only as far as it is asked for."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from maneuver_automaton._compile import inner_kernel, kernel
+
+SETTLED = 2
+BLOCKED = 1
+
+
+@inner_kernel
+def push(keys, items, size, key, item):
+    """Put (key, item) into a binary heap in arrays that holds `size`."""
+    k = size
+    while k > 0:
+        up = (k - 1) >> 1
+        if keys[up] <= key:
+            break
+        keys[k], items[k] = keys[up], items[up]
+        k = up
+    keys[k], items[k] = key, item
+
+
+@inner_kernel
+def pop(keys, items, size):
+    """Take the least out of a binary heap that holds `size`; returns its item."""
+    top = items[0]
+    last = size - 1
+    key, item = keys[last], items[last]
+    k = 0
+    while True:
+        down = 2 * k + 1
+        if down >= last:
+            break
+        if down + 1 < last and keys[down + 1] < keys[down]:
+            down += 1
+        if key <= keys[down]:
+            break
+        keys[k], items[k] = keys[down], items[down]
+        k = down
+    keys[k], items[k] = key, item
+    return top
+
+
+@inner_kernel
+def blocked_cell(grid, field, i, j):
+    """Whether no reference point can be anywhere in the cell: sound."""
+    f_i, f_j = i * grid.stride + grid.shift_x, j * grid.stride + grid.shift_y
+    if 0 <= f_i < field.distance.shape[1] and 0 <= f_j < field.distance.shape[0]:
+        return field.distance[f_j, f_i] < grid.inflation
+    return False
+
+
+@inner_kernel
+def distance_at(grid, field, x, y):
+    """Distance [m] from the nearest seed to the cell of (x, y); inf if there is no way.
+
+    Grows until that cell is settled, in the order of distance plus the straight way to where the
+    grid is aimed at, so that cells off the way are not looked at.
+    """
+    i = int(math.floor((x - grid.origin_x) / grid.cell))
+    j = int(math.floor((y - grid.origin_y) / grid.cell))
+    if not (0 <= i < grid.columns and 0 <= j < grid.rows):
+        return math.inf
+    wanted = j * grid.columns + i
+    if grid.mark[wanted] == BLOCKED or blocked_cell(grid, field, i, j):
+        return math.inf
+    while grid.mark[wanted] != SETTLED:
+        size = grid.state[0]
+        if size == 0:
+            return math.inf
+        here = pop(grid.keys, grid.items, size)
+        grid.state[0] = size - 1
+        if grid.mark[here] == SETTLED:
+            continue
+        grid.mark[here] = SETTLED
+        grid.state[1] += 1
+        h_j, h_i = here // grid.columns, here % grid.columns
+        if h_i == 0 or h_j == 0 or h_i == grid.columns - 1 or h_j == grid.rows - 1:
+            grid.state[2] = 1  # the rim was reached: what is beyond is not known
+        value = grid.value[here]
+        for b in range(-1, 2):
+            for a in range(-1, 2):
+                n_i, n_j = h_i + a, h_j + b
+                if not (0 <= n_i < grid.columns and 0 <= n_j < grid.rows):
+                    continue
+                there = n_j * grid.columns + n_i
+                if grid.mark[there] != 0:
+                    continue
+                if blocked_cell(grid, field, n_i, n_j):
+                    grid.mark[there] = BLOCKED
+                    continue
+                step = grid.cell * (1.4142135623730951 if a != 0 and b != 0 else 1.0)
+                if value + step < grid.value[there]:
+                    grid.value[there] = value + step
+                    e_x, e_y = (n_i - grid.aim_i) * grid.cell, (n_j - grid.aim_j) * grid.cell
+                    key = value + step + math.sqrt(e_x * e_x + e_y * e_y)
+                    if grid.state[0] < grid.keys.shape[0]:
+                        push(grid.keys, grid.items, grid.state[0], key, there)
+                        grid.state[0] += 1
+    return grid.value[wanted]
+
+
+@kernel
+def seed(grid, points):
+    """Set the distance of the cells of `points` (n, 2) to 0."""
+    for k in range(points.shape[0]):
+        i = int(math.floor((points[k, 0] - grid.origin_x) / grid.cell))
+        j = int(math.floor((points[k, 1] - grid.origin_y) / grid.cell))
+        if 0 <= i < grid.columns and 0 <= j < grid.rows:
+            here = j * grid.columns + i
+            if grid.value[here] > 0.0:
+                grid.value[here] = 0.0
+                e_x, e_y = (i - grid.aim_i) * grid.cell, (j - grid.aim_j) * grid.cell
+                key = math.sqrt(e_x * e_x + e_y * e_y)
+                push(grid.keys, grid.items, grid.state[0], key, here)
+                grid.state[0] += 1
+
+
+@kernel
+def distances(grid, field, points):
+    """`distance_at` (n,) for points (n, 2)."""
+    out = np.empty(points.shape[0])
+    for k in range(points.shape[0]):
+        out[k] = distance_at(grid, field, points[k, 0], points[k, 1])
+    return out

@@ -1,0 +1,103 @@
+"""The plane as cells through which the pose must pass: distances that know the obstacles."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.collision.world import World
+from maneuver_automaton.search import _kernels_distance
+
+MOST_CELLS = 1_000_000
+
+
+class DistanceGrid(NamedTuple):
+    """What the kernels see; cells coincide with cells of the world's field of distances."""
+
+    value: Array  # (cells,) [m]
+    mark: NDArray[np.uint8]  # (cells,) 0 open, 1 blocked, 2 settled
+    keys: Array
+    items: IntArray
+    state: IntArray  # heap size, settled cells, whether the rim was reached
+    origin_x: float
+    origin_y: float
+    cell: float
+    columns: int
+    rows: int
+    stride: int  # field cells a cell
+    shift_x: int  # field cell of cell (0, 0)
+    shift_y: int
+    inflation: float  # [m] clearance of a cell's centre below which the pose cannot be in it
+    aim_i: int  # cell towards which it grows first
+    aim_j: int
+
+
+def distance_grid(world: World, box: Array, seeds: Array, aim: Array) -> DistanceGrid:
+    """Distances from `seeds` (n, 2 or more) inside `box` (4,), grown towards `aim` (2 or more,).
+
+    Source of the inflation: a pose in a cell is at most half its diagonal from the centre, and a
+    disc of the body's inscribed radius around it must be free.
+    """
+    field = world.arrays.field
+    low, high = box[:2], box[2:]
+    if not field.distance.size:
+        return _none()
+    width = float(np.maximum(high - low, field.cell).prod())
+    stride = 1
+    while width / (stride * field.cell) ** 2 > MOST_CELLS:
+        stride += 2  # odd: centres of cells stay centres of field cells
+    cell = stride * field.cell
+    origin = np.array([field.origin_x, field.origin_y]) - (stride // 2) * field.cell
+    first = np.floor((low - origin) / cell).astype(int)
+    columns, rows = (int(n) for n in np.ceil((high - origin) / cell).astype(int) - first)
+    columns, rows = max(columns, 1), max(rows, 1)
+    start = origin + first * cell
+    n = columns * rows
+    aim_i, aim_j = (int(k) for k in np.floor((aim[:2] - start) / cell))
+    grid = DistanceGrid(
+        value=np.full(n, np.inf),
+        mark=np.zeros(n, dtype=np.uint8),
+        keys=np.empty(8 * n + 8),
+        items=np.empty(8 * n + 8, dtype=np.int64),
+        state=np.zeros(3, dtype=np.int64),
+        origin_x=float(start[0]),
+        origin_y=float(start[1]),
+        cell=float(cell),
+        columns=columns,
+        rows=rows,
+        stride=stride,
+        shift_x=int(first[0]) * stride,
+        shift_y=int(first[1]) * stride,
+        inflation=world.body.inscribed - cell * math.sqrt(0.5),
+        aim_i=aim_i,
+        aim_j=aim_j,
+    )
+    _kernels_distance.seed(grid, np.ascontiguousarray(seeds[:, :2]))
+    return grid
+
+
+def _none() -> DistanceGrid:
+    """No obstacle stands still: the straight way is as good."""
+    empty, none = np.zeros(0), np.zeros(0, dtype=np.int64)
+    return DistanceGrid(
+        value=empty,
+        mark=np.zeros(0, dtype=np.uint8),
+        keys=empty,
+        items=none,
+        state=np.zeros(3, dtype=np.int64),
+        origin_x=0.0,
+        origin_y=0.0,
+        cell=1.0,
+        columns=0,
+        rows=0,
+        stride=1,
+        shift_x=0,
+        shift_y=0,
+        inflation=0.0,
+        aim_i=0,
+        aim_j=0,
+    )

@@ -1,0 +1,203 @@
+"""The trims of a problem as the lattice uses them: edges, triples for steering, sizes."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.collision.body import body_of, fastest_points
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.search.setup import moving_library
+
+MOST_TRIMS = 10  # of a larger library the most useful ones
+QUANTA = (0.17, 0.5)  # lengths of the edges, in turning radii
+SPIN_QUANTA = (math.pi / 12.0, math.pi / 4.0)  # [rad] of turns on the spot
+SHORTEST = 1e-9  # [s] coasting times below it are none
+TOLERANCE = 1e-10  # of the steering function
+
+
+class LatticeArrays(NamedTuple):
+    """What the kernels see; the row after the last trim is the turn of a free heading."""
+
+    twists: Array  # (m + 1, 3)
+    rates: Array  # (m + 1,) cost per second, that of rest taken off where it pads
+    speeds: Array  # (m + 1,) [m/s] of the fastest point of the body
+    periods: Array  # (m + 1,) [s] of a full turn
+    gears: IntArray  # (m + 1,) sign of the forward speed
+    quanta: Array  # (m, 2) [s] lengths of the edges, 0 for none
+    triples: IntArray  # (K, 3)
+    free_triples: IntArray  # (F, 3) that end with the turn of a free heading
+    n_trims: int
+    switch: float
+    direction_change: float
+    min_coast: float  # [s]
+    shortest: float  # [s]
+    tolerance: float
+
+
+class LatticeLibrary(NamedTuple):
+    """The arrays with what the wrapper needs beside them."""
+
+    arrays: LatticeArrays
+    trims: IntArray  # (m,) their indices in the automaton
+    radius: float  # [m] length scale: the tightest turn, or the size of the body
+    per_metre: float  # least cost per metre
+    per_turn: float  # cost of the cheapest full turn
+    rest: int | None  # index in the automaton of the rest that pads
+    rest_rate: float
+    mirrored: bool  # whether the mirror image of every trim is a trim of the same cost
+
+
+def lattice_library(problem: Problem) -> LatticeLibrary:
+    """The part of a lattice search that is the same for every start, goal and map."""
+    horizon = problem.horizon
+    return _library(
+        problem,
+        horizon.time is not None,
+        problem.moves,
+        horizon.min_coast,
+    )
+
+
+def _library(
+    problem: Problem, fixed_time: bool, waits: bool, min_coast: float
+) -> LatticeLibrary:
+    key = (problem.automaton, problem.cost, problem.footprint, fixed_time, waits, min_coast)
+    return _cached(*key)
+
+
+@functools.lru_cache(maxsize=16)
+def _cached(automaton, cost, footprint, fixed_time, waits, min_coast):  # type: ignore[no-untyped-def]
+    library = moving_library(automaton, cost)
+    body = body_of(footprint)
+    pads = fixed_time and library.rest is not None
+    rates = library.rates - (library.rest_rate if pads else 0.0)
+    chosen = _most_useful(library.twists, rates)
+    trims = library.trims[chosen]
+    twists, rates, periods = library.twists[chosen, :3], rates[chosen], library.periods[chosen]
+    radius = _length_scale(twists, body.half_width, body.reach)
+    if waits and library.rest is not None:
+        trims = np.append(trims, library.rest)
+        twists = np.vstack([twists, np.zeros(3)])
+        rates = np.append(rates, 0.0 if pads else library.rest_rate)
+        periods = np.append(periods, np.inf)
+    still = ~twists.any(axis=1)
+    speed = np.hypot(twists[:, 0], twists[:, 1])
+    moving = np.flatnonzero(~still)
+    quanta = np.zeros((len(trims), 2))
+    for k, share in enumerate(QUANTA):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            straight = np.where(speed > 0.0, share * radius / speed, np.inf)
+            turning = np.where(twists[:, 2] != 0.0, SPIN_QUANTA[k] / np.abs(twists[:, 2]), np.inf)
+        quanta[:, k] = np.where(speed > 0.1 * np.abs(twists[:, 2]) * radius, straight, turning)
+        if still.any():
+            quanta[still, k] = share * radius / max(float(speed.max()), 1e-9)
+    quanta = np.maximum(quanta, min_coast)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        per_metre = np.where(speed > 0.0, rates / speed, np.inf)
+        per_radian = np.where(twists[:, 2] != 0.0, rates / np.abs(twists[:, 2]), np.inf)
+    m = len(trims)
+    prices = (getattr(cost, "switch", 0.0), getattr(cost, "direction_change", 0.0))
+    arrays = LatticeArrays(
+        twists=np.vstack([twists, [0.0, 0.0, 1.0]]),
+        rates=np.append(rates, 0.0),
+        speeds=np.append(fastest_points(body, twists), 0.0),
+        periods=np.append(periods, 2.0 * np.pi),
+        gears=np.append(np.sign(twists[:, 0]), 0).astype(np.int64),
+        quanta=quanta,
+        triples=_triples(moving),
+        free_triples=np.array(
+            [(i, j, m) for i, j in itertools.permutations(moving.tolist(), 2)]
+            or [(int(i), int(i), m) for i in moving],
+            dtype=np.int64,
+        ).reshape(-1, 3),
+        n_trims=m,
+        switch=float(prices[0]),
+        direction_change=float(prices[1]),
+        min_coast=float(min_coast),
+        shortest=SHORTEST,
+        tolerance=TOLERANCE,
+    )
+    best = float(per_radian.min())
+    return LatticeLibrary(
+        arrays=arrays,
+        trims=np.asarray(trims, dtype=np.int64),
+        radius=radius,
+        per_metre=float(per_metre.min()) if np.isfinite(per_metre.min()) else 0.0,
+        per_turn=2.0 * math.pi * best if math.isfinite(best) else 0.0,
+        rest=library.rest,
+        rest_rate=library.rest_rate if pads else 0.0,
+        mirrored=_mirrored(twists, rates),
+    )
+
+
+def _triples(moving: IntArray) -> IntArray:
+    """Words of three trims whose neighbours differ; of fewer where there are fewer trims."""
+    every = moving.tolist()
+    words = [
+        (i, j, k) for i, j, k in itertools.product(every, repeat=3) if i != j and j != k
+    ] or [(i, i, i) for i in every]
+    return np.array(words, dtype=np.int64).reshape(-1, 3)
+
+
+def _length_scale(twists: Array, half_width: float, reach: float) -> float:
+    """Radius of the tightest turn that drives; a few widths of the body where there is none."""
+    speed = np.hypot(twists[:, 0], twists[:, 1])
+    turns = (np.abs(twists[:, 2]) > 0.0) & (speed > 0.0)
+    body = 4.0 * half_width or 4.0 * reach
+    if turns.any():
+        radius = float((speed[turns] / np.abs(twists[turns, 2])).min())
+        spins = bool(((speed == 0.0) & (twists[:, 2] != 0.0)).any())
+        return max(radius, 0.5 * body) if not spins else min(max(radius, 0.5 * body), 2.0 * body or radius)
+    return body or 1.0
+
+
+def _most_useful(twists: Array, rates: Array) -> IntArray:
+    """All trims of a small library; of a large one straight, sharp and middling turns, and spins.
+
+    For each kind the cheapest for the way or the turn it makes, and the fastest.
+    """
+    n = len(twists)
+    if n <= MOST_TRIMS:
+        return np.arange(n)
+    speed = np.hypot(twists[:, 0], twists[:, 1])
+    turn = twists[:, 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        curvature = np.where(speed > 0.0, turn / speed, 0.0)
+    drives = speed > 0.0
+    sharpest = float(np.abs(curvature[drives]).max()) if drives.any() else 0.0
+    kinds = []
+    for gear in (1.0, -1.0):
+        going = drives & (np.sign(twists[:, 0]) == gear)
+        kinds += [going & (curvature == 0.0)]
+        for side in (1.0, -1.0):
+            turning = going & (np.sign(curvature) == side)
+            gentle = turning & (np.abs(curvature) <= 0.3 * min(sharpest, 4.0))
+            kinds += [turning & ~gentle, gentle]
+    for side in (1.0, -1.0):
+        kinds.append(~drives & (np.sign(turn) == side))
+    chosen: list[int] = []
+    amount = np.where(drives, speed, np.abs(turn))
+    for kind in kinds:
+        members = np.flatnonzero(kind)
+        if not members.size:
+            continue
+        price = rates[members] / amount[members]
+        order = np.lexsort((-amount[members], np.round(price, 9)))
+        chosen.append(int(members[order[0]]))
+    fastest = int(np.argmax(np.where(turn == 0.0, speed, -1.0)))
+    chosen.append(fastest)
+    return np.array(sorted(set(chosen)), dtype=np.int64)
+
+
+def _mirrored(twists: Array, rates: Array) -> bool:
+    """Whether the library and its prices are their own mirror image."""
+    rows = np.column_stack([twists, rates])
+    image = rows * np.array([1.0, -1.0, -1.0, 1.0])
+    order = np.lexsort(np.round(rows, 9).T)
+    return bool(np.allclose(rows[order], image[np.lexsort(np.round(image + 0.0, 9).T)]))

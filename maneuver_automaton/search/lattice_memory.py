@@ -1,0 +1,95 @@
+"""Arrays of one lattice search: they grow when they are full, and are used again."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.search import _kernels_lattice as kernels
+
+SMALLEST = 2048  # nodes
+
+
+class Scratch(NamedTuple):
+    """Candidates of one steering: at most two for each triple."""
+
+    costs: Array
+    durations: Array
+    rows: IntArray
+    times: Array  # (n, 3)
+    branches: Array  # (2, 3)
+
+
+class SearchArrays(NamedTuple):
+    """Nodes, their hash table, the heap, and a few numbers, as in `_kernels_lattice`."""
+
+    nodes: Array  # (n, 8)
+    links: NDArray[np.int32]  # (n, 6)
+    hash_key: IntArray
+    hash_node: NDArray[np.int32]
+    hash_generation: NDArray[np.int32]
+    heap_key: Array
+    heap_node: IntArray
+    state: IntArray  # (11,)
+    found: Array  # (5,) cost, three durations, time
+    scratch: Scratch
+
+
+def scratch_of(n_triples: int) -> Scratch:
+    """Room for the candidates of one steering."""
+    n = 2 * max(1, n_triples)
+    return Scratch(
+        costs=np.empty(n),
+        durations=np.empty(n),
+        rows=np.empty(n, dtype=np.int64),
+        times=np.empty((n, 3)),
+        branches=np.empty((2, 3)),
+    )
+
+
+def search_arrays(n_triples: int) -> SearchArrays:
+    """Room for a small search."""
+    n = SMALLEST
+    return SearchArrays(
+        nodes=np.empty((n, 8)),
+        links=np.empty((n, 6), dtype=np.int32),
+        hash_key=np.empty(4 * n, dtype=np.int64),
+        hash_node=np.empty(4 * n, dtype=np.int32),
+        hash_generation=np.zeros(4 * n, dtype=np.int32),
+        heap_key=np.empty(n),
+        heap_node=np.empty(n, dtype=np.int64),
+        state=np.zeros(11, dtype=np.int64),
+        found=np.zeros(5),
+        scratch=scratch_of(n_triples),
+    )
+
+
+def with_room(search: SearchArrays, nodes: int) -> SearchArrays:
+    """The same search in arrays that hold at least so many nodes."""
+    n = len(search.nodes)
+    if nodes <= n:
+        return search
+    while n < nodes:
+        n *= 2
+    used = int(search.state[kernels.N_NODES])
+    wide_nodes, wide_links = np.empty((n, 8)), np.empty((n, 6), dtype=np.int32)
+    wide_nodes[:used], wide_links[:used] = search.nodes[:used], search.links[:used]
+    queued = int(search.state[kernels.HEAP])
+    heap_key, heap_node = np.empty(n), np.empty(n, dtype=np.int64)
+    heap_key[:queued], heap_node[:queued] = search.heap_key[:queued], search.heap_node[:queued]
+    hash_key = np.empty(4 * n, dtype=np.int64)
+    hash_node = np.empty(4 * n, dtype=np.int32)
+    hash_generation = np.zeros(4 * n, dtype=np.int32)
+    kernels.rehash(search, hash_key, hash_node, hash_generation)
+    return search._replace(
+        nodes=wide_nodes,
+        links=wide_links,
+        hash_key=hash_key,
+        hash_node=hash_node,
+        hash_generation=hash_generation,
+        heap_key=heap_key,
+        heap_node=heap_node,
+    )

@@ -1,0 +1,120 @@
+"""One start and its goals among obstacles, seen from the world's own frame."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.collision.advancement import clearances
+from maneuver_automaton.collision.world import World, own_frame, world_of
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.search.inside import outside
+from maneuver_automaton.search.lattice_library import LatticeLibrary, lattice_library
+
+MARGIN = 0.005  # proven clearance of every pose looked at, in half widths of the body
+LEAST_MARGIN = 1e-7  # [m]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class LatticeQuery:
+    """What every pass of the lattice shares."""
+
+    problem: Problem
+    library: LatticeLibrary
+    world: World
+    start: Array  # (3,) in the world's frame
+    goals: Array  # (n, 3) those that can be reached at all
+    goal_index: tuple[int, ...]  # which of the problem's goals they are
+    free_heading: NDArray[np.bool_]  # (n,)
+    window: Array  # (9,) as in `_kernels_connect.inside_window`
+    box: Array  # (4,) of the window in the world's frame
+    bounded: bool  # whether the window's rim is a wall on every side
+    margin: float  # [m] proven clearance beyond the problem's own margin
+    most_time: float  # [s] inf if free
+
+    @property
+    def keep(self) -> float:
+        """Distance kept from everything [m]."""
+        return self.problem.margin
+
+
+def lattice_query(problem: Problem, goal_index: tuple[int, ...]) -> LatticeQuery:
+    """Start and the goals of these numbers, with the world around them."""
+    library = lattice_library(problem)
+    first = problem.goals[goal_index[0]].pose
+    world = world_of(problem.obstacles, problem.footprint, own_frame(problem.obstacles, first))
+    start = world.into(problem.start)
+    goals = world.into(np.array([problem.goals[k].pose for k in goal_index]))
+    box, window, bounded = _window(problem, world, library.radius, np.vstack([start, goals]))
+    horizon = problem.horizon
+    limit = horizon.time if horizon.time is not None else horizon.max_time
+    return LatticeQuery(
+        problem=problem,
+        library=library,
+        world=world,
+        start=start,
+        goals=goals,
+        goal_index=goal_index,
+        free_heading=np.array([problem.goals[k].free_heading for k in goal_index]),
+        window=window,
+        box=box,
+        bounded=bounded,
+        margin=_margin(problem, world, start, goals),
+        most_time=math.inf if limit is None else limit * (1.0 + 1e-12),
+    )
+
+
+def admitted_goals(problem: Problem) -> tuple[int, ...]:
+    """Numbers of the goals inside the bounds."""
+    return tuple(
+        k for k, goal in enumerate(problem.goals) if not outside(goal.pose, problem.bounds)
+    )
+
+
+def _margin(problem: Problem, world: World, start: Array, goals: Array) -> float:
+    """Proven clearance: a share of the body, at most half of what start and goals have."""
+    usual = MARGIN * (world.body.half_width or _typical(world))
+    poses = np.vstack([start, goals])
+    here = clearances(world, poses[:1], times=problem.start_time) - problem.margin
+    settled = max(problem.start_time, world.last_event)
+    there = clearances(world, poses[1:], times=settled) - problem.margin
+    known = [float(value) for value in np.append(here, there) if value > 0.0]
+    return max(LEAST_MARGIN, min([usual, *(0.5 * value for value in known)]))
+
+
+def _typical(world: World) -> float:
+    """A length of the world, for vehicles that are points."""
+    width = world.box[2:] - world.box[:2]
+    return float(np.clip(0.02 * width.max(), 1e-3, 1.0)) if np.isfinite(width).all() else 1.0
+
+
+def _window(
+    problem: Problem, world: World, radius: float, poses: Array
+) -> tuple[Array, Array, bool]:
+    """Where to search: the bounds, and where there are none, some way around everything."""
+    bounds = problem.bounds
+    pad = 4.0 * radius + 4.0 * world.body.reach
+    low = np.minimum(world.box[:2], poses[:, :2].min(axis=0)) - pad
+    high = np.maximum(world.box[2:], poses[:, :2].max(axis=0)) + pad
+    if bounds.x is None and bounds.y is None:
+        box = np.concatenate([low, high])
+        return box, np.concatenate([box, [0.0, 0.0, 1.0, 0.0, 0.0]]), False
+    turn = float(world.frame[2])
+    c, s = math.cos(turn), math.sin(turn)
+    corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+    seen = corners @ np.array([[c, s], [-s, c]])  # along the axes of the problem
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    for axis, pair in enumerate((bounds.x, bounds.y)):
+        if pair is not None:
+            low[axis], high[axis] = pair[0] - world.frame[axis], pair[1] - world.frame[axis]
+    slack = 1e-9 * (1.0 + float(np.abs(np.append(low, high)).max()))
+    window = np.array([low[0], low[1], high[0], high[1], 0.0, 0.0, c, s, slack])
+    inner = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+    back = np.asarray(SE2(np.array([0.0, 0.0, -turn])).act(inner))
+    box = np.concatenate([back.min(axis=0), back.max(axis=0)])
+    return box, window, bounds.x is not None and bounds.y is not None
