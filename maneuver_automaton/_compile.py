@@ -67,20 +67,15 @@ def kernel(function: Kernel) -> Kernel:
     >>> double(1.5)
     3.0
     """
-    import numba
+    return _cached(function, {})
 
-    folder = kernel_folder()
-    if folder is None:
-        return cast("Kernel", numba.njit(nogil=True, error_model="numpy")(function))
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(folder)  # read while decorating, and only then
-    try:
-        return cast("Kernel", numba.njit(nogil=True, error_model="numpy", cache=True)(function))
-    except RuntimeError:
-        # No source file to hang the cache on: an interactive session, a doctest.
-        return cast("Kernel", numba.njit(nogil=True, error_model="numpy")(function))
-    finally:
-        numba.config.CACHE_DIR = before
+
+def bare_kernel(function: Kernel) -> Kernel:
+    """A `kernel` that makes no array, and so need not count references to those it is given.
+
+    A call that takes a dozen arrays otherwise spends most of a microsecond on the counts.
+    """
+    return _cached(function, NO_COUNTS)
 
 
 def inner_kernel(function: Kernel) -> Kernel:
@@ -88,24 +83,55 @@ def inner_kernel(function: Kernel) -> Kernel:
 
     Its code is part of the kernels that call it; without the wrapper it compiles in half the time.
     """
-    import numba
+    return _inner(function, {})
 
-    return cast(
-        "Kernel",
-        numba.njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(
-            function
-        ),
-    )
+
+def bare_inner_kernel(function: Kernel) -> Kernel:
+    """An `inner_kernel` that makes no array, and so counts no references."""
+    return _inner(function, NO_COUNTS)
 
 
 def inlined_kernel(function: Kernel) -> Kernel:
-    """Compile a function into each kernel that calls it: arrays need not be counted at its door.
-
-    A call that takes a dozen arrays spends most of a microsecond on their reference counts.
-    """
+    """Compile a function that makes no array into each kernel that calls it, line by line."""
     import numba
 
     return cast(
         "Kernel",
-        numba.njit(nogil=True, error_model="numpy", inline="always")(function),
+        numba.njit(nogil=True, error_model="numpy", inline="always", **NO_COUNTS)(function),
     )
+
+
+NO_COUNTS: dict[str, Any] = {"_nrt": False}
+
+
+def _inner(function: Kernel, options: dict[str, Any]) -> Kernel:
+    import numba
+
+    return cast(
+        "Kernel",
+        numba.njit(
+            nogil=True,
+            error_model="numpy",
+            no_cpython_wrapper=True,
+            no_cfunc_wrapper=True,
+            **options,
+        )(function),
+    )
+
+
+def _cached(function: Kernel, options: dict[str, Any]) -> Kernel:
+    import numba
+
+    settings: dict[str, Any] = {"nogil": True, "error_model": "numpy", **options}
+    folder = kernel_folder()
+    if folder is None:
+        return cast("Kernel", numba.njit(**settings)(function))
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(folder)  # read while decorating, and only then
+    try:
+        return cast("Kernel", numba.njit(cache=True, **settings)(function))
+    except RuntimeError:
+        # No source file to hang the cache on: an interactive session, a doctest.
+        return cast("Kernel", numba.njit(**settings)(function))
+    finally:
+        numba.config.CACHE_DIR = before

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
-from maneuver_automaton._compile import inner_kernel, kernel
+from maneuver_automaton._compile import bare_inner_kernel, kernel
 from maneuver_automaton.collision._kernels_gap import NEAR, piece_gap, still_gap
 from maneuver_automaton.groups._kernels import coast, compose
 
 
-@inner_kernel
+@bare_inner_kernel
 def mover_pose(movers, m, time):
     """Pose (x, y, heading) of an obstacle that moves, held before its first knot and after."""
     k_0, k_1 = movers.first_knot[m], movers.first_knot[m + 1]
@@ -34,7 +34,7 @@ def mover_pose(movers, m, time):
     return x, y, heading
 
 
-@inner_kernel
+@bare_inner_kernel
 def mover_gap(movers, m, body, x, y, heading, time, enough):
     """Gap to one obstacle that moves, at `time`; a lower bound, not exact above `enough`."""
     o_x, o_y, o_heading = mover_pose(movers, m, time)
@@ -58,7 +58,7 @@ def mover_gap(movers, m, body, x, y, heading, time, enough):
     return best
 
 
-@inner_kernel
+@bare_inner_kernel
 def free_time(
     world, body, x, y, heading, v_x, v_y, turn_rate, speed, duration, keep, margin, clock
 ):

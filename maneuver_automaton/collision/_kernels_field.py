@@ -76,8 +76,8 @@ def write_map(distance, origin_x, origin_y, cell, cap, blocked, resolution, m_x,
             w_x = origin_x + (i + 0.5) * cell
             d_x, d_y = w_x - m_x, w_y - m_y
             x, y = (c * d_x + s * d_y) / resolution, (c * d_y - s * d_x) / resolution
-            row = min(max(int(math.floor(y)), 0), n_rows - 1)
-            column = min(max(int(math.floor(x)), 0), n_columns - 1)
+            row = min(max(math.floor(y), 0), n_rows - 1)
+            column = min(max(math.floor(x), 0), n_columns - 1)
             best = min(most, distance[j, i] / resolution)
             best = best * best
             reach = 0
@@ -113,10 +113,10 @@ def write_map(distance, origin_x, origin_y, cell, cap, blocked, resolution, m_x,
 def count_buckets(start, plates, origin_x, origin_y, cell, columns, rows, reach):
     """How many pieces each bucket holds, one place late: `start[k + 1]`."""
     for p in range(plates.shape[0]):
-        i_0 = max(0, int(math.floor((plates[p, 0] - reach - origin_x) / cell)))
-        i_1 = min(columns - 1, int(math.floor((plates[p, 2] + reach - origin_x) / cell)))
-        j_0 = max(0, int(math.floor((plates[p, 1] - reach - origin_y) / cell)))
-        j_1 = min(rows - 1, int(math.floor((plates[p, 3] + reach - origin_y) / cell)))
+        i_0 = max(0, math.floor((plates[p, 0] - reach - origin_x) / cell))
+        i_1 = min(columns - 1, math.floor((plates[p, 2] + reach - origin_x) / cell))
+        j_0 = max(0, math.floor((plates[p, 1] - reach - origin_y) / cell))
+        j_1 = min(rows - 1, math.floor((plates[p, 3] + reach - origin_y) / cell))
         for j in range(j_0, j_1 + 1):
             for i in range(i_0, i_1 + 1):
                 start[j * columns + i + 1] += 1
@@ -126,10 +126,10 @@ def count_buckets(start, plates, origin_x, origin_y, cell, columns, rows, reach)
 def fill_buckets(start, items, plates, origin_x, origin_y, cell, columns, rows, reach):
     """Write the pieces of each bucket; `start` is moved on by the count, and must be moved back."""
     for p in range(plates.shape[0]):
-        i_0 = max(0, int(math.floor((plates[p, 0] - reach - origin_x) / cell)))
-        i_1 = min(columns - 1, int(math.floor((plates[p, 2] + reach - origin_x) / cell)))
-        j_0 = max(0, int(math.floor((plates[p, 1] - reach - origin_y) / cell)))
-        j_1 = min(rows - 1, int(math.floor((plates[p, 3] + reach - origin_y) / cell)))
+        i_0 = max(0, math.floor((plates[p, 0] - reach - origin_x) / cell))
+        i_1 = min(columns - 1, math.floor((plates[p, 2] + reach - origin_x) / cell))
+        j_0 = max(0, math.floor((plates[p, 1] - reach - origin_y) / cell))
+        j_1 = min(rows - 1, math.floor((plates[p, 3] + reach - origin_y) / cell))
         for j in range(j_0, j_1 + 1):
             for i in range(i_0, i_1 + 1):
                 k = j * columns + i

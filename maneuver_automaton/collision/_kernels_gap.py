@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 
-from maneuver_automaton._compile import inlined_kernel, inner_kernel
+from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 
-NEAR = 0.1  # share of a body's reach below which gaps are made exact
+NEAR = 0.02  # share of a body's reach below which gaps are made exact
 
 
-@inner_kernel
+@bare_inner_kernel
 def point_to_segment(x, y, ax, ay, bx, by):
     """Squared distance of a point to a segment."""
     dx, dy = bx - ax, by - ay
@@ -135,14 +135,14 @@ def field_bound(field, body, x, y, c, s):
     return best
 
 
-@inner_kernel
+@bare_inner_kernel
 def near_gap(buckets, solids, body, x, y, c, s, near):
     """Gap to the solids near the body, exact below `near`; at most the buckets' reach."""
     m_x = x + c * body.middle_x - s * body.middle_y
     m_y = y + s * body.middle_x + c * body.middle_y
     best = buckets.reach
-    i = int(math.floor((m_x - buckets.origin_x) / buckets.cell))
-    j = int(math.floor((m_y - buckets.origin_y) / buckets.cell))
+    i = math.floor((m_x - buckets.origin_x) / buckets.cell)
+    j = math.floor((m_y - buckets.origin_y) / buckets.cell)
     if not (0 <= i < buckets.columns and 0 <= j < buckets.rows):
         return best
     k = j * buckets.columns + i

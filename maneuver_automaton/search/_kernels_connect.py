@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from maneuver_automaton._compile import inlined_kernel, inner_kernel
+from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 from maneuver_automaton.collision._kernels_advancement import free_time
 from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search._kernels_steering import steer
@@ -24,7 +24,7 @@ def price_of_switch(lib, before, gear, trim):
     return price
 
 
-@inner_kernel
+@bare_inner_kernel
 def candidates(lib, triples, x, y, heading, goal_x, goal_y, goal_heading, first, last, scratch):
     """Fill `scratch` with every triple of trims that leads to the goal; returns how many.
 
@@ -85,10 +85,8 @@ def candidates(lib, triples, x, y, heading, goal_x, goal_y, goal_heading, first,
     return count
 
 
-@inner_kernel
-def free_candidate(
-    lib, task, world, body, triples, pose, n, most_cost, most_time, clock, scratch
-):
+@bare_inner_kernel
+def free_candidate(lib, task, world, body, triples, pose, n, most_cost, most_time, clock, scratch):
     """Cheapest of `n` candidates from `pose` that is proven free; -1 if none of `task.tries` is.
 
     Candidates that cost `most_cost` or more, or last longer than `most_time`, are left out.
@@ -138,7 +136,7 @@ def free_candidate(
     return -1
 
 
-@inner_kernel
+@bare_inner_kernel
 def inside_window(window, x, y, heading, v_x, v_y, turn, t):
     """Whether a motion stays inside [low x, low y, high x, high y], seen from the bounds' frame.
 

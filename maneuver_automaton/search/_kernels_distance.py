@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from maneuver_automaton._compile import inner_kernel, kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, kernel
 
 SETTLED = 2
 BLOCKED = 1
 
 
-@inner_kernel
+@bare_inner_kernel
 def push(keys, items, size, key, item):
     """Put (key, item) into a binary heap in arrays that holds `size`."""
     k = size
@@ -25,7 +25,7 @@ def push(keys, items, size, key, item):
     keys[k], items[k] = key, item
 
 
-@inner_kernel
+@bare_inner_kernel
 def pop(keys, items, size):
     """Take the least out of a binary heap that holds `size`; returns its item."""
     top = items[0]
@@ -46,7 +46,7 @@ def pop(keys, items, size):
     return top
 
 
-@inner_kernel
+@bare_inner_kernel
 def blocked_cell(grid, field, i, j):
     """Whether no reference point can be anywhere in the cell: sound."""
     f_i, f_j = i * grid.stride + grid.shift_x, j * grid.stride + grid.shift_y
@@ -55,15 +55,15 @@ def blocked_cell(grid, field, i, j):
     return False
 
 
-@inner_kernel
+@bare_inner_kernel
 def distance_at(grid, field, x, y):
     """Distance [m] from the nearest seed to the cell of (x, y); inf if there is no way.
 
     Grows until that cell is settled, in the order of distance plus the straight way to where the
     grid is aimed at, so that cells off the way are not looked at.
     """
-    i = int(math.floor((x - grid.origin_x) / grid.cell))
-    j = int(math.floor((y - grid.origin_y) / grid.cell))
+    i = math.floor((x - grid.origin_x) / grid.cell)
+    j = math.floor((y - grid.origin_y) / grid.cell)
     if not (0 <= i < grid.columns and 0 <= j < grid.rows):
         return math.inf
     wanted = j * grid.columns + i
@@ -105,12 +105,12 @@ def distance_at(grid, field, x, y):
     return grid.value[wanted]
 
 
-@kernel
+@bare_kernel
 def seed(grid, points):
     """Set the distance of the cells of `points` (n, 2) to 0."""
     for k in range(points.shape[0]):
-        i = int(math.floor((points[k, 0] - grid.origin_x) / grid.cell))
-        j = int(math.floor((points[k, 1] - grid.origin_y) / grid.cell))
+        i = math.floor((points[k, 0] - grid.origin_x) / grid.cell)
+        j = math.floor((points[k, 1] - grid.origin_y) / grid.cell)
         if 0 <= i < grid.columns and 0 <= j < grid.rows:
             here = j * grid.columns + i
             if grid.value[here] > 0.0:

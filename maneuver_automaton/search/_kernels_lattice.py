@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from maneuver_automaton._compile import inlined_kernel, inner_kernel, kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
 from maneuver_automaton.collision._kernels_advancement import free_time
 from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search._kernels_connect import (
@@ -32,11 +32,11 @@ def cell_key(task, x, y, heading, layer, time, fine):
     c, s = task.frame_cos, task.frame_sin
     cell = task.fine_cell if fine else task.cell
     n_headings = task.fine_headings if fine else task.headings
-    i = int(math.floor((c * d_x + s * d_y) / cell + 0.5)) & 0xFFFF
-    j = int(math.floor((c * d_y - s * d_x) / cell + 0.5)) & 0xFFFF
+    i = math.floor((c * d_x + s * d_y) / cell + 0.5) & 0xFFFF
+    j = math.floor((c * d_y - s * d_x) / cell + 0.5) & 0xFFFF
     turn = (heading - task.frame_heading) / FULL_TURN
-    k = int(math.floor((turn - math.floor(turn)) * n_headings + 0.5)) % n_headings
-    tick = int(math.floor(time / task.tick)) & 0x1FF if task.tick > 0.0 else 0
+    k = math.floor((turn - math.floor(turn)) * n_headings + 0.5) % n_headings
+    tick = math.floor(time / task.tick) & 0x1FF if task.tick > 0.0 else 0
     return ((((layer * 2 + fine) * 512 + tick) * 512 + k) * 65536 + j) * 65536 + i
 
 
@@ -63,13 +63,13 @@ def table_value(table, task, x, y, heading):
     else:  # the start seen from this pose
         c, s = math.cos(heading), math.sin(heading)
         d_x, d_y, turn = g_x - x, g_y - y, g_heading - heading
-    i = int(math.floor((c * d_x + s * d_y) / table.cell + 0.5)) + table.half
-    j = int(math.floor((c * d_y - s * d_x) / table.cell + 0.5)) + table.half
+    i = math.floor((c * d_x + s * d_y) / table.cell + 0.5) + table.half
+    j = math.floor((c * d_y - s * d_x) / table.cell + 0.5) + table.half
     if not (0 <= i <= 2 * table.half and 0 <= j <= 2 * table.half):
         return 0.0
     n = table.value.shape[0]
     share = turn / FULL_TURN
-    k = int(math.floor((share - math.floor(share)) * n + 0.5)) % n
+    k = math.floor((share - math.floor(share)) * n + 0.5) % n
     value = table.value[k, j, i]
     return value if value < math.inf else 0.0
 
@@ -103,7 +103,7 @@ def layer_of(task, lib, trim, gear, n_trims):
     return layer
 
 
-@inner_kernel
+@bare_inner_kernel
 def connect_ends(search, task, lib, world, body, node, ceiling, estimate):
     """Try to reach the other end from a node by three trims; keeps the cheapest plan found."""
     nodes, links, state, found = search.nodes, search.links, search.state, search.found
@@ -118,14 +118,10 @@ def connect_ends(search, task, lib, world, body, node, ceiling, estimate):
         a_x, a_y, a_heading = task.aims[g, 0], task.aims[g, 1], task.aims[g, 2]
         if task.sign > 0.0:
             pose, clock = (x, y, heading), task.clock + spent
-            n = candidates(
-                lib, triples, x, y, heading, a_x, a_y, a_heading, here, nowhere, scratch
-            )
+            n = candidates(lib, triples, x, y, heading, a_x, a_y, a_heading, here, nowhere, scratch)
         else:
             pose, clock = (a_x, a_y, a_heading), task.clock
-            n = candidates(
-                lib, triples, a_x, a_y, a_heading, x, y, heading, nowhere, here, scratch
-            )
+            n = candidates(lib, triples, a_x, a_y, a_heading, x, y, heading, nowhere, here, scratch)
         if task.most_trims > 0 or lib.min_coast > 0.0:
             for k in range(n):
                 if not word_admitted(search, task, lib, triples, node, k):
@@ -134,9 +130,7 @@ def connect_ends(search, task, lib, world, body, node, ceiling, estimate):
         if estimate < math.inf:
             most = min(most, task.patience * estimate + task.slack)
         left = task.most_time - spent
-        which = free_candidate(
-            lib, task, world, body, triples, pose, n, most, left, clock, scratch
-        )
+        which = free_candidate(lib, task, world, body, triples, pose, n, most, left, clock, scratch)
         state[QUERIES] += 1
         if which >= 0:
             found[0] = done + scratch.costs[which]
@@ -147,7 +141,7 @@ def connect_ends(search, task, lib, world, body, node, ceiling, estimate):
             state[ROW], state[FREE] = scratch.rows[which], 1 if free_heading else 0
 
 
-@inner_kernel
+@bare_inner_kernel
 def word_admitted(search, task, lib, triples, node, k):
     """Whether the word through a node and one candidate keeps the limits of single words."""
     scratch, links, nodes = search.scratch, search.links, search.nodes
@@ -172,7 +166,7 @@ def word_admitted(search, task, lib, triples, node, k):
     return task.most_trims == 0 or count <= task.most_trims
 
 
-@inner_kernel
+@bare_inner_kernel
 def add_node(search, task, lib, key_slot, key, row, link, estimate):
     """Append a node and queue it."""
     nodes, links, state = search.nodes, search.links, search.state
@@ -189,7 +183,7 @@ def add_node(search, task, lib, key_slot, key, row, link, estimate):
     state[HEAP] += 1
 
 
-@kernel
+@bare_kernel
 def begin(search, task, lib, world, grid, table):
     """Queue the roots of a search; what was searched before is forgotten."""
     state, found = search.state, search.found
@@ -209,7 +203,7 @@ def begin(search, task, lib, world, grid, table):
         add_node(search, task, lib, slot, key, row, (-1, NO_TRIM, 0, 0, r), estimate)
 
 
-@kernel
+@bare_kernel
 def expand(search, task, lib, world, body, grid, table, n, ceiling):
     """Expand up to `n` nodes; stops at the first connection if the task says so.
 
@@ -310,9 +304,7 @@ def expand(search, task, lib, world, body, grid, table, n, ceiling):
                     d_x, d_y, angle = coast(v_x, v_y, turn, task.sign * t)
                     n_x, n_y, n_heading = compose(x, y, heading, d_x, d_y, angle)
                     key = cell_key(task, n_x, n_y, n_heading, layer, time, 1)
-                    slot = slot_of(
-                        search.hash_key, search.hash_generation, state[GENERATION], key
-                    )
+                    slot = slot_of(search.hash_key, search.hash_generation, state[GENERATION], key)
                     old = -1
                     if search.hash_generation[slot] == state[GENERATION]:
                         old = search.hash_node[slot]
@@ -333,7 +325,7 @@ def expand(search, task, lib, world, body, grid, table, n, ceiling):
     return 1
 
 
-@kernel
+@bare_kernel
 def rehash(search, wide_key, wide_node, wide_generation):
     """Carry the entries of this generation over into a wider hash table."""
     generation = search.state[GENERATION]

@@ -64,9 +64,7 @@ def lattice_library(problem: Problem) -> LatticeLibrary:
     )
 
 
-def _library(
-    problem: Problem, fixed_time: bool, waits: bool, min_coast: float
-) -> LatticeLibrary:
+def _library(problem: Problem, fixed_time: bool, waits: bool, min_coast: float) -> LatticeLibrary:
     key = (problem.automaton, problem.cost, problem.footprint, fixed_time, waits, min_coast)
     return _cached(*key)
 
@@ -139,9 +137,9 @@ def _cached(automaton, cost, footprint, fixed_time, waits, min_coast):  # type: 
 def _triples(moving: IntArray) -> IntArray:
     """Words of three trims whose neighbours differ; of fewer where there are fewer trims."""
     every = moving.tolist()
-    words = [
-        (i, j, k) for i, j, k in itertools.product(every, repeat=3) if i != j and j != k
-    ] or [(i, i, i) for i in every]
+    words = [(i, j, k) for i, j, k in itertools.product(every, repeat=3) if i != j and j != k] or [
+        (i, i, i) for i in every
+    ]
     return np.array(words, dtype=np.int64).reshape(-1, 3)
 
 
@@ -153,7 +151,11 @@ def _length_scale(twists: Array, half_width: float, reach: float) -> float:
     if turns.any():
         radius = float((speed[turns] / np.abs(twists[turns, 2])).min())
         spins = bool(((speed == 0.0) & (twists[:, 2] != 0.0)).any())
-        return max(radius, 0.5 * body) if not spins else min(max(radius, 0.5 * body), 2.0 * body or radius)
+        return (
+            max(radius, 0.5 * body)
+            if not spins
+            else min(max(radius, 0.5 * body), 2.0 * body or radius)
+        )
     return body or 1.0
 
 
