@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -180,12 +179,11 @@ def first_plan(
     *,
     deadline: float,
     max_expansions: int | None = None,
-    memory: Callable[[], SearchArrays] | None = None,
 ) -> FirstPlan:
     """The first connection from start to a goal, by the first rung that has one."""
     settings = query.problem.search
     base = Rung(weight=settings.weight or WEIGHT)
-    grids = _grids(query)
+    grids = distance_grids(query)
     room = max_expansions or 2**62
     passes = both_ends(query, base, grids=grids)
     total, laddered, last = 0, False, False
@@ -317,7 +315,7 @@ def _goal_roots(query: LatticeQuery) -> Array:
     return np.array(rows)
 
 
-def _grids(query: LatticeQuery) -> tuple[DistanceGrid, DistanceGrid]:
+def distance_grids(query: LatticeQuery) -> tuple[DistanceGrid, DistanceGrid]:
     """Distances to the goals and to the start."""
     to_goal = distance_grid(query.world, query.box, query.goals, query.start)
     to_start = distance_grid(query.world, query.box, query.start[None], query.goals[0])

@@ -1,0 +1,468 @@
+"""Shorten a free word: dynamic programming over its points, shortcuts, and via-points.
+
+A word is two arrays, trims and durations, of which the first `n` entries count.
+"""
+
+from __future__ import annotations
+
+import math
+
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
+from maneuver_automaton.collision._kernels_advancement import free_time
+from maneuver_automaton.groups._kernels import coast, compose
+from maneuver_automaton.search._kernels_connect import (
+    NO_TRIM,
+    candidates,
+    free_candidate,
+    inside_window,
+)
+
+GAIN = 1e-9  # share of the cost that counts as a gain
+LENGTH, ACCEPTED, LAST, TRIED = range(4)
+
+
+@bare_inner_kernel
+def word_cost(lib, trims, durations, n):
+    """Cost of a word with the prices of its switches."""
+    cost, gear = 0.0, 0
+    for k in range(n):
+        trim = trims[k]
+        cost += lib.rates[trim] * durations[k]
+        if k > 0:
+            cost += lib.switch
+        if lib.gears[trim] != 0:
+            if gear * lib.gears[trim] < 0:
+                cost += lib.direction_change
+            gear = lib.gears[trim]
+    return cost
+
+
+@bare_inner_kernel
+def unroll(lib, work, n):
+    """Fill the poses and times at the switches of the word in `work`."""
+    x, y, heading = work.start[0], work.start[1], work.start[2]
+    time = 0.0
+    for k in range(n):
+        work.poses[k, 0], work.poses[k, 1], work.poses[k, 2] = x, y, heading
+        work.times[k] = time
+        trim, t = work.trims[k], work.durations[k]
+        d_x, d_y, turn = coast(lib.twists[trim, 0], lib.twists[trim, 1], lib.twists[trim, 2], t)
+        x, y, heading = compose(x, y, heading, d_x, d_y, turn)
+        time += t
+    work.poses[n, 0], work.poses[n, 1], work.poses[n, 2] = x, y, heading
+    work.times[n] = time
+
+
+@inlined_kernel
+def owner(work, n, time):
+    """Number of the trim that is driven at a time; the later one at a switch."""
+    low, high = 0, n
+    while high - low > 1:
+        middle = (low + high) // 2
+        if work.times[middle] <= time:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@inlined_kernel
+def pose_at(lib, work, k, time):
+    """Pose at a time within trim `k`."""
+    trim, t = work.trims[k], time - work.times[k]
+    d_x, d_y, turn = coast(lib.twists[trim, 0], lib.twists[trim, 1], lib.twists[trim, 2], t)
+    return compose(work.poses[k, 0], work.poses[k, 1], work.poses[k, 2], d_x, d_y, turn)
+
+
+@bare_inner_kernel
+def append(lib, trims, durations, n, trim, t):
+    """Put a trim at the end of a word, joined with the last one if that is the same."""
+    if t < lib.shortest:
+        return n
+    if n > 0 and trims[n - 1] == trim:
+        durations[n - 1] += t
+        return n
+    if n >= trims.shape[0] - 1:
+        return n + 1  # too long: the caller sees it
+    trims[n], durations[n] = trim, t
+    return n + 1
+
+
+@bare_inner_kernel
+def spliced(lib, work, n, begin, end, first, last, m):
+    """Write into `work.new_*` the word with what is between two times replaced; its length.
+
+    The new middle is the word `work.middle_*` of `m` trims.
+    """
+    size = 0
+    for k in range(first + 1):
+        t = work.durations[k] if k < first else begin - work.times[k]
+        size = append(lib, work.new_trims, work.new_durations, size, work.trims[k], t)
+    for k in range(m):
+        t = work.middle_durations[k]
+        size = append(lib, work.new_trims, work.new_durations, size, work.middle_trims[k], t)
+    for k in range(last, n):
+        t = work.durations[k] if k > last else work.times[k + 1] - end
+        size = append(lib, work.new_trims, work.new_durations, size, work.trims[k], t)
+    return size
+
+
+@bare_inner_kernel
+def admitted(lib, task, work, size):
+    """Whether the word in `work.new_*` keeps the limits of words."""
+    if size > work.new_trims.shape[0] - 1 or (task.most_trims > 0 and size > task.most_trims):
+        return False
+    duration = 0.0
+    for k in range(size):
+        if work.new_durations[k] < lib.min_coast:
+            return False
+        duration += work.new_durations[k]
+    return duration <= task.most_time
+
+
+@bare_inner_kernel
+def still_free(lib, task, world, body, work, size, begin):
+    """Whether the word in `work.new_*` is free after `begin` [s], where obstacles move."""
+    x, y, heading = work.start[0], work.start[1], work.start[2]
+    time = 0.0
+    for k in range(size):
+        trim, t = work.new_trims[k], work.new_durations[k]
+        v_x, v_y, turn = lib.twists[trim, 0], lib.twists[trim, 1], lib.twists[trim, 2]
+        if time + t > begin:
+            proven, _ = free_time(
+                world,
+                body,
+                x,
+                y,
+                heading,
+                v_x,
+                v_y,
+                turn,
+                lib.speeds[trim],
+                t,
+                task.keep,
+                task.margin,
+                task.clock + time,
+            )
+            if proven < t:
+                return False
+        d_x, d_y, angle = coast(v_x, v_y, turn, t)
+        x, y, heading = compose(x, y, heading, d_x, d_y, angle)
+        time += t
+    return True
+
+
+@bare_inner_kernel
+def take(work, state, size):
+    """Make the word in `work.new_*` the word."""
+    for k in range(size):
+        work.trims[k], work.durations[k] = work.new_trims[k], work.new_durations[k]
+    state[LENGTH] = size
+
+
+@inlined_kernel
+def put_middle(lib, work, triples, scratch, which, m):
+    """Append a candidate to the new middle; returns its length."""
+    row = scratch.rows[which]
+    for n_th in range(3):
+        trim, t = triples[row, n_th], scratch.times[which, n_th]
+        if t > 0.0 and trim < lib.n_trims:
+            work.middle_trims[m], work.middle_durations[m] = trim, t
+            m += 1
+    return m
+
+
+@inlined_kernel
+def gear_before(lib, work, k):
+    """Sign of the last forward speed up to trim `k`, that included."""
+    gear = 0
+    while k >= 0 and gear == 0:
+        gear = lib.gears[work.trims[k]]
+        k -= 1
+    return gear
+
+
+@inlined_kernel
+def gear_after(lib, work, n, k):
+    """Sign of the first forward speed from trim `k` on."""
+    gear = 0
+    while k < n and gear == 0:
+        gear = lib.gears[work.trims[k]]
+        k += 1
+    return gear
+
+
+@bare_kernel
+def attempt_all(lib, task, world, body, work, state, uniform, normal):
+    """Try one shortcut or via-point per row of the draws; counts in `state`; returns the cost.
+
+    `uniform` (k, 6): kind, middle, span, two chances to snap to a switch, spread of the via-point;
+    `normal` (k, 3): its place and heading.
+    """
+    n = state[LENGTH]
+    cost = word_cost(lib, work.trims, work.durations, n)
+    unroll(lib, work, n)
+    for row in range(uniform.shape[0]):
+        state[TRIED] += 1
+        total = work.times[n]
+        if n == 0 or not total > 0.0:
+            return cost
+        middle = uniform[row, 1] * total
+        shortest = min(task.shortest_span, 0.5 * total)
+        span = shortest * (total / shortest) ** uniform[row, 2]
+        begin = max(middle - 0.5 * span, 0.0)
+        end = min(middle + 0.5 * span, total)
+        first, last = owner(work, n, begin), owner(work, n, end)
+        if uniform[row, 3] < task.snap:
+            begin = work.times[first]
+        if uniform[row, 4] < task.snap:
+            end = work.times[last + 1]
+        x, y, heading = pose_at(lib, work, first, begin)
+        e_x, e_y, e_heading = pose_at(lib, work, last, end)
+        to_end = end >= total
+        free_heading = task.free_heading and to_end
+        section = 0.0
+        for k in range(first, last + 1):
+            low, high = max(work.times[k], begin), min(work.times[k + 1], end)
+            section += lib.rates[work.trims[k]] * max(high - low, 0.0)
+        if lib.switch > 0.0:
+            section += lib.switch * (last - first)
+        for k in range(first, last):
+            if lib.gears[work.trims[k]] * lib.gears[work.trims[k + 1]] < 0:
+                section += lib.direction_change
+        entered = first if begin > work.times[first] else first - 1
+        before = NO_TRIM if entered < 0 else work.trims[entered]
+        after = NO_TRIM if to_end else work.trims[last]
+        entry = (before, 0 if before == NO_TRIM else gear_before(lib, work, entered))
+        leave = (after, 0 if after == NO_TRIM else gear_after(lib, work, n, last))
+        left = task.most_time - total + (end - begin)
+        clock = task.clock + begin
+        budget = section - GAIN * cost
+        m = 0
+        if uniform[row, 0] < task.via:
+            spread = task.spread * (1.0 / 33.0) ** uniform[row, 5]
+            half = 0.5 * (begin + end)
+            v_x, v_y, v_heading = pose_at(lib, work, owner(work, n, half), half)
+            v_x += spread * normal[row, 0]
+            v_y += spread * normal[row, 1]
+            v_heading += 0.5 * spread / task.radius * normal[row, 2]
+            way = math.hypot(v_x - x, v_y - y) + math.hypot(e_x - v_x, e_y - v_y)
+            if way * task.per_metre >= budget:
+                continue
+            nowhere = (NO_TRIM, 0)
+            n_1 = candidates(
+                lib, lib.triples, x, y, heading, v_x, v_y, v_heading, entry, nowhere, work.one
+            )
+            if n_1 == 0:
+                continue
+            cheapest = math.inf
+            for k in range(n_1):
+                cheapest = min(cheapest, work.one.costs[k])
+            if cheapest >= budget:
+                continue
+            triples = lib.free_triples if free_heading else lib.triples
+            n_2 = candidates(
+                lib, triples, v_x, v_y, v_heading, e_x, e_y, e_heading, nowhere, leave, work.two
+            )
+            rest = math.inf
+            for k in range(n_2):
+                rest = min(rest, work.two.costs[k])
+            if cheapest + rest >= budget:
+                continue
+            which = free_candidate(
+                lib,
+                task,
+                world,
+                body,
+                lib.triples,
+                (x, y, heading),
+                n_1,
+                budget - rest,
+                left,
+                clock,
+                work.one,
+            )
+            if which < 0:
+                continue
+            used = work.one.durations[which]
+            spent = work.one.costs[which]
+            m = put_middle(lib, work, lib.triples, work.one, which, 0)
+            which = free_candidate(
+                lib,
+                task,
+                world,
+                body,
+                triples,
+                (v_x, v_y, v_heading),
+                n_2,
+                budget - spent,
+                left - used,
+                clock + used,
+                work.two,
+            )
+            if which < 0:
+                continue
+            m = put_middle(lib, work, triples, work.two, which, m)
+        else:
+            if math.hypot(e_x - x, e_y - y) * task.per_metre >= budget:
+                continue
+            triples = lib.free_triples if free_heading else lib.triples
+            n_1 = candidates(
+                lib, triples, x, y, heading, e_x, e_y, e_heading, entry, leave, work.one
+            )
+            which = free_candidate(
+                lib,
+                task,
+                world,
+                body,
+                triples,
+                (x, y, heading),
+                n_1,
+                budget,
+                left,
+                clock,
+                work.one,
+            )
+            if which < 0:
+                continue
+            m = put_middle(lib, work, triples, work.one, which, 0)
+        size = spliced(lib, work, n, begin, end, first, last, m)
+        if not admitted(lib, task, work, size):
+            continue
+        new_cost = word_cost(lib, work.new_trims, work.new_durations, size)
+        if not new_cost < cost - GAIN * cost:
+            continue
+        if world.movers.speed.shape[0] > 0:
+            if not still_free(lib, task, world, body, work, size, begin):
+                continue
+        take(work, state, size)
+        n, cost = size, new_cost
+        unroll(lib, work, n)
+        state[ACCEPTED] += 1
+        state[LAST] = row
+    return cost
+
+
+@bare_kernel
+def dynamic_programming(lib, task, world, body, work, state, points):
+    """Best way over `points` poses of the word, joined by triples where that is cheaper.
+
+    Returns the cost. The word changes only if it gains; nothing may move.
+    """
+    n = state[LENGTH]
+    cost = word_cost(lib, work.trims, work.durations, n)
+    unroll(lib, work, n)
+    total = work.times[n]
+    if n == 0 or points < 2:
+        return cost
+    for j in range(points):
+        time = total * j / (points - 1)
+        k = owner(work, n, time)
+        x, y, heading = pose_at(lib, work, k, min(time, work.times[k + 1]))
+        work.at[j, 0], work.at[j, 1], work.at[j, 2], work.at[j, 3] = x, y, heading, time
+        work.best[j] = math.inf
+        work.back[j] = -1
+    work.best[0] = 0.0
+    nowhere = (NO_TRIM, 0)
+    for j in range(1, points):
+        begin, end = work.at[j - 1, 3], work.at[j, 3]
+        first, last = owner(work, n, begin), owner(work, n, end)
+        along = 0.0
+        for k in range(first, last + 1):
+            low, high = max(work.times[k], begin), min(work.times[k + 1], end)
+            along += lib.rates[work.trims[k]] * max(high - low, 0.0)
+            if k > first:
+                along += lib.switch
+                if lib.gears[work.trims[k]] * lib.gears[work.trims[k - 1]] < 0:
+                    along += lib.direction_change
+        work.best[j] = work.best[j - 1] + along
+        work.back[j] = -1
+        e_x, e_y, e_heading = work.at[j, 0], work.at[j, 1], work.at[j, 2]
+        free_heading = task.free_heading and j == points - 1
+        triples = lib.free_triples if free_heading else lib.triples
+        for i in range(j - 1):
+            x, y, heading = work.at[i, 0], work.at[i, 1], work.at[i, 2]
+            budget = work.best[j] - work.best[i]
+            if math.hypot(e_x - x, e_y - y) * task.per_metre >= budget:
+                continue
+            count = candidates(
+                lib, triples, x, y, heading, e_x, e_y, e_heading, nowhere, nowhere, work.one
+            )
+            which = free_candidate(
+                lib,
+                task,
+                world,
+                body,
+                triples,
+                (x, y, heading),
+                count,
+                budget - GAIN * cost,
+                task.most_time,
+                task.clock + work.at[i, 3],
+                work.one,
+            )
+            if which < 0:
+                continue
+            work.best[j] = work.best[i] + work.one.costs[which]
+            work.back[j] = i
+            row = work.one.rows[which]
+            for n_th in range(3):
+                work.by_trims[j, n_th] = triples[row, n_th]
+                work.by_durations[j, n_th] = work.one.times[which, n_th]
+    j, n_legs = points - 1, 0
+    while j > 0:
+        work.legs[n_legs] = j
+        n_legs += 1
+        j = work.back[j] if work.back[j] >= 0 else j - 1
+    size = 0
+    for leg in range(n_legs - 1, -1, -1):
+        j = work.legs[leg]
+        if work.back[j] >= 0:
+            for n_th in range(3):
+                trim, t = work.by_trims[j, n_th], work.by_durations[j, n_th]
+                if t > 0.0 and trim < lib.n_trims:
+                    size = append(lib, work.new_trims, work.new_durations, size, trim, t)
+            continue
+        begin, end = work.at[j - 1, 3], work.at[j, 3]
+        for k in range(owner(work, n, begin), owner(work, n, end) + 1):
+            t = min(work.times[k + 1], end) - max(work.times[k], begin)
+            size = append(lib, work.new_trims, work.new_durations, size, work.trims[k], t)
+    if not admitted(lib, task, work, size):
+        return cost
+    new_cost = word_cost(lib, work.new_trims, work.new_durations, size)
+    if new_cost < cost - GAIN * cost:
+        take(work, state, size)
+        state[ACCEPTED] += 1
+        return new_cost
+    return cost
+
+
+@bare_kernel
+def check_word(lib, task, world, body, work, state):
+    """Whether the whole word is proven free and stays inside its window."""
+    n = state[LENGTH]
+    unroll(lib, work, n)
+    for k in range(n):
+        trim, t = work.trims[k], work.durations[k]
+        v_x, v_y, turn = lib.twists[trim, 0], lib.twists[trim, 1], lib.twists[trim, 2]
+        x, y, heading = work.poses[k, 0], work.poses[k, 1], work.poses[k, 2]
+        if not inside_window(task.window, x, y, heading, v_x, v_y, turn, t):
+            return False
+        proven, _ = free_time(
+            world,
+            body,
+            x,
+            y,
+            heading,
+            v_x,
+            v_y,
+            turn,
+            lib.speeds[trim],
+            t,
+            task.keep,
+            task.margin,
+            task.clock + work.times[k],
+        )
+        if proven < t:
+            return False
+    return True

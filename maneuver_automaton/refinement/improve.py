@@ -1,0 +1,313 @@
+"""Make a free word cheaper until nothing gains any more, or the time is over.
+
+Dynamic programming over the word's points, random shortcuts and via-points, and new searches from
+both ends at other resolutions, which find other ways round the obstacles. The sequence is the
+same at every call: it is counted in attempts, and a time limit only says where it stops.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.refinement import _kernels_improve as kernels
+from maneuver_automaton.search.lattice import (
+    CostTable,
+    Rung,
+    Word,
+    both_ends,
+    distance_grids,
+    with_cost,
+)
+from maneuver_automaton.search.lattice_memory import Scratch, scratch_of, search_arrays
+from maneuver_automaton.search.lattice_query import LatticeQuery
+
+POINTS = 40  # of the dynamic program
+SLICE = 400  # attempts
+SECOND_SLICE = 4000  # attempts for candidates near the best
+NEAR = 1.01  # share of the best cost that is near
+PRUNE = 1.08  # of a new search: its raw path is longer than what it becomes
+FIRST_CAP = 1500  # expansions of the first new search ...
+CAP_GROWTH = 1.35  # ... and how the caps grow
+MOST_CAP = 60_000
+WEIGHTS = (2.0, 1.5, 1.25, 1.1, 1.0)
+VIA = 0.6  # share of attempts with a via-point
+SNAP = 0.25  # chance of an end to snap to a switch
+SEED = 20_09  # of the random draws
+MOST_WORD = 4096  # trims
+TIMELY = 400  # attempts between two looks at the clock
+
+
+class Work(NamedTuple):
+    """Arrays of one word that is being improved."""
+
+    start: Array  # (3,)
+    trims: IntArray
+    durations: Array
+    poses: Array  # (n + 1, 3)
+    times: Array
+    new_trims: IntArray
+    new_durations: Array
+    middle_trims: IntArray  # (6,)
+    middle_durations: Array
+    one: Scratch
+    two: Scratch
+    at: Array  # (points, 4)
+    best: Array
+    back: IntArray
+    by_trims: IntArray  # (points, 3)
+    by_durations: Array
+    legs: IntArray
+
+
+class ImproveTask(NamedTuple):
+    """Limits and sizes, as the kernels see them."""
+
+    keep: float
+    margin: float
+    tries: int
+    window: Array
+    clock: float
+    most_time: float
+    most_trims: int
+    per_metre: float
+    radius: float
+    shortest_span: float  # [s]
+    snap: float
+    via: float
+    spread: float  # [m]
+    free_heading: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Improved:
+    """What the improvement came to."""
+
+    word: Word
+    attempts: int
+    expansions: int
+    passes: int  # new searches
+    finished: bool  # nothing gained for as long as the settings ask
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Patience:
+    """When to stop: after so many attempts and new searches in a row that gained nothing."""
+
+    attempts: int = 20_000
+    passes: int = 12
+
+
+Better = Callable[[Word], None]
+
+
+def improve(
+    query: LatticeQuery,
+    word: Word,
+    *,
+    deadline: float,
+    patience: Patience,
+    max_expansions: int | None = None,
+    table: Callable[[], CostTable] | None = None,
+    better: Better = lambda word: None,
+) -> Improved:
+    """The cheapest word found from `word` on, which must be free; `better` hears of each gain."""
+    return _Improvement(query, word, deadline, patience, max_expansions, table, better).run()
+
+
+@dataclass(slots=True, eq=False)
+class _Improvement:
+    """The state of one improvement."""
+
+    query: LatticeQuery
+    best: Word
+    deadline: float
+    patience: Patience
+    max_expansions: int | None
+    table: Callable[[], CostTable] | None
+    better: Better
+    attempts: int = 0
+    expansions: int = 0
+    passes: int = 0
+
+    def run(self) -> Improved:
+        rng = np.random.default_rng(SEED)
+        query = self.query
+        self.best = with_cost(self.best, query)
+        self._consider(self._shortened(self.best, rng, SLICE))
+        self._consider(self._attempted(self.best, rng, SECOND_SLICE))
+        grids = distance_grids(query)
+        memory = [
+            search_arrays(
+                max(len(query.library.arrays.triples), len(query.library.arrays.free_triples))
+            )
+        ]
+        idle_attempts = idle_passes = 0
+        step = 0
+        slice_ = SLICE
+        while not self._over() and (
+            idle_attempts < self.patience.attempts or idle_passes < self.patience.passes
+        ):
+            before = self.best.cost
+            candidate = self._searched_again(step, rng, grids, memory)
+            if candidate is not None and not self._over():
+                candidate = self._shortened(candidate, rng, SLICE)
+                if candidate.cost < NEAR * self.best.cost:
+                    candidate = self._attempted(candidate, rng, SECOND_SLICE)
+                self._consider(candidate)
+            idle_passes = 0 if self._gained(before) else idle_passes + 1
+            if not self._over():
+                before = self.best.cost
+                self._consider(self._attempted(self.best, rng, slice_))
+                idle_attempts = 0 if self._gained(before) else idle_attempts + slice_
+                slice_ = min(int(1.2 * slice_), 8000)
+            step += 1
+        return Improved(
+            word=self.best,
+            attempts=self.attempts,
+            expansions=self.expansions,
+            passes=self.passes,
+            finished=not self._over(),
+        )
+
+    def _gained(self, before: float) -> bool:
+        return self.best.cost < before * (1.0 - 1e-4)
+
+    def _over(self) -> bool:
+        if self.max_expansions is not None and self.expansions >= self.max_expansions:
+            return True
+        return time.monotonic() >= self.deadline
+
+    def _consider(self, candidate: Word) -> None:
+        if candidate.cost < self.best.cost:
+            self.best = candidate
+            self.better(candidate)
+
+    def _searched_again(self, step: int, rng: np.random.Generator, grids, memory):  # type: ignore[no-untyped-def]
+        """A connection found by a new search with other settings; None if there is none."""
+        scale, quanta = 1.0, 1.0
+        weight = WEIGHTS[step // 2] if step < 2 * len(WEIGHTS) else float(rng.uniform(1.0, 2.0))
+        if step >= 2:
+            scale, quanta = (float(value) for value in rng.uniform(0.5, 1.4, 2))
+        cap = min(int(FIRST_CAP * CAP_GROWTH ** (step // 2)), MOST_CAP)
+        if self.max_expansions is not None:
+            cap = min(cap, self.max_expansions - self.expansions)
+        tight = bool(step % 5 == 4)
+        rung = Rung(scale=scale, quanta=quanta, weight=weight, contact=tight)
+        sign = -1.0 if step % 2 and not self.query.problem.moves else 1.0
+        table = self.table() if self.table is not None and step >= 2 else None
+        kwargs = {} if table is None else {"table": table}
+        (one,) = both_ends(
+            self.query, rung, grids=grids, arrays=memory[0], ends=(sign,), **kwargs
+        )
+        word = None
+        while one.alive and one.expansions < cap and time.monotonic() < self.deadline:
+            word = one.run(min(1024, cap - one.expansions), PRUNE * self.best.cost)
+            if word is not None:
+                break
+        memory[0] = one.arrays
+        self.expansions += one.expansions
+        self.passes += 1
+        return None if word is None else with_cost(word, self.query)
+
+    def _shortened(self, word: Word, rng: np.random.Generator, attempts: int) -> Word:
+        """The word after the dynamic program and some attempts."""
+        query = self.query
+        work, state = work_of(query, word)
+        if not query.problem.moves:
+            kernels.dynamic_programming(
+                query.library.arrays,
+                improve_task(query, word),
+                query.world.arrays,
+                query.world.body,
+                work,
+                state,
+                POINTS,
+            )
+        return self._attempted(word_of(work, state, word, query), rng, attempts)
+
+    def _attempted(self, word: Word, rng: np.random.Generator, attempts: int) -> Word:
+        """The word after random shortcuts and via-points."""
+        query = self.query
+        work, state = work_of(query, word)
+        task = improve_task(query, word)
+        done = 0
+        while done < attempts:
+            n = min(TIMELY, attempts - done)
+            uniform, normal = rng.random((n, 6)), rng.standard_normal((n, 3))
+            if time.monotonic() < self.deadline:
+                kernels.attempt_all(
+                    query.library.arrays,
+                    task,
+                    query.world.arrays,
+                    query.world.body,
+                    work,
+                    state,
+                    uniform,
+                    normal,
+                )
+                self.attempts += n
+            done += n
+        return word_of(work, state, word, query)
+
+
+def work_of(query: LatticeQuery, word: Word) -> tuple[Work, IntArray]:
+    """Arrays that hold a word, and its state."""
+    n = max(256, 4 * len(word.trims) + 64)
+    triples = max(len(query.library.arrays.triples), len(query.library.arrays.free_triples))
+    work = Work(
+        start=np.array(query.start),
+        trims=np.zeros(n, dtype=np.int64),
+        durations=np.zeros(n),
+        poses=np.zeros((n + 1, 3)),
+        times=np.zeros(n + 1),
+        new_trims=np.zeros(n, dtype=np.int64),
+        new_durations=np.zeros(n),
+        middle_trims=np.zeros(6, dtype=np.int64),
+        middle_durations=np.zeros(6),
+        one=scratch_of(triples),
+        two=scratch_of(triples),
+        at=np.zeros((POINTS, 4)),
+        best=np.zeros(POINTS),
+        back=np.zeros(POINTS, dtype=np.int64),
+        by_trims=np.zeros((POINTS, 3), dtype=np.int64),
+        by_durations=np.zeros((POINTS, 3)),
+        legs=np.zeros(POINTS, dtype=np.int64),
+    )
+    work.trims[: len(word.trims)] = word.trims
+    work.durations[: len(word.trims)] = word.durations
+    return work, np.array([len(word.trims), 0, -1, 0], dtype=np.int64)
+
+
+def word_of(work: Work, state: IntArray, word: Word, query: LatticeQuery) -> Word:
+    """The word that arrays hold."""
+    n = int(state[kernels.LENGTH])
+    held = replace(word, trims=work.trims[:n].copy(), durations=work.durations[:n].copy())
+    return with_cost(held, query)
+
+
+def improve_task(query: LatticeQuery, word: Word) -> ImproveTask:
+    """Limits and sizes of improving a word."""
+    library = query.library
+    speed = np.hypot(library.arrays.twists[:, 0], library.arrays.twists[:, 1]).max()
+    return ImproveTask(
+        keep=float(query.keep),
+        margin=float(query.margin),
+        tries=6,
+        window=query.window,
+        clock=float(query.problem.start_time),
+        most_time=float(query.most_time),
+        most_trims=int(query.problem.horizon.max_trims or 0),
+        per_metre=float(library.per_metre),
+        radius=float(library.radius),
+        shortest_span=float(0.25 * library.radius / max(float(speed), 1e-9)),
+        snap=SNAP,
+        via=VIA,
+        spread=float(0.25 * library.radius),
+        free_heading=bool(query.free_heading[word.goal]),
+    )
