@@ -7,9 +7,10 @@ same at every call: it is counted in attempts, and a time limit only says where 
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -40,6 +41,7 @@ VIA = 0.6  # share of attempts with a via-point
 SNAP = 0.25  # chance of an end to snap to a switch
 SEED = 20_09  # of the random draws
 MOST_WORD = 4096  # trims
+MOST_OTHERS = 50  # words kept beside the best
 TIMELY = 400  # attempts between two looks at the clock
 
 
@@ -93,6 +95,7 @@ class Improved:
     expansions: int
     passes: int  # new searches
     finished: bool  # nothing gained for as long as the settings ask
+    others: tuple[Word, ...] = ()  # what other searches came to, cheapest first
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,12 +115,17 @@ def improve(
     *,
     deadline: float,
     patience: Patience,
+    floor: float = -math.inf,
     max_expansions: int | None = None,
     table: Callable[[], CostTable] | None = None,
     better: Better = lambda word: None,
 ) -> Improved:
-    """The cheapest word found from `word` on, which must be free; `better` hears of each gain."""
-    return _Improvement(query, word, deadline, patience, max_expansions, table, better).run()
+    """The cheapest word found from `word` on, which must be free; `better` hears of each gain.
+
+    It ends when no word can be cheaper than `floor` allows.
+    """
+    one = _Improvement(query, word, deadline, patience, floor, max_expansions, table, better)
+    return one.run()
 
 
 @dataclass(slots=True, eq=False)
@@ -128,12 +136,14 @@ class _Improvement:
     best: Word
     deadline: float
     patience: Patience
+    floor: float
     max_expansions: int | None
     table: Callable[[], CostTable] | None
     better: Better
     attempts: int = 0
     expansions: int = 0
     passes: int = 0
+    others: list[Word] = field(default_factory=list)
 
     def run(self) -> Improved:
         rng = np.random.default_rng(SEED)
@@ -172,18 +182,23 @@ class _Improvement:
             attempts=self.attempts,
             expansions=self.expansions,
             passes=self.passes,
-            finished=not self._over(),
+            finished=not self._late(),
+            others=tuple(sorted(self.others, key=lambda other: other.cost)[:MOST_OTHERS]),
         )
 
     def _gained(self, before: float) -> bool:
         return self.best.cost < before * (1.0 - 1e-4)
 
     def _over(self) -> bool:
+        return self._late() or self.best.cost <= self.floor * (1.0 + 1e-12)
+
+    def _late(self) -> bool:
         if self.max_expansions is not None and self.expansions >= self.max_expansions:
             return True
         return time.monotonic() >= self.deadline
 
     def _consider(self, candidate: Word) -> None:
+        self.others.append(candidate)
         if candidate.cost < self.best.cost:
             self.best = candidate
             self.better(candidate)
@@ -202,9 +217,7 @@ class _Improvement:
         sign = -1.0 if step % 2 and not self.query.problem.moves else 1.0
         table = self.table() if self.table is not None and step >= 2 else None
         kwargs = {} if table is None else {"table": table}
-        (one,) = both_ends(
-            self.query, rung, grids=grids, arrays=memory[0], ends=(sign,), **kwargs
-        )
+        (one,) = both_ends(self.query, rung, grids=grids, arrays=memory[0], ends=(sign,), **kwargs)
         word = None
         while one.alive and one.expansions < cap and time.monotonic() < self.deadline:
             word = one.run(min(1024, cap - one.expansions), PRUNE * self.best.cost)

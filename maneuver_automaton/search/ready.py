@@ -11,6 +11,7 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,6 +25,9 @@ from maneuver_automaton.search.insertion import compile_calming, search_insertio
 from maneuver_automaton.search.result import Solution
 from maneuver_automaton.search.words import compile_polishing, compile_scanning, search_words
 from maneuver_automaton.switching_times import solve_switching_times
+
+if TYPE_CHECKING:
+    from maneuver_automaton.search.lattice_query import LatticeQuery
 
 PATIENCE = 120.0  # [s] for the second process
 
@@ -58,6 +62,18 @@ def load_times_kernels() -> None:
     problem = _smallest_problem()
     straight = Solution(word=np.array([0]), durations=np.array([1.0]), cost=1.0)
     certificate(problem, problem.goals[0], straight)
+
+
+def smallest_lattice_query() -> LatticeQuery:
+    """A wall beside the way: what compiles every kernel of the lattice."""
+    from maneuver_automaton.collision import Box, Obstacle
+    from maneuver_automaton.search.lattice_query import lattice_query
+    from maneuver_automaton.search.plane_bound import plane_bound
+
+    wall = Obstacle(Box([1.0, 1.0], [0.0, 9.0]))
+    query = lattice_query(replace(_smallest_problem(), obstacles=(wall,)), (0,))
+    plane_bound(query)
+    return query
 
 
 def compile_the_rest() -> None:

@@ -1,0 +1,226 @@
+"""Plans among obstacles: first the lattice's, then better ones, then the checks."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from maneuver_automaton.audit import terminal_error
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.planning.blocked import why_goal_blocked
+from maneuver_automaton.planning.bounds import lattice_bound
+from maneuver_automaton.planning.checking import Checked, check_plan, load_checks
+from maneuver_automaton.planning.result import Alternative, PlanResult, PlanStatus
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.refinement.improve import Improved, Patience, improve
+from maneuver_automaton.refinement.ready import load_lattice
+from maneuver_automaton.search.lattice import FirstPlan, Word, first_plan, with_cost
+from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
+from maneuver_automaton.search.limits import why_impossible
+from maneuver_automaton.switching_times.closing import closed_at
+
+REJECTED = 8  # plans in a row that the checks may refuse before it is given up
+
+
+@dataclass(slots=True, eq=False)
+class _Progress:
+    """What was found so far, the cheapest last."""
+
+    query: LatticeQuery
+    began: float
+    words: list[Word] = field(default_factory=list)
+    improvements: list[tuple[float, float]] = field(default_factory=list)
+
+    def heard(self, word: Word) -> None:
+        """A better word was found."""
+        self.words.append(word)
+        fixed = self.query.library.rest_rate * (self.query.problem.horizon.time or 0.0)
+        self.improvements.append((time.monotonic() - self.began, word.cost + fixed))
+
+
+def plan_on_lattice(problem: Problem, *, time_limit: float, alternatives: int) -> PlanResult:
+    """The cheapest free plan found within the time."""
+    load_lattice()
+    began = time.monotonic()
+    deadline = began + time_limit
+    goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
+    query = lattice_query(problem, goals)
+    progress = _Progress(query, began)
+    first = first_plan(query, deadline=deadline, max_expansions=problem.search.max_expansions)
+    found = time.monotonic()
+    if first.word is None:
+        timing = _timing(began, found, found, found)
+        status, reason = _why_none(query, first, time_limit)
+        return PlanResult(
+            problem=problem,
+            status=status,
+            reason=reason,
+            timing_s=timing,
+            counts={"expansions": first.expansions, "collision_queries": first.queries},
+        )
+    progress.heard(with_cost(first.word, query))
+    bound = lattice_bound(query)
+    better = improve(
+        query,
+        first.word,
+        deadline=deadline,
+        patience=Patience(),
+        floor=bound,
+        max_expansions=_left(problem, first),
+        better=progress.heard,
+    )
+    refined = time.monotonic()
+    load_checks(problem)
+    chosen = _checked(progress, better, alternatives)
+    timing = _timing(began, found, refined, time.monotonic())
+    counts = {
+        "expansions": first.expansions + better.expansions,
+        "collision_queries": first.queries,
+        "attempts": better.attempts,
+        "searches": 1 + better.passes,
+        "rejected_by_fcl": chosen.rejected_by_fcl,
+        "rejected_by_audit": chosen.rejected_by_audit,
+    }
+    if not chosen.plans:
+        return PlanResult(
+            problem=problem,
+            status=PlanStatus.NO_PLAN,
+            reason=f"every plan found was refused: {chosen.reason}",
+            timing_s=timing,
+            counts=counts,
+        )
+    best = chosen.plans[0]
+    audit = best.checked.audit
+    assert audit is not None
+    goal = problem.goals[best.goal_index]
+    bound = min(best.cost, bound)
+    return PlanResult(
+        problem=problem,
+        status=PlanStatus.FOUND,
+        reason="",
+        plan=best.plan,
+        goal_index=best.goal_index,
+        cost=best.cost,
+        lower_bound=bound,
+        gap=0.0 if best.cost <= bound else (best.cost - bound) / best.cost,
+        terminal_error=terminal_error(best.plan, goal),
+        clearance_m=audit.min_clearance_m,
+        audit=audit,
+        alternatives=tuple(
+            Alternative(
+                plan=other.plan,
+                cost=other.cost,
+                terminal_error=terminal_error(other.plan, problem.goals[other.goal_index]),
+            )
+            for other in chosen.plans[1:]
+        ),
+        timing_s=timing,
+        counts=counts,
+        improvements=tuple(progress.improvements),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Accepted:
+    """A plan that passed every check."""
+
+    plan: Plan
+    goal_index: int
+    cost: float
+    checked: Checked
+
+
+@dataclass(slots=True, eq=False)
+class _Chosen:
+    """What the checks left, cheapest first."""
+
+    plans: list[_Accepted] = field(default_factory=list)
+    rejected_by_fcl: int = 0
+    rejected_by_audit: int = 0
+    reason: str = ""
+
+
+def _checked(progress: _Progress, better: Improved, alternatives: int) -> _Chosen:
+    """The cheapest plans that pass; of equal words one."""
+    query = progress.query
+    chosen = _Chosen()
+    seen: set[tuple[int, ...]] = set()
+    words = sorted([*progress.words, *better.others], key=lambda word: word.cost)
+    for word in words:
+        key = (word.goal, *word.trims.tolist())
+        if len(chosen.plans) > alternatives or key in seen:
+            continue
+        if chosen.rejected_by_fcl + chosen.rejected_by_audit >= REJECTED and not chosen.plans:
+            break
+        plan = plan_of_word(query, word)
+        index = query.goal_index[word.goal]
+        checked = check_plan(query.problem, plan, query.problem.goals[index])
+        if checked.passed:
+            seen.add(key)
+            chosen.plans.append(
+                _Accepted(
+                    plan=plan,
+                    goal_index=index,
+                    cost=query.problem.cost_of(plan),
+                    checked=checked,
+                )
+            )
+        elif checked.audit is None:
+            chosen.rejected_by_fcl += 1
+            chosen.reason = chosen.reason or checked.reason
+        else:
+            chosen.rejected_by_audit += 1
+            chosen.reason = chosen.reason or checked.reason
+    chosen.plans.sort(key=lambda one: one.cost)
+    return chosen
+
+
+def plan_of_word(query: LatticeQuery, word: Word) -> Plan:
+    """The word from the problem's own start, its times corrected until it ends at the goal."""
+    problem = query.problem
+    goal = problem.goals[query.goal_index[word.goal]]
+    trims = [problem.automaton.trims[k] for k in query.library.trims[word.trims]]
+    twists = np.array([trim.body_velocity for trim in trims]).reshape(-1, 3)
+    durations = closed_at(
+        problem.start, twists, word.durations, goal.pose, free_heading=goal.free_heading
+    )
+    total = float(durations.sum())
+    fixed, rest = problem.horizon.time, query.library.rest
+    if fixed is not None and rest is not None and total < fixed:
+        trims.append(problem.automaton.trims[rest])
+        durations = np.append(durations, fixed - total)
+    return Plan(problem.start, tuple(trims), durations=durations, start_time=problem.start_time)
+
+
+def _left(problem: Problem, first: FirstPlan) -> int | None:
+    """Expansions that may still be spent."""
+    most = problem.search.max_expansions
+    return None if most is None else max(0, most - first.expansions)
+
+
+def _timing(began: float, found: float, refined: float, checked: float) -> dict[str, float]:
+    return {
+        "search": found - began,
+        "first_plan": found - began,
+        "refine": refined - found,
+        "audit": checked - refined,
+    }
+
+
+def _why_none(query: LatticeQuery, first: FirstPlan, time_limit: float) -> tuple[PlanStatus, str]:
+    if first.enclosed:
+        return PlanStatus.UNREACHABLE, first.enclosed
+    impossible = why_impossible(query.problem)
+    if impossible:
+        return PlanStatus.UNREACHABLE, impossible
+    nearest = (
+        "" if math.isinf(first.nearest) else f"; the nearest node is {first.nearest:.3g} m off"
+    )
+    if first.exhausted:
+        return PlanStatus.NO_PLAN, (f"none at any resolution tried, which proves nothing{nearest}")
+    return PlanStatus.OUT_OF_BUDGET, (
+        f"no plan within {time_limit:g} s and {first.expansions} expansions{nearest}"
+    )

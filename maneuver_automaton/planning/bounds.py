@@ -1,0 +1,18 @@
+"""Lower bounds of plans among obstacles, and what they cover."""
+
+from __future__ import annotations
+
+from maneuver_automaton.search.lattice_query import LatticeQuery
+from maneuver_automaton.search.limits import closed_bound
+from maneuver_automaton.search.plane_bound import plane_bound
+
+
+def lattice_bound(query: LatticeQuery) -> float:
+    """No plan is cheaper, whatever its word: the largest of the bounds that hold.
+
+    The closed bounds hold without obstacles too; the way in the plane knows those that stand still.
+    """
+    problem = query.problem
+    closed = min(closed_bound(problem, problem.goals[k]) for k in query.goal_index)
+    fixed = query.library.rest_rate * (problem.horizon.time or 0.0)
+    return max(closed, fixed + query.library.per_metre * plane_bound(query))

@@ -1,0 +1,255 @@
+"""Plans from words alone: every word, or insertion; obstacles only sort out what hits them."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from maneuver_automaton.audit import Audit, audit_plan, terminal_error
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.planning.result import Alternative, PlanResult, PlanStatus
+from maneuver_automaton.problem import Horizon, Problem
+from maneuver_automaton.search import SearchStatus, Solution
+from maneuver_automaton.search.certificate import certificate
+from maneuver_automaton.search.choose import load_search, search_goal
+from maneuver_automaton.search.inside import outside, stays_inside
+from maneuver_automaton.search.limits import closed_bound, why_impossible
+from maneuver_automaton.search.result import plan_of
+
+
+def plan_by_words(problem: Problem, *, time_limit: float, alternatives: int) -> PlanResult:
+    """The cheapest word, by exhaustive search or insertion, that stays free and inside."""
+    load_search(problem)
+    began = time.monotonic()
+    found = _search_goals(problem, alternatives, began + time_limit)
+    searched = time.monotonic()
+    chosen = _audited(problem, found.candidates, alternatives)
+    audited = time.monotonic()
+    timing = {
+        "search": searched - began,
+        "first_plan": found.first_plan,
+        "refine": 0.0,
+        "audit": audited - searched,
+    }
+    counts = dict(found.counts) | {"rejected_by_audit": chosen.rejected}
+    if not chosen.plans:
+        status, reason = _why_none(problem, found, chosen, time_limit)
+        return PlanResult(
+            problem=problem, status=status, reason=reason, timing_s=timing, counts=counts
+        )
+    best = chosen.plans[0]
+    free = found.candidates[0].cost if found.proven else None
+    bound = _lower_bound(problem, best, free)
+    return PlanResult(
+        problem=problem,
+        status=PlanStatus.FOUND,
+        reason="",
+        plan=best.plan,
+        goal_index=best.goal_index,
+        cost=best.cost,
+        lower_bound=bound,
+        gap=_gap(best.cost, bound),
+        certificate=certificate(problem, problem.goals[best.goal_index], best.solution),
+        terminal_error=terminal_error(best.plan, problem.goals[best.goal_index]),
+        audit=best.audit,
+        alternatives=tuple(
+            Alternative(
+                plan=other.plan,
+                cost=other.cost,
+                terminal_error=terminal_error(other.plan, problem.goals[other.goal_index]),
+            )
+            for other in chosen.plans[1:]
+        ),
+        timing_s=timing,
+        counts=counts,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Candidate:
+    """A solution as a plan."""
+
+    goal_index: int
+    solution: Solution
+    plan: Plan
+    audit: Audit | None = None
+
+    @property
+    def cost(self) -> float:
+        return self.solution.cost
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Found:
+    """What the searches for all goals came to."""
+
+    candidates: list[_Candidate]
+    counts: dict[str, int]
+    first_plan: float
+    exhausted: bool  # no search was cut short
+    proven: bool  # every admitted word was searched
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Chosen:
+    """What bounds and audit left."""
+
+    plans: list[_Candidate]
+    outside: int
+    rejected: int
+    complaint: str
+
+
+def _search_goals(problem: Problem, alternatives: int, deadline: float) -> _Found:
+    """Search for every goal that is inside the bounds; all candidates, cheapest first."""
+    bounded = any(getattr(problem.bounds, name) is not None for name in ("x", "y", "z"))
+    counts: dict[str, int] = {}
+    candidates: list[_Candidate] = []
+    exhausted = proven = True
+    began = time.monotonic()
+    first_plan = math.nan
+    for index, goal in enumerate(problem.goals):
+        if outside(goal.pose, problem.bounds):
+            continue
+        left = max(deadline - time.monotonic(), 1e-3)
+        results = search_goal(
+            problem, goal, alternatives=None if bounded else alternatives, time_limit=left
+        )
+        if math.isnan(first_plan) and any(result.solutions for result in results):
+            first_plan = time.monotonic() - began
+        proven = proven and any(result.exhaustive for result in results)
+        for result in results:
+            exhausted = exhausted and result.status is not SearchStatus.OUT_OF_BUDGET
+            for name, value in result.counts.items():
+                counts[name] = counts.get(name, 0) + value
+            candidates += [
+                _Candidate(goal_index=index, solution=solution, plan=plan_of(problem, solution))
+                for solution in result.solutions
+            ]
+    order = sorted(candidates, key=_order)
+    return _Found(
+        candidates=_distinct(order),
+        counts=counts,
+        first_plan=first_plan if math.isfinite(first_plan) else time.monotonic() - began,
+        exhausted=exhausted,
+        proven=proven,
+    )
+
+
+def _order(candidate: _Candidate) -> tuple[float, int, tuple[int, ...]]:
+    word = candidate.solution.word
+    return float(f"{candidate.cost:.9g}"), len(word), tuple(word.tolist())
+
+
+def _distinct(candidates: Iterable[_Candidate]) -> list[_Candidate]:
+    """Each motion once: the same word with the same times may come from two searches."""
+    kept: list[_Candidate] = []
+    for candidate in candidates:
+        solution = candidate.solution
+        for other in kept:
+            same_word = other.plan.word == candidate.plan.word
+            if same_word and np.allclose(
+                other.solution.durations, solution.durations, rtol=1e-6, atol=1e-6
+            ):
+                break
+        else:
+            kept.append(candidate)
+    return kept
+
+
+def _audited(problem: Problem, candidates: Sequence[_Candidate], alternatives: int) -> _Chosen:
+    """The cheapest candidates that stay inside the bounds and pass the audit."""
+    plans: list[_Candidate] = []
+    outside = rejected = 0
+    complaint = ""
+    for candidate in candidates:
+        if len(plans) > alternatives:
+            break
+        if not stays_inside(candidate.plan, problem.bounds):
+            outside += 1
+            continue
+        goal = problem.goals[candidate.goal_index]
+        audit = audit_plan(candidate.plan, goal, problem.automaton.model)
+        if audit.passed:
+            plans.append(replace(candidate, audit=audit))
+        else:
+            rejected += 1
+            complaint = complaint or audit.reason
+    return _Chosen(plans=plans, outside=outside, rejected=rejected, complaint=complaint)
+
+
+def _why_none(
+    problem: Problem, found: _Found, chosen: _Chosen, time_limit: float
+) -> tuple[PlanStatus, str]:
+    if chosen.rejected:
+        return PlanStatus.NO_PLAN, (
+            f"the audit rejected {chosen.rejected} plans: {chosen.complaint}; "
+            "do the trims belong to the model?"
+        )
+    if not found.exhausted:
+        return PlanStatus.OUT_OF_BUDGET, (
+            f"no plan within {time_limit:g} s and the expansions allowed"
+        )
+    if chosen.outside:
+        return PlanStatus.NO_PLAN, (f"all {chosen.outside} plans found leave the bounds")
+    impossible = why_impossible(problem)
+    if any(goal.tolerance_m or goal.tolerance_rad for goal in problem.goals):
+        return PlanStatus.NO_PLAN, (
+            "no word was found to end exactly at the goal; what ends within its tolerance "
+            "is not searched for"
+        )
+    if impossible:
+        return PlanStatus.UNREACHABLE, impossible
+    too_short = _least_time(problem)
+    if too_short is not None:
+        return too_short
+    limit = problem.horizon.max_trims
+    if found.proven and limit is not None:
+        return PlanStatus.UNREACHABLE, (
+            f"no word of at most {limit} trims of this library ends at the goal"
+        )
+    return PlanStatus.NO_PLAN, "no word of this library was found to end at the goal"
+
+
+def _least_time(problem: Problem) -> tuple[PlanStatus, str] | None:
+    """Verdict where the time is what stands in the way: the least time to any goal is named."""
+    from maneuver_automaton.costs import Cost
+
+    limit = problem.horizon.time or problem.horizon.max_time
+    if limit is None:
+        return None
+    hurry = replace(
+        problem, cost=Cost(time=1.0), horizon=Horizon(max_trims=problem.horizon.max_trims)
+    )
+    quickest = [
+        (solution.duration, index, solution, result.exhaustive)
+        for index, goal in enumerate(problem.goals)
+        for result in search_goal(hurry, goal, alternatives=0, time_limit=5.0)
+        for solution in result.solutions
+    ]
+    if not quickest:
+        return None
+    least, index, solution, exhaustive = min(quickest, key=lambda row: row[:2])
+    if least <= limit:
+        return None
+    evidence = certificate(hurry, problem.goals[index], solution)
+    settled = exhaustive or (evidence is not None and evidence >= -1e-9)
+    return (PlanStatus.UNREACHABLE if settled else PlanStatus.NO_PLAN), (
+        f"the goal cannot be reached in {limit:g} s: the least time found is {least:.6g} s"
+    )
+
+
+def _lower_bound(problem: Problem, best: _Candidate, free: float | None) -> float:
+    """No admitted plan is cheaper: the optimum `free` of bounds if proven, or a closed bound."""
+    if free is not None:
+        return min(best.cost, free)
+    bounds = [closed_bound(problem, goal) for goal in problem.goals]
+    return min(best.cost, min(bounds))
+
+
+def _gap(cost: float, bound: float) -> float:
+    return 0.0 if cost <= bound else (cost - bound) / cost

@@ -1,0 +1,58 @@
+"""`plan(problem)`: choose, search, refine, check, audit."""
+
+from __future__ import annotations
+
+from maneuver_automaton.planning.among_obstacles import plan_on_lattice
+from maneuver_automaton.planning.blocked import blocked_ends
+from maneuver_automaton.planning.free_space import plan_by_words
+from maneuver_automaton.planning.result import PlanResult
+from maneuver_automaton.problem import Problem
+
+
+def plan(problem: Problem, *, time_limit: float = 5.0, alternatives: int = 0) -> PlanResult:
+    """Cheapest plan found for `problem`, audited by an ODE solver before it is returned.
+
+    Parameters
+    ----------
+    problem : Problem
+    time_limit : float
+        [s] for search and refinement; the audit comes after it.
+    alternatives : int
+        How many dearer plans to return beside the cheapest, as far as there are so many.
+
+    Returns
+    -------
+    PlanResult
+        ``status`` says how it ended. ``lower_bound`` is the cost itself where the search was
+        exhaustive over all admitted words of at most four moving trims, otherwise a closed bound.
+
+    Raises
+    ------
+    ValueError
+        If a limit is not positive, or the number of alternatives negative.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Cost, Horizon, Problem, Unicycle, plan
+    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "ahead": (1, 0), "spin": (0, 1)})
+    >>> problem = Problem(robot, [0, 0, 0], [1, 1, 0], horizon=Horizon(max_trims=3))
+    >>> result = plan(problem)
+    >>> result.plan.word, round(result.cost, 4), result.audit.passed
+    (('spin', 'ahead', 'spin'), 7.6974, True)
+    """
+    if not time_limit > 0.0:
+        raise ValueError(f"time_limit must be positive, got {time_limit} s")
+    if alternatives < 0:
+        raise ValueError(f"alternatives must be at least 0, got {alternatives}")
+    blocked = blocked_ends(problem)
+    if blocked is not None:
+        return blocked
+    if uses_lattice(problem):
+        return plan_on_lattice(problem, time_limit=time_limit, alternatives=alternatives)
+    return plan_by_words(problem, time_limit=time_limit, alternatives=alternatives)
+
+
+def uses_lattice(problem: Problem) -> bool:
+    """Whether the lattice is what plans: it was asked for, or there is something in the way."""
+    method = problem.search.method
+    return method == "lattice" or (method == "auto" and bool(problem.obstacles))

@@ -1,0 +1,36 @@
+"""The shortest way of the reference point round what stands still: a bound on every plan."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from maneuver_automaton.search import _kernels_plane
+from maneuver_automaton.search.distance_grid import distance_grid
+from maneuver_automaton.search.lattice_query import LatticeQuery
+
+FACTOR = 1.0823922002923938  # an octile way is at most so much longer than the true one
+
+
+def plane_bound(query: LatticeQuery) -> float:
+    """No way in the plane from the start to any goal is shorter [m]; 0 where none is known.
+
+    The shortest way round blocked cells leads over their corners, and among the corners of cells
+    an octile way is at most 1.0824 times as long; start and goal are at most half a diagonal from
+    a corner. Cells are blocked only where the pose cannot be at all.
+
+    Source: Bailey, Tovey, Uras, Koenig, Nash (2015), *Path planning on grids: the effect of vertex
+    placement on path length*.
+    """
+    grid = distance_grid(query.world, query.box, query.goals, query.start)
+    if not grid.columns:
+        return 0.0
+    way: float = _kernels_plane.corner_way(
+        grid,
+        query.world.arrays.field,
+        np.ascontiguousarray(query.goals[:, :2]),
+        float(query.start[0]),
+        float(query.start[1]),
+    )
+    if not np.isfinite(way):
+        return 0.0
+    return max(0.0, way / FACTOR - grid.cell * float(np.sqrt(2.0)))
