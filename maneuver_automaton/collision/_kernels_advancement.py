@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from maneuver_automaton._compile import bare_inner_kernel, kernel
-from maneuver_automaton.collision._kernels_gap import NEAR, piece_gap, still_gap
+from maneuver_automaton.collision._kernels_gap import NEAR, field_bound, near_step, piece_gap, still_gap
 from maneuver_automaton.groups._kernels import coast, compose
 
 
@@ -52,7 +52,8 @@ def mover_gap(movers, m, body, x, y, heading, time, enough):
     near = NEAR * (body.reach + movers.reach[m])
     for p in range(movers.first_piece[m], movers.first_piece[m + 1]):
         for b in range(body.first.shape[0] - 1):
-            best = min(best, piece_gap(body, b, r_x, r_y, c, s, movers.solids, p, near, best))
+            gap, _, _ = piece_gap(body, b, r_x, r_y, c, s, movers.solids, p, near, best)
+            best = min(best, gap)
             if best <= 0.0:
                 return best
     return best
@@ -71,16 +72,43 @@ def free_time(
     sign = 1.0 if duration >= 0.0 else -1.0
     length = abs(duration)
     n_movers = world.movers.speed.shape[0]
+    near = NEAR * body.reach + keep
+    c, s = math.cos(heading), math.sin(heading)
+    w_x, w_y, turning = sign * (c * v_x - s * v_y), sign * (s * v_x + c * v_y), sign * turn_rate
+    center_x, center_y = x, y
+    if turn_rate != 0.0:
+        center_x = x - (s * v_x + c * v_y) / turn_rate
+        center_y = y + (c * v_x - s * v_y) / turn_rate
     t, nearest = 0.0, math.inf
     while True:
         d_x, d_y, turn = coast(v_x, v_y, turn_rate, sign * t)
         p_x, p_y, p_heading = compose(x, y, heading, d_x, d_y, turn)
         c, s = math.cos(p_heading), math.sin(p_heading)
-        gap = still_gap(world, body, p_x, p_y, c, s) - keep
-        if gap <= margin:
-            return t, gap
-        nearest = gap
-        step = gap / speed if speed > 0.0 else math.inf
+        gap = field_bound(world.field, body, p_x, p_y, c, s)
+        if gap > near:
+            nearest = gap - keep
+            step = nearest / speed if speed > 0.0 else math.inf
+        else:
+            step, nearest = near_step(
+                world.buckets,
+                world.solids,
+                body,
+                p_x,
+                p_y,
+                c,
+                s,
+                center_x,
+                center_y,
+                w_x,
+                w_y,
+                turning,
+                speed,
+                keep,
+                margin,
+                length - t,
+            )
+            if step < 0.0:
+                return t, nearest
         for m in range(n_movers):
             fast = speed + world.movers.speed[m]
             time = clock + sign * t

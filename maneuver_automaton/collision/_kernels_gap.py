@@ -11,28 +11,36 @@ import math
 
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 
-NEAR = 0.02  # share of a body's reach below which gaps are made exact
+NEAR = 0.1  # share of a body's reach below which solids are looked at one by one
+SHARP = 0.3  # share of that below which gaps to sharp corners are made exact
 
 
-@bare_inner_kernel
-def point_to_segment(x, y, ax, ay, bx, by):
-    """Squared distance of a point to a segment."""
+@inlined_kernel
+def from_segment(x, y, ax, ay, bx, by):
+    """Vector to a point from the nearest point of a segment."""
     dx, dy = bx - ax, by - ay
     px, py = x - ax, y - ay
     square = dx * dx + dy * dy
     t = (px * dx + py * dy) / square if square > 0.0 else 0.0
     t = min(max(t, 0.0), 1.0)
-    ex, ey = px - t * dx, py - t * dy
+    return px - t * dx, py - t * dy
+
+
+@bare_inner_kernel
+def point_to_segment(x, y, ax, ay, bx, by):
+    """Squared distance of a point to a segment."""
+    ex, ey = from_segment(x, y, ax, ay, bx, by)
     return ex * ex + ey * ey
 
 
 @inlined_kernel
 def separation(body, b, x, y, c, s, solids, p, enough):
-    """Largest separation of two convex cores over the normals of their edges; -inf without edges.
+    """Largest separation of two convex cores over the normals of their edges, and that normal.
 
-    A lower bound of their distance, and not positive only if they touch. Stops at `enough`.
+    A lower bound of their distance, not positive only if they touch; -inf without edges. The normal
+    points to the body. Stops at `enough`.
     """
-    best = -math.inf
+    best, axis_x, axis_y = -math.inf, 0.0, 0.0
     b_0, b_1 = body.first[b], body.first[b + 1]
     p_0, p_1 = solids.first[p], solids.first[p + 1]
     if p_1 - p_0 > 1:
@@ -45,10 +53,10 @@ def separation(body, b, x, y, c, s, solids, p, enough):
                 least = min(least, value)
             gap = least + n_x * x + n_y * y - solids.edges[k, 4]
             if gap > best:
-                best = gap
+                best, axis_x, axis_y = gap, n_x, n_y
                 if best > enough:
-                    return best
-    if b_1 - b_0 > 1:
+                    break
+    if b_1 - b_0 > 1 and best <= enough:
         for k in range(b_0, b_1):  # edges of the body against corners of the solid
             n_x = c * body.edges[k, 2] - s * body.edges[k, 3]
             n_y = s * body.edges[k, 2] + c * body.edges[k, 3]
@@ -58,24 +66,24 @@ def separation(body, b, x, y, c, s, solids, p, enough):
                 least = min(least, value)
             gap = least - n_x * x - n_y * y - body.edges[k, 4]
             if gap > best:
-                best = gap
+                best, axis_x, axis_y = gap, -n_x, -n_y
                 if best > enough:
-                    return best
-    return best
+                    break
+    return best, axis_x, axis_y
 
 
-@inlined_kernel
+@bare_inner_kernel
 def core_distance(body, b, x, y, c, s, solids, p):
-    """Distance of two convex cores that do not overlap."""
+    """Distance of two convex cores that do not overlap, and its direction towards the body."""
     b_0, b_1 = body.first[b], body.first[b + 1]
     p_0, p_1 = solids.first[p], solids.first[p + 1]
-    best = math.inf
+    best, axis_x, axis_y = math.inf, 0.0, 0.0
     for j in range(b_0, b_1):
         at_x = x + c * body.edges[j, 0] - s * body.edges[j, 1]
         at_y = y + s * body.edges[j, 0] + c * body.edges[j, 1]
         before = p_1 - 1
         for k in range(p_0, p_1):
-            square = point_to_segment(
+            e_x, e_y = from_segment(
                 at_x,
                 at_y,
                 solids.edges[before, 0],
@@ -83,14 +91,15 @@ def core_distance(body, b, x, y, c, s, solids, p):
                 solids.edges[k, 0],
                 solids.edges[k, 1],
             )
-            best = min(best, square)
+            if e_x * e_x + e_y * e_y < best:
+                best, axis_x, axis_y = e_x * e_x + e_y * e_y, e_x, e_y
             before = k
     for j in range(p_0, p_1):
         d_x, d_y = solids.edges[j, 0] - x, solids.edges[j, 1] - y
         at_x, at_y = c * d_x + s * d_y, c * d_y - s * d_x
         before = b_1 - 1
         for k in range(b_0, b_1):
-            square = point_to_segment(
+            e_x, e_y = from_segment(
                 at_x,
                 at_y,
                 body.edges[before, 0],
@@ -98,22 +107,29 @@ def core_distance(body, b, x, y, c, s, solids, p):
                 body.edges[k, 0],
                 body.edges[k, 1],
             )
-            best = min(best, square)
+            if e_x * e_x + e_y * e_y < best:
+                best = e_x * e_x + e_y * e_y
+                axis_x, axis_y = s * e_y - c * e_x, -s * e_x - c * e_y
             before = k
-    return math.sqrt(best)
+    distance = math.sqrt(best)
+    if distance > 0.0:
+        axis_x, axis_y = axis_x / distance, axis_y / distance
+    return distance, axis_x, axis_y
 
 
 @inlined_kernel
 def piece_gap(body, b, x, y, c, s, solids, p, near, enough):
-    """Gap of one piece of the body at (x, y, cos, sin) to one solid: a lower bound.
+    """Gap of one piece of the body at (x, y, cos, sin) to one solid, and the axis along which.
 
-    Exact where it is below `near`; at most 0 if they touch. Need not be exact above `enough`.
+    A lower bound; exact where it is a small share of `near`; at most 0 if they touch. Need not be
+    exact above `enough`.
     """
     rounding = body.radius[b] + solids.plates[p, 4]
-    gap = separation(body, b, x, y, c, s, solids, p, enough + rounding)
-    if -math.inf < gap <= 0.0 or gap - rounding > min(near, enough):
-        return gap - rounding
-    return core_distance(body, b, x, y, c, s, solids, p) - rounding
+    gap, axis_x, axis_y = separation(body, b, x, y, c, s, solids, p, enough + rounding)
+    exact = near if rounding > 0.0 else SHARP * near
+    if not -math.inf < gap <= 0.0 and gap - rounding <= min(exact, enough):
+        gap, axis_x, axis_y = core_distance(body, b, x, y, c, s, solids, p)
+    return gap - rounding, axis_x, axis_y
 
 
 @inlined_kernel
@@ -154,10 +170,116 @@ def near_gap(buckets, solids, body, x, y, c, s, near):
         if d_x * d_x + d_y * d_y >= away * away:
             continue
         for b in range(body.first.shape[0] - 1):
-            best = min(best, piece_gap(body, b, x, y, c, s, solids, p, near, best))
+            gap, _, _ = piece_gap(body, b, x, y, c, s, solids, p, near, best)
+            best = min(best, gap)
             if best <= 0.0:
                 return best
     return best
+
+
+@bare_inner_kernel
+def corner_time(a, b, ahead, turn, limit):
+    """When a corner comes down to `limit` along an axis, driven by a constant twist.
+
+    Without `turn` its height is ``a + ahead t``; with it, it is on a circle, (a, b) along the axis
+    and aside from the centre, whose height is `ahead`.
+    """
+    if turn == 0.0:
+        return (a - limit) / -ahead if ahead < 0.0 else math.inf
+    radius = math.sqrt(a * a + b * b)
+    if ahead - radius > limit:
+        return math.inf
+    low = (limit - ahead) / radius
+    if low >= 1.0:
+        return 0.0
+    reach = math.acos(low)
+    now = math.atan2(b, a)
+    return max(reach - now if turn > 0.0 else reach + now, 0.0) / abs(turn)
+
+
+@inlined_kernel
+def axis_time(body, b, x, y, c, s, center_x, center_y, v_x, v_y, turn, axis_x, axis_y, drop):
+    """How long a piece of the body stays apart along a fixed axis: until it is nearer by `drop`.
+
+    The body turns about the centre, or moves with the world velocity (v_x, v_y).
+    """
+    lowest = math.inf
+    b_0, b_1 = body.first[b], body.first[b + 1]
+    m_x, m_y = c * axis_x + s * axis_y, c * axis_y - s * axis_x
+    for k in range(b_0, b_1):
+        lowest = min(lowest, m_x * body.edges[k, 0] + m_y * body.edges[k, 1])
+    limit = lowest - drop  # heights are counted from the pose
+    time = math.inf
+    for k in range(b_0, b_1):
+        u_x = c * body.edges[k, 0] - s * body.edges[k, 1]
+        u_y = s * body.edges[k, 0] + c * body.edges[k, 1]
+        if turn == 0.0:
+            a = axis_x * u_x + axis_y * u_y
+            t = corner_time(a, 0.0, axis_x * v_x + axis_y * v_y, 0.0, limit)
+        else:
+            w_x, w_y = u_x - (center_x - x), u_y - (center_y - y)
+            height = axis_x * (center_x - x) + axis_y * (center_y - y)
+            a, b_side = axis_x * w_x + axis_y * w_y, axis_x * w_y - axis_y * w_x
+            t = corner_time(a, b_side, height, turn, limit)
+        time = min(time, t)
+    return time
+
+
+@bare_inner_kernel
+def near_step(
+    buckets, solids, body, x, y, c, s, center_x, center_y, v_x, v_y, turn, speed, keep, margin, most
+):
+    """How long the motion that goes on from here stays free of what is near, at most `most` [s].
+
+    Every solid keeps apart by its gap over the body's speed, or by the axis between the two for as
+    long as that axis parts them. Also the least gap; not positive `-1` if one is at most `margin`.
+    """
+    near = NEAR * body.reach
+    m_x = x + c * body.middle_x - s * body.middle_y
+    m_y = y + s * body.middle_x + c * body.middle_y
+    nearest = buckets.reach - keep
+    if nearest <= margin:  # the distance to keep is beyond what the buckets know
+        return -1.0, nearest
+    step = min(most, nearest / speed) if speed > 0.0 else most
+    i = math.floor((m_x - buckets.origin_x) / buckets.cell)
+    j = math.floor((m_y - buckets.origin_y) / buckets.cell)
+    if not (0 <= i < buckets.columns and 0 <= j < buckets.rows):
+        return step, nearest
+    k = j * buckets.columns + i
+    for item in range(buckets.start[k], buckets.start[k + 1]):
+        p = buckets.items[item]
+        d_x = max(max(solids.plates[p, 0] - m_x, m_x - solids.plates[p, 2]), 0.0)
+        d_y = max(max(solids.plates[p, 1] - m_y, m_y - solids.plates[p, 3]), 0.0)
+        away = step * speed + keep + body.reach
+        if d_x * d_x + d_y * d_y >= away * away:
+            continue
+        for b in range(body.first.shape[0] - 1):
+            enough = step * speed + keep
+            gap, axis_x, axis_y = piece_gap(body, b, x, y, c, s, solids, p, near, enough)
+            gap -= keep
+            nearest = min(nearest, gap)
+            if gap <= margin:
+                return -1.0, gap
+            lasts = gap / speed if speed > 0.0 else math.inf
+            if lasts < step:
+                along = axis_time(
+                    body,
+                    b,
+                    x,
+                    y,
+                    c,
+                    s,
+                    center_x,
+                    center_y,
+                    v_x,
+                    v_y,
+                    turn,
+                    axis_x,
+                    axis_y,
+                    gap - margin,
+                )
+                step = min(step, max(lasts, along))
+    return step, nearest
 
 
 @inlined_kernel

@@ -100,9 +100,15 @@ class World:
 
 @functools.lru_cache(maxsize=8)
 def world_of(
-    obstacles: tuple[AnyObstacle, ...], footprint: tuple[Shape, ...], frame: tuple[float, ...]
+    obstacles: tuple[AnyObstacle, ...],
+    footprint: tuple[Shape, ...],
+    frame: tuple[float, ...],
+    *,
+    keep: float = 0.0,
 ) -> World:
     """The world of obstacles around a footprint, seen from the pose `frame`.
+
+    A distance `keep` [m] to everything can be asked for later, up to the one given here.
 
     Examples
     --------
@@ -124,8 +130,8 @@ def world_of(
     box = _box(solids.plates[:, :4], movers)
     arrays = WorldArrays(
         solids=solids,
-        buckets=_buckets(solids.plates, body),
-        field=_field(solids, listed, maps, body),
+        buckets=_buckets(solids.plates, body, keep),
+        field=_field(solids, listed, maps, body, keep),
         movers=movers,
     )
     return World(
@@ -189,7 +195,9 @@ def _box(boxes: Array, movers: Movers) -> Array:
     return np.concatenate([every[:, :2].min(axis=0), every[:, 2:].max(axis=0)])
 
 
-def _field(solids: Solids, listed: int, maps: list[OccupancyMap], body: Body) -> Field:
+def _field(
+    solids: Solids, listed: int, maps: list[OccupancyMap], body: Body, keep: float
+) -> Field:
     """Distances: polygons one by one, maps by a transform of their cells."""
     if not len(solids.plates):
         return Field(np.zeros((0, 0)), 0.0, 0.0, 1.0, math.inf)
@@ -198,7 +206,7 @@ def _field(solids: Solids, listed: int, maps: list[OccupancyMap], body: Body) ->
     most = MOST_MAP_CELLS if maps else MOST_FIELD_CELLS
     scale = body.half_width or 0.25 * float(np.median(solids.plates[:, 2:4] - solids.plates[:, :2]))
     cell = max(0.25 * scale, math.sqrt(max(float(width.prod()), 1e-12) / most), width.max() / most)
-    cap = max(4.0 * body.half_width, 8.0 * cell)
+    cap = keep + max(4.0 * body.half_width, 8.0 * cell)
     columns, rows = np.ceil((width + 2.0 * cap) / cell).astype(int)
     distance = np.full((rows, columns), cap)
     origin = low - cap
@@ -211,8 +219,8 @@ def _field(solids: Solids, listed: int, maps: list[OccupancyMap], body: Body) ->
     return Field(distance, float(origin[0]), float(origin[1]), cell, cap)
 
 
-def _buckets(plates: Array, body: Body) -> Buckets:
-    reach = 0.15 * body.reach if body.reach else 0.25
+def _buckets(plates: Array, body: Body, keep: float) -> Buckets:
+    reach = keep + (0.4 * body.reach if body.reach else 0.25)
     if not len(plates):
         empty = np.zeros(1, dtype=np.int64)
         return Buckets(empty, empty[:0], 0.0, 0.0, 1.0, 0, 0, math.inf)

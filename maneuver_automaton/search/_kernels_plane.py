@@ -30,12 +30,12 @@ def corner_way(grid, field, goals, x, y):
     settled = np.zeros(columns * rows, dtype=np.uint8)
     keys = np.empty(9 * columns * rows)
     items = np.empty(9 * columns * rows, dtype=np.int64)
-    end_i = min(max(int(round((x - grid.origin_x) / grid.cell)), 0), columns - 1)
-    end_j = min(max(int(round((y - grid.origin_y) / grid.cell)), 0), rows - 1)
+    end_i = min(max(round((x - grid.origin_x) / grid.cell), 0), columns - 1)
+    end_j = min(max(round((y - grid.origin_y) / grid.cell), 0), rows - 1)
     size = 0
     for g in range(goals.shape[0]):
-        i = min(max(int(round((goals[g, 0] - grid.origin_x) / grid.cell)), 0), columns - 1)
-        j = min(max(int(round((goals[g, 1] - grid.origin_y) / grid.cell)), 0), rows - 1)
+        i = min(max(round((goals[g, 0] - grid.origin_x) / grid.cell), 0), columns - 1)
+        j = min(max(round((goals[g, 1] - grid.origin_y) / grid.cell), 0), rows - 1)
         here = j * columns + i
         if value[here] > 0.0:
             value[here] = 0.0

@@ -47,7 +47,8 @@ def lattice_query(problem: Problem, goal_index: tuple[int, ...]) -> LatticeQuery
     """Start and the goals of these numbers, with the world around them."""
     library = lattice_library(problem)
     first = problem.goals[goal_index[0]].pose
-    world = world_of(problem.obstacles, problem.footprint, own_frame(problem.obstacles, first))
+    frame = own_frame(problem.obstacles, first)
+    world = world_of(problem.obstacles, problem.footprint, frame, keep=problem.margin)
     start = world.into(problem.start)
     goals = world.into(np.array([problem.goals[k].pose for k in goal_index]))
     box, window, bounded = _window(problem, world, library.radius, np.vstack([start, goals]))
