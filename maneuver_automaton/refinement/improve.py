@@ -17,8 +17,8 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.refinement import _kernels_improve as kernels
+from maneuver_automaton.search.cost_to_go import CostTable
 from maneuver_automaton.search.lattice import (
-    CostTable,
     Rung,
     Word,
     both_ends,

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.search import _kernels_lattice as kernels
+from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.distance_grid import DistanceGrid, distance_grid
 from maneuver_automaton.search.lattice_memory import SearchArrays, search_arrays, with_room
 from maneuver_automaton.search.lattice_query import LatticeQuery
@@ -69,17 +70,6 @@ class Task(NamedTuple):
     by_trim: bool
     by_count: bool
     window: Array
-
-
-class CostTable(NamedTuple):
-    """Cost to go without obstacles around a goal; empty where there is none."""
-
-    value: NDArray[np.float32]  # (headings, 2 half + 1, 2 half + 1)
-    cell: float
-    half: int
-
-
-NO_TABLE = CostTable(np.zeros((0, 1, 1), dtype=np.float32), 1.0, 0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

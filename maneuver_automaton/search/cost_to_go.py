@@ -1,0 +1,146 @@
+"""Cost-to-go tables: by symmetry one dynamic program serves every goal, and every later run.
+
+An estimate, not a bound: cells round poses.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import math
+import os
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maneuver_automaton._compile import user_cache_folder
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.search import _kernels_table
+from maneuver_automaton.search.lattice_library import LatticeLibrary, lattice_library
+
+HALF = 48  # cells from the middle to the rim
+HEADINGS = 72
+REACH = 3.0  # [turning radii] from the middle to the rim, where nothing else is asked for
+SCALES = (0.09, 0.18, 0.36)  # lengths of the program's edges, in those of the lattice's longest
+
+
+class CostTable(NamedTuple):
+    """Cost to go around a goal; a table of no cells where there is none."""
+
+    value: NDArray[np.float32]  # (headings, 2 half + 1, 2 half + 1), inf where not known
+    cell: float  # [m]
+    half: int
+
+
+NO_TABLE = CostTable(np.zeros((0, 1, 1), dtype=np.float32), 1.0, 0)
+
+
+def cost_to_go_table(
+    problem: Problem, *, reach: float | None = None, folder: Path | None = None
+) -> CostTable:
+    """Cost from every pose within `reach` of the goal, without obstacles, for any goal.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its automaton and cost; start, goals and obstacles do not matter.
+    reach : float, optional
+        Half the side of the square around the goal [m]; three turning radii if None.
+    folder : Path, optional
+        Where tables are kept, in files named after a hash of what they were made from; the user's
+        cache folder if None. Where nothing can be written it works without.
+
+    Returns
+    -------
+    CostTable
+        ``value[k, j, i]`` belongs to the pose ``((i - half) cell, (j - half) cell, k 2 pi / n)``
+        seen from the goal.
+
+    Raises
+    ------
+    ValueError
+        If `reach` is not positive.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"on": (1, 0), "left": (1, 1), "right": (1, -1)})
+    >>> table = cost_to_go_table(Problem(robot, [0, 0, 0], [1, 0, 0]), reach=3.0)
+    >>> bool(abs(table.value[0, table.half, 0] - 3.0) < 0.3)
+    True
+    """
+    library = lattice_library(problem)
+    size = REACH * library.radius if reach is None else reach
+    if not (math.isfinite(size) and size > 0.0):
+        raise ValueError(f"reach must be positive, got {size} m")
+    return _table(library, size, folder)
+
+
+def _table(library: LatticeLibrary, reach: float, folder: Path | None) -> CostTable:
+    arrays = library.arrays
+    m = arrays.n_trims
+    moving = arrays.twists[:m].any(axis=1)
+    twists, rates = arrays.twists[:m][moving].copy(), arrays.rates[:m][moving].copy()
+    longest = arrays.quanta[moving].max(axis=1)
+    quanta = np.multiply.outer(longest, SCALES)
+    cell = reach / HALF
+    smallest = np.where(arrays.twists[:m][moving, :2].any(axis=1), cell, 0.0)
+    speed = np.hypot(twists[:, 0], twists[:, 1])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        least = np.where(speed > 0.0, smallest / speed, 0.0)
+    quanta = np.maximum(quanta, np.multiply.outer(least, [1.0, 2.0, 4.0]))
+    return _kept(
+        twists.tobytes(), rates.tobytes(), quanta.tobytes(), reach, library.mirrored, folder
+    )
+
+
+@functools.lru_cache(maxsize=8)
+def _kept(
+    twists: bytes, rates: bytes, quanta: bytes, reach: float, mirrored: bool, folder: Path | None
+) -> CostTable:
+    """The table from memory, from the cache folder, or made anew."""
+    cell = reach / HALF
+    digest = hashlib.sha256(twists + rates + quanta)
+    digest.update(repr((reach, mirrored, HALF, HEADINGS, 1)).encode())
+    path = (folder or user_cache_folder() / "cost_to_go") / f"{digest.hexdigest()[:24]}.npy"
+    value = _load(path)
+    if value is None:
+        value = _kernels_table.fill_table(
+            np.frombuffer(twists).reshape(-1, 3).copy(),
+            np.frombuffer(rates).copy(),
+            np.frombuffer(quanta).reshape(-1, len(SCALES)).copy(),
+            cell,
+            HALF,
+            HEADINGS,
+            mirrored,
+        )
+        _save(value, path)
+    return CostTable(value, cell, HALF)
+
+
+def _load(path: Path) -> NDArray[np.float32] | None:
+    """A table from a file; None if there is none that can be used."""
+    try:
+        value = np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError):
+        return None
+    right = value.shape == (HEADINGS, 2 * HALF + 1, 2 * HALF + 1) and value.dtype == np.float32
+    return np.ascontiguousarray(value) if right else None
+
+
+def _save(value: NDArray[np.float32], path: Path) -> None:
+    """Write under another name and rename: a reader sees a whole table or none."""
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
+        try:
+            with os.fdopen(handle, "wb") as file:
+                np.save(file, value)
+            Path(name).replace(path)
+        except BaseException:
+            Path(name).unlink(missing_ok=True)
+            raise
