@@ -17,6 +17,7 @@ from maneuver_automaton.planning.result import Alternative, PlanResult, PlanStat
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.improve import Improved, Patience, improve
 from maneuver_automaton.refinement.ready import load_lattice
+from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable, cost_to_go_table
 from maneuver_automaton.search.lattice import FirstPlan, Word, first_plan, with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.limits import why_impossible
@@ -44,12 +45,15 @@ class _Progress:
 def plan_on_lattice(problem: Problem, *, time_limit: float, alternatives: int) -> PlanResult:
     """The cheapest free plan found within the time."""
     load_lattice()
+    table = _table(problem)
     began = time.monotonic()
     deadline = began + time_limit
     goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
     query = lattice_query(problem, goals)
     progress = _Progress(query, began)
-    first = first_plan(query, deadline=deadline, max_expansions=problem.search.max_expansions)
+    first = first_plan(
+        query, deadline=deadline, max_expansions=problem.search.max_expansions, table=table
+    )
     found = time.monotonic()
     if first.word is None:
         timing = _timing(began, found, found, found)
@@ -70,6 +74,7 @@ def plan_on_lattice(problem: Problem, *, time_limit: float, alternatives: int) -
         patience=Patience(),
         floor=bound,
         max_expansions=_left(problem, first),
+        table=table,
         better=progress.heard,
     )
     refined = time.monotonic()
@@ -121,6 +126,13 @@ def plan_on_lattice(problem: Problem, *, time_limit: float, alternatives: int) -
         counts=counts,
         improvements=tuple(progress.improvements),
     )
+
+
+def _table(problem: Problem) -> CostTable:
+    """The cost to go of the library, made once for all problems; none for several aims at once."""
+    if len(problem.goals) > 1 or problem.goals[0].free_heading:
+        return NO_TABLE
+    return cost_to_go_table(problem)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -17,7 +17,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.refinement import _kernels_improve as kernels
-from maneuver_automaton.search.cost_to_go import CostTable
+from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.lattice import (
     Rung,
     Word,
@@ -30,7 +30,7 @@ from maneuver_automaton.search.lattice_query import LatticeQuery
 
 POINTS = 40  # of the dynamic program
 SLICE = 400  # attempts
-SECOND_SLICE = 4000  # attempts for candidates near the best
+SECOND_SLICE = 2000  # attempts for candidates near the best
 NEAR = 1.01  # share of the best cost that is near
 PRUNE = 1.08  # of a new search: its raw path is longer than what it becomes
 FIRST_CAP = 1500  # expansions of the first new search ...
@@ -117,7 +117,7 @@ def improve(
     patience: Patience,
     floor: float = -math.inf,
     max_expansions: int | None = None,
-    table: Callable[[], CostTable] | None = None,
+    table: CostTable = NO_TABLE,
     better: Better = lambda word: None,
 ) -> Improved:
     """The cheapest word found from `word` on, which must be free; `better` hears of each gain.
@@ -138,7 +138,7 @@ class _Improvement:
     patience: Patience
     floor: float
     max_expansions: int | None
-    table: Callable[[], CostTable] | None
+    table: CostTable
     better: Better
     attempts: int = 0
     expansions: int = 0
@@ -150,7 +150,6 @@ class _Improvement:
         query = self.query
         self.best = with_cost(self.best, query)
         self._consider(self._shortened(self.best, rng, SLICE))
-        self._consider(self._attempted(self.best, rng, SECOND_SLICE))
         grids = distance_grids(query)
         memory = [
             search_arrays(
@@ -213,15 +212,15 @@ class _Improvement:
         if self.max_expansions is not None:
             cap = min(cap, self.max_expansions - self.expansions)
         tight = bool(step % 5 == 4)
-        rung = Rung(scale=scale, quanta=quanta, weight=weight, contact=tight)
+        rung = Rung(scale=scale, quanta=quanta, weight=weight, contact=tight, stop=step % 3 == 1)
         sign = -1.0 if step % 2 and not self.query.problem.moves else 1.0
-        table = self.table() if self.table is not None and step >= 2 else None
-        kwargs = {} if table is None else {"table": table}
-        (one,) = both_ends(self.query, rung, grids=grids, arrays=memory[0], ends=(sign,), **kwargs)
+        (one,) = both_ends(
+            self.query, rung, grids=grids, table=self.table, arrays=memory[0], ends=(sign,)
+        )
         word = None
         while one.alive and one.expansions < cap and time.monotonic() < self.deadline:
             word = one.run(min(1024, cap - one.expansions), PRUNE * self.best.cost)
-            if word is not None:
+            if word is not None and rung.stop:
                 break
         memory[0] = one.arrays
         self.expansions += one.expansions

@@ -22,7 +22,6 @@ HEADINGS = 72
 WEIGHT = 2.0
 FIRST_CHUNK = 64  # expansions
 MOST_CHUNK = 8192
-LADDER_AFTER = 1500  # expansions of the first pass
 TRIES = 6  # candidates of one steering that are tried
 PATIENCE = 1.5  # a connection may cost so much more than the estimate ...
 SLACK = 2.0  # ... and so many turning radii
@@ -82,15 +81,25 @@ class Rung:
     contact: bool = False  # keep what was driven before a contact
     fine: float = 0.4  # cells of such edges, in cells of this rung
     margin: float = 1.0  # of the proven clearance
+    guided: bool = False  # by the table of the cost to go
+    stop: bool = True  # at the first connection
 
 
-LADDER = (
-    Rung(scale=0.5, quanta=0.5, contact=True),
-    Rung(scale=0.5, quanta=0.5, contact=True, fine=0.2),
-    Rung(scale=0.24, quanta=0.25, contact=True, fine=0.4),
-    Rung(scale=0.12, quanta=0.17),
+LADDER = (  # after so many expansions of all passes together, or when all are exhausted
+    (
+        300,
+        Rung(contact=True, guided=True),
+        Rung(scale=0.5, quanta=0.5, contact=True, guided=True),
+    ),
+    (
+        8000,
+        Rung(scale=0.5, quanta=0.5, contact=True, fine=0.2, guided=True),
+        Rung(scale=0.24, quanta=0.25, contact=True, guided=True),
+        Rung(scale=0.5, quanta=0.5, contact=True),
+        Rung(scale=0.12, quanta=0.17),
+    ),
+    (2**62, Rung(scale=0.24, quanta=0.25, contact=True, margin=0.1, guided=True)),
 )
-LAST_RUNGS = (Rung(scale=0.24, quanta=0.25, contact=True, fine=0.4, margin=0.1),)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -169,14 +178,15 @@ def first_plan(
     *,
     deadline: float,
     max_expansions: int | None = None,
+    table: CostTable = NO_TABLE,
 ) -> FirstPlan:
     """The first connection from start to a goal, by the first rung that has one."""
     settings = query.problem.search
-    base = Rung(weight=settings.weight or WEIGHT)
     grids = distance_grids(query)
     room = max_expansions or 2**62
+    base = Rung(weight=settings.weight or WEIGHT)
     passes = both_ends(query, base, grids=grids)
-    total, laddered, last = 0, False, False
+    total, ladder = 0, list(LADDER)
     while True:
         for one in passes:
             if not one.alive or total >= room or time.monotonic() >= deadline:
@@ -187,17 +197,17 @@ def first_plan(
             one.chunk = min(2 * one.chunk, MOST_CHUNK)
             if word is not None:
                 return _outcome(query, passes, total, word, exhausted=False)
-        alive = [one for one in passes if one.alive]
-        enclosed = _enclosed(query, grids) if not alive else ""
-        stop = total >= room or time.monotonic() >= deadline or bool(enclosed)
-        if not laddered and not stop and (not alive or total >= LADDER_AFTER):
-            laddered = True
-            passes += [one for rung in LADDER for one in both_ends(query, rung, grids=grids)]
-        elif laddered and not alive and not last and not stop:
-            last = True
-            passes += [one for rung in LAST_RUNGS for one in both_ends(query, rung, grids=grids)]
-        elif stop or not alive:
+        alive = any(one.alive for one in passes)
+        enclosed = "" if alive else _enclosed(query, grids)
+        if total >= room or time.monotonic() >= deadline or enclosed:
             return _outcome(query, passes, total, None, exhausted=not alive, enclosed=enclosed)
+        if ladder and (not alive or total >= ladder[0][0]):
+            for rung in ladder.pop(0)[1:]:
+                assert isinstance(rung, Rung)
+                guide = table if rung.guided else NO_TABLE
+                passes += both_ends(query, rung, grids=grids, table=guide)
+        elif not alive:
+            return _outcome(query, passes, total, None, exhausted=True)
 
 
 def both_ends(
@@ -272,7 +282,7 @@ def _task(query: LatticeQuery, rung: Rung, sign: float) -> Task:
         patience=PATIENCE,
         slack=float(SLACK * radius * price + library.per_turn) or math.inf,
         tries=TRIES,
-        stop_at_first=True,
+        stop_at_first=bool(rung.stop),
         contact=rung.contact,
         back_off=float(max(BACK_OFF * size, 2.0 * query.margin)),
         shortest_contact=float(SHORTEST_CONTACT * size),
