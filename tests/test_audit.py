@@ -13,6 +13,7 @@ from hypothesis.extra.numpy import arrays
 
 from maneuver_automaton.audit import audit_plan, terminal_error
 from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap, Polygon
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import Car, Unicycle, UserModel
 from maneuver_automaton.primitives import Trim
@@ -227,3 +228,179 @@ def test_a_start_time_changes_nothing(start_time):
     audit = audit_plan(later, Goal(pose=PARKING.end), ROBOT.model)
     assert audit.passed, audit.reason
     assert audit.max_dynamics_defect < 1e-8
+
+
+BODY = (Polygon([[-0.5, -0.4], [1.5, -0.4], [1.5, 0.4], [-0.5, 0.4]]),)
+AHEAD = plan_of(CAR, ("ahead", 10.0))  # from (0, 0) to (10, 0), its front from 1.5 to 11.5
+AROUND = plan_of(CAR, ("left", 2.0), ("ahead", 3.0), ("back right", 4.0))
+
+
+def audited(plan, *obstacles, footprint=BODY, margin=0.0, automaton=CAR):
+    goal = Goal(pose=plan.end)
+    return audit_plan(
+        plan, goal, automaton.model, footprint=footprint, obstacles=obstacles, margin=margin
+    )
+
+
+def test_without_obstacles_there_is_no_clearance():
+    assert audited(AHEAD).min_clearance_m is None
+    empty = OccupancyMap(np.zeros((4, 4)), resolution=1.0)
+    assert audited(AHEAD, empty).min_clearance_m is None
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "clearance"),
+    [
+        (Obstacle(Box([1.0, 1.0], center=[5.0, 2.0])), 1.1),
+        (Obstacle(Box([1.0, 1.0], center=[13.0, 0.0])), 1.0),  # in front of where it ends
+        (Obstacle(Disc(0.5, center=[-2.0, 0.0])), 1.0),  # behind where it begins
+        (Obstacle(Disc(1.0, center=[5.0, -3.0])), 1.6),
+        (OccupancyMap([[1, 0], [0, 0]], resolution=0.5, origin=[4.0, 1.0, 0.0]), 0.6),
+        (OccupancyMap([[1]], resolution=0.5, origin=[4.0, 1.0, math.pi / 2]), 0.6),
+        (
+            Obstacle(
+                Polygon(
+                    [[-9, -9], [19, -9], [19, 9], [-9, 9]], [[[-8, -2], [18, -2], [18, 3], [-8, 3]]]
+                )
+            ),
+            1.6,
+        ),
+    ],
+)
+def test_the_least_clearance_by_hand(obstacle, clearance):
+    audit = audited(AHEAD, obstacle)
+    assert audit.passed, audit.reason
+    assert audit.min_clearance_m == pytest.approx(clearance, abs=1e-3)
+    assert audit.min_clearance_m >= clearance - 1e-9
+    assert not audited(AHEAD, obstacle, margin=clearance + 1e-2).passed
+    assert audited(AHEAD, obstacle, margin=clearance - 1e-2).passed
+
+
+@pytest.mark.parametrize(
+    "obstacle",
+    [
+        Obstacle(Box([1.0, 1.0], center=[12.0, 0.0])),  # touched by the front, at the very end
+        Obstacle(Box([1.0, 1.0], center=[-1.0, 0.0])),  # touched by the tail, at the start
+        Obstacle(Box([1.0, 1.0], center=[5.0, 0.9])),  # touched by the side
+        Obstacle(Disc(0.5, center=[5.0, 0.9])),
+        Obstacle(Disc(1e-3, center=[5.0, 0.4])),
+        Obstacle(Box([1e-6, 1e-6], center=[5.0, 0.0])),  # driven over
+        Obstacle(Box([100.0, 100.0])),  # all inside it
+        Obstacle(Box([1e-9, 3.0], center=[7.123, 0.0])),  # a thin wall
+        OccupancyMap([[1]], resolution=0.05, origin=[4.0, 0.0, 1.0]),
+        Obstacle(Disc(0.1), motion=Motion([4.0, 6.0], [[5.5, -6.0, 0.0], [5.5, 6.0, 0.0]])),
+    ],
+)
+def test_what_is_hit_is_reported(obstacle):
+    audit = audited(AHEAD, obstacle)
+    assert not audit.passed
+    assert audit.min_clearance_m <= 1e-9
+    assert audit.reason.startswith("at ")
+    assert " s the vehicle touches " in audit.reason
+
+
+def test_the_reason_names_obstacle_and_time():
+    crate = Obstacle(Box([1.0, 1.0], center=[12.0, 0.0]), name="crate")
+    audit = audited(AHEAD, Obstacle(Disc(1.0, center=[0.0, 20.0])), crate)
+    assert audit.reason == "at 10 s the vehicle touches obstacle 'crate'"
+    later = replace(AHEAD, start_time=1000.0)
+    assert audited(later, crate).reason == "at 1010 s the vehicle touches obstacle 'crate'"
+    near = audited(AHEAD, Obstacle(Box([1.0, 1.0], center=[12.1, 0.0])), margin=0.2)
+    assert near.reason.startswith("at 10 s the vehicle is 0.1 m from obstacle 0 (box near (11.6, ")
+    assert near.reason.endswith("), closer than 0.2 m")
+
+
+def test_moving_obstacles_count_at_their_time():
+    def crossing(begin):
+        poses = [[6.0, -5.0, 0.0], [6.0, 5.0, 0.0]]
+        return Obstacle(Box([0.5, 0.5]), motion=Motion([begin, begin + 5.0], poses))
+
+    assert not audited(AHEAD, crossing(3.0)).passed  # at (6, 0) after 5.5 s
+    assert audited(AHEAD, crossing(9.0)).passed  # when it has passed
+    assert audited(AHEAD, crossing(-2.0)).passed  # before it comes
+    assert audited(AHEAD, crossing(1e6)).passed
+    later = replace(AHEAD, start_time=7.0)
+    assert not audited(later, crossing(10.0)).passed
+    assert audited(later, crossing(3.0)).passed
+    for aside, clearance in ((4.6, 0.199), (4.2, 0.0)):  # it points down when the car is there
+        motion = Motion([0.0, 10.0], [[5.0, aside, 0.0], [5.0, aside, 9.0]])
+        audit = audited(AHEAD, Obstacle(Box([8.0, 0.2]), motion=motion))
+        assert audit.min_clearance_m == pytest.approx(clearance, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    "footprint",
+    [
+        (),
+        (Disc(0.5),),
+        (Box([1.0, 0.5]), Disc(0.3, center=[1.0, 0.5])),
+        (Polygon([[0, 0], [2, 0], [2, 0.5], [0.5, 0.5], [0.5, 2], [0, 2]]),),
+    ],
+)
+def test_against_many_poses(footprint):
+    from tests.collision.scenes import random_scene, slow_distance
+
+    rng = np.random.default_rng(8)
+    for _ in range(8):
+        obstacles = tuple(o.moved(SE2([3.0, 1.0, 0.0])) for o in random_scene(rng, movers=1))
+        audit = audited(AROUND, *obstacles, footprint=footprint)
+        times = np.linspace(0.0, AROUND.duration, 250)
+        least = min(
+            slow_distance(footprint, obstacles, pose, time)
+            for pose, time in zip(AROUND.pose_at(times), times, strict=True)
+        )
+        assert audit.min_clearance_m <= max(least / 0.9, least + 1e-3) + 1e-9
+        assert audit.passed == (audit.min_clearance_m > 1e-9)
+
+
+def test_a_graze_between_coarse_poses_is_seen():
+    # the front corner swings over a post that no pose at a switching time touches
+    plan = plan_of(CAR, ("left", 4.0))
+    corner = SE2(plan.pose_at(np.array([1.2345]))).act([1.5, -0.4])[0]
+    outward = SE2(plan.pose_at(np.array([1.2345]))).act([1.5, -0.4 - 1.0])[0] - corner
+    inside = Obstacle(Box([1e-6, 1e-6], center=corner - 2e-3 * outward))
+    assert not audited(plan, inside).passed
+
+
+@pytest.mark.parametrize("far", [1e6, 1e9, -1e9])
+def test_far_from_zero_obstacles_lose_no_digit(far):
+    place = SE2([far, -far - 3.0, 0.5])
+    post = Obstacle(Box([1.0, 1.0], center=[12.0 + 1e-6, 0.0]))
+    free, hit = post.moved(place), Obstacle(Box([1.0, 1.0], center=[12.0, 0.0])).moved(place)
+    plan = AHEAD.moved(place)
+    # the places themselves are rounded there
+    assert audited(plan, free, margin=0.0).min_clearance_m == pytest.approx(1e-6, abs=4e-7)
+    assert audited(plan, hit).min_clearance_m < 4e-7
+
+
+def test_a_moved_plan_has_the_same_clearance():
+    rng = np.random.default_rng(11)
+    from tests.collision.scenes import random_scene
+
+    for _ in range(5):
+        obstacles = random_scene(rng, movers=1)
+        by = SE2([*rng.uniform(-50.0, 50.0, 2), rng.uniform(-5.0, 5.0)])
+        one = audited(AROUND, *obstacles)
+        other = audited(AROUND.moved(by), *(o.moved(by) for o in obstacles))
+        assert one.min_clearance_m == pytest.approx(other.min_clearance_m, abs=1e-3, rel=0.1)
+        assert one.passed == other.passed
+
+
+def test_where_an_empty_plan_stands_counts():
+    here = Plan([0.0, 0.0, 0.0], (), durations=[])
+    wall = Obstacle(Box([1.0, 1.0], center=[2.5, 0.0]))
+    assert audited(here, wall).min_clearance_m == pytest.approx(0.5)
+    assert not audited(here, Obstacle(Box([1.0, 1.0], center=[2.0, 0.0]))).passed
+    resting = plan_of(ROBOT, ("rest", 10.0))
+    coming = Obstacle(Disc(0.5), motion=Motion([0.0, 10.0], [[9.0, 0.0, 0.0], [2.1, 0.0, 0.0]]))
+    assert audited(resting, coming, automaton=ROBOT).min_clearance_m == pytest.approx(0.1, abs=1e-3)
+    nearer = Obstacle(Disc(0.5), motion=Motion([0.0, 10.0], [[9.0, 0.0, 0.0], [1.9, 0.0, 0.0]]))
+    assert not audited(resting, nearer, automaton=ROBOT).passed
+
+
+def test_all_that_is_wrong_is_said():
+    crate = Obstacle(Box([1.0, 1.0], center=[5.0, 0.0]), name="crate")
+    wrong = Goal(pose=np.add(AHEAD.end, [0.0, 1.0, 0.0]))
+    audit = audit_plan(AHEAD, wrong, CAR.model, footprint=BODY, obstacles=(crate,))
+    assert audit.reason.startswith("it ends 1 m from the goal; at ")
+    assert audit.reason.endswith(" s the vehicle touches obstacle 'crate'")

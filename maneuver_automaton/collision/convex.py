@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -114,7 +115,7 @@ def _decomposed(shape: Polygon) -> list[Array]:
                 points = shapely.get_coordinates(line)
                 pieces += [
                     np.stack([a, b])
-                    for a, b in zip(points[:-1], points[1:], strict=True)
+                    for a, b in itertools.pairwise(points)
                     if (a != b).any()
                 ]
         elif part.geom_type == "MultiPolygon":

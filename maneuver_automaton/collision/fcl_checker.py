@@ -11,20 +11,28 @@ import functools
 import math
 import threading
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, IntArray, as_array
+from maneuver_automaton.collision.approach import least_over_poses, travel
 from maneuver_automaton.collision.shapes import AnyObstacle, Motion, Obstacle, Shape
-from maneuver_automaton.collision.solids import Skin, body_skin, joined, obstacle_skin
-from maneuver_automaton.collision.spacetime import Mover, Rover, meet
+from maneuver_automaton.collision.solids import (
+    Region,
+    Skin,
+    body_skin,
+    obstacle_region,
+    obstacle_skin,
+)
+from maneuver_automaton.collision.spacetime import Mover, Rover, may_meet, meet
 from maneuver_automaton.collision.swept import (
     STANDING,
     Body,
     Twist,
     Windows,
+    along,
     body_of,
     fastest,
     halves,
@@ -83,19 +91,7 @@ class FclChecker:
     proven: float = field(default=1e-3, kw_only=True)  # [m]
     _body: Body = field(init=False, repr=False)
     _bare: Body = field(init=False, repr=False)
-    _ground: Any = field(init=False, repr=False)
-
-    if TYPE_CHECKING:
-
-        def __init__(
-            self,
-            footprint: tuple[Shape, ...],
-            obstacles: tuple[AnyObstacle, ...],
-            *,
-            margin: float = 0.0,
-            origin: tuple[float, float] = (0.0, 0.0),
-            proven: float = 1e-3,
-        ) -> None: ...
+    _ground: _Ground = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.margin) and self.margin >= 0.0):
@@ -104,6 +100,8 @@ class FclChecker:
             raise ValueError(f"proven must be a positive number, got {self.proven} m")
         x, y = as_array("origin", self.origin, last=2).tolist()
         excess = 0.25 * self.proven  # of round corners, on either side; the rest is for slices
+        object.__setattr__(self, "footprint", tuple(self.footprint))
+        object.__setattr__(self, "obstacles", tuple(self.obstacles))
         object.__setattr__(self, "origin", (x, y))
         object.__setattr__(self, "_body", body_of(self.footprint, self.margin, excess))
         object.__setattr__(self, "_bare", body_of(self.footprint, 0.0, excess))
@@ -116,8 +114,8 @@ class FclChecker:
         if hit is not None:
             return hit
         for mover in self._ground.movers:
-            _place(mover.object, mover.motion.at(time))
-            if _touching(_standing(self._body), here[None], mover.object):
+            there = mover.path.at(time)
+            if _touching(_standing(self._body), here[None], mover.object, there=there):
                 return mover.owner
         return None
 
@@ -145,7 +143,9 @@ class FclChecker:
             raise ValueError(f"duration must be a number of at least 0, got {duration} s")
         twist = (v_x, v_y, turn_rate)
         hit = self._still_hit_on_way(here, twist, duration)
-        return self._meets(here, twist, duration, start_time) if hit is None else hit
+        if hit is not None or not self._ground.movers:
+            return hit
+        return self._moving_hit_on_way(here, twist, duration, start_time)
 
     def clearance(self, poses: ArrayLike, *, times: ArrayLike | None = None) -> float:
         """Least distance [m] to any obstacle at poses (n, 3) and times (n,) [s], 0 if none given.
@@ -155,12 +155,16 @@ class FclChecker:
         """
         seen = np.atleast_2d(self._seen("poses", poses))
         clock = np.broadcast_to(0.0 if times is None else as_array("times", times), len(seen))
-        least = math.inf
+        movers = self._ground.movers
         if self._ground.still is not None:
-            still = _Moving(self._ground.still, _NOWHERE, 0.0, -1)
-            least = _least_distance(self._bare, seen, still, clock, least)
-        for mover in self._ground.movers:
-            least = _least_distance(self._bare, seen, mover, clock, least)
+            movers = (_Moving(self._ground.still, _STILL, -1), *movers)
+        least = math.inf
+        moved = travel(seen, self._bare.middle, self._bare.reach)
+        for mover in movers:
+            others = mover.path.at(clock)
+            both = moved + travel(others, np.zeros(2), mover.path.reach)
+            gap = functools.partial(_distance, _standing(self._bare), mover.object)
+            least = least_over_poses(gap, seen, others, moved=both, least=least)
         return least
 
     def _seen(self, name: str, poses: ArrayLike) -> Array:
@@ -186,23 +190,29 @@ class FclChecker:
         parts = windows(twist, min(duration, once))
         while True:
             solid = _sliced(self._body, twist, parts.level)
-            hits = _touching(solid.object, _along(start, twist, parts.begins), self._ground.still)
+            hits = _touching(solid.object, along(start, twist, parts.begins), self._ground.still)
             if not hits or solid.excess <= 0.5 * self.proven:
                 return self._ground.owner_of(hits)
             parts = Windows(parts.level, parts.begins[list(hits)])
-            middles = _along(start, twist, parts.begins + 0.5 * parts.length)
+            middles = along(start, twist, parts.begins + 0.5 * parts.length)
             hit = self._still_hit(middles)
             if hit is not None:
                 return hit
             parts = halves(parts)
 
-    def _meets(self, start: Array, twist: Twist, duration: float, time: float) -> int | None:
+    def _moving_hit_on_way(
+        self, start: Array, twist: Twist, duration: float, time: float
+    ) -> int | None:
         """An obstacle that moves and is touched on the way."""
-        rover = Rover(start, twist, self._body.middle, self._body.reach)
+        body = self._body
+        rover = Rover(start, twist, complex(*body.middle), body.reach)
+        center = rover.center(rover.at(0.5 * duration))
         for mover in self._ground.movers:
-            path = Mover.of(mover.motion, mover.reach, start_time=time)
-            gap = functools.partial(_distance, _standing(self._body), mover.object)
-            if meet(rover, path, duration=duration, distance=gap, contact=0.5 * self.proven):
+            path = mover.path.from_time(time)
+            gap = functools.partial(_distance, _standing(body), mover.object)
+            if may_meet(rover, path, duration=duration, center=center) and meet(
+                rover, path, duration=duration, distance=gap, contact=0.5 * self.proven
+            ):
                 return mover.owner
         return None
 
@@ -211,8 +221,7 @@ class _Moving(NamedTuple):
     """An obstacle that moves."""
 
     object: Any
-    motion: Motion
-    reach: float  # [m] no point is further from the origin of its frame
+    path: Mover
     owner: int
 
 
@@ -235,28 +244,31 @@ class _Sliced(NamedTuple):
     excess: float  # [m]
 
 
-_NOWHERE = Motion([0.0], [[0.0, 0.0, 0.0]])
+_STILL = Mover.of(Motion([0.0], [[0.0, 0.0, 0.0]]), 0.0)
 
 
 @functools.lru_cache(maxsize=8)
 def _ground_of(
     obstacles: tuple[AnyObstacle, ...], origin: tuple[float, float], excess: float
 ) -> _Ground:
-    to_origin = SE2([-origin[0], -origin[1], 0.0])
-    skins: list[Skin] = []
+    to_origin = SE2(np.array([-origin[0], -origin[1], 0.0]))
+    regions: list[Region] = []
     owners: list[int] = []
     movers: list[_Moving] = []
     for index, far in enumerate(obstacles):
-        obstacle = far.moved(to_origin)
-        skin = obstacle_skin(obstacle, excess=excess)
+        obstacle = far.moved(to_origin) if any(origin) else far
+        region = obstacle_region(obstacle, excess=excess)
         if isinstance(obstacle, Obstacle) and obstacle.motion is not None:
-            reach = float(np.hypot(*skin.vertices[:, :2].T).max())
-            movers.append(_Moving(_object(skin), obstacle.motion, reach, index))
-        elif len(skin.triangles):
-            skins.append(skin)
-            owners += [index] * len(skin.triangles)
-    still = _object(joined(skins)) if skins else None
-    return _Ground(still, np.array(owners, dtype=np.int64), tuple(movers))
+            reach = float(np.hypot(*region.cover.reshape(-1, 2).T).max())
+            skin, _ = obstacle_skin([region])
+            movers.append(_Moving(_object(skin), Mover.of(obstacle.motion, reach), index))
+        elif len(region.cover):
+            regions.append(region)
+            owners.append(index)
+    if not regions:
+        return _Ground(None, np.zeros(0, dtype=np.int64), tuple(movers))
+    skin, which = obstacle_skin(regions)
+    return _Ground(_object(skin), np.array(owners)[which], tuple(movers))
 
 
 @functools.lru_cache(maxsize=32)
@@ -265,16 +277,11 @@ def _standing(body: Body) -> Any:
     return _object(body_skin(body.pieces))
 
 
-@functools.lru_cache(maxsize=4096)
+@functools.lru_cache(maxsize=1024)
 def _sliced(body: Body, twist: Twist, level: int) -> _Sliced:
     duration = math.ldexp(1.0, -level)
     hulls = slice_hulls(body, twist, duration)
     return _Sliced(_object(body_skin(hulls)), slice_excess(body, twist, duration))
-
-
-def _along(start: Array, twist: Twist, times: Array) -> Array:
-    """Poses (n, 3) of a coast after `times` (n,) [s]."""
-    return (SE2(start) @ SE2.exp(np.multiply.outer(times, twist))).pose
 
 
 def _object(skin: Skin) -> Any:
@@ -304,21 +311,26 @@ def _place(one: Any, pose: Array) -> None:
     one.setTranslation(np.array([pose[0], pose[1], 0.0]))
 
 
-def _touching(one: Any, poses: Array, other: Any, *, most: int | None = None) -> dict[int, int]:
+def _touching(
+    one: Any, poses: Array, other: Any, *, there: Array | None = None, most: int | None = None
+) -> dict[int, int]:
     """At which of the poses (n, 3) an object touches another, and which of its triangles."""
     import fcl
 
     request = fcl.CollisionRequest(num_max_contacts=1, enable_contact=False)
     places = np.column_stack([poses[:, :2], np.zeros(len(poses))])
     hits: dict[int, int] = {}
-    for k, (turn, place) in enumerate(zip(_turns(poses), places, strict=True)):
-        one.setRotation(turn)
-        one.setTranslation(place)
-        result = fcl.CollisionResult()
-        if fcl.collide(one, other, request, result):
-            hits[k] = result.contacts[0].b2
-            if len(hits) == most:
-                break
+    with _ONE_AT_A_TIME:
+        if there is not None:
+            _place(other, there)
+        for k, (turn, place) in enumerate(zip(_turns(poses), places, strict=True)):
+            one.setRotation(turn)
+            one.setTranslation(place)
+            result = fcl.CollisionResult()
+            if fcl.collide(one, other, request, result):
+                hits[k] = result.contacts[0].b2
+                if len(hits) == most:
+                    break
     return hits
 
 
@@ -326,32 +338,8 @@ def _distance(one: Any, other: Any, here: Array, there: Array) -> float:
     """Distance [m] of two objects at two poses (3,), zero on contact."""
     import fcl
 
-    _place(one, here)
-    _place(other, there)
-    return max(0.0, float(fcl.distance(one, other, fcl.DistanceRequest(), fcl.DistanceResult())))
-
-
-def _least_distance(body: Body, poses: Array, mover: _Moving, times: Array, least: float) -> float:
-    """Least of `least` and the distances [m] at the poses (n, 3) and times (n,).
-
-    Where the last distance, less what both have moved since, is no smaller, none is computed.
-    """
-    others = mover.motion.at(times)
-    moved = _travel(poses, body.middle, body.reach)
-    moved += _travel(others, np.zeros(2), mover.reach)
-    bound = -math.inf
-    for here, there, way in zip(poses, others, moved, strict=True):
-        bound -= way
-        if bound >= least:
-            continue
-        bound = _distance(_standing(body), mover.object, here, there)
-        least = min(least, bound)
-    return least
-
-
-def _travel(poses: Array, middle: Array, reach: float) -> Array:
-    """How far (n,) any point of a disc can have moved since the pose before [m]."""
-    places = SE2(poses).act(middle)
-    ways = np.hypot(*np.diff(places, axis=0).T)
-    turns = 2.0 * reach * np.abs(np.sin(0.5 * np.diff(poses[:, 2])))
-    return np.concatenate([[0.0], ways + turns])
+    with _ONE_AT_A_TIME:
+        _place(one, here)
+        _place(other, there)
+        away = fcl.distance(one, other, fcl.DistanceRequest(), fcl.DistanceResult())
+    return max(0.0, float(away))

@@ -51,7 +51,8 @@ def rings_of(polygon: Any) -> list[Array]:
     """Corners (n, 2) of the outer ring of a valid polygon, then of its holes, none repeated."""
     import shapely
 
-    return [shapely.get_coordinates(ring)[:-1] for ring in (polygon.exterior, *polygon.interiors)]
+    rings = [shapely.get_coordinates(ring) for ring in (polygon.exterior, *polygon.interiors)]
+    return [ring[1:][(ring[1:] != ring[:-1]).any(axis=1)] for ring in rings]
 
 
 def _faces(ring: Array) -> list[Any]:

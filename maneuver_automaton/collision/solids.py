@@ -1,14 +1,16 @@
-"""Solids between two heights: what a mesh library needs to see an overlap in the plane.
+"""Solids for a library of meshes, which are skins: what it needs to see an overlap in the plane.
 
-Meshes are skins. A body stands from 0 to 1, an obstacle from 1/2 to 3/2, and each has the one lid
-that lies inside the other's heights: where two solids overlap in the plane, a wall crosses a wall
-or a lid, one inside the other included; where they do not, nothing touches.
+An obstacle is a sheet at height 1/2, and two posts on each of its parts, thin triangles up to 3/2.
+A body has walls from height 0 to 1, and a lid on top. If they overlap in the plane, then either
+the outline of the body meets the part, and a wall cuts the sheet; this includes a body inside an
+obstacle. Or the part lies inside the body, and its posts pierce the lid. If they do not overlap,
+nothing touches; and the distance of the skins is that in the plane.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,14 +18,28 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.outline import outlines, rings_of
 from maneuver_automaton.collision.rectangles import blocked_rectangles
-from maneuver_automaton.collision.shapes import AnyObstacle, Disc, OccupancyMap, Shape
+from maneuver_automaton.collision.shapes import (
+    AnyObstacle,
+    Box,
+    Disc,
+    OccupancyMap,
+    Polygon,
+    Shape,
+)
 from maneuver_automaton.groups import SE2
 
 POINT = 1e-9  # [m] half the side of the square that stands for a vehicle without a footprint
 
 
+class Region(NamedTuple):
+    """A part of the plane: triangles that cover it, and where posts stand, two on each part."""
+
+    cover: Array  # (n, 3, 2) [m]
+    posts: Array  # (m, 2, 2) from where to where [m]
+
+
 class Skin(NamedTuple):
-    """Triangles: walls, and one lid."""
+    """A mesh."""
 
     vertices: Array  # (n, 3) [m]
     triangles: IntArray  # (m, 3)
@@ -43,15 +59,13 @@ def body_pieces(footprint: tuple[Shape, ...], *, margin: float, excess: float) -
 
     Examples
     --------
-    >>> from maneuver_automaton.collision.shapes import Box
     >>> (square,) = body_pieces((Box([2.0, 2.0]),), margin=0.5, excess=1e-3)
     >>> bool(np.hypot(*(square - 1.0).T).min() > 0.49), square.max().round(2).item()
     (True, 1.5)
     """
     round_corners = circumscribed(np.zeros(2), margin, excess) if margin > 0.0 else np.zeros((1, 2))
     if not footprint:
-        point = POINT * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-        return (_grown(point, round_corners),)
+        return (_grown(Box([2.0 * POINT, 2.0 * POINT]).corners, round_corners),)
     pieces: list[Array] = []
     for shape in footprint:
         if isinstance(shape, Disc):
@@ -64,13 +78,16 @@ def body_pieces(footprint: tuple[Shape, ...], *, margin: float, excess: float) -
 def circumscribed(center: Array, radius: float, excess: float) -> Array:
     """Corners (n, 2) of a regular polygon around a disc, none further than `excess` [m] from it.
 
+    Of a huge disc, none further than a billionth of its radius.
+
     Examples
     --------
     >>> around = circumscribed(np.zeros(2), 1.0, 1e-3)
     >>> len(around), bool(np.hypot(*around.T).max() <= 1.0 + 1e-3)
     (71, True)
     """
-    corners = max(8, math.ceil(math.pi / math.acos(radius / (radius + excess))))
+    reach = radius + max(excess, 1e-9 * radius)
+    corners = max(8, math.ceil(math.pi / math.acos(radius / reach)))
     angle = 2.0 * math.pi / corners * np.arange(corners)
     reach = radius / math.cos(math.pi / corners)
     return center + reach * np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -80,41 +97,91 @@ def convex_hull(points: Array) -> Array:
     """Corners (m, 2) of the convex hull of points (n, 2) that are not all on one line."""
     import shapely
 
-    return shapely.get_coordinates(shapely.convex_hull(shapely.multipoints(points)))[:-1]
+    hull = shapely.convex_hull(shapely.multipoints(points))
+    return np.asarray(shapely.get_coordinates(hull)[:-1])
 
 
-def body_skin(pieces: Iterable[Array]) -> Skin:
-    """Skin of convex polygons, from height 0 to a lid at 1."""
-    return joined([_skin([piece], _fan(piece), 0.0, 1.0, lid=1.0) for piece in pieces])
+def obstacle_region(obstacle: AnyObstacle, *, excess: float) -> Region:
+    """The region of an obstacle in its own frame; a disc stands out by at most `excess` [m].
 
-
-def obstacle_skin(obstacle: AnyObstacle, *, excess: float) -> Skin:
-    """Skin of an obstacle in its own frame, from a lid at height 1/2 to 3/2.
-
-    A disc stands out by at most `excess` [m].
+    Raises
+    ------
+    ValueError
+        If a polygon has no area.
 
     Examples
     --------
-    >>> from maneuver_automaton.collision.shapes import Box, Obstacle
-    >>> skin = obstacle_skin(Obstacle(Box([1.0, 1.0])), excess=1e-3)
-    >>> skin.vertices.shape, skin.triangles.shape
-    ((22, 3), (10, 3))
+    >>> room = OccupancyMap([[1, 1, 1], [1, 0, 1], [1, 1, 1]], resolution=0.5)
+    >>> region = obstacle_region(room, excess=1e-3)
+    >>> len(region.cover), len(region.posts)
+    (8, 8)
     """
     if isinstance(obstacle, OccupancyMap):
-        return _map_skin(obstacle)
-    shape = obstacle.shape
-    if isinstance(shape, Disc):
-        ring = circumscribed(shape.center, shape.radius, excess)
-        return _obstacle_skin([ring], _fan(ring))
-    return joined([_obstacle_skin(rings_of(part), _lid(part)) for part in outlines(shape)])
+        return _region(_map_triangles(obstacle))
+    if isinstance(obstacle.shape, Disc):
+        disc = obstacle.shape
+        return _region(_fan(circumscribed(disc.center, disc.radius, excess))[None])
+    if isinstance(obstacle.shape, Box):
+        return _region(_fan(obstacle.shape.corners)[None])
+    parts = [_region(_triangles(part)[None]) for part in outlines(obstacle.shape)]
+    return Region(*map(np.concatenate, zip(*parts, strict=True)))
 
 
-def joined(skins: list[Skin]) -> Skin:
-    """Several skins as one."""
-    first = np.cumsum([0, *(len(skin.vertices) for skin in skins)])
-    shifted = [skin.triangles + n for skin, n in zip(skins, first, strict=False)]
-    vertices = np.concatenate([np.zeros((0, 3)), *(skin.vertices for skin in skins)])
-    return Skin(vertices, np.concatenate([np.zeros((0, 3), dtype=np.int64), *shifted]))
+def body_skin(pieces: Sequence[Array]) -> Skin:
+    """Walls and lid over convex polygons (n, 2).
+
+    Examples
+    --------
+    >>> skin = body_skin([Box([1.0, 1.0]).corners])
+    >>> skin.vertices.shape, skin.triangles.shape
+    ((8, 3), (10, 3))
+    """
+    vertices, triangles, first = [], [], 0
+    for ring in pieces:
+        n = len(ring)
+        i, j = np.arange(n), np.append(np.arange(1, n), 0)
+        k = np.arange(1, n - 1)
+        walls = [np.stack([i, j, j + n], 1), np.stack([i, j + n, i + n], 1)]
+        lid = np.stack([np.zeros_like(k), k, k + 1], 1) + n
+        vertices += [_raised(ring, 0.0), _raised(ring, 1.0)]
+        triangles += [first + np.concatenate([*walls, lid])]
+        first += 2 * n
+    return Skin(np.concatenate(vertices), np.concatenate(triangles))
+
+
+def obstacle_skin(regions: Sequence[Region]) -> tuple[Skin, IntArray]:
+    """Sheets and posts of regions, and which region each triangle belongs to.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.collision.shapes import Obstacle
+    >>> square = obstacle_region(Obstacle(Box([1.0, 1.0])), excess=1e-3)
+    >>> obstacle_skin([square, square])[1].tolist()
+    [0, 0, 1, 1, 0, 0, 1, 1]
+    """
+    cover = np.concatenate([region.cover for region in regions]).reshape(-1, 2)
+    posts = np.concatenate([region.posts for region in regions])
+    feet = _raised(posts.reshape(-1, 2), 0.5).reshape(-1, 2, 3)
+    tops = _raised(posts[:, 0], 1.5)[:, None]
+    vertices = np.concatenate(
+        [_raised(cover, 0.5), np.concatenate([feet, tops], axis=1).reshape(-1, 3)]
+    )
+    index = np.arange(len(regions))
+    owners = [
+        np.repeat(index, [len(region.cover) for region in regions]),
+        np.repeat(index, [len(region.posts) for region in regions]),
+    ]
+    return Skin(vertices, np.arange(len(vertices)).reshape(-1, 3)), np.concatenate(owners)
+
+
+def _raised(places: Array, height: float) -> Array:
+    return np.column_stack([places, np.full(len(places), height)])
+
+
+def _region(triangles: Array) -> Region:
+    """Connected parts (k, m, 3, 2) of m triangles each; no line holds both posts of one."""
+    posts = triangles[:, 0][:, [[0, 1], [1, 2]]]
+    return Region(triangles.reshape(-1, 3, 2), posts.reshape(-1, 2, 2))
 
 
 def _grown(part: Array, corners: Array) -> Array:
@@ -122,39 +189,27 @@ def _grown(part: Array, corners: Array) -> Array:
     return convex_hull((part[:, None] + corners).reshape(-1, 2))
 
 
-def _convex_parts(shape: Any) -> list[Array]:
+def _convex_parts(shape: Polygon | Box) -> list[Array]:
     """Convex polygons that together are a shape: itself, or triangles."""
     parts: list[Array] = []
     for polygon in outlines(shape):
-        hull = polygon.convex_hull
-        whole = not polygon.interiors and hull.area - polygon.area <= 1e-12 * hull.area
-        parts += rings_of(hull) if whole else list(_lid(polygon))
+        rings = rings_of(polygon)
+        parts += rings if _is_convex(rings) else list(_triangles(polygon))
     return parts
 
 
-def _obstacle_skin(rings: list[Array], lid: Array) -> Skin:
-    return _skin(rings, lid, 0.5, 1.5, lid=0.5)
+def _is_convex(rings: list[Array]) -> bool:
+    """Whether the rings of a valid polygon are one, which turns one way at every corner."""
+    if len(rings) > 1:
+        return False
+    edges = _after(rings[0]) - rings[0]
+    after = _after(edges)
+    turns = edges[:, 0] * after[:, 1] - edges[:, 1] * after[:, 0]
+    return bool((turns >= 0.0).all() or (turns <= 0.0).all())
 
 
-def _skin(rings: list[Array], cover: Array, low: float, high: float, *, lid: float) -> Skin:
-    """Walls over closed lines (n, 2), and triangles (m, 3, 2) at the height `lid`."""
-    begins = np.concatenate(rings)
-    ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
-    return _walls_and_lid(begins, ends, cover, low, high, lid)
-
-
-def _walls_and_lid(
-    begins: Array, ends: Array, cover: Array, low: float, high: float, lid: float
-) -> Skin:
-    n, m = len(begins), 3 * len(cover)
-    places = np.concatenate([begins, ends, begins, ends, cover.reshape(-1, 2)])
-    heights = np.repeat([low, high, lid], [2 * n, 2 * n, m])
-    i = np.arange(n)
-    walls = np.concatenate(
-        [np.stack([i, i + n, i + 3 * n], 1), np.stack([i, i + 3 * n, i + 2 * n], 1)]
-    )
-    lids = 4 * n + np.arange(m).reshape(-1, 3)
-    return Skin(np.column_stack([places, heights]), np.concatenate([walls, lids]))
+def _after(ring: Array) -> Array:
+    return np.concatenate([ring[1:], ring[:1]])
 
 
 def _fan(ring: Array) -> Array:
@@ -163,10 +218,13 @@ def _fan(ring: Array) -> Array:
     return np.stack([np.broadcast_to(ring[0], (n, 2)), ring[1:-1], ring[2:]], axis=1)
 
 
-def _lid(polygon: Any) -> Array:
+def _triangles(polygon: Any) -> Array:
     """Triangles (n, 3, 2) that cover a valid polygon."""
     import shapely
 
+    rings = rings_of(polygon)
+    if len(rings) == 1 and len(rings[0]) == 3:
+        return rings[0][None]
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
     missed = polygon.area - shapely.area(triangles).sum()
     if abs(missed) > 1e-9 * polygon.area:
@@ -174,33 +232,11 @@ def _lid(polygon: Any) -> Array:
             f"polygon: {missed:.3g} m^2 of {polygon.area:.3g} m^2 were lost in triangles; need "
             "corners further apart"
         )
-    return shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
+    return np.asarray(shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3])
 
 
-def _map_skin(one: OccupancyMap) -> Skin:
-    """Walls where blocked cells meet free ones, a lid of rectangles."""
-    boxes = blocked_rectangles(one.blocked)
-    across = _edges(one.blocked)  # rows are lines of the grid
-    along = _edges(one.blocked.T)
-    starts = np.concatenate([across[:, [1, 0]], along[:, [0, 1]]])
-    stops = np.concatenate([across[:, [2, 0]], along[:, [0, 2]]])
-    cover = boxes[:, [[0, 1], [2, 1], [2, 3], [0, 1], [2, 3], [0, 3]]].reshape(-1, 2)
-    cells = np.concatenate([starts, stops, cover]).astype(np.float64)
-    places = SE2(one.origin).act(one.resolution * cells)
-    n = len(starts)
-    return _walls_and_lid(
-        places[:n], places[n : 2 * n], places[2 * n :].reshape(-1, 3, 2), 0.5, 1.5, 0.5
-    )
-
-
-def _edges(blocked: Any) -> IntArray:
-    """Runs (n, 3) along the rows where blocked meets free: line, first cell, last cell + 1."""
-    rows, columns = blocked.shape
-    padded = np.zeros((rows + 2, columns + 2), dtype=np.int8)
-    padded[1:-1, 1:-1] = blocked
-    edge = np.zeros((rows + 1, columns + 2), dtype=np.int8)
-    edge[:, 1:-1] = padded[1:, 1:-1] != padded[:-1, 1:-1]
-    step = np.diff(edge, axis=1)
-    line, first = np.nonzero(step == 1)
-    _, last = np.nonzero(step == -1)
-    return np.stack([line, first, last], axis=1).astype(np.int64)
+def _map_triangles(one: OccupancyMap) -> Array:
+    """Rectangles of blocked cells (n, 2, 3, 2), two triangles each."""
+    boxes = blocked_rectangles(one.blocked).astype(np.float64)
+    corners = boxes[:, [[[0, 1], [2, 1], [2, 3]], [[0, 1], [2, 3], [0, 3]]]]
+    return SE2(one.origin).act(one.resolution * corners)

@@ -4,11 +4,11 @@ From the exact distance at one time, the time at which two bodies can touch at t
 there again, until they are closer than what counts as contact or the motion is over. Nothing is
 missed between, whatever turns, and what is reported is no further than that.
 
-Solids in (x, y, c t) are the other sound way. Where all move straight they are exact, and one
-query is cheaper. But the solid of what turns stands out by ``reach * turn / 2``, on the side of
-the obstacle too, where symmetry does not help: an error of 1 mm takes thousands of sections a
-second, or a new mesh for every slice of every query, each dearer than ten distances. And with time
-as third axis no heights are left that tell the inside of a skin.
+Solids in (x, y, c t) are the other sound way. Where all move straight they are exact, and a query
+takes 5 us. But the solid of what turns stands out by ``reach * turn / 2``, of the obstacle too,
+where no symmetry helps: 1 mm takes hundreds of sections a second, and to make one takes as long as
+three exact distances. Twenty obstacles with sixty poses each, none of them turning, took 0.2 s to
+build, here 10 ms. And with time as third axis no heights are left that tell a skin's inside.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision.shapes import Motion
@@ -30,39 +31,68 @@ class Rover(NamedTuple):
 
     start: Array  # (3,)
     twist: Twist
-    middle: Array  # (2,) of a disc around the body, in its frame [m]
+    middle: complex  # x + i y of the middle of a disc around the body, in its frame [m]
     reach: float  # [m] radius of that disc
+
+    @property
+    def velocity(self) -> complex:
+        """Velocity of the middle, in the frame of the body [m/s]."""
+        v_x, v_y, turn_rate = self.twist
+        return complex(v_x, v_y) + 1j * turn_rate * self.middle
 
     def at(self, time: float) -> Array:
         """Pose (3,) after `time` [s]."""
         return (SE2(self.start) @ SE2.exp(time * np.array(self.twist))).pose
 
+    def center(self, pose: Array) -> complex:
+        """Where the middle is at a pose (3,)."""
+        return complex(pose[0], pose[1]) + _direction(pose) * self.middle
+
 
 class Mover(NamedTuple):
-    """A body whose frame follows poses in time."""
+    """A body whose frame follows poses in time, linear between, still before and after."""
 
     knots: Array  # (n,) [s]
     poses: Array  # (n, 3)
     reach: float  # [m] no point is further from the frame's origin
+    speed: float  # [m/s] the frame's origin is never faster
+    turn_rate: float  # [rad/s] the frame never turns faster
 
     @classmethod
-    def of(cls, motion: Motion, reach: float, *, start_time: float) -> Mover:
-        """A motion whose clock is set to zero at `start_time` [s]."""
-        return cls(motion.time - start_time, motion.pose, reach)
+    def of(cls, motion: Motion, reach: float) -> Mover:
+        """What follows a motion and has no point further than `reach` [m] from its frame."""
+        rates = np.diff(motion.pose, axis=0) / np.diff(motion.time)[:, None]
+        speed = float(np.hypot(rates[:, 0], rates[:, 1]).max(initial=0.0))
+        return cls(
+            motion.time, motion.pose, reach, speed, float(np.abs(rates[:, 2]).max(initial=0))
+        )
 
-    def at(self, time: float) -> Array:
-        """Pose (3,) at `time` [s]."""
-        return np.array([np.interp(time, self.knots, self.poses[:, k]) for k in range(3)])
+    def from_time(self, time: float) -> Mover:
+        """The same, with the clock at zero at `time` [s]."""
+        return self._replace(knots=self.knots - time)
 
-    def rates(self, time: float) -> tuple[Array, float]:
-        """Velocity of the pose (3,) from `time` [s] on, and until when it lasts [s]."""
+    def at(self, time: ArrayLike) -> Array:
+        """Poses (..., 3) at `time` (...,) [s]."""
+        times = np.asarray(time, dtype=np.float64)
+        return np.stack([np.interp(times, self.knots, self.poses[:, k]) for k in range(3)], axis=-1)
+
+    def rates(self, time: float) -> tuple[complex, float, float]:
+        """Velocity [m/s], turn rate [rad/s] from `time` [s] on, and until when they last [s]."""
         k = int(np.searchsorted(self.knots, time, side="right"))
         if k == self.knots.size:
-            return np.zeros(3), math.inf
+            return 0j, 0.0, math.inf
         if k == 0:
-            return np.zeros(3), float(self.knots[0])
-        step = (self.poses[k] - self.poses[k - 1]) / (self.knots[k] - self.knots[k - 1])
-        return step, float(self.knots[k])
+            return 0j, 0.0, float(self.knots[0])
+        lasts = float(self.knots[k] - self.knots[k - 1])
+        x, y, turn = ((self.poses[k] - self.poses[k - 1]) / lasts).tolist()
+        return complex(x, y), turn, float(self.knots[k])
+
+
+def may_meet(rover: Rover, mover: Mover, *, duration: float, center: complex) -> bool:
+    """False where both are too far and too slow; `center` is the rover's after half the time."""
+    x, y = (float(np.interp(0.5 * duration, mover.knots, mover.poses[:, k])) for k in range(2))
+    way = 0.5 * duration * (abs(rover.velocity) + mover.speed)
+    return abs(center - complex(x, y)) <= way + rover.reach + mover.reach
 
 
 def meet(
@@ -83,8 +113,8 @@ def meet(
 
     Examples
     --------
-    >>> still = Rover(np.zeros(3), (0.0, 0.0, 0.0), np.zeros(2), 0.5)
-    >>> crossing = Mover(np.array([0.0, 4.0]), np.array([[-4.0, 0, 0], [4.0, 0, 0]]), 0.5)
+    >>> still = Rover(np.zeros(3), (0.0, 0.0, 0.0), 0j, 0.5)
+    >>> crossing = Mover.of(Motion([0.0, 4.0], [[-4.0, 0, 0], [4.0, 0, 0]]), 0.5)
     >>> def gap(one, other):
     ...     return max(0.0, math.hypot(*(one - other)[:2]) - 1.0)
     >>> meet(still, crossing, duration=1.0, distance=gap, contact=1e-3)
@@ -92,25 +122,28 @@ def meet(
     >>> meet(still, crossing, duration=2.0, distance=gap, contact=1e-3)
     True
     """
-    v_x, v_y, turn_rate = rover.twist
-    middle_twist = complex(v_x, v_y) + 1j * turn_rate * complex(*rover.middle)
-    bend = abs(middle_twist) * abs(turn_rate)
+    turning = abs(rover.twist[2]) * rover.reach
+    bend = abs(rover.velocity) * abs(rover.twist[2])
+    fastest = abs(rover.velocity) + mover.speed + turning + mover.turn_rate * mover.reach
     near = 0.5 * (rover.reach + mover.reach)
     time = 0.0
     while True:
         here, there = rover.at(time), mover.at(time)
-        turned = complex(math.cos(here[2]), math.sin(here[2]))
-        center = complex(here[0], here[1]) + turned * complex(*rover.middle)
-        gap = abs(center - complex(there[0], there[1])) - rover.reach - mover.reach
+        gap = abs(rover.center(here) - complex(there[0], there[1])) - rover.reach - mover.reach
         if gap <= near:
             gap = distance(here, there)
             if gap <= contact:
                 return True
-        if time >= duration:
-            return False
-        rates, until = mover.rates(time)
-        closing = abs(turned * middle_twist - complex(rates[0], rates[1]))
-        closing += abs(turn_rate) * rover.reach + abs(rates[2]) * mover.reach
+        velocity, turn_rate, until = mover.rates(time)
+        closing = abs(_direction(here) * rover.velocity - velocity)
+        closing += turning + abs(turn_rate) * mover.reach
         speed = closing + math.sqrt(closing * closing + 2.0 * bend * gap)
-        step = 2.0 * gap / speed if speed > 0.0 else math.inf
-        time = min(time + step, until, duration)
+        same_rates = min(time + 2.0 * gap / speed, until) if speed > 0.0 else until
+        after = max(same_rates, time + gap / fastest) if fastest > 0.0 else math.inf
+        if after > duration or time >= duration:
+            return False
+        time = after
+
+
+def _direction(pose: Array) -> complex:
+    return complex(math.cos(pose[2]), math.sin(pose[2]))

@@ -136,6 +136,11 @@ def halves(parts: Windows) -> Windows:
     return Windows(parts.level + 1, begins.reshape(-1))
 
 
+def along(start: Array, twist: Twist, times: Array) -> Array:
+    """Poses (n, 3) of a coast after `times` (n,) [s]."""
+    return (SE2(start) @ SE2.exp(np.multiply.outer(times, twist))).pose
+
+
 def fastest(body: Body, twist: Twist) -> float:
     """Speed [m/s] no point of the body exceeds."""
     corners = np.concatenate(body.pieces)

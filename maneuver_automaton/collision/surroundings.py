@@ -1,0 +1,227 @@
+"""Obstacles as shapely sees them: exact distances, and nothing of what the search uses.
+
+Polygons keep their holes, a disc is a point and a radius, an occupancy map its runs of cells.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.collision.outline import outlines
+from maneuver_automaton.collision.shapes import (
+    AnyObstacle,
+    Disc,
+    Motion,
+    OccupancyMap,
+    Shape,
+)
+from maneuver_automaton.groups import SE2
+
+
+class Part(NamedTuple):
+    """A shapely polygon, or a point with a radius."""
+
+    core: Any
+    radius: float  # [m]
+    middle: Array  # (2,) of a disc around it [m]
+    reach: float  # [m] radius of that disc
+
+    def at(self, poses: Array) -> Any:
+        """The core at poses (n, 3): shapely geometries (n,)."""
+        import shapely
+
+        frame = SE2(poses[:, None])
+        if self.core.geom_type == "Point":
+            return shapely.points(frame.act(self.middle)[:, 0])
+        shells, *holes = (
+            shapely.linearrings(frame.act(shapely.get_coordinates(ring)))
+            for ring in (self.core.exterior, *self.core.interiors)
+        )
+        return shapely.polygons(shells, holes=np.stack(holes, axis=1) if holes else None)
+
+
+class Nearest(NamedTuple):
+    """For each pose the nearest obstacle."""
+
+    distance: Array  # (n,) [m], zero on contact, inf without obstacles
+    owner: IntArray  # (n,) its index, -1 without
+
+
+class _Single(NamedTuple):
+    """What the tree does not hold: a disc, or a part of an obstacle that moves."""
+
+    part: Part
+    motion: Motion
+    owner: int
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Surroundings:
+    """Obstacles counted from an origin, prepared once for any number of plans.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.collision import Obstacle
+    >>> pillar = Obstacle(Disc(0.5, center=[3.0, 0.0]))
+    >>> around = surroundings_of((pillar,), (0.0, 0.0))
+    >>> around.nearest(parts_of((Disc(1.0),)), np.zeros((1, 3)), np.zeros(1)).distance.tolist()
+    [1.5]
+    """
+
+    tree: Any  # of the polygons that stand still
+    owners: IntArray  # which obstacle each belongs to
+    singles: tuple[_Single, ...]
+    speed: float  # [m/s] no point of an obstacle is faster
+
+    def nearest(self, body: Sequence[Part], poses: Array, times: Array) -> Nearest:
+        """What is nearest to a body at poses (n, 3) and times (n,) [s]."""
+        best = Nearest(np.full(len(poses), math.inf), np.full(len(poses), -1))
+        for part in body:
+            if len(self.owners):
+                best = _nearer(best, self._nearest_in_tree(part, poses))
+            if self.singles:
+                best = self._nearest_single(part, poses, times, best)
+        return best
+
+    def _nearest_in_tree(self, part: Part, poses: Array) -> Nearest:
+        (_, which), away = self.tree.query_nearest(
+            part.at(poses), return_distance=True, all_matches=False
+        )
+        return Nearest(np.maximum(away - part.radius, 0.0), self.owners[which])
+
+    def _nearest_single(self, part: Part, poses: Array, times: Array, best: Nearest) -> Nearest:
+        """Measured only where discs around both do not say that another is nearer."""
+        import shapely
+
+        cores, centers = part.at(poses), SE2(poses).act(part.middle)
+        frames = [single.motion.at(times) for single in self.singles]
+        ways = [
+            np.hypot(*(SE2(frame).act(single.part.middle) - centers).T)
+            for single, frame in zip(self.singles, frames, strict=True)
+        ]
+        reaches = np.array([part.reach + single.part.reach for single in self.singles])
+        limit = np.minimum(best.distance, (np.array(ways).T + reaches).min(axis=1))
+        for single, frame, way, reach in zip(self.singles, frames, ways, reaches, strict=True):
+            rows = np.flatnonzero(way - reach <= np.minimum(limit, best.distance))
+            away = np.full(len(poses), math.inf)
+            apart = shapely.distance(cores[rows], single.part.at(frame[rows]))
+            away[rows] = np.maximum(apart - part.radius - single.part.radius, 0.0)
+            best = _nearer(best, Nearest(away, np.full(len(poses), single.owner)))
+        return best
+
+
+@functools.lru_cache(maxsize=4)
+def surroundings_of(
+    obstacles: tuple[AnyObstacle, ...], origin: tuple[float, float]
+) -> Surroundings:
+    """Obstacles counted from an origin [m].
+
+    Raises
+    ------
+    ValueError
+        If a polygon has no area.
+    """
+    import shapely
+
+    to_origin = SE2(np.array([-origin[0], -origin[1], 0.0]))
+    cores: list[Any] = []
+    owners: list[int] = []
+    singles: list[_Single] = []
+    for index, far in enumerate(obstacles):
+        obstacle = far.moved(to_origin)
+        if isinstance(obstacle, OccupancyMap):
+            cores += (runs := runs_of(obstacle))
+            owners += [index] * len(runs)
+            continue
+        for part in parts_of((obstacle.shape,)):
+            if obstacle.motion is None and not part.radius:
+                cores.append(part.core)
+                owners.append(index)
+            else:
+                singles.append(_Single(part, obstacle.motion or _STILL, index))
+    return Surroundings(
+        tree=shapely.STRtree(cores),
+        owners=np.array(owners, dtype=np.int64),
+        singles=tuple(singles),
+        speed=max((_speed(single) for single in singles), default=0.0),
+    )
+
+
+def parts_of(shapes: tuple[Shape, ...]) -> list[Part]:
+    """Shapes as shapely knows them; a point if there is none.
+
+    Examples
+    --------
+    >>> (point,) = parts_of(())
+    >>> point.core.wkt, point.radius
+    ('POINT (0 0)', 0.0)
+    """
+    import shapely
+
+    if not shapes:
+        return [Part(shapely.Point(0.0, 0.0), 0.0, np.zeros(2), 0.0)]
+    parts: list[Part] = []
+    for shape in shapes:
+        if isinstance(shape, Disc):
+            core = shapely.Point(shape.center)
+            parts.append(Part(core, shape.radius, shape.center, shape.radius))
+            continue
+        for polygon in outlines(shape):
+            low, high = np.array(polygon.bounds).reshape(2, 2)
+            reach = 0.5 * float(np.hypot(*(high - low)))
+            parts.append(Part(polygon, 0.0, 0.5 * (low + high), reach))
+    return parts
+
+
+def fastest_point(body: Sequence[Part], twists: Array) -> Array:
+    """Speeds (n,) [m/s] no point of a body exceeds at twists (n, 3).
+
+    Examples
+    --------
+    >>> fastest_point(parts_of((Disc(0.5),)), np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 2.0]])).tolist()
+    [1.0, 1.0]
+    """
+    v_x, v_y, turn_rate = twists.T
+    speeds = [
+        np.hypot(v_x - turn_rate * part.middle[1], v_y + turn_rate * part.middle[0])
+        + np.abs(turn_rate) * part.reach
+        for part in body
+    ]
+    return np.asarray(np.max(speeds, axis=0))
+
+
+_STILL = Motion([0.0], [[0.0, 0.0, 0.0]])
+
+
+def _nearer(one: Nearest, other: Nearest) -> Nearest:
+    closer = other.distance < one.distance
+    return Nearest(
+        np.where(closer, other.distance, one.distance), np.where(closer, other.owner, one.owner)
+    )
+
+
+def runs_of(one: OccupancyMap) -> list[Any]:
+    """Blocked cells of a map, those next to each other in a row as one polygon."""
+    import shapely
+
+    step = np.diff(one.blocked.astype(np.int8), axis=1, prepend=0, append=0)
+    row, low = np.nonzero(step == 1)
+    _, high = np.nonzero(step == -1)
+    cells = np.array([[low, row], [high, row], [high, row + 1], [low, row + 1]], dtype=np.float64)
+    corners = SE2(one.origin).act(one.resolution * np.moveaxis(cells, -1, 0))
+    return list(shapely.polygons(corners))
+
+
+def _speed(single: _Single) -> float:
+    if single.motion.time.size < 2:
+        return 0.0
+    rates = np.diff(single.motion.pose, axis=0) / np.diff(single.motion.time)[:, None]
+    reach = float(np.hypot(*single.part.middle)) + single.part.reach
+    return float((np.hypot(rates[:, 0], rates[:, 1]) + reach * np.abs(rates[:, 2])).max())

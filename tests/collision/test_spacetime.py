@@ -1,0 +1,100 @@
+"""Moving obstacles: nothing is missed between two times, and what is met is near."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from maneuver_automaton.collision import Motion
+from maneuver_automaton.collision.spacetime import Mover, Rover, may_meet, meet
+
+speeds = st.floats(-3.0, 3.0) | st.just(0.0)
+places = st.floats(-5.0, 5.0)
+
+
+def offset_disc(pose, aside):
+    """Where a disc off the frame's origin is."""
+    turn = pose[..., 2]
+    return pose[..., :2] + aside * np.stack([-np.sin(turn), np.cos(turn)], axis=-1)
+
+
+def gap(here, there):
+    """Distance of two discs of radius 0.3, one a metre beside the origin of its frame."""
+    apart = offset_disc(np.asarray(there), 1.0) - np.asarray(here)[..., :2]
+    return np.maximum(np.hypot(apart[..., 0], apart[..., 1]) - 0.6, 0.0)
+
+
+@given(
+    start=st.tuples(places, places, st.floats(-7, 7)),
+    twist=st.tuples(speeds, speeds, speeds),
+    knots=st.lists(st.tuples(places, places, st.floats(-9, 9)), min_size=1, max_size=4),
+    begin=st.floats(-2.0, 2.0),
+    duration=st.floats(0.0, 4.0),
+)
+def test_against_dense_times(start, twist, knots, begin, duration):
+    motion = Motion(begin + np.arange(len(knots)) * 0.8, knots)
+    rover, mover = Rover(np.array(start), twist, 0j, 0.3), Mover.of(motion, 1.3)
+    times = np.linspace(0.0, duration, 400)
+    gaps = gap(np.array([rover.at(time) for time in times]), mover.at(times))
+    found = meet(
+        rover, mover, duration=duration, distance=lambda a, b: float(gap(a, b)), contact=1e-3
+    )
+    rate = math.hypot(*twist[:2]) + mover.speed + mover.turn_rate * 1.3
+    if found:
+        assert gaps.min() <= 1e-3 + rate * duration / 399 / 2 + 1e-12
+        center = rover.center(rover.at(0.5 * duration))
+        assert may_meet(rover, mover, duration=duration, center=center)
+    else:
+        assert gaps.min() > 0.0
+
+
+def test_rates_by_hand():
+    mover = Mover.of(Motion([1.0, 3.0, 4.0], [[0, 0, 0], [4, 2, 1], [4, 2, 7]]), 1.0)
+    assert mover.rates(0.0) == (0j, 0.0, 1.0)
+    assert mover.rates(1.0) == (2 + 1j, 0.5, 3.0)
+    assert mover.rates(3.5) == (0j, 6.0, 4.0)
+    assert mover.rates(4.0) == (0j, 0.0, math.inf)
+    assert mover.speed == pytest.approx(math.sqrt(5.0))
+    assert mover.turn_rate == 6.0
+    assert mover.from_time(1.0).at(1.0).tolist() == [2.0, 1.0, 0.5]
+    assert mover.at([-9.0, 9.0]).tolist() == [[0.0, 0.0, 0.0], [4.0, 2.0, 7.0]]
+
+
+def test_a_convoy_takes_few_steps():
+    asked = []
+
+    def distance(here, there):
+        asked.append(1)
+        return abs(here[0] - there[0]) - 1.0
+
+    rover = Rover(np.zeros(3), (10.0, 0.0, 0.0), 0j, 0.5)
+    times = np.arange(100.0)
+    road = Motion(times, np.column_stack([1.01 + 10.0 * times, 0 * times, 0 * times]))
+    ahead = Mover.of(road, 0.5)
+    assert not meet(rover, ahead, duration=99.0, distance=distance, contact=1e-3)
+    assert len(asked) <= 100  # one for each stretch of the road
+
+
+def test_what_never_moves_is_asked_once():
+    asked = []
+
+    def distance(here, there):
+        asked.append(1)
+        return 0.5
+
+    still = Rover(np.zeros(3), (0.0, 0.0, 0.0), 0j, 1.0)
+    parked = Mover.of(Motion([0.0], [[2.0, 0.0, 0.0]]), 1.0)
+    assert not meet(still, parked, duration=1e9, distance=distance, contact=1e-3)
+    assert len(asked) == 1
+
+
+def test_far_and_slow_cannot_meet():
+    rover = Rover(np.zeros(3), (1.0, 0.0, 0.0), 0j, 1.0)
+    parked = Mover.of(Motion([0.0], [[20.0, 0.0, 0.0]]), 1.0)
+    for duration, possible in ((10.0, False), (19.0, True)):
+        center = rover.center(rover.at(0.5 * duration))
+        assert may_meet(rover, parked, duration=duration, center=center) is possible
