@@ -210,7 +210,10 @@ class TestFolder:
     def test_nothing_in_it(self, folder, capsys):
         Path("none").mkdir()
         assert run(["plan", "none"]) == 2
-        message = "none: holds no scenario, need a file ending in .yaml or .yml\n"
+        message = (
+            "none: holds no file that states a problem, need a scenario (.yaml, .yml) or another "
+            "format that is read\n"
+        )
         assert capsys.readouterr().err == message
 
     def test_two_files_of_one_name(self, folder, capsys):
@@ -230,20 +233,20 @@ class TestFolder:
         (["plan", "x.yaml", "--time-limit", "nan"],
          "--time-limit: got nan, need a positive number of seconds"),
         (["plan", "x.yaml", "--with", "x.yaml"],
-         "--with: serves formats that state a part of a problem; this version reads none, only "
-         "scenario files, which state all of it"),
+         "--with: serves formats that state a part of a problem, but x.yaml is a scenario, which "
+         "states all of it"),
         (["plan", "x.yaml", "--case", "1"],
-         "--case: serves files with several problems; this version reads none, only scenario "
-         "files, which hold one"),
-        (["plan", "case.csv"],
-         "case.csv: TPCAP files are not read in this version, only scenario files (.yaml, .yml)"),
+         "--case: got 1, but x.yaml holds one problem, need 0 or no case"),
+        (["plan", "case.csv"], "case.csv: no such file"),
+        (["plan", "road.xml"], "road.xml: CommonRoad files are not read in this version"),
         (["mpc", "x.yaml", "--steps", "3", "--seed", "1"],
          "x.yaml: receding_horizon: missing, need {step_s: ...}, the time between two plans"),
         (["plan", "x.yaml", "--out", "x.yaml"], "x.yaml: cannot be written: File exists"),
         (["convert", "x.yaml", "x.csv"],
-         "x.csv: TPCAP files are not read in this version, only scenario files (.yaml, .yml)"),
-        (["convert", "x.yaml", "x.txt"],
-         "x.txt: is in no format that this version writes, need a scenario file (.yaml, .yml)"),
+         "x.csv: is in no format that this version writes, need a scenario or a Nav2 map (.yaml, "
+         ".yml) or a MovingAI map (.map)"),
+        (["convert", "x.yaml", "x.map"],
+         "x.yaml: states no occupancy map, or several; need one"),
         (["plot", "plan.json"], "plan.json: no such file"),
         (["check", "nowhere.yaml"], "nowhere.yaml: no such file"),
         (["automaton", "show", "nowhere.json"], "nowhere.json: no such file"),

@@ -243,7 +243,8 @@ class TestFolder:
         Path("none").mkdir()
         assert run(["mpc", "none"]) == 2
         assert capsys.readouterr().err == (
-            "none: holds no scenario, need a file ending in .yaml or .yml\n"
+            "none: holds no file that states a problem, need a scenario (.yaml, .yml) or another "
+            "format that is read\n"
         )
 
     def test_two_files_of_one_name(self, folder, capsys):

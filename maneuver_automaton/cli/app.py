@@ -10,7 +10,6 @@ from typing import Annotated, NoReturn
 import typer
 
 from maneuver_automaton.cli.guard import exits
-from maneuver_automaton.errors import InvalidScenario
 
 # Importing libraries makes a million objects and no garbage: look for it less often than usual.
 COLLECT_EVERY = 100_000  # objects
@@ -27,7 +26,7 @@ automaton_app = typer.Typer(
 )
 app.add_typer(automaton_app, name="automaton")
 
-File = Annotated[Path, typer.Argument(metavar="FILE", help="Scenario file (YAML).")]
+File = Annotated[Path, typer.Argument(metavar="FILE", help="Scenario (YAML), or another format.")]
 Library = Annotated[Path, typer.Argument(metavar="FILE", help="Scenario or library file.")]
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")]
 TimeLimit = Annotated[
@@ -46,12 +45,12 @@ Jobs = Annotated[int, typer.Option("--jobs", min=1, metavar="N", help="Files pla
 With = Annotated[
     Path | None,
     typer.Option(
-        "--with", metavar="FILE", help="Scenario for what FILE leaves out (not in this version)."
+        "--with", metavar="FILE", help="Scenario for what FILE leaves out, such as the vehicle."
     ),
 ]
 Case = Annotated[
     int | None,
-    typer.Option("--case", min=0, metavar="N", help="Which problem of FILE (not in this version)."),
+    typer.Option("--case", min=0, metavar="N", help="Which problem of FILE, from 0."),
 ]
 
 
@@ -75,19 +74,6 @@ def main() -> NoReturn:
     sys.exit(code)
 
 
-def _refuse_parts(with_file: Path | None, case: int | None) -> None:
-    if with_file is not None:
-        raise InvalidScenario(
-            "--with: serves formats that state a part of a problem; this version reads "
-            "none, only scenario files, which state all of it"
-        )
-    if case is not None:
-        raise InvalidScenario(
-            "--case: serves files with several problems; this version reads none, only "
-            "scenario files, which hold one"
-        )
-
-
 @app.command()
 @exits
 def plan(
@@ -102,10 +88,10 @@ def plan(
     with_file: With = None,
     case: Case = None,
 ) -> int:
-    """Plan a scenario, or every scenario of a folder."""
+    """Plan the problem of a file, or of every file of a folder."""
     from maneuver_automaton.cli import plan_command
+    from maneuver_automaton.cli.inputs import Parts
 
-    _refuse_parts(with_file, case)
     settings = plan_command.Settings(
         time_limit=time_limit,
         alternatives=alternatives,
@@ -113,9 +99,10 @@ def plan(
         animate=animate,
         quiet=quiet,
     )
+    parts = Parts(beside=with_file, case=case)
     if file.is_dir():
-        return plan_command.plan_folder(file, out, settings=settings, jobs=jobs)
-    return plan_command.plan_file(file, out, settings=settings)
+        return plan_command.plan_folder(file, out, settings=settings, parts=parts, jobs=jobs)
+    return plan_command.plan_file(file, out, settings=settings, parts=parts)
 
 
 @app.command()
@@ -158,8 +145,8 @@ def mpc(
 ) -> int:
     """Drive a scenario in closed loop: plan, drive a step, plan again."""
     from maneuver_automaton.cli import mpc_command, plan_command
+    from maneuver_automaton.cli.inputs import Parts
 
-    _refuse_parts(with_file, case)
     plan_command.Settings(time_limit=time_limit, alternatives=alternatives)  # checked alike
     settings = mpc_command.Settings(
         steps=steps,
@@ -173,18 +160,20 @@ def mpc(
         animate=animate,
         quiet=quiet,
     )
+    parts = Parts(beside=with_file, case=case)
     if file.is_dir():
-        return mpc_command.drive_folder(file, out, settings=settings)
-    return mpc_command.drive_file(file, out, settings=settings)
+        return mpc_command.drive_folder(file, out, settings=settings, parts=parts)
+    return mpc_command.drive_file(file, out, settings=settings, parts=parts)
 
 
 @app.command()
 @exits
-def check(file: File) -> int:
+def check(file: File, with_file: With = None, case: Case = None) -> int:
     """Report symmetry, consistency and feasibility, without a plan."""
     from maneuver_automaton.cli import check_command
+    from maneuver_automaton.cli.inputs import Parts
 
-    return check_command.check_file(file)
+    return check_command.check_file(file, parts=Parts(beside=with_file, case=case))
 
 
 @automaton_app.command("build")
@@ -225,14 +214,18 @@ def automaton_draw(file: Library, out: Out = Path("out")) -> int:
 def convert(
     source: Annotated[Path, typer.Argument(metavar="IN")],
     target: Annotated[Path, typer.Argument(metavar="OUT")],
+    with_file: With = None,
+    case: Case = None,
 ) -> int:
-    """Write a scenario again, with its trims listed.
+    """Write a problem as a scenario, its trims listed, or a map in another format.
 
-    In this version both files are scenarios, YAML.
+    OUT ends in .yaml or .yml, or, for a map, in .map (MovingAI). A map without --with becomes
+    a Nav2 map: OUT and an image beside it.
     """
     from maneuver_automaton.cli import convert_command
+    from maneuver_automaton.cli.inputs import Parts
 
-    return convert_command.convert(source, target)
+    return convert_command.convert(source, target, parts=Parts(beside=with_file, case=case))
 
 
 @app.command()

@@ -18,7 +18,7 @@ from maneuver_automaton.automaton.validation import validate
 from maneuver_automaton.cli.automaton_command import few, report_lines
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN
-from maneuver_automaton.cli.inputs import scenario_of
+from maneuver_automaton.cli.inputs import Parts, scenario_of
 from maneuver_automaton.cli.tables import console, table
 from maneuver_automaton.models import Model, rollout, vector_field
 from maneuver_automaton.planning import PlanStatus
@@ -39,9 +39,9 @@ class Finding:
     words: str
 
 
-def check_file(path: Path) -> int:
-    """Print the report of a scenario, and return the exit code."""
-    scenario = scenario_of(path)
+def check_file(path: Path, *, parts: Parts) -> int:
+    """Print the report of a problem, and return the exit code."""
+    scenario = scenario_of(path, parts)
     problem = scenario.problem
     findings = [
         *_symmetry(problem),

@@ -4,44 +4,93 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.cli.guard import FOUND
-from maneuver_automaton.cli.inputs import (
-    SCENARIO_ENDINGS,
-    make_folder,
-    not_written,
-    refuse_other_format,
-    scenario_of,
-)
+from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, scenario_of
+from maneuver_automaton.collision import AnyObstacle, OccupancyMap
 from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.movingai import save_movingai_map
+from maneuver_automaton.formats.nav2_map import save_nav2_map
+from maneuver_automaton.formats.recognition import YAML_ENDINGS
+from maneuver_automaton.formats.statement import MapFile
+from maneuver_automaton.scenario import Scenario, statements_of, to_yaml
 
+MAP_ENDINGS = (".map",)
 PICTURE_ENDINGS = (".png", ".pdf", ".svg")
 ANIMATION_ENDINGS = (".gif",)
 
 
-def convert(source: Path, target: Path) -> int:
-    """Write a scenario again, its trims listed."""
-    from maneuver_automaton.scenario import to_yaml
-
-    refuse_other_format(source)
-    refuse_other_format(target)
-    if target.suffix.lower() not in SCENARIO_ENDINGS:
+def convert(source: Path, target: Path, *, parts: Parts) -> int:
+    """Write a problem as a scenario, or a map alone in another format."""
+    ending = target.suffix.lower()
+    if ending not in YAML_ENDINGS + MAP_ENDINGS:
         raise InvalidScenario(
-            f"{target}: is in no format that this version writes, need a scenario file "
-            f"({', '.join(SCENARIO_ENDINGS)})"
+            f"{target}: is in no format that this version writes, need a scenario or a Nav2 map "
+            f"({', '.join(YAML_ENDINGS)}) or a MovingAI map ({', '.join(MAP_ENDINGS)})"
         )
     try:
-        text = to_yaml(scenario_of(source))
+        if ending in MAP_ENDINGS:
+            cells = _only_map(source, parts)
+            make_folder(target.parent)
+            save_movingai_map(cells, target)
+        elif parts == Parts() and (plain := _plain_map(source)) is not None:
+            make_folder(target.parent)
+            save_nav2_map(plain, target)
+        else:
+            _write_scenario(scenario_of(source, parts), source, target)
+    except OSError as error:
+        raise not_written(Path(error.filename or target), error) from error
+    return FOUND
+
+
+def _plain_map(source: Path) -> OccupancyMap | None:
+    """The map of a file that states a map, and neither vehicle nor several problems."""
+    statements = statements_of(source)
+    if statements is None or len(statements) > 1 or statements[0].vehicle is not None:
+        return None
+    return _one_map(statements[0].obstacles)
+
+
+def _only_map(source: Path, parts: Parts) -> OccupancyMap:
+    """The one map of a file, which may be among other obstacles."""
+    statements = statements_of(source)
+    obstacles = (
+        scenario_of(source, parts).problem.obstacles
+        if statements is None
+        else statements[0].obstacles
+    )
+    cells = _one_map(obstacles)
+    if cells is None:
+        raise InvalidScenario(f"{source}: states no occupancy map, or several; need one")
+    return cells
+
+
+def _one_map(obstacles: tuple[AnyObstacle, ...]) -> OccupancyMap | None:
+    maps = [obstacle for obstacle in obstacles if isinstance(obstacle, OccupancyMap)]
+    return maps[0] if len(maps) == 1 else None
+
+
+def _write_scenario(scenario: Scenario, source: Path, target: Path) -> None:
+    """Write a scenario; a map that no Nav2 file states is written beside it, as one."""
+    known = [file.map for file in scenario.maps]
+    path = target.with_name(f"{target.stem}_map.yaml")
+    new = [
+        MapFile(map=obstacle, path=path)
+        for obstacle in scenario.problem.obstacles
+        if isinstance(obstacle, OccupancyMap) and not any(obstacle is cells for cells in known)
+    ]
+    try:
+        stated = replace(scenario, maps=(*scenario.maps, *new))
+        text = to_yaml(stated, folder=target.parent)
     except ValueError as error:
         raise InvalidScenario(f"{source}: {str(error).removeprefix(f'{source}: ')}") from error
     make_folder(target.parent)
-    try:
-        write_text_atomically(target, text)
-    except OSError as error:
-        raise not_written(target, error) from error
-    return FOUND
+    for file in new:
+        save_nav2_map(file.map, file.path)
+    write_text_atomically(target, text)
 
 
 def plot(file: Path, out: Path | None, *, animate: bool) -> int:

@@ -1,7 +1,8 @@
-"""Files named on the command line: which format they are in, and where results go."""
+"""Files named on the command line: what to load of them, and where results go."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,39 +12,21 @@ if TYPE_CHECKING:
     from maneuver_automaton.automaton import Automaton
     from maneuver_automaton.scenario import Scenario
 
-SCENARIO_ENDINGS = (".yaml", ".yml")
-OTHER_ENDINGS = {
-    ".csv": "TPCAP",
-    ".xml": "CommonRoad",
-    ".mprim": "SBPL",
-    ".cfg": "SBPL",
-    ".env": "SBPL",
-    ".map": "MovingAI",
-    ".scen": "MovingAI",
-}
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parts:
+    """The options --with and --case: what completes a file that states a part of a problem."""
+
+    beside: Path | None = None
+    case: int | None = None
 
 
-def scenario_of(path: Path) -> Scenario:
-    """The scenario of a file; InvalidScenario if its ending is that of another format."""
+def scenario_of(path: Path, parts: Parts | None = None) -> Scenario:
+    """The problem of a file, completed by `parts`."""
     from maneuver_automaton.scenario import load_scenario
 
-    refuse_other_format(path)
-    return load_scenario(path)
-
-
-def scenarios_in(folder: Path) -> list[Path]:
-    """Every scenario of a folder; InvalidScenario if there is none, or two have one name."""
-    paths = sorted(path for path in folder.iterdir() if path.suffix in SCENARIO_ENDINGS)
-    if not paths:
-        raise InvalidScenario(f"{folder}: holds no scenario, need a file ending in .yaml or .yml")
-    seen: dict[str, Path] = {}
-    for path in paths:
-        if path.stem in seen:
-            raise InvalidScenario(
-                f"{path}: has the same name as {seen[path.stem].name}, need another one"
-            )
-        seen[path.stem] = path
-    return paths
+    parts = parts or Parts()
+    return load_scenario(path, beside=parts.beside, case=parts.case)
 
 
 def automaton_of(path: Path) -> Automaton:
@@ -51,15 +34,6 @@ def automaton_of(path: Path) -> Automaton:
     from maneuver_automaton.automaton.library import load_library
 
     return load_library(path) if path.suffix == ".json" else scenario_of(path).problem.automaton
-
-
-def refuse_other_format(path: Path) -> None:
-    """Say which format a file is in, if it is one that this version does not read."""
-    if known := OTHER_ENDINGS.get(path.suffix.lower()):
-        raise InvalidScenario(
-            f"{path}: {known} files are not read in this version, only scenario files "
-            f"({', '.join(SCENARIO_ENDINGS)})"
-        )
 
 
 def target(out: Path, name: str) -> Path:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
-from maneuver_automaton.cli.inputs import make_folder, not_written, scenario_of, scenarios_in
+from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, scenario_of
 from maneuver_automaton.cli.progress import progress_bar
 from maneuver_automaton.errors import InvalidScenario
 
@@ -37,9 +37,9 @@ class Settings:
     quiet: bool = False
 
 
-def drive_file(path: Path, out: Path, *, settings: Settings) -> int:
-    """Close the loop of one scenario into the folder `out`, print it, return the exit code."""
-    scenario = scenario_of(path)
+def drive_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> int:
+    """Close the loop of one problem into the folder `out`, print it, return the exit code."""
+    scenario = scenario_of(path, parts)
     if scenario.receding_horizon is None:
         raise InvalidScenario(
             f"{path}: receding_horizon: missing, need {{step_s: ...}}, the time between two plans"
@@ -65,16 +65,17 @@ def drive_file(path: Path, out: Path, *, settings: Settings) -> int:
     return FOUND if loop.reached else NO_PLAN
 
 
-def drive_folder(folder: Path, out: Path, *, settings: Settings) -> int:
-    """Close the loop of every scenario of a folder that has one, each into `out`/STEM."""
+def drive_folder(folder: Path, out: Path, *, settings: Settings, parts: Parts) -> int:
+    """Close the loop of every problem of a folder that has one, each into `out`/STEM."""
+    from maneuver_automaton.cli.folders import problems_in
     from maneuver_automaton.cli.guard import BAD_INPUT, explained
 
     codes = []
-    for path in scenarios_in(folder):
+    for path, needs in problems_in(folder, parts):
         try:
-            if scenario_of(path).receding_horizon is None:
+            if scenario_of(path, needs).receding_horizon is None:
                 continue  # for plan, not for mpc
-            codes.append(drive_file(path, out / path.stem, settings=settings))
+            codes.append(drive_file(path, out / path.stem, settings=settings, parts=needs))
         except Exception as error:  # noqa: BLE001, one bad file must not stop the others
             complain(explained(error))
             codes.append(BAD_INPUT)

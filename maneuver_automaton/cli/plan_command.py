@@ -1,4 +1,4 @@
-"""`plan`: a scenario, or every scenario of a folder."""
+"""`plan`: the problem of a file, or of every file of a folder."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
-from maneuver_automaton.cli.inputs import make_folder, not_written, scenario_of, scenarios_in
+from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, scenario_of
 from maneuver_automaton.cli.progress import progress_bar
 from maneuver_automaton.errors import InvalidScenario
 
@@ -51,9 +51,9 @@ class Row:
     search_s: float | None = None
 
 
-def plan_file(path: Path, out: Path, *, settings: Settings) -> int:
-    """Plan one scenario into the folder `out`, print the plan, return the exit code."""
-    scenario = scenario_of(path)
+def plan_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> int:
+    """Plan one problem into the folder `out`, print the plan, return the exit code."""
+    scenario = scenario_of(path, parts)
     make_folder(out)
     result = _plan(scenario, out, settings)
     if result.plan is None:
@@ -66,20 +66,23 @@ def plan_file(path: Path, out: Path, *, settings: Settings) -> int:
     return FOUND
 
 
-def plan_folder(folder: Path, out: Path, *, settings: Settings, jobs: int) -> int:
-    """Plan every scenario of a folder into `out`/STEM, print a table, return the exit code."""
-    paths = scenarios_in(folder)
+def plan_folder(folder: Path, out: Path, *, settings: Settings, parts: Parts, jobs: int) -> int:
+    """Plan every problem of a folder into `out`/STEM, print a table, return the exit code."""
+    from maneuver_automaton.cli.folders import problems_in
+
+    problems = problems_in(folder, parts)
     from joblib import Parallel, delayed
 
     make_folder(out)
-    jobs = min(jobs, len(paths))
+    jobs = min(jobs, len(problems))
     if jobs > 1:
         _compile_first(settings)
     work = Parallel(n_jobs=jobs, return_as="generator")(
-        delayed(_row)(path, out / path.stem, settings, Path.cwd()) for path in paths
+        delayed(_row)(path, needs, out / path.stem, settings, Path.cwd())
+        for path, needs in problems
     )
     rows: list[Row] = []
-    with progress_bar("planning", len(paths), quiet=settings.quiet) as advance:
+    with progress_bar("planning", len(problems), quiet=settings.quiet) as advance:
         for row in work:
             rows.append(row)
             advance()
@@ -129,14 +132,14 @@ def _write(scenario: Scenario, result: PlanResult, out: Path, settings: Settings
         plotting.save_plan_animation(result.plan, out / "plan.gif", footprint=footprint)
 
 
-def _row(path: Path, out: Path, settings: Settings, folder: Path) -> Row:
+def _row(path: Path, parts: Parts, out: Path, settings: Settings, folder: Path) -> Row:
     """Plan one file of a folder; what goes wrong is told in the row.
 
     Paths are relative to `folder`: a process that works for others may have begun elsewhere.
     """
     try:
         with contextlib.chdir(folder):
-            result = _plan(scenario_of(path), out, settings)
+            result = _plan(scenario_of(path, parts), out, settings)
     except Exception as error:  # noqa: BLE001, one bad file must not stop the others
         return Row(name=path.name, code=BAD_INPUT, status="bad input", reason=explained(error))
     found = result.plan is not None

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 from pydantic import ValidationError
 
+from maneuver_automaton.formats.yaml_source import Document, Where, shown
 from maneuver_automaton.models import Car, Unicycle
 from maneuver_automaton.scenario.schema import ScenarioFile
-from maneuver_automaton.scenario.yaml_source import Document, Where
 
 CONTROL_NAMES: Mapping[str, tuple[str, ...]] = {
     "unicycle": Unicycle.control_names,
@@ -20,7 +19,6 @@ OTHER_KINDS: Mapping[str, set[str]] = {  # and what only they have
     "a library of trims": {"format", "trims"},
     "a plan": {"status", "primitives"},
 }
-MAX_SHOWN = 60  # characters of a value that a message shows
 
 
 def values_of(document: Document) -> ScenarioFile:
@@ -53,32 +51,6 @@ def _check_schema(document: Document) -> None:
     if schema != 1 or not isinstance(schema, int) or isinstance(schema, bool):
         what = "need 1, the schema that this version reads"
         raise document.error(("schema",), f"got {shown(schema)}, {what}")
-
-
-def shown(value: Any) -> str:
-    """A value as a message shows it, in the words of YAML.
-
-    Examples
-    --------
-    >>> shown("abc"), shown(True), shown(None), shown([1, "a"])
-    ("'abc'", 'true', 'nothing', "[1, 'a']")
-    """
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if value is None:
-        return "nothing"
-    if isinstance(value, list):
-        return _short("[" + ", ".join(shown(item) for item in value[:MAX_SHOWN]) + "]")
-    if isinstance(value, dict):
-        items = (f"{key}: {shown(value[key])}" for key in list(value)[:MAX_SHOWN])
-        return _short("{" + ", ".join(items) + "}")
-    if isinstance(value, float) and not math.isfinite(value):
-        return str(value)
-    return _short(repr(value))
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= MAX_SHOWN else text[: MAX_SHOWN - 3] + "..."
 
 
 def _context(value: Any) -> dict[str, Any]:

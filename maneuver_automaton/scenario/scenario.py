@@ -13,19 +13,15 @@ from typing import Any
 
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import load_library
+from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.statement import MapFile
+from maneuver_automaton.formats.yaml_source import Document, Where, parse, shown
 from maneuver_automaton.models import Car, Model, Unicycle
-from maneuver_automaton.problem import (
-    SEARCH_METHODS,
-    Bounds,
-    Goal,
-    Horizon,
-    Problem,
-    SearchSettings,
-)
+from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.scenario.presets import preset_controls
-from maneuver_automaton.scenario.reading import shown, values_of
+from maneuver_automaton.scenario.reading import values_of
 from maneuver_automaton.scenario.schema import (
     Axis,
     CostPart,
@@ -35,10 +31,10 @@ from maneuver_automaton.scenario.schema import (
     NamedControl,
     RecedingHorizonPart,
     ScenarioFile,
-    Shape,
+    SearchPart,
 )
+from maneuver_automaton.scenario.shapes import footprint_of, obstacles_of, stated_footprint
 from maneuver_automaton.scenario.vehicles import described, model_of
-from maneuver_automaton.scenario.yaml_source import Document, Where, parse, read_text
 
 MAX_GRID_TRIMS = 100_000
 
@@ -47,29 +43,20 @@ Footprint = tuple[Mapping[str, Any], ...]  # shapes, each {rectangle_m, referenc
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Scenario:
-    """What a scenario file describes."""
+    """What a scenario file describes, or a file of another format and a scenario beside it."""
 
     name: str
     problem: Problem
-    footprint: Footprint = ()  # in the frame of the vehicle, as the file states it
     time_limit_s: float = 5.0  # ceiling for search and refinement [s]
-    margin_m: float = 0.0  # distance kept from everything [m]
     receding_horizon: RecedingHorizonPart | None = None
+    maps: tuple[MapFile, ...] = ()  # files of the maps among the obstacles
     path: Path | None = None
     timing_s: Mapping[str, float] = field(default_factory=dict)  # load, automaton [s]
 
-
-def load_scenario(path: Path | str) -> Scenario:
-    """The scenario of a file.
-
-    Raises
-    ------
-    InvalidScenario
-        If the file cannot be read or used: one line with file, line, field, the value met, and
-        what would be right.
-    """
-    begin, path = time.perf_counter(), Path(path)
-    return _scenario(parse(read_text(path), name=str(path)), path=path, begin=begin)
+    @property
+    def footprint(self) -> Footprint:
+        """The body of the vehicle in the words of a scenario file, for pictures."""
+        return stated_footprint(self.problem.footprint)
 
 
 def scenario_of_text(text: str, *, name: str) -> Scenario:
@@ -78,7 +65,8 @@ def scenario_of_text(text: str, *, name: str) -> Scenario:
     Raises
     ------
     InvalidScenario
-        As `load_scenario`.
+        If it cannot be used: one line with name, line, field, the value met, and what would be
+        right.
 
     Examples
     --------
@@ -93,47 +81,37 @@ def scenario_of_text(text: str, *, name: str) -> Scenario:
     ('rest', 'straight', 'clockwise', 'anticlockwise', 'spin')
     """
     begin = time.perf_counter()
-    return _scenario(parse(text, name=name), path=None, begin=begin)
+    return scenario_of_document(parse(text, name=name), path=None, begin=begin)
 
 
-def _scenario(document: Document, *, path: Path | None, begin: float) -> Scenario:
+def scenario_of_document(document: Document, *, path: Path | None, begin: float) -> Scenario:
+    """The scenario of a YAML file that was read since `begin` [s].
+
+    Raises
+    ------
+    InvalidScenario
+        As `scenario_of_text`.
+    """
     file = values_of(document)
-    _refuse_what_is_not_there(document, file)
+    if file.search.method == "words":
+        _refuse_long_words(document, file)
+    folder = path.parent if path else Path()
     with _at(document, ("vehicle",)):
         model = model_of(file.vehicle)
+    footprint = footprint_of(document, file.vehicle.footprint)
+    obstacles, maps = obstacles_of(document, file.obstacles, folder)
     read = time.perf_counter()
-    automaton = _automaton(document, file, model, path.parent if path else Path())
+    automaton = _automaton(document, file, model, folder)
     made = time.perf_counter()
-    problem = _problem(document, file, automaton)
     return Scenario(
         name=(path.stem if path else document.name) if file.name is None else file.name,
-        problem=problem,
-        footprint=_plain(file.vehicle.footprint),
+        problem=_problem(document, file, automaton, footprint=footprint, obstacles=obstacles),
         time_limit_s=file.search.time_limit_s,
-        margin_m=file.margin_m,
         receding_horizon=file.receding_horizon,
+        maps=maps,
         path=path,
         timing_s={"load": read - begin, "automaton": made - read},
     )
-
-
-def _refuse_what_is_not_there(document: Document, file: ScenarioFile) -> None:
-    """One message for each part of the schema that this version reads but cannot plan with."""
-    if file.obstacles:
-        n = len(file.obstacles)
-        raise document.error(
-            ("obstacles",),
-            f"got {n} obstacle{'s' if n > 1 else ''}, but this version plans in free space only; "
-            "need an empty list",
-        )
-    if file.search.method not in SEARCH_METHODS:
-        raise document.error(
-            ("search", "method"),
-            f"got {file.search.method!r}, which this version does not have; need one of "
-            f"{', '.join(SEARCH_METHODS)}",
-        )
-    if file.search.method == "words":
-        _refuse_long_words(document, file)
 
 
 def _refuse_long_words(document: Document, file: ScenarioFile) -> None:
@@ -254,7 +232,14 @@ def _words(model: Model) -> str:
     return shown(described(model))
 
 
-def _problem(document: Document, file: ScenarioFile, automaton: Automaton) -> Problem:
+def _problem(
+    document: Document,
+    file: ScenarioFile,
+    automaton: Automaton,
+    *,
+    footprint: tuple[Shape, ...],
+    obstacles: tuple[AnyObstacle, ...],
+) -> Problem:
     goals = file.goal if isinstance(file.goal, tuple) else (file.goal,)
     many = isinstance(file.goal, tuple)
     dof = automaton.model.group.dof
@@ -277,9 +262,10 @@ def _problem(document: Document, file: ScenarioFile, automaton: Automaton) -> Pr
             start_trim=file.start.trim,
             start_time=file.start.time_s,
             bounds=Bounds(x=file.bounds_m.x, y=file.bounds_m.y, z=file.bounds_m.z),
-            search=SearchSettings(
-                method=file.search.method, max_expansions=file.search.max_expansions
-            ),
+            search=_search(file.search),
+            obstacles=obstacles,
+            footprint=footprint,
+            margin=file.margin_m,
         )
 
 
@@ -329,6 +315,16 @@ def _cost(document: Document, part: CostPart, automaton: Automaton) -> Cost:
     return cost
 
 
+def _search(part: SearchPart) -> SearchSettings:
+    return SearchSettings(
+        method=part.method,
+        max_expansions=part.max_expansions,
+        cell=part.cell_m,
+        headings=part.headings,
+        weight=part.weight,
+    )
+
+
 def _horizon(document: Document, part: HorizonPart) -> Horizon:
     fixed = part.time_s != "free" and part.max_time_s is not None
     with _at(document, ("horizon", "max_time_s") if fixed else ("horizon",)):
@@ -338,10 +334,3 @@ def _horizon(document: Document, part: HorizonPart) -> Horizon:
             min_coast=part.min_coast_s,
             max_time=part.max_time_s,
         )
-
-
-def _plain(footprint: Shape | tuple[Shape, ...] | None) -> Footprint:
-    if footprint is None:
-        return ()
-    shapes = footprint if isinstance(footprint, tuple) else (footprint,)
-    return tuple(shape.model_dump(exclude_none=True) for shape in shapes)

@@ -6,29 +6,34 @@ import json
 import math
 import re
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import WEIGHTS, Cost, StageCost
-from maneuver_automaton.problem import Goal, Horizon, Problem
+from maneuver_automaton.formats.yaml_source import scalar
+from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.scenario.scenario import Scenario
 from maneuver_automaton.scenario.schema import ScenarioFile
+from maneuver_automaton.scenario.shapes import stated_obstacle
 from maneuver_automaton.scenario.vehicles import described
-from maneuver_automaton.scenario.yaml_source import scalar
 
 _PLAIN = re.compile(r"[A-Za-z][A-Za-z0-9_ ()-]*[A-Za-z0-9_)]|[A-Za-z]")
 _HARD = re.compile(r"[^\x20-\x7e\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]")
 
 
-def to_yaml(scenario: Scenario) -> str:
+def to_yaml(scenario: Scenario, *, folder: Path | None = None) -> str:
     """The scenario as a file that reads back to the same problem, to the last bit.
 
-    The trims are listed, whatever named them before.
+    The trims are listed, whatever named them before. A map stays a reference to its file, as seen
+    from `folder`, where the file will be; None: that of the scenario's own file. The names of
+    obstacles are not written.
 
     Raises
     ------
     ValueError
-        If a scenario file cannot state it: another model or cost, maneuvers, a reduced state.
+        If a scenario file cannot state it: another model or cost, maneuvers, a reduced state, a
+        map without a file, a body that is a disc beside the pose.
 
     Examples
     --------
@@ -52,10 +57,12 @@ def to_yaml(scenario: Scenario) -> str:
     problem = scenario.problem
     vehicle = described(problem.automaton.model)
     if scenario.footprint:
-        shapes = [dict(shape) for shape in scenario.footprint]
+        shapes = list(scenario.footprint)
         vehicle["footprint"] = shapes if len(shapes) > 1 else shapes[0]
     bounds = {name: getattr(problem.bounds, name) for name in ("x", "y", "z")}
     goals = [_goal(goal) for goal in problem.goals]
+    if folder is None:
+        folder = scenario.path.parent if scenario.path else Path()
     entries: dict[str, Any] = {
         "schema": 1,
         "name": scenario.name,
@@ -66,16 +73,15 @@ def to_yaml(scenario: Scenario) -> str:
         "cost": _cost(problem.cost),
         "horizon": _horizon(problem.horizon),
         "bounds_m": {name: list(pair) for name, pair in bounds.items() if pair is not None},
-        "margin_m": scenario.margin_m or None,
-        "search": {
-            "method": problem.search.method,
-            "time_limit_s": scenario.time_limit_s,
-            **_given(max_expansions=problem.search.max_expansions),
-        },
+        "margin_m": problem.margin or None,
+        "obstacles": [stated_obstacle(one, scenario.maps, folder) for one in problem.obstacles],
+        "search": _search(problem.search, scenario.time_limit_s),
         "receding_horizon": scenario.receding_horizon
         and scenario.receding_horizon.model_dump(exclude_none=True),
     }
-    return "".join(_block(key, value) for key, value in entries.items() if value not in ({}, None))
+    return "".join(
+        _block(key, value) for key, value in entries.items() if value not in ({}, [], None)
+    )
 
 
 def json_schema() -> dict[str, Any]:
@@ -138,6 +144,19 @@ def _cost(cost: StageCost) -> dict[str, Any]:
 def _horizon(horizon: Horizon) -> dict[str, Any]:
     entry = _given(time_s=horizon.time, max_trims=horizon.max_trims, max_time_s=horizon.max_time)
     return entry | ({"min_coast_s": horizon.min_coast} if horizon.min_coast else {})
+
+
+def _search(search: SearchSettings, time_limit_s: float) -> dict[str, Any]:
+    return {
+        "method": search.method,
+        "time_limit_s": time_limit_s,
+        **_given(
+            max_expansions=search.max_expansions,
+            cell_m=search.cell,
+            headings=search.headings,
+            weight=search.weight,
+        ),
+    }
 
 
 def _given(**entries: Any) -> dict[str, Any]:

@@ -356,10 +356,13 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
         search("method: astar"),
         ":13: search.method: got 'astar', need auto, words, insertion or lattice",
     ),
-    "lattice": (
-        search("method: lattice, cell_m: 0.5"),
-        ":13: search.method: got 'lattice', which this version does not have; need "
-        "one of auto, words, insertion",
+    "lattice cell": (
+        search("method: lattice, cell_m: 0"),
+        ":13: search.cell_m: got 0, need a positive number",
+    ),
+    "lattice weight": (
+        search("method: lattice, weight: 0.5"),
+        ":13: search.weight: got 0.5, need a finite number of at least 1",
     ),
     "long words": (
         search("method: words").replace("max_trims: 4", "max_trims: 6"),
@@ -389,10 +392,84 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
         SCENARIO + "margin_m: -1\n",
         ":14: margin_m: got -1, need a finite number of at least 0",
     ),
-    "obstacles": (
-        obstacle("{disc_m: {center: [3, 0], radius: 0.5}}"),
-        ":14: obstacles: got 1 obstacle, but this version plans in free space only; "
-        "need an empty list",
+    "obstacle without area": (
+        obstacle("{polygon_m: [[0, 0], [0.1, 0.1], [0.3, 0.3]]}"),
+        ":15: obstacles[0].polygon_m: the ring encloses no area, need corners that are not on "
+        "one line",
+    ),
+    "obstacle with two corners": (
+        obstacle("{polygon_m: [[0, 0], [1, 1], [0, 0], [0, 0]]}"),
+        ":15: obstacles[0].polygon_m: the ring has 2 different corners, need at least 3",
+    ),
+    "obstacle crosses itself": (
+        obstacle("{polygon_m: [[0, 0], [2, 2], [2, 0], [0, 3]]}"),
+        ":15: obstacles[0].polygon_m: the ring crosses or touches itself at (1.2, 1.2), "
+        "need a simple polygon",
+    ),
+    "obstacle touches itself": (
+        obstacle("{polygon_m: [[0, 0], [4, 0], [4, 4], [2, 0], [0, 4]]}"),
+        ":15: obstacles[0].polygon_m: the ring crosses or touches itself at (2, 0), "
+        "need a simple polygon",
+    ),
+    "hole outside": (
+        obstacle("{polygon_m: [[0, 0], [1, 0], [0, 1]], holes_m: [[[5, 5], [6, 5], [5, 6]]]}"),
+        ":15: obstacles[0].polygon_m: a hole lies outside the polygon at (5, 5), "
+        "need holes inside it",
+    ),
+    "hole in a hole": (
+        obstacle(
+            "{polygon_m: [[0, 0], [9, 0], [0, 9]],\n     holes_m: [[[1, 1], [4, 1], [1, 4]], "
+            "[[1.5, 1.5], [2, 1.5], [1.5, 2]]]}"
+        ),
+        ":15: obstacles[0].polygon_m: a hole lies inside another one at (1.5, 1.5), "
+        "need holes apart from each other",
+    ),
+    "hole without polygon": (
+        obstacle("{disc_m: {center: [3, 0], radius: 1}, holes_m: [[[5, 5], [6, 5], [5, 6]]]}"),
+        ":15: obstacles[0].holes_m: goes with polygon_m only",
+    ),
+    "second obstacle": (
+        obstacle("{disc_m: {center: [3, 0], radius: 1}}\n  - {polygon_m: [[0, 0], [1, 1]]}"),
+        ":16: obstacles[1].polygon_m: got [[0, 0], [1, 1]], need a list of at least 3 points "
+        "[x, y]",
+    ),
+    "obstacle nan": (
+        obstacle("{box_m: {center: [0, .nan], size: [1, 1]}}"),
+        ":15: obstacles[0].box_m.center[1]: got nan, need a finite number",
+    ),
+    "box flat": (
+        obstacle("{box_m: {center: [0, 0], size: [1, 0]}}"),
+        ":15: obstacles[0].box_m.size[1]: got 0, need a positive number",
+    ),
+    "height reversed": (
+        obstacle("{disc_m: {center: [3, 0], radius: 1}, height_m: [3, 0]}"),
+        ":15: obstacles[0].height_m: got [3, 0], need an interval [low, high] with low < high",
+    ),
+    "map missing": (
+        obstacle("{map: nowhere.yaml}"),
+        ":15: obstacles[0].map: nowhere.yaml: no such file",
+    ),
+    "map is this file": (
+        obstacle("{map: x.yaml}"),
+        ":15: obstacles[0].map: x.yaml:1: the key 'image' is missing: a map needs image, "
+        "resolution, origin, negate, occupied_thresh, free_thresh",
+    ),
+    "map unknown": (
+        obstacle("{map: a.yaml, unknown: maybe}"),
+        ":15: obstacles[0].unknown: got 'maybe', need blocked or free",
+    ),
+    "map that moves": (
+        obstacle("{map: a.yaml, motion: [[0, 0, 0, 0]]}"),
+        ":15: obstacles[0].motion: goes with polygon_m or disc_m or box_m only",
+    ),
+    "unknown without a map": (
+        obstacle("{disc_m: {center: [3, 0], radius: 1}, unknown: free}"),
+        ":15: obstacles[0].unknown: goes with map only",
+    ),
+    "footprint crosses itself": (
+        footprint("[{disc_m: 1}, {polygon_m: [[0, 0], [2, 2], [2, 0], [0, 2]]}]"),
+        ":3: vehicle.footprint[1].polygon_m: the ring crosses or touches itself at (1, 1), "
+        "need a simple polygon",
     ),
     "obstacle bad": (
         obstacle("{disc_m: {center: [3, 0], radius: 0}}"),
@@ -569,7 +646,7 @@ def test_a_folder_is_no_file(tmp_path):
 def test_the_parser_in_python_reads_the_same(monkeypatch):
     import yaml
 
-    from maneuver_automaton.scenario import yaml_source
+    from maneuver_automaton.formats import yaml_source
 
     fast = yaml_source.parse(SCENARIO, name="x")
     monkeypatch.setattr(yaml_source, "_PARSER", yaml.SafeLoader)

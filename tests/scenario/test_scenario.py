@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,7 +42,9 @@ def test_what_is_left_out():
     assert scenario.name == "x.yaml"
     assert scenario.time_limit_s == 5.0
     assert scenario.footprint == ()
-    assert scenario.margin_m == 0.0
+    assert problem.margin == 0.0
+    assert problem.obstacles == ()
+    assert problem.footprint == ()
     assert isinstance(problem.cost, Cost)
     assert problem.cost.time == 1.0
     assert not any(getattr(problem.cost, name) for name in ("effort", "norm", "length", "switch"))
@@ -50,7 +53,7 @@ def test_what_is_left_out():
     assert problem.horizon.max_time is None
     assert problem.horizon.min_coast == 0.0
     assert asdict(problem.bounds) == asdict(Bounds())
-    assert asdict(problem.search) == {"method": "auto", "max_expansions": None}
+    assert asdict(problem.search) == asdict(SearchSettings())
     assert problem.start_trim is None
     assert problem.start_time == 0.0
     goal = problem.goals[0]
@@ -207,8 +210,10 @@ def test_shipped_scenarios_go_to_yaml_and_back(path):
 def assert_same(a: Scenario, b: Scenario) -> None:
     """Everything a file states agrees to the last bit."""
     assert to_yaml(a) == to_yaml(b)
-    assert (a.name, a.time_limit_s, a.margin_m) == (b.name, b.time_limit_s, b.margin_m)
     one, two = a.problem, b.problem
+    assert (a.name, a.time_limit_s, one.margin) == (b.name, b.time_limit_s, two.margin)
+    assert a.footprint == b.footprint
+    assert [solid(x) for x in one.obstacles] == [solid(x) for x in two.obstacles]
     assert automaton_hash(one.automaton) == automaton_hash(two.automaton)
     assert one.start.tolist() == two.start.tolist()
     assert (one.start_trim, one.start_time) == (two.start_trim, two.start_time)
@@ -216,6 +221,14 @@ def assert_same(a: Scenario, b: Scenario) -> None:
     assert one.rates.tolist() == two.rates.tolist()
     for part in ("horizon", "bounds", "search"):
         assert asdict(getattr(one, part)) == asdict(getattr(two, part))
+
+
+def solid(obstacle: Any) -> Any:
+    """The numbers of an obstacle, as lists."""
+    shape = obstacle.shape
+    fields = {name: getattr(shape, name) for name in type(shape).__dataclass_fields__}
+    motion = obstacle.motion and (obstacle.motion.time.tolist(), obstacle.motion.pose.tolist())
+    return type(shape), str(fields), obstacle.height, motion
 
 
 positive = st.floats(1e-3, 1e3)
@@ -257,9 +270,12 @@ def scenarios(draw: st.DrawFn) -> Scenario:
             start_trim=draw(st.none() | st.sampled_from(names)),
             start_time=draw(number),
             bounds=Bounds(y=draw(st.none() | st.just((-1.5, 1e7)))),
+            search=SearchSettings(
+                method="lattice", cell=draw(st.none() | positive), headings=8, weight=1.5
+            ),
+            margin=draw(st.floats(0.0, 1.0)),
         ),
         time_limit_s=draw(positive),
-        margin_m=draw(st.floats(0.0, 1.0)),
     )
 
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from maneuver_automaton.scenario.yaml_source import parse
+from maneuver_automaton.formats.yaml_source import parse
 
 
 def value_of(text: str) -> object:
@@ -84,7 +84,7 @@ def test_an_alias_stands_for_its_value():
 
 
 def test_utf_8_with_a_mark_and_windows_line_ends(tmp_path):
-    from maneuver_automaton.scenario.yaml_source import read_text
+    from maneuver_automaton.formats.text_source import read_text
 
     path = tmp_path / "x.yaml"
     path.write_bytes("\ufeffname: Größe\r\nb: 1\r\n".encode())

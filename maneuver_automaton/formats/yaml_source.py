@@ -7,19 +7,20 @@ events, without recursion, and stops at the first limit that is exceeded.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import yaml
 
 from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.text_source import MAX_BYTES, too_long
 
-MAX_BYTES = 5_000_000
 MAX_DEPTH = 40
 MAX_COPIED = 10_000  # values that aliases may add to those that are written
+MAX_SHOWN = 60  # characters of a value that a message shows
 
 Where = tuple[str | int, ...]  # keys and positions from the top of the file to a value
 
@@ -72,38 +73,36 @@ def spelled(where: Where) -> str:
     ).removeprefix(".")
 
 
-def read_text(path: Path) -> str:
-    """The text of a scenario file.
+def shown(value: Any) -> str:
+    """A value as a message shows it, in the words of YAML.
 
-    Raises
-    ------
-    InvalidScenario
-        If it is missing, a folder, unreadable, too long, or not text in UTF-8 (or UTF-16).
+    Examples
+    --------
+    >>> shown("abc"), shown(True), shown(None), shown([1, "a"])
+    ("'abc'", 'true', 'nothing', "[1, 'a']")
     """
-    if path.is_dir():
-        raise InvalidScenario(f"{path}: is a folder, need a file")
-    try:
-        with path.open("rb") as stream:
-            content = stream.read(MAX_BYTES + 1)
-    except FileNotFoundError as error:
-        raise InvalidScenario(f"{path}: no such file") from error
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the path
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InvalidScenario(f"{path}: cannot be read: {reason}") from error
-    if len(content) > MAX_BYTES:
-        raise InvalidScenario(
-            f"{path}: is longer than {MAX_BYTES // 1_000_000} MB, too long for a scenario"
-        )
-    encoding = "utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
-    try:
-        return content.decode(encoding)
-    except UnicodeDecodeError as error:
-        line = content[: error.start].count(b"\n") + 1
-        raise InvalidScenario(f"{path}:{line}: is not a text file in UTF-8") from error
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if value is None:
+        return "nothing"
+    if isinstance(value, list):
+        return _short("[" + ", ".join(shown(item) for item in value[:MAX_SHOWN]) + "]")
+    if isinstance(value, dict):
+        items = (f"{key}: {shown(value[key])}" for key in list(value)[:MAX_SHOWN])
+        return _short("{" + ", ".join(items) + "}")
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return _short(repr(value))
 
 
-def parse(text: str, *, name: str) -> Document:
+def _short(text: str) -> str:
+    return text if len(text) <= MAX_SHOWN else text[: MAX_SHOWN - 3] + "..."
+
+
+def parse(text: str, *, name: str, what: str = "a scenario") -> Document:
     r"""Values and lines of a YAML text; `name` is what messages call the file.
+
+    `what` is what it should hold, for the message if it is empty or too long.
 
     Raises
     ------
@@ -117,16 +116,14 @@ def parse(text: str, *, name: str) -> Document:
     ({'cost': {'effort': 1e-06}}, 2)
     """
     if len(text) > MAX_BYTES:
-        raise InvalidScenario(
-            f"{name}: is longer than {MAX_BYTES // 1_000_000} MB, too long for a scenario"
-        )
+        raise too_long(name, MAX_BYTES, what=what)
     if bad := _NOT_TEXT.search(text):
         raise InvalidScenario(
             f"{name}:{_line_at(text, bad.start())}: is not a text file: "
             f"it has the character {bad.group()!r}"
         )
     try:
-        return _Builder(name).build(yaml.parse(text, Loader=_PARSER))
+        return _Builder(name, what).build(yaml.parse(text, Loader=_PARSER))
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = f":{mark.line + 1}" if mark else ""
@@ -152,8 +149,9 @@ class _Unfinished:
 class _Builder:
     """Collect events into values: one use."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, what: str) -> None:
         self.name = name
+        self.what = what
         self.lines: dict[Where, int] = {}
         self.stack: list[_Unfinished] = []
         self.anchors: dict[str, tuple[Any, int]] = {}  # value, number of nodes in it
@@ -165,7 +163,7 @@ class _Builder:
         for event in events:
             self._take(event)
         if not self.roots or self.roots == [None]:
-            raise InvalidScenario(f"{self.name}: is empty, need a scenario")
+            raise InvalidScenario(f"{self.name}: is empty, need {self.what}")
         return Document(self.name, self.roots[0], self.lines)
 
     def _take(self, event: Any) -> None:

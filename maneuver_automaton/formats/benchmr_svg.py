@@ -1,0 +1,196 @@
+"""Worlds of Bench-MR: an SVG drawing, every path of it one obstacle.
+
+In the drawing y points down; here ``X = x + t_x`` and ``Y = -(y + t_y)``, in metres, with the
+translations of the groups around the path. As in Bench-MR, an obstacle is the convex hull of its
+path, and the bounds are the box around all obstacles. A file `queries.csv` beside the drawing, or
+one folder above, states start, goal and robot of every world; the robot's outline is an SVG of that
+name, its centroid at the pose.
+
+Source: Heiden et al. (2021), *Bench-MR: A Motion Planning Benchmark for Wheeled Mobile Robots*,
+RA-L 6(3), and its files.
+"""
+
+from __future__ import annotations
+
+import csv
+import glob
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.collision import Obstacle, Polygon
+from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.statement import Statement
+from maneuver_automaton.formats.svg_paths import DrawnPath, read_svg_paths
+from maneuver_automaton.formats.text_source import finite, lines_of, read_text
+from maneuver_automaton.problem import Bounds
+
+QUERIES = "queries.csv"
+COLUMNS = ("world", "robot", "x0_m", "y0_m", "yaw0_rad", "x1_m", "y1_m", "yaw1_rad")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Query:
+    """One row of the table of queries."""
+
+    world: str
+    robot: str
+    start: Array  # (3,) [m, m, rad]
+    goal: Array  # (3,) [m, m, rad]
+
+
+def read_benchmr(path: Path) -> tuple[Statement, ...]:
+    """The problems on a world, one for every query; without any, its obstacles alone.
+
+    Raises
+    ------
+    InvalidScenario
+        If the drawing has no path, or one of another kind than polygons; if the table of queries
+        or the robot's outline is malformed.
+    """
+    world = _world(path)
+    table = _queries_beside(path)
+    queries = [] if table is None else [q for q in read_queries(table) if q.world == path.stem]
+    if len(queries) > 1:
+        return tuple(_asked(world, query, path, case=k) for k, query in enumerate(queries))
+    return (_asked(world, queries[0], path),) if queries else (world,)
+
+
+def read_benchmr_queries(path: Path) -> tuple[Statement, ...]:
+    """One problem for every row of a table of queries; the worlds are beside it or a folder below.
+
+    Raises
+    ------
+    InvalidScenario
+        If a world is not there; as `read_benchmr`.
+    """
+    statements, worlds = [], {}
+    for case, query in enumerate(read_queries(path)):
+        name = f"{query.world}.svg"
+        places = [path.parent / name, *sorted(path.parent.glob(f"*/{glob.escape(name)}"))]
+        file = next((place for place in places if place.is_file()), None)
+        if file is None:
+            raise InvalidScenario(f"{path}: world: got {query.world!r}, but there is no {name}")
+        if file not in worlds:
+            worlds[file] = _world(file)
+        statements.append(_asked(worlds[file], query, file, case=case))
+    if not statements:
+        raise InvalidScenario(f"{path}: holds no query, need at least one")
+    return tuple(statements)
+
+
+def _world(path: Path) -> Statement:
+    obstacles = tuple(
+        Obstacle(_hull(path, drawn), name=f"obstacle {k + 1}")
+        for k, drawn in enumerate(read_svg_paths(path))
+    )
+    corners = np.concatenate([_corners(obstacle) for obstacle in obstacles])
+    (left, low), (right, high) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    bounds = Bounds(x=(left, right), y=(low, high))
+    return Statement(format="Bench-MR", name=path.stem, obstacles=obstacles, bounds=bounds)
+
+
+def _asked(world: Statement, query: Query, path: Path, *, case: int | None = None) -> Statement:
+    """The world with one query on it."""
+    return replace(
+        world,
+        name=world.name if case is None else f"{world.name} case {case}",
+        start=query.start,
+        goal=query.goal,
+        footprint=(outline(path.with_name(f"{query.robot}.svg")),),
+    )
+
+
+def n_queries(path: Path) -> int:
+    """How often a table of queries names this drawing as a world; robots and pictures: never.
+
+    Raises
+    ------
+    InvalidScenario
+        If the table cannot be used.
+    """
+    table = _queries_beside(path)
+    return 0 if table is None else sum(q.world == path.stem for q in read_queries(table))
+
+
+def is_queries(path: Path) -> bool:
+    """Whether a file begins like a table of queries."""
+    try:
+        with path.open("rb") as stream:
+            return stream.read(80).removeprefix(b"\xef\xbb\xbf").startswith(b"world,robot")
+    except (OSError, ValueError):
+        return False
+
+
+def outline(path: Path) -> Polygon:
+    """The body of a robot, its centroid at the pose and x ahead.
+
+    Raises
+    ------
+    InvalidScenario
+        If the drawing does not hold exactly one polygon.
+    """
+    drawn = read_svg_paths(path)
+    if len(drawn) != 1:
+        raise InvalidScenario(f"{path}: got {len(drawn)} paths, need one, the robot's outline")
+    corners = _hull(path, drawn[0]).corners
+    import shapely
+
+    centroid = shapely.Polygon(corners).centroid
+    return Polygon(corners - np.array([centroid.x, centroid.y]))
+
+
+def _queries_beside(path: Path) -> Path | None:
+    """The table of queries of a world, if there is one."""
+    for folder in (path.absolute().parent, path.absolute().parent.parent):
+        if (folder / QUERIES).is_file():
+            return folder / QUERIES
+    return None
+
+
+def read_queries(path: Path) -> tuple[Query, ...]:
+    """The rows of a table of queries.
+
+    Raises
+    ------
+    InvalidScenario
+        If a column is missing, or holds what it may not.
+    """
+    rows = list(csv.reader(lines_of(read_text(path, what="a table of queries"))))
+    head = [word.strip() for word in rows[0]] if rows else []
+    for name in COLUMNS:
+        if name not in head:
+            raise InvalidScenario(f"{path}:1: the column {name!r} is missing")
+    queries = []
+    for k, row in enumerate(rows[1:]):
+        if not any(word.strip() for word in row):
+            continue
+        at = f"{path}:{k + 2}"
+        if len(row) != len(head):
+            raise InvalidScenario(f"{at}: got {len(row)} columns, need {len(head)}")
+        entry = dict(zip(head, row, strict=True))
+        numbers = np.array([finite(entry[name], at=f"{at}: {name}") for name in COLUMNS[2:]])
+        robot = entry["robot"].strip()
+        if not robot or robot != Path(robot).name:
+            raise InvalidScenario(f"{at}: robot: got {robot!r}, need the name of a drawing")
+        queries.append(Query(entry["world"].strip(), robot, numbers[:3], numbers[3:]))
+    return tuple(queries)
+
+
+def _hull(path: Path, drawn: DrawnPath) -> Polygon:
+    """Convex hull of a path, y upwards."""
+    import shapely
+
+    hull = shapely.MultiPoint(drawn.points * np.array([1.0, -1.0])).convex_hull
+    if hull.geom_type != "Polygon" or not hull.area > 0.0:
+        raise InvalidScenario(
+            f"{path}:{drawn.line}: the path encloses no area, need a polygon of at least 3 corners"
+        )
+    return Polygon(np.asarray(hull.exterior.coords)[:-1])
+
+
+def _corners(obstacle: Obstacle) -> Array:
+    assert isinstance(obstacle.shape, Polygon)
+    return obstacle.shape.corners

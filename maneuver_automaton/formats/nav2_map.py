@@ -1,0 +1,215 @@
+"""Occupancy maps of Nav2 and ROS: a YAML file beside an image.
+
+`origin` is the pose of the lower left corner of the image, `resolution` the size of a pixel. The
+occupancy of a pixel is ``1 - shade``, or its shade if `negate`; in the mode raw, its value (0 to
+100) in percent. At `occupied_thresh` and above a cell is blocked, at `free_thresh` and below it is
+free. Between, and where an image is transparent or a raw value above 100, nothing is known.
+
+The mode scale counts as trinary: its shades between the thresholds are degrees of not knowing.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton._files import write_bytes_atomically, write_text_atomically
+from maneuver_automaton.collision import OccupancyMap
+from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.cells import bounds_around, check_cell
+from maneuver_automaton.formats.grey_image import GreyImage, read_grey_image
+from maneuver_automaton.formats.statement import MapFile, Statement, Unknown
+from maneuver_automaton.formats.text_source import read_text
+from maneuver_automaton.formats.yaml_source import Document, parse, shown
+
+MODES = ("trinary", "scale", "raw")
+YES_OR_NO = {"yes": True, "on": True, "no": False, "off": False}  # words of YAML 1.1
+FARTHEST_CELL = 1e12  # cells between the map and the origin; more, and their corners coincide
+MAX_YAW = 1e6  # [rad]
+REQUIRED = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Header:
+    """What the YAML states."""
+
+    image: str
+    resolution: float  # [m]
+    origin: tuple[float, ...]  # [m, m, rad]
+    negate: bool
+    occupied: float
+    free: float
+    raw: bool
+
+
+def is_nav2_map(document: Document) -> bool:
+    """Whether a YAML file is one of a map."""
+    value = document.value
+    return (
+        isinstance(value, dict)
+        and "schema" not in value
+        and {"image", "resolution"} & set(value) != set()
+    )
+
+
+def load_nav2_map(path: Path, *, unknown: Unknown = "blocked") -> OccupancyMap:
+    """The map of a YAML file; `unknown` says what cells are of which it knows nothing.
+
+    Raises
+    ------
+    InvalidScenario
+        If the file or its image cannot be used: file, line, field, value, what would be right.
+    """
+    text = read_text(path, what="a map")
+    return map_of_document(parse(text, name=str(path), what="a map"), path, unknown=unknown)
+
+
+def map_of_document(
+    document: Document, path: Path, *, unknown: Unknown = "blocked"
+) -> OccupancyMap:
+    """The map of a YAML file that was read before; see `load_nav2_map`."""
+    header = _header(document)
+    try:
+        image = read_grey_image(path.parent / _from_home(header.image))
+    except InvalidScenario as error:
+        raise document.error(("image",), str(error)) from error
+    cells = _blocked(image, header, unknown=unknown)
+    return OccupancyMap(
+        cells[::-1], resolution=header.resolution, origin=header.origin, name=path.name
+    )
+
+
+def read_nav2_map(path: Path, document: Document) -> tuple[Statement, ...]:
+    """A world with one map, and bounds around it; the rest is left to others.
+
+    Raises
+    ------
+    InvalidScenario
+        As `load_nav2_map`.
+    """
+    cells = map_of_document(document, path)
+    return (
+        Statement(
+            format="Nav2 map",
+            name=path.stem,
+            obstacles=(cells,),
+            bounds=bounds_around(cells),
+            maps=(MapFile(map=cells, path=path),),
+        ),
+    )
+
+
+def save_nav2_map(cells: OccupancyMap, path: Path) -> None:
+    """Write a map as `path`, a YAML file, and an image with the ending .pgm beside it.
+
+    It reads back to the same map, to the last bit.
+
+    Raises
+    ------
+    OSError
+        If the files cannot be written.
+    """
+    rows, columns = cells.blocked.shape
+    image = path.with_suffix(".pgm")
+    pixels = np.where(cells.blocked[::-1], 0, 254).astype(np.uint8)
+    write_bytes_atomically(image, f"P5\n{columns} {rows}\n255\n".encode() + pixels.tobytes())
+    origin = ", ".join(repr(value) for value in cells.origin.tolist())
+    name = image.name.replace("\\", "\\\\").replace('"', '\\"')
+    write_text_atomically(
+        path,
+        f'image: "{name}"\nmode: trinary\nresolution: {float(cells.resolution)!r}\n'
+        f"origin: [{origin}]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n",
+    )
+
+
+def _header(document: Document) -> _Header:
+    value = document.value
+    if not isinstance(value, dict):
+        raise document.error((), f"got {shown(value)}, need the keys {', '.join(REQUIRED)}")
+    for key in REQUIRED:
+        if key not in value:
+            raise document.error(
+                (), f"the key {key!r} is missing: a map needs {', '.join(REQUIRED)}"
+            )
+    image, origin, mode = value["image"], value["origin"], value.get("mode", "trinary")
+    if not isinstance(image, str) or not image.strip() or "\0" in image:
+        raise document.error(("image",), f"got {shown(image)}, need the name of an image file")
+    if not (isinstance(origin, list) and len(origin) == 3):
+        raise document.error(("origin",), f"got {shown(origin)}, need [x, y, yaw]")
+    if not isinstance(mode, str) or mode not in MODES:
+        raise document.error(("mode",), f"got {shown(mode)}, need one of {', '.join(MODES)}")
+    resolution = _number(document, ("resolution",))
+    check_cell(resolution, at=f"{document.name}:{document.line_of(('resolution',))}: resolution")
+    occupied, free = (
+        _number(document, (key,), most=1.0) for key in ("occupied_thresh", "free_thresh")
+    )
+    if free > occupied:
+        raise document.error(
+            ("free_thresh",), f"got {free:g}, need at most occupied_thresh, {occupied:g}"
+        )
+    return _Header(
+        image=image,
+        resolution=resolution,
+        origin=tuple(_origin(document, k, resolution) for k in range(3)),
+        negate=_negate(document),
+        occupied=occupied,
+        free=free,
+        raw=mode == "raw",
+    )
+
+
+def _number(document: Document, where: tuple[str | int, ...], most: float = math.inf) -> float:
+    value: Any = document.value
+    for step in where:
+        value = value[step]
+    good = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    if not good or (most < math.inf and not 0.0 <= value <= most):
+        need = "a finite number" if most == math.inf else f"a number from 0 to {most:g}"
+        raise document.error(where, f"got {shown(value)}, need {need}")
+    return float(value)
+
+
+def _origin(document: Document, k: int, resolution: float) -> float:
+    value = _number(document, ("origin", k))
+    most = FARTHEST_CELL * resolution if k < 2 else MAX_YAW
+    if abs(value) > most:
+        raise document.error(("origin", k), f"got {value:g}, need at most {most:g} in size")
+    return value
+
+
+def _negate(document: Document) -> bool:
+    value = document.value["negate"]
+    if isinstance(value, str) and value.lower() in YES_OR_NO:
+        return YES_OR_NO[value.lower()]
+    if value not in (0, 1) or isinstance(value, float):
+        raise document.error(("negate",), f"got {shown(value)}, need 0 or 1")
+    return bool(value)
+
+
+def _from_home(name: str) -> Path:
+    """A path whose ~ is the home of the user, where there is one."""
+    try:
+        return Path(name).expanduser()
+    except RuntimeError:
+        return Path(name)
+
+
+def _blocked(image: GreyImage, header: _Header, *, unknown: Unknown) -> NDArray[np.bool_]:
+    """Blocked cells, the first row at the top."""
+    if header.raw:
+        occupancy: Array = np.round(image.shade * 255.0) / 100.0
+        known = occupancy <= 1.0
+    else:
+        occupancy = image.shade if header.negate else 1.0 - image.shade
+        known = image.opaque
+    blocked = occupancy >= header.occupied
+    if unknown == "blocked":
+        blocked |= occupancy > header.free
+        return blocked | ~known
+    return blocked & known

@@ -1,0 +1,123 @@
+"""Files as text: read once, never without a limit, every complaint with its place."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from maneuver_automaton.errors import InvalidScenario
+
+MAX_BYTES = 5_000_000  # of a file that people write
+FARTHEST = 1e15  # of a coordinate [m], and of any other number of a text
+MAX_MAP_BYTES = 200_000_000  # of a file that holds a map, cell by cell
+
+
+def read_bytes(path: Path, *, most: int = MAX_BYTES, what: str = "a scenario") -> bytes:
+    """The content of a file of at most `most` bytes; `what` is what it should hold.
+
+    Raises
+    ------
+    InvalidScenario
+        If it is missing, a folder, unreadable, or too long.
+    """
+    if path.is_dir():
+        raise InvalidScenario(f"{path}: is a folder, need a file")
+    try:
+        with path.open("rb") as stream:
+            content = stream.read(most + 1)
+    except FileNotFoundError as error:
+        raise InvalidScenario(f"{path}: no such file") from error
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the path
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InvalidScenario(f"{path}: cannot be read: {reason}") from error
+    if len(content) > most:
+        raise too_long(str(path), most, what=what)
+    return content
+
+
+def too_long(name: str, most: int, *, what: str) -> InvalidScenario:
+    """The error of a file of more than `most` bytes: raise it."""
+    return InvalidScenario(f"{name}: is longer than {most // 1_000_000} MB, too long for {what}")
+
+
+def read_text(path: Path, *, most: int = MAX_BYTES, what: str = "a scenario") -> str:
+    """The text of a file, without the mark that some editors put in front of it.
+
+    Raises
+    ------
+    InvalidScenario
+        As `read_bytes`, and if it is not text in UTF-8 (or UTF-16).
+    """
+    content = read_bytes(path, most=most, what=what)
+    encoding = "utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
+    try:
+        return content.decode(encoding)
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+        raise InvalidScenario(f"{path}:{line}: is not a text file in UTF-8") from error
+
+
+def lines_of(text: str) -> list[str]:
+    r"""Lines of a text from any system; one that is not finished counts.
+
+    Examples
+    --------
+    >>> lines_of("a\r\nb\n")
+    ['a', 'b']
+    """
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    return lines[:-1] if lines[-1] == "" else lines
+
+
+def finite(token: str, *, at: str) -> float:
+    """The number that a word states; `at` is its place, for the message.
+
+    Raises
+    ------
+    InvalidScenario
+        If it is none, not finite, or so large that no computation with it has a digit left.
+
+    Examples
+    --------
+    >>> finite(" 2.5e-1", at="Case1.csv:1: value 4")
+    0.25
+    """
+    try:
+        value = float(token) if "_" not in token else math.nan
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InvalidScenario(f"{at}: got {_brief(token)}, need a finite number")
+    if abs(value) > FARTHEST:
+        raise InvalidScenario(f"{at}: got {_brief(token)}, need at most {FARTHEST:g} in size")
+    return value
+
+
+def whole(token: str, *, at: str, least: int = 0) -> int:
+    """The whole number that a word states; `at` is its place, for the message.
+
+    Raises
+    ------
+    InvalidScenario
+        If it is none, or less than `least`.
+
+    Examples
+    --------
+    >>> whole("4.0", at="Case1.csv:1: value 8")
+    4
+    """
+    try:
+        value = float(token) if "_" not in token else math.nan
+    except ValueError:
+        value = math.nan
+    if not (value >= least and value.is_integer() and value < 2**53):
+        raise InvalidScenario(f"{at}: got {_brief(token)}, need a whole number of at least {least}")
+    return int(value)
+
+
+def _brief(token: str) -> str:
+    """A word as a message shows it."""
+    word = token.strip()
+    if not word:
+        return "nothing"
+    return repr(word if len(word) <= 40 else word[:37] + "...")

@@ -1,0 +1,119 @@
+"""A file that states a part of a problem, and a scenario for the rest: together, a scenario.
+
+What the file states wins. Its obstacles, bounds, start and goal replace those of the scenario; the
+goal keeps the scenario's trim and tolerances, and, where the file states no heading, its free
+heading. Cost, horizon, margin, search and closed loop are the scenario's, and so are automaton and
+body, unless the file names its vehicle.
+
+Two formats do without a scenario. TPCAP has one car for every case; dynobench has its own models,
+whose trims are then all combinations of extreme controls, and whose cost is time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.collision import Shape
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.statement import StatedVehicle, Statement
+from maneuver_automaton.formats.tpcap import FORMAT
+from maneuver_automaton.problem import Bounds, Goal, Problem
+from maneuver_automaton.scenario.scenario import Scenario, scenario_of_text
+
+TPCAP = """\
+schema: 1
+name: The car of TPCAP
+vehicle:
+  model: car
+  wheelbase_m: 2.8
+  max_steering_rad: 0.75
+  footprint: {rectangle_m: [4.689, 1.942], reference_m: [-1.4155, 0.0]}
+automaton: {preset: reeds_shepp}
+start: {pose: [0.0, 0.0, 0.0]}
+goal: {pose: [0.0, 0.0, 0.0]}
+cost: {length: 1.0}
+"""
+
+
+def combined(statement: Statement, beside: Scenario | None, *, path: Path) -> Scenario:
+    """The problem that a file `path` states, completed by the scenario `beside` it.
+
+    Raises
+    ------
+    InvalidScenario
+        If something is missing still, or the scenario's trims are not for the file's vehicle.
+    """
+    rest = _own(statement, path) if beside is None else beside
+    problem = rest.problem
+    if statement.vehicle is not None:
+        problem = replace(problem, automaton=_driven(statement.vehicle, rest, path))
+    return replace(
+        rest,
+        name=statement.name,
+        problem=replace(
+            problem,
+            start=problem.start if statement.start is None else statement.start,
+            goals=_goals(statement, problem),
+            bounds=_bounds(statement.bounds, problem.bounds),
+            obstacles=statement.obstacles,
+            footprint=_footprint(statement, problem),
+        ),
+        maps=statement.maps,
+        path=path,
+    )
+
+
+def _own(statement: Statement, path: Path) -> Scenario:
+    """What a format means where no scenario stands beside the file."""
+    if statement.format == FORMAT:
+        return scenario_of_text(TPCAP, name=FORMAT)
+    vehicle, start, goal = statement.vehicle, statement.start, statement.goal
+    if vehicle is not None and start is not None and goal is not None:
+        problem = Problem(vehicle.automaton, start, goal, cost=Cost(time=1.0))
+        return Scenario(name=statement.name, problem=problem)
+    missing = "vehicle" if start is not None else "vehicle, start or goal"
+    raise InvalidScenario(
+        f"{path}: states no {missing} ({statement.format}); need --with and a scenario that does"
+    )
+
+
+def _goals(statement: Statement, rest: Problem) -> tuple[Goal, ...]:
+    if statement.goal is None:
+        return rest.goals
+    like = rest.goals[0]
+    free = like.free_heading and not statement.headings
+    return (replace(like, pose=statement.goal, free_heading=free),)
+
+
+def _bounds(stated: Bounds, rest: Bounds) -> Bounds:
+    return Bounds(x=stated.x or rest.x, y=stated.y or rest.y, z=stated.z or rest.z)
+
+
+def _footprint(statement: Statement, rest: Problem) -> tuple[Shape, ...]:
+    return rest.footprint if statement.footprint is None else statement.footprint
+
+
+def _driven(vehicle: StatedVehicle, beside: Scenario, path: Path) -> Automaton:
+    """The scenario's trims, driven by the vehicle that the file names."""
+    given, model = beside.problem.automaton, vehicle.automaton.model
+    what = f"{path}: its vehicle is {vehicle.name}"
+    if given.model.name != model.name:
+        raise InvalidScenario(
+            f"{what}, a {model.name}, but the scenario of --with has a {given.model.name}; "
+            "need the same"
+        )
+    for trim in given.trims:
+        for name, value, (low, high) in zip(
+            model.control_names, trim.control, vehicle.limits, strict=True
+        ):
+            if not low <= value <= high:
+                raise InvalidScenario(
+                    f"{what}, but trim {trim.name!r} of the scenario of --with has {name} "
+                    f"{value:g}, need {low:g} to {high:g}"
+                )
+    return Automaton.of_controls(model, {trim.name: np.array(trim.control) for trim in given.trims})

@@ -1,0 +1,102 @@
+"""Files that state a problem, in whichever format, as scenarios."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.recognition import reader_of, yaml_statements
+from maneuver_automaton.formats.statement import Statement
+from maneuver_automaton.formats.text_source import read_text
+from maneuver_automaton.formats.yaml_source import parse
+from maneuver_automaton.scenario.combining import combined
+from maneuver_automaton.scenario.scenario import Scenario, scenario_of_document
+
+
+def load_scenario(
+    path: Path | str, *, beside: Path | str | None = None, case: int | None = None
+) -> Scenario:
+    """The problem of a file: a scenario, or another format that states one or a part of one.
+
+    Parameters
+    ----------
+    path : Path or str
+        Scenario, TPCAP case, Nav2 map, dynobench problem, MovingAI map or queries, SBPL
+        environment, Bench-MR world: told apart by their endings, YAML files by their keys.
+    beside : Path or str, optional
+        A scenario for what the file leaves out, such as the vehicle. What the file states wins.
+    case : int, optional
+        Which problem of a file that holds several, from 0.
+
+    Raises
+    ------
+    InvalidScenario
+        If a file cannot be read or used: one line with file, line, field, the value met, and
+        what would be right.
+    """
+    begin, path = time.perf_counter(), Path(path)
+    read = reader_of(path)
+    if read is not None:
+        statements = read(path)
+    else:
+        document = parse(read_text(path), name=str(path))
+        found = yaml_statements(document, path)
+        if found is None:
+            if isinstance(document.value, dict) and "schema" in document.value:
+                _refuse_parts(path, beside, case)
+            return scenario_of_document(document, path=path, begin=begin)
+        statements = found
+    statement = _chosen(path, statements, case)
+    rest = None if beside is None else _scenario_beside(Path(beside))
+    scenario = combined(statement, rest, path=path)
+    made = scenario.timing_s.get("automaton", 0.0)
+    load = time.perf_counter() - begin - made
+    return replace(scenario, timing_s={"load": load, "automaton": made})
+
+
+def statements_of(path: Path) -> tuple[Statement, ...] | None:
+    """What a file of another format states, problem by problem; None for a scenario.
+
+    Raises
+    ------
+    InvalidScenario
+        As `load_scenario`.
+    """
+    read = reader_of(path)
+    return read(path) if read else yaml_statements(parse(read_text(path), name=str(path)), path)
+
+
+def _scenario_beside(path: Path) -> Scenario:
+    begin = time.perf_counter()
+    try:
+        document = parse(read_text(path), name=str(path))
+        return scenario_of_document(document, path=path, begin=begin)
+    except InvalidScenario as error:
+        raise InvalidScenario(f"--with: {error}") from error
+
+
+def _refuse_parts(path: Path, beside: Path | str | None, case: int | None) -> None:
+    if beside is not None:
+        raise InvalidScenario(
+            f"--with: serves formats that state a part of a problem, but {path} is a scenario, "
+            "which states all of it"
+        )
+    if case is not None and case != 0:
+        raise _no_case(path, 1, case)
+
+
+def _chosen(path: Path, statements: Sequence[Statement], case: int | None) -> Statement:
+    n = len(statements)
+    if case is None and n > 1:
+        raise InvalidScenario(f"{path}: holds {n} problems, need --case and a number, 0 to {n - 1}")
+    if case is not None and not 0 <= case < n:
+        raise _no_case(path, n, case)
+    return statements[case or 0]
+
+
+def _no_case(path: Path, n: int, case: int) -> InvalidScenario:
+    holds = "one problem, need 0 or no case" if n == 1 else f"{n} problems, need 0 to {n - 1}"
+    return InvalidScenario(f"--case: got {case}, but {path} holds {holds}")

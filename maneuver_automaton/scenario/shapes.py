@@ -1,0 +1,190 @@
+"""Bodies and obstacles of a scenario file as shapes, and back."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from maneuver_automaton.collision import (
+    AnyObstacle,
+    Box,
+    Disc,
+    Motion,
+    Obstacle,
+    OccupancyMap,
+    Polygon,
+    Shape,
+)
+from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.nav2_map import load_nav2_map
+from maneuver_automaton.formats.polygons import simple_polygon
+from maneuver_automaton.formats.statement import MapFile
+from maneuver_automaton.formats.yaml_source import Document, Where
+from maneuver_automaton.scenario import schema
+
+
+def footprint_of(
+    document: Document, part: schema.Shape | tuple[schema.Shape, ...] | None
+) -> tuple[Shape, ...]:
+    """The body of a vehicle.
+
+    Raises
+    ------
+    InvalidScenario
+        If a polygon is not simple.
+    """
+    if part is None:
+        return ()
+    where: Where = ("vehicle", "footprint")
+    if isinstance(part, schema.Shape):
+        return (_body_part(document, part, where),)
+    return tuple(_body_part(document, one, (*where, k)) for k, one in enumerate(part))
+
+
+def obstacles_of(
+    document: Document, parts: Sequence[schema.Obstacle], folder: Path
+) -> tuple[tuple[AnyObstacle, ...], tuple[MapFile, ...]]:
+    """Obstacles, and the files of the maps among them; paths are relative to `folder`.
+
+    Raises
+    ------
+    InvalidScenario
+        If a polygon is not simple, or a map is missing or malformed.
+    """
+    obstacles: list[AnyObstacle] = []
+    maps = []
+    for k, part in enumerate(parts):
+        if part.map is not None:
+            maps.append(_map_file(document, part, k, folder))
+            obstacles.append(maps[-1].map)
+        else:
+            obstacles.append(_obstacle(document, part, k))
+    return tuple(obstacles), tuple(maps)
+
+
+def stated_footprint(footprint: Sequence[Shape]) -> tuple[dict[str, Any], ...]:
+    """A body in the words of a scenario file, and of `plotting`.
+
+    Raises
+    ------
+    ValueError
+        If a file cannot state it: a disc beside the pose, or a hole.
+
+    Examples
+    --------
+    >>> stated_footprint([Box([4.0, 2.0], [1.0, 0.0])])
+    ({'rectangle_m': (4.0, 2.0), 'reference_m': (-1.0, 0.0)},)
+    """
+    return tuple(_stated_part(shape) for shape in footprint)
+
+
+def stated_obstacle(obstacle: AnyObstacle, maps: Sequence[MapFile], folder: Path) -> dict[str, Any]:
+    """An obstacle in the words of a scenario file in `folder`; a map by its file.
+
+    Raises
+    ------
+    ValueError
+        If a map has no file.
+    """
+    if isinstance(obstacle, OccupancyMap):
+        for file in maps:
+            if file.map is obstacle:
+                path = _relative(file.path, folder)
+                return {"map": path} | ({"unknown": "free"} if file.unknown == "free" else {})
+        raise ValueError(
+            f"obstacles: a scenario file states a map by its file, and {obstacle.name!r} has none; "
+            "write one with save_nav2_map"
+        )
+    entry = _stated_shape(obstacle.shape)
+    if obstacle.height is not None:
+        entry["height_m"] = [float(z) for z in obstacle.height]
+    if obstacle.motion is not None:
+        motion = obstacle.motion
+        entry["motion"] = np.column_stack([motion.time, motion.pose]).tolist()
+    return entry
+
+
+def _body_part(document: Document, part: schema.Shape, where: Where) -> Shape:
+    if part.rectangle_m is not None:
+        reference = np.array(part.reference_m or (0.0, 0.0))
+        return Box(part.rectangle_m, 0.0 - reference)
+    if part.disc_m is not None:
+        return Disc(part.disc_m)
+    assert part.polygon_m is not None
+    return _polygon(document, part.polygon_m, (), (*where, "polygon_m"))
+
+
+def _obstacle(document: Document, part: schema.Obstacle, k: int) -> Obstacle:
+    motion = None
+    if part.motion is not None:
+        rows = np.array(part.motion)
+        motion = Motion(rows[:, 0], rows[:, 1:])
+    return Obstacle(
+        _shape(document, part, ("obstacles", k)),
+        height=part.height_m,
+        motion=motion,
+        name=f"obstacle {k + 1}",
+    )
+
+
+def _shape(document: Document, part: schema.Obstacle, where: Where) -> Shape:
+    if part.disc_m is not None:
+        return Disc(part.disc_m.radius, part.disc_m.center)
+    if part.box_m is not None:
+        return Box(part.box_m.size, part.box_m.center, part.box_m.heading_rad)
+    assert part.polygon_m is not None
+    return _polygon(document, part.polygon_m, part.holes_m, (*where, "polygon_m"))
+
+
+def _polygon(document: Document, corners: Any, holes: Any, where: Where) -> Polygon:
+    try:
+        return simple_polygon(corners, holes)
+    except ValueError as error:
+        raise document.error(where, str(error)) from error
+
+
+def _map_file(document: Document, part: schema.Obstacle, k: int, folder: Path) -> MapFile:
+    assert part.map is not None
+    path = folder / part.map
+    try:
+        cells = load_nav2_map(path, unknown=part.unknown)
+    except InvalidScenario as error:
+        raise document.error(("obstacles", k, "map"), str(error)) from error
+    return MapFile(map=cells, path=path, unknown=part.unknown)
+
+
+def _stated_part(shape: Shape) -> dict[str, Any]:
+    if isinstance(shape, Box) and shape.heading == 0.0:
+        entry: dict[str, Any] = {"rectangle_m": tuple(shape.size.tolist())}
+        if shape.center.any():
+            entry["reference_m"] = tuple((0.0 - shape.center).tolist())
+        return entry
+    if isinstance(shape, Disc):
+        if shape.center.any():
+            raise ValueError("footprint: a scenario file can state a disc around the pose only")
+        return {"disc_m": float(shape.radius)}
+    if isinstance(shape, Polygon) and shape.holes:
+        raise ValueError("footprint: a scenario file cannot state the holes of a body")
+    return {"polygon_m": tuple((x, y) for x, y in shape.corners.tolist())}
+
+
+def _stated_shape(shape: Shape) -> dict[str, Any]:
+    if isinstance(shape, Disc):
+        return {"disc_m": {"center": shape.center.tolist(), "radius": float(shape.radius)}}
+    if isinstance(shape, Box):
+        heading = {"heading_rad": float(shape.heading)} if shape.heading else {}
+        return {"box_m": {"center": shape.center.tolist(), "size": shape.size.tolist(), **heading}}
+    holes = {"holes_m": [ring.tolist() for ring in shape.holes]} if shape.holes else {}
+    return {"polygon_m": shape.corners.tolist(), **holes}
+
+
+def _relative(path: Path, folder: Path) -> str:
+    """The path as seen from a folder, with the slashes of every system."""
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:  # on another drive
+        return path.absolute().as_posix()

@@ -1,0 +1,168 @@
+"""Problems of dynobench: world, robot, model; and what is wrong with a file."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+
+from maneuver_automaton.collision import Box
+from maneuver_automaton.formats.dynobench import READ, read_dynobench
+from maneuver_automaton.formats.text_source import read_text
+from maneuver_automaton.formats.yaml_source import parse
+from tests.formats.outside import DATA, message_of, needs_data
+
+PROBLEM = """\
+name: yard
+environment:
+  min: [0, -1.5]
+  max: [6, 4]
+  obstacles:
+    - type: box
+      center: [3, 1]
+      size: [0.2, 3]
+robots:
+  - type: unicycle1_v0
+    start: [1, 0, 0]  # x, y, theta
+    goal: [5, 0, 1.5]
+"""
+MODEL = """\
+dynamics: "unicycle1"
+max_vel: 1.5
+min_vel: -0.5
+max_angular_vel: 2
+min_angular_vel: -1
+size: [.8, .4]
+shape: "box"
+dt: .1
+"""
+
+
+def read(path):
+    (case,) = read_dynobench(path, parse(read_text(path), name=str(path)))
+    return case
+
+
+def problem(folder, text=PROBLEM):
+    (folder / "envs" / "yard").mkdir(parents=True, exist_ok=True)
+    path = folder / "envs" / "yard" / "yard.yaml"
+    path.write_text(text)
+    return path
+
+
+def controls(case):
+    return sorted(map(tuple, case.vehicle.automaton.controls.tolist()))
+
+
+def test_what_a_file_states(tmp_path):
+    case = read(problem(tmp_path))
+    assert case.name == "yard"
+    assert case.start.tolist() == [1.0, 0.0, 0.0]
+    assert case.goal.tolist() == [5.0, 0.0, 1.5]
+    assert (case.bounds.x, case.bounds.y) == ((0.0, 6.0), (-1.5, 4.0))
+    (wall,) = case.obstacles
+    assert isinstance(wall.shape, Box)
+    assert (wall.shape.center.tolist(), wall.shape.size.tolist()) == ([3.0, 1.0], [0.2, 3.0])
+    (body,) = case.footprint
+    assert (body.size.tolist(), body.center.tolist()) == ([0.5, 0.25], [0.0, 0.0])
+
+
+def test_the_built_in_model_has_its_extremes_and_rest(tmp_path):
+    extremes = (-0.5, 0.0, 0.5)
+    case = read(problem(tmp_path))
+    assert controls(case) == sorted(itertools.product(extremes, extremes))
+    assert case.vehicle.automaton.rest is not None
+
+
+@pytest.mark.parametrize(("name", "least"), [("unicycle1_v1", -0.5), ("unicycle1_v2", -0.25)])
+def test_one_that_cannot_stop(tmp_path, name, least):
+    case = read(problem(tmp_path, PROBLEM.replace("unicycle1_v0", name)))
+    assert controls(case) == sorted(itertools.product((0.25, 0.5), (least, 0.0, 0.5)))
+    assert case.vehicle.limits.tolist() == [[0.25, 0.5], [least, 0.5]]
+    assert case.vehicle.automaton.rest is None
+
+
+def test_a_model_above_the_file_comes_first(tmp_path):
+    (tmp_path / "models").mkdir()
+    (tmp_path / "models" / "unicycle1_v0.yaml").write_text(MODEL)
+    case = read(problem(tmp_path))
+    assert controls(case) == sorted(itertools.product((-0.5, 0.0, 1.5), (-1.0, 0.0, 2.0)))
+    assert case.footprint[0].size.tolist() == [0.8, 0.4]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("unicycle1_v0", "tank", ":10: robots[0].type: got 'tank', which is not built in, and "
+         f"there is no models/tank.yaml above this file; need {READ}"),
+        ("unicycle1_v0", "../x", ":10: robots[0].type: got '../x', which is not built in, and "
+         f"there is no models/../x.yaml above this file; need {READ}"),
+        ("unicycle1_v0", "7", ":10: robots[0].type: got 7, need the name of a model"),
+        ("  - type: unicycle1_v0\n    start", "  - start",
+         ":10: robots[0].type: is missing, need the name of a model"),
+        ("start: [1, 0, 0]", "start: [1, 0]",
+         ":11: robots[0].start: got 2 numbers, need 3: [x, y, heading]"),
+        ("start: [1, 0, 0]", "start: [1, 0, .nan]",
+         ":11: robots[0].start[2]: got nan, need a finite number of at most 1e+15 in size"),
+        ("start: [1, 0, 0]", "start: [1, 0, true]",
+         ":11: robots[0].start[2]: got true, need a finite number"),
+        ("    start: [1, 0, 0]  # x, y, theta\n", "",
+         ":10: robots[0].start: is missing, need [x, y, heading]"),
+        ("max: [6, 4]", "max: [6, -4]",
+         ":4: environment.max[1]: got -4, need more than min y, -1.5"),
+        ("max: [6, 4]", "max: [6, 4, 2]",
+         ":4: environment.max: got 3 numbers, need 2: [x, y]"),
+        ("  min: [0, -1.5]\n", "", ":2: environment.min: is missing, need [x, y]"),
+        ("type: box", "type: sphere",
+         ":6: environment.obstacles[0].type: got 'sphere', need box"),
+        ("size: [0.2, 3]", "size: [0.2, 0]",
+         ":8: environment.obstacles[0].size: got [0.2, 0.0], need positive sizes"),
+        ("center: [3, 1]", "centre: [3, 1]",
+         ":6: environment.obstacles[0].center: is missing, need [x, y]"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong(tmp_path, old, new, message):
+    assert PROBLEM.count(old) == 1
+    assert message_of(read, problem(tmp_path), PROBLEM.replace(old, new)) == message
+
+
+def test_two_robots(tmp_path):
+    text = PROBLEM + "  - {type: unicycle1_v0, start: [0, 0, 0], goal: [1, 1, 1]}\n"
+    assert message_of(read, problem(tmp_path), text) == ":9: robots: got 2 robots, need one"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("max_vel: 1.5\n", "", ":1: max_vel: is missing, need a finite number"),
+        ("max_vel: 1.5", "max_vel: -1", ":2: max_vel: got -1, need more than min_vel, -0.5"),
+        ("[.8, .4]", "[.8]", ":6: size: got 1 numbers, need 2: [length, width]"),
+        ('"box"', "sphere", ":7: shape: got 'sphere', need box"),
+        (MODEL, "", ": is empty, need a model"),
+    ],
+)
+def test_what_is_wrong_with_a_model(tmp_path, old, new, message):
+    path = problem(tmp_path)
+    (tmp_path / "models").mkdir()
+
+    def read_problem(_):
+        read(path)
+
+    model = tmp_path / "models" / "unicycle1_v0.yaml"
+    assert MODEL.count(old) == 1
+    assert message_of(read_problem, model, MODEL.replace(old, new)) == message
+
+
+@needs_data
+def test_problems_of_dynobench():
+    paths = sorted((DATA / "dynobench" / "envs").glob("*/*.yaml"))
+    assert len(paths) == 24
+    for path in paths:
+        if path.parent.name.startswith("unicycle1"):
+            case = read(path)
+            assert case.vehicle.name == path.parent.name
+            assert case.bounds.x[0] < case.start[0] < case.bounds.x[1]
+            continue
+        said = message_of(read, path, path.read_bytes())
+        assert ": robots[0].type: got " in said
+        assert said.endswith(f"not in this version; need {READ}")
