@@ -72,7 +72,7 @@ def free_time(
     sign = 1.0 if duration >= 0.0 else -1.0
     length = abs(duration)
     n_movers = world.movers.speed.shape[0]
-    near = NEAR * body.reach + keep
+    near = max(max(NEAR * body.reach, 0.25 * world.field.cell), 2.0 * margin)
     c, s = math.cos(heading), math.sin(heading)
     w_x, w_y, turning = sign * (c * v_x - s * v_y), sign * (s * v_x + c * v_y), sign * turn_rate
     center_x, center_y = x, y
@@ -85,7 +85,7 @@ def free_time(
         p_x, p_y, p_heading = compose(x, y, heading, d_x, d_y, turn)
         c, s = math.cos(p_heading), math.sin(p_heading)
         gap = field_bound(world.field, body, p_x, p_y, c, s)
-        if gap > near:
+        if gap > keep + near:
             nearest = gap - keep
             step = nearest / speed if speed > 0.0 else math.inf
         else:
@@ -105,6 +105,7 @@ def free_time(
                 speed,
                 keep,
                 margin,
+                near,
                 length - t,
             )
             if step < 0.0:

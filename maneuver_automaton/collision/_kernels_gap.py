@@ -227,14 +227,29 @@ def axis_time(body, b, x, y, c, s, center_x, center_y, v_x, v_y, turn, axis_x, a
 
 @bare_inner_kernel
 def near_step(
-    buckets, solids, body, x, y, c, s, center_x, center_y, v_x, v_y, turn, speed, keep, margin, most
+    buckets,
+    solids,
+    body,
+    x,
+    y,
+    c,
+    s,
+    center_x,
+    center_y,
+    v_x,
+    v_y,
+    turn,
+    speed,
+    keep,
+    margin,
+    near,
+    most,
 ):
     """How long the motion that goes on from here stays free of what is near, at most `most` [s].
 
     Every solid keeps apart by its gap over the body's speed, or by the axis between the two for as
     long as that axis parts them. Also the least gap; not positive `-1` if one is at most `margin`.
     """
-    near = NEAR * body.reach
     m_x = x + c * body.middle_x - s * body.middle_y
     m_y = y + s * body.middle_x + c * body.middle_y
     nearest = buckets.reach - keep
@@ -285,7 +300,7 @@ def near_step(
 @inlined_kernel
 def still_gap(world, body, x, y, c, s):
     """Lower bound of the clearance to all that stands still, at most the field's reach."""
-    near = NEAR * body.reach
+    near = max(NEAR * body.reach, 0.25 * world.field.cell)
     bound = field_bound(world.field, body, x, y, c, s)
     if bound <= near:
         exact = near_gap(world.buckets, world.solids, body, x, y, c, s, near)

@@ -45,7 +45,7 @@ class _Progress:
 def plan_on_lattice(problem: Problem, *, time_limit: float, alternatives: int) -> PlanResult:
     """The cheapest free plan found within the time."""
     load_lattice()
-    table = _table(problem)
+    table = library_table(problem)
     began = time.monotonic()
     deadline = began + time_limit
     goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
@@ -128,7 +128,7 @@ def plan_on_lattice(problem: Problem, *, time_limit: float, alternatives: int) -
     )
 
 
-def _table(problem: Problem) -> CostTable:
+def library_table(problem: Problem) -> CostTable:
     """The cost to go of the library, made once for all problems; none for several aims at once."""
     if len(problem.goals) > 1 or problem.goals[0].free_heading:
         return NO_TABLE

@@ -1,6 +1,9 @@
 """Pictures: draw on the axes given and return the artists, or write a whole figure to a file."""
 
 from maneuver_automaton.plotting.alternatives import draw_alternatives as draw_alternatives
+from maneuver_automaton.plotting.alternatives_figure import (
+    save_alternatives_figure as save_alternatives_figure,
+)
 from maneuver_automaton.plotting.animation import save_plan_animation as save_plan_animation
 from maneuver_automaton.plotting.automata import draw_automaton as draw_automaton
 from maneuver_automaton.plotting.automata import draw_motions as draw_motions
@@ -34,10 +37,9 @@ from maneuver_automaton.plotting.library_size import draw_library_sizes as draw_
 from maneuver_automaton.plotting.library_size import (
     save_library_size_figure as save_library_size_figure,
 )
+from maneuver_automaton.plotting.nodes import draw_nodes as draw_nodes
+from maneuver_automaton.plotting.obstacles import draw_obstacles as draw_obstacles
 from maneuver_automaton.plotting.paths import draw_plan as draw_plan
-from maneuver_automaton.plotting.plan_figures import (
-    save_alternatives_figure as save_alternatives_figure,
-)
 from maneuver_automaton.plotting.plan_figures import save_plan_figure as save_plan_figure
 from maneuver_automaton.plotting.plan_figures import save_plan_file_figure as save_plan_file_figure
 from maneuver_automaton.plotting.stability import CertificateCurve as CertificateCurve

@@ -8,27 +8,31 @@ from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PathCollection, PolyCollection
+from matplotlib.collections import PolyCollection
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
-from matplotlib.quiver import Quiver
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.plotting.colors import SEQUENCE, Color
+from maneuver_automaton.plotting.ends import EndArtists, draw_ends
 from maneuver_automaton.plotting.footprint import footprint_polygons, placed
 from maneuver_automaton.plotting.labels import word_text
-from maneuver_automaton.plotting.paths import (
-    ARROW_SIZE,
-    STILL_SIZE_M,
-    draw_goal,
-    draw_headings,
-    draw_start,
+from maneuver_automaton.plotting.obstacles import ObstacleArtists, draw_obstacles, round_times
+from maneuver_automaton.plotting.scene import (
+    Scene,
+    mark_size,
+    scene_of,
+    scene_points,
+    scene_size,
     set_view,
+    view_box,
 )
 from maneuver_automaton.plotting.style import corner_legend
 from maneuver_automaton.plotting.track import track_of_plan
+from maneuver_automaton.problem import Goal, Problem
 
+SAME = 1e-6  # [m, rad] between ends that are one goal
 DASHES: tuple[tuple[float, Sequence[float]] | Literal["-"], ...] = (
     "-",
     (0, (4, 1.5)),
@@ -42,9 +46,8 @@ class AlternativesArtists:
 
     paths: tuple[Line2D, ...]  # in the order of the plans
     bodies: tuple[PolyCollection, ...]  # at the switching times, if there is a footprint
-    start: PathCollection
-    goals: tuple[PathCollection, ...]
-    headings: Quiver
+    ends: EndArtists
+    obstacles: ObstacleArtists
     legend: Legend | None
 
 
@@ -58,6 +61,7 @@ def draw_alternatives(
     plans: Sequence[Plan],
     *,
     costs: Sequence[float] = (),
+    problem: Problem | None = None,
     footprint: Any = None,
     legend: bool = True,
 ) -> AlternativesArtists:
@@ -71,8 +75,10 @@ def draw_alternatives(
         What to draw, at least one, from a common start.
     costs : sequence of float
         Cost of each, for the legend.
+    problem : Problem, optional
+        Obstacles, goals and body to draw with them.
     footprint : any form of `footprint_polygons`, optional
-        The body, drawn at the switching times.
+        The body, drawn at the switching times; that of the problem if left out.
     legend : bool
         Whether to list words and costs in the emptiest corner.
 
@@ -91,9 +97,10 @@ def draw_alternatives(
     if costs and len(costs) != len(plans):
         raise ValueError(f"alternatives: got {len(costs)} costs for {len(plans)} plans")
     tracks = [track_of_plan(plan) for plan in plans]
-    outlines = footprint_polygons(footprint)
-    size = max(track.size for track in tracks) or STILL_SIZE_M
-    ends = np.array([plans[0].start, *_distinct([track.end for track in tracks], within=1e-6)])
+    scene = _scene(plans, problem, footprint)
+    size = max(scene_size(scene, track) for track in tracks)
+    points = np.concatenate([scene_points(scene, track, size=size) for track in tracks])
+    box = view_box(scene, points, size=size)
     paths = tuple(
         ax.plot(
             *track.pose[:, :2].T, color=plan_color(rank), linewidth=3.0 if rank == 0 else 1.8,
@@ -103,24 +110,23 @@ def draw_alternatives(
     )  # fmt: skip
     bodies = tuple(
         PolyCollection(
-            placed(outlines, track.switching_poses), facecolors="none",
+            placed(scene.body, track.switching_poses), facecolors="none",
             edgecolors=[(*plan_color(rank), 0.9 if rank == 0 else 0.5)],
             linewidths=1.0 if rank == 0 else 0.7, zorder=2.5 - rank / len(tracks),
         )
         for rank, track in enumerate(tracks)
-        if outlines
+        if scene.body
     )  # fmt: skip
     for part in bodies:
         ax.add_collection(part)
     artists = AlternativesArtists(
         paths=paths,
         bodies=bodies,
-        start=draw_start(ax, plans[0].start),
-        goals=tuple(draw_goal(ax, pose) for pose in ends[1:]),
-        headings=draw_headings(ax, ends, length=ARROW_SIZE * size),
+        ends=draw_ends(ax, plans[0].start, scene.goals, size=mark_size(scene, box, size=size)),
+        obstacles=draw_obstacles(ax, scene.obstacles, time=scene.times),
         legend=_legend(ax, plans, costs, paths) if legend else None,
     )
-    set_view(ax, ends, size=size)
+    set_view(ax, box, plans[0].start[:2])
     return artists
 
 
@@ -141,10 +147,17 @@ def _legend(
     return corner_legend(ax, paths, labels, points=points, length=80)
 
 
-def _distinct(poses: Sequence[Array], *, within: float) -> list[Array]:
-    """The poses that differ by more than `within`."""
-    kept: list[Array] = []
-    for pose in poses:
-        if all(np.abs(pose - other).max() > within for other in kept):
-            kept.append(pose)
-    return kept
+def _scene(plans: Sequence[Plan], problem: Problem | None, footprint: Any) -> Scene:
+    """The scene of a problem during all plans; without one, their ends are the goals."""
+    begin, end = plans[0].start_time, max(plan.switching_times[-1] for plan in plans)
+    if problem is not None:
+        return scene_of(problem, begin, float(end), footprint=footprint)
+    ends: list[Array] = []
+    for plan in plans:
+        if all(np.abs(plan.end - other).max() > SAME for other in ends):
+            ends.append(plan.end)
+    return Scene(
+        goals=tuple(Goal(pose=pose) for pose in ends),
+        body=tuple(footprint_polygons(footprint)),
+        times=round_times(begin, float(end)),
+    )

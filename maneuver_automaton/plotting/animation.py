@@ -6,20 +6,29 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import LineCollection, PolyCollection
 
-from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.plotting.colors import INK, trim_colors
+from maneuver_automaton.plotting.bodies import DART, DART_SIZE
+from maneuver_automaton.plotting.colors import GREY, INK, Color, trim_colors
 from maneuver_automaton.plotting.film import Film, picture_times, write_film
-from maneuver_automaton.plotting.footprint import footprint_polygons, placed
-from maneuver_automaton.plotting.pages import axes_at, new_figure
-from maneuver_automaton.plotting.paths import draw_plan
+from maneuver_automaton.plotting.footprint import placed
+from maneuver_automaton.plotting.paths import bare_scene
+from maneuver_automaton.plotting.scene import (
+    mark_size,
+    plan_scene,
+    scene_points,
+    scene_size,
+    view_box,
+)
+from maneuver_automaton.plotting.stage import stage_of
+from maneuver_automaton.plotting.track import track_of_plan
+from maneuver_automaton.problem import Problem
 
-WIDTH, HEIGHT = 6.4, 4.8  # [in]
 
-
-def save_plan_animation(plan: Plan, path: str | Path, *, footprint: Any = None) -> None:
+def save_plan_animation(
+    plan: Plan, path: str | Path, *, problem: Problem | None = None, footprint: Any = None
+) -> None:
     """Write an animated GIF of a plan; the file is replaced in one step.
 
     Parameters
@@ -28,8 +37,10 @@ def save_plan_animation(plan: Plan, path: str | Path, *, footprint: Any = None) 
         What to drive; an empty plan gives a single frame.
     path : str or Path
         Where to write; the ending must be .gif.
+    problem : Problem, optional
+        Obstacles, which may move, goals and body to draw with it.
     footprint : any form of `footprint_polygons`, optional
-        The body of the vehicle; an arrowhead if there is none.
+        The body of the vehicle; that of the problem if left out, a dart if there is none.
 
     Raises
     ------
@@ -41,38 +52,51 @@ def save_plan_animation(plan: Plan, path: str | Path, *, footprint: Any = None) 
     target = Path(path)
     if target.suffix.lower() != ".gif":
         raise ValueError(f"animation: got the file name {target.name}, need one ending in .gif")
-    times = picture_times(plan.start_time, plan.start_time + plan.duration)
-    figure = new_figure(WIDTH, HEIGHT)
-    ax = axes_at(figure, left=0.75, bottom=0.55, width=WIDTH - 0.95, height=HEIGHT - 0.95)
-    draw_plan(ax, plan, footprint=footprint)
-    size = 0.05 * float(np.ptp([ax.get_xlim(), ax.get_ylim()], axis=1).max())
-    outlines = footprint_polygons(footprint) or [_arrowhead(size)]
-    colors = trim_colors({trim.name: trim.body_velocity for trim in plan.trims})
-    body = PolyCollection([], closed=True, edgecolor=INK, linewidth=1.2, zorder=10)
-    ax.add_collection(body, autolim=False)
-    clock = figure.text(0.75 / WIDTH, 1.0 - 0.25 / HEIGHT, "", fontsize=10, color=INK)
+    write_film(_film(plan, problem, footprint), target)
+
+
+def _film(plan: Plan, problem: Problem | None, footprint: Any) -> Film:
+    track = track_of_plan(plan)
+    if problem is None:
+        scene = bare_scene(track, footprint=footprint)
+    else:
+        scene = plan_scene(problem, plan, footprint=footprint)
+    size = scene_size(scene, track)
+    body = scene.body or (DART_SIZE * size * DART,)
+    everywhere = [scene_points(scene, track, size=size), *placed(body, track.pose)]
+    box = view_box(scene, np.concatenate(everywhere), size=size)
+    colors = trim_colors(track.twists)
+    marks = mark_size(scene, box, size=size)
+    stage = stage_of(scene, track, colors=colors, box=box, size=marks)
+    way = LineCollection([track.pose[:, :2]], colors=[(*GREY, 0.7)], linewidths=0.9, zorder=1.8)
+    trail = LineCollection([], linewidths=2.8, capstyle="butt", zorder=3.0)
+    vehicle = PolyCollection([], edgecolors=[INK], linewidths=1.2, zorder=6.0)
+    for part in (way, trail, vehicle):
+        stage.ax.add_collection(part, autolim=False)
 
     def show(time: float) -> None:
-        body.set_verts(placed(outlines, plan.pose_at(time)[None]))
-        body.set_facecolor((*_color_at(plan, time, colors), 0.55))
-        clock.set_text(f"{time:.2f} s")
+        stage.show(time)
+        driven = track.between(plan.start_time, time)
+        trail.set_segments([places for _, places in driven])
+        trail.set_color([colors[name] for name, _ in driven])
+        vehicle.set_verts(placed(body, plan.pose_at(time)[None]))
+        vehicle.set_facecolor((*_color_at(plan, time, colors), 0.55))
+        stage.clock.set_text(f"{time:.2f} s")
 
+    times = picture_times(plan.start_time, plan.start_time + plan.duration)
     # one picture of each trim: its colour is in none of the others
     first = {trim.name: time for trim, time in zip(plan.trims, plan.switching_times, strict=False)}
-    samples = list(first.values()) or [float(times[0])]
-    write_film(
-        Film(figure=figure, moving=[body, clock], show=show, times=times, samples=samples), target
+    return Film(
+        figure=stage.figure,
+        moving=[stage.traffic, trail, vehicle, stage.clock],
+        show=show,
+        times=times,
+        samples=[float(times[-1]), *first.values()],
     )
 
 
-def _color_at(plan: Plan, time: float, colors: Any) -> tuple[float, float, float]:
-    from matplotlib.colors import to_rgb
-
+def _color_at(plan: Plan, time: float, colors: dict[str, Color]) -> Color:
     if not plan.trims:
-        return to_rgb(INK)
+        return INK
     after = np.searchsorted(plan.switching_times[1:-1], time, side="right")
-    return to_rgb(colors[plan.trims[int(after)].name])
-
-
-def _arrowhead(size: float) -> Array:
-    return size * np.array([[1.0, 0.0], [-0.7, 0.6], [-0.4, 0.0], [-0.7, -0.6]])
+    return colors.get(plan.trims[int(after)].name, GREY)

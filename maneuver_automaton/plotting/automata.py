@@ -14,9 +14,10 @@ from matplotlib.text import Text
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.plotting.bodies import DART
 from maneuver_automaton.plotting.colors import GREY, INK, Color, trim_colors, twist_color
 from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
-from maneuver_automaton.plotting.paths import ARC_POINTS, DART
+from maneuver_automaton.plotting.paths import ARC_POINTS
 from maneuver_automaton.plotting.style import TEXT_PT, shortened, tidy
 from maneuver_automaton.primitives import Trim
 

@@ -16,11 +16,10 @@ from maneuver_automaton.plotting.closed_loop_time import draw_solve_times, draw_
 from maneuver_automaton.plotting.closed_loop_track import (
     driven_track,
     loop_colors,
-    loop_points,
-    view_size,
+    loop_scene,
+    loop_view,
 )
 from maneuver_automaton.plotting.controls import draw_track_altitude, draw_track_controls
-from maneuver_automaton.plotting.footprint import footprint_polygons
 from maneuver_automaton.plotting.labels import control_labels
 from maneuver_automaton.plotting.pages import (
     axes_at,
@@ -39,7 +38,6 @@ PLANE, SIDE = 4.82, 6.35  # [in] width of the plane, and where what is beside it
 VALUE, PANEL, GAP = 1.6, 0.95, 0.2  # [in] heights over time, and between them
 LEGEND = 0.42  # [in] above the value
 LABELS = 0.44  # [in] below axes that show their numbers
-ROOM = 0.32  # around what is drawn in the plane, of its size
 FLAT = 2.4  # a plane so much wider than high is given the width of the page
 MOST_NAMES, MOST_REASONS, TEXT_WIDTH = 26, 2, 132
 
@@ -57,7 +55,7 @@ def save_closed_loop_figure(loop: ClosedLoop, path: str | Path, *, footprint: An
     path : str or Path
         Where to write.
     footprint : any form of `footprint_polygons`, optional
-        The body of the vehicle.
+        The body of the vehicle; that of the problem if left out.
 
     Raises
     ------
@@ -201,7 +199,5 @@ def _times(count: int) -> str:
 
 def _shape(loop: ClosedLoop, footprint: Any) -> float:
     """Width of what is drawn in the plane by its height."""
-    points = loop_points(loop)
-    size = view_size(points, footprint_polygons(footprint))
-    wide, high = np.ptp(points, axis=0) + ROOM * size
+    wide, high = np.ptp(loop_view(loop, loop_scene(loop, footprint=footprint))[0], axis=0)
     return float(wide / high)

@@ -8,42 +8,26 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.plotting.closed_loop_plane import (
-    JUMP,
-    JUMP_STYLE,
-    draw_ends,
-)
+from maneuver_automaton.plotting.bodies import DART, DART_SIZE
+from maneuver_automaton.plotting.closed_loop_plane import JUMP, JUMP_STYLE
 from maneuver_automaton.plotting.closed_loop_track import (
     driven_track,
     loop_colors,
-    loop_points,
-    view_size,
+    loop_scene,
+    loop_view,
 )
 from maneuver_automaton.plotting.colors import GREY, INK, Color
 from maneuver_automaton.plotting.film import Film, check_film_path, picture_times, write_film
-from maneuver_automaton.plotting.footprint import footprint_polygons, placed
-from maneuver_automaton.plotting.pages import (
-    DPI,
-    axes_at,
-    bottom_legend,
-    legend_rows,
-    new_figure,
-)
-from maneuver_automaton.plotting.paths import DART, DART_SIZE, end_handles, trim_handles
-from maneuver_automaton.plotting.track import Piece, Track, track_of_plan
+from maneuver_automaton.plotting.footprint import placed
+from maneuver_automaton.plotting.stage import Stage, stage_of
+from maneuver_automaton.plotting.track import Track, track_of_plan
 from maneuver_automaton.receding_horizon import ClosedLoop
 
-WIDTH, LEFT, RIGHT = 6.4, 0.75, 0.2  # [in]
-LOWEST, HIGHEST = 1.6, 4.0  # [in] of the plane
-ROOM = 0.2  # around what is drawn, of its size
 REMEMBERED = 6  # plans that are still fading
-MOST_NAMES = 12
 
 
 def save_closed_loop_animation(
@@ -59,7 +43,7 @@ def save_closed_loop_animation(
         Where to write: a .gif, an .html that needs no other file, or an .mp4 where Matplotlib
         finds ffmpeg.
     footprint : any form of `footprint_polygons`, optional
-        The body of the vehicle; a dart if there is none.
+        The body of the vehicle; that of the problem if left out, a dart if it has none.
 
     Raises
     ------
@@ -115,50 +99,37 @@ class _Scene:
 
     def _set(self, lines: LineCollection, track: Track, begin: float, end: float) -> None:
         """Have `lines` show the part of a `track` between two times."""
-        shown = [
-            piece for piece in track.pieces if max(begin, piece.time[0]) < min(end, piece.time[-1])
-        ]
-        lines.set_segments([_between(piece, begin, end) for piece in shown])
-        lines.set_color([self.colors[piece.name] for piece in shown])
+        shown = track.between(begin, end)
+        lines.set_segments([places for _, places in shown])
+        lines.set_color([self.colors[name] for name, _ in shown])
 
 
 def _film(loop: ClosedLoop, *, footprint: Any) -> Film:
-    colors, track = loop_colors(loop), driven_track(loop)
-    outlines = footprint_polygons(footprint)
-    points = loop_points(loop)
-    size = view_size(points, outlines)
-    body = outlines or [DART_SIZE * size * DART]
-    points = np.concatenate([points, *placed(body, track.pose), *placed(body, loop.poses)])
-    wide, high = np.ptp(points, axis=0) + ROOM * size
-    inner = WIDTH - LEFT - RIGHT
-    height = min(max(inner * float(high / wide), LOWEST), HIGHEST)
-    handles, names = trim_handles(track, colors)
-    if len(names) > MOST_NAMES:
-        handles, names = [], []
-    ends, end_names = end_handles()
-    handles, names = [*handles, *ends], [*names, *end_names]
-    bottom = 0.62 + 0.2 * legend_rows(names, inner)
-    figure = new_figure(WIDTH, _even(bottom + height + 0.45))
-    ax = axes_at(figure, left=LEFT, bottom=bottom, width=inner, height=height)
-    bottom_legend(figure, handles, names, left=LEFT, width=inner)
-    ax.update_datalim(points)
-    draw_ends(ax, loop, size=size)
-    scene = _scene(figure, ax, loop, body, colors=colors)
-    times = picture_times(float(loop.times[0]), float(loop.times[-1]))
-    moving = [scene.old, scene.jumps, scene.trail, scene.ahead, scene.vehicle, scene.clock]
-    samples = [times[-1], *(step.time for step in loop.steps)]
-    return Film(figure=figure, moving=moving, show=scene.show, times=times, samples=samples)
+    colors = loop_colors(loop)
+    around = loop_scene(loop, footprint=footprint)
+    box, size = loop_view(loop, around)
+    stage = stage_of(around, driven_track(loop), colors=colors, box=box, size=size)
+    scene = _scene(stage, loop, list(around.body) or [DART_SIZE * size * DART], colors=colors)
+
+    def show(time: float) -> None:
+        scene.show(time)
+        stage.show(time)
+
+    return Film(
+        figure=stage.figure,
+        moving=[
+            stage.traffic, scene.old, scene.jumps, scene.trail, scene.ahead, scene.vehicle,
+            scene.clock,
+        ],
+        show=show,
+        times=picture_times(float(loop.times[0]), float(loop.times[-1])),
+        samples=[float(loop.times[-1]), *(step.time for step in loop.steps)],
+    )  # fmt: skip
 
 
 def _scene(
-    figure: Figure,
-    ax: Axes,
-    loop: ClosedLoop,
-    body: list[Array],
-    *,
-    colors: Mapping[str, Color],
+    stage: Stage, loop: ClosedLoop, body: list[Array], *, colors: Mapping[str, Color]
 ) -> _Scene:
-    high = figure.get_size_inches()[1]
     scene = _Scene(
         loop=loop,
         body=body,
@@ -172,13 +143,10 @@ def _scene(
         vehicle=PolyCollection(
             [], facecolors=[(*GREY, 0.35)], edgecolors=[INK], linewidths=1.2, zorder=6.0
         ),
-        clock=figure.text(
-            LEFT / WIDTH, 1.0 - 0.14 / high, "", fontsize=10.0, color=INK, va="top",
-            parse_math=False,
-        ),
-    )  # fmt: skip
+        clock=stage.clock,
+    )
     for part in (scene.old, scene.ahead, scene.trail, scene.jumps, scene.vehicle):
-        ax.add_collection(part, autolim=False)
+        stage.ax.add_collection(part, autolim=False)
     return scene
 
 
@@ -209,16 +177,3 @@ def _clock_text(loop: ClosedLoop, k: int | None, time: float) -> str:
     if step.violations:
         parts.append("guarantee broken")
     return " · ".join(parts)
-
-
-def _between(piece: Piece, begin: float, end: float) -> Array:
-    """Places (n, 2) of a piece between two times."""
-    low, high = max(begin, float(piece.time[0])), min(end, float(piece.time[-1]))
-    inside = piece.time[(piece.time > low) & (piece.time < high)]
-    at = np.array([low, *inside, high])
-    return np.stack([np.interp(at, piece.time, column) for column in piece.pose.T[:2]], axis=-1)
-
-
-def _even(inches: float) -> float:
-    """A height that is an even number of pixels, as films need it."""
-    return 2.0 * round(inches * DPI / 2.0) / DPI

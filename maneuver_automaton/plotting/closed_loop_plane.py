@@ -7,57 +7,45 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PathCollection, PolyCollection
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle
-from matplotlib.quiver import Quiver
 
 from maneuver_automaton._arrays import Array, wrapped
+from maneuver_automaton.plotting.bodies import DART, DART_SIZE
 from maneuver_automaton.plotting.closed_loop_track import (
     SAME,
     driven_track,
     loop_colors,
     loop_points,
+    loop_scene,
+    loop_view,
     planned_places,
-    view_size,
 )
 from maneuver_automaton.plotting.colors import GREY, INK, Color
-from maneuver_automaton.plotting.footprint import footprint_polygons, placed
+from maneuver_automaton.plotting.ends import EndArtists, draw_ends, end_handles
+from maneuver_automaton.plotting.footprint import placed
+from maneuver_automaton.plotting.obstacles import (
+    ObstacleArtists,
+    draw_obstacles,
+    obstacle_handles,
+)
 from maneuver_automaton.plotting.paths import (
-    ARROW_SIZE,
-    DART,
-    DART_SIZE,
-    _draw_still,
-    _spin_symbols,
-    draw_goal,
-    draw_headings,
-    draw_start,
-    end_handles,
-    set_view,
+    draw_still,
+    spin_symbols,
     trim_handles,
 )
+from maneuver_automaton.plotting.scene import set_view
 from maneuver_automaton.plotting.style import corner_legend, line_handle
 from maneuver_automaton.plotting.track import Track
-from maneuver_automaton.problem import Goal
 from maneuver_automaton.receding_horizon import ClosedLoop, Step
 
 APART, APART_RAD = 0.4, 0.3  # between bodies, of their reach; turned further, both are drawn
 PALE: tuple[float, ...] = (*GREY, 0.5)
 JUMP: Color = (0.85, 0.15, 0.45)
-SET: Color = (0.00, 0.62, 0.45)
 JUMP_STYLE, NEW_STYLE = (0, (1.0, 1.2)), (0, (5.0, 2.0))
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class EndArtists:
-    """Where a closed loop starts and is to end."""
-
-    start: PathCollection
-    goals: tuple[PathCollection, ...]
-    sets: tuple[Circle, ...]  # places within the tolerance of a goal
-    headings: Quiver
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -74,6 +62,7 @@ class ClosedLoopArtists:
     spin_heads: PolyCollection
     still: tuple[PathCollection, ...]
     ends: EndArtists
+    obstacles: ObstacleArtists
     legend: Legend | None
 
 
@@ -99,7 +88,7 @@ def draw_closed_loop(
     loop : ClosedLoop
         What to draw.
     footprint : any form of `footprint_polygons`, optional
-        The body; a small dart stands for it if left out.
+        The body; that of the problem if left out, where there is none a small dart.
     colors : mapping, optional
         Colour of each trim by name; `loop_colors` if left out.
     legend : bool
@@ -124,12 +113,12 @@ def draw_closed_loop(
     track = driven_track(loop)
     used = dict(loop_colors(loop) if colors is None else colors)
     plans = planned_places(loop)
-    points = loop_points(loop)
-    body = footprint_polygons(footprint)
-    size = view_size(points, body)
+    scene = loop_scene(loop, footprint=footprint)
+    body = scene.body
+    box, size = loop_view(loop, scene)
     new = [step for step in loop.steps if step.replanned]
     spins = [piece for piece in track.pieces if not piece.drives and piece.turn]
-    arcs, heads = _spin_symbols(spins, size=size)
+    arcs, heads = spin_symbols(spins, size=size)
     spin_colors = [used[piece.name] for piece in spins]
     driving = [piece for piece in track.pieces if piece.drives]
     artists = ClosedLoopArtists(
@@ -147,45 +136,32 @@ def draw_closed_loop(
         jumps=LineCollection(
             _jumps(loop), colors=[JUMP], linewidths=1.5, linestyles=[JUMP_STYLE], zorder=3.4
         ),
-        bodies=_bodies(body or [DART_SIZE * size * DART], loop.poses, outlined=bool(body)),
+        bodies=_bodies(body or (DART_SIZE * size * DART,), loop.poses, outlined=bool(body)),
         spins=LineCollection(arcs, colors=spin_colors, linewidths=1.8, zorder=4.0),
         spin_heads=PolyCollection(heads, facecolors=spin_colors, linewidths=0.0, zorder=4.0),
-        still=_draw_still(ax, track, used),
-        ends=draw_ends(ax, loop, size=size),
-        legend=_legend(ax, loop, track, used, points=points) if legend else None,
+        still=draw_still(ax, track, used),
+        ends=draw_ends(ax, loop.poses[0], loop.problem.goals, size=size),
+        obstacles=draw_obstacles(ax, loop.problem.obstacles, time=scene.times),
+        legend=_legend(ax, loop, track, used, points=loop_points(loop)) if legend else None,
     )  # fmt: skip
     for part in (
         artists.path, artists.plans, artists.new_plans, artists.jumps, artists.bodies,
         artists.spins, artists.spin_heads,
     ):  # fmt: skip
         ax.add_collection(part)
-    ax.autoscale_view()
-    return artists
-
-
-def draw_ends(ax: Axes, loop: ClosedLoop, *, size: float) -> EndArtists:
-    """Draw start, goals and their tolerances, and make the scales of `ax` equal."""
-    goals = loop.problem.goals
-    artists = EndArtists(
-        start=draw_start(ax, loop.poses[0]),
-        goals=tuple(draw_goal(ax, goal.pose) for goal in goals),
-        sets=tuple(_draw_set(ax, goal) for goal in goals if goal.tolerance_m > 0.0),
-        headings=draw_headings(ax, _headed(loop), length=ARROW_SIZE * size),
-    )
-    set_view(ax, np.array([loop.poses[0], *(goal.pose for goal in goals)]), size=size)
+    set_view(ax, box, loop.poses[0, :2])
     return artists
 
 
 def loop_handles(
     loop: ClosedLoop, track: Track, colors: Mapping[str, Color]
-) -> tuple[list[Line2D], list[str]]:
+) -> tuple[list[Artist], list[str]]:
     """Legend handles and names: the trims driven, start and goal, plans, and what else there is."""
-    handles, names = trim_handles(track, colors)
-    marks, mark_names = end_handles()
-    handles, names = [*handles, *marks], [*names, *mark_names]
-    if any(goal.tolerance_m > 0.0 for goal in loop.problem.goals):
-        handles.append(_dot("o", size=9.0, face=(*SET, 0.15), edge=SET))
-        names.append("goal tolerance")
+    handles: list[Artist]
+    handles, names = [*trim_handles(track, colors)[0]], [*track.twists]
+    marks, mark_names = end_handles(loop.problem.goals)
+    around, around_names = obstacle_handles(loop.problem.obstacles, loop_scene(loop).times)
+    handles, names = [*handles, *marks, *around], [*names, *mark_names, *around_names]
     if loop.steps:
         handles.append(line_handle(GREY, width=0.9))
         names.append("plan of a step")
@@ -211,22 +187,6 @@ def _jumps(loop: ClosedLoop) -> list[Array]:
     return [line for line in lines if np.abs(line[1] - line[0]).max() > SAME]
 
 
-def _headed(loop: ClosedLoop) -> Array:
-    """Poses whose heading is to be shown: the start, and goals that ask for one."""
-    return np.array(
-        [loop.poses[0], *(goal.pose for goal in loop.problem.goals if not goal.free_heading)]
-    )
-
-
-def _draw_set(ax: Axes, goal: Goal) -> Circle:
-    disc = Circle(
-        (float(goal.pose[0]), float(goal.pose[1])), goal.tolerance_m, facecolor=(*SET, 0.15),
-        edgecolor=SET, linewidth=0.9, zorder=1.2,
-    )  # fmt: skip
-    ax.add_patch(disc)
-    return disc
-
-
 def _draw_replanned(ax: Axes, steps: Sequence[Step]) -> PathCollection:
     places = np.array([step.pose[:2] for step in steps]).reshape(-1, 2)
     return ax.scatter(
@@ -240,7 +200,7 @@ def _draw_replanned(ax: Axes, steps: Sequence[Step]) -> PathCollection:
     )
 
 
-def _bodies(body: list[Array], poses: Array, *, outlined: bool) -> PolyCollection:
+def _bodies(body: Sequence[Array], poses: Array, *, outlined: bool) -> PolyCollection:
     """The body at those of the `poses` (n, dof) that are apart, the first and last among them."""
     reach = max(float(np.linalg.norm(outline, axis=1).max()) for outline in body)
     shown = [poses[0]] if len(poses) == 1 else [poses[0], poses[-1]]

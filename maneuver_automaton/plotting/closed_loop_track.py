@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.plotting.colors import Color, trim_colors
-from maneuver_automaton.plotting.paths import STILL_SIZE_M
+from maneuver_automaton.plotting.footprint import placed
+from maneuver_automaton.plotting.scene import (
+    STILL_SIZE_M,
+    Scene,
+    mark_size,
+    scene_of,
+    scene_points,
+    view_box,
+)
 from maneuver_automaton.plotting.track import Piece, Track, track_of_plan
 from maneuver_automaton.receding_horizon import ClosedLoop
 
@@ -49,11 +57,21 @@ def loop_points(loop: ClosedLoop) -> Array:
     )
 
 
-def view_size(points: Array, outlines: Sequence[Array]) -> float:
-    """Size [m] of a picture of points (n, 2), the first being the start, and of a body."""
-    reach = max((float(np.linalg.norm(o, axis=1).max()) for o in outlines), default=0.0)
-    size = max(float(np.linalg.norm(points - points[0], axis=1).max()), 2.0 * reach)
-    return size if size > SAME else STILL_SIZE_M
+def loop_scene(loop: ClosedLoop, *, footprint: Any = None) -> Scene:
+    """What a `loop` is drawn among; its own body if no other is given."""
+    begin, end = loop.times[[0, -1]].tolist()
+    return scene_of(loop.problem, begin, end, footprint=footprint)
+
+
+def loop_view(loop: ClosedLoop, scene: Scene) -> tuple[Array, float]:
+    """Corners (2, 2) of what a picture of a `loop` shows, and the size [m] of its marks."""
+    points = loop_points(loop)
+    size = max(float(np.linalg.norm(points - points[0], axis=1).max()), 2.0 * scene.reach)
+    size = size if size > SAME else STILL_SIZE_M
+    around = scene_points(scene, driven_track(loop), size=size)
+    bodies = placed(scene.body, loop.poses)
+    box = view_box(scene, np.concatenate([points, around, *bodies]), size=size)
+    return box, mark_size(scene, box, size=size)
 
 
 def _goes_on(one: Piece, other: Piece) -> bool:

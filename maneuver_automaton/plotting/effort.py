@@ -15,8 +15,8 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.optimal_control.uniform_effort import END_NODES, UniformEffortExample
 from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE, Color
 from maneuver_automaton.plotting.controls import TIME_LABEL
+from maneuver_automaton.plotting.ends import draw_headings
 from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
-from maneuver_automaton.plotting.paths import draw_headings
 from maneuver_automaton.plotting.style import corner_legend, line_handle, tidy
 from maneuver_automaton.refinement.effort import EffortReport
 from maneuver_automaton.refinement.retiming import Retiming

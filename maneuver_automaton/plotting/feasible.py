@@ -22,6 +22,7 @@ from matplotlib.transforms import ScaledTranslation
 from maneuver_automaton._arrays import Array, wrapped
 from maneuver_automaton.analysis.feasible import FeasibleSet
 from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE, shaded
+from maneuver_automaton.plotting.ends import draw_goal, draw_headings, draw_start, end_handles
 from maneuver_automaton.plotting.pages import (
     axes_at,
     bottom_legend,
@@ -30,7 +31,6 @@ from maneuver_automaton.plotting.pages import (
     new_figure,
     write_figure,
 )
-from maneuver_automaton.plotting.paths import draw_goal, draw_headings, draw_start, end_handles
 from maneuver_automaton.plotting.style import SMALL_PT, TEXT_PT, line_handle, tidy
 
 SOON, LATE = shaded(SEQUENCE[0], -0.35), shaded(SEQUENCE[0], 0.86)

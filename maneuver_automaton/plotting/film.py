@@ -114,6 +114,7 @@ def _gif(film: Film) -> bytes:
     # one palette for all, so that what does not move does not flicker
     samples = np.concatenate([picture(time) for time in list(film.samples)[:MOST_SAMPLES]])
     palette = Image.fromarray(samples).quantize(colors=PALETTE)
+    palette.putpalette(_with_white(palette.getpalette() or []))
     images = [
         Image.fromarray(picture(time)).quantize(palette=palette, dither=Image.Dither.NONE)
         for time in film.times
@@ -124,6 +125,13 @@ def _gif(film: Film) -> bytes:
         stream, format="GIF", save_all=True, append_images=images[1:], duration=lasts, loop=0
     )
     return stream.getvalue()
+
+
+def _with_white(palette: Sequence[int]) -> list[int]:
+    """The palette, its lightest colour made white: taking means has made paper grey."""
+    colors = np.array(palette).reshape(-1, 3)
+    colors[np.argmax(colors.min(axis=1))] = 255
+    return [int(channel) for channel in colors.ravel()]
 
 
 def _video(film: Film) -> bytes:

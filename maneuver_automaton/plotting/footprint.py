@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton.collision import Box, Disc, Polygon
 from maneuver_automaton.groups import SE2
 
 DISC_CORNERS = 48
@@ -18,9 +19,10 @@ def footprint_polygons(footprint: Any) -> list[Array]:
 
     Parameters
     ----------
-    footprint : None, (n, 2) array, mapping, or a list of these
-        Corners [m], or one of the mappings of a scenario file: ``{"polygon_m": corners}``,
-        ``{"disc_m": radius}``, ``{"rectangle_m": [length, width], "reference_m": [x, y]}``.
+    footprint : None, shape, (n, 2) array, mapping, or a sequence of these
+        A `Polygon`, `Disc` or `Box`; corners [m]; or a mapping of a scenario file:
+        ``{"polygon_m": corners}``, ``{"disc_m": radius}``,
+        ``{"rectangle_m": [length, width], "reference_m": [x, y]}``.
         `reference_m` says where the pose sits, measured from the centre of the rectangle: the
         body spans ``[-length / 2 - x, length / 2 - x]`` ahead; (0, 0) if left out.
 
@@ -41,13 +43,17 @@ def footprint_polygons(footprint: Any) -> list[Array]:
     """
     if footprint is None:
         return []
+    if isinstance(footprint, Polygon | Box):
+        return [footprint.corners]
+    if isinstance(footprint, Disc):
+        return [_circle(footprint.radius) + footprint.center]
     if isinstance(footprint, Mapping):
         return [_of_mapping(footprint)]
     if _is_polygon(footprint):
         return [_polygon(footprint)]
     if isinstance(footprint, Sequence) and not isinstance(footprint, str):
         return [outline for part in footprint for outline in footprint_polygons(part)]
-    raise ValueError(f"footprint: got {footprint!r}, need corners, a mapping, or a list of these")
+    raise ValueError(f"footprint: got {footprint!r}, need a shape, corners, a mapping, or several")
 
 
 def placed(outlines: Sequence[Array], poses: Array) -> list[Array]:
@@ -85,8 +91,7 @@ def _of_mapping(footprint: Mapping[str, Any]) -> Array:
         radius = as_array("footprint: disc_m", footprint["disc_m"])
         if radius.ndim or not radius > 0.0:
             raise ValueError(f"footprint: disc_m must be a positive radius, got {radius} m")
-        angle = np.linspace(0.0, 2.0 * np.pi, DISC_CORNERS, endpoint=False)
-        return float(radius) * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        return _circle(float(radius))
     if "rectangle_m" in footprint:
         size = as_array("footprint: rectangle_m", footprint["rectangle_m"], last=2)
         if not (size > 0.0).all():
@@ -100,3 +105,8 @@ def _of_mapping(footprint: Mapping[str, Any]) -> Array:
         f"footprint: got the keys {', '.join(map(repr, footprint))}, "
         "need rectangle_m, polygon_m or disc_m"
     )
+
+
+def _circle(radius: float) -> Array:
+    angle = np.linspace(0.0, 2.0 * np.pi, DISC_CORNERS, endpoint=False)
+    return radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)

@@ -58,9 +58,14 @@ def word_text(word: Sequence[str], *, width: int, lines: int) -> str:
 
 
 def result_text(
-    *, cost: float | None, duration: float | None, error_m: float | None, error_rad: float | None
+    *,
+    cost: float | None,
+    duration: float | None,
+    error_m: float | None,
+    error_rad: float | None,
+    clearance_m: float | None = None,
 ) -> str:
-    """Cost, duration and terminal error in one line; what is None is left out.
+    """Cost, duration, terminal error and clearance in one line; what is None is left out.
 
     Examples
     --------
@@ -75,4 +80,6 @@ def result_text(
     if error_m is not None:
         angle = "" if error_rad is None else f", {error_rad:.2g} rad"
         parts.append(f"terminal error {error_m:.2g} m{angle}")
+    if clearance_m is not None:
+        parts.append(f"clearance {clearance_m:.3g} m")
     return " · ".join(parts)

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.colors import GREY, INK, WHEEL, Color
+from maneuver_automaton.plotting.ends import draw_goal, draw_headings
 from maneuver_automaton.plotting.pages import axes_at, new_figure, write_figure
-from maneuver_automaton.plotting.paths import draw_goal, draw_headings
 from maneuver_automaton.plotting.style import TEXT_PT, tidy
 from maneuver_automaton.primitives import Trim
 

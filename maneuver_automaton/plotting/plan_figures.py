@@ -1,4 +1,4 @@
-"""Pictures of a result as files: the plan, and its alternatives."""
+"""The picture of a plan as a file: its path among obstacles, and its controls over time."""
 
 from __future__ import annotations
 
@@ -8,21 +8,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
+from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array
-from maneuver_automaton.automaton import Plan
+from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.planning import PlanResult
-from maneuver_automaton.plotting.alternatives import alternative_text, draw_alternatives, plan_color
-from maneuver_automaton.plotting.colors import INK, Color, trim_colors
-from maneuver_automaton.plotting.controls import (
-    draw_over_time,
-    draw_track_altitude,
-    draw_track_controls,
-    step_curves,
-)
+from maneuver_automaton.plotting.colors import Color, trim_colors
+from maneuver_automaton.plotting.controls import draw_track_altitude, draw_track_controls
 from maneuver_automaton.plotting.labels import control_labels, result_text, word_text
+from maneuver_automaton.plotting.nodes import draw_cost_bar, draw_nodes
 from maneuver_automaton.plotting.pages import (
     axes_at,
     bottom_legend,
@@ -32,14 +29,27 @@ from maneuver_automaton.plotting.pages import (
     stacked_axes,
     write_figure,
 )
-from maneuver_automaton.plotting.paths import draw_track, end_handles, trim_handles
-from maneuver_automaton.plotting.style import SMALL_PT, TEXT_PT, line_handle, share_limits
+from maneuver_automaton.plotting.paths import bare_scene, draw_track, scene_handles, trim_handles
+from maneuver_automaton.plotting.scene import (
+    MARGIN,
+    Scene,
+    plan_scene,
+    scene_points,
+    scene_size,
+    view_box,
+)
+from maneuver_automaton.plotting.style import TEXT_PT, line_handle
 from maneuver_automaton.plotting.track import Track, track_of_document, track_of_plan
 
-WIDTH, LEFT = 9.6, 0.7  # [in] of the page, and of what stands left of the axes on it
+WIDTH, LEFT, RIGHT = 9.6, 0.7, 0.15  # [in] of the page, and beside the axes on it
+INNER = WIDTH - LEFT - RIGHT
+PLANE, SIDE = 4.82, 6.35  # [in] width of the plane, and where what is beside it begins
+LOW, HIGH, LOW_FLAT, HIGH_FLAT = 3.55, 5.6, 1.7, 4.6  # [in] height of the plane
+PANEL, FLAT_PANEL, GAP = 1.25, 1.35, 0.75  # [in] heights over time, and beside each other
+LABELS, BAR = 0.56, 0.3  # [in] below axes with numbers, and for a colour bar
+FLAT = 1.7  # a plane so much wider than high is given the width of the page
 WORD_WIDTH, WORD_LINES, HEADLINE_WIDTH = 112, 2, 96  # [characters]
 MOST_NAMES = 34
-ALTERNATIVE_ROW = 0.95  # [in]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -47,14 +57,21 @@ class _Sheet:
     """What the picture of one plan shows."""
 
     track: Track
-    goal: Array
+    scene: Scene
     word: str
     headline: str
     labels: Sequence[str]
+    nodes: Array | None = None  # (n, 3) or (n, 4)
 
 
-def save_plan_figure(result: PlanResult, path: str | Path, *, footprint: Any = None) -> None:
-    """Write the picture of a `result`: path on the left, controls over time on the right.
+def save_plan_figure(
+    result: PlanResult,
+    path: str | Path,
+    *,
+    footprint: Any = None,
+    nodes: ArrayLike | None = None,
+) -> None:
+    """Write the picture of a `result`: obstacles, path, what the body sweeps, controls over time.
 
     Without a plan it shows start and goal, and says why there is none. The file is replaced in
     one step; its ending chooses the format.
@@ -66,10 +83,18 @@ def save_plan_figure(result: PlanResult, path: str | Path, *, footprint: Any = N
     path : str or Path
         Where to write.
     footprint : any form of `footprint_polygons`, optional
-        The body of the vehicle.
+        The body of the vehicle; that of the problem if left out.
+    nodes : (n, 3) or (n, 4) array_like, optional
+        Poses that the search has expanded [m, m, rad], and the cost of each.
+
+    Raises
+    ------
+    ValueError
+        If the nodes are none, or Matplotlib does not know the ending.
+    OSError
+        If the file cannot be written; an old one stays as it was.
     """
     problem, plan = result.problem, result.plan
-    goal = problem.goals[result.goal_index or 0]
     if plan is None:
         track = Track(problem.start, ())
         headline = _no_plan_text(result.status.value, result.reason)
@@ -81,18 +106,17 @@ def save_plan_figure(result: PlanResult, path: str | Path, *, footprint: Any = N
             duration=plan.duration,
             error_m=None if error is None else error.position_m,
             error_rad=None if error is None else error.heading_rad,
+            clearance_m=result.clearance_m,
         )
-    pose = goal.pose.copy()
-    if goal.free_heading:
-        pose[2] = track.end[2]
     sheet = _Sheet(
         track=track,
-        goal=pose,
+        scene=plan_scene(problem, plan, footprint=footprint),
         word="" if plan is None else word_text(plan.word, width=WORD_WIDTH, lines=WORD_LINES),
         headline=headline,
         labels=control_labels(problem.automaton.model.control_names),
+        nodes=None if nodes is None else as_array("nodes", nodes, last=(3, 4)),
     )
-    write_figure(_plan_figure(sheet, footprint=footprint), path)
+    write_figure(_plan_figure(sheet), path)
 
 
 def save_plan_file_figure(
@@ -100,7 +124,7 @@ def save_plan_file_figure(
 ) -> None:
     """Write the picture of a loaded plan.json: that of `save_plan_figure`, from the file alone.
 
-    The file does not name the controls, so they are numbered.
+    The file names neither controls nor obstacles: the former are numbered.
 
     Raises
     ------
@@ -117,7 +141,7 @@ def save_plan_file_figure(
         return
     sheet = _Sheet(
         track=track,
-        goal=track.end,
+        scene=bare_scene(track, footprint=footprint),
         word=word_text(
             [str(part["name"]) for part in document["primitives"]],
             width=WORD_WIDTH,
@@ -128,123 +152,103 @@ def save_plan_file_figure(
             duration=document.get("duration_s"),
             error_m=error.get("position_m"),
             error_rad=error.get("heading_rad"),
+            clearance_m=document.get("clearance_m"),
         ),
         labels=(),
     )
-    write_figure(_plan_figure(sheet, footprint=footprint), path)
+    write_figure(_plan_figure(sheet), path)
 
 
-def save_alternatives_figure(
-    result: PlanResult, path: str | Path, *, footprint: Any = None
-) -> None:
-    """Write a picture of all plans of a `result`: overlaid on the left, their controls beside.
-
-    Raises
-    ------
-    ValueError
-        If the result has no plan.
-    """
-    if result.plan is None or result.cost is None:
-        raise ValueError(f"alternatives: the result holds no plan: {result.reason}")
-    plans = [result.plan, *(other.plan for other in result.alternatives)]
-    costs = [result.cost, *(other.cost for other in result.alternatives)]
-    labels = control_labels(result.problem.automaton.model.control_names)
-    body = max(3.6, ALTERNATIVE_ROW * len(plans))
-    figure = new_figure(WIDTH, 0.52 + body + 0.5)
-    heading_text(figure, [(_count_text(len(plans)), 10.0, "bold")], left=LEFT)
-    tall = min(body, 4.6)
-    ax = axes_at(figure, left=LEFT, bottom=0.5 + body - tall, width=3.82, height=tall)
-    draw_alternatives(ax, plans, costs=costs, footprint=footprint, legend=False)
-    _draw_rows(figure, plans, costs, labels=labels, left=5.1, bottom=0.5, height=body)
-    write_figure(figure, path)
-
-
-def _count_text(count: int) -> str:
-    return "1 plan" if count == 1 else f"{count} locally optimal plans, best first"
-
-
-def _draw_rows(
-    figure: Figure, plans: Sequence[Plan], costs: Sequence[float], *, labels: Sequence[str],
-    left: float, bottom: float, height: float,
-) -> None:  # fmt: skip
-    """One row per plan, one column per control, scales shared by the column."""
-    high = figure.get_size_inches()[1]
-    row, gap = min(height / len(plans), 1.3), 0.5
-    width = (WIDTH - 0.15 - left + gap) / len(labels) - gap
-    tracks = [track_of_plan(plan) for plan in plans]
-    for k, label in enumerate(labels):
-        column = [
-            axes_at(
-                figure, left=left + k * (width + gap), bottom=bottom + height - (n + 1) * row,
-                width=width, height=row - 0.36,
-            )
-            for n in range(len(plans))
-        ]  # fmt: skip
-        for n, (ax, track) in enumerate(zip(column, tracks, strict=True)):
-            draw_over_time(
-                ax,
-                track,
-                step_curves(track, k),
-                label="",
-                colors=plan_color(n),
-            )
-        share_limits(column)
-        figure.text(
-            (left + k * (width + gap)) / WIDTH, (bottom + height - 0.1) / high, label,
-            fontsize=TEXT_PT, color=INK, va="bottom", parse_math=False,
-        )  # fmt: skip
-    for n, (plan, cost) in enumerate(zip(plans, costs, strict=True)):
-        figure.text(
-            left / WIDTH, (bottom + height - n * row - 0.31) / high,
-            alternative_text(plan, cost, width=74), fontsize=SMALL_PT, color=plan_color(n),
-            fontweight="bold" if n == 0 else "normal", va="bottom", parse_math=False,
-        )  # fmt: skip
-
-
-def _plan_figure(sheet: _Sheet, *, footprint: Any) -> Figure:
-    colors = trim_colors(sheet.track.twists)
-    handles, shown = _legend_entries(sheet.track, colors)
-    many = sheet.track.pieces[0].control.shape[1] if sheet.track.pieces else 0
-    panels = many + sheet.track.climbs if sheet.track.pieces else 0
-    strip = 0.2 + 0.2 * legend_rows(shown, WIDTH - LEFT - 0.08)
-    word = sheet.word
-    top = 0.58 + 0.18 * word.count("\n") + 0.2 * sheet.headline.count("\n")
-    bottom, inner = strip + 0.42, max(3.55, 1.25 * panels)
-    figure = new_figure(WIDTH, top + inner + bottom)
-    heading_text(figure, [(sheet.headline, 10.0, "bold"), (word, TEXT_PT, "normal")], left=LEFT)
-    ax = axes_at(
-        figure,
-        left=LEFT,
-        bottom=bottom,
-        width=4.82 if panels else WIDTH - LEFT - 0.18,
-        height=inner,
-    )
-    draw_track(ax, sheet.track, footprint=footprint, goal=sheet.goal, colors=colors, legend=False)
-    if panels:
+def _plan_figure(sheet: _Sheet) -> Figure:
+    """The plane beside what happens over time, or above it if the plane is flat."""
+    track = sheet.track
+    colors = trim_colors(track.twists)
+    handles, names = _legend_entries(sheet, colors)
+    many = track.pieces[0].control.shape[1] if track.pieces else 0
+    panels = many + track.climbs if track.pieces else 0
+    bottom = 0.6 + 0.2 * legend_rows(names, INNER)
+    top = 0.36 + 0.2 * sheet.headline.count("\n")
+    top += 0.2 + 0.18 * sheet.word.count("\n") if sheet.word else 0.0
+    top += BAR if _has_costs(sheet) else 0.0
+    shape = _shape(sheet)
+    flat = shape > FLAT or not panels
+    if flat:
+        height = min(max(INNER / shape, LOW_FLAT), HIGH_FLAT)
+        below = FLAT_PANEL + LABELS if panels else 0.0
+        figure = new_figure(WIDTH, bottom + below + height + top)
+        ax = axes_at(figure, left=LEFT, bottom=bottom + below, width=INNER, height=height)
+        side = _beside(figure, panels, bottom=bottom)
+    else:
+        height = max(min(max(PLANE / shape, LOW), HIGH), PANEL * panels)
+        figure = new_figure(WIDTH, bottom + height + top)
+        ax = axes_at(figure, left=LEFT, bottom=bottom, width=PLANE, height=height)
         side = stacked_axes(
-            figure, panels, left=6.35, bottom=bottom, width=WIDTH - 6.35 - 0.15, height=inner
+            figure, panels, left=SIDE, bottom=bottom, width=WIDTH - SIDE - RIGHT, height=height
         )
-        draw_track_controls(side[:many], sheet.track, labels=sheet.labels, colors=colors)
-        if sheet.track.climbs:
-            draw_track_altitude(side[-1], sheet.track, colors=colors)
+    draw_track(ax, track, sheet.scene, colors=colors, legend=False)
+    _draw_nodes(figure, ax, sheet)
+    if side:
+        draw_track_controls(side[:many], track, labels=sheet.labels, colors=colors)
+        if track.climbs:
+            draw_track_altitude(side[-1], track, colors=colors)
+    if not flat:
         for upper in side[:-1]:
             upper.set_xlabel("")
             upper.tick_params(labelbottom=False)
-    bottom_legend(figure, handles, shown, left=LEFT, width=WIDTH - LEFT - 0.08)
+    heading_text(
+        figure, [(sheet.headline, 10.0, "bold"), (sheet.word, TEXT_PT, "normal")], left=LEFT
+    )
+    bottom_legend(figure, handles, names, left=LEFT, width=INNER)
     return figure
 
 
-def _legend_entries(track: Track, colors: Mapping[str, Color]) -> tuple[list[Line2D], list[str]]:
-    """Handles and names of the first trims of a track, and of its start and goal."""
-    handles, names = trim_handles(track, colors)
-    ends, end_names = end_handles()
+def _beside(figure: Figure, count: int, *, bottom: float) -> list[Axes]:
+    """`count` axes beside each other in the width of the page."""
+    width = (INNER - GAP * (count - 1)) / max(count, 1)
+    return [
+        axes_at(
+            figure, left=LEFT + k * (width + GAP), bottom=bottom, width=width, height=FLAT_PANEL
+        )
+        for k in range(count)
+    ]
+
+
+def _draw_nodes(figure: Figure, ax: Axes, sheet: _Sheet) -> None:
+    if sheet.nodes is None:
+        return
+    cost = sheet.nodes[:, 3] if _has_costs(sheet) else None
+    ticks = draw_nodes(ax, sheet.nodes[:, :3], cost=cost)
+    if cost is not None:
+        place = ax.get_position()
+        wide, high = figure.get_size_inches()
+        box = (place.x1 * wide - 1.7, place.y1 * high + 0.06, 1.7, 0.08)
+        draw_cost_bar(figure, ticks, box=box)
+
+
+def _has_costs(sheet: _Sheet) -> bool:
+    return sheet.nodes is not None and sheet.nodes.shape[-1] == 4
+
+
+def _shape(sheet: _Sheet) -> float:
+    """Width of what the plane shows by its height."""
+    size = scene_size(sheet.scene, sheet.track)
+    points = scene_points(sheet.scene, sheet.track, size=size)
+    sides = np.ptp(view_box(sheet.scene, points, size=size), axis=0)
+    wide, high = sides * (1.0 + 2.0 * MARGIN)
+    return float(wide / high)
+
+
+def _legend_entries(sheet: _Sheet, colors: Mapping[str, Color]) -> tuple[list[Artist], list[str]]:
+    """Handles and names of the first trims of a track, and of what else is in the plane."""
+    handles, names = trim_handles(sheet.track, colors)
+    others, other_names = scene_handles(sheet.track, sheet.scene)
     left_out = len(names) - MOST_NAMES
     if left_out <= 0:
-        return [*handles, *ends], [*names, *end_names]
+        return [*handles, *others], [*names, *other_names]
     blank = line_handle((1.0, 1.0, 1.0))
     return (
-        [*handles[:MOST_NAMES], blank, *ends],
-        [*names[:MOST_NAMES], f"and {left_out} more", *end_names],
+        [*handles[:MOST_NAMES], blank, *others],
+        [*names[:MOST_NAMES], f"and {left_out} more", *other_names],
     )
 
 

@@ -14,8 +14,8 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.analysis.stability import CertifiedHorizon
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.colors import INK, SEQUENCE
+from maneuver_automaton.plotting.ends import draw_goal, draw_headings, draw_start
 from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
-from maneuver_automaton.plotting.paths import draw_goal, draw_headings, draw_start
 from maneuver_automaton.plotting.style import SMALL_PT, TEXT_PT, line_handle, plain, tidy
 from maneuver_automaton.receding_horizon.unconstrained import UnconstrainedProblem
 from maneuver_automaton.receding_horizon.unconstrained_loop import UnconstrainedLoop

@@ -91,6 +91,26 @@ class Track:
         """Whether the altitude varies."""
         return bool(self.start.size > 3 and np.ptp(self.pose[:, 3]) > 1e-9)
 
+    def at(self, times: Array) -> Array:
+        """Poses (m, dof) at `times` (m,) [s], between samples on their chord."""
+        if not self.pieces:
+            return np.repeat(self.start[None], len(times), axis=0)
+        time = np.concatenate([piece.time for piece in self.pieces])
+        pose = np.concatenate([piece.pose for piece in self.pieces])
+        return np.stack([np.interp(times, time, column) for column in pose.T], axis=-1)
+
+    def between(self, begin: float, end: float) -> list[tuple[str, Array]]:
+        """Names and places (n, 2) of the pieces from one time to another [s]."""
+        parts = []
+        for piece in self.pieces:
+            low, high = max(begin, float(piece.time[0])), min(end, float(piece.time[-1]))
+            if low < high:
+                inside = piece.time[(piece.time > low) & (piece.time < high)]
+                at = np.array([low, *inside, high])
+                places = [np.interp(at, piece.time, column) for column in piece.pose.T[:2]]
+                parts.append((piece.name, np.stack(places, axis=-1)))
+        return parts
+
     def spread(self, count: int, *, reach: float) -> Array:
         """Poses (m, dof), about `count`, evenly along the path; `reach` [m] weighs the heading."""
         steps = np.abs(np.diff(self.pose, axis=0))

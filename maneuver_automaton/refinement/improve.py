@@ -217,11 +217,7 @@ class _Improvement:
         (one,) = both_ends(
             self.query, rung, grids=grids, table=self.table, arrays=memory[0], ends=(sign,)
         )
-        word = None
-        while one.alive and one.expansions < cap and time.monotonic() < self.deadline:
-            word = one.run(min(1024, cap - one.expansions), PRUNE * self.best.cost)
-            if word is not None and rung.stop:
-                break
+        word = one.run(cap, PRUNE * self.best.cost, deadline=self.deadline)
         memory[0] = one.arrays
         self.expansions += one.expansions
         self.passes += 1

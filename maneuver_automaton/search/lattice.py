@@ -22,6 +22,7 @@ HEADINGS = 72
 WEIGHT = 2.0
 FIRST_CHUNK = 64  # expansions
 MOST_CHUNK = 8192
+TIMELY = 256  # expansions between two looks at the clock
 TRIES = 6  # candidates of one steering that are tried
 PATIENCE = 1.5  # a connection may cost so much more than the estimate ...
 SLACK = 2.0  # ... and so many turning radii
@@ -131,14 +132,14 @@ class Pass:
         """Nodes expanded so far."""
         return int(self.arrays.state[kernels.EXPANSIONS])
 
-    def run(self, n: int, ceiling: float) -> Word | None:
+    def run(self, n: int, ceiling: float, *, deadline: float = math.inf) -> Word | None:
         """Expand up to `n` more nodes; a plan, if one was found that costs less than `ceiling`."""
         query = self.query
         left = self.expansions + n
-        while self.alive and self.expansions < left:
+        while self.alive and self.expansions < left and time.monotonic() < deadline:
             state = self.arrays.state
             per_node = self.library.n_trims * 2  # type: ignore[attr-defined]
-            step = min(left - self.expansions, 512)
+            step = min(left - self.expansions, TIMELY)
             self.arrays = with_room(
                 self.arrays, int(state[kernels.N_NODES]) + per_node * (step + 1) + 2
             )
@@ -192,7 +193,7 @@ def first_plan(
             if not one.alive or total >= room or time.monotonic() >= deadline:
                 continue
             before = one.expansions
-            word = one.run(min(one.chunk, room - total), math.inf)
+            word = one.run(min(one.chunk, room - total), math.inf, deadline=deadline)
             total += one.expansions - before
             one.chunk = min(2 * one.chunk, MOST_CHUNK)
             if word is not None:

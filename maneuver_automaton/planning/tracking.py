@@ -1,0 +1,142 @@
+"""Plans among obstacles for callers that plan again and again: unchecked, proven in the kernels.
+
+A closed loop has a plan already and a moment to find a better one. What it drives is checked by
+FCL and audited where it is applied.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.collision.advancement import free_times
+from maneuver_automaton.planning.among_obstacles import library_table, plan_of_word
+from maneuver_automaton.planning.blocked import why_goal_blocked
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.refinement.improve import Patience, improve
+from maneuver_automaton.refinement.ready import load_lattice
+from maneuver_automaton.search.lattice import Word, first_plan
+from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
+
+LITTLE = Patience(attempts=800, passes=2)  # where a step's budget is short
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Tracked:
+    """A plan proven free by the kernels, or none."""
+
+    plan: Plan | None
+    goal_index: int | None
+    cost: float
+    reason: str = ""
+
+
+def free_until(problem: Problem, plan: Plan, *, margin: float = 1e-4) -> float:
+    """Time since its start [s] up to which a plan is proven free of the problem's obstacles.
+
+    The plan's own duration if all of it is; the obstacles are where they are at the plan's times.
+    What comes nearer than ``problem.margin + margin`` [m] counts as hit.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Disc, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "spin": (0.0, 1.0)})
+    >>> problem = Problem(robot, [0, 0, 0], [9, 0, 0], obstacles=Disc(1.0, [5, 0]))
+    >>> plan = Plan([0, 0, 0], (robot.trims[0],), durations=[9.0])
+    >>> bool(3.9 < free_until(problem, plan) <= 4.0)
+    True
+    """
+    query = lattice_query(problem, (0,))
+    world = query.world
+    if not plan.trims:
+        return plan.duration
+    free = free_times(
+        world,
+        world.into(plan.switching_poses[:-1]),
+        twists=np.array([trim.body_velocity[:3] for trim in plan.trims]),
+        durations=plan.durations,
+        margin=margin,
+        keep=problem.margin,
+        times=plan.switching_times[:-1],
+    )
+    short = np.flatnonzero(free < plan.durations)
+    if not short.size:
+        return plan.duration
+    k = int(short[0])
+    return float(plan.switching_times[k] - plan.start_time + free[k])
+
+
+def track(
+    problem: Problem,
+    *,
+    time_limit: float,
+    known: Plan | None = None,
+    patience: Patience = LITTLE,
+) -> Tracked:
+    """A plan to any goal within `time_limit` [s]; `known` is improved if it is free.
+
+    Parameters
+    ----------
+    problem : Problem
+        From the vehicle's pose, at its time.
+    time_limit : float
+        [s] for all of it.
+    known : Plan, optional
+        A plan from the problem's start that ends at one of its goals, of trims of its library.
+    patience : Patience
+        When to stop before the time is over.
+    """
+    load_lattice()
+    table = library_table(problem)
+    deadline = time.monotonic() + time_limit
+    goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
+    if not goals:
+        return Tracked(plan=None, goal_index=None, cost=math.inf, reason="every goal is blocked")
+    query = lattice_query(problem, goals)
+    word = None if known is None else word_of_plan(query, known)
+    if word is None:
+        found = first_plan(query, deadline=deadline, table=table)
+        word = found.word
+        if word is None:
+            reason = found.enclosed or "no plan was found in the time given"
+            return Tracked(plan=None, goal_index=None, cost=math.inf, reason=reason)
+    better = improve(query, word, deadline=deadline, patience=patience, table=table)
+    plan = plan_of_word(query, better.word)
+    return Tracked(
+        plan=plan,
+        goal_index=query.goal_index[better.word.goal],
+        cost=problem.cost_of(plan),
+    )
+
+
+def word_of_plan(query: LatticeQuery, plan: Plan) -> Word | None:
+    """A plan as a word of the lattice's library; None if it uses other trims or hits something.
+
+    Rest that only pads at its end is left out.
+    """
+    problem = query.problem
+    if free_until(problem, plan, margin=query.margin) < plan.duration:
+        return None
+    numbers = {problem.automaton.trims[k].name: n for n, k in enumerate(query.library.trims)}
+    trims, durations = list(plan.trims), plan.durations.tolist()
+    while trims and trims[-1].is_rest:
+        trims.pop()
+        durations.pop()
+    if any(trim.name not in numbers for trim in trims):
+        return None
+    ends = [
+        problem.goals[index].off(np.asarray(plan.end[:3]))
+        for index in query.goal_index
+    ]
+    reached = [k for k, (way, turn) in enumerate(ends) if way < 1e-7 and turn < 1e-7]
+    if not reached:
+        return None
+    return Word(
+        trims=np.array([numbers[trim.name] for trim in trims], dtype=np.int64),
+        durations=np.array(durations, dtype=np.float64),
+        goal=reached[0],
+    )

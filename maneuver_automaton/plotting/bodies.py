@@ -1,0 +1,102 @@
+"""Draw a body along a path: what it sweeps, and where it is when trims begin."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection, PolyCollection
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.plotting.colors import GREY, INK, Color
+from maneuver_automaton.plotting.ends import SET
+from maneuver_automaton.plotting.footprint import placed
+from maneuver_automaton.plotting.obstacles import moment_colors
+from maneuver_automaton.plotting.regions import region_path
+from maneuver_automaton.plotting.scene import Scene
+from maneuver_automaton.plotting.swept import swept_region
+from maneuver_automaton.plotting.track import Track
+
+FAINT_DARTS = 9  # along a path
+DART = np.array([[0.6, 0.0], [-0.4, 0.32], [-0.22, 0.0], [-0.4, -0.32]])
+DART_SIZE = 0.066  # of the size of the path
+SWEPT: Color = (0.36, 0.60, 0.85)
+SWEPT_ALPHA = 0.20
+FEW_BODIES, LEAST_ALPHA = 8, 0.3  # more bodies than that are fainter, but not more than this
+
+
+def swept_area(track: Track, scene: Scene) -> PathCollection:
+    """What the body covers along a track; empty where it is not known."""
+    region = swept_region(track, scene.body) if scene.body and track.pieces else []
+    return PathCollection(
+        [region_path(region)] if region else [], facecolors=[(*SWEPT, SWEPT_ALPHA)],
+        linewidths=0.0, zorder=1.4,
+    )  # fmt: skip
+
+
+def darts(track: Track, scene: Scene, *, size: float) -> PolyCollection:
+    """Where the body is not known: darts along a path, and white ones where trims begin."""
+    if scene.body:
+        return PolyCollection([])
+    dart = [DART_SIZE * size * DART]
+    faint = track.spread(FAINT_DARTS, reach=0.0)
+    clear = _between_ends(track, scene, apart=1e-6 * size)
+    return PolyCollection(
+        [*placed(dart, faint), *placed(dart, clear)],
+        facecolors=[(*GREY, 0.6)] * len(faint) + [(1.0, 1.0, 1.0, 1.0)] * len(clear),
+        edgecolors=[(*INK, 0.0)] * len(faint) + [(*INK, 1.0)] * len(clear),
+        linewidths=0.9,
+        zorder=3.5,
+    )
+
+
+def switch_bodies(track: Track, scene: Scene) -> PolyCollection:
+    """Outlines where trims begin and at the end, which is clear; many others are fainter."""
+    poses = track.switching_poses
+    alpha = max(LEAST_ALPHA, 0.8 * min(1.0, FEW_BODIES / len(poses)))
+    inner = len(poses) - 2
+    return PolyCollection(
+        placed(scene.body, poses),
+        facecolors="none",
+        edgecolors=[(*INK, 0.95), *[(*INK, alpha)] * inner, (*INK, 0.95)] * len(scene.body),
+        linewidths=[1.3, *[0.7] * inner, 1.3] * len(scene.body),
+        zorder=2.1,
+    )
+
+
+def moment_bodies(track: Track, scene: Scene) -> PolyCollection:
+    """The body at the times at which what moves is shown, in the colours of these times."""
+    times = scene.times if scene.moves and track.pieces else scene.times[:0]
+    colors = [color for _ in scene.body for color in moment_colors(len(times))]
+    return PolyCollection(
+        placed(scene.body, track.at(times)), facecolors=[(*color, 0.85) for color in colors],
+        edgecolors=[INK], linewidths=1.1, zorder=3.7,
+    )  # fmt: skip
+
+
+def goal_bodies(scene: Scene) -> PolyCollection:
+    """Dashed outlines at the goals that are not reached and ask for a heading."""
+    poses = [
+        goal.pose
+        for k, goal in enumerate(scene.goals)
+        if k != scene.reached and not goal.free_heading
+    ]
+    return PolyCollection(
+        placed(scene.body, np.array(poses)) if poses else [], facecolors="none",
+        edgecolors=[SET], linewidths=1.2, linestyles=[(0, (3, 2))], zorder=2.0,
+    )  # fmt: skip
+
+
+def draw_switches(ax: Axes, track: Track, scene: Scene, *, size: float) -> PathCollection:
+    """Dots where one trim follows another; darts show it where the body is not known."""
+    poses = _between_ends(track, scene, apart=1e-6 * size)[: None if scene.body else 0]
+    return ax.scatter(
+        poses[:, 0], poses[:, 1], s=8.0, facecolors="white", edgecolors=[INK], linewidths=0.7,
+        zorder=3.6,
+    )  # fmt: skip
+
+
+def _between_ends(track: Track, scene: Scene, *, apart: float) -> Array:
+    """Poses where trims begin, but none at the start or a goal, where other marks are."""
+    ends = np.array([track.start, *(goal.pose for goal in scene.goals)])
+    gaps = np.linalg.norm(track.switching_poses[:, None, :2] - ends[:, :2], axis=-1)
+    return np.asarray(track.switching_poses[gaps.min(axis=1) > apart])

@@ -1,0 +1,125 @@
+"""Draw where a plan starts and where it is to end: places, headings, tolerances."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle
+from matplotlib.quiver import Quiver
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.plotting.colors import GREY, INK, Color
+from maneuver_automaton.problem import Goal
+
+ARROW_SIZE = 0.13  # of the size of the path
+SET: Color = (0.00, 0.62, 0.45)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class EndArtists:
+    """Where a vehicle starts and is to end."""
+
+    start: PathCollection
+    goals: tuple[PathCollection, ...]
+    rings: tuple[PathCollection, ...]  # around the goals that any heading will do for
+    sets: tuple[Circle, ...]  # places within the tolerance of a goal
+    headings: Quiver  # of the start, and of the goals that ask for one
+
+
+def draw_ends(
+    ax: Axes, start: Array, goals: Sequence[Goal], *, size: float, reached: int | None = None
+) -> EndArtists:
+    """Draw a start pose (dof,) and all goals; if one is `reached`, the others are pale."""
+    pale = [reached is not None and k != reached for k in range(len(goals))]
+    colors = [GREY if others else INK for others in pale]
+    headed = [k for k, goal in enumerate(goals) if not goal.free_heading]
+    return EndArtists(
+        start=draw_start(ax, start),
+        goals=tuple(
+            draw_goal(ax, goal.pose, color=color) for goal, color in zip(goals, colors, strict=True)
+        ),
+        rings=tuple(
+            _draw_ring(ax, goal.pose, color)
+            for goal, color in zip(goals, colors, strict=True)
+            if goal.free_heading
+        ),
+        sets=tuple(_draw_set(ax, goal) for goal in goals if goal.tolerance_m > 0.0),
+        headings=draw_headings(
+            ax,
+            np.array([start, *(goals[k].pose for k in headed)]),
+            length=ARROW_SIZE * size,
+            color=[INK, *(colors[k] for k in headed)],
+        ),
+    )
+
+
+def draw_start(ax: Axes, pose: Array) -> PathCollection:
+    """A dot for a start."""
+    return ax.scatter(pose[0], pose[1], s=26.0, color=[INK], linewidths=0.0, zorder=5.1)
+
+
+def draw_goal(ax: Axes, pose: Array, *, color: Color = INK) -> PathCollection:
+    """A diamond for a goal; a start in the same place shows inside."""
+    return ax.scatter(
+        pose[0], pose[1], s=58.0, marker="D", facecolors=["white"], edgecolors=[color],
+        linewidths=1.3, zorder=5.0 if color == INK else 4.9,
+    )  # fmt: skip
+
+
+def draw_headings(
+    ax: Axes, poses: Array, *, length: float, color: Color | Sequence[Color] = INK
+) -> Quiver:
+    """Arrows of `length` [m] for the headings of poses (n, dof)."""
+    arrows = length * np.stack([np.cos(poses[:, 2]), np.sin(poses[:, 2])], axis=-1)
+    ax.update_datalim(poses[:, :2] + arrows)
+    return ax.quiver(
+        *poses[:, :2].T, *arrows.T, angles="xy", scale_units="xy", scale=1.0, units="inches",
+        width=0.018, headwidth=5.0, headlength=6.0, headaxislength=5.2, color=color, zorder=4.8,
+    )  # fmt: skip
+
+
+def end_handles(goals: Sequence[Goal] = ()) -> tuple[list[Line2D], list[str]]:
+    """Legend handles of start and goals, and what else there is of goals."""
+    handles = [_mark("o", size=5.5, face=INK, edge=INK), _mark("D", size=6.0, edge=INK)]
+    names = ["start", "goal"]
+    if goals and all(goal.free_heading for goal in goals):
+        names[1] = "goal, any heading"
+    elif any(goal.free_heading for goal in goals):
+        handles.append(_mark("o", size=9.0, edge=INK))
+        names.append("any heading")
+    if len(goals) > 1:
+        handles.append(_mark("D", size=6.0, edge=GREY))
+        names.append("other goal")
+    if any(goal.tolerance_m > 0.0 for goal in goals):
+        handles.append(_mark("o", size=9.0, face=(*SET, 0.15), edge=SET))
+        names.append("goal tolerance")
+    return handles, names
+
+
+def _mark(marker: str, *, size: float, edge: Color, face: Any = "white") -> Line2D:
+    return Line2D(
+        [], [], linestyle="none", marker=marker, markersize=size, markeredgecolor=edge,
+        markerfacecolor=face, markeredgewidth=1.3 if marker == "D" else 1.0,
+    )  # fmt: skip
+
+
+def _draw_ring(ax: Axes, pose: Array, color: Color) -> PathCollection:
+    return ax.scatter(
+        pose[0], pose[1], s=210.0, facecolors="none", edgecolors=[color], linewidths=1.1,
+        zorder=4.9,
+    )  # fmt: skip
+
+
+def _draw_set(ax: Axes, goal: Goal) -> Circle:
+    disc = Circle(
+        (float(goal.pose[0]), float(goal.pose[1])), goal.tolerance_m, facecolor=(*SET, 0.15),
+        edgecolor=SET, linewidth=0.9, zorder=1.6,
+    )  # fmt: skip
+    ax.add_patch(disc)
+    return disc

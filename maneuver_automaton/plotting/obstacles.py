@@ -1,0 +1,184 @@
+"""Draw obstacles: shapes, maps, and what moves, at one time or at several."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PathCollection
+from matplotlib.patches import Patch
+from matplotlib.path import Path
+from numpy.typing import ArrayLike
+
+from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton.collision import AnyObstacle, Motion, Obstacle, OccupancyMap
+from maneuver_automaton.collision.shapes import as_obstacles
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.plotting.colors import Color, shaded
+from maneuver_automaton.plotting.regions import map_paths, moved_path, shape_path
+
+SOLID: Color = (0.36, 0.38, 0.42)
+MOVER: Color = (0.44, 0.22, 0.58)
+PALEST, DARKEST = 0.72, -0.15  # of what moves, at the first of several times and at the last
+TRACK_POINTS = 60
+MOST_STEPS = 5  # between the times at which what moves is shown
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ObstacleArtists:
+    """What `draw_obstacles` has drawn."""
+
+    still: PathCollection  # one path per shape that stands still
+    maps: tuple[PathCollection, ...]  # blocked cells, one collection per map
+    movers: PathCollection  # one path per time and shape that moves, time by time
+    tracks: LineCollection  # where the middle of each goes in between
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Mover:
+    """The path around a shape that moves, in the frame that moves."""
+
+    path: Path
+    motion: Motion
+
+    def at(self, time: float) -> Path:
+        """Where it is at `time` [s]."""
+        return moved_path(self.path, self.motion.at(time))
+
+    def track(self, begin: float, end: float) -> Array:
+        """Places (n, 2) of its middle between two times [m]."""
+        corners = self.motion.time[(self.motion.time > begin) & (self.motion.time < end)]
+        times = np.union1d(np.linspace(begin, end, TRACK_POINTS), corners)
+        box = self.path.get_extents()
+        middle = np.array([0.5 * (box.x0 + box.x1), 0.5 * (box.y0 + box.y1)])
+        return np.asarray(SE2(self.motion.at(times)).act(middle))
+
+
+def draw_obstacles(
+    ax: Axes,
+    obstacles: AnyObstacle | Sequence[AnyObstacle],
+    *,
+    time: ArrayLike | None = None,
+) -> ObstacleArtists:
+    """Draw `obstacles` on `ax`, which keeps its limits.
+
+    What stands is dark grey. What moves is violet, at several times the darker the later, over
+    its track from the first time to the last.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where to draw.
+    obstacles : obstacle, map, shape, or a sequence of these
+        What to draw; margins are not drawn.
+    time : array_like, optional
+        One time or several in a row [s]; if left out, where each motion begins, over its whole
+        track.
+
+    Returns
+    -------
+    ObstacleArtists
+        The artists, by what they show.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> from maneuver_automaton.collision import Box, Disc
+    >>> there = Obstacle(Disc(0.3), motion=Motion([0.0, 1.0], [[0, 0, 0], [2, 0, 0]]))
+    >>> artists = draw_obstacles(Figure().add_subplot(), [Box([1.0, 2.0]), there], time=[0.0, 0.5])
+    >>> len(artists.still.get_paths()), len(artists.movers.get_paths())
+    (1, 2)
+    """
+    known = as_obstacles(obstacles)
+    moving = movers_of(known)
+    if time is None:
+        shown = [mover.at(float(mover.motion.time[0])) for mover in moving]
+        tracks = [mover.track(*mover.motion.time[[0, -1]].tolist()) for mover in moving]
+        colors = [MOVER] * len(shown)
+    else:
+        times = np.atleast_1d(as_array("obstacles: time", time))
+        shown = [mover.at(t) for t in times.tolist() for mover in moving]
+        tracks = [mover.track(float(times[0]), float(times[-1])) for mover in moving]
+        colors = [color for color in moment_colors(len(times)) for _ in moving]
+    artists = ObstacleArtists(
+        still=_solid([shape_path(one.shape) for one in still_shapes(known)]),
+        maps=tuple(_solid(map_paths(one)) for one in known if isinstance(one, OccupancyMap)),
+        movers=movers_collection(shown, colors),
+        tracks=LineCollection(
+            tracks, colors=[(*MOVER, 0.45)], linewidths=0.8, linestyles=[(0, (4, 2))], zorder=1.3
+        ),
+    )
+    for part in (artists.still, *artists.maps, artists.movers, artists.tracks):
+        ax.add_collection(part, autolim=False)
+    return artists
+
+
+def still_shapes(obstacles: Sequence[AnyObstacle]) -> list[Obstacle]:
+    """The shapes that stand still."""
+    return [one for one in obstacles if isinstance(one, Obstacle) and one.motion is None]
+
+
+def movers_of(obstacles: Sequence[AnyObstacle]) -> list[Mover]:
+    """The shapes that move, ready to be drawn at many times."""
+    return [
+        Mover(path=shape_path(one.shape), motion=one.motion)
+        for one in obstacles
+        if isinstance(one, Obstacle) and one.motion is not None
+    ]
+
+
+def movers_collection(paths: Sequence[Path], colors: Sequence[Color]) -> PathCollection:
+    """Shapes that move, each in its colour."""
+    return PathCollection(
+        paths, facecolors=[(*color, 0.62) for color in colors],
+        edgecolors=[shaded(color, -0.25) for color in colors], linewidths=0.7, zorder=1.9,
+    )  # fmt: skip
+
+
+def round_times(begin: float, end: float) -> Array:
+    """A few round times (n,) [s] from `begin` to `end`, which are the first and the last.
+
+    Examples
+    --------
+    >>> round_times(0.0, 17.3).tolist()
+    [0.0, 5.0, 10.0, 15.0, 17.3]
+    """
+    if not end > begin:
+        return np.array([begin])
+    tens = 10.0 ** np.floor(np.log10((end - begin) / MOST_STEPS))
+    steps = tens * np.array([1.0, 2.0, 5.0, 10.0])
+    step = steps[(end - begin) / steps <= MOST_STEPS][0]
+    inner = step * np.arange(np.floor(begin / step) + 1.0, np.ceil(end / step))
+    apart = inner[(inner - begin > 0.3 * step) & (end - inner > 0.3 * step)]
+    return np.array([begin, *apart.tolist(), end])
+
+
+def moment_colors(count: int) -> list[Color]:
+    """A colour for each of `count` times, pale to dark."""
+    if count == 1:
+        return [MOVER]
+    return [shaded(MOVER, amount) for amount in np.linspace(PALEST, DARKEST, count).tolist()]
+
+
+def obstacle_handles(
+    obstacles: Sequence[AnyObstacle], times: Array
+) -> tuple[list[Patch], list[str]]:
+    """Legend handles: obstacles, and what moves at each of the `times` (n,) [s]."""
+    handles, names = [], []
+    moving = [one for one in obstacles if isinstance(one, Obstacle) and one.motion is not None]
+    if len(moving) < len(obstacles):
+        handles.append(Patch(facecolor=SOLID))
+        names.append("obstacle")
+    if moving:
+        colors = moment_colors(len(times))
+        handles += [Patch(facecolor=(*c, 0.62), edgecolor=shaded(c, -0.25)) for c in colors]
+        later = [f"at {t:.3g} s" for t in times[1:].tolist()]
+        names += [f"moving, at {times[0]:.3g} s", *later] if later else ["moving"]
+    return handles, names
+
+
+def _solid(paths: Sequence[Path]) -> PathCollection:
+    """What stands still; the thin edge keeps walls of one cell visible, and hides seams."""
+    return PathCollection(paths, facecolors=[SOLID], edgecolors=[SOLID], linewidths=0.4, zorder=1.0)

@@ -1,0 +1,98 @@
+"""What stands still in a moving picture, what moves by itself, and the clock."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.plotting.colors import INK, Color
+from maneuver_automaton.plotting.ends import draw_ends, end_handles
+from maneuver_automaton.plotting.obstacles import (
+    Mover,
+    draw_obstacles,
+    movers_of,
+    obstacle_handles,
+)
+from maneuver_automaton.plotting.pages import (
+    DPI,
+    axes_at,
+    bottom_legend,
+    legend_rows,
+    new_figure,
+)
+from maneuver_automaton.plotting.paths import trim_handles
+from maneuver_automaton.plotting.scene import Scene, set_view
+from maneuver_automaton.plotting.track import Track
+
+WIDTH, LEFT, RIGHT, TOP = 6.4, 0.75, 0.2, 0.45  # [in]
+LOWEST, HIGHEST = 1.6, 4.8  # [in] of the plane
+MOST_NAMES = 12
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Stage:
+    """A figure with obstacles, start and goals, on which a vehicle is to drive."""
+
+    figure: Figure
+    ax: Axes
+    traffic: PathCollection
+    movers: list[Mover]
+    clock: Text
+
+    def show(self, time: float) -> None:
+        """Put what moves where it is at `time` [s]."""
+        self.traffic.set_paths([mover.at(time) for mover in self.movers])
+
+
+def stage_of(
+    scene: Scene, track: Track, *, colors: Mapping[str, Color], box: Array, size: float
+) -> Stage:
+    """The stage for a `track` in a `scene`: shows `box` (2, 2), marks suit a path of `size` [m]."""
+    handles, names = _legend_entries(scene, track, colors)
+    inner = WIDTH - LEFT - RIGHT
+    wide, high = np.ptp(box, axis=0).tolist()
+    height = min(max(inner * high / wide, LOWEST), HIGHEST)
+    bottom = 0.62 + 0.2 * legend_rows(names, inner)
+    figure = new_figure(WIDTH, _even(bottom + height + TOP))
+    ax = axes_at(figure, left=LEFT, bottom=bottom, width=inner, height=height)
+    bottom_legend(figure, handles, names, left=LEFT, width=inner)
+    draw_ends(ax, track.start, scene.goals, size=size, reached=scene.reached)
+    obstacles = draw_obstacles(ax, scene.obstacles, time=scene.times[0])
+    set_view(ax, box, track.start[:2])
+    return Stage(
+        figure=figure,
+        ax=ax,
+        traffic=obstacles.movers,
+        movers=movers_of(scene.obstacles),
+        clock=figure.text(
+            LEFT / WIDTH, 1.0 - 0.14 / figure.get_size_inches()[1], "", fontsize=10.0, color=INK,
+            va="top", parse_math=False,
+        ),
+    )  # fmt: skip
+
+
+def _legend_entries(
+    scene: Scene, track: Track, colors: Mapping[str, Color]
+) -> tuple[list[Artist], list[str]]:
+    """Handles and names of the trims, unless there are many, of the ends, and of obstacles."""
+    trims, trim_names = trim_handles(track, colors)
+    few = len(trims) <= MOST_NAMES
+    ends, end_names = end_handles(scene.goals)
+    others, other_names = obstacle_handles(scene.obstacles, scene.times[:1])
+    return (
+        [*trims[: None if few else 0], *ends, *others],
+        [*trim_names[: None if few else 0], *end_names, *other_names],
+    )
+
+
+def _even(inches: float) -> float:
+    """A height that is an even number of pixels, as films need it."""
+    return 2.0 * round(inches * DPI / 2.0) / DPI
