@@ -13,6 +13,9 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.shapes import Box, Disc, Polygon, Shape
 
 
+NOWHERE = np.zeros(2)
+
+
 class Solids(NamedTuple):
     """Convex polygons, counter-clockwise, each rounded by a radius; one corner makes a disc."""
 
@@ -21,8 +24,10 @@ class Solids(NamedTuple):
     plates: Array  # (P, 5) [low x, low y, high x, high y], rounding included, and the rounding
 
 
-def convex_pieces(shape: Shape) -> list[tuple[Array, float]]:
+def convex_pieces(shape: Shape, origin: Array = NOWHERE) -> list[tuple[Array, float]]:
     """Convex pieces (corners counter-clockwise, rounding) that together are the shape.
+
+    Counted from `origin` (2,): it is taken off first, so that no digit is lost far away.
 
     Examples
     --------
@@ -33,12 +38,14 @@ def convex_pieces(shape: Shape) -> list[tuple[Array, float]]:
     2
     """
     if isinstance(shape, Disc):
-        return [(shape.center[None].copy(), shape.radius)]
+        return [(shape.center[None] - origin, shape.radius)]
     if isinstance(shape, Box):
-        return [(shape.corners, 0.0)]
-    if not shape.holes and len(simple := _simple(shape.corners)) >= 3 and _is_convex(simple):
+        return [(Box(shape.size, shape.center - origin, shape.heading).corners, 0.0)]
+    corners = shape.corners - origin
+    if not shape.holes and len(simple := _simple(corners)) >= 3 and _is_convex(simple):
         return [(simple, 0.0)]
-    return [(piece, 0.0) for piece in _decomposed(shape)]
+    holes = [hole - origin for hole in shape.holes]
+    return [(piece, 0.0) for piece in _decomposed(corners, holes)]
 
 
 def solids_of(pieces: Iterable[tuple[Array, float]]) -> Solids:
@@ -98,11 +105,11 @@ def _is_convex(ring: Array) -> bool:
     return bool(turns.sum() < 3.0 * math.pi)
 
 
-def _decomposed(shape: Polygon) -> list[Array]:
+def _decomposed(corners: Array, holes: list[Array]) -> list[Array]:
     """Pieces of a polygon that is concave, has holes, or is none: nothing solid is lost."""
     import shapely
 
-    polygon = shapely.Polygon(shape.corners, shape.holes)
+    polygon = shapely.Polygon(corners, holes)
     if not polygon.is_valid:
         polygon = shapely.make_valid(polygon)
     pieces: list[Array] = []

@@ -122,7 +122,7 @@ def world_of(
     still = [o for o in obstacles if isinstance(o, Obstacle) and o.motion is None]
     moving = [o for o in obstacles if isinstance(o, Obstacle) and o.motion is not None]
     maps = [_seen_map(o, pose) for o in obstacles if isinstance(o, OccupancyMap)]
-    pieces = [piece for o in still for piece in _seen(convex_pieces(o.shape), pose)]
+    pieces = [piece for o in still for piece in _turned(convex_pieces(o.shape, pose[:2]), pose)]
     listed = len(pieces)
     pieces += [(ring, 0.0) for one in maps for ring in _cells(one)]
     solids = solids_of([(np.round(ring, DIGITS), r) for ring, r in pieces])
@@ -164,11 +164,11 @@ def own_frame(obstacles: tuple[AnyObstacle, ...], otherwise: Array) -> tuple[flo
     return tuple(otherwise[:3].tolist())
 
 
-def _seen(pieces: list[tuple[Array, float]], frame: Array) -> list[tuple[Array, float]]:
-    """Pieces seen from a frame: places first, so that no digit is lost."""
+def _turned(pieces: list[tuple[Array, float]], frame: Array) -> list[tuple[Array, float]]:
+    """Pieces counted from the frame's place, seen along its heading."""
     c, s = math.cos(frame[2]), math.sin(frame[2])
     turn = np.array([[c, -s], [s, c]])
-    return [((ring - frame[:2]) @ turn, rounding) for ring, rounding in pieces]
+    return [(ring @ turn, rounding) for ring, rounding in pieces]
 
 
 def _seen_map(one: OccupancyMap, frame: Array) -> OccupancyMap:

@@ -9,14 +9,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from maneuver_automaton.audit import Audit, audit_plan, terminal_error
+from maneuver_automaton.audit import Audit, terminal_error
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.planning.result import Alternative, PlanResult, PlanStatus
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search import SearchStatus, Solution
 from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.choose import load_search, search_goal
-from maneuver_automaton.search.inside import outside, stays_inside
+from maneuver_automaton.search.inside import outside
 from maneuver_automaton.search.limits import closed_bound, why_impossible
 from maneuver_automaton.search.result import plan_of
 
@@ -36,6 +37,8 @@ def plan_by_words(problem: Problem, *, time_limit: float, alternatives: int) -> 
         "audit": audited - searched,
     }
     counts = dict(found.counts) | {"rejected_by_audit": chosen.rejected}
+    if problem.obstacles:
+        counts["words_that_hit"] = chosen.hit
     if not chosen.plans:
         status, reason = _why_none(problem, found, chosen, time_limit)
         return PlanResult(
@@ -55,6 +58,7 @@ def plan_by_words(problem: Problem, *, time_limit: float, alternatives: int) -> 
         gap=_gap(best.cost, bound),
         certificate=certificate(problem, problem.goals[best.goal_index], best.solution),
         terminal_error=terminal_error(best.plan, problem.goals[best.goal_index]),
+        clearance_m=None if best.audit is None else best.audit.min_clearance_m,
         audit=best.audit,
         alternatives=tuple(
             Alternative(
@@ -100,6 +104,7 @@ class _Chosen:
 
     plans: list[_Candidate]
     outside: int
+    hit: int  # an obstacle
     rejected: int
     complaint: str
 
@@ -107,6 +112,7 @@ class _Chosen:
 def _search_goals(problem: Problem, alternatives: int, deadline: float) -> _Found:
     """Search for every goal that is inside the bounds; all candidates, cheapest first."""
     bounded = any(getattr(problem.bounds, name) is not None for name in ("x", "y", "z"))
+    sorted_out = bounded or bool(problem.obstacles)
     counts: dict[str, int] = {}
     candidates: list[_Candidate] = []
     exhausted = proven = True
@@ -117,7 +123,7 @@ def _search_goals(problem: Problem, alternatives: int, deadline: float) -> _Foun
             continue
         left = max(deadline - time.monotonic(), 1e-3)
         results = search_goal(
-            problem, goal, alternatives=None if bounded else alternatives, time_limit=left
+            problem, goal, alternatives=None if sorted_out else alternatives, time_limit=left
         )
         if math.isnan(first_plan) and any(result.solutions for result in results):
             first_plan = time.monotonic() - began
@@ -162,24 +168,24 @@ def _distinct(candidates: Iterable[_Candidate]) -> list[_Candidate]:
 
 
 def _audited(problem: Problem, candidates: Sequence[_Candidate], alternatives: int) -> _Chosen:
-    """The cheapest candidates that stay inside the bounds and pass the audit."""
+    """The cheapest candidates that stay inside the bounds, are free, and pass the audit."""
     plans: list[_Candidate] = []
-    outside = rejected = 0
+    outside = hit = rejected = 0
     complaint = ""
     for candidate in candidates:
         if len(plans) > alternatives:
             break
-        if not stays_inside(candidate.plan, problem.bounds):
+        checked = check_plan(problem, candidate.plan, problem.goals[candidate.goal_index])
+        if checked.passed:
+            plans.append(replace(candidate, audit=checked.audit))
+        elif not checked.inside:
             outside += 1
-            continue
-        goal = problem.goals[candidate.goal_index]
-        audit = audit_plan(candidate.plan, goal, problem.automaton.model)
-        if audit.passed:
-            plans.append(replace(candidate, audit=audit))
+        elif not checked.free:
+            hit += 1
         else:
             rejected += 1
-            complaint = complaint or audit.reason
-    return _Chosen(plans=plans, outside=outside, rejected=rejected, complaint=complaint)
+            complaint = complaint or checked.reason
+    return _Chosen(plans=plans, outside=outside, hit=hit, rejected=rejected, complaint=complaint)
 
 
 def _why_none(
@@ -194,8 +200,13 @@ def _why_none(
         return PlanStatus.OUT_OF_BUDGET, (
             f"no plan within {time_limit:g} s and the expansions allowed"
         )
-    if chosen.outside:
+    if chosen.outside and not chosen.hit:
         return PlanStatus.NO_PLAN, (f"all {chosen.outside} plans found leave the bounds")
+    if chosen.hit:
+        return PlanStatus.NO_PLAN, (
+            f"all {chosen.outside + chosen.hit} words found hit an obstacle or leave the bounds; "
+            "the method lattice knows the obstacles"
+        )
     impossible = why_impossible(problem)
     if any(goal.tolerance_m or goal.tolerance_rad for goal in problem.goals):
         return PlanStatus.NO_PLAN, (

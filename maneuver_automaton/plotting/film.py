@@ -23,6 +23,7 @@ FRAMES_PER_SECOND = 15
 MOST_FRAMES = 150  # longer motions are shown faster
 PAUSE_S = 1.0  # on the last picture
 PALETTE, MOST_SAMPLES = 128, 16  # colours, and pictures that they are taken from
+NEARLY_WHITE = 248  # of 255, in each channel
 EMBED_MB = 100.0  # of pictures in one page
 ENDINGS = (".gif", ".html", ".mp4")
 SYMBOLS = {  # of the buttons of a page, which would otherwise be loaded from elsewhere
@@ -128,9 +129,9 @@ def _gif(film: Film) -> bytes:
 
 
 def _with_white(palette: Sequence[int]) -> list[int]:
-    """The palette, its lightest colour made white: taking means has made paper grey."""
+    """The palette with white for what is nearly white: taking means would make paper grey."""
     colors = np.array(palette).reshape(-1, 3)
-    colors[np.argmax(colors.min(axis=1))] = 255
+    colors[colors.min(axis=1) >= NEARLY_WHITE] = 255
     return [int(channel) for channel in colors.ravel()]
 
 

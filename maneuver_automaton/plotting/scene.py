@@ -25,7 +25,8 @@ ROOM = 0.16  # around start and goals where the body is not known, of the size
 MARGIN = 0.04  # around all, of the axes
 MUCH_LARGER = 2.5  # surroundings so much larger than what happens in them are cropped
 KEPT = 0.5  # of them around what happens, of its size
-BODIES, LEAST_MARK = 8.0, 0.35  # marks suit a path of so many bodies, or this share of the picture
+BODIES, LEAST_MARK = 8.0, 0.35  # marks suit a path of so many bodies, or this share of the path
+IN_VIEW = 0.5  # or, among obstacles, one that takes this share of the picture
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -109,7 +110,7 @@ def mark_size(scene: Scene, box: Array, *, size: float) -> float:
     if scene.body:
         size = min(size, max(BODIES * scene.reach, LEAST_MARK * size))
     if scene.obstacles:
-        size = max(size, LEAST_MARK * float((box[1] - box[0]).max()))
+        size = max(size, IN_VIEW * float((box[1] - box[0]).max()))
     return size
 
 

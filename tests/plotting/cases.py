@@ -10,6 +10,7 @@ from PIL import Image
 
 from maneuver_automaton.audit import TerminalError
 from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap, Polygon
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning import Alternative, PlanResult, PlanStatus
@@ -59,6 +60,23 @@ def flight_plan():
         for name, twist in twists.items()
     )
     return Plan(np.zeros(4), trims, durations=np.array([3.0, 4.0, 5.0]))
+
+
+def slalom_problem(plan, **more):
+    """The problem that `plan` solves, among one obstacle of every kind."""
+    x, y = plan.start[:2]
+    ring = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    crossing = Motion([0.0, 4.0], [[x - 2.0, y + 1.5, 0.0], [x + 2.0, y + 1.5, 0.5]])
+    obstacles = [
+        Polygon([x - 2.0, y] + 0.6 * ring, holes=[[x - 2.0, y] + 0.3 * ring]),
+        Disc(0.3, [x + 2.0, y - 1.0]),
+        Box([1.0, 0.4], [x, y - 1.5], 0.4),
+        OccupancyMap([[1, 0, 1], [0, 1, 1]], resolution=0.2, origin=[x - 1.0, y + 2.0, 0.6]),
+        Obstacle(Box([0.6, 0.3], [0.1, 0.0]), motion=crossing),
+    ]
+    goal = more.pop("goal", plan.end)
+    footprint = more.pop("footprint", Box([0.5, 0.3]))
+    return Problem(ROBOT, plan.start, goal, obstacles=obstacles, footprint=footprint, **more)
 
 
 def result_of(plan, *, others=()):

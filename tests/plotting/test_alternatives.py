@@ -33,8 +33,8 @@ def test_the_legend_holds_cost_and_word():
 
 def test_a_common_goal_is_marked_once():
     artists = draw_alternatives(Figure().add_subplot(), [PLANS[0], PLANS[0]])
-    assert len(artists.goals) == 1
-    assert len(draw_alternatives(Figure().add_subplot(), PLANS).goals) == 3
+    assert len(artists.ends.goals) == 1
+    assert len(draw_alternatives(Figure().add_subplot(), PLANS).ends.goals) == 3
 
 
 def test_bodies_stand_at_the_switching_times():

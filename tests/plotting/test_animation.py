@@ -5,8 +5,10 @@ import pytest
 from PIL import Image
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.plotting.animation import save_plan_animation
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.plotting.animation import _film, save_plan_animation
 from maneuver_automaton.primitives import Trim
+from tests.plotting.cases import parking_plan, slalom_problem
 
 ARC = Trim(name="arc", body_velocity=[1.0, 0.0, 0.5], control=[1.0, 0.5])
 REST = Trim(name="rest", body_velocity=[0.0, 0.0, 0.0], control=[0.0, 0.0])
@@ -20,6 +22,40 @@ def test_frames_move_and_cover_the_plan(tmp_path):
         first = np.asarray(film.convert("RGB")).copy()
         film.seek(film.n_frames // 2)
         assert (np.asarray(film.convert("RGB")) != first).any()
+
+
+def test_what_moves_is_where_it_is_at_the_time():
+    plan = parking_plan()
+    film = _film(plan, slalom_problem(plan), None)
+    traffic, trail, vehicle, clock = film.moving
+    for time in (0.0, 2.0, 3.0):
+        film.show(time)
+        (path,) = traffic.get_paths()
+        pose = SE2([-2.0 + time, 2.5, 0.125 * time])
+        middle = 0.25 * path.vertices[:4].sum(axis=0)
+        np.testing.assert_allclose(middle, pose.act([0.1, 0.0]), atol=1e-12)
+        body = vehicle.get_paths()[0].vertices[:4].mean(axis=0)
+        np.testing.assert_allclose(body, plan.pose_at(time)[:2], atol=1e-12)
+        assert clock.get_text() == f"{time:.2f} s"
+    np.testing.assert_allclose(trail.get_segments()[-1][-1], plan.pose_at(3.0)[:2], atol=1e-3)
+
+
+def test_the_path_grows():
+    plan = parking_plan()
+    film = _film(plan, None, None)
+    trail = film.moving[1]
+    film.show(0.5)
+    assert len(trail.get_segments()) == 1
+    film.show(plan.duration)
+    assert len(trail.get_segments()) == 4
+
+
+def test_films_of_scenes_are_small_and_white(tmp_path):
+    plan = parking_plan()
+    save_plan_animation(plan, tmp_path / "plan.gif", problem=slalom_problem(plan))
+    assert (tmp_path / "plan.gif").stat().st_size < 1e6
+    with Image.open(tmp_path / "plan.gif") as film:
+        assert film.convert("RGB").getpixel((2, 2)) == (255, 255, 255)
 
 
 def test_an_empty_plan_is_one_frame(tmp_path):

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
 import io
 import re
 
@@ -9,6 +10,7 @@ import pytest
 from matplotlib.animation import FFMpegWriter
 from PIL import Image
 
+from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
 from maneuver_automaton.plotting import save_closed_loop_animation
 from maneuver_automaton.plotting.closed_loop_animation import _film
 from maneuver_automaton.plotting.film import MOST_FRAMES, picture_times
@@ -20,7 +22,11 @@ CAR = {"rectangle_m": [0.5, 0.3]}
 def shown(film):
     """The moving parts by what they are, in the order in which they are drawn."""
     return dict(
-        zip(("old", "jumps", "trail", "ahead", "vehicle", "clock"), film.moving, strict=True)
+        zip(
+            ("traffic", "old", "jumps", "trail", "ahead", "vehicle", "clock"),
+            film.moving,
+            strict=True,
+        )
     )
 
 
@@ -89,6 +95,21 @@ def test_nothing_is_cut_off():
         corners = shown(film)["vehicle"].get_paths()[0].vertices
         assert (corners > [left, low]).all()
         assert (corners < [right, high]).all()
+
+
+def test_obstacles_stand_and_move_around_the_loop():
+    loop = parking_loop()
+    bar, disc = Box([1.0, 0.2], [0.0, -0.6]), Disc(0.1)
+    passing = Obstacle(disc, motion=Motion([0.0, 4.0], [[-1, -0.3, 0], [1, -0.3, 0]]))
+    problem = dataclasses.replace(loop.problem, obstacles=(Obstacle(bar), passing))
+    film = _film(dataclasses.replace(loop, problem=problem), footprint=CAR)
+    for time, x in ((1.0, -0.5), (3.0, 0.5)):
+        film.show(time)
+        (path,) = shown(film)["traffic"].get_paths()
+        assert np.allclose(path.get_extents().get_points().mean(axis=0), [x, -0.3])
+    (ax,) = film.figure.axes
+    ax.apply_aspect()
+    assert ax.get_ylim()[0] < -0.7
 
 
 def test_long_loops_are_shown_faster():

@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from maneuver_automaton.collision import Box, Disc, Polygon
 from maneuver_automaton.plotting.footprint import footprint_polygons, placed
 
 SQUARE = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]
@@ -15,6 +16,15 @@ SQUARE = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]
 def test_a_polygon_may_be_stated_in_many_ways(footprint):
     (outline,) = footprint_polygons(footprint)
     np.testing.assert_array_equal(outline, SQUARE)
+
+
+def test_shapes_have_their_own_outlines():
+    shapes = (Box([4.0, 2.0], [1.0, 0.0]), Disc(0.5, [1.0, 2.0]), Polygon(SQUARE))
+    box, disc, polygon = footprint_polygons(shapes)
+    assert box.min(axis=0).tolist() == [-1.0, -1.0]
+    np.testing.assert_allclose(np.linalg.norm(disc - [1.0, 2.0], axis=1), 0.5)
+    np.testing.assert_array_equal(polygon, SQUARE)
+    assert footprint_polygons(()) == []
 
 
 def test_no_footprint_has_no_outline():
@@ -52,7 +62,7 @@ def test_outlines_are_placed_by_the_pose():
         ({"rectangle_m": [1.0, -2.0]}, r"rectangle_m must be positive, got \[1.0, -2.0\] m"),
         ({"disc_m": 0.0}, "disc_m must be a positive radius, got 0.0 m"),
         ([[0.0, 0.0], [1.0, 1.0]], r"polygon has shape \(2, 2\)"),
-        ("box", "got 'box', need corners"),
+        ("box", "got 'box', need a shape, corners, a mapping, or several"),
         (np.array([[0.0, 0.0], [np.nan, 1.0], [1.0, 1.0]]), "need finite numbers"),
     ],
 )

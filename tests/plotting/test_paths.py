@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,9 +9,18 @@ from hypothesis import strategies as st
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
+from maneuver_automaton.collision import Disc
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting import draw_plan, trim_colors
-from tests.plotting.cases import flight_plan, parking_plan, plan_of, plan_of_trims
+from maneuver_automaton.plotting.colors import GREY, INK
+from maneuver_automaton.problem import Goal
+from tests.plotting.cases import (
+    flight_plan,
+    parking_plan,
+    plan_of,
+    plan_of_trims,
+    slalom_problem,
+)
 
 FOOTPRINT = {"rectangle_m": [0.6, 0.4], "reference_m": [-0.1, 0.0]}
 
@@ -33,8 +44,8 @@ def test_the_path_has_a_segment_per_trim_that_drives():
     first, second = artists.path.get_segments()
     np.testing.assert_allclose(first[[0, -1]], plan.switching_poses[[1, 2], :2], atol=1e-12)
     np.testing.assert_allclose(second[[0, -1]], plan.switching_poses[[2, 3], :2], atol=1e-12)
-    np.testing.assert_array_equal(artists.start.get_offsets()[0], plan.start[:2])
-    np.testing.assert_allclose(artists.goal.get_offsets()[0], plan.end[:2])
+    np.testing.assert_array_equal(artists.ends.start.get_offsets()[0], plan.start[:2])
+    np.testing.assert_allclose(artists.ends.goals[0].get_offsets()[0], plan.end[:2])
     assert ax.get_aspect() == 1.0
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("x [m]", "y [m]")
 
@@ -91,11 +102,11 @@ def test_a_climb_on_the_spot_is_a_marker():
 def test_the_body_is_drawn_at_every_switching_time():
     plan = parking_plan()
     _, artists = drawn(plan, footprint=FOOTPRINT)
-    bodies = outlines(artists.switch_bodies)
+    bodies = outlines(artists.bodies)
     assert len(bodies) == len(plan.switching_times)
     corners = SE2(plan.switching_poses[2]).act([[-0.2, -0.2], [0.4, -0.2], [0.4, 0.2], [-0.2, 0.2]])
     np.testing.assert_allclose(bodies[2][:4], corners, atol=1e-12)
-    assert len(outlines(artists.bodies)) > 5
+    assert outlines(artists.darts) == []
 
 
 def test_without_a_footprint_a_dart_grows_with_the_path():
@@ -103,7 +114,8 @@ def test_without_a_footprint_a_dart_grows_with_the_path():
     for duration in (1.0, 10.0):
         plan = plan_of(["straight", "clockwise"], [duration, duration])
         _, artists = drawn(plan)
-        sizes.append(np.ptp(outlines(artists.switch_bodies)[0], axis=0).max())
+        assert outlines(artists.bodies) == outlines(artists.swept) == []
+        sizes.append(np.ptp(outlines(artists.darts)[0], axis=0).max())
     assert sizes[1] > 5.0 * sizes[0]
 
 
@@ -117,20 +129,85 @@ def test_a_moved_plan_has_moved_artists(footprint, by):
     pairs = [
         (here.path.get_segments(), there.path.get_segments()),
         (here.spins.get_segments(), there.spins.get_segments()),
+        (outlines(here.darts), outlines(there.darts)),
         (outlines(here.bodies), outlines(there.bodies)),
-        (outlines(here.switch_bodies), outlines(there.switch_bodies)),
         (outlines(here.spin_heads), outlines(there.spin_heads)),
-        ([here.start.get_offsets()], [there.start.get_offsets()]),
-        ([here.goal.get_offsets()], [there.goal.get_offsets()]),
+        ([here.ends.start.get_offsets()], [there.ends.start.get_offsets()]),
+        ([here.ends.goals[0].get_offsets()], [there.ends.goals[0].get_offsets()]),
     ]
     for before, after in pairs:
         assert len(before) == len(after)
         for points, moved in zip(before, after, strict=True):
             np.testing.assert_allclose(move.act(np.asarray(points)), moved, atol=1e-9)
     np.testing.assert_array_equal(here.path.get_colors(), there.path.get_colors())
-    tips = [np.stack([quiver.U, quiver.V], axis=-1) for quiver in (here.headings, there.headings)]
+    tips = [
+        np.stack([quiver.U, quiver.V], axis=-1)
+        for quiver in (here.ends.headings, there.ends.headings)
+    ]
     turn = SE2(np.array([0.0, 0.0, by[2]]))
     np.testing.assert_allclose(turn.act(tips[0]), tips[1], atol=1e-9)
+
+
+@given(by=st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0), st.floats(-3.0, 3.0)))
+@settings(max_examples=10)
+def test_a_moved_problem_has_a_moved_picture(by):
+    plan, move = parking_plan(), SE2(np.array(by))
+    problem = slalom_problem(plan)
+    problem = replace(problem, obstacles=[o for o in problem.obstacles if not _is_disc(o)])
+    _, here = drawn(plan, problem=problem)
+    _, there = drawn(plan.moved(move), problem=problem.moved(move))
+    pairs = [(here.obstacles.maps[0], there.obstacles.maps[0])]
+    pairs += [(here.obstacles.still, there.obstacles.still)]
+    pairs += [(here.obstacles.movers, there.obstacles.movers)]
+    pairs += [(here.moment_bodies, there.moment_bodies)]
+    for before, after in pairs:
+        for path, moved in zip(before.get_paths(), after.get_paths(), strict=True):
+            np.testing.assert_allclose(move.act(path.vertices), moved.vertices, atol=1e-9)
+
+
+def _is_disc(obstacle):
+    """Its path is round, but its points do not turn with it."""
+    return isinstance(getattr(obstacle, "shape", None), Disc)
+
+
+def test_the_problem_gives_body_goals_and_obstacles():
+    plan = plan_of(["straight"], [2.0])
+    goals = [
+        Goal(pose=[9.0, 9.0, 0.0], tolerance_m=0.5),
+        Goal(pose=plan.end),
+        Goal(pose=[-3.0, 0.0, 0.0], free_heading=True),
+    ]
+    _, artists = drawn(plan, problem=slalom_problem(plan, goal=goals))
+    assert len(outlines(artists.bodies)) == 2
+    assert len(artists.ends.goals) == 3
+    assert len(artists.ends.rings) == len(artists.ends.sets) == 1
+    edges = [to_rgb(goal.get_edgecolor()[0]) for goal in artists.ends.goals]
+    assert edges == [GREY, INK, GREY]  # the one that is reached stands out
+    assert len(outlines(artists.goal_bodies)) == 1  # not reached, with a heading
+    assert artists.ends.headings.N == 3  # of the start, and of the goals with a heading
+    assert len(artists.obstacles.still.get_paths()) == 3
+    shown = names(artists.legend)
+    assert shown[1:5] == ["start", "goal", "any heading", "other goal"]
+    assert shown[5:8] == ["goal tolerance", "swept by the body", "obstacle"]
+    assert shown[8:] == [
+        "moving, at 0 s", *(f"at {t:g} s" for t in (0.5, 1.0, 1.5, 2.0)),
+    ]  # fmt: skip
+
+
+def test_a_footprint_comes_before_that_of_the_problem():
+    plan = parking_plan()
+    _, artists = drawn(plan, problem=slalom_problem(plan), footprint={"disc_m": 0.7})
+    assert np.ptp(outlines(artists.bodies)[0][:, 0]) == pytest.approx(1.4)
+
+
+def test_the_body_and_what_moves_have_the_colours_of_their_time():
+    plan = parking_plan()
+    _, artists = drawn(plan, problem=slalom_problem(plan))
+    bodies = artists.moment_bodies.get_facecolor()[:, :3]
+    np.testing.assert_array_equal(bodies, artists.obstacles.movers.get_facecolor()[:, :3])
+    assert len(np.unique(bodies, axis=0)) == len(bodies) == 5
+    middles = [outline[:4].mean(axis=0) for outline in outlines(artists.moment_bodies)]
+    np.testing.assert_allclose(middles, plan.pose_at([0, 2, 4, 6, 8])[:, :2], atol=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -151,7 +228,7 @@ def test_small_and_still_plans_are_drawn(plan):
     assert np.isfinite(limits).all()
     assert limits[0] < plan.start[0] < limits[1]
     assert limits[2] < plan.start[1] < limits[3]
-    assert np.isfinite(artists.goal.get_offsets()).all()
+    assert np.isfinite(artists.ends.goals[0].get_offsets()).all()
 
 
 def test_far_away_axes_are_counted_from_a_round_number():

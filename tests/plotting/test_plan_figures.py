@@ -22,6 +22,7 @@ from tests.plotting.cases import (
     plan_of,
     plan_of_trims,
     result_of,
+    slalom_problem,
 )
 
 CAR = {"rectangle_m": [0.9, 0.5], "reference_m": [-0.2, 0.0]}
@@ -63,6 +64,47 @@ def test_a_goal_of_free_heading_is_written(tmp_path):
     result = dataclasses.replace(result_of(plan), problem=problem)
     save_plan_figure(result, tmp_path / "plan.png")
     assert_picture(tmp_path / "plan.png")
+
+
+@pytest.mark.parametrize("goal", ["reached", "several", "free heading"])
+def test_scenes_are_written(goal, tmp_path):
+    plan = parking_plan()
+    goals = {
+        "reached": plan.end,
+        "several": [Goal(pose=plan.end, tolerance_m=0.1), Goal(pose=[2.0, 0.0, 1.0])],
+        "free heading": Goal(pose=plan.end, free_heading=True),
+    }
+    problem = slalom_problem(plan, goal=goals[goal])
+    result = dataclasses.replace(result_of(plan), problem=problem, clearance_m=0.25)
+    save_plan_figure(result, tmp_path / "plan.png")
+    assert_picture(tmp_path / "plan.png")
+
+
+def test_a_scene_without_a_plan_is_written(tmp_path):
+    result = PlanResult(
+        problem=slalom_problem(parking_plan()),
+        status=PlanStatus.GOAL_BLOCKED,
+        reason="at the goal the vehicle touches obstacle 1",
+    )
+    save_plan_figure(result, tmp_path / "plan.png")
+    assert_picture(tmp_path / "plan.png")
+
+
+@pytest.mark.parametrize("columns", [3, 4])
+def test_expanded_nodes_are_drawn_on_request(columns, tmp_path):
+    nodes = np.random.default_rng(1).normal(size=(200, columns))
+    save_plan_figure(result_of(parking_plan()), tmp_path / "plan.png", nodes=nodes)
+    assert_picture(tmp_path / "plan.png")
+    with pytest.raises(ValueError, match=r"nodes: got shape \(200, 2\), need 3 or 4 components"):
+        save_plan_figure(result_of(parking_plan()), tmp_path / "plan.png", nodes=nodes[:, :2])
+
+
+def test_the_same_result_gives_the_same_bytes(tmp_path):
+    plan = parking_plan()
+    result = dataclasses.replace(result_of(plan), problem=slalom_problem(plan))
+    for name in ("one.png", "two.png"):
+        save_plan_figure(result, tmp_path / name)
+    assert (tmp_path / "one.png").read_bytes() == (tmp_path / "two.png").read_bytes()
 
 
 @pytest.mark.parametrize("plan", [parking_plan(), plan_of_trims(50), flight_plan()])
