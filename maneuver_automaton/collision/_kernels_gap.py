@@ -248,18 +248,19 @@ def near_step(
     """How long the motion that goes on from here stays free of what is near, at most `most` [s].
 
     Every solid keeps apart by its gap over the body's speed, or by the axis between the two for as
-    long as that axis parts them. Also the least gap; not positive `-1` if one is at most `margin`.
+    long as that axis parts them. Also a lower bound of the gap; -1 if one is at most `margin`.
     """
     m_x = x + c * body.middle_x - s * body.middle_y
     m_y = y + s * body.middle_x + c * body.middle_y
     nearest = buckets.reach - keep
     if nearest <= margin:  # the distance to keep is beyond what the buckets know
         return -1.0, nearest
-    step = min(most, nearest / speed) if speed > 0.0 else most
+    speed = max(speed, 1e-12)  # a body at rest
+    step = min(max(most, near / speed), nearest / speed)
     i = math.floor((m_x - buckets.origin_x) / buckets.cell)
     j = math.floor((m_y - buckets.origin_y) / buckets.cell)
     if not (0 <= i < buckets.columns and 0 <= j < buckets.rows):
-        return step, nearest
+        return min(step, most), nearest
     k = j * buckets.columns + i
     for item in range(buckets.start[k], buckets.start[k + 1]):
         p = buckets.items[item]
@@ -275,7 +276,7 @@ def near_step(
             nearest = min(nearest, gap)
             if gap <= margin:
                 return -1.0, gap
-            lasts = gap / speed if speed > 0.0 else math.inf
+            lasts = gap / speed
             if lasts < step:
                 along = axis_time(
                     body,
@@ -294,7 +295,8 @@ def near_step(
                     gap - margin,
                 )
                 step = min(step, max(lasts, along))
-    return step, nearest
+    # solids that were passed over are further away than any step that was left then
+    return min(step, most), min(nearest, step * speed)
 
 
 @inlined_kernel
