@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.groups import SE2xR as SE2xR
     from maneuver_automaton.models import Car as Car
     from maneuver_automaton.models import Unicycle as Unicycle
+    from maneuver_automaton.planning import Planner as Planner
     from maneuver_automaton.planning import PlanResult as PlanResult
     from maneuver_automaton.planning import PlanStatus as PlanStatus
     from maneuver_automaton.planning import plan as plan
@@ -66,6 +67,7 @@ _HOMES = {
     "OccupancyMap": "collision",
     "Plan": "automaton",
     "PlanResult": "planning",
+    "Planner": "planning",
     "PlanStatus": "planning",
     "Polygon": "collision",
     "Problem": "problem",

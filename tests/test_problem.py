@@ -249,7 +249,7 @@ def test_bounds_are_low_and_high(name, pair):
     ("values", "message"),
     [
         ({"method": "latice"},
-         "search: method must be one of auto, words, insertion, got 'latice'"),
+         "search: method must be one of auto, words, insertion, lattice, got 'latice'"),
         ({"max_expansions": 0}, "search: max_expansions must be at least 1, got 0"),
     ],
 )  # fmt: skip

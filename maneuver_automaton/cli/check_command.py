@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,9 +20,11 @@ from maneuver_automaton.cli.automaton_command import few, report_lines
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN
 from maneuver_automaton.cli.inputs import Parts, scenario_of
+from maneuver_automaton.cli.progress import waiting
 from maneuver_automaton.cli.tables import console, table
 from maneuver_automaton.models import Model, rollout, vector_field
 from maneuver_automaton.planning import PlanStatus
+from maneuver_automaton.planning.blocked import where_touched
 from maneuver_automaton.problem import Bounds, Problem
 
 TRIM_SECONDS = 2.0  # how long every trim is driven by the ODE solver
@@ -209,7 +212,9 @@ def _feasibility(problem: Problem, time_limit: float) -> Iterator[Finding]:
             worst=max(outside.values()) if outside else None,
             words=words if bounded else "there are none",
         )
-    with announced():
+    if problem.obstacles:
+        yield from _ends_free(problem)
+    with announced(), waiting(f"planning, at most {time_limit:g} s", quiet=False):
         result = planning.plan(problem, time_limit=time_limit)
     found = result.status is PlanStatus.FOUND
     yield Finding(
@@ -217,6 +222,20 @@ def _feasibility(problem: Problem, time_limit: float) -> Iterator[Finding]:
         holds=None if result.status in UNDECIDED else found,
         words="a plan exists" if found else f"{result.status.value}: {result.reason}",
     )
+
+
+def _ends_free(problem: Problem) -> Iterator[Finding]:
+    """Whether start and goals touch an obstacle, and which."""
+    said = [("start", where_touched(problem, problem.start, problem.start_time))]
+    said += [
+        ("goal", where_touched(problem, goal.pose, math.inf))
+        for goal in problem.goals
+        if not goal.free_heading
+    ]
+    for what, words in said:
+        yield Finding(
+            what=f"{what}: keeps clear of obstacles", holds=not words, words=words or "it does"
+        )
 
 
 def _outside(bounds: Bounds, pose: Array) -> dict[str, float]:

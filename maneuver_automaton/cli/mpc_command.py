@@ -51,7 +51,7 @@ def drive_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> in
         return _statistics(path, scenario, out, settings)
     loop = _loop(path, scenario, settings)
     try:
-        _write(scenario, loop, out, settings)
+        _write(loop, out, settings)
     except OSError as error:
         raise not_written(Path(error.filename or out), error) from error
     if not settings.quiet:
@@ -194,7 +194,7 @@ def _disturbance(part: Any, seed: int | None) -> Disturbance | None:
     )
 
 
-def _write(scenario: Scenario, loop: ClosedLoop, out: Path, settings: Settings) -> None:
+def _write(loop: ClosedLoop, out: Path, settings: Settings) -> None:
     from maneuver_automaton.formats.closed_loop_json import save_closed_loop
 
     save_closed_loop(loop, out / "closed_loop.json")
@@ -204,9 +204,8 @@ def _write(scenario: Scenario, loop: ClosedLoop, out: Path, settings: Settings) 
         return
     from maneuver_automaton import plotting
 
-    footprint = list(scenario.footprint) or None
     if settings.plot:
-        plotting.save_closed_loop_figure(loop, out / "closed_loop.png", footprint=footprint)
+        plotting.save_closed_loop_figure(loop, out / "closed_loop.png")
     if settings.animate:
         for name in FILMS:
-            plotting.save_closed_loop_animation(loop, out / name, footprint=footprint)
+            plotting.save_closed_loop_animation(loop, out / name)

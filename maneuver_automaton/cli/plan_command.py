@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, scenario_of
-from maneuver_automaton.cli.progress import progress_bar
+from maneuver_automaton.cli.progress import progress_bar, waiting
 from maneuver_automaton.errors import InvalidScenario
 
 if TYPE_CHECKING:
@@ -48,14 +48,16 @@ class Row:
     reason: str = ""
     cost: float | None = None
     duration: float | None = None
-    search_s: float | None = None
+    clearance: float | None = None
+    first_plan: float | None = None
 
 
 def plan_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> int:
     """Plan one problem into the folder `out`, print the plan, return the exit code."""
     scenario = scenario_of(path, parts)
-    make_folder(out)
-    result = _plan(scenario, out, settings)
+    limit = settings.time_limit or scenario.time_limit_s
+    with waiting(f"planning, at most {limit:g} s", quiet=settings.quiet):
+        result = _plan(scenario, out, settings)
     if result.plan is None:
         complain(f"{path}: {result.status.value}: {result.reason}")
         return NO_PLAN
@@ -107,13 +109,13 @@ def _plan(scenario: Scenario, out: Path, settings: Settings) -> PlanResult:
         )
     result = replace(result, timing_s={**scenario.timing_s, **result.timing_s})
     try:
-        _write(scenario, result, out, settings)
+        _write(result, out, settings)
     except OSError as error:
         raise not_written(Path(error.filename or out), error) from error
     return result
 
 
-def _write(scenario: Scenario, result: PlanResult, out: Path, settings: Settings) -> None:
+def _write(result: PlanResult, out: Path, settings: Settings) -> None:
     from maneuver_automaton.formats.plan_json import save_plan
 
     save_plan(result, out / "plan.json")
@@ -123,13 +125,12 @@ def _write(scenario: Scenario, result: PlanResult, out: Path, settings: Settings
         return
     from maneuver_automaton import plotting
 
-    footprint = list(scenario.footprint) or None
     if settings.plot:
-        plotting.save_plan_figure(result, out / "plan.png", footprint=footprint)
+        plotting.save_plan_figure(result, out / "plan.png")
         if result.alternatives:
-            plotting.save_alternatives_figure(result, out / "alternatives.png", footprint=footprint)
+            plotting.save_alternatives_figure(result, out / "alternatives.png")
     if settings.animate and result.plan is not None:
-        plotting.save_plan_animation(result.plan, out / "plan.gif", footprint=footprint)
+        plotting.save_plan_animation(result.plan, out / "plan.gif", problem=result.problem)
 
 
 def _row(path: Path, parts: Parts, out: Path, settings: Settings, folder: Path) -> Row:
@@ -151,17 +152,20 @@ def _row(path: Path, parts: Parts, out: Path, settings: Settings, folder: Path) 
         reason="" if found else f"{path}: {status}: {result.reason}",
         cost=result.cost,
         duration=None if result.plan is None else result.plan.duration,
-        search_s=result.timing_s.get("search"),
+        clearance=result.clearance_m,
+        first_plan=result.timing_s.get("first_plan"),
     )
 
 
 def _compile_first(settings: Settings) -> None:
     """Have the kernels in the cache, or every process would compile them for itself."""
+    from maneuver_automaton.refinement.ready import load_lattice
     from maneuver_automaton.search.ready import load_insertion_kernels, load_word_kernels
 
     with announced(quiet=settings.quiet):
         load_word_kernels(4)
         load_insertion_kernels()
+        load_lattice()
 
 
 def _print_rows(rows: list[Row]) -> None:
@@ -171,8 +175,15 @@ def _print_rows(rows: list[Row]) -> None:
         return "" if value is None else f"{value:.{digits}g}"
 
     cells = [
-        [row.name, row.status, shown(row.cost, 6), shown(row.duration, 6), shown(row.search_s, 2)]
+        [
+            row.name,
+            row.status,
+            shown(row.cost, 6),
+            shown(row.duration, 6),
+            shown(row.clearance, 2),
+            shown(row.first_plan, 2),
+        ]
         for row in rows
     ]
-    columns = ["file", "status", "cost", "duration [s]", "search [s]"]
-    console().print(table("", columns, cells, numbers=(2, 3, 4)))
+    columns = ["file", "status", "cost", "duration [s]", "clearance [m]", "first plan [s]"]
+    console().print(table("", columns, cells, numbers=(2, 3, 4, 5)))

@@ -1,4 +1,4 @@
-"""A bar on a terminal, nothing elsewhere."""
+"""A bar or a clock on a terminal, nothing elsewhere."""
 
 from __future__ import annotations
 
@@ -36,3 +36,18 @@ def progress_bar(what: str, total: int, *, quiet: bool) -> Iterator[Advance]:
             bar.advance(task, n)
 
         yield advance
+
+
+@contextlib.contextmanager
+def waiting(what: str, *, quiet: bool) -> Iterator[None]:
+    """A clock that runs while something is computed of which no one knows how long it takes."""
+    if quiet or not sys.stderr.isatty():
+        yield
+        return
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as clock:
+        clock.add_task(what, total=None)
+        yield

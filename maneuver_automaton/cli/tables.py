@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
 from rich import box
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 if TYPE_CHECKING:
+    from maneuver_automaton.automaton import Plan
     from maneuver_automaton.planning import PlanResult
 
 WIDE = 160  # columns where the output goes to no terminal
@@ -45,7 +48,7 @@ def table(
 
 
 def print_result(name: str, result: PlanResult, *, folder: str) -> None:
-    """Word, durations, cost, terminal error and timing of a plan, and its alternatives."""
+    """Word, durations, cost, what it keeps to and what it took; and the alternatives."""
     plan, error = result.plan, result.terminal_error
     if plan is None or result.cost is None or error is None:
         return
@@ -62,12 +65,16 @@ def print_result(name: str, result: PlanResult, *, folder: str) -> None:
     facts = {
         "cost": f"{result.cost:.9g}{_bound(result)}",
         "duration": f"{plan.duration:.9g} s",
+        "turning points": f"{_direction_changes(plan)} between forward and reverse",
+        "clearance": _clearance(result),
         "terminal error": f"{error.position_m:.2g} m, {error.heading_rad:.2g} rad",
-        "timing": ", ".join(f"{k} {v:.3f} s" for k, v in result.timing_s.items()),
+        "timing": ", ".join(f"{_spoken(k)} {v:.3f} s" for k, v in result.timing_s.items()),
+        "counts": ", ".join(f"{_spoken(k)} {n}" for k, n in result.counts.items()),
         "written to": folder,
     }
     for what, value in facts.items():
-        out.print(Text(f"  {what + ':':<16}{value}"), soft_wrap=True)
+        if value:
+            out.print(Text(f"  {what + ':':<16}{value}"), soft_wrap=True)
     if result.alternatives:
         out.print()
         _print_alternatives(out, result)
@@ -86,6 +93,24 @@ def _bound(result: PlanResult) -> str:
     if result.lower_bound is None or result.gap is None:
         return ""
     return f" (at least {result.lower_bound:.9g}, gap {100 * result.gap:.2g} %)"
+
+
+def _clearance(result: PlanResult) -> str:
+    if result.clearance_m is None or math.isinf(result.clearance_m):
+        return ""
+    kept = f", {result.problem.margin:g} m asked for" if result.problem.margin else ""
+    return f"{result.clearance_m:.3g} m to the nearest obstacle{kept}"
+
+
+def _direction_changes(plan: Plan) -> int:
+    from maneuver_automaton.costs import Cost
+
+    velocities = [trim.body_velocity for trim in plan.trims]
+    return round(Cost(direction_change=1.0).switching(np.array(velocities))) if velocities else 0
+
+
+def _spoken(name: str) -> str:
+    return name.replace("_", " ").replace("fcl", "FCL")
 
 
 def _word(names: Sequence[str]) -> str:

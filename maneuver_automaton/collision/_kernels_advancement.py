@@ -7,8 +7,16 @@ import math
 import numpy as np
 
 from maneuver_automaton._compile import bare_inner_kernel, kernel
-from maneuver_automaton.collision._kernels_gap import NEAR, field_bound, near_step, piece_gap, still_gap
+from maneuver_automaton.collision._kernels_gap import (
+    NEAR,
+    field_bound,
+    near_step,
+    piece_gap,
+    still_gap,
+)
 from maneuver_automaton.groups._kernels import coast, compose
+
+FLAT = 1e5  # [m] radius beyond which an arc is not counted from its centre
 
 
 @bare_inner_kernel
@@ -79,11 +87,24 @@ def free_time(
     if turn_rate != 0.0:
         center_x = x - (s * v_x + c * v_y) / turn_rate
         center_y = y + (c * v_x - s * v_y) / turn_rate
+    flat = math.hypot(v_x, v_y) > FLAT * abs(turn_rate)  # a centre too far away to count from
+    if flat and turn_rate != 0.0:
+        turning = math.inf
     t, nearest = 0.0, math.inf
+    p_x, p_y, p_heading = x, y, heading
     while True:
-        d_x, d_y, turn = coast(v_x, v_y, turn_rate, sign * t)
-        p_x, p_y, p_heading = compose(x, y, heading, d_x, d_y, turn)
-        c, s = math.cos(p_heading), math.sin(p_heading)
+        if t > 0.0:
+            if turn_rate == 0.0:
+                p_x, p_y = x + w_x * t, y + w_y * t
+            elif flat:
+                d_x, d_y, turn = coast(v_x, v_y, turn_rate, sign * t)
+                p_x, p_y, p_heading = compose(x, y, heading, d_x, d_y, turn)
+                c, s = math.cos(p_heading), math.sin(p_heading)
+            else:
+                p_heading = heading + sign * turn_rate * t
+                c, s = math.cos(p_heading), math.sin(p_heading)
+                p_x = center_x + (s * v_x + c * v_y) / turn_rate
+                p_y = center_y - (c * v_x - s * v_y) / turn_rate
         gap = field_bound(world.field, body, p_x, p_y, c, s)
         if gap > keep + near:
             nearest = gap - keep
@@ -150,7 +171,7 @@ def free_times(world, body, poses, twists, speeds, durations, keep, margin, cloc
 
 @kernel
 def gaps(world, body, poses, times):
-    """Clearance (k,) at poses (k, 3): a lower bound, exact near contact, at most the field's cap."""
+    """Clearance (k,) at poses (k, 3): a lower bound, exact near contact, capped by the field."""
     out = np.empty(poses.shape[0])
     for k in range(poses.shape[0]):
         x, y, heading = poses[k, 0], poses[k, 1], poses[k, 2]

@@ -248,7 +248,8 @@ def near_step(
     """How long the motion that goes on from here stays free of what is near, at most `most` [s].
 
     Every solid keeps apart by its gap over the body's speed, or by the axis between the two for as
-    long as that axis parts them. Also a lower bound of the gap; -1 if one is at most `margin`.
+    long as that axis parts them (not asked for if `turn` is inf). Also a lower bound of the gap.
+    The time is -1 if a gap is at most `margin`.
     """
     m_x = x + c * body.middle_x - s * body.middle_y
     m_y = y + s * body.middle_x + c * body.middle_y
@@ -277,7 +278,7 @@ def near_step(
             if gap <= margin:
                 return -1.0, gap
             lasts = gap / speed
-            if lasts < step:
+            if lasts < step and turn < math.inf:
                 along = axis_time(
                     body,
                     b,
@@ -294,7 +295,8 @@ def near_step(
                     axis_y,
                     gap - margin,
                 )
-                step = min(step, max(lasts, along))
+                lasts = max(lasts, along)
+            step = min(step, lasts)
     # solids that were passed over are further away than any step that was left then
     return min(step, most), min(nearest, step * speed)
 

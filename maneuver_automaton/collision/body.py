@@ -46,9 +46,7 @@ def body_of(footprint: tuple[Shape, ...]) -> Body:
     solids = solids_of(pieces)
     low, high = solids.plates[:, :2].min(axis=0), solids.plates[:, 2:4].max(axis=0)
     middle = 0.5 * (low + high)
-    reach = max(
-        float(np.hypot(*(ring - middle).T).max()) + rounding for ring, rounding in pieces
-    )
+    reach = max(float(np.hypot(*(ring - middle).T).max()) + rounding for ring, rounding in pieces)
     covers = [_cover(ring, rounding) for ring, rounding in pieces]
     return Body(
         edges=solids.edges,
@@ -105,9 +103,7 @@ def _inscribed(footprint: tuple[Shape, ...]) -> float:
         if isinstance(shape, Disc):
             best = max(best, shape.radius - float(np.hypot(*shape.center)))
         else:
-            parts += [
-                shapely.Polygon(ring) for ring, _ in convex_pieces(shape) if len(ring) >= 3
-            ]
+            parts += [shapely.Polygon(ring) for ring, _ in convex_pieces(shape) if len(ring) >= 3]
     if parts:
         union, pose = shapely.union_all(parts), shapely.Point(0.0, 0.0)
         if union.contains(pose):

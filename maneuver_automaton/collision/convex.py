@@ -12,8 +12,8 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.shapes import Box, Disc, Polygon, Shape
 
-
 NOWHERE = np.zeros(2)
+DIGITS = 9  # decimals of coordinates seen from a frame [m, rad]
 
 
 class Solids(NamedTuple):
@@ -48,15 +48,64 @@ def convex_pieces(shape: Shape, origin: Array = NOWHERE) -> list[tuple[Array, fl
     return [(piece, 0.0) for piece in _decomposed(corners, holes)]
 
 
-def solids_of(pieces: Iterable[tuple[Array, float]]) -> Solids:
-    """Arrays of pieces for the kernels."""
+def plain_pieces(rings: list[Array], origin: Array) -> list[tuple[Array, float]]:
+    """Convex pieces of many polygons without holes, counted from `origin` (2,).
+
+    The convex ones, most as a rule, are found all at once.
+    """
+    if not rings:
+        return []
+    counts = np.array([len(ring) for ring in rings])
+    first = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    corners = np.concatenate(rings) - origin
+    after = np.arange(1, len(corners) + 1)
+    after[first + counts - 1] = first
+    edge = corners[after] - corners
+    following = edge[after]
+    cross = edge[:, 0] * following[:, 1] - edge[:, 1] * following[:, 0]
+    turn = np.arctan2(cross, np.einsum("ij,ij->i", edge, following))
+    total = np.add.reduceat(turn, first)
+    left = np.minimum.reduceat(cross, first) >= 0.0
+    right = np.maximum.reduceat(cross, first) <= 0.0
+    apart = np.logical_and.reduceat(edge.any(axis=1), first)
+    once = apart & (np.abs(np.abs(total) - 2.0 * math.pi) < 1.0)
+    pieces: list[tuple[Array, float]] = []
+    for k, begin in enumerate(first):
+        ring = corners[begin : begin + counts[k]]
+        if once[k] and left[k]:
+            pieces.append((ring, 0.0))
+        elif once[k] and right[k]:
+            pieces.append((ring[::-1], 0.0))
+        else:
+            pieces += convex_pieces(Polygon(rings[k]), origin)
+    return pieces
+
+
+def box_pieces(boxes: list[Box], origin: Array) -> list[tuple[Array, float]]:
+    """Pieces of many boxes, counted from `origin` (2,)."""
+    if not boxes:
+        return []
+    center = np.array([box.center for box in boxes]) - origin
+    half = 0.5 * np.array([box.size for box in boxes])
+    heading = np.array([box.heading for box in boxes])
+    along = half[:, :1] * np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    aside = half[:, 1:] * np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+    rings = np.stack([-along - aside, along - aside, along + aside, aside - along], axis=1)
+    return [(ring, 0.0) for ring in rings + center[:, None]]
+
+
+def solids_of(pieces: Iterable[tuple[Array, float]], frame: Array | None = None) -> Solids:
+    """Arrays of pieces for the kernels, seen along the heading of a frame (3,), and rounded."""
     rings, rounding = [], []
-    for ring, radius in pieces:
+    for ring, round_by in pieces:
         rings.append(ring)
-        rounding.append(radius)
+        rounding.append(round_by)
     counts = np.array([len(ring) for ring in rings], dtype=np.int64)
     first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     corners = np.concatenate([np.zeros((0, 2)), *rings])
+    if frame is not None:
+        c, s = math.cos(frame[2]), math.sin(frame[2])
+        corners = np.round(corners @ np.array([[c, -s], [s, c]]), DIGITS)
     radius = np.array(rounding, dtype=np.float64)
     if not rings:
         return Solids(np.zeros((0, 5)), first, np.zeros((0, 5)))
@@ -121,9 +170,7 @@ def _decomposed(corners: Array, holes: list[Array]) -> list[Array]:
             for line in shapely.get_parts(part):
                 points = shapely.get_coordinates(line)
                 pieces += [
-                    np.stack([a, b])
-                    for a, b in itertools.pairwise(points)
-                    if (a != b).any()
+                    np.stack([a, b]) for a, b in itertools.pairwise(points) if (a != b).any()
                 ]
         elif part.geom_type == "MultiPolygon":
             for polygon_part in shapely.get_parts(part):
@@ -137,7 +184,7 @@ def _decomposed(corners: Array, holes: list[Array]) -> list[Array]:
 def _ring_of(triangle: object) -> Array:
     import shapely
 
-    return shapely.get_coordinates(triangle)[:-1]
+    return np.asarray(shapely.get_coordinates(triangle)[:-1])
 
 
 def _merged(pieces: list[Array]) -> list[Array]:

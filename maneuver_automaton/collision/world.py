@@ -16,7 +16,14 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision import _kernels_field
 from maneuver_automaton.collision.body import Body, body_of
-from maneuver_automaton.collision.convex import Solids, convex_pieces, solids_of
+from maneuver_automaton.collision.convex import (
+    DIGITS,
+    Solids,
+    box_pieces,
+    convex_pieces,
+    plain_pieces,
+    solids_of,
+)
 from maneuver_automaton.collision.rectangles import blocked_rectangles
 from maneuver_automaton.collision.shapes import (
     AnyObstacle,
@@ -25,11 +32,11 @@ from maneuver_automaton.collision.shapes import (
     Motion,
     Obstacle,
     OccupancyMap,
+    Polygon,
     Shape,
 )
 from maneuver_automaton.groups import SE2
 
-DIGITS = 9  # decimals of coordinates [m, rad]
 MOST_FIELD_CELLS = 60_000
 MOST_MAP_CELLS = 250_000  # of the field over an occupancy map, where a cell costs less
 MOST_BUCKETS = 100_000
@@ -113,7 +120,7 @@ def world_of(
     Examples
     --------
     >>> world = world_of((Obstacle(Box([1.0, 1.0])),), (Disc(0.5),), (0.0, 0.0, 0.0))
-    >>> len(world.arrays.solids.radius), world.arrays.movers.speed.size
+    >>> len(world.arrays.solids.plates), world.arrays.movers.speed.size
     (1, 0)
     """
     body = body_of(footprint)
@@ -122,10 +129,19 @@ def world_of(
     still = [o for o in obstacles if isinstance(o, Obstacle) and o.motion is None]
     moving = [o for o in obstacles if isinstance(o, Obstacle) and o.motion is not None]
     maps = [_seen_map(o, pose) for o in obstacles if isinstance(o, OccupancyMap)]
-    pieces = [piece for o in still for piece in _turned(convex_pieces(o.shape, pose[:2]), pose)]
+    shapes = [o.shape for o in still]
+    plain = [s.corners for s in shapes if isinstance(s, Polygon) and not s.holes]
+    pieces = plain_pieces(plain, pose[:2])
+    pieces += box_pieces([shape for shape in shapes if isinstance(shape, Box)], pose[:2])
+    for shape in shapes:
+        if isinstance(shape, Disc) or (isinstance(shape, Polygon) and shape.holes):
+            pieces += convex_pieces(shape, pose[:2])
     listed = len(pieces)
-    pieces += [(ring, 0.0) for one in maps for ring in _cells(one)]
-    solids = solids_of([(np.round(ring, DIGITS), r) for ring, r in pieces])
+    shift = SE2(np.array([-pose[0], -pose[1], 0.0]))
+    for obstacle in obstacles:
+        if isinstance(obstacle, OccupancyMap):
+            pieces += [(ring, 0.0) for ring in _cells(obstacle.moved(shift))]
+    solids = solids_of(pieces, pose)
     movers = _movers(moving, pose)
     box = _box(solids.plates[:, :4], movers)
     arrays = WorldArrays(
@@ -164,13 +180,6 @@ def own_frame(obstacles: tuple[AnyObstacle, ...], otherwise: Array) -> tuple[flo
     return tuple(otherwise[:3].tolist())
 
 
-def _turned(pieces: list[tuple[Array, float]], frame: Array) -> list[tuple[Array, float]]:
-    """Pieces counted from the frame's place, seen along its heading."""
-    c, s = math.cos(frame[2]), math.sin(frame[2])
-    turn = np.array([[c, -s], [s, c]])
-    return [(ring @ turn, rounding) for ring, rounding in pieces]
-
-
 def _seen_map(one: OccupancyMap, frame: Array) -> OccupancyMap:
     there = one.moved(SE2(np.array([-frame[0], -frame[1], 0.0])))
     return there.moved(SE2(np.array([0.0, 0.0, -frame[2]])))
@@ -195,9 +204,7 @@ def _box(boxes: Array, movers: Movers) -> Array:
     return np.concatenate([every[:, :2].min(axis=0), every[:, 2:].max(axis=0)])
 
 
-def _field(
-    solids: Solids, listed: int, maps: list[OccupancyMap], body: Body, keep: float
-) -> Field:
+def _field(solids: Solids, listed: int, maps: list[OccupancyMap], body: Body, keep: float) -> Field:
     """Distances: polygons one by one, maps by a transform of their cells."""
     if not len(solids.plates):
         return Field(np.zeros((0, 0)), 0.0, 0.0, 1.0, math.inf)

@@ -21,7 +21,14 @@ from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.plan_json import package_version, read_json
 from maneuver_automaton.primitives import Trim
-from maneuver_automaton.receding_horizon import ClosedLoop, Guarantee, Origin, Step, Violation
+from maneuver_automaton.receding_horizon import (
+    ClosedLoop,
+    Deed,
+    Guarantee,
+    Origin,
+    Step,
+    Violation,
+)
 
 SCHEMA = 1
 NEEDED = ("schema", "automaton_hash", "reached", "steps", "step_s")
@@ -59,6 +66,8 @@ def closed_loop_to_dict(loop: ClosedLoop) -> dict[str, Any]:
                 (float(audit.max_dynamics_defect) for audit in loop.audits), default=None
             ),
         },
+        "min_clearance_m": loop.min_clearance_m,
+        "collisions": len(list(loop.collisions)),
         "broken_guarantees": [
             {"step": number, "guarantee": one.guarantee.value, "reason": one.reason}
             for number, one in loop.violations
@@ -157,6 +166,9 @@ def _step(step: Step, vehicle_pose: list[float]) -> dict[str, Any]:
         "gap": step.gap,
         "exhaustive": step.exhaustive,
         "arrived": step.arrived,
+        "deed": step.deed.value,
+        "free_until_s": step.free_until,
+        "clearance_m": step.clearance_m,
         "broken_guarantees": [
             {"guarantee": one.guarantee.value, "reason": one.reason} for one in step.violations
         ],
@@ -202,6 +214,9 @@ def _step_of(number: int, entry: Mapping[str, Any], automaton: Automaton) -> Ste
         solve_s=float(entry["solve_s"]),
         number=int(entry["number"]),
         arrived=bool(entry["arrived"]),
+        deed=Deed(entry["deed"]),
+        free_until=entry["free_until_s"],
+        clearance_m=entry["clearance_m"],
         measured=None if entry["measured_pose"] is None else np.array(entry["measured_pose"]),
         violations=tuple(
             Violation(guarantee=Guarantee(one["guarantee"]), reason=one["reason"])

@@ -128,6 +128,14 @@ def plan_on_lattice(problem: Problem, *, time_limit: float, alternatives: int) -
     )
 
 
+def prepare_lattice(problem: Problem) -> None:
+    """Kernels, the table, and the map as the search, FCL and the audit see it."""
+    load_lattice()
+    library_table(problem)
+    lattice_query(problem, tuple(range(len(problem.goals))))
+    load_checks(problem)
+
+
 def library_table(problem: Problem) -> CostTable:
     """The cost to go of the library, made once for all problems; none for several aims at once."""
     if len(problem.goals) > 1 or problem.goals[0].free_heading:

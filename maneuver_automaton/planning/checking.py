@@ -10,6 +10,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.collision.fcl_checker import FclChecker
+from maneuver_automaton.collision.surroundings import surroundings_of
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.inside import stays_inside
 
@@ -50,7 +51,9 @@ def check_plan(problem: Problem, plan: Plan, goal: Goal) -> Checked:
 def load_checks(problem: Problem) -> None:
     """Prepare what FCL and the audit compare with, once for a map."""
     if problem.obstacles:
-        checker_of(problem.footprint, problem.obstacles, problem.margin, _origin(problem.goals[0]))
+        origin = _origin(problem.goals[0])
+        checker_of(problem.footprint, problem.obstacles, problem.margin, origin)
+        surroundings_of(problem.obstacles, origin)
 
 
 @functools.lru_cache(maxsize=4)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from maneuver_automaton.planning.among_obstacles import plan_on_lattice
+from maneuver_automaton.planning.among_obstacles import plan_on_lattice, prepare_lattice
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.free_space import plan_by_words
 from maneuver_automaton.planning.result import PlanResult
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.search.choose import load_search
 
 
 def plan(problem: Problem, *, time_limit: float = 5.0, alternatives: int = 0) -> PlanResult:
@@ -50,6 +51,14 @@ def plan(problem: Problem, *, time_limit: float = 5.0, alternatives: int = 0) ->
     if uses_lattice(problem):
         return plan_on_lattice(problem, time_limit=time_limit, alternatives=alternatives)
     return plan_by_words(problem, time_limit=time_limit, alternatives=alternatives)
+
+
+def prepare(problem: Problem) -> None:
+    """Have ready what every problem on the map of this one needs."""
+    if uses_lattice(problem):
+        prepare_lattice(problem)
+    else:
+        load_search(problem)
 
 
 def uses_lattice(problem: Problem) -> bool:

@@ -1,7 +1,7 @@
 """Plans among obstacles for callers that plan again and again: unchecked, proven in the kernels.
 
-A closed loop has a plan already and a moment to find a better one. What it drives is checked by
-FCL and audited where it is applied.
+A closed loop has a plan already and a moment to find a better one. What it drives is audited where
+it is applied.
 """
 
 from __future__ import annotations
@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.collision.advancement import free_times
+from maneuver_automaton.collision.advancement import clearances, free_times
 from maneuver_automaton.planning.among_obstacles import library_table, plan_of_word
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.problem import Problem
@@ -23,6 +24,8 @@ from maneuver_automaton.search.lattice import Word, first_plan
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 
 LITTLE = Patience(attempts=800, passes=2)  # where a step's budget is short
+PROVEN = 1e-6  # [m] what a search has proven with its margin passes with this one, once more
+PROVEN_SHARE = 0.2  # of the search's margin, where that is tiny
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -35,7 +38,7 @@ class Tracked:
     reason: str = ""
 
 
-def free_until(problem: Problem, plan: Plan, *, margin: float = 1e-4) -> float:
+def free_until(problem: Problem, plan: Plan, *, margin: float = PROVEN) -> float:
     """Time since its start [s] up to which a plan is proven free of the problem's obstacles.
 
     The plan's own duration if all of it is; the obstacles are where they are at the plan's times.
@@ -50,16 +53,16 @@ def free_until(problem: Problem, plan: Plan, *, margin: float = 1e-4) -> float:
     >>> bool(3.9 < free_until(problem, plan) <= 4.0)
     True
     """
-    query = lattice_query(problem, (0,))
-    world = query.world
     if not plan.trims:
         return plan.duration
+    query = lattice_query(problem, (0,))
+    world = query.world
     free = free_times(
         world,
         world.into(plan.switching_poses[:-1]),
         twists=np.array([trim.body_velocity[:3] for trim in plan.trims]),
         durations=plan.durations,
-        margin=margin,
+        margin=min(margin, PROVEN_SHARE * query.margin),
         keep=problem.margin,
         times=plan.switching_times[:-1],
     )
@@ -70,12 +73,57 @@ def free_until(problem: Problem, plan: Plan, *, margin: float = 1e-4) -> float:
     return float(plan.switching_times[k] - plan.start_time + free[k])
 
 
+def stands_free(
+    problem: Problem, pose: Array, *, time: float, duration: float, margin: float = PROVEN
+) -> float:
+    """How long from `time` on [s] it is proven free to stand at a pose, at most `duration`.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Disc, Motion, Obstacle, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "spin": (0.0, 1.0)})
+    >>> coming = Obstacle(Disc(1.0), motion=Motion([0, 9], [[9, 0, 0], [0, 0, 0]]))
+    >>> problem = Problem(robot, [0, 0, 0], [9, 9, 0], obstacles=coming)
+    >>> 3.9 < stands_free(problem, problem.start, time=4.0, duration=60.0) <= 4.0
+    True
+    """
+    query = lattice_query(problem, (0,))
+    (free,) = free_times(
+        query.world,
+        query.world.into(pose)[None],
+        twists=np.zeros((1, 3)),
+        durations=[duration],
+        margin=min(margin, PROVEN_SHARE * query.margin),
+        keep=problem.margin,
+        times=[time],
+    )
+    return float(free)
+
+
+def clearance_at(problem: Problem, poses: Array, times: Array) -> Array:
+    """Distance (n,) [m] to what is nearest at poses (n, 3) and times (n,): a lower bound.
+
+    Exact near contact, at most what the kernels look for, not positive on contact.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Disc, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "spin": (0.0, 1.0)})
+    >>> problem = Problem(robot, [0, 0, 0], [9, 0, 0], obstacles=Disc(1.0, [1.5, 0]))
+    >>> clearance_at(problem, np.zeros((1, 3)), np.zeros(1)).tolist()
+    [0.5]
+    """
+    world = lattice_query(problem, (0,)).world
+    return clearances(world, world.into(poses), times=times)
+
+
 def track(
     problem: Problem,
     *,
     time_limit: float,
     known: Plan | None = None,
     patience: Patience = LITTLE,
+    max_expansions: int | None = None,
 ) -> Tracked:
     """A plan to any goal within `time_limit` [s]; `known` is improved if it is free.
 
@@ -89,6 +137,16 @@ def track(
         A plan from the problem's start that ends at one of its goals, of trims of its library.
     patience : Patience
         When to stop before the time is over.
+    max_expansions : int, optional
+        Of nodes, until a first plan is found; the problem's own limit if omitted.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Disc, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "spin": (0.0, 1.0)})
+    >>> problem = Problem(robot, [0, 0, 0], [9, 0, 0], obstacles=Disc(1.0, [5, 4]))
+    >>> track(problem, time_limit=5.0).cost
+    9.0
     """
     load_lattice()
     table = library_table(problem)
@@ -99,7 +157,8 @@ def track(
     query = lattice_query(problem, goals)
     word = None if known is None else word_of_plan(query, known)
     if word is None:
-        found = first_plan(query, deadline=deadline, table=table)
+        most = max_expansions or problem.search.max_expansions
+        found = first_plan(query, deadline=deadline, max_expansions=most, table=table)
         word = found.word
         if word is None:
             reason = found.enclosed or "no plan was found in the time given"
@@ -119,7 +178,7 @@ def word_of_plan(query: LatticeQuery, plan: Plan) -> Word | None:
     Rest that only pads at its end is left out.
     """
     problem = query.problem
-    if free_until(problem, plan, margin=query.margin) < plan.duration:
+    if free_until(problem, plan) < plan.duration:
         return None
     numbers = {problem.automaton.trims[k].name: n for n, k in enumerate(query.library.trims)}
     trims, durations = list(plan.trims), plan.durations.tolist()
@@ -128,10 +187,7 @@ def word_of_plan(query: LatticeQuery, plan: Plan) -> Word | None:
         durations.pop()
     if any(trim.name not in numbers for trim in trims):
         return None
-    ends = [
-        problem.goals[index].off(np.asarray(plan.end[:3]))
-        for index in query.goal_index
-    ]
+    ends = [problem.goals[index].off(np.asarray(plan.end[:3])) for index in query.goal_index]
     reached = [k for k, (way, turn) in enumerate(ends) if way < 1e-7 and turn < 1e-7]
     if not reached:
         return None

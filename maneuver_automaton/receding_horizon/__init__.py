@@ -2,9 +2,12 @@
 
 from maneuver_automaton.receding_horizon.candidates import within as within
 from maneuver_automaton.receding_horizon.controller import RecedingHorizon as RecedingHorizon
+from maneuver_automaton.receding_horizon.escape import Escape as Escape
+from maneuver_automaton.receding_horizon.escape import escape as escape
 from maneuver_automaton.receding_horizon.guarantees import Promises as Promises
 from maneuver_automaton.receding_horizon.guarantees import promises as promises
 from maneuver_automaton.receding_horizon.log import ClosedLoop as ClosedLoop
+from maneuver_automaton.receding_horizon.log import Deed as Deed
 from maneuver_automaton.receding_horizon.log import Guarantee as Guarantee
 from maneuver_automaton.receding_horizon.log import Origin as Origin
 from maneuver_automaton.receding_horizon.log import Step as Step

@@ -30,6 +30,8 @@ class Settings:
     hold: bool = False
     retimed: bool = False
     pad: Trim | None = None  # the rest that prolongs a plan
+    look_ahead: float = 60.0  # [s] that a way out must be free
+    stand: float = 2.0  # [s] that the goal must stay free after arrival
 
     def pad_of(self, problem: Problem) -> Trim | None:
         """The rest that fills a fixed time; None where time is free."""
@@ -59,11 +61,14 @@ class Candidate:
 def candidate(
     here: Problem, settings: Settings, plan: Plan, *, goal_index: int, origin: Origin
 ) -> Candidate:
-    """A plan at its best pace, if that is asked for, and in the order that costs most at first."""
+    """A plan at its best pace, if that is asked for, and in the order that costs most at first.
+
+    Among obstacles the order stays: another one drives elsewhere.
+    """
     if settings.retimed:
         plan = at_best_pace(here, plan)
     cost = here.cost_of(plan)
-    ordered = costliest_first(plan, here.rates_of(plan))
+    ordered = plan if here.obstacles else costliest_first(plan, here.rates_of(plan))
     if ordered is not plan:
         dearer = here.cost_of(ordered)
         if dearer <= cost + TIE * (1.0 + abs(cost)) and allowed(here, ordered):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,18 +12,24 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.collision import AnyObstacle, Shape, as_obstacles
+from maneuver_automaton.planning.among_obstacles import library_table
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.receding_horizon.among_obstacles import decide_among_obstacles
 from maneuver_automaton.receding_horizon.candidates import (
     EXACT,
     Settings,
     cost_until,
     is_rest_of,
 )
-from maneuver_automaton.receding_horizon.decision import Chosen, Decision
+from maneuver_automaton.receding_horizon.decision import Decision
+from maneuver_automaton.receding_horizon.escape import load_escape
 from maneuver_automaton.receding_horizon.guarantees import broken, promises, too_cheap
-from maneuver_automaton.receding_horizon.log import Step
+from maneuver_automaton.receding_horizon.log import Deed, Origin, Step
 from maneuver_automaton.receding_horizon.pace import is_uniform
+from maneuver_automaton.receding_horizon.situation import Chosen, Situation
+from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.search.choose import load_search
 from maneuver_automaton.search.limits import closed_bound
 from maneuver_automaton.search.ready import load_times_kernels
@@ -33,6 +40,11 @@ class RecedingHorizon:
 
     Every step shifts the last plan, which always leads to the goal, looks for a cheaper one, and
     checks what the paper proves of the loop; what is broken stands in the log with the reason.
+
+    Among obstacles the last plan is checked against where they are predicted now. Nothing is driven
+    that is not free, and followed by a free motion: a plan to the goal and time to stand there, or
+    a way out, which waits or evades. Where there is none, what does the least harm is driven, and
+    flagged.
 
     Source: the paper, Algorithm 14, Theorem 17, Sec. 4.2 and 4.3.
 
@@ -59,6 +71,10 @@ class RecedingHorizon:
     hold : bool
         Within the goal's tolerance, correct what is left within a few steps, along plans that stay
         within it if there are such; otherwise rest.
+    look_ahead : float
+        [s] that a way out, or standing still, must be free; less where nothing moves any more.
+    stand : float
+        [s] that the goal must stay free after arrival, and a step at least.
 
     Raises
     ------
@@ -96,12 +112,16 @@ class RecedingHorizon:
         first: Plan | None = None,
         hold: bool = False,
         retimed: bool = False,
+        look_ahead: float = 60.0,
+        stand: float = 2.0,
     ) -> None:
-        for name, value in (("step", step), ("time_limit", time_limit)):
+        for name, value in (("step", step), ("time_limit", time_limit), ("look_ahead", look_ahead)):
             if not value > 0.0:
                 raise ValueError(f"receding horizon: {name} must be positive, got {value} s")
         if not margin >= 0.0:
             raise ValueError(f"receding horizon: margin must be at least 0, got {margin}")
+        if not stand >= 0.0:
+            raise ValueError(f"receding horizon: stand must be at least 0, got {stand} s")
         pad = _pad(problem)
         _check_horizon(problem, step, pad, retimed=retimed)
         if last is not None and not 0 <= last.goal_index < len(problem.goals):
@@ -118,6 +138,8 @@ class RecedingHorizon:
             hold=hold,
             retimed=retimed,
             pad=pad,
+            look_ahead=look_ahead,
+            stand=stand,
         )
         self.last = last
         self.promises = promises(problem, step=step)
@@ -125,11 +147,30 @@ class RecedingHorizon:
         if last is not None and not retimed:  # the bound counts from the first step
             bound = self.promises.most_steps(last.value)
             self.most_steps = None if bound is None else bound + last.number
-        load_search(problem)
         load_times_kernels()
+        self._see(problem.obstacles)
+
+    def _see(self, obstacles: tuple[AnyObstacle, ...]) -> None:
+        """Take these obstacles for the ones there are, and have ready what decides among them."""
+        if self.settings.retimed and any(getattr(one, "motion", None) for one in obstacles):
+            raise ValueError(
+                "receding horizon: retimed plans meet what moves at other times; need obstacles "
+                "that stand still"
+            )
+        self.problem = replace(self.problem, obstacles=obstacles)
+        if not obstacles:
+            load_search(self.problem)
+            return
+        load_lattice()
+        load_escape()
+        library_table(self.problem)
 
     def step(
-        self, measured_state: ArrayLike, *, elapsed: float | None = None
+        self,
+        measured_state: ArrayLike,
+        *,
+        elapsed: float | None = None,
+        obstacles: Sequence[AnyObstacle | Shape] | None = None,
     ) -> tuple[Array | None, Step]:
         """Decide what to do from `measured_state`.
 
@@ -139,6 +180,9 @@ class RecedingHorizon:
             Pose [m, m, rad(, m)].
         elapsed : float, optional
             [s] since the last step; if omitted, what was to be applied of its plan.
+        obstacles : sequence of Obstacle or OccupancyMap, optional
+            What is seen from now on, with its predicted motions in the time of the world; if
+            omitted, what was seen last, at first that of the problem.
 
         Returns
         -------
@@ -155,12 +199,16 @@ class RecedingHorizon:
         Notes
         -----
         Where no plan leads to the goal, in whatever time, the log says so: its value is infinite,
-        and the vehicle rests.
+        and the vehicle rests. Among obstacles its value is then a lower bound, and ``deed`` says
+        what it does instead.
         """
         dof = self.problem.automaton.model.group.dof
         pose = np.array(as_array("measured_state", measured_state, last=dof))
         if pose.shape != (dof,):
             raise ValueError(f"measured_state: got shape {pose.shape}, need ({dof},)")
+        changed = obstacles is not None and as_obstacles(obstacles) != self.problem.obstacles
+        if obstacles is not None and changed:
+            self._see(as_obstacles(obstacles))
         began = time.monotonic()
         last = self.last
         passed = 0.0 if last is None else (last.applied if elapsed is None else elapsed)
@@ -170,8 +218,11 @@ class RecedingHorizon:
             last = self._cut(last, passed)
         at = self.problem.start_time if last is None else last.time + passed
         here = replace(self.problem, start=pose, start_time=at)
-        chosen = Decision(self.settings, here, last, passed, began).chosen()
-        now = self._logged(chosen, here, last, began)
+        if here.obstacles:
+            chosen = decide_among_obstacles(self.settings, here, last, passed, began)
+        else:
+            chosen = Decision(Situation(self.settings, here, last, passed, began)).chosen()
+        now = self._logged(chosen, here, last, began, changed=changed)
         self.last = now
         control = now.control
         if control is None and self.settings.pad is not None:
@@ -186,16 +237,22 @@ class RecedingHorizon:
             last, applied=passed, applied_cost=cost_until(self.problem, last.plan, passed)
         )
 
-    def _logged(self, chosen: Chosen, here: Problem, last: Step | None, began: float) -> Step:
+    def _logged(
+        self, chosen: Chosen, here: Problem, last: Step | None, began: float, *, changed: bool
+    ) -> Step:
         plan, goal = chosen.plan, here.goals[chosen.goal_index]
         retimed = self.settings.retimed
+        deed = _deed(chosen, last)
+        bound = self._bound(chosen, here)
+        nowhere = not deed.leads and bool(here.obstacles)
+        value = bound if nowhere else chosen.value
         applied = min(self.settings.step, plan.duration) if plan.trims else self.settings.step
         now = Step(
             time=here.start_time,
             pose=here.start,
             plan=plan,
             goal_index=chosen.goal_index,
-            value=chosen.value,
+            value=value,
             applied=applied,
             applied_cost=cost_until(here, plan, applied),
             accumulated_cost=0.0 if last is None else last.accumulated_cost + last.applied_cost,
@@ -203,17 +260,21 @@ class RecedingHorizon:
             replanned=last is not None and not is_rest_of(plan, chosen.rest),
             shifted_value=chosen.shifted_value,
             off_plan=chosen.off_plan,
-            lower_bound=min(chosen.value, self._bound(chosen, here)),
+            lower_bound=min(value, bound),
             exhaustive=chosen.exhaustive,
             solve_s=time.monotonic() - began,
             number=0 if last is None else last.number + 1,
             arrived=chosen.arrived,
+            deed=deed,
+            free_until=chosen.free_until,
         )
         if (last is None or now.off_plan) and not retimed:  # from here on, undisturbed
-            bound = self.promises.most_steps(now.value)
-            self.most_steps = None if bound is None else bound + now.number
+            most = None if here.moves or nowhere else self.promises.most_steps(now.value)
+            self.most_steps = None if most is None else most + now.number
+        if here.moves:
+            self.most_steps = None  # to wait may cost nothing
         found = list(chosen.violations)
-        if last is not None and math.isfinite(now.value):
+        if last is not None and deed.leads and last.deed.leads:
             found += broken(
                 self.promises,
                 goal,
@@ -221,8 +282,9 @@ class RecedingHorizon:
                 now,
                 most_steps=None if retimed else self.most_steps,
                 uniform=retimed and is_uniform(now.plan, here.cost),
+                moved=here.moves or changed,
             )
-        if not (now.arrived or retimed) and math.isfinite(now.value):
+        if deed.leads and not (now.arrived or retimed or here.moves):
             found += too_cheap(self.promises, now)
         return replace(now, violations=tuple(found))
 
@@ -233,6 +295,20 @@ class RecedingHorizon:
         if self.settings.retimed:  # trims at another pace may cost less than those of the library
             return min(self.promises.effort_bound(here.start, goal) for goal in here.goals)
         return min(closed_bound(here, goal) for goal in here.goals)
+
+
+def _deed(chosen: Chosen, last: Step | None) -> Deed:
+    """What a step does, where the decision does not say it."""
+    if chosen.deed is not None:
+        return chosen.deed
+    if math.isinf(chosen.value):
+        return Deed.STOPPED
+    if last is None:
+        return Deed.PLANNED
+    if chosen.origin is not Origin.SEARCHED:
+        return Deed.KEPT
+    same = last.deed.leads and is_rest_of(chosen.plan, chosen.rest)
+    return Deed.IMPROVED if same else Deed.REPLANNED
 
 
 def _check_horizon(problem: Problem, step: float, pad: Trim | None, *, retimed: bool) -> None:

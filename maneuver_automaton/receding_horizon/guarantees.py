@@ -113,20 +113,30 @@ def _least_effort(problem: Problem, cost: Cost) -> float:
 
 
 def broken(
-    promised: Promises, goal: Goal, last: Step, now: Step, *, most_steps: int | None, uniform: bool
+    promised: Promises,
+    goal: Goal,
+    last: Step,
+    now: Step,
+    *,
+    most_steps: int | None,
+    uniform: bool,
+    moved: bool = False,
 ) -> Iterator[Violation]:
     """The guarantees that the step from `last` to `now` broke, each with the reason.
 
     `uniform`: the controls are continuous and the effort is uniform, so that the paper's decrease
-    by the effort is promised too.
+    by the effort is promised too. `moved`: obstacles move, or were seen anew.
     """
     off = now.off_plan or 0.0
-    why = f"the state was measured {off:.3g} off the plan" if off > 0.0 else "the plan was followed"
+    why = "obstacles moved" if moved else "the plan was followed"
+    if off > 0.0:
+        why = f"the state was measured {off:.3g} off the plan"
     tolerance = ACCURACY * (1.0 + abs(last.value))
+    free = " and safely" if moved else ""
     if now.shifted_value is None:
         yield Violation(
             guarantee=Guarantee.FEASIBILITY,
-            reason=f"the rest of the last plan does not lead to the goal in time; {why}",
+            reason=f"the rest of the last plan does not lead to the goal in time{free}; {why}",
         )
     padding = promised.rest_rate * last.applied
     if last.plan.trims and last.plan.trims[-1].body_velocity.any():  # rest is a new switch

@@ -25,6 +25,8 @@ class Guarantee(enum.Enum):
     HORIZON = "horizon"
     BUDGET = "time budget"
     BOUNDS = "bounds"
+    SAFETY = "safety"  # what is applied is free, and a free motion follows
+    NO_COLLISION = "no collision"  # found by the audit of what was driven
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,15 +49,33 @@ class Origin(enum.Enum):
     SEARCHED = "searched"  # found anew
 
 
+class Deed(enum.Enum):
+    """What a step did."""
+
+    PLANNED = "planned"  # the first plan to the goal
+    KEPT = "kept"  # the last plan
+    IMPROVED = "improved"  # the last plan's word with better times
+    REPLANNED = "replanned"  # another word to the goal
+    APPROACHED = "approached"  # towards the goal, as far as there is a way out
+    STOPPED = "stopped"  # it waits at rest
+    EVADED = "evaded"  # out of the way of something
+    HARMFUL = "harmful"  # nothing is free: what is hit last, or least
+
+    @property
+    def leads(self) -> bool:
+        """Whether the step's plan ends at the goal."""
+        return self in (Deed.PLANNED, Deed.KEPT, Deed.IMPROVED, Deed.REPLANNED)
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Step:
     """One step: where the vehicle was, what was planned from there, and what of it is applied."""
 
     time: float  # [s]
     pose: Array  # (dof,) the plan starts here [m, m, rad(, m)]
-    plan: Plan  # from `pose` to the goal
+    plan: Plan  # from `pose` to the goal, or, if its deed does not lead there, out of the way
     goal_index: int  # which of the problem's goals it reaches
-    value: float  # cost of the whole plan
+    value: float  # cost of the whole plan; of one that does not lead to the goal, a lower bound
     applied: float  # [s] until the next step
     applied_cost: float
     accumulated_cost: float  # of all steps before
@@ -70,6 +90,9 @@ class Step:
     arrived: bool = False  # nothing remains to be done but to rest
     violations: tuple[Violation, ...] = ()
     measured: Array | None = None  # (dof,) what was seen meanwhile, if it is used a step later
+    deed: Deed = Deed.PLANNED
+    free_until: float | None = None  # [s] no contact is predicted until then; None: nothing there
+    clearance_m: float | None = None  # least one while it was driven, by the audit
 
     def __post_init__(self) -> None:
         freeze(self, "pose", last=(3, 4))
@@ -118,6 +141,19 @@ class ClosedLoop:
     def __post_init__(self) -> None:
         freeze(self, "poses", last=(3, 4))
         freeze(self, "times")
+
+    @property
+    def min_clearance_m(self) -> float | None:
+        """Least distance to an obstacle that the audit measured [m]; None if it measured none."""
+        known = [step.clearance_m for step in self.steps if step.clearance_m is not None]
+        return min(known, default=None)
+
+    @property
+    def collisions(self) -> Iterator[tuple[int, Violation]]:
+        """Number of the step and what it hit, as the audit found."""
+        for number, violation in self.violations:
+            if violation.guarantee is Guarantee.NO_COLLISION:
+                yield number, violation
 
     @property
     def violations(self) -> Iterator[tuple[int, Violation]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -12,11 +12,15 @@ import numpy as np
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.audit import Audit, audit_plan
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.collision import AnyObstacle, Shape
+from maneuver_automaton.collision.blocked import too_close
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.controller import RecedingHorizon
-from maneuver_automaton.receding_horizon.log import ClosedLoop, Step
+from maneuver_automaton.receding_horizon.log import ClosedLoop, Guarantee, Step, Violation
+
+Seen = Callable[[int], Sequence[AnyObstacle | Shape]]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -65,6 +69,9 @@ def simulate(
     first: Plan | None = None,
     stay: bool = False,
     retimed: bool = False,
+    look_ahead: float = 60.0,
+    stand: float = 2.0,
+    obstacles: Seen | None = None,
     audit: bool = True,
     progress: Callable[[Step], None] | None = None,
 ) -> ClosedLoop:
@@ -80,14 +87,18 @@ def simulate(
         At most so many.
     disturbance : Disturbance, optional
         None: the vehicle does what its model says.
-    margin, time_limit, first, retimed
+    margin, time_limit, first, retimed, look_ahead, stand
         As in `RecedingHorizon`.
     last : Step, optional
         To go on from the last step of another loop; the problem's start is where that led.
     stay : bool
         Go on for all steps after the goal's set is reached, and try to stay in it.
+    obstacles : callable, optional
+        What the controller sees and predicts at the step of a number; if omitted, the obstacles of
+        the problem. Those are what there is: what was driven is judged by them.
     audit : bool
-        Have an ODE solver drive every piece again that was applied.
+        Have an ODE solver drive every piece again that was applied, and measure its distance to
+        the obstacles of the problem.
     progress : callable, optional
         Called with every step.
 
@@ -126,6 +137,8 @@ def simulate(
         first=first,
         hold=stay,
         retimed=retimed,
+        look_ahead=look_ahead,
+        stand=stand,
     )
     begin = 0 if last is None else last.number + 1
     for _ in range(begin):  # the numbers that the steps before have used
@@ -146,19 +159,22 @@ def simulate(
         if upset.delay and before is not None:  # what has been applied since is a group element
             seen = _after(before, measured_late)
         measured_late = measured
-        _, now = controller.step(seen)
+        _, now = controller.step(seen, obstacles=None if obstacles is None else obstacles(number))
         if upset.delay:
             now = replace(now, measured=measured)
         before = now
         log.append(now)
-        if progress is not None:
-            progress(now)
-        if not math.isfinite(now.value):
+        stuck = not (now.deed.leads or problem.moves or obstacles is not None)
+        if stuck:
             break
         piece = replace(now.piece, start=where)
+        driven.append(_as_driven(piece, upset))
         if audit and piece.trims:
             audits.append(_audited(problem, piece))
-        driven.append(_as_driven(piece, upset))
+            real = audits[-1] if driven[-1] is piece else _audited(problem, driven[-1])
+            log[-1] = _judged(now, real)
+        if progress is not None:
+            progress(log[-1])
         where = np.array(driven[-1].end) + draw.noise
         if number in upset.pushes:
             group = group_of(where.size)
@@ -168,7 +184,17 @@ def simulate(
         times.append(now.time + now.applied)
         inside.append(_inside(problem, where))
     return _closed_loop(
-        problem, controller, log, poses, times, driven, audits, inside, step=step, stay=stay
+        problem,
+        controller,
+        log,
+        poses,
+        times,
+        driven,
+        audits,
+        inside,
+        step=step,
+        stay=stay,
+        seen=obstacles,
     )
 
 
@@ -184,19 +210,21 @@ def _closed_loop(
     *,
     step: float,
     stay: bool,
+    seen: Seen | None,
 ) -> ClosedLoop:
-    helpless = bool(log) and not math.isfinite(log[-1].value)
+    helpless = len(log) > len(driven)
     applied = log[:-1] if helpless else log
     reached = any(inside) if stay else inside[-1]
     cost = log[-1].accumulated_cost if helpless else _spent(controller.last)
     value, reason, status, bound = 0.0, "", "reached", controller.most_steps
     if helpless:
         value, status = log[-1].lower_bound, "no_plan"
-        reason = str(log[-1].violations[0])
+        reason = str(log[-1].violations[-1])
     elif not inside[-1]:
         if applied:  # what would have come next
             controller.last = applied[-1]
-            value = controller.step(poses[-1])[1].value
+            then = applied[-1].number + 1
+            value = controller.step(poses[-1], obstacles=seen and seen(then))[1].value
             controller.last = applied[-1]
         if not reached:
             status = "steps_spent"
@@ -267,8 +295,23 @@ def _after(step: Step, start: Array) -> Array:
 
 
 def _audited(problem: Problem, piece: Plan) -> Audit:
-    """The piece against the model's equations; it need not end at the goal."""
-    return audit_plan(piece, Goal(pose=piece.end), problem.automaton.model)
+    """A piece against the model's equations and the obstacles; it need not end at the goal."""
+    return audit_plan(
+        piece,
+        Goal(pose=piece.end),
+        problem.automaton.model,
+        footprint=problem.footprint,
+        obstacles=problem.obstacles,
+    )
+
+
+def _judged(now: Step, driven: Audit) -> Step:
+    """The step with the clearance of what was driven; a collision is flagged."""
+    clearance = driven.min_clearance_m
+    if clearance is None or clearance > too_close(0.0):
+        return replace(now, clearance_m=clearance)
+    hit = Violation(guarantee=Guarantee.NO_COLLISION, reason=driven.reason.split("; ")[-1])
+    return replace(now, clearance_m=clearance, violations=(*now.violations, hit))
 
 
 def _inside(problem: Problem, pose: Array) -> bool:

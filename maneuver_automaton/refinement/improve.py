@@ -18,6 +18,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.refinement import _kernels_improve as kernels
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
+from maneuver_automaton.search.distance_grid import DistanceGrid
 from maneuver_automaton.search.lattice import (
     Rung,
     Word,
@@ -25,7 +26,12 @@ from maneuver_automaton.search.lattice import (
     distance_grids,
     with_cost,
 )
-from maneuver_automaton.search.lattice_memory import Scratch, scratch_of, search_arrays
+from maneuver_automaton.search.lattice_memory import (
+    Scratch,
+    SearchArrays,
+    scratch_of,
+    search_arrays,
+)
 from maneuver_automaton.search.lattice_query import LatticeQuery
 
 POINTS = 40  # of the dynamic program
@@ -202,7 +208,13 @@ class _Improvement:
             self.best = candidate
             self.better(candidate)
 
-    def _searched_again(self, step: int, rng: np.random.Generator, grids, memory):  # type: ignore[no-untyped-def]
+    def _searched_again(
+        self,
+        step: int,
+        rng: np.random.Generator,
+        grids: tuple[DistanceGrid, DistanceGrid],
+        memory: list[SearchArrays],
+    ) -> Word | None:
         """A connection found by a new search with other settings; None if there is none."""
         scale, quanta = 1.0, 1.0
         weight = WEIGHTS[step // 2] if step < 2 * len(WEIGHTS) else float(rng.uniform(1.0, 2.0))

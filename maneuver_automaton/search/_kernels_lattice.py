@@ -41,14 +41,24 @@ def cell_key(task, x, y, heading, layer, time, fine):
 
 
 @inlined_kernel
-def slot_of(table, generations, generation, key):
-    """Place of a key in the hash table, or the free one where it belongs."""
+def slot_of(table, generation, key):
+    """Row of a key in the hash table, or the free one where it belongs.
+
+    Rows are (key, generation and node); those of another generation are free.
+    """
     mask = table.shape[0] - 1
     mixed = (key ^ (key >> 23) ^ (key >> 41)) & 0x7FFFFFFF
     slot = ((mixed * 0x9E3779B1) >> 15) & mask
-    while generations[slot] == generation and table[slot] != key:
+    while table[slot, 1] >> 31 == generation and table[slot, 0] != key:
         slot = (slot + 1) & mask
     return slot
+
+
+@inlined_kernel
+def node_in(table, generation, slot):
+    """Node that a row of the hash table holds; -1 if it is free."""
+    entry = table[slot, 1]
+    return entry & 0x7FFFFFFF if entry >> 31 == generation else -1
 
 
 @inlined_kernel
@@ -176,9 +186,8 @@ def add_node(search, task, lib, key_slot, key, row, link, estimate):
     links[node, 0], links[node, 1], links[node, 2] = link[0], link[1], link[2]
     links[node, 3], links[node, 4], links[node, 5] = link[3], link[4], 0
     state[N_NODES] = node + 1
-    search.hash_key[key_slot] = key
-    search.hash_node[key_slot] = node
-    search.hash_generation[key_slot] = state[GENERATION]
+    search.table[key_slot, 0] = key
+    search.table[key_slot, 1] = (state[GENERATION] << 31) | node
     push(search.heap_key, search.heap_node, state[HEAP], row[3] + task.weight * estimate, node)
     state[HEAP] += 1
 
@@ -196,8 +205,8 @@ def begin(search, task, lib, world, grid, table):
         x, y, heading = task.roots[r, 0], task.roots[r, 1], task.roots[r, 2]
         estimate = cost_to_go(task, grid, table, world, x, y, heading)
         key = cell_key(task, x, y, heading, layer_of(task, lib, NO_TRIM, 0, 0), 0.0, 0)
-        slot = slot_of(search.hash_key, search.hash_generation, generation, key)
-        if estimate == math.inf or search.hash_generation[slot] == generation:
+        slot = slot_of(search.table, generation, key)
+        if estimate == math.inf or node_in(search.table, generation, slot) >= 0:
             continue
         row = (x, y, heading, 0.0, 0.0, 0.0, 0.0, 0.0)
         add_node(search, task, lib, slot, key, row, (-1, NO_TRIM, 0, 0, r), estimate)
@@ -212,6 +221,7 @@ def expand(search, task, lib, world, body, grid, table, n, ceiling):
     """
     nodes, links, state = search.nodes, search.links, search.state
     room = nodes.shape[0] - lib.n_trims * lib.quanta.shape[1] - 1
+    generation = state[GENERATION]
     for _ in range(n):
         node = -1
         while state[HEAP] > 0:
@@ -241,6 +251,7 @@ def expand(search, task, lib, world, body, grid, table, n, ceiling):
             if state[FOUND] == 1 and task.stop_at_first:
                 return 1
         limit = min(ceiling, search.found[0])
+        cos, sin = math.cos(heading), math.sin(heading)
         before, gear = links[node, 1], links[node, 2]
         for trim in range(lib.n_trims):
             if before != NO_TRIM and before != trim and run < lib.min_coast:
@@ -260,16 +271,15 @@ def expand(search, task, lib, world, body, grid, table, n, ceiling):
                 time = spent + t
                 if cost >= limit or time > task.most_time:
                     break
-                d_x, d_y, angle = coast(v_x, v_y, turn, task.sign * t)
-                n_x, n_y, n_heading = compose(x, y, heading, d_x, d_y, angle)
+                d_x, d_y = lib.moves[trim, q, 0], lib.moves[trim, q, 1]
+                n_x, n_y = x + cos * d_x - sin * d_y, y + sin * d_x + cos * d_y
+                n_heading = heading + lib.moves[trim, q, 2]
                 fine = 0
                 key = cell_key(task, n_x, n_y, n_heading, layer, time, 0)
-                slot = slot_of(search.hash_key, search.hash_generation, state[GENERATION], key)
-                old = -1
-                if search.hash_generation[slot] == state[GENERATION]:
-                    old = search.hash_node[slot]
-                    if nodes[old, 3] <= cost and (not task.contact):
-                        continue
+                slot = slot_of(search.table, generation, key)
+                old = node_in(search.table, generation, slot)
+                if old >= 0 and nodes[old, 3] <= cost and not task.contact:
+                    continue
                 ahead = cost_to_go(task, grid, table, world, n_x, n_y, n_heading)
                 if (cost + ahead >= limit) and not task.contact:
                     continue
@@ -304,10 +314,8 @@ def expand(search, task, lib, world, body, grid, table, n, ceiling):
                     d_x, d_y, angle = coast(v_x, v_y, turn, task.sign * t)
                     n_x, n_y, n_heading = compose(x, y, heading, d_x, d_y, angle)
                     key = cell_key(task, n_x, n_y, n_heading, layer, time, 1)
-                    slot = slot_of(search.hash_key, search.hash_generation, state[GENERATION], key)
-                    old = -1
-                    if search.hash_generation[slot] == state[GENERATION]:
-                        old = search.hash_node[slot]
+                    slot = slot_of(search.table, generation, key)
+                    old = node_in(search.table, generation, slot)
                     ahead = cost_to_go(task, grid, table, world, n_x, n_y, n_heading)
                     gap = 0.0
                 fits = cost + ahead < limit and (old < 0 or nodes[old, 3] > cost)
@@ -326,13 +334,10 @@ def expand(search, task, lib, world, body, grid, table, n, ceiling):
 
 
 @bare_kernel
-def rehash(search, wide_key, wide_node, wide_generation):
+def rehash(search, wide):
     """Carry the entries of this generation over into a wider hash table."""
     generation = search.state[GENERATION]
-    for k in range(search.hash_key.shape[0]):
-        if search.hash_generation[k] == generation:
-            key = search.hash_key[k]
-            slot = slot_of(wide_key, wide_generation, generation, key)
-            wide_key[slot] = key
-            wide_node[slot] = search.hash_node[k]
-            wide_generation[slot] = generation
+    for k in range(search.table.shape[0]):
+        if node_in(search.table, generation, k) >= 0:
+            slot = slot_of(wide, generation, search.table[k, 0])
+            wide[slot, 0], wide[slot, 1] = search.table[k, 0], search.table[k, 1]

@@ -14,6 +14,7 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.search import _kernels_lattice as kernels
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.distance_grid import DistanceGrid, distance_grid
+from maneuver_automaton.search.lattice_library import LatticeArrays, moves_of
 from maneuver_automaton.search.lattice_memory import SearchArrays, search_arrays, with_room
 from maneuver_automaton.search.lattice_query import LatticeQuery
 
@@ -86,20 +87,25 @@ class Rung:
     stop: bool = True  # at the first connection
 
 
-LADDER = (  # after so many expansions of all passes together, or when all are exhausted
+LADDER: tuple[tuple[int, tuple[Rung, ...]], ...] = (
+    # after so many expansions of all passes together, or when all are exhausted
     (
         300,
-        Rung(contact=True, guided=True),
-        Rung(scale=0.5, quanta=0.5, contact=True, guided=True),
+        (
+            Rung(contact=True, guided=True),
+            Rung(scale=0.5, quanta=0.5, contact=True, guided=True),
+        ),
     ),
     (
         8000,
-        Rung(scale=0.5, quanta=0.5, contact=True, fine=0.2, guided=True),
-        Rung(scale=0.24, quanta=0.25, contact=True, guided=True),
-        Rung(scale=0.5, quanta=0.5, contact=True),
-        Rung(scale=0.12, quanta=0.17),
+        (
+            Rung(scale=0.5, quanta=0.5, contact=True, fine=0.2, guided=True),
+            Rung(scale=0.24, quanta=0.25, contact=True, guided=True),
+            Rung(scale=0.5, quanta=0.5, contact=True),
+            Rung(scale=0.12, quanta=0.17),
+        ),
     ),
-    (2**62, Rung(scale=0.24, quanta=0.25, contact=True, margin=0.1, guided=True)),
+    (2**62, (Rung(scale=0.24, quanta=0.25, contact=True, margin=0.1, guided=True),)),
 )
 
 
@@ -123,7 +129,7 @@ class Pass:
     grid: DistanceGrid
     table: CostTable
     arrays: SearchArrays
-    library: object
+    library: LatticeArrays
     chunk: int = FIRST_CHUNK
     alive: bool = True
 
@@ -138,7 +144,7 @@ class Pass:
         left = self.expansions + n
         while self.alive and self.expansions < left and time.monotonic() < deadline:
             state = self.arrays.state
-            per_node = self.library.n_trims * 2  # type: ignore[attr-defined]
+            per_node = self.library.n_trims * 2
             step = min(left - self.expansions, TIMELY)
             self.arrays = with_room(
                 self.arrays, int(state[kernels.N_NODES]) + per_node * (step + 1) + 2
@@ -203,8 +209,7 @@ def first_plan(
         if total >= room or time.monotonic() >= deadline or enclosed:
             return _outcome(query, passes, total, None, exhausted=not alive, enclosed=enclosed)
         if ladder and (not alive or total >= ladder[0][0]):
-            for rung in ladder.pop(0)[1:]:
-                assert isinstance(rung, Rung)
+            for rung in ladder.pop(0)[1]:
                 guide = table if rung.guided else NO_TABLE
                 passes += both_ends(query, rung, grids=grids, table=guide)
         elif not alive:
@@ -237,8 +242,10 @@ def _pass(
     arrays: SearchArrays | None,
 ) -> Pass:
     library = query.library.arrays
-    scaled = library._replace(quanta=np.maximum(library.quanta * rung.quanta, library.min_coast))
-    scaled = scaled._replace(quanta=np.where(library.quanta > 0.0, scaled.quanta, 0.0))
+    quanta = np.maximum(library.quanta * rung.quanta, library.min_coast)
+    quanta = np.where(library.quanta > 0.0, quanta, 0.0)
+    moves = moves_of(library.twists[: library.n_trims], sign * quanta)
+    scaled = library._replace(quanta=quanta, moves=moves)
     task = _task(query, rung, sign)
     n_triples = max(len(library.triples), len(library.free_triples))
     room = search_arrays(n_triples) if arrays is None else arrays

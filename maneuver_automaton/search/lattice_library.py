@@ -10,7 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.collision import Shape
 from maneuver_automaton.collision.body import body_of, fastest_points
+from maneuver_automaton.costs import StageCost
+from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.setup import moving_library
 
@@ -30,6 +34,7 @@ class LatticeArrays(NamedTuple):
     periods: Array  # (m + 1,) [s] of a full turn
     gears: IntArray  # (m + 1,) sign of the forward speed
     quanta: Array  # (m, 2) [s] lengths of the edges, 0 for none
+    moves: Array  # (m, 2, 3) poses they lead to, forwards or backwards
     triples: IntArray  # (K, 3)
     free_triples: IntArray  # (F, 3) that end with the turn of a free heading
     n_trims: int
@@ -57,20 +62,25 @@ def lattice_library(problem: Problem) -> LatticeLibrary:
     """The part of a lattice search that is the same for every start, goal and map."""
     horizon = problem.horizon
     return _library(
-        problem,
-        horizon.time is not None,
-        problem.moves,
-        horizon.min_coast,
+        problem.automaton,
+        problem.cost,
+        problem.footprint,
+        fixed_time=horizon.time is not None,
+        waits=problem.moves,
+        min_coast=horizon.min_coast,
     )
 
 
-def _library(problem: Problem, fixed_time: bool, waits: bool, min_coast: float) -> LatticeLibrary:
-    key = (problem.automaton, problem.cost, problem.footprint, fixed_time, waits, min_coast)
-    return _cached(*key)
-
-
 @functools.lru_cache(maxsize=16)
-def _cached(automaton, cost, footprint, fixed_time, waits, min_coast):  # type: ignore[no-untyped-def]
+def _library(
+    automaton: Automaton,
+    cost: StageCost,
+    footprint: tuple[Shape, ...],
+    *,
+    fixed_time: bool,
+    waits: bool,
+    min_coast: float,
+) -> LatticeLibrary:
     library = moving_library(automaton, cost)
     body = body_of(footprint)
     pads = fixed_time and library.rest is not None
@@ -108,6 +118,7 @@ def _cached(automaton, cost, footprint, fixed_time, waits, min_coast):  # type: 
         periods=np.append(periods, 2.0 * np.pi),
         gears=np.append(np.sign(twists[:, 0]), 0).astype(np.int64),
         quanta=quanta,
+        moves=moves_of(twists, quanta),
         triples=_triples(moving),
         free_triples=np.array(
             [(i, j, m) for i, j in itertools.permutations(moving.tolist(), 2)]
@@ -134,6 +145,11 @@ def _cached(automaton, cost, footprint, fixed_time, waits, min_coast):  # type: 
     )
 
 
+def moves_of(twists: Array, durations: Array) -> Array:
+    """Poses (m, k, 3) reached from the identity by twists (m, 3) after durations (m, k) [s]."""
+    return SE2.exp(durations[..., None] * twists[:, None, :]).pose
+
+
 def _triples(moving: IntArray) -> IntArray:
     """Words of three trims whose neighbours differ; of fewer where there are fewer trims."""
     every = moving.tolist()
@@ -144,19 +160,18 @@ def _triples(moving: IntArray) -> IntArray:
 
 
 def _length_scale(twists: Array, half_width: float, reach: float) -> float:
-    """Radius of the tightest turn that drives; a few widths of the body where there is none."""
+    """Radius of the tightest turn that drives; a few widths of the body where there is none.
+
+    Where the vehicle can turn on the spot, gentle turns need not set the scale.
+    """
     speed = np.hypot(twists[:, 0], twists[:, 1])
     turns = (np.abs(twists[:, 2]) > 0.0) & (speed > 0.0)
     body = 4.0 * half_width or 4.0 * reach
-    if turns.any():
-        radius = float((speed[turns] / np.abs(twists[turns, 2])).min())
-        spins = bool(((speed == 0.0) & (twists[:, 2] != 0.0)).any())
-        return (
-            max(radius, 0.5 * body)
-            if not spins
-            else min(max(radius, 0.5 * body), 2.0 * body or radius)
-        )
-    return body or 1.0
+    if not turns.any():
+        return body or 1.0
+    radius = max(float((speed[turns] / np.abs(twists[turns, 2])).min()), 0.5 * body)
+    spins = bool(((speed == 0.0) & (twists[:, 2] != 0.0)).any())
+    return min(radius, 2.0 * body) if spins and body else radius
 
 
 def _most_useful(twists: Array, rates: Array) -> IntArray:

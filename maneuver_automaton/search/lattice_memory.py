@@ -28,9 +28,7 @@ class SearchArrays(NamedTuple):
 
     nodes: Array  # (n, 8)
     links: NDArray[np.int32]  # (n, 6)
-    hash_key: IntArray
-    hash_node: NDArray[np.int32]
-    hash_generation: NDArray[np.int32]
+    table: IntArray  # (4 n, 2) key, generation and node
     heap_key: Array
     heap_node: IntArray
     state: IntArray  # (11,)
@@ -56,9 +54,7 @@ def search_arrays(n_triples: int) -> SearchArrays:
     return SearchArrays(
         nodes=np.empty((n, 8)),
         links=np.empty((n, 6), dtype=np.int32),
-        hash_key=np.empty(4 * n, dtype=np.int64),
-        hash_node=np.empty(4 * n, dtype=np.int32),
-        hash_generation=np.zeros(4 * n, dtype=np.int32),
+        table=np.zeros((4 * n, 2), dtype=np.int64),
         heap_key=np.empty(n),
         heap_node=np.empty(n, dtype=np.int64),
         state=np.zeros(11, dtype=np.int64),
@@ -80,16 +76,12 @@ def with_room(search: SearchArrays, nodes: int) -> SearchArrays:
     queued = int(search.state[kernels.HEAP])
     heap_key, heap_node = np.empty(n), np.empty(n, dtype=np.int64)
     heap_key[:queued], heap_node[:queued] = search.heap_key[:queued], search.heap_node[:queued]
-    hash_key = np.empty(4 * n, dtype=np.int64)
-    hash_node = np.empty(4 * n, dtype=np.int32)
-    hash_generation = np.zeros(4 * n, dtype=np.int32)
-    kernels.rehash(search, hash_key, hash_node, hash_generation)
+    table = np.zeros((4 * n, 2), dtype=np.int64)
+    kernels.rehash(search, table)
     return search._replace(
         nodes=wide_nodes,
         links=wide_links,
-        hash_key=hash_key,
-        hash_node=hash_node,
-        hash_generation=hash_generation,
+        table=table,
         heap_key=heap_key,
         heap_node=heap_node,
     )

@@ -65,13 +65,14 @@ def load_times_kernels() -> None:
 
 
 def smallest_lattice_query() -> LatticeQuery:
-    """A wall beside the way: what compiles every kernel of the lattice."""
-    from maneuver_automaton.collision import Box, Obstacle
+    """A wall and a map beside the way: what compiles every kernel of the lattice."""
+    from maneuver_automaton.collision import Box, Obstacle, OccupancyMap
     from maneuver_automaton.search.lattice_query import lattice_query
     from maneuver_automaton.search.plane_bound import plane_bound
 
     wall = Obstacle(Box([1.0, 1.0], [0.0, 9.0]))
-    query = lattice_query(replace(_smallest_problem(), obstacles=(wall,)), (0,))
+    room = OccupancyMap(np.eye(2, dtype=np.bool_), resolution=0.5, origin=[5.0, 9.0, 0.1])
+    query = lattice_query(replace(_smallest_problem(), obstacles=(wall, room)), (0,))
     plane_bound(query)
     return query
 

@@ -1,0 +1,108 @@
+"""A planner that keeps what can be used again: many queries on one map, changed obstacles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.collision import AnyObstacle, Shape, as_footprint, as_obstacles
+from maneuver_automaton.costs import Cost, StageCost
+from maneuver_automaton.planning.plan import plan, prepare
+from maneuver_automaton.planning.result import PlanResult
+from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
+
+
+@dataclass(frozen=True, eq=False)
+class Planner:
+    """An automaton, a cost and a map, ready for any start and goal.
+
+    Making one compiles or loads the kernels, makes or loads the table of the cost to go, and
+    prepares the map for the search, for FCL and for the audit; a query pays for none of it.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Box, Unicycle
+    >>> controls = {"ahead": (1, 0), "left": (0, 1), "right": (0, -1)}
+    >>> robot = Automaton.of_controls(Unicycle(), controls)
+    >>> planner = Planner(robot, obstacles=[Box([1, 4], [3, 0])], footprint=Box([0.4, 0.4]))
+    >>> planner.plan([0, 0, 0], [6, 0, 0], time_limit=0.2).audit.passed
+    True
+    >>> planner.with_obstacles([]).plan([0, 0, 0], [6, 0, 0]).plan.word
+    ('ahead',)
+    """
+
+    automaton: Automaton
+    cost: StageCost = field(default_factory=lambda: Cost(time=1.0), kw_only=True)
+    horizon: Horizon = field(default_factory=Horizon, kw_only=True)
+    bounds: Bounds = field(default_factory=Bounds, kw_only=True)
+    search: SearchSettings = field(default_factory=SearchSettings, kw_only=True)
+    obstacles: tuple[AnyObstacle, ...] = field(default=(), kw_only=True)
+    footprint: tuple[Shape, ...] = field(default=(), kw_only=True)
+    margin: float = field(default=0.0, kw_only=True)  # [m]
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            automaton: Automaton,
+            *,
+            cost: StageCost = ...,
+            horizon: Horizon = ...,
+            bounds: Bounds = ...,
+            search: SearchSettings = ...,
+            obstacles: AnyObstacle | Shape | Sequence[AnyObstacle | Shape] = (),
+            footprint: Shape | Sequence[Shape] = (),
+            margin: float = 0.0,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "obstacles", as_obstacles(self.obstacles))
+        object.__setattr__(self, "footprint", as_footprint(self.footprint))
+        dof = self.automaton.model.group.dof
+        prepare(self.problem(np.zeros(dof), np.ones(dof)))
+
+    def problem(
+        self,
+        start: ArrayLike,
+        goals: ArrayLike | Goal | Sequence[Goal],
+        *,
+        start_time: float = 0.0,
+    ) -> Problem:
+        """The problem of one query."""
+        return Problem(
+            self.automaton,
+            start,
+            goals,
+            cost=self.cost,
+            horizon=self.horizon,
+            bounds=self.bounds,
+            search=self.search,
+            obstacles=self.obstacles,
+            footprint=self.footprint,
+            margin=self.margin,
+            start_time=start_time,
+        )
+
+    def plan(
+        self,
+        start: ArrayLike,
+        goals: ArrayLike | Goal | Sequence[Goal],
+        *,
+        time_limit: float = 5.0,
+        alternatives: int = 0,
+        start_time: float = 0.0,
+    ) -> PlanResult:
+        """As `plan` of the problem from `start` (dof,) to `goals`, at `start_time` [s]."""
+        problem = self.problem(start, goals, start_time=start_time)
+        return plan(problem, time_limit=time_limit, alternatives=alternatives)
+
+    def with_obstacles(
+        self, obstacles: AnyObstacle | Shape | Sequence[AnyObstacle | Shape]
+    ) -> Planner:
+        """The same planner on another map."""
+        return replace(self, obstacles=as_obstacles(obstacles))

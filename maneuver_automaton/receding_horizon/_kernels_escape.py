@@ -1,0 +1,184 @@
+"""A search in space and time for a motion that stays free, wherever it leads.
+
+A node is a row of two arrays. `nodes`: x, y, heading, clock, duration of the edge that leads here,
+time until which it is safe. `links`: parent, trim. Safe is a vehicle that can rest as long as rest
+is free there; one that cannot, as long as the trim that led there stays free.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
+from maneuver_automaton.collision._kernels_advancement import free_time
+from maneuver_automaton.groups._kernels import coast, compose
+from maneuver_automaton.search._kernels_connect import inside_window
+from maneuver_automaton.search._kernels_distance import pop, push
+
+FULL_TURN = 2.0 * math.pi
+N_NODES, HEAP, FOUND, BEST, EXPANSIONS = range(5)
+EMPTY = -1
+
+
+class EscapeTask(NamedTuple):
+    """Where to begin and what is asked for."""
+
+    x: float
+    y: float
+    heading: float
+    clock: float  # [s]
+    until: float  # [s] to be free until then
+    rest: int  # number of the trim that rests, -1 for none
+    keep: float  # [m]
+    margin: float  # [m]
+    cell: float  # [m]
+    headings: int
+    tick: float  # [s]
+    longest: float  # [s] that a trim which moves is held, if the vehicle can rest
+    impatience: float  # seconds of safety that a second on the way is worth
+    window: np.ndarray  # as in `_kernels_connect.inside_window`
+
+
+class EscapeArrays(NamedTuple):
+    """Room for the nodes, the cells they are in, and the queue."""
+
+    nodes: np.ndarray  # (n, 6)
+    links: np.ndarray  # (n, 2)
+    cells: np.ndarray  # (4 n,) keys, `EMPTY` where free; n is a power of two
+    heap_key: np.ndarray  # (n,)
+    heap_node: np.ndarray  # (n,)
+    state: np.ndarray  # (5,)
+
+
+@bare_inner_kernel
+def is_new(task, cells, x, y, heading, clock):
+    """Mark the cell of a pose and a time; whether it was free."""
+    i = math.floor((x - task.x) / task.cell + 0.5) & 0xFFFF
+    j = math.floor((y - task.y) / task.cell + 0.5) & 0xFFFF
+    turn = (heading - task.heading) / FULL_TURN
+    k = math.floor((turn - math.floor(turn)) * task.headings + 0.5) % task.headings
+    tick = math.floor((clock - task.clock) / task.tick + 0.5) & 0xFFFF
+    key = ((tick * 512 + k) * 65536 + j) * 65536 + i
+    mask = cells.shape[0] - 1
+    mixed = (key ^ (key >> 23) ^ (key >> 41)) & 0x7FFFFFFF
+    slot = ((mixed * 0x9E3779B1) >> 15) & mask
+    while cells[slot] != EMPTY:
+        if cells[slot] == key:
+            return False
+        slot = (slot + 1) & mask
+    cells[slot] = key
+    return True
+
+
+@bare_inner_kernel
+def safe_until(task, lib, world, body, x, y, heading, clock):
+    """Until when it is free to rest at a pose from a time on."""
+    proven, _ = free_time(
+        world,
+        body,
+        x,
+        y,
+        heading,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        max(task.until - clock, 0.0),
+        task.keep,
+        task.margin,
+        clock,
+    )
+    return clock + proven
+
+
+@bare_inner_kernel
+def add_node(task, search, x, y, heading, clock, lasting, safe, parent, trim):
+    """Append a node and queue it; the one that is safe for longest is remembered."""
+    nodes, links, state = search.nodes, search.links, search.state
+    node = state[N_NODES]
+    nodes[node, 0], nodes[node, 1], nodes[node, 2] = x, y, heading
+    nodes[node, 3], nodes[node, 4], nodes[node, 5] = clock, lasting, safe
+    links[node, 0], links[node, 1] = parent, trim
+    state[N_NODES] = node + 1
+    if node == 0 or safe > nodes[state[BEST], 5]:
+        state[BEST] = node
+    if safe >= task.until:
+        state[FOUND] = 1
+    key = task.impatience * (clock - task.clock) - safe
+    push(search.heap_key, search.heap_node, state[HEAP], key, node)
+    state[HEAP] += 1
+
+
+@bare_kernel
+def begin(task, lib, world, body, search):
+    """Queue the pose to begin at."""
+    for k in range(search.state.shape[0]):
+        search.state[k] = 0
+    x, y, heading = task.x, task.y, task.heading
+    is_new(task, search.cells, x, y, heading, task.clock)
+    safe = task.clock
+    if task.rest >= 0:
+        safe = safe_until(task, lib, world, body, x, y, heading, task.clock)
+    add_node(task, search, x, y, heading, task.clock, 0.0, safe, -1, -1)
+
+
+@bare_kernel
+def expand(task, lib, world, body, search, n):
+    """Expand up to `n` nodes until one is safe for long enough.
+
+    Every trim is held as long as it is free, and left at several moments. Returns whether it may go
+    on: 0 when nothing is left, or no room.
+    """
+    nodes, state = search.nodes, search.state
+    room = nodes.shape[0] - 32 * lib.n_trims
+    for _ in range(n):
+        if state[FOUND] == 1 or state[HEAP] == 0 or state[N_NODES] > room:
+            return 0
+        node = pop(search.heap_key, search.heap_node, state[HEAP])
+        state[HEAP] -= 1
+        state[EXPANSIONS] += 1
+        x, y, heading, clock = nodes[node, 0], nodes[node, 1], nodes[node, 2], nodes[node, 3]
+        left = task.until - clock
+        for trim in range(lib.n_trims):
+            v_x, v_y, turn = lib.twists[trim, 0], lib.twists[trim, 1], lib.twists[trim, 2]
+            if trim == task.rest:
+                proven = nodes[node, 5] - clock
+            else:
+                most = left if task.rest < 0 else min(left, task.longest)
+                proven, _ = free_time(
+                    world,
+                    body,
+                    x,
+                    y,
+                    heading,
+                    v_x,
+                    v_y,
+                    turn,
+                    lib.speeds[trim],
+                    most,
+                    task.keep,
+                    task.margin,
+                    clock,
+                )
+            t = lib.quanta[trim, 0]
+            if task.rest < 0 and proven >= left:
+                t = left
+            while t > 0.0 and t <= proven and t <= left:
+                if not inside_window(task.window, x, y, heading, v_x, v_y, turn, t):
+                    break
+                d_x, d_y, angle = coast(v_x, v_y, turn, t)
+                n_x, n_y, n_heading = compose(x, y, heading, d_x, d_y, angle)
+                if is_new(task, search.cells, n_x, n_y, n_heading, clock + t):
+                    safe = clock + proven
+                    if trim == task.rest:
+                        safe = nodes[node, 5]
+                    elif task.rest >= 0:
+                        safe = safe_until(task, lib, world, body, n_x, n_y, n_heading, clock + t)
+                    add_node(task, search, n_x, n_y, n_heading, clock + t, t, safe, node, trim)
+                    if state[FOUND] == 1:
+                        return 0
+                t *= 2.0
+    return 1

@@ -1,0 +1,154 @@
+"""A way out: any motion that stays free for a while, where no plan to the goal does."""
+
+from __future__ import annotations
+
+import functools
+import math
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.planning.tracking import stands_free
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.receding_horizon import _kernels_escape as kernels
+from maneuver_automaton.receding_horizon.shifting import merged
+from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
+
+CELL = 0.25  # of the search, in turning radii
+HEADINGS = 24
+LONGEST = 32  # quanta that a trim is held
+IMPATIENCE = 0.1  # seconds of safety that a second on the way is worth
+MOST_NODES = 2**16
+TIMELY = 16  # expansions between two looks at the clock
+MOST_EXPANSIONS = 4000
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Escape:
+    """A motion that stays free as long as was found possible."""
+
+    plan: Plan
+    free_until: float  # [s] of the world's clock
+    complete: bool  # whether that is as long as was asked for
+    expansions: int
+
+
+def escape(
+    problem: Problem,
+    *,
+    until: float,
+    deadline: float = math.inf,
+    max_expansions: int = MOST_EXPANSIONS,
+) -> Escape:
+    """A motion from the problem's start that is free of its obstacles until a time, if possible.
+
+    A vehicle that can rest ends at rest. What is returned is the best there is: the motion that is
+    free for longest.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its goals do not matter.
+    until : float
+        [s] of the world's clock.
+    deadline : float
+        As `time.monotonic` counts [s].
+    max_expansions : int
+        Poses to go on from.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Disc, Motion, Obstacle, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "on": (1, 0), "back": (-1, 0)})
+    >>> passing = Obstacle(Disc(1.0), motion=Motion([0, 4], [[2, -4, 0], [2, 4, 0]]))
+    >>> problem = Problem(robot, [2, 0, 0], [9, 0, 0], obstacles=passing)
+    >>> found = escape(problem, until=4.0)
+    >>> found.complete, abs(found.plan.end[0] - 2.0) > 1.0
+    (True, True)
+    """
+    query = lattice_query(problem, (0,))
+    library = query.library.arrays
+    still = np.flatnonzero(~library.twists[: library.n_trims].any(axis=1))
+    rest = int(still[0]) if still.size else -1
+    task = _task(query, rest, until)
+    search = _arrays(MOST_NODES)
+    search.cells.fill(kernels.EMPTY)
+    around = (query.world.arrays, query.world.body, search)
+    kernels.begin(task, library, *around)
+    left = max_expansions
+    while left > 0 and kernels.expand(task, library, *around, min(TIMELY, left)):
+        left -= TIMELY
+        if time.monotonic() >= deadline:
+            break
+    state = search.state
+    node = int(state[kernels.BEST])
+    free_until = float(search.nodes[node, 5])
+    return Escape(
+        plan=_plan(query, search, node, rest),
+        free_until=free_until,
+        complete=bool(state[kernels.FOUND]),
+        expansions=int(state[kernels.EXPANSIONS]),
+    )
+
+
+def _task(query: LatticeQuery, rest: int, until: float) -> kernels.EscapeTask:
+    library = query.library
+    quantum = float(library.arrays.quanta[: library.arrays.n_trims, 0].min())
+    open_ = query.problem.bounds.x is None and query.problem.bounds.y is None
+    window = np.array(query.window)
+    if open_:
+        window[:4] = [-math.inf, -math.inf, math.inf, math.inf]
+    return kernels.EscapeTask(
+        x=float(query.start[0]),
+        y=float(query.start[1]),
+        heading=float(query.start[2]),
+        clock=float(query.problem.start_time),
+        until=float(until),
+        rest=rest,
+        keep=float(query.keep),
+        margin=float(query.margin),
+        cell=CELL * library.radius,
+        headings=HEADINGS,
+        tick=quantum,
+        longest=LONGEST * quantum,
+        impatience=IMPATIENCE,
+        window=window,
+    )
+
+
+@functools.lru_cache(maxsize=1)
+def _arrays(n: int) -> kernels.EscapeArrays:
+    """Room for `n` nodes."""
+    return kernels.EscapeArrays(
+        nodes=np.empty((n, 6)),
+        links=np.empty((n, 2), dtype=np.int64),
+        cells=np.empty(4 * n, dtype=np.int64),
+        heap_key=np.empty(n),
+        heap_node=np.empty(n, dtype=np.int64),
+        state=np.zeros(5, dtype=np.int64),
+    )
+
+
+def _plan(query: LatticeQuery, search: kernels.EscapeArrays, node: int, rest: int) -> Plan:
+    """The way to a node, and rest there as long as it is free."""
+    problem = query.problem
+    edges: list[tuple[int, float]] = []
+    if rest >= 0:
+        edges.append((rest, float(search.nodes[node, 5] - search.nodes[node, 3])))
+    while search.links[node, 0] >= 0:
+        edges.append((int(search.links[node, 1]), float(search.nodes[node, 4])))
+        node = int(search.links[node, 0])
+    trims = [problem.automaton.trims[query.library.trims[k]] for k, _ in reversed(edges)]
+    word, times = merged(trims, [t for _, t in reversed(edges)])
+    return Plan(problem.start, word, durations=times, start_time=problem.start_time)
+
+
+@functools.cache
+def load_escape() -> None:
+    """Have the kernels ready before the clock runs."""
+    from maneuver_automaton.search.ready import smallest_lattice_query
+
+    problem = smallest_lattice_query().problem
+    stands_free(problem, escape(problem, until=1.0).plan.end, time=1.0, duration=1.0)

@@ -1,0 +1,107 @@
+"""What follows a plan: whether the vehicle can stand at its end, and leave again in time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.collision import Obstacle
+from maneuver_automaton.planning.tracking import free_until, stands_free
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.receding_horizon.candidates import Settings
+from maneuver_automaton.receding_horizon.escape import Escape, escape
+from maneuver_automaton.receding_horizon.log import first_part
+from maneuver_automaton.receding_horizon.shifting import merged
+
+SAME = 1e-9  # [s]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Outlook:
+    """The obstacles as they are predicted now, and how far ahead that is looked at."""
+
+    here: Problem
+    stand: float  # [s] that the goal must stay free after arrival
+    until: float  # [s] of the world's clock
+    deadline: float  # [s] as `time.monotonic` counts
+
+    def is_free(self, plan: Plan) -> bool:
+        """Whether all of a plan is free."""
+        return free_until(self.here, plan) >= plan.duration
+
+    def is_safe(self, plan: Plan) -> bool:
+        """Whether a plan is free, the vehicle may stand at its end, and there is a way out later.
+
+        Where nothing moves, the end of a free plan is free for ever.
+        """
+        if not self.is_free(plan):
+            return False
+        if not self.here.moves:
+            return True
+        arrival = plan.start_time + plan.duration
+        left = max(self.stand, self.until - arrival)
+        free = stands_free(self.here, plan.end, time=arrival, duration=left)
+        if free >= left:
+            return True
+        if free < self.stand:
+            return False
+        if self.here.automaton.body_velocities.any(axis=1).all():
+            return True  # without rest the end of the plan is the end
+        return self.way_out(plan.end, arrival + self.stand).complete
+
+    def way_out(self, pose: Array, time: float) -> Escape:
+        """A motion from a pose and a time that is free for as long as is looked ahead."""
+        there = replace(self.here, start=pose, start_time=time)
+        return escape(there, until=max(self.until, time + SAME), deadline=self.deadline)
+
+    def continued(self, plan: Plan, after: float) -> Plan | None:
+        """The first seconds of a plan, then a way out; None if they are not free or there is none.
+
+        A plan that ends before is not continued: it would end where one cannot stay.
+        """
+        if after >= plan.duration - SAME or free_until(self.here, plan) < after:
+            return None
+        out = self.way_out(plan.pose_at(plan.start_time + after), plan.start_time + after)
+        if not out.complete:
+            return None
+        return joined(first_part(plan, after), out.plan)
+
+
+def outlook(here: Problem, settings: Settings, *, deadline: float) -> Outlook:
+    """How far to look ahead: as far as is asked for, or until nothing moves any more."""
+    until = here.start_time + settings.look_ahead
+    if here.moves and settings.pad is not None:
+        until = min(until, last_event(here))
+    return Outlook(
+        here=here,
+        stand=max(settings.stand, settings.step),
+        until=max(until, here.start_time + settings.step),
+        deadline=deadline,
+    )
+
+
+def last_event(problem: Problem) -> float:
+    """Time [s] after which nothing moves; -inf if nothing does.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Disc, Motion, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "spin": (0.0, 1.0)})
+    >>> passing = Obstacle(Disc(1.0), motion=Motion([0, 4], [[2, -4, 0], [2, 4, 0]]))
+    >>> last_event(Problem(robot, [0, 0, 0], [9, 0, 0], obstacles=passing))
+    4.0
+    """
+    motions = [one.motion for one in problem.obstacles if isinstance(one, Obstacle)]
+    return max((float(m.time[-1]) for m in motions if m is not None), default=-math.inf)
+
+
+def joined(first: Plan, second: Plan) -> Plan:
+    """One plan, then another that begins where and when it ends."""
+    word, durations = merged(
+        (*first.trims, *second.trims), [*first.durations.tolist(), *second.durations.tolist()]
+    )
+    return replace(first, trims=word, durations=np.array(durations))

@@ -1,0 +1,87 @@
+"""Slow twins of the collision kernels: shapely, at one pose after the other."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from maneuver_automaton._compile import kernel
+from maneuver_automaton.collision import Obstacle
+from maneuver_automaton.collision._kernels_advancement import free_time
+from maneuver_automaton.collision.body import fastest_points
+from maneuver_automaton.collision.world import World, own_frame, world_of
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.problem import Problem
+from tests import solids
+from tests.scenes import differential_robot
+
+
+def shapely_world(footprint, obstacles) -> solids.World:
+    """Everything in its place: the clearance of poses (n, 3) at times (n,)."""
+    robot = differential_robot()
+    return solids.World(Problem(robot, [0, 0, 0], [0, 0, 0], obstacles=obstacles,
+                                footprint=footprint))  # fmt: skip
+
+
+def world_around(footprint, obstacles, *, keep: float = 0.0) -> World:
+    """The world as the kernels see it, from its own frame."""
+    listed = tuple(obstacles)
+    return world_of(listed, tuple(footprint), own_frame(listed, np.zeros(3)), keep=keep)
+
+
+def driven(pose, twist, times) -> np.ndarray:
+    """Poses (n, 3) after `times` (n,) [s] of a constant twist."""
+    return (SE2(np.asarray(pose)) @ SE2.exp(np.multiply.outer(times, twist))).pose
+
+
+def moved(obstacles, by: SE2):
+    return tuple(obstacle.moved(by) for obstacle in obstacles)
+
+
+@kernel
+def _free_times_and_gaps(world, body, poses, twists, speeds, durations, keep, margin, clocks, out):
+    for k in range(durations.shape[0]):
+        out[k, 0], out[k, 1] = free_time(
+            world,
+            body,
+            poses[k, 0],
+            poses[k, 1],
+            poses[k, 2],
+            twists[k, 0],
+            twists[k, 1],
+            twists[k, 2],
+            speeds[k],
+            durations[k],
+            keep,
+            margin,
+            clocks[k],
+        )
+
+
+def free_times_and_gaps(world: World, poses, twists, durations, *, margin, keep=0.0, times=0.0):
+    """What `free_time` returns (k, 2): proven time, and a bound of the last clearance."""
+    twists = np.array(twists, dtype=np.float64)
+    n = len(twists)
+    out = np.empty((n, 2))
+    durations = np.array(np.broadcast_to(np.asarray(durations, dtype=np.float64), n))
+    clocks = np.array(np.broadcast_to(np.asarray(times, dtype=np.float64), n))
+    speeds = fastest_points(world.body, twists)
+    _free_times_and_gaps(world.arrays, world.body, np.array(poses), twists, speeds, durations,
+                         keep, margin, clocks, out)  # fmt: skip
+    return out
+
+
+def solid_polygons(solids_) -> list[tuple[shapely.Geometry, float]]:
+    """Shapely geometries and roundings of the pieces that kernels see."""
+    pieces = []
+    for p, (a, b) in enumerate(zip(solids_.first[:-1], solids_.first[1:], strict=True)):
+        ring = solids_.edges[a:b, :2]
+        kind = (
+            shapely.Point if b - a == 1 else shapely.LineString if b - a == 2 else shapely.Polygon
+        )
+        pieces.append((kind(ring[0] if b - a == 1 else ring), float(solids_.plates[p, 4])))
+    return pieces
+
+
+def still(obstacles):
+    return tuple(o for o in obstacles if not isinstance(o, Obstacle) or o.motion is None)
