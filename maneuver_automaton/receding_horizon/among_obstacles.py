@@ -134,14 +134,15 @@ class AmongObstacles:
     def _without_plan(self) -> Chosen:
         """No safe plan leads to the goal from here, now."""
         now, here = self.now, self.here
-        end = "; the goal does not stay free after arrival" if self.unsafe else ""
-        now.violations.append(
-            Violation(
-                guarantee=Guarantee.FEASIBILITY,
-                reason=f"no safe plan leads to the goal from {here.start.round(3).tolist()} at "
-                f"{here.start_time:.6g} s{end}",
+        if not here.moves or (now.last is not None and now.last.deed.leads):
+            end = "; the goal does not stay free after arrival" if self.unsafe else ""
+            now.violations.append(
+                Violation(
+                    guarantee=Guarantee.FEASIBILITY,
+                    reason=f"no safe plan leads to the goal from {here.start.round(3).tolist()} at "
+                    f"{here.start_time:.6g} s{end}",
+                )
             )
-        )
         for plan in self._ambitions() if here.moves else ():
             for share in SHARES:
                 towards = self.outlook.continued(plan, share * self.settings.step)

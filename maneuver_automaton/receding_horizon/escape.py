@@ -65,8 +65,8 @@ def escape(
     >>> passing = Obstacle(Disc(1.0), motion=Motion([0, 4], [[2, -4, 0], [2, 4, 0]]))
     >>> problem = Problem(robot, [2, 0, 0], [9, 0, 0], obstacles=passing)
     >>> found = escape(problem, until=4.0)
-    >>> found.complete, abs(found.plan.end[0] - 2.0) > 1.0
-    (True, True)
+    >>> found.complete, found.plan.word[-1], bool(abs(found.plan.end[0] - 2.0) > 1.0)
+    (True, 'rest', True)
     """
     query = lattice_query(problem, (0,))
     library = query.library.arrays
@@ -74,7 +74,6 @@ def escape(
     rest = int(still[0]) if still.size else -1
     task = _task(query, rest, until)
     search = _arrays(MOST_NODES)
-    search.cells.fill(kernels.EMPTY)
     around = (query.world.arrays, query.world.body, search)
     kernels.begin(task, library, *around)
     left = max_expansions
@@ -118,13 +117,12 @@ def _task(query: LatticeQuery, rest: int, until: float) -> kernels.EscapeTask:
     )
 
 
-@functools.lru_cache(maxsize=1)
 def _arrays(n: int) -> kernels.EscapeArrays:
-    """Room for `n` nodes."""
+    """Room for `n` nodes, a power of two."""
     return kernels.EscapeArrays(
         nodes=np.empty((n, 6)),
         links=np.empty((n, 2), dtype=np.int64),
-        cells=np.empty(4 * n, dtype=np.int64),
+        cells=np.full(4 * n, kernels.EMPTY),
         heap_key=np.empty(n),
         heap_node=np.empty(n, dtype=np.int64),
         state=np.zeros(5, dtype=np.int64),

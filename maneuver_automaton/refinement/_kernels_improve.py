@@ -332,9 +332,9 @@ def attempt_all(lib, task, world, body, work, state, uniform, normal):
         new_cost = word_cost(lib, work.new_trims, work.new_durations, size)
         if not new_cost < cost - GAIN * cost:
             continue
-        if world.movers.speed.shape[0] > 0:
-            if not still_free(lib, task, world, body, work, size, begin):
-                continue
+        changes = world.movers.speed.shape[0] > 0  # what comes after is driven at other times
+        if changes and not still_free(lib, task, world, body, work, size, begin):
+            continue
         take(work, state, size)
         n, cost = size, new_cost
         unroll(lib, work, n)

@@ -143,9 +143,6 @@ def inside_window(window, x, y, heading, v_x, v_y, turn, t):
     `window` is those four, then the frame's (x, y, cos, sin) in the world; extreme points of arcs
     count.
     """
-    if window[0] == -math.inf and window[1] == -math.inf:
-        if window[2] == math.inf and window[3] == math.inf:
-            return True
     c, s = window[6], window[7]
     d_x, d_y = x - window[4], y - window[5]
     a_x, a_y = c * d_x - s * d_y, s * d_x + c * d_y
