@@ -113,6 +113,7 @@ class SearchSettings:
     cell: float | None = None  # [m] of the lattice, scaled to the vehicle if None
     headings: int | None = None  # of the lattice, 72 if None
     weight: float | None = None  # of the cost to go in the first pass, 2 if None
+    show_nodes: bool = False  # hand over what the first plan's search expanded
 
     def __post_init__(self) -> None:
         if self.method not in SEARCH_METHODS:

@@ -64,6 +64,7 @@ def plan_on_lattice(problem: Problem, *, time_limit: float, alternatives: int) -
             reason=reason,
             timing_s=timing,
             counts={"expansions": first.expansions, "collision_queries": first.queries},
+            nodes=first.nodes,
         )
     progress.heard(with_cost(first.word, query))
     bound = lattice_bound(query)
@@ -76,9 +77,9 @@ def plan_on_lattice(problem: Problem, *, time_limit: float, alternatives: int) -
         max_expansions=_left(problem, first),
         table=table,
         better=progress.heard,
+        meanwhile=lambda: load_checks(problem),
     )
     refined = time.monotonic()
-    load_checks(problem)
     chosen = _checked(progress, better, alternatives)
     timing = _timing(began, found, refined, time.monotonic())
     counts = {
@@ -125,6 +126,7 @@ def plan_on_lattice(problem: Problem, *, time_limit: float, alternatives: int) -
         timing_s=timing,
         counts=counts,
         improvements=tuple(progress.improvements),
+        nodes=first.nodes,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass, field
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.audit import Audit, TerminalError
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.problem import Problem
@@ -50,3 +51,4 @@ class PlanResult:
     timing_s: dict[str, float] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)
     improvements: tuple[tuple[float, float], ...] = ()  # seconds since the start, cost
+    nodes: Array | None = None  # (n, 4) x, y, heading, cost of what was expanded, if asked for

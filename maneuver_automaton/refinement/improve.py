@@ -35,6 +35,7 @@ from maneuver_automaton.search.lattice_memory import (
 from maneuver_automaton.search.lattice_query import LatticeQuery
 
 POINTS = 40  # of the dynamic program
+FIRST_GAINS = 4  # new searches after which the first gains are made
 SLICE = 400  # attempts
 SECOND_SLICE = 2000  # attempts for candidates near the best
 NEAR = 1.01  # share of the best cost that is near
@@ -125,13 +126,15 @@ def improve(
     max_expansions: int | None = None,
     table: CostTable = NO_TABLE,
     better: Better = lambda word: None,
+    meanwhile: Callable[[], None] = lambda: None,
 ) -> Improved:
     """The cheapest word found from `word` on, which must be free; `better` hears of each gain.
 
-    It ends when no word can be cheaper than `floor` allows.
+    It ends when no word can be cheaper than `floor` allows. Once the first gains are made,
+    `meanwhile` is called: what has to be prepared, but not at once.
     """
     one = _Improvement(query, word, deadline, patience, floor, max_expansions, table, better)
-    return one.run()
+    return one.run(meanwhile)
 
 
 @dataclass(slots=True, eq=False)
@@ -151,7 +154,7 @@ class _Improvement:
     passes: int = 0
     others: list[Word] = field(default_factory=list)
 
-    def run(self) -> Improved:
+    def run(self, meanwhile: Callable[[], None]) -> Improved:
         rng = np.random.default_rng(SEED)
         query = self.query
         self.best = with_cost(self.best, query)
@@ -182,6 +185,8 @@ class _Improvement:
                 idle_attempts = 0 if self._gained(before) else idle_attempts + slice_
                 slice_ = min(int(1.2 * slice_), 8000)
             step += 1
+            if step == FIRST_GAINS:
+                meanwhile()
         return Improved(
             word=self.best,
             attempts=self.attempts,

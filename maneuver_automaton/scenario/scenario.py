@@ -322,6 +322,7 @@ def _search(part: SearchPart) -> SearchSettings:
         cell=part.cell_m,
         headings=part.headings,
         weight=part.weight,
+        show_nodes=part.show_nodes,
     )
 
 

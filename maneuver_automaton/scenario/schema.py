@@ -357,6 +357,7 @@ class SearchPart(Part):
         Annotated[float, Strict(), AllowInfNan(False), Ge(1), Need("a finite number of at least 1")]
         | None
     ) = Field(None, description="lattice: weight of the cost to go")
+    show_nodes: bool = Field(False, description="lattice: draw what the first plan's search tried")
 
 
 class PushPart(Part):

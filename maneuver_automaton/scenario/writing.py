@@ -155,6 +155,7 @@ def _search(search: SearchSettings, time_limit_s: float) -> dict[str, Any]:
             cell_m=search.cell,
             headings=search.headings,
             weight=search.weight,
+            show_nodes=search.show_nodes or None,
         ),
     }
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.groups import SE2
 from maneuver_automaton.search import _kernels_lattice as kernels
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.distance_grid import DistanceGrid, distance_grid
@@ -178,6 +179,7 @@ class FirstPlan:
     exhausted: bool  # every rung was tried to its end
     enclosed: str  # why no plan can exist, if the plane alone proves it
     nearest: float  # [m] least distance to the goal that was reached
+    nodes: Array | None = None  # (n, 4) x, y, heading, cost of what was expanded, if asked for
 
 
 def first_plan(
@@ -369,7 +371,22 @@ def _outcome(
         exhausted=exhausted,
         enclosed=enclosed,
         nearest=nearest,
+        nodes=_expanded(query, passes) if query.problem.search.show_nodes else None,
     )
+
+
+def _expanded(query: LatticeQuery, passes: list[Pass]) -> Array:
+    """Poses (n, 4) of the nodes that were expanded, in the problem's frame, and their costs."""
+    rows = []
+    for one in passes:
+        n = int(one.arrays.state[kernels.N_NODES])
+        which = one.arrays.links[:n, 5] == 1
+        rows.append(one.arrays.nodes[:n][which][:, :4])
+    nodes = np.concatenate(rows)
+    turned = SE2(np.array([0.0, 0.0, query.world.frame[2]])) @ SE2(nodes[:, :3])
+    poses = turned.pose.copy()
+    poses[:, :2] += query.world.frame[:2]
+    return np.column_stack([poses, nodes[:, 3]])
 
 
 def _word(one: Pass) -> Word:
