@@ -1,8 +1,9 @@
-"""Every scenario of the repository: it plans, ends where it must, and survives its file."""
+"""Every scenario of the repository: it plans, stays clear, ends at its goal, outlives its file."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,21 +11,43 @@ import pytest
 
 import maneuver_automaton as ma
 from maneuver_automaton.audit import audit_plan
+from maneuver_automaton.collision.blocked import touched
 from maneuver_automaton.formats import plan_to_dict
 
 FOLDER = Path(__file__).parent.parent / "scenarios"
 FILES = sorted(FOLDER.glob("*.yaml"))
+EXPANSIONS = 40_000  # where obstacles are: it ends the search after the same work everywhere
+NAMES = {path.stem for path in FILES}
+
+
+def plan_of(scenario):
+    """The plan of a scenario; a generous limit, for machines that are busy."""
+    problem = scenario.problem
+    if problem.obstacles:
+        problem = replace(problem, search=replace(problem.search, max_expansions=EXPANSIONS))
+    return ma.plan(problem, time_limit=60.0)
 
 
 @pytest.fixture(scope="module", params=FILES, ids=[path.stem for path in FILES])
 def planned(request):
-    """A scenario and its plan; a generous limit, for machines that are busy."""
+    """A scenario and its plan."""
     scenario = ma.load_scenario(request.param)
-    return scenario, ma.plan(scenario.problem, time_limit=60.0)
+    return scenario, plan_of(scenario)
 
 
 def test_there_are_scenarios():
-    assert FILES
+    assert {
+        "parking",
+        "parallel_parking",
+        "perpendicular_parking",
+        "diagonal_parking",
+        "dead_end",
+        "narrow_corridor",
+        "cluttered_room",
+        "warehouse",
+        "crossing_traffic",
+        "opening_door",
+    } <= NAMES
 
 
 def test_it_says_what_it_shows(planned):
@@ -40,6 +63,25 @@ def test_a_plan_is_found_and_passes_its_audit(planned):
     assert result.reason == ""
     assert result.audit.passed
     assert result.audit.max_dynamics_defect < 1e-7
+
+
+def test_it_stays_clear(planned):
+    scenario, result = planned
+    problem, plan = scenario.problem, result.plan
+    if not problem.obstacles:
+        return
+    assert result.clearance_m >= problem.margin - 1e-9
+    assert result.clearance_m == result.audit.min_clearance_m
+    begin = problem.start_time
+    for time in np.linspace(begin, begin + plan.duration, 200):
+        assert not touched(
+            problem.footprint,
+            problem.obstacles,
+            plan.pose_at(time),
+            time=time,
+            margin=problem.margin,
+            origin=tuple(problem.start[:2]),
+        )
 
 
 def test_it_ends_at_the_goal(planned):
@@ -90,12 +132,20 @@ def test_the_plan_from_the_file_passes_the_audit_again(planned, tmp_path):
     ma.save_plan(result, tmp_path / "plan.json")
     goal = scenario.problem.goals[result.goal_index]
     read = ma.load_plan(tmp_path / "plan.json")
-    assert audit_plan(read, goal, scenario.problem.automaton.model).passed
+    problem = scenario.problem
+    assert audit_plan(
+        read,
+        goal,
+        problem.automaton.model,
+        footprint=problem.footprint,
+        obstacles=problem.obstacles,
+        margin=problem.margin,
+    ).passed
 
 
 def test_planning_again_writes_the_same(planned):
     scenario, result = planned
     document = plan_to_dict(result)
-    again = plan_to_dict(ma.plan(scenario.problem, time_limit=60.0))
+    again = plan_to_dict(plan_of(scenario))
     for key in document.keys() - {"timing_s"}:
         assert again[key] == document[key], key

@@ -126,7 +126,7 @@ def _write(result: PlanResult, out: Path, settings: Settings) -> None:
     from maneuver_automaton import plotting
 
     if settings.plot:
-        plotting.save_plan_figure(result, out / "plan.png")
+        plotting.save_plan_figure(result, out / "plan.png", nodes=result.nodes)
         if result.alternatives:
             plotting.save_alternatives_figure(result, out / "alternatives.png")
     if settings.animate and result.plan is not None:

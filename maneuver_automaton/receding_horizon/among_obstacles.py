@@ -28,7 +28,7 @@ from maneuver_automaton.search.inside import outside
 
 SEARCHING = 0.6  # share of a step's budget after which no plan to the goal is searched
 LATE = 0.8  # after which no way to the goal is; the rest is for a way out
-MOST_EXPANSIONS = 20_000  # of such a search, where something moves
+MOST_EXPANSIONS = 4_000  # of such a search, where something moves
 SHARES = (1.0, 0.5, 0.25)  # of a step that a way is gone towards the goal before it is left
 
 

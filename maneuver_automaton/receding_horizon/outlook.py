@@ -59,16 +59,12 @@ class Outlook:
         return escape(there, until=max(self.until, time + SAME), deadline=self.deadline)
 
     def continued(self, plan: Plan, after: float) -> Plan | None:
-        """The first seconds of a plan, then a way out; None if they are not free or there is none.
-
-        A plan that ends before is not continued: it would end where one cannot stay.
-        """
-        if after >= plan.duration - SAME or free_until(self.here, plan) < after:
+        """The first seconds of a plan, then a way out; None if they are not free or there is none."""
+        piece = first_part(plan, after)
+        if not self.is_free(piece):
             return None
-        out = self.way_out(plan.pose_at(plan.start_time + after), plan.start_time + after)
-        if not out.complete:
-            return None
-        return joined(first_part(plan, after), out.plan)
+        out = self.way_out(piece.end, piece.start_time + piece.duration)
+        return joined(piece, out.plan) if out.complete else None
 
 
 def outlook(here: Problem, settings: Settings, *, deadline: float) -> Outlook:

@@ -150,8 +150,9 @@ def simulate(
     log: list[Step] = []
     poses, times, driven, audits = [where], [_begin(problem, last)], [], []
     inside: list[bool] = [_inside(problem, where)]
+    arrived = inside[-1] and (last is None or last.deed.leads)
     for number in range(begin, begin + steps):
-        if inside[-1] and not stay:
+        if arrived and not stay:
             break
         draw = next(random)
         measured = where + draw.measurement
@@ -183,6 +184,7 @@ def simulate(
         poses.append(where)
         times.append(now.time + now.applied)
         inside.append(_inside(problem, where))
+        arrived = inside[-1] and now.deed.leads  # not on the way past it
     return _closed_loop(
         problem,
         controller,
@@ -193,7 +195,7 @@ def simulate(
         audits,
         inside,
         step=step,
-        stay=stay,
+        reached=any(inside) if stay else arrived,
         seen=obstacles,
     )
 
@@ -209,12 +211,11 @@ def _closed_loop(
     inside: list[bool],
     *,
     step: float,
-    stay: bool,
+    reached: bool,
     seen: Seen | None,
 ) -> ClosedLoop:
     helpless = len(log) > len(driven)
     applied = log[:-1] if helpless else log
-    reached = any(inside) if stay else inside[-1]
     cost = log[-1].accumulated_cost if helpless else _spent(controller.last)
     value, reason, status, bound = 0.0, "", "reached", controller.most_steps
     if helpless:

@@ -97,11 +97,11 @@ LADDER: tuple[tuple[int, tuple[Rung, ...]], ...] = (
             Rung(scale=0.5, quanta=0.5, contact=True, guided=True),
         ),
     ),
+    (1500, (Rung(scale=0.24, quanta=0.25, contact=True, guided=True),)),
     (
         8000,
         (
             Rung(scale=0.5, quanta=0.5, contact=True, fine=0.2, guided=True),
-            Rung(scale=0.24, quanta=0.25, contact=True, guided=True),
             Rung(scale=0.5, quanta=0.5, contact=True),
             Rung(scale=0.12, quanta=0.17),
         ),

@@ -1,0 +1,118 @@
+"""Field and buckets against distances found one by one."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from maneuver_automaton.collision import Box, Disc, Obstacle, OccupancyMap
+from maneuver_automaton.collision._kernels_field import write_map
+from maneuver_automaton.groups import SE2
+from tests.collision import scenes
+from tests.reference_collision import shapely_world, solid_polygons, still, world_around
+
+
+def centres(field):
+    rows, columns = field.distance.shape
+    x = field.origin_x + (np.arange(columns) + 0.5) * field.cell
+    y = field.origin_y + (np.arange(rows) + 0.5) * field.cell
+    return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+
+
+def out_of(world, places):
+    """Poses of the problem (n, 3) at places (n, 2) of the world's own frame."""
+    return (SE2(world.frame) @ SE2(np.column_stack([places, np.zeros(len(places))]))).pose
+
+
+def random_worlds(seed, footprint, n, *, keep=0.0):
+    rng = np.random.default_rng(seed)
+    for _ in range(n):
+        obstacles = scenes.random_scene(rng, movers=1)
+        if still(obstacles):
+            yield obstacles, world_around(footprint, obstacles, keep=keep)
+
+
+@pytest.mark.parametrize(("name", "keep"), [("car", 0.0), ("disc", 0.4), ("point", 0.0)])
+def test_the_field_is_the_distance(name, keep):
+    rng = np.random.default_rng(1)
+    for obstacles, world in random_worlds(2, scenes.FOOTPRINTS[name], 8, keep=keep):
+        field = world.arrays.field
+        values, places = field.distance.ravel(), centres(field)
+        some = rng.permutation(len(values))[:800]
+        exact = shapely_world((), still(obstacles)).clearance(out_of(world, places[some]))
+        assert values[some] == pytest.approx(np.clip(exact, 0.0, field.outside), abs=5e-9)
+
+
+@pytest.mark.parametrize("name", ["car", "disc", "point"])
+def test_outside_the_field_all_is_far(name):
+    rng = np.random.default_rng(3)
+    for obstacles, world in random_worlds(4, scenes.FOOTPRINTS[name], 5):
+        field = world.arrays.field
+        rows, columns = field.distance.shape
+        size = field.cell * np.array([columns, rows])
+        origin = np.array([field.origin_x, field.origin_y])
+        places = origin + size * rng.uniform(-1.0, 2.0, (400, 2))
+        away = ((places < origin) | (places > origin + size)).any(axis=1)
+        exact = shapely_world((), still(obstacles)).clearance(out_of(world, places[away]))
+        assert exact.min() >= field.outside - 1e-8
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.7, -2.4])
+def test_a_map_is_as_far_as_its_cells(yaw):
+    rng = np.random.default_rng(5)
+    for share in (0.02, 0.2, 1.0):
+        cells = OccupancyMap(rng.random((9, 14)) < share, resolution=0.3, origin=[1.0, -2.0, yaw])
+        if not cells.blocked.any():
+            continue
+        distance = np.full((40, 50), 2.5)
+        where = (-3.0, -5.0, 0.2, 2.5)
+        write_map(distance, *where, cells.blocked, 0.3, 1.0, -2.0, math.cos(yaw), math.sin(yaw))
+        x, y = -3.0 + 0.2 * (np.arange(50) + 0.5), -5.0 + 0.2 * (np.arange(40) + 0.5)
+        places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        poses = np.column_stack([places, np.zeros(len(places))])
+        exact = np.array([shapely_world((), [cells]).clearance(poses)]).reshape(40, 50)
+        assert distance == pytest.approx(np.minimum(exact, 2.5), abs=1e-9)
+
+
+def test_a_map_lowers_what_is_there_and_no_more():
+    distance = np.full((20, 20), 0.3)
+    distance[:, 10:] = 9.0
+    blocked = np.zeros((2, 2), dtype=bool)
+    write_map(distance, 0.0, 0.0, 0.5, 9.0, blocked, 1.0, 4.0, 4.0, 1.0, 0.0)
+    assert distance.max() == 9.0
+    blocked[0, 0] = True
+    write_map(distance, 0.0, 0.0, 0.5, 9.0, blocked, 1.0, 4.0, 4.0, 1.0, 0.0)
+    assert distance[8, 8] == 0.0
+    assert distance[0, 0] == 0.3
+    assert distance[8, 19] == pytest.approx(9.75 - 5.0)
+
+
+@pytest.mark.parametrize("name", ["car", "truck", "disc", "point"])
+def test_every_solid_within_reach_is_in_the_bucket(name):
+    rng = np.random.default_rng(6)
+    for _, world in random_worlds(7, scenes.FOOTPRINTS[name], 6):
+        buckets, solids = world.arrays.buckets, solid_polygons(world.arrays.solids)
+        low = np.array([buckets.origin_x, buckets.origin_y])
+        size = buckets.cell * np.array([buckets.columns, buckets.rows])
+        places = low + size * rng.uniform(-0.1, 1.1, (300, 2))
+        reach = world.body.reach + buckets.reach
+        for place in places:
+            i, j = np.floor((place - low) / buckets.cell).astype(int)
+            inside = 0 <= i < buckets.columns and 0 <= j < buckets.rows
+            k = j * buckets.columns + i
+            held = buckets.items[buckets.start[k] : buckets.start[k + 1]] if inside else []
+            away = [shape.distance(shapely.Point(place)) - r for shape, r in solids]
+            assert set(np.flatnonzero(np.array(away) < reach)) <= set(np.asarray(held).tolist())
+
+
+def test_a_world_of_one_needle_or_of_far_corners_has_a_small_field():
+    lone = [Obstacle(Box([5.0, 1e-7]))]
+    far = [Obstacle(Disc(0.1)), Obstacle(Disc(0.1, [1e6, 1e6])), Obstacle(Disc(0.1, [1e6, 0.0]))]
+    for obstacles in (lone, far):
+        for footprint in ((), (Disc(0.05),), (Box([4.0, 2.0]),)):
+            world = world_around(footprint, obstacles)
+            assert world.arrays.field.distance.size < 300_000
+            assert world.arrays.buckets.start.size < 300_000

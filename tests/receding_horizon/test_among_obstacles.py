@@ -1,0 +1,172 @@
+"""Closed loops among obstacles that stand still: every guarantee holds, as in the open."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.collision import Box, Disc, Obstacle
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
+from maneuver_automaton.receding_horizon import (
+    Deed,
+    Disturbance,
+    Guarantee,
+    RecedingHorizon,
+    simulate,
+)
+from tests.receding_horizon.loops import off_goal, totals
+from tests.receding_horizon.scenes import among, clearances
+from tests.scenes import differential_robot, parallel_slot
+from tests.solids import World
+
+WALL = Obstacle(Box([0.2, 4.0], [3.0, 1.5]))
+NOISE = Disturbance(position_m=0.02, heading_rad=0.02, seed=1)
+
+
+def seeded(seed: int) -> Problem:
+    """The robot at a free pose before a wall and two parked boxes."""
+    parked = [Obstacle(Box([1.0, 0.5], [1.5, -1.5], 0.4)), Obstacle(Box([0.8, 0.8], [4.5, 1.0]))]
+    rng = np.random.default_rng(seed)
+    problem = among(WALL, *parked, goal=[6.0, 0.0, 0.0], bounds=Bounds(x=(-2, 8), y=(-4, 5)))
+    while True:
+        start = np.array([*rng.uniform([-1.5, -3.0], [2.5, 4.0]), rng.uniform(-3.0, 3.0)])
+        if World(replace(problem, start=start)).clearance(start[None] * [0, 0, 1])[0] > 0.05:
+            return replace(problem, start=start)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_undisturbed_all_that_is_promised_is_kept(seed):
+    loop = simulate(seeded(seed), step=1.0)
+    assert loop.reached
+    assert list(loop.violations) == []
+    total = totals(loop)
+    assert (total[1:] <= total[:-1] + 1e-8).all()
+    assert clearances(loop).min() > 0.0
+    for one in loop.steps:
+        assert off_goal(loop, one) <= 1e-8
+        assert one.shifted_value is not None or one.number == 0
+        assert one.lower_bound <= one.value
+        assert one.clearance_m is not None
+        assert one.deed in (Deed.PLANNED, Deed.KEPT, Deed.IMPROVED, Deed.REPLANNED)
+    assert loop.min_clearance_m == min(one.clearance_m or 0.0 for one in loop.steps)
+    assert loop.steps_bound is not None
+    assert len(loop.steps) <= loop.steps_bound
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_with_noise_it_arrives_free_and_says_what_the_noise_broke(seed):
+    problem = replace(seeded(seed), goals=(Goal(pose=[6, 0, 0], tolerance_m=0.1, tolerance_rad=0.1),))
+    problem = replace(problem, margin=0.1)
+    loop = simulate(problem, step=1.0, disturbance=replace(NOISE, seed=seed))
+    assert loop.reached
+    assert list(loop.collisions) == []
+    assert clearances(loop).min() > 0.0
+    for _, violation in loop.violations:
+        assert violation.guarantee in (Guarantee.DECREASE, Guarantee.FEASIBILITY, Guarantee.SAFETY)
+        if violation.guarantee is not Guarantee.SAFETY:
+            assert "off the plan" in violation.reason
+
+
+def test_a_car_that_cannot_rest_parks():
+    loop = simulate(parallel_slot(5.9), step=2.0)
+    assert loop.reached
+    assert list(loop.violations) == []
+    assert clearances(loop).min() > 0.0
+
+
+@pytest.mark.parametrize("cost", [Cost(effort=1.0), Cost(effort=0.5, norm=0.5)])
+def test_a_fixed_time_is_kept(cost):
+    problem = among(WALL, goal=[6.0, 0.0, 0.0], cost=cost, horizon=Horizon(time=15.0))
+    loop = simulate(problem, step=1.0)
+    assert loop.reached
+    assert list(loop.violations) == []
+    assert clearances(loop).min() > 0.0
+    assert all(one.plan.duration == pytest.approx(15.0) for one in loop.steps)
+
+
+def test_where_the_goal_is_closed_in_it_says_so_and_stays():
+    cage = [Box([0.2, 4.2], [6.0 + side, 0.0]) for side in (2.0, -2.0)]
+    cage += [Box([4.2, 0.2], [6.0, side]) for side in (2.0, -2.0)]
+    loop = simulate(among(*cage), step=1.0)
+    assert (loop.status, loop.steps) == ("no_plan", ())
+    assert "no safe plan leads to the goal" in loop.reason
+
+
+def test_pushed_closer_than_the_margin_it_goes_on_with_what_it_has():
+    problem = among(WALL, margin=0.3, start=(2.5, 1.5, np.pi))
+    loop = simulate(problem, step=0.5)
+    assert loop.reached
+    assert clearances(loop).min() == pytest.approx(0.1, abs=1e-6)
+    assert loop.steps[0].violations[0].guarantee is Guarantee.SAFETY
+    assert "the clearance is 0.1 m, need more than 0.3 m" in loop.steps[0].violations[0].reason
+    assert clearances(loop)[-1] >= 0.3 - 1e-9
+
+
+def test_pushed_out_of_the_bounds_it_comes_back():
+    push = Disturbance(pushes={0: (0.0, 6.0, 0.0)})
+    loop = simulate(among(WALL, bounds=Bounds(y=(-4.0, 5.0))), step=1.0, disturbance=push)
+    assert loop.reached
+    assert clearances(loop).min() > 0.0
+
+
+def test_pushed_into_a_wall_the_collision_is_flagged():
+    push = Disturbance(pushes={1: (1.0, 0.0, 0.0)})
+    loop = simulate(among(WALL), step=1.0, disturbance=push, steps=4)
+    assert loop.status == "no_plan"
+    assert not loop.reached
+
+
+def test_a_margin_for_new_words_keeps_the_old_one():
+    loop = simulate(seeded(3), step=1.0, margin=0.5)
+    assert loop.reached
+    assert list(loop.violations) == []
+
+
+def test_retimed_plans_stay_on_their_free_path():
+    problem = among(
+        WALL, goal=[6.0, 0.0, 0.0], cost=Cost(effort=1.0), horizon=Horizon(time=20.0)
+    )
+    loop = simulate(problem, step=2.0, retimed=True)
+    assert loop.reached
+    assert clearances(loop).min() > 0.0
+
+
+def test_held_in_the_goal_beside_a_wall():
+    goal = Goal(pose=[6.0, 0.0, 0.0], tolerance_m=0.2, tolerance_rad=0.3)
+    problem = among(WALL, Disc(0.5, [7.1, 0.0]), goal=goal)
+    loop = simulate(problem, step=0.5, steps=40, stay=True, disturbance=NOISE)
+    assert loop.reached
+    assert list(loop.collisions) == []
+
+
+@pytest.mark.parametrize("seed", [0, 5])
+def test_a_moved_scene_has_the_moved_loop(seed):
+    problem = replace(seeded(seed), bounds=Bounds())
+    move = SE2(np.array([30.0, -7.0, 2.2]))
+    one, two = (simulate(each, step=1.0) for each in (problem, problem.moved(move)))
+    assert [step.plan.word for step in one.steps] == [step.plan.word for step in two.steps]
+    assert [step.value for step in two.steps] == pytest.approx(
+        [step.value for step in one.steps], abs=1e-6
+    )
+    assert (move @ SE2(one.poses)).pose == pytest.approx(two.poses, abs=1e-6)
+
+
+def test_the_first_plan_must_be_free():
+    ahead = next(trim for trim in differential_robot(1.0, 1.5).trims if trim.name == "ahead")
+    through = Plan([0.0, 0.0, 0.0], (ahead,), durations=[6.0])
+    controller = RecedingHorizon(among(WALL), step=1.0, first=through)
+    with pytest.raises(ValueError, match="first hits an obstacle"):
+        controller.step([0.0, 0.0, 0.0])
+    controller = RecedingHorizon(among(Disc(1.0, [3.0, 4.0])), step=1.0, first=through)
+    assert controller.step([0.0, 0.0, 0.0])[1].plan.word == ("ahead",)
+
+
+@pytest.mark.parametrize(("name", "value"), [("look_ahead", 0.0), ("stand", -1.0)])
+def test_numbers_out_of_range_are_refused(name, value):
+    with pytest.raises(ValueError, match=f"receding horizon: {name} must be"):
+        RecedingHorizon(among(WALL), step=1.0, **{name: value})

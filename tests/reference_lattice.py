@@ -1,0 +1,113 @@
+"""Slow twins of what the lattice looks up: Dijkstra by SciPy, by a dictionary, by sight."""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import math
+
+import numpy as np
+import shapely
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
+
+from maneuver_automaton._arrays import Array
+from tests.reference import plain_end
+
+
+def cells_open(grid, field) -> Array:
+    """Which cells (rows, columns) of a distance grid the pose may be in."""
+    rows, columns = np.arange(grid.rows), np.arange(grid.columns)
+    f_j, f_i = rows * grid.stride + grid.shift_y, columns * grid.stride + grid.shift_x
+    open_ = np.ones((grid.rows, grid.columns), dtype=bool)
+    in_j = (f_j >= 0) & (f_j < field.distance.shape[0])
+    in_i = (f_i >= 0) & (f_i < field.distance.shape[1])
+    known = field.distance[np.ix_(f_j[in_j], f_i[in_i])]
+    open_[np.ix_(in_j, in_i)] = known >= grid.inflation
+    return open_
+
+
+def grid_distances(open_: Array, cell: float, seeds: list[tuple[int, int]]) -> Array:
+    """Octile distance [m] of every open cell (rows, columns) from seeds (row, column), or inf.
+
+    Seeds may be closed; no way leads through another closed cell.
+    """
+    rows, columns = open_.shape
+    number = np.arange(open_.size).reshape(open_.shape)
+    enter = open_.copy()
+    leave = open_.copy()
+    for seed in seeds:
+        leave[seed] = True
+    begins, ends, lengths = [], [], []
+    for b, a in itertools.product((-1, 0, 1), repeat=2):
+        if a == b == 0:
+            continue
+        here = (slice(max(0, -b), rows - max(0, b)), slice(max(0, -a), columns - max(0, a)))
+        there = (slice(max(0, b), rows - max(0, -b)), slice(max(0, a), columns - max(0, -a)))
+        step = leave[here] & enter[there]
+        begins.append(number[here][step])
+        ends.append(number[there][step])
+        lengths.append(np.full(step.sum(), cell * math.hypot(a, b)))
+    graph = coo_array(
+        (np.concatenate(lengths), (np.concatenate(begins), np.concatenate(ends))),
+        shape=(open_.size, open_.size),
+    ).tocsr()
+    sources = [int(number[seed]) for seed in seeds]
+    away = dijkstra(graph, indices=sources, min_only=True).reshape(open_.shape)
+    return np.where(open_, away, np.inf)
+
+
+def shortest_way(solids: shapely.Geometry, start: Array, goal: Array) -> float:
+    """Length [m] of the shortest way of a point around polygons: over corners in sight."""
+    parts = [p for p in shapely.get_parts(shapely.union_all(solids)) if not p.is_empty]
+    corners = [shapely.get_coordinates(part)[:-1] for part in parts]
+    points = np.concatenate([[start, goal], *corners])
+    blocked = shapely.union_all(parts).buffer(-1e-7)
+    shapely.prepare(blocked)
+    n = len(points)
+    i, j = np.triu_indices(n, 1)
+    lines = shapely.linestrings(np.stack([points[i], points[j]], axis=1))
+    clear = ~shapely.intersects(blocked, lines)
+    lengths = np.hypot(*(points[i] - points[j]).T)
+    graph = coo_array((lengths[clear] + 1e-300, (i[clear], j[clear])), shape=(n, n)).tocsr()
+    return float(dijkstra(graph, directed=False, indices=0)[1])
+
+
+def cost_table(twists, rates, quanta, cell: float, half: int, n_headings: int) -> Array:
+    """Cost (headings, rows, columns) to the goal in the middle, inf where none was found.
+
+    Dijkstra backwards over a dictionary of cells, each with the pose by which it was reached.
+    """
+
+    def cell_of(pose):
+        i, j = (math.floor(value / cell + 0.5) for value in pose[:2])
+        k = math.floor((pose[2] / (2 * math.pi)) % 1.0 * n_headings + 0.5) % n_headings
+        return (k, j, i) if max(abs(i), abs(j)) <= half else None
+
+    settled: dict[tuple[int, int, int], float] = {}
+    order = itertools.count()
+    frontier = [(0.0, next(order), (0.0, 0.0, 0.0))]
+    best = {cell_of((0.0, 0.0, 0.0)): 0.0}
+    while frontier:
+        cost, _, pose = heapq.heappop(frontier)
+        here = cell_of(pose)
+        if here in settled or cost > best[here]:
+            continue
+        settled[here] = cost
+        for twist, rate, times in zip(twists, rates, quanta, strict=True):
+            for t in times:
+                if t <= 0.0:
+                    continue
+                x, y, heading = pose
+                step = plain_end([twist], [-t])
+                place = complex(x, y) + complex(step[0], step[1]) * np.exp(1j * heading)
+                there = (place.real, place.imag, heading + step[2])
+                key = cell_of(there)
+                if key is None or key in settled or cost + t * rate >= best.get(key, math.inf):
+                    continue
+                best[key] = cost + t * rate
+                heapq.heappush(frontier, (best[key], next(order), there))
+    table = np.full((n_headings, 2 * half + 1, 2 * half + 1), np.inf)
+    for (k, j, i), cost in settled.items():
+        table[k, j + half, i + half] = cost
+    return table

@@ -1,0 +1,209 @@
+"""Tables of the cost to go: those of a slow Dijkstra, halved by mirrors, kept whole on disk."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.collision import Box
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.models import Unicycle
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.scenario.presets import TABLE_2
+from maneuver_automaton.search import cost_to_go
+from maneuver_automaton.search._kernels_table import fill_table
+from maneuver_automaton.search.cost_to_go import NO_TABLE, cost_to_go_table
+from maneuver_automaton.search.lattice_library import lattice_library
+from tests import scenes
+from tests.reference_lattice import cost_table
+
+ROOT = Path(__file__).parents[2]
+HALF, HEADINGS, CELL = 7, 12, 0.31
+ODD = np.array([[1.0, 0.0, 0.0], [1.0, 0.0, 1.13], [0.9, 0.0, -1.27], [-0.7, 0.1, 0.3]])
+RATES = np.array([1.0, 1.171, 1.313, 1.557])
+QUANTA = np.array([[0.37, 0.91, 0.0], [0.41, 0.83, 0.0], [0.43, 0.97, 0.0], [0.57, 1.13, 0.0]])
+SIX = np.array([[v, 0.0, v * w] for v in (1.0, -1.0) for w in (1.0, 0.0, -1.0)])
+
+
+@pytest.mark.parametrize("n", [1, 2, 4])
+def test_the_table_is_that_of_a_dictionary(n):
+    got = fill_table(ODD[:n], RATES[:n], QUANTA[:n], CELL, HALF, HEADINGS, False)
+    slow = cost_table(ODD[:n], RATES[:n], QUANTA[:n], CELL, HALF, HEADINGS)
+    assert np.array_equal(np.isinf(got), np.isinf(slow))
+    known = np.isfinite(slow)
+    assert known.sum() > 10 * n
+    assert got[known] == pytest.approx(slow[known], rel=1e-6)
+    assert got[0, HALF, HALF] == 0.0
+
+
+def test_mirrored_and_whole_agree():
+    quanta = np.tile([0.15, 0.31, 0.62], (6, 1))
+    rates = np.full(6, 1.0)
+    half = 16
+    shared = (SIX, rates, quanta, 0.15, half, 36)
+    whole, mirrored = fill_table(*shared, False), fill_table(*shared, True)
+    image = mirrored[(36 - np.arange(36)) % 36, ::-1]
+    assert np.array_equal(mirrored, image)
+    both = np.isfinite(whole) & np.isfinite(mirrored)
+    assert both.mean() > 0.9
+    assert np.abs(whole - mirrored)[both].mean() < 0.1
+    assert abs((whole - mirrored)[both].mean()) < 0.05
+
+
+def test_near_the_truth_straight_ahead_and_behind():
+    robot = scenes.reeds_shepp(1.0)
+    table = cost_to_go_table(Problem(robot, [0, 0, 0], [0, 0, 0]))
+    i = np.arange(2 * table.half + 1)
+    line = table.value[0, table.half]
+    assert line == pytest.approx(np.abs(i - table.half) * table.cell, abs=0.15)
+    # turned round on the spot: pi on circles of 1 m
+    assert table.value[len(table.value) // 2, table.half, table.half] == pytest.approx(
+        math.pi, rel=0.15
+    )
+
+
+def controls(**trims):
+    return Automaton.of_controls(Unicycle(), trims)
+
+
+@pytest.mark.parametrize(
+    ("automaton", "cost", "mirrored"),
+    [
+        (scenes.reeds_shepp(), Cost(time=1.0), True),
+        (scenes.differential_robot(), Cost(effort=1.0), True),
+        (controls(**TABLE_2), Cost(effort=1.0, norm=0.5), False),
+        (controls(on=(1.0, 0.0), left=(1.0, 1.0)), Cost(time=1.0), False),
+        (controls(left=(1.0, 1.0), right=(1.0, -0.99)), Cost(time=1.0), False),
+        (controls(left=(1.0, 1.0), right=(1.0, -1.0), slow=(0.5, 0.0)), Cost(time=1.0), True),
+    ],
+)
+def test_what_is_its_own_mirror_image(automaton, cost, mirrored):
+    library = lattice_library(Problem(automaton, [0, 0, 0], [1, 0, 0], cost=cost))
+    assert library.mirrored is mirrored
+
+
+def test_a_library_that_is_no_mirror_image_has_a_table_that_is_none():
+    table = cost_to_go_table(Problem(controls(**TABLE_2), [0, 0, 0], [1, 0, 0]), reach=1.0)
+    value = table.value
+    image = value[(len(value) - np.arange(len(value))) % len(value), ::-1]
+    assert np.abs(value - image)[np.isfinite(value) & np.isfinite(image)].max() > 0.5
+
+
+def test_reach_is_a_length():
+    problem = Problem(scenes.reeds_shepp(), [0, 0, 0], [1, 0, 0])
+    for reach in (0.0, -1.0, math.inf, math.nan):
+        with pytest.raises(ValueError) as caught:
+            cost_to_go_table(problem, reach=reach)
+        assert str(caught.value) == f"reach must be positive, got {reach} m"
+    assert NO_TABLE.value.size == 0
+
+
+# --- what is kept on disk ---
+
+SMALL = Problem(controls(on=(1.0, 0.0), left=(1.0, 1.0)), [0, 0, 0], [1, 0, 0])
+
+
+def kept_in(folder):
+    """A table as another process would get it: from the folder, or made anew."""
+    cost_to_go._kept.cache_clear()
+    return cost_to_go_table(SMALL, reach=1.5, folder=folder).value
+
+
+def test_loading_gives_the_same_bits(tmp_path):
+    made = kept_in(tmp_path)
+    (path,) = tmp_path.iterdir()
+    assert path.suffix == ".npy"
+    assert np.load(path).tobytes() == made.tobytes()
+    path.write_bytes(path.read_bytes()[:-4] + np.float32(7.0).tobytes())  # to tell it from anew
+    loaded = kept_in(tmp_path)
+    assert loaded[-1, -1, -1] == 7.0
+    assert np.array_equal(loaded.ravel()[:-1], made.ravel()[:-1])
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"rubbish",
+        b"\x93NUMPY\x01\x00",
+        b"\x93NUMPY\x01\x00v\x00{'descr': '<f4', 'fortran_order': False, 'shape': (2,)}",
+        b"\x80\x04N.",
+        pytest.param(
+            b"PK\x03\x04" + bytes(40),
+            marks=pytest.mark.xfail(strict=True, reason="numpy takes it for an archive"),
+        ),
+    ],
+)
+def test_a_damaged_file_is_made_anew(tmp_path, content):
+    made = kept_in(tmp_path)
+    (path,) = tmp_path.iterdir()
+    whole = path.read_bytes()
+    path.write_bytes(content)
+    assert np.array_equal(kept_in(tmp_path), made)
+    assert path.read_bytes() == whole
+
+
+def test_a_file_that_ends_too_soon_or_is_another_table_is_made_anew(tmp_path):
+    made = kept_in(tmp_path)
+    (path,) = tmp_path.iterdir()
+    path.write_bytes(path.read_bytes()[:-1000])
+    assert np.array_equal(kept_in(tmp_path), made)
+    np.save(path, np.zeros((2, 3, 3), dtype=np.float32))
+    assert np.array_equal(kept_in(tmp_path), made)
+    np.save(path, made.astype(np.float64))
+    assert np.array_equal(kept_in(tmp_path), made)
+
+
+def test_where_nothing_can_be_written_it_works_without(tmp_path):
+    made = kept_in(tmp_path)
+    (tmp_path / "file").write_text("no folder")
+    assert np.array_equal(kept_in(tmp_path / "file" / "below"), made)
+    locked = tmp_path / "locked"
+    locked.mkdir()
+    locked.chmod(0o500)
+    assert np.array_equal(kept_in(locked), made)
+    locked.chmod(0o700)
+    assert os.geteuid() == 0 or not list(locked.iterdir())
+
+
+def test_nothing_is_left_behind_when_writing_fails(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(cost_to_go.np, "save", full)
+    kept_in(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_two_processes_at_once_keep_one_whole_table(tmp_path):
+    order = (
+        "from tests.search.test_cost_to_go import kept_in; from pathlib import Path; import sys;"
+        "kept_in(Path(sys.argv[1]))"
+    )
+    running = [
+        subprocess.Popen([sys.executable, "-c", order, str(tmp_path)], cwd=ROOT) for _ in range(2)
+    ]
+    assert [process.wait(120) for process in running] == [0, 0]
+    assert len(list(tmp_path.iterdir())) == 1
+    assert np.array_equal(kept_in(tmp_path), kept_in(tmp_path / "anew"))
+
+
+def test_costs_and_trims_have_tables_of_their_own(tmp_path):
+    for cost in (Cost(time=1.0), Cost(time=2.0), Cost(length=1.0, time=1.0)):
+        cost_to_go._kept.cache_clear()
+        problem = Problem(SMALL.automaton, [0, 0, 0], [1, 0, 0], cost=cost)
+        cost_to_go_table(problem, reach=1.5, folder=tmp_path)
+    assert len(list(tmp_path.iterdir())) == 2  # the last two are the same at 1 m/s
+
+
+def test_start_goal_and_obstacles_do_not_matter():
+    moved = Problem(SMALL.automaton, [5, 6, 1], [7, 8, 2], obstacles=Box([1.0, 1.0]))
+    one, other = cost_to_go_table(SMALL, reach=1.5), cost_to_go_table(moved, reach=1.5)
+    assert one.value is other.value

@@ -1,0 +1,137 @@
+"""Distances that know the obstacles: those of plain Dijkstra, whatever is asked for first."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from maneuver_automaton.collision import Box, Disc, Obstacle, Polygon
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.search._kernels_distance import distances
+from maneuver_automaton.search.distance_grid import distance_grid
+from tests.collision import scenes
+from tests.reference_collision import shapely_world, still, world_around
+from tests.reference_lattice import cells_open, grid_distances
+
+CAR, DISC = scenes.FOOTPRINTS["car"], (Disc(0.6),)
+RING = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+
+
+def grid_and_world(footprint, obstacles, seeds, aim, *, pad=3.0):
+    world = world_around(footprint, obstacles)
+    seeds, aim = world.into(np.atleast_2d(seeds)), world.into(np.asarray(aim))
+    ends = np.vstack([seeds, aim])[:, :2]
+    low = np.minimum(world.box[:2], ends.min(axis=0)) - pad
+    high = np.maximum(world.box[2:], ends.max(axis=0)) + pad
+    return distance_grid(world, np.concatenate([low, high]), seeds, aim), world, seeds
+
+
+def centres(grid):
+    x = grid.origin_x + (np.arange(grid.columns) + 0.5) * grid.cell
+    y = grid.origin_y + (np.arange(grid.rows) + 0.5) * grid.cell
+    return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+
+
+def cells_of(grid, places):
+    at = np.floor((places[:, :2] - [grid.origin_x, grid.origin_y]) / grid.cell).astype(int)
+    return [(int(j), int(i)) for i, j in at]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_asked_in_any_order_it_is_dijkstra(seed):
+    rng = np.random.default_rng(seed)
+    obstacles = (*still(scenes.random_scene(rng)), Obstacle(Box([4.0, 3.0], [1.0, 1.0], 0.4)))
+    ends = np.array([scenes.random_pose(rng) for _ in range(3)])
+    footprint = CAR if seed % 2 else DISC
+    grid, world, seeds = grid_and_world(footprint, obstacles, ends[:2], ends[2])
+    field = world.arrays.field
+    expected = grid_distances(cells_open(grid, field), grid.cell, cells_of(grid, seeds)).ravel()
+    assert np.isinf(expected).any()
+    some = rng.permutation(len(expected))
+    for batch in np.array_split(some, 5):
+        got = distances(grid, field, centres(grid)[batch])
+        assert np.array_equal(np.isinf(got), np.isinf(expected[batch]))
+        finite = np.isfinite(got)
+        assert got[finite] == pytest.approx(expected[batch][finite], abs=1e-9)
+    assert grid.state[1] <= len(expected)
+
+
+def test_little_is_looked_at_where_little_is_asked():
+    grid, world, _ = grid_and_world(DISC, [Obstacle(Box([1.0, 9.0], [5.0, 6.0]))], [0.0, 0.0, 0.0],
+                                    [10.0, 0.0, 0.0], pad=20.0)  # fmt: skip
+    here = world.into(np.array([[10.0, 0.0, 0.0]]))[:, :2]
+    (way,) = distances(grid, world.arrays.field, np.ascontiguousarray(here))
+    assert 10.0 - 2 * grid.cell <= way <= 11.0
+    assert grid.state[1] < 0.2 * grid.value.size
+
+
+@pytest.mark.parametrize("name", ["car", "disc", "truck"])
+def test_no_free_pose_is_in_a_blocked_cell(name):
+    rng = np.random.default_rng([9, *name.encode()])
+    blocked = 0
+    for _ in range(6):
+        obstacles = (*still(scenes.random_scene(rng)), Obstacle(Box([5.0, 4.0], [1.0, 1.0], 0.4)))
+        footprint = (Disc(0.6),) if name == "disc" else scenes.FOOTPRINTS[name]
+        grid, world, _ = grid_and_world(footprint, obstacles, np.zeros(3), np.ones(3))
+        closed = np.argwhere(~cells_open(grid, world.arrays.field))
+        blocked += len(closed)
+        if not len(closed):
+            continue
+        some = closed[rng.integers(len(closed), size=300)]
+        inside = rng.uniform(0.0, 1.0, (300, 2))
+        inside[:80] = rng.integers(0, 2, (80, 2))  # corners of cells
+        origin = np.array([grid.origin_x, grid.origin_y])
+        places = origin + grid.cell * (some[:, ::-1] + inside)
+        turns = rng.uniform(-math.pi, math.pi, 300)
+        poses = (SE2(world.frame) @ SE2(np.column_stack([places, turns]))).pose
+        assert shapely_world(footprint, obstacles).clearance(poses).max() <= 1e-9
+    assert blocked > 100
+
+
+def test_a_point_has_no_blocked_cell():
+    grid, world, _ = grid_and_world((), [Obstacle(Box([4.0, 4.0]))], [9, 0, 0], [-9, 0, 0])
+    assert cells_open(grid, world.arrays.field).all()
+
+
+def test_without_obstacles_there_is_no_grid():
+    world = world_around(CAR, [])
+    grid = distance_grid(world, np.array([-9.0, -9.0, 9.0, 9.0]), np.zeros((1, 3)), np.ones(3))
+    assert (grid.columns, grid.rows) == (0, 0)
+
+
+def test_a_closed_ring_lets_nothing_out_and_an_open_one_does():
+    court = Obstacle(Polygon(9.0 * RING, [8.0 * RING]))
+    goal, start = np.zeros(3), np.array([15.0, 0.0, 0.0])
+    grid, world, _ = grid_and_world(CAR, [court], goal, start)
+    outside = np.ascontiguousarray(world.into(start[None])[:, :2])
+    assert np.isinf(distances(grid, world.arrays.field, outside)).all()
+    assert grid.state[2] == 0  # the rim was not reached
+    opened = [Obstacle(Box([1.0, 18.0], [-8.5, 0.0])), Obstacle(Box([18.0, 1.0], [0.0, 8.5])),
+              Obstacle(Box([18.0, 1.0], [0.0, -8.5]))]  # fmt: skip
+    grid, world, _ = grid_and_world(CAR, opened, goal, start)
+    outside = np.ascontiguousarray(world.into(start[None])[:, :2])
+    assert distances(grid, world.arrays.field, outside)[0] < 16.0
+
+
+def test_many_cells_are_made_larger():
+    posts = [Obstacle(Disc(0.05, [x, y])) for x, y in ((0, 0), (0, 400), (400, 0), (400, 400))]
+    grid, world, _ = grid_and_world((Disc(0.2),), posts, [10, 10, 0], [390, 390, 0])
+    assert grid.value.size <= 1_200_000
+    assert grid.stride % 2 == 1
+    field = world.arrays.field
+    # centres of cells are centres of cells of the field
+    off = (grid.origin_x + 0.5 * grid.cell - field.origin_x) / field.cell - 0.5
+    assert off == pytest.approx(round(off), abs=1e-6)
+
+
+@pytest.mark.xfail(strict=True, reason="the far rim of the box belongs to no cell")
+def test_on_the_rim_of_what_is_searched():
+    # the far corner of the box may be a place that is asked for
+    world = world_around((Box([2.0, 2.0]),), [Obstacle(Box([1.0, 4.0], [5.5, 0.0]))])
+    goal, start = world.into(np.array([10.0, 0.0, 0.0])), world.into(np.array([0.0, 0.0, 0.0]))
+    box = np.array([start[0], -9.0, goal[0], 9.0])
+    grid = distance_grid(world, box, goal[None], start)
+    ends = np.ascontiguousarray(np.vstack([start, goal])[:, :2])
+    assert np.isfinite(distances(grid, world.arrays.field, ends)).all()
