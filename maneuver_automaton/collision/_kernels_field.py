@@ -12,7 +12,7 @@ from maneuver_automaton.collision._kernels_gap import point_to_segment
 
 @inner_kernel
 def distance_to_piece(x, y, corners, first, last):
-    """Distance of a point to a convex polygon, its corners counter-clockwise; 0 inside."""
+    """Distance of a point to a convex polygon, its corners counter-clockwise; negative inside."""
     best = math.inf
     inside = last - first > 2
     before = last - 1
@@ -22,7 +22,7 @@ def distance_to_piece(x, y, corners, first, last):
         best = min(best, point_to_segment(x, y, a_x, a_y, b_x, b_y))
         inside = inside and (b_x - a_x) * (y - a_y) - (b_y - a_y) * (x - a_x) >= 0.0
         before = k
-    return 0.0 if inside else math.sqrt(best)
+    return -math.sqrt(best) if inside else math.sqrt(best)
 
 
 @kernel
@@ -40,35 +40,73 @@ def write_pieces(distance, origin_x, origin_y, cell, cap, edges, first, plates, 
             for i in range(i_0, i_1):
                 x = origin_x + (i + 0.5) * cell
                 d_x = max(max(plates[p, 0] - x, x - plates[p, 2]), 0.0)
-                known = distance[j, i]
-                if d_x * d_x + d_y * d_y >= known * known:
+                known = max(distance[j, i], 0.0)
+                if d_x * d_x + d_y * d_y > known * known:
                     continue
                 value = distance_to_piece(x, y, edges, first[p], first[p + 1]) - plates[p, 4]
-                distance[j, i] = min(known, max(value, 0.0))
+                distance[j, i] = min(distance[j, i], value)
+
+
+@kernel
+def rows_to(blocked, wanted):
+    """Rows (rows, columns) from each cell to the nearest of its column that is as `wanted`."""
+    n_rows, n_columns = blocked.shape
+    far = n_rows + n_columns
+    away = np.full((n_rows, n_columns), far, dtype=np.int32)
+    for i in range(n_columns):
+        last = -far
+        for j in range(n_rows):
+            if blocked[j, i] == wanted:
+                last = j
+            away[j, i] = min(j - last, far)
+        last = 2 * far
+        for j in range(n_rows - 1, -1, -1):
+            if blocked[j, i] == wanted:
+                last = j
+            away[j, i] = min(away[j, i], last - j)
+    return away
+
+
+@inner_kernel
+def to_cells(blocked, wanted, away, x, y, most):
+    """Distance of a point, in cells, to the nearest cell that is as `wanted`; at most `most`.
+
+    `away` are the rows of `rows_to`. Columns ever further away are looked at, as long as they can
+    be nearer.
+    """
+    n_rows, n_columns = blocked.shape
+    row = min(max(math.floor(y), 0), n_rows - 1)
+    column = min(max(math.floor(x), 0), n_columns - 1)
+    best = most * most
+    for reach in range(n_columns + 1):
+        ended = True
+        for side in range(2):
+            k = column + reach if side == 0 else column - reach
+            if (side == 1 and reach == 0) or k < 0 or k >= n_columns:
+                continue
+            a_x = max(max(k - x, x - k - 1.0), 0.0)
+            if a_x * a_x >= best:
+                continue
+            ended = False
+            for sign in range(2):  # the nearest cell of this column, up or down
+                r = row + away[row, k] if sign == 0 else row - away[row, k]
+                if 0 <= r < n_rows and blocked[r, k] == wanted:
+                    a_y = max(max(r - y, y - r - 1.0), 0.0)
+                    best = min(best, a_x * a_x + a_y * a_y)
+        if ended and reach > 0:
+            break
+    return math.sqrt(best)
 
 
 @kernel
 def write_map(distance, origin_x, origin_y, cell, cap, blocked, resolution, m_x, m_y, c, s):
-    """Lower the field to the exact distance of the blocked cells of a map at (m_x, m_y, c, s).
+    """Lower the field to the exact distance of a map at (m_x, m_y, c, s), negative inside.
 
-    Two passes: along each column of the map the rows to the nearest blocked cell, then along rows
-    the least hypotenuse, with distances to the cells' edges.
+    In two passes: along each column the rows to the nearest cell, then the least hypotenuse over
+    the columns, to the cells' edges.
     """
     n_rows, n_columns = blocked.shape
-    far = n_rows + n_columns
-    up = np.full((n_rows, n_columns), far, dtype=np.int32)
-    for i in range(n_columns):
-        last = -far
-        for j in range(n_rows):
-            if blocked[j, i]:
-                last = j
-            up[j, i] = min(j - last, far)
-        last = 2 * far
-        for j in range(n_rows - 1, -1, -1):
-            if blocked[j, i]:
-                last = j
-            up[j, i] = min(up[j, i], last - j)
-    most = int(cap / resolution) + 2
+    to_blocked, to_free = rows_to(blocked, True), rows_to(blocked, False)
     rows, columns = distance.shape
     for j in range(rows):
         w_y = origin_y + (j + 0.5) * cell
@@ -76,37 +114,12 @@ def write_map(distance, origin_x, origin_y, cell, cap, blocked, resolution, m_x,
             w_x = origin_x + (i + 0.5) * cell
             d_x, d_y = w_x - m_x, w_y - m_y
             x, y = (c * d_x + s * d_y) / resolution, (c * d_y - s * d_x) / resolution
-            row = min(max(math.floor(y), 0), n_rows - 1)
-            column = min(max(math.floor(x), 0), n_columns - 1)
-            best = min(most, distance[j, i] / resolution)
-            best = best * best
-            reach = 0
-            while True:  # columns ever further away, as long as they can be nearer
-                ended = True
-                for side in range(2):
-                    k = column + reach if side == 0 else column - reach
-                    if (side == 1 and reach == 0) or k < 0 or k >= n_columns:
-                        continue
-                    a_x = max(max(k - x, x - k - 1.0), 0.0)
-                    if a_x * a_x >= best:
-                        continue
-                    ended = False
-                    rise = up[row, k]
-                    if rise >= far:
-                        continue
-                    # the nearest blocked cell of this column is `rise` rows up or down
-                    for sign in range(2):
-                        r = row + rise if sign == 0 else row - rise
-                        if r < 0 or r >= n_rows or not blocked[r, k]:
-                            continue
-                        a_y = max(max(r - y, y - r - 1.0), 0.0)
-                        best = min(best, a_x * a_x + a_y * a_y)
-                if ended and reach > 0:
-                    break
-                reach += 1
-                if reach > n_columns:
-                    break
-            distance[j, i] = min(distance[j, i], resolution * math.sqrt(best))
+            most = max(distance[j, i], 0.0) / resolution
+            value = to_cells(blocked, True, to_blocked, x, y, most)
+            if value <= 0.0:  # inside: the way out, over the rim of the map too
+                most = min(min(x, n_columns - x), min(y, n_rows - y))
+                value = -to_cells(blocked, False, to_free, x, y, max(most, 0.0))
+            distance[j, i] = min(distance[j, i], resolution * value)
 
 
 @kernel

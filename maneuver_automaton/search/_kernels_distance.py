@@ -9,6 +9,7 @@ import numpy as np
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, kernel
 
 SETTLED = 2
+NARROW = 4.0  # how much dearer a cell is whose middle is no place for the vehicle
 BLOCKED = 1
 
 
@@ -47,17 +48,25 @@ def pop(keys, items, size):
 
 
 @bare_inner_kernel
-def blocked_cell(grid, field, i, j):
-    """Whether no reference point can be anywhere in the cell: sound."""
+def centre_clearance(grid, field, i, j):
+    """Clearance of a point in the middle of a cell [m], negative inside a solid."""
     f_i, f_j = i * grid.stride + grid.shift_x, j * grid.stride + grid.shift_y
     if 0 <= f_i < field.distance.shape[1] and 0 <= f_j < field.distance.shape[0]:
-        return field.distance[f_j, f_i] < grid.inflation
-    return False
+        return field.distance[f_j, f_i]
+    return math.inf
+
+
+@bare_inner_kernel
+def blocked_cell(grid, field, i, j):
+    """Whether no reference point can be anywhere in the cell: sound."""
+    return centre_clearance(grid, field, i, j) < grid.inflation
 
 
 @bare_inner_kernel
 def distance_at(grid, field, x, y):
     """Distance [m] from the nearest seed to the cell of (x, y); inf if there is no way.
+
+    Cells in whose middle the vehicle cannot be count more: an estimate, not a bound.
 
     Grows until that cell is settled, in the order of distance plus the straight way to where the
     grid is aimed at, so that cells off the way are not looked at.
@@ -91,10 +100,13 @@ def distance_at(grid, field, x, y):
                 there = n_j * grid.columns + n_i
                 if grid.mark[there] != 0:
                     continue
-                if blocked_cell(grid, field, n_i, n_j):
+                room = centre_clearance(grid, field, n_i, n_j)
+                if room < grid.inflation:
                     grid.mark[there] = BLOCKED
                     continue
                 step = grid.cell * (1.4142135623730951 if a != 0 and b != 0 else 1.0)
+                if room < grid.wanted:
+                    step *= NARROW
                 if value + step < grid.value[there]:
                     grid.value[there] = value + step
                     e_x, e_y = (n_i - grid.aim_i) * grid.cell, (n_j - grid.aim_j) * grid.cell

@@ -32,6 +32,7 @@ class DistanceGrid(NamedTuple):
     shift_x: int  # field cell of cell (0, 0)
     shift_y: int
     inflation: float  # [m] clearance of a cell's centre below which the pose cannot be in it
+    wanted: float  # [m] clearance of a cell's centre below which the vehicle cannot be there
     aim_i: int  # cell towards which it grows first
     aim_j: int
 
@@ -73,6 +74,7 @@ def distance_grid(world: World, box: Array, seeds: Array, aim: Array) -> Distanc
         shift_x=int(first[0]) * stride,
         shift_y=int(first[1]) * stride,
         inflation=world.body.inscribed - cell * math.sqrt(0.5),
+        wanted=world.body.inscribed,
         aim_i=aim_i,
         aim_j=aim_j,
     )
@@ -98,6 +100,7 @@ def _none() -> DistanceGrid:
         shift_x=0,
         shift_y=0,
         inflation=0.0,
+        wanted=0.0,
         aim_i=0,
         aim_j=0,
     )
