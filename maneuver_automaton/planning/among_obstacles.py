@@ -18,7 +18,8 @@ from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.improve import Improved, Patience, improve
 from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable, cost_to_go_table
-from maneuver_automaton.search.lattice import FirstPlan, Word, first_plan, with_cost
+from maneuver_automaton.search.lattice import FirstPlan, first_plan
+from maneuver_automaton.search.lattice_pass import Word, with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.limits import why_impossible
 from maneuver_automaton.switching_times.closing import closed_at

@@ -20,7 +20,8 @@ from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.improve import Patience, improve
 from maneuver_automaton.refinement.ready import load_lattice
-from maneuver_automaton.search.lattice import Word, first_plan
+from maneuver_automaton.search.lattice import first_plan
+from maneuver_automaton.search.lattice_pass import Word
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 
 LITTLE = Patience(attempts=800, passes=2)  # where a step's budget is short

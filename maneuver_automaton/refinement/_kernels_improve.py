@@ -8,13 +8,12 @@ from __future__ import annotations
 import math
 
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
-from maneuver_automaton.collision._kernels_advancement import free_time
-from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search._kernels_connect import (
     NO_TRIM,
     candidates,
+    driven,
     free_candidate,
-    inside_window,
+    trim_free,
 )
 
 GAIN = 1e-9  # share of the cost that counts as a gain
@@ -46,8 +45,7 @@ def unroll(lib, work, n):
         work.poses[k, 0], work.poses[k, 1], work.poses[k, 2] = x, y, heading
         work.times[k] = time
         trim, t = work.trims[k], work.durations[k]
-        d_x, d_y, turn = coast(lib.twists[trim, 0], lib.twists[trim, 1], lib.twists[trim, 2], t)
-        x, y, heading = compose(x, y, heading, d_x, d_y, turn)
+        x, y, heading = driven(lib, trim, x, y, heading, t)
         time += t
     work.poses[n, 0], work.poses[n, 1], work.poses[n, 2] = x, y, heading
     work.times[n] = time
@@ -69,9 +67,8 @@ def owner(work, n, time):
 @inlined_kernel
 def pose_at(lib, work, k, time):
     """Pose at a time within trim `k`."""
-    trim, t = work.trims[k], time - work.times[k]
-    d_x, d_y, turn = coast(lib.twists[trim, 0], lib.twists[trim, 1], lib.twists[trim, 2], t)
-    return compose(work.poses[k, 0], work.poses[k, 1], work.poses[k, 2], d_x, d_y, turn)
+    t = time - work.times[k]
+    return driven(lib, work.trims[k], work.poses[k, 0], work.poses[k, 1], work.poses[k, 2], t)
 
 
 @bare_inner_kernel
@@ -127,27 +124,11 @@ def still_free(lib, task, world, body, work, size, begin):
     time = 0.0
     for k in range(size):
         trim, t = work.new_trims[k], work.new_durations[k]
-        v_x, v_y, turn = lib.twists[trim, 0], lib.twists[trim, 1], lib.twists[trim, 2]
-        if time + t > begin:
-            proven, _ = free_time(
-                world,
-                body,
-                x,
-                y,
-                heading,
-                v_x,
-                v_y,
-                turn,
-                lib.speeds[trim],
-                t,
-                task.keep,
-                task.margin,
-                task.clock + time,
-            )
-            if proven < t:
-                return False
-        d_x, d_y, angle = coast(v_x, v_y, turn, t)
-        x, y, heading = compose(x, y, heading, d_x, d_y, angle)
+        begun = time + t > begin
+        clock = task.clock + time
+        if begun and not trim_free(lib, task, world, body, trim, x, y, heading, t, clock):
+            return False
+        x, y, heading = driven(lib, trim, x, y, heading, t)
         time += t
     return True
 
@@ -435,34 +416,3 @@ def dynamic_programming(lib, task, world, body, work, state, points):
         state[ACCEPTED] += 1
         return new_cost
     return cost
-
-
-@bare_kernel
-def check_word(lib, task, world, body, work, state):
-    """Whether the whole word is proven free and stays inside its window."""
-    n = state[LENGTH]
-    unroll(lib, work, n)
-    for k in range(n):
-        trim, t = work.trims[k], work.durations[k]
-        v_x, v_y, turn = lib.twists[trim, 0], lib.twists[trim, 1], lib.twists[trim, 2]
-        x, y, heading = work.poses[k, 0], work.poses[k, 1], work.poses[k, 2]
-        if not inside_window(task.window, x, y, heading, v_x, v_y, turn, t):
-            return False
-        proven, _ = free_time(
-            world,
-            body,
-            x,
-            y,
-            heading,
-            v_x,
-            v_y,
-            turn,
-            lib.speeds[trim],
-            t,
-            task.keep,
-            task.margin,
-            task.clock + work.times[k],
-        )
-        if proven < t:
-            return False
-    return True

@@ -19,19 +19,14 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.refinement import _kernels_improve as kernels
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.distance_grid import DistanceGrid
-from maneuver_automaton.search.lattice import (
-    Rung,
-    Word,
-    both_ends,
-    distance_grids,
-    with_cost,
-)
+from maneuver_automaton.search.lattice import distance_grids
 from maneuver_automaton.search.lattice_memory import (
     Scratch,
     SearchArrays,
     scratch_of,
     search_arrays,
 )
+from maneuver_automaton.search.lattice_pass import Rung, Word, both_ends, with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
 
 POINTS = 40  # of the dynamic program

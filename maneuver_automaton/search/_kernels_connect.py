@@ -85,6 +85,29 @@ def candidates(lib, triples, x, y, heading, goal_x, goal_y, goal_heading, first,
     return count
 
 
+@inlined_kernel
+def driven(lib, trim, x, y, heading, t):
+    """Pose after coasting a trim."""
+    d_x, d_y, turn = coast(lib.twists[trim, 0], lib.twists[trim, 1], lib.twists[trim, 2], t)
+    return compose(x, y, heading, d_x, d_y, turn)
+
+
+@inlined_kernel
+def trim_inside(lib, task, trim, x, y, heading, t):
+    """Whether coasting a trim stays inside the task's window."""
+    v_x, v_y, turn = lib.twists[trim, 0], lib.twists[trim, 1], lib.twists[trim, 2]
+    return inside_window(task.window, x, y, heading, v_x, v_y, turn, t)
+
+
+@inlined_kernel
+def trim_free(lib, task, world, body, trim, x, y, heading, t, clock):
+    """Whether coasting a trim from a pose is proven free, the world's time being `clock`."""
+    v_x, v_y, turn = lib.twists[trim, 0], lib.twists[trim, 1], lib.twists[trim, 2]
+    fast, keep, margin = lib.speeds[trim], task.keep, task.margin
+    proven, _ = free_time(world, body, x, y, heading, v_x, v_y, turn, fast, t, keep, margin, clock)
+    return proven >= t
+
+
 @bare_inner_kernel
 def free_candidate(lib, task, world, body, triples, pose, n, most_cost, most_time, clock, scratch):
     """Cheapest of `n` candidates from `pose` that is proven free; -1 if none of `task.tries` is.
@@ -105,30 +128,12 @@ def free_candidate(lib, task, world, body, triples, pose, n, most_cost, most_tim
             t, trim = scratch.times[which, n_th], triples[row, n_th]
             if t == 0.0 or trim >= lib.n_trims:
                 continue
-            v_x, v_y, turn = lib.twists[trim, 0], lib.twists[trim, 1], lib.twists[trim, 2]
-            if not inside_window(task.window, x, y, heading, v_x, v_y, turn, t):
+            if not trim_inside(lib, task, trim, x, y, heading, t) or not trim_free(
+                lib, task, world, body, trim, x, y, heading, t, time
+            ):
                 free = False
                 break
-            proven, _ = free_time(
-                world,
-                body,
-                x,
-                y,
-                heading,
-                v_x,
-                v_y,
-                turn,
-                lib.speeds[trim],
-                t,
-                task.keep,
-                task.margin,
-                time,
-            )
-            if proven < t:
-                free = False
-                break
-            d_x, d_y, angle = coast(v_x, v_y, turn, t)
-            x, y, heading = compose(x, y, heading, d_x, d_y, angle)
+            x, y, heading = driven(lib, trim, x, y, heading, t)
             time += t
         if free:
             return which

@@ -4,90 +4,19 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.search import _kernels_lattice as kernels
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.distance_grid import DistanceGrid, distance_grid
-from maneuver_automaton.search.lattice_library import LatticeArrays, moves_of
-from maneuver_automaton.search.lattice_memory import SearchArrays, search_arrays, with_room
+from maneuver_automaton.search.lattice_pass import WEIGHT, Pass, Rung, Word, both_ends
 from maneuver_automaton.search.lattice_query import LatticeQuery
 
-CELL = 0.122  # of the first pass, in turning radii
-HEADINGS = 72
-WEIGHT = 2.0
-FIRST_CHUNK = 64  # expansions
-MOST_CHUNK = 8192
-TIMELY = 256  # expansions between two looks at the clock
-TRIES = 6  # candidates of one steering that are tried
-PATIENCE = 1.5  # a connection may cost so much more than the estimate ...
-SLACK = 2.0  # ... and so many turning radii
-BACK_OFF = 0.01  # [half widths of the body] kept before contact
-SHORTEST_CONTACT = 0.03  # [half widths] of an edge that ends there
-SAMPLED_HEADINGS = 16  # roots at a goal whose heading is free
-
-
-class Task(NamedTuple):
-    """One search from one end, as the kernels see it."""
-
-    sign: float  # 1: from the start, -1: from the goals backwards
-    roots: Array  # (R, 3)
-    aims: Array  # (A, 3)
-    aim_free: NDArray[np.bool_]  # (A,)
-    aim_x: float
-    aim_y: float
-    aim_heading: float
-    frame_x: float
-    frame_y: float
-    frame_heading: float
-    frame_cos: float
-    frame_sin: float
-    cell: float
-    headings: int
-    fine_cell: float
-    fine_headings: int
-    tick: float
-    weight: float
-    per_metre: float
-    per_shot: float
-    patience: float
-    slack: float
-    tries: int
-    stop_at_first: bool
-    contact: bool
-    back_off: float
-    shortest_contact: float
-    keep: float
-    margin: float
-    clock: float
-    most_time: float
-    most_trims: int
-    by_gear: bool
-    by_trim: bool
-    by_count: bool
-    window: Array
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Rung:
-    """One resolution of the lattice."""
-
-    scale: float = 1.0  # of the cells
-    quanta: float = 1.0  # of the lengths of edges
-    weight: float = WEIGHT
-    contact: bool = False  # keep what was driven before a contact
-    fine: float = 0.4  # cells of such edges, in cells of this rung
-    margin: float = 1.0  # of the proven clearance
-    guided: bool = False  # by the table of the cost to go
-    stop: bool = True  # at the first connection
-
-
+MOST_CHUNK = 8192  # expansions of one pass before it is the next one's turn
 LADDER: tuple[tuple[int, tuple[Rung, ...]], ...] = (
     # after so many expansions of all passes together, or when all are exhausted
     (
@@ -108,65 +37,6 @@ LADDER: tuple[tuple[int, tuple[Rung, ...]], ...] = (
     ),
     (2**62, (Rung(scale=0.24, quanta=0.25, contact=True, margin=0.1, guided=True),)),
 )
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Word:
-    """Trims of the lattice library with their coasting times, joined where they repeat."""
-
-    trims: IntArray  # (n,)
-    durations: Array  # (n,) [s]
-    goal: int  # among the goals of the query
-    cost: float = math.nan
-
-
-@dataclass(slots=True, eq=False)
-class Pass:
-    """A search from one end at one resolution; it can be stopped and resumed."""
-
-    query: LatticeQuery
-    rung: Rung
-    task: Task
-    grid: DistanceGrid
-    table: CostTable
-    arrays: SearchArrays
-    library: LatticeArrays
-    chunk: int = FIRST_CHUNK
-    alive: bool = True
-
-    @property
-    def expansions(self) -> int:
-        """Nodes expanded so far."""
-        return int(self.arrays.state[kernels.EXPANSIONS])
-
-    def run(self, n: int, ceiling: float, *, deadline: float = math.inf) -> Word | None:
-        """Expand up to `n` more nodes; a plan, if one was found that costs less than `ceiling`."""
-        query = self.query
-        left = self.expansions + n
-        while self.alive and self.expansions < left and time.monotonic() < deadline:
-            state = self.arrays.state
-            per_node = self.library.n_trims * 2
-            step = min(left - self.expansions, TIMELY)
-            self.arrays = with_room(
-                self.arrays, int(state[kernels.N_NODES]) + per_node * (step + 1) + 2
-            )
-            going = kernels.expand(
-                self.arrays,
-                self.task,
-                self.library,
-                query.world.arrays,
-                query.world.body,
-                self.grid,
-                self.table,
-                step,
-                ceiling,
-            )
-            self.alive = bool(going)
-            if self.arrays.state[kernels.FOUND] and self.task.stop_at_first:
-                break
-        if not self.arrays.state[kernels.FOUND]:
-            return None
-        return _word(self)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -216,113 +86,6 @@ def first_plan(
                 passes += both_ends(query, rung, grids=grids, table=guide)
         elif not alive:
             return _outcome(query, passes, total, None, exhausted=True)
-
-
-def both_ends(
-    query: LatticeQuery,
-    rung: Rung,
-    *,
-    grids: tuple[DistanceGrid, DistanceGrid],
-    table: CostTable = NO_TABLE,
-    arrays: SearchArrays | None = None,
-    ends: tuple[float, ...] = (1.0, -1.0),
-) -> list[Pass]:
-    """Passes from the start and, where nothing moves, from the goals."""
-    return [
-        _pass(query, rung, sign, grids[0 if sign > 0 else 1], table, arrays)
-        for sign in ends
-        if sign > 0.0 or not query.problem.moves
-    ]
-
-
-def _pass(
-    query: LatticeQuery,
-    rung: Rung,
-    sign: float,
-    grid: DistanceGrid,
-    table: CostTable,
-    arrays: SearchArrays | None,
-) -> Pass:
-    library = query.library.arrays
-    quanta = np.maximum(library.quanta * rung.quanta, library.min_coast)
-    quanta = np.where(library.quanta > 0.0, quanta, 0.0)
-    moves = moves_of(library.twists[: library.n_trims], sign * quanta)
-    scaled = library._replace(quanta=quanta, moves=moves)
-    task = _task(query, rung, sign)
-    n_triples = max(len(library.triples), len(library.free_triples))
-    room = search_arrays(n_triples) if arrays is None else arrays
-    room = with_room(room, len(task.roots) + 4)
-    kernels.begin(room, task, scaled, query.world.arrays, grid, table)
-    return Pass(query, rung, task, grid, table, room, scaled)
-
-
-def _task(query: LatticeQuery, rung: Rung, sign: float) -> Task:
-    library, problem = query.library, query.problem
-    settings = problem.search
-    radius, body = library.radius, query.world.body
-    goals = query.goals
-    frame = goals[0]
-    cell = rung.scale * (settings.cell or CELL * radius)
-    size = body.half_width or radius * 0.1
-    cost = library.arrays
-    price = library.per_metre
-    sharp = 0.25 * radius * price
-    aim = goals[0] if sign > 0.0 else query.start
-    return Task(
-        sign=sign,
-        roots=query.start[None].copy() if sign > 0.0 else _goal_roots(query),
-        aims=goals.copy() if sign > 0.0 else query.start[None].copy(),
-        aim_free=query.free_heading.copy() if sign > 0.0 else np.zeros(1, dtype=np.bool_),
-        aim_x=float(aim[0]),
-        aim_y=float(aim[1]),
-        aim_heading=float(aim[2]),
-        frame_x=float(frame[0]),
-        frame_y=float(frame[1]),
-        frame_heading=float(frame[2]),
-        frame_cos=math.cos(float(frame[2])),
-        frame_sin=math.sin(float(frame[2])),
-        cell=float(cell),
-        headings=int(settings.headings or HEADINGS),
-        fine_cell=float(rung.fine * cell),
-        fine_headings=250,
-        tick=_tick(query, rung),
-        weight=float(rung.weight),
-        per_metre=float(price),
-        per_shot=float(sharp) if sharp > 0.0 else 1.0,
-        patience=PATIENCE,
-        slack=float(SLACK * radius * price + library.per_turn) or math.inf,
-        tries=TRIES,
-        stop_at_first=bool(rung.stop),
-        contact=rung.contact,
-        back_off=float(max(BACK_OFF * size, 2.0 * query.margin)),
-        shortest_contact=float(SHORTEST_CONTACT * size),
-        keep=float(query.keep),
-        margin=float(query.margin * rung.margin),
-        clock=float(problem.start_time),
-        most_time=float(query.most_time),
-        most_trims=int(problem.horizon.max_trims or 0),
-        by_gear=bool(cost.direction_change > 0.0),
-        by_trim=bool(cost.switch > 0.0 or cost.min_coast > 0.0),
-        by_count=problem.horizon.max_trims is not None,
-        window=query.window,
-    )
-
-
-def _tick(query: LatticeQuery, rung: Rung) -> float:
-    """Length in time of a cell [s]; 0 where the time does not matter."""
-    if not (query.problem.moves or math.isfinite(query.most_time)):
-        return 0.0
-    quanta = query.library.arrays.quanta
-    return float(rung.quanta * quanta[quanta > 0.0].min()) if (quanta > 0.0).any() else 0.0
-
-
-def _goal_roots(query: LatticeQuery) -> Array:
-    """Poses at the goals; a few headings where any will do."""
-    rows = []
-    for goal, free in zip(query.goals, query.free_heading, strict=True):
-        turns = np.arange(SAMPLED_HEADINGS if free else 1) * (2.0 * np.pi / SAMPLED_HEADINGS)
-        rows += [goal + np.array([0.0, 0.0, turn]) for turn in turns]
-    return np.array(rows)
 
 
 def distance_grids(query: LatticeQuery) -> tuple[DistanceGrid, DistanceGrid]:
@@ -387,59 +150,3 @@ def _expanded(query: LatticeQuery, passes: list[Pass]) -> Array:
     poses = turned.pose.copy()
     poses[:, :2] += query.world.frame[:2]
     return np.column_stack([poses, nodes[:, 3]])
-
-
-def _word(one: Pass) -> Word:
-    """The plan that a pass has found, from start to goal."""
-    arrays, library = one.arrays, one.query.library.arrays
-    state = arrays.state
-    triples = library.free_triples if state[kernels.FREE] else library.triples
-    middle = [
-        (int(trim), float(t))
-        for trim, t in zip(triples[state[kernels.ROW]], arrays.found[1:4], strict=True)
-        if t > 0.0 and trim < library.n_trims
-    ]
-    edges: list[tuple[int, float]] = []
-    node = int(state[kernels.NODE])
-    while arrays.links[node, 0] >= 0:
-        edges.append((int(arrays.links[node, 1]), float(arrays.nodes[node, 5])))
-        node = int(arrays.links[node, 0])
-    root = int(arrays.links[node, 4])
-    if one.task.sign > 0.0:
-        parts, goal = edges[::-1] + middle, int(state[kernels.GOAL])
-    else:
-        parts, goal = middle + edges, _goal_of_root(one.query, root)
-    return joined(parts, goal=goal)
-
-
-def _goal_of_root(query: LatticeQuery, root: int) -> int:
-    counts = np.where(query.free_heading, SAMPLED_HEADINGS, 1)
-    return int(np.searchsorted(np.cumsum(counts), root, side="right"))
-
-
-def joined(parts: list[tuple[int, float]], *, goal: int) -> Word:
-    """A word without neighbours that repeat."""
-    trims: list[int] = []
-    durations: list[float] = []
-    for trim, t in parts:
-        if trims and trims[-1] == trim:
-            durations[-1] += t
-        else:
-            trims.append(trim)
-            durations.append(t)
-    return Word(
-        trims=np.array(trims, dtype=np.int64),
-        durations=np.array(durations, dtype=np.float64),
-        goal=goal,
-    )
-
-
-def with_cost(word: Word, query: LatticeQuery) -> Word:
-    """The word with what it costs in the lattice library, prices of switches included."""
-    library = query.library.arrays
-    cost = float(library.rates[word.trims] @ word.durations)
-    cost += library.switch * max(0, len(word.trims) - 1)
-    gears = library.gears[word.trims]
-    gears = gears[gears != 0]
-    cost += library.direction_change * int(np.count_nonzero(gears[1:] != gears[:-1]))
-    return replace(word, cost=cost)
