@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
 import itertools
 import math
 
@@ -15,26 +14,30 @@ from maneuver_automaton._arrays import Array
 from tests.reference import plain_end
 
 
-def cells_open(grid, field) -> Array:
-    """Which cells (rows, columns) of a distance grid the pose may be in."""
-    rows, columns = np.arange(grid.rows), np.arange(grid.columns)
-    f_j, f_i = rows * grid.stride + grid.shift_y, columns * grid.stride + grid.shift_x
-    open_ = np.ones((grid.rows, grid.columns), dtype=bool)
+def centre_clearances(grid, field) -> Array:
+    """Clearance (rows, columns) of a point in the middle of every cell of a distance grid."""
+    f_j = np.arange(grid.rows) * grid.stride + grid.shift_y
+    f_i = np.arange(grid.columns) * grid.stride + grid.shift_x
     in_j = (f_j >= 0) & (f_j < field.distance.shape[0])
     in_i = (f_i >= 0) & (f_i < field.distance.shape[1])
-    known = field.distance[np.ix_(f_j[in_j], f_i[in_i])]
-    open_[np.ix_(in_j, in_i)] = known >= grid.inflation
-    return open_
+    clear = np.full((grid.rows, grid.columns), np.inf)
+    clear[np.ix_(in_j, in_i)] = field.distance[np.ix_(f_j[in_j], f_i[in_i])]
+    return clear
 
 
-def grid_distances(open_: Array, cell: float, seeds: list[tuple[int, int]]) -> Array:
+def cells_open(grid, field) -> Array:
+    """Which cells (rows, columns) of a distance grid the pose may be in."""
+    return np.asarray(centre_clearances(grid, field) >= grid.inflation)
+
+
+def grid_distances(open_: Array, price: Array, cell: float, seeds: list[tuple[int, int]]) -> Array:
     """Octile distance [m] of every open cell (rows, columns) from seeds (row, column), or inf.
 
-    Seeds may be closed; no way leads through another closed cell.
+    A step costs its length times the `price` (rows, columns) of the cell it leads into. Seeds may
+    be closed; no way leads through another closed cell.
     """
     rows, columns = open_.shape
     number = np.arange(open_.size).reshape(open_.shape)
-    enter = open_.copy()
     leave = open_.copy()
     for seed in seeds:
         leave[seed] = True
@@ -44,10 +47,10 @@ def grid_distances(open_: Array, cell: float, seeds: list[tuple[int, int]]) -> A
             continue
         here = (slice(max(0, -b), rows - max(0, b)), slice(max(0, -a), columns - max(0, a)))
         there = (slice(max(0, b), rows - max(0, -b)), slice(max(0, a), columns - max(0, -a)))
-        step = leave[here] & enter[there]
+        step = leave[here] & open_[there]
         begins.append(number[here][step])
         ends.append(number[there][step])
-        lengths.append(np.full(step.sum(), cell * math.hypot(a, b)))
+        lengths.append(cell * math.hypot(a, b) * price[there][step])
     graph = coo_array(
         (np.concatenate(lengths), (np.concatenate(begins), np.concatenate(ends))),
         shape=(open_.size, open_.size),
@@ -73,6 +76,40 @@ def shortest_way(solids: shapely.Geometry, start: Array, goal: Array) -> float:
     return float(dijkstra(graph, directed=False, indices=0)[1])
 
 
+class Heap:
+    """A binary heap as in a textbook: of what costs the same, its order decides."""
+
+    def __init__(self) -> None:
+        self.keys: list[float] = []
+        self.items: list[object] = []
+
+    def push(self, key: float, item: object) -> None:
+        self.keys.append(key)
+        self.items.append(item)
+        k = len(self.keys) - 1
+        while k and self.keys[k] < self.keys[(k - 1) // 2]:
+            self._swap(k, (k - 1) // 2)
+            k = (k - 1) // 2
+
+    def pop(self) -> object:
+        self._swap(0, len(self.keys) - 1)
+        self.keys.pop()
+        item = self.items.pop()
+        k = 0
+        while (down := 2 * k + 1) < len(self.keys):
+            if down + 1 < len(self.keys) and self.keys[down + 1] < self.keys[down]:
+                down += 1
+            if self.keys[k] <= self.keys[down]:
+                break
+            self._swap(k, down)
+            k = down
+        return item
+
+    def _swap(self, i: int, j: int) -> None:
+        self.keys[i], self.keys[j] = self.keys[j], self.keys[i]
+        self.items[i], self.items[j] = self.items[j], self.items[i]
+
+
 def cost_table(twists, rates, quanta, cell: float, half: int, n_headings: int) -> Array:
     """Cost (headings, rows, columns) to the goal in the middle, inf where none was found.
 
@@ -85,28 +122,28 @@ def cost_table(twists, rates, quanta, cell: float, half: int, n_headings: int) -
         return (k, j, i) if max(abs(i), abs(j)) <= half else None
 
     settled: dict[tuple[int, int, int], float] = {}
-    order = itertools.count()
-    frontier = [(0.0, next(order), (0.0, 0.0, 0.0))]
-    best = {cell_of((0.0, 0.0, 0.0)): 0.0}
-    while frontier:
-        cost, _, pose = heapq.heappop(frontier)
-        here = cell_of(pose)
-        if here in settled or cost > best[here]:
+    best = {cell_of((0.0, 0.0, 0.0)): (0.0, (0.0, 0.0, 0.0))}
+    frontier = Heap()
+    frontier.push(0.0, cell_of((0.0, 0.0, 0.0)))
+    while frontier.keys:
+        here = frontier.pop()
+        if here in settled:
             continue
+        cost, (x, y, heading) = best[here]
         settled[here] = cost
         for twist, rate, times in zip(twists, rates, quanta, strict=True):
             for t in times:
-                if t <= 0.0:
+                if t == 0.0:
                     continue
-                x, y, heading = pose
                 step = plain_end([twist], [-t])
                 place = complex(x, y) + complex(step[0], step[1]) * np.exp(1j * heading)
                 there = (place.real, place.imag, heading + step[2])
                 key = cell_of(there)
-                if key is None or key in settled or cost + t * rate >= best.get(key, math.inf):
+                if key is None or key in settled:
                     continue
-                best[key] = cost + t * rate
-                heapq.heappush(frontier, (best[key], next(order), there))
+                if cost + t * rate < best.get(key, (math.inf,))[0]:
+                    best[key] = cost + t * rate, there
+                    frontier.push(cost + t * rate, key)
     table = np.full((n_headings, 2 * half + 1, 2 * half + 1), np.inf)
     for (k, j, i), cost in settled.items():
         table[k, j + half, i + half] = cost

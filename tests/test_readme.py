@@ -50,6 +50,11 @@ def test_the_first_plan_is_short_and_prints_what_it_says(clone, capsys):
     assert f"# {printed[0]}" in code.splitlines()
 
 
+def test_the_first_plan_among_obstacles_is_short():
+    code = next(code for code in blocks("python") if "obstacles=" in code)
+    assert len(code.splitlines()) <= 15
+
+
 COMMANDS = [
     line
     for block in blocks("sh")

@@ -10,6 +10,7 @@ import shapely
 
 from maneuver_automaton.collision import Box, Disc, Obstacle, OccupancyMap
 from maneuver_automaton.collision._kernels_field import write_map
+from maneuver_automaton.collision.surroundings import runs_of
 from maneuver_automaton.groups import SE2
 from tests.collision import scenes
 from tests.reference_collision import shapely_world, solid_polygons, still, world_around
@@ -35,6 +36,29 @@ def random_worlds(seed, footprint, n, *, keep=0.0):
             yield obstacles, world_around(footprint, obstacles, keep=keep)
 
 
+def assert_distances(values, exact, depth, *, most):
+    """Capped distances outside; inside they are negative, and no deeper than it is."""
+    outside = exact > 1e-8
+    assert values[outside] == pytest.approx(np.minimum(exact, most)[outside], abs=5e-9)
+    assert (values[~outside] <= 1e-8).all()
+    assert (-values[~outside] <= depth[~outside] + 1e-8).all()
+
+
+def solid_union(obstacles):
+    """All that stands still as one geometry, discs as polygons around them."""
+    solids = []
+    for obstacle in still(obstacles):
+        if isinstance(obstacle, OccupancyMap):
+            solids += runs_of(obstacle)
+        elif isinstance(obstacle.shape, Disc):
+            around = obstacle.shape.radius / math.cos(math.pi / 256)
+            solids.append(shapely.Point(obstacle.shape.center).buffer(around, quad_segs=64))
+        else:
+            holes = getattr(obstacle.shape, "holes", ())
+            solids.append(shapely.make_valid(shapely.Polygon(obstacle.shape.corners, holes)))
+    return shapely.union_all(solids, grid_size=1e-9)
+
+
 @pytest.mark.parametrize(("name", "keep"), [("car", 0.0), ("disc", 0.4), ("point", 0.0)])
 def test_the_field_is_the_distance(name, keep):
     rng = np.random.default_rng(1)
@@ -42,8 +66,22 @@ def test_the_field_is_the_distance(name, keep):
         field = world.arrays.field
         values, places = field.distance.ravel(), centres(field)
         some = rng.permutation(len(values))[:800]
-        exact = shapely_world((), still(obstacles)).clearance(out_of(world, places[some]))
-        assert values[some] == pytest.approx(np.clip(exact, 0.0, field.outside), abs=5e-9)
+        poses = out_of(world, places[some])
+        exact = shapely_world((), still(obstacles)).clearance(poses)
+        depth = shapely.distance(solid_union(obstacles).boundary, shapely.points(poses[:, :2]))
+        assert_distances(values[some], exact, depth, most=field.outside)
+
+
+def test_deep_inside_it_is_as_deep_as_it_is():
+    for obstacles in ([Obstacle(Box([8.0, 6.0], [1.0, 2.0], 0.4))], [Obstacle(Disc(3.0))]):
+        world = world_around((Disc(0.6),), obstacles)
+        places = centres(world.arrays.field)
+        depth = shapely.distance(
+            solid_union(obstacles).boundary, shapely.points(out_of(world, places)[:, :2])
+        )
+        values = world.arrays.field.distance.ravel()
+        assert -values.min() > 2.8
+        assert -values[values < 0.0] == pytest.approx(depth[values < 0.0], abs=1e-3)
 
 
 @pytest.mark.parametrize("name", ["car", "disc", "point"])
@@ -63,7 +101,7 @@ def test_outside_the_field_all_is_far(name):
 @pytest.mark.parametrize("yaw", [0.0, 0.7, -2.4])
 def test_a_map_is_as_far_as_its_cells(yaw):
     rng = np.random.default_rng(5)
-    for share in (0.02, 0.2, 1.0):
+    for share in (0.02, 0.2, 0.8, 1.0):
         cells = OccupancyMap(rng.random((9, 14)) < share, resolution=0.3, origin=[1.0, -2.0, yaw])
         if not cells.blocked.any():
             continue
@@ -72,9 +110,13 @@ def test_a_map_is_as_far_as_its_cells(yaw):
         write_map(distance, *where, cells.blocked, 0.3, 1.0, -2.0, math.cos(yaw), math.sin(yaw))
         x, y = -3.0 + 0.2 * (np.arange(50) + 0.5), -5.0 + 0.2 * (np.arange(40) + 0.5)
         places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-        poses = np.column_stack([places, np.zeros(len(places))])
-        exact = np.array([shapely_world((), [cells]).clearance(poses)]).reshape(40, 50)
-        assert distance == pytest.approx(np.minimum(exact, 2.5), abs=1e-9)
+        exact = shapely_world((), [cells]).clearance(np.column_stack([places, 0 * places[:, 0]]))
+        inner = SE2(cells.origin).inverse().act(places)  # where cells fit together exactly
+        union = solid_union([OccupancyMap(cells.blocked, resolution=0.3)])
+        depth = shapely.distance(union.boundary, shapely.points(inner))
+        assert_distances(distance.ravel(), exact, depth, most=2.5)
+        inside = distance.ravel() < -1e-9
+        assert -distance.ravel()[inside] == pytest.approx(depth[inside], abs=1e-6)
 
 
 def test_a_map_lowers_what_is_there_and_no_more():
@@ -85,7 +127,8 @@ def test_a_map_lowers_what_is_there_and_no_more():
     assert distance.max() == 9.0
     blocked[0, 0] = True
     write_map(distance, 0.0, 0.0, 0.5, 9.0, blocked, 1.0, 4.0, 4.0, 1.0, 0.0)
-    assert distance[8, 8] == 0.0
+    assert distance[8, 8] == pytest.approx(-0.25)
+    assert distance[9, 9] == pytest.approx(-0.25)
     assert distance[0, 0] == 0.3
     assert distance[8, 19] == pytest.approx(9.75 - 5.0)
 

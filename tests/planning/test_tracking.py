@@ -85,7 +85,9 @@ class TestTrack:
         assert (found.plan, found.reason) == (None, "every goal is blocked")
 
     def test_the_limit_of_expansions(self):
-        cage = Obstacle(Disc(0.5), motion=Motion([0.0, 9.0, 12.0], [[6, 0, 0], [6, 0, 0], [6, 9, 0]]))
+        cage = Obstacle(
+            Disc(0.5), motion=Motion([0.0, 9.0, 12.0], [[6, 0, 0], [6, 0, 0], [6, 9, 0]])
+        )
         found = track(problem(cage), time_limit=20.0, max_expansions=10)
         assert (found.plan, found.reason) == (None, "no plan was found in the time given")
 

@@ -42,9 +42,7 @@ def on_the_goal(until: float = 12.0) -> Obstacle:
 def door(opens: float = 8.0) -> tuple[Obstacle, ...]:
     """A wall across the way with a door in it that slides aside."""
     posts = [Obstacle(Box([0.2, 9.0], [3.0, side * 5.25])) for side in (1, -1)]
-    leaf = mover(
-        [0.0, opens, opens + 2.0], [(3.0, 0.0), (3.0, 0.0), (3.0, 1.6)], Box([0.1, 1.5])
-    )
+    leaf = mover([0.0, opens, opens + 2.0], [(3.0, 0.0), (3.0, 0.0), (3.0, 1.6)], Box([0.1, 1.5]))
     return (*posts, leaf)
 
 

@@ -9,11 +9,11 @@ import pytest
 
 from maneuver_automaton.collision import Box, Disc, Obstacle, Polygon
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.search._kernels_distance import distances
+from maneuver_automaton.search._kernels_distance import NARROW, distances
 from maneuver_automaton.search.distance_grid import distance_grid
 from tests.collision import scenes
 from tests.reference_collision import shapely_world, still, world_around
-from tests.reference_lattice import cells_open, grid_distances
+from tests.reference_lattice import cells_open, centre_clearances, grid_distances
 
 CAR, DISC = scenes.FOOTPRINTS["car"], (Disc(0.6),)
 RING = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -47,7 +47,10 @@ def test_asked_in_any_order_it_is_dijkstra(seed):
     footprint = CAR if seed % 2 else DISC
     grid, world, seeds = grid_and_world(footprint, obstacles, ends[:2], ends[2])
     field = world.arrays.field
-    expected = grid_distances(cells_open(grid, field), grid.cell, cells_of(grid, seeds)).ravel()
+    clear = centre_clearances(grid, field)
+    price = np.where(clear < world.body.inscribed, NARROW, 1.0)
+    open_, begins = cells_open(grid, field), cells_of(grid, seeds)
+    expected = grid_distances(open_, price, grid.cell, begins).ravel()
     assert np.isinf(expected).any()
     some = rng.permutation(len(expected))
     for batch in np.array_split(some, 5):
@@ -90,9 +93,10 @@ def test_no_free_pose_is_in_a_blocked_cell(name):
     assert blocked > 100
 
 
-def test_a_point_has_no_blocked_cell():
+def test_a_point_is_in_no_cell_deep_inside():
     grid, world, _ = grid_and_world((), [Obstacle(Box([4.0, 4.0]))], [9, 0, 0], [-9, 0, 0])
-    assert cells_open(grid, world.arrays.field).all()
+    closed = ~cells_open(grid, world.arrays.field)
+    assert closed.sum() * grid.cell**2 == pytest.approx(16.0, rel=0.25)
 
 
 def test_without_obstacles_there_is_no_grid():

@@ -1,0 +1,362 @@
+"""The lattice: nodes hold exact poses of free ways, and what they add up to."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap, Polygon
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
+from maneuver_automaton.search import _kernels_lattice as kernels
+from maneuver_automaton.search.lattice import LADDER, distance_grids, first_plan
+from maneuver_automaton.search.lattice_memory import search_arrays, with_room
+from maneuver_automaton.search.lattice_pass import Rung, both_ends, joined, with_cost
+from maneuver_automaton.search.lattice_query import admitted_goals, lattice_query
+from tests import scenes
+from tests.collision.scenes import random_map
+from tests.reference import plain_end
+from tests.reference_collision import driven
+from tests.solids import World, outside
+
+ROOT = Path(__file__).parents[2]
+COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
+EXPANSIONS = 1200 if COMPILED else 12
+X, Y, HEADING, COST, TIME, EDGE, RUN, CLEARANCE = range(8)
+PARENT, TRIM, GEAR, COUNT, ROOT_OF, CLOSED = range(6)
+
+ROBOT, CAR, DUBINS = scenes.differential_robot(), scenes.reeds_shepp(1.0), scenes.dubins(0.8)
+BODY = (Box([0.8, 0.5], [0.1, 0.0]),)
+CLUTTER = (
+    Obstacle(Box([2.0, 0.4], [2.0, 0.6], 0.4)),
+    Obstacle(Disc(0.5, [3.4, -0.9])),
+    Obstacle(Polygon([[1, -2], [2.5, -2], [2.5, -1.2], [2, -1.2], [2, -1.7], [1, -1.7]])),
+    random_map(np.random.default_rng(3)),
+)
+CROSSING = Obstacle(Box([1.0, 0.5]), motion=Motion([0, 4, 9], [[2, -3, 0], [2, 1, 1], [2, 3, 2]]))
+BASE = Problem(CAR, [0, 0, 0], [4.5, 1.0, 0.5], obstacles=CLUTTER[:3], footprint=BODY)
+PRICES = Cost(time=1.0, switch=0.2, direction_change=0.7)
+PROBLEMS = {
+    "car": BASE,
+    "robot": replace(BASE, automaton=ROBOT, cost=Cost(effort=1.0, time=0.1)),
+    "prices": replace(BASE, cost=PRICES),
+    "few": replace(BASE, horizon=Horizon(max_trims=4, min_coast=0.1)),
+    "slow": replace(BASE, automaton=ROBOT, horizon=Horizon(max_time=14.0)),
+    "fixed": replace(BASE, automaton=ROBOT, horizon=Horizon(time=30.0)),
+    "margin": replace(BASE, margin=0.05),
+    "map": replace(BASE, obstacles=CLUTTER),
+    "moving": replace(BASE, automaton=ROBOT, obstacles=(*CLUTTER[:2], CROSSING)),
+    "point": replace(BASE, footprint=()),
+    "bounds": replace(BASE, bounds=Bounds(x=(-0.5, 5.0), y=(-1.5, 2.5))),
+    "goals": replace(BASE, goals=(Goal(pose=[4.5, 1.0, 0.5]), Goal(pose=[-2.0, 2.0, 1.0]))),
+    "free heading": replace(BASE, goals=(Goal(pose=[4.5, 1.0, 0.5], free_heading=True),)),
+}
+
+
+def query_of(problem):
+    return lattice_query(problem, tuple(range(len(problem.goals))))
+
+
+def grown(problem, *, sign=1.0, rung=None, n=EXPANSIONS):
+    """A pass that does not stop at a connection, its nodes and links."""
+    query = query_of(problem)
+    rung = Rung(stop=False) if rung is None else rung
+    (one,) = both_ends(query, rung, grids=distance_grids(query), ends=(sign,))
+    one.run(n, math.inf)
+    used = int(one.arrays.state[kernels.N_NODES])
+    return one, one.arrays.nodes[:used], one.arrays.links[:used]
+
+
+def in_the_problem(query, nodes):
+    """Poses of nodes in the coordinates of the problem, relative to its start's place."""
+    poses = (SE2(query.world.frame) @ SE2(nodes[:, :3])).pose.copy()
+    poses[:, :2] -= query.problem.start[:2]
+    return poses
+
+
+TIGHT = Rung(contact=True, scale=0.5, quanta=0.5, stop=False)
+
+
+NAMES = [
+    pytest.param(name, marks=pytest.mark.xfail(
+        not COMPILED, strict=True, raises=OverflowError, reason="counts of trims are of 32 bits"
+    )) if name == "few" else name
+    for name in PROBLEMS
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("rung", [Rung(stop=False), TIGHT])
+@pytest.mark.parametrize("name", NAMES)
+def test_nodes_are_ends_of_free_ways(name, rung, sign):
+    problem = PROBLEMS[name]
+    if sign < 0.0 and problem.moves:
+        pytest.skip("no search from a goal where something moves")
+    one, nodes, links = grown(problem, sign=sign, rung=rung)
+    library, query = one.query.library.arrays, one.query
+    children = np.flatnonzero(links[:, PARENT] >= 0)
+    if not (
+        one.arrays.state[kernels.FOUND] or problem.horizon.max_trims
+    ):  # what is dearer than a connection is left out
+        assert len(children) > (40 if COMPILED else 5)
+    elif not len(children):
+        return
+    parents = links[children, PARENT]
+    trims, times = links[children, TRIM], nodes[children, EDGE]
+    # exact poses: those of the edge done from the parent's
+    steps = [plain_end([library.twists[k]], [sign * t]) for k, t in zip(trims, times, strict=True)]
+    expected = (SE2(nodes[parents, :3]) @ SE2(np.array(steps)[:, :3])).pose
+    assert np.abs(expected - nodes[children, :3]).max() < 1e-11
+    # costs, times and counts add up
+    before, gear = links[parents, TRIM], links[parents, GEAR]
+    switched = (before >= 0) & (before != trims)
+    turned = gear * library.gears[trims] < 0
+    price = library.switch * switched + library.direction_change * turned
+    cost = nodes[parents, COST] + library.rates[trims] * times + price
+    assert nodes[children, COST] == pytest.approx(cost, abs=1e-12)
+    assert nodes[children, TIME] == pytest.approx(nodes[parents, TIME] + times, abs=1e-12)
+    assert np.array_equal(links[children, COUNT], links[parents, COUNT] + (before != trims))
+    run = np.where(before == trims, nodes[parents, RUN], 0.0) + times
+    assert nodes[children, RUN] == pytest.approx(run, abs=1e-12)
+    assert np.array_equal(
+        links[children, GEAR], np.where(library.gears[trims] != 0, library.gears[trims], gear)
+    )
+    # limits
+    horizon = problem.horizon
+    assert nodes[:, TIME].max() <= (horizon.time or horizon.max_time or math.inf) * (1 + 1e-9)
+    assert links[:, COUNT].max() <= (horizon.max_trims or math.inf)
+    assert (run[switched] > 0.0).all()
+    assert (nodes[parents[switched], RUN] >= horizon.min_coast).all()
+    # and nothing is hit on the way
+    clock = problem.start_time
+    world = World(problem)
+    poses = in_the_problem(query, nodes)
+    kept = world.clearance(poses[children], clock + nodes[children, TIME]) - problem.margin
+    assert kept.min() > -1e-8
+    assert (nodes[children, CLEARANCE] <= np.maximum(kept, 0.0) + 1e-8).all()
+    rng = np.random.default_rng(1)
+    for k in rng.permutation(len(children))[: 150 if COMPILED else 10]:
+        since = np.linspace(0.0, times[k], 12)
+        way = driven(poses[parents[k]], library.twists[trims[k]], sign * since)
+        at = clock + nodes[parents[k], TIME] + since
+        assert (world.clearance(way, at) > problem.margin - 1e-8).all()
+        assert outside(problem, way[:, :2] + problem.start[:2]).max() < 1e-6
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_a_connection_ends_at_a_goal_and_costs_what_it_says(name):
+    problem = PROBLEMS[name]
+    query = query_of(problem)
+    found = first_plan(query, deadline=math.inf, max_expansions=20_000 if COMPILED else 60)
+    if found.word is None:
+        assert not COMPILED
+        return
+    word = with_cost(found.word, query)
+    twists = query.library.arrays.twists[word.trims]
+    goal = problem.goals[query.goal_index[word.goal]]
+    start = SE2(query.start)
+    end = (start @ SE2(plain_end(twists, word.durations)[:3])).pose if len(twists) else start.pose
+    off = np.abs(end - query.goals[word.goal])
+    assert off[:2].max() < 1e-7
+    assert goal.free_heading or abs(math.remainder(off[2], 2 * math.pi)) < 1e-7
+    assert (word.durations > 0.0).all()
+    assert all(a != b for a, b in itertools.pairwise(word.trims.tolist()))
+    rates = problem.rates[query.library.trims[word.trims]] - query.library.rest_rate
+    assert word.cost == pytest.approx(
+        float(rates @ word.durations) + problem.cost.switching(twists), rel=1e-12
+    )
+    horizon = problem.horizon
+    assert word.durations.sum() <= (horizon.time or horizon.max_time or math.inf) + 1e-9
+    assert len(word.trims) <= (horizon.max_trims or math.inf)
+    assert word.durations.min() >= horizon.min_coast
+    times = np.concatenate([[0.0], np.cumsum(word.durations)])
+    poses = in_the_problem(query, np.array([query.start]))
+    world = World(problem)
+    for twist, begin, end_ in zip(twists, times[:-1], times[1:], strict=True):
+        since = np.linspace(0.0, end_ - begin, 60)
+        way = driven(poses[-1], twist, since)
+        clear = world.clearance(way, problem.start_time + begin + since)
+        assert (clear > problem.margin - 1e-7).all()
+        assert outside(problem, way[:, :2] + problem.start[:2]).max() < 1e-6
+        poses = way[-1:]
+
+
+ORDER = """
+import math
+from tests.search.test_lattice import PROBLEMS, query_of
+from maneuver_automaton.search.lattice import first_plan
+for name in ("car", "moving", "prices"):
+    found = first_plan(query_of(PROBLEMS[name]), deadline=math.inf, max_expansions=25)
+    word = found.word
+    print(name, found.expansions, found.queries, found.nearest.hex(), found.exhausted,
+          word and ([int(k) for k in word.trims], [float(t).hex() for t in word.durations]))
+"""
+
+
+@pytest.mark.skipif(not COMPILED, reason="compares compiled kernels with these")
+def test_compiled_and_not_the_first_plan_is_the_same_to_the_last_bit():
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", ORDER], cwd=ROOT, check=True, capture_output=True, text=True,
+            env={**os.environ, "NUMBA_DISABLE_JIT": disabled},
+        ).stdout
+        for disabled in ("0", "1")
+    ]  # fmt: skip
+    assert said[0].count("\n") == 3
+    assert said[0] == said[1]
+
+
+def test_the_same_at_every_call_and_from_used_memory():
+    query = query_of(PROBLEMS["car"])
+    rung, grids = Rung(), distance_grids(query)
+    memory = search_arrays(len(query.library.arrays.triples))
+    said = []
+    for arrays in (None, memory, memory):
+        (one,) = both_ends(query, rung, grids=grids, arrays=arrays, ends=(1.0,))
+        word = one.run(EXPANSIONS, math.inf)
+        said.append((one.expansions, None if word is None else word.durations.tobytes()))
+    assert said[0] == said[1] == said[2]
+
+
+def test_in_chunks_it_is_the_same_as_at_once():
+    nodes = []
+    for chunks in ([EXPANSIONS], [1, 7, EXPANSIONS - 8]):
+        query = query_of(PROBLEMS["car"])
+        (one,) = both_ends(query, Rung(stop=False), grids=distance_grids(query), ends=(1.0,))
+        for n in chunks:
+            one.run(n, math.inf)
+        nodes.append(one.arrays.nodes[: int(one.arrays.state[kernels.N_NODES])])
+    assert nodes[0].shape == nodes[1].shape
+    assert np.array_equal(nodes[0], nodes[1])
+
+
+def test_arrays_grow_and_forget_nothing():
+    one, nodes, links = grown(PROBLEMS["car"], n=min(EXPANSIONS, 400))
+    wide = with_room(one.arrays, 5 * len(one.arrays.nodes))
+    used = len(nodes)
+    assert len(wide.nodes) >= 5 * len(one.arrays.nodes)
+    assert np.array_equal(wide.nodes[:used], nodes)
+    assert np.array_equal(wide.links[:used], links)
+    one.arrays = wide
+    one.run(20, math.inf)
+    other, _, _ = grown(PROBLEMS["car"], n=min(EXPANSIONS, 400) + 20)
+    more = int(wide.state[kernels.N_NODES])
+    assert np.array_equal(wide.nodes[:more], other.arrays.nodes[:more])
+
+
+def test_joined_and_priced_by_hand():
+    query = query_of(PROBLEMS["prices"])
+    gears = query.library.arrays.gears
+    ahead = int(np.flatnonzero(gears > 0)[0])
+    back = int(np.flatnonzero(gears < 0)[0])
+    word = joined([(ahead, 1.0), (ahead, 0.5), (back, 2.0), (ahead, 1.0)], goal=0)
+    assert word.trims.tolist() == [ahead, back, ahead]
+    assert word.durations.tolist() == [1.5, 2.0, 1.0]
+    assert with_cost(word, query).cost == pytest.approx(4.5 + 2 * 0.2 + 2 * 0.7)
+    assert with_cost(joined([], goal=0), query).cost == 0.0
+
+
+def test_a_lattice_without_a_way_out_is_exhausted():
+    ring = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    court = Polygon(1.4 * ring, [1.0 * ring])
+    for footprint in (BODY, (Disc(0.3),)):
+        shut_in = replace(BASE, obstacles=(Obstacle(court),), footprint=footprint)
+        limit = None if COMPILED else 30
+        found = first_plan(query_of(shut_in), deadline=math.inf, max_expansions=limit)
+        assert found.word is None
+        assert found.enclosed == "obstacles enclose the start"
+
+
+def test_the_ladder_is_climbed_one_rung_after_the_other():
+    assert [row[0] for row in LADDER] == sorted(row[0] for row in LADDER)
+    query = query_of(scenes.bay(2.1, 4.3))
+    if not COMPILED:
+        return
+    found = first_plan(query, deadline=math.inf, max_expansions=1000)
+    assert found.word is None or found.expansions <= 1000
+    assert first_plan(query, deadline=math.inf, max_expansions=50).expansions == 50
+
+
+def test_time_is_up():
+    found = first_plan(query_of(BASE), deadline=-math.inf)
+    assert (found.word, found.expansions, found.exhausted) == (None, 0, False)
+
+
+def test_settings_are_heeded():
+    coarse = replace(BASE, search=SearchSettings(cell=1.5, headings=8, weight=1.0))
+    one, nodes, _ = grown(coarse)
+    assert (one.task.cell, one.task.headings, one.task.weight) == (1.5, 8, 2.0)
+    fine = grown(BASE)[1]
+    assert len(nodes) < len(fine)
+    found = first_plan(query_of(coarse), deadline=math.inf, max_expansions=EXPANSIONS)
+    assert found.expansions <= EXPANSIONS
+
+
+# --- queries ---
+
+
+def test_a_query_from_its_own_frame():
+    query = query_of(PROBLEMS["goals"])
+    back = (SE2(query.world.frame) @ SE2(np.vstack([query.start, query.goals]))).pose
+    given = np.array([BASE.start, [4.5, 1.0, 0.5], [-2.0, 2.0, 1.0]])
+    assert np.abs(back - given)[:, :2].max() < 3e-9
+    assert np.abs(np.sin(back[:, 2] - given[:, 2])).max() < 3e-9
+    assert query.goal_index == (0, 1)
+
+
+def test_the_margin_is_half_of_what_the_ends_have():
+    usual = query_of(BASE).margin
+    assert usual == pytest.approx(0.005 * 0.25)
+    near = Obstacle(Box([1.0, 1.0], [-0.3 - 0.5 - 1e-3, 0.0]))  # 1 mm behind the start
+    tight = replace(BASE, obstacles=(*BASE.obstacles, near))
+    assert query_of(tight).margin == pytest.approx(0.5e-3, rel=1e-4)
+    kept = replace(tight, margin=0.4e-3)
+    assert query_of(kept).margin == pytest.approx(0.3e-3, rel=1e-3)
+
+
+def test_the_window_holds_the_ends_and_the_bounds_are_walls():
+    query = query_of(BASE)
+    ends = np.vstack([query.start, query.goals])[:, :2]
+    assert (ends > query.box[:2]).all()
+    assert (ends < query.box[2:]).all()
+    assert not query.bounded
+    assert query_of(PROBLEMS["bounds"]).bounded
+    assert not query_of(replace(BASE, bounds=Bounds(x=(-9.0, 9.0)))).bounded
+
+
+def test_goals_outside_the_bounds_are_left_out():
+    bounds = Bounds(x=(-1.0, 5.0))
+    problem = replace(PROBLEMS["goals"], bounds=bounds)
+    assert admitted_goals(problem) == (0,)
+    assert admitted_goals(PROBLEMS["goals"]) == (0, 1)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.4, -2.0])
+def test_bounds_are_kept_in_a_turned_world(turn):
+    # the world's frame is that of the map, the bounds are along the axes of the problem
+    cells = OccupancyMap([[1, 0], [1, 1]], resolution=0.6, origin=[2.2, 0.3, turn])
+    bounds = Bounds(x=(-0.5, 4.6), y=(-2.4, 1.4))
+    problem = Problem(CAR, [0, 0, 0], [4.5, 1.0, 2.5], obstacles=cells, bounds=bounds,
+                      footprint=BODY)  # fmt: skip
+    one, nodes, _ = grown(problem)
+    places = in_the_problem(one.query, nodes)[:, :2] + problem.start[:2]
+    assert outside(problem, places).max() < 1e-7
+    assert len(nodes) > (100 if COMPILED else 10)
+
+
+@pytest.mark.xfail(strict=True, reason="the far rim of the bounds belongs to no cell of the plane")
+def test_a_goal_on_the_rim_of_the_bounds_is_not_enclosed():
+    wall = Box([1.0, 4.0], [5.5, 0.0])
+    problem = Problem(CAR, [1, 0, 0], [10, 0, 0], obstacles=wall, footprint=Box([2.0, 2.0]),
+                      bounds=Bounds(x=(0.0, 10.0), y=(-10.0, 10.0)))  # fmt: skip
+    found = first_plan(query_of(problem), deadline=math.inf, max_expansions=60)
+    assert found.enclosed == ""

@@ -1,0 +1,90 @@
+"""Closing the last digits of a word: as little as possible, and never a negative time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.switching_times.closing import closed_at
+from tests.reference import plain_end
+
+TWISTS = np.array([[1, 0, 0.5], [1, 0, 0], [-1, 0, 0.25], [0, 0, 1], [0.5, 0.3, -0.8]], dtype=float)
+TURNING = [0, 2, 3, 4]
+
+
+def end_of(start, twists, durations):
+    return (SE2(start) @ SE2(plain_end(twists, durations)[:3])).pose
+
+
+@given(
+    word=st.lists(st.integers(0, 4), min_size=3, max_size=12),
+    seed=st.integers(0, 10**6),
+    free_heading=st.booleans(),
+    far=st.sampled_from([0.0, 1e3, 1e6]),
+)
+@settings(max_examples=150)
+def test_what_is_nearly_there_gets_there(word, seed, free_heading, far):
+    rng = np.random.default_rng(seed)
+    twists = TWISTS[word]
+    times = rng.uniform(0.3, 2.0, len(word))
+    start = np.array([far, -far, rng.uniform(-3, 3)])
+    goal = end_of(start, twists, times)
+    if len(set(word) & set(TURNING)) < 2 or len(set(word)) < 3:
+        return  # its columns may not span
+    off = 1e-7 * rng.standard_normal(len(word))
+    closed = closed_at(start, twists, times + off, goal, free_heading=free_heading)
+    reached = end_of(start, twists, closed)
+    ulp = np.spacing(far) + 1e-12
+    assert np.hypot(*(reached - goal)[:2]) < 4.0 * ulp
+    assert free_heading or abs(reached[2] - goal[2]) < 1e-12
+    # no larger a change than the one that is undone
+    assert np.linalg.norm(closed - times - off) < 1.01 * np.linalg.norm(off) + 1e-9
+
+
+def test_a_goal_a_full_turn_away_is_the_same():
+    twists, times = TWISTS[[0, 1, 2]], np.array([1.0, 1.0, 1.0])
+    goal = end_of(np.zeros(3), twists, times)
+    turned = goal + np.array([0.0, 0.0, 4.0 * math.pi])
+    assert closed_at(np.zeros(3), twists, times, turned) == pytest.approx(times, abs=1e-12)
+
+
+def test_nothing_to_close():
+    empty = closed_at(np.zeros(3), np.zeros((0, 3)), np.zeros(0), np.zeros(3))
+    assert empty.shape == (0,)
+    far = closed_at(np.zeros(3), np.zeros((0, 3)), np.zeros(0), np.array([5.0, 0.0, 0.0]))
+    assert far.shape == (0,)
+
+
+def test_a_word_that_cannot_get_there_is_as_good_as_it_gets():
+    straight = np.array([[1.0, 0.0, 0.0]])
+    closed = closed_at(np.zeros(3), straight, np.array([1.9]), np.array([2.0, 1.0, 0.0]))
+    assert closed == pytest.approx([1.9], abs=0.2)
+    assert closed.min() >= 0.0
+
+
+def test_no_time_becomes_negative():
+    # the second trim would have to be driven backwards
+    twists = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    closed = closed_at(np.zeros(3), twists, np.array([1.0, 1e-9]), np.array([1.0, -1e-6, 0.0]))
+    assert (closed >= 0.0).all()
+    assert closed == pytest.approx([1.0, 0.0], abs=1e-8)
+
+
+def test_at_the_goal_the_times_stay_as_they_are():
+    twists, times = TWISTS[[0, 1, 2, 1]], np.array([0.5, 1.5, 0.25, 2.0])
+    goal = end_of(np.array([1.0, 2.0, 0.5]), twists, times)
+    closed = closed_at(np.array([1.0, 2.0, 0.5]), twists, times, goal)
+    assert closed == pytest.approx(times, abs=1e-14)
+
+
+def test_the_given_times_are_not_written_on():
+    twists, times = TWISTS[[0, 1, 2]], np.array([1.0, 1.0, 1.0])
+    times.setflags(write=False)
+    goal = np.array([2.0, 1.5, 1.0])
+    closed_at(np.zeros(3), twists, times, goal)
+    assert times.tolist() == [1.0, 1.0, 1.0]
