@@ -247,7 +247,12 @@ class Problem:
     @property
     def moves(self) -> bool:
         """Whether an obstacle moves."""
-        return any(isinstance(o, Obstacle) and o.motion is not None for o in self.obstacles)
+        return any(moves(obstacle) for obstacle in self.obstacles)
+
+
+def moves(obstacle: AnyObstacle) -> bool:
+    """Whether an obstacle moves."""
+    return isinstance(obstacle, Obstacle) and obstacle.motion is not None
 
 
 @functools.lru_cache(maxsize=8)

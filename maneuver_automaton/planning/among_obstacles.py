@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.checking import Checked, check_plan, load_checks
 from maneuver_automaton.planning.result import Alternative, PlanResult, PlanStatus
-from maneuver_automaton.problem import Problem
+from maneuver_automaton.problem import Problem, moves
 from maneuver_automaton.refinement.improve import Improved, Patience, improve
 from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable, cost_to_go_table
@@ -22,8 +22,12 @@ from maneuver_automaton.search.lattice import FirstPlan, first_plan
 from maneuver_automaton.search.lattice_pass import Word, with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.limits import why_impossible
+from maneuver_automaton.search.waiting import with_waits
 from maneuver_automaton.switching_times.closing import closed_at
 
+BRIEF = Patience(attempts=1000, passes=3)  # of the way among what stands still
+MOST_WAYS = 4  # that are tried with rests
+QUICK = 1500  # expansions in space and time before a way with rests is tried
 REJECTED = 8  # plans in a row that the checks may refuse before it is given up
 
 
@@ -39,8 +43,7 @@ class _Progress:
     def heard(self, word: Word) -> None:
         """A better word was found."""
         self.words.append(word)
-        fixed = self.query.library.rest_rate * (self.query.problem.horizon.time or 0.0)
-        self.improvements.append((time.monotonic() - self.began, word.cost + fixed))
+        self.improvements.append((time.monotonic() - self.began, word.cost + self.query.padding))
 
 
 def plan_on_lattice(problem: Problem, *, time_limit: float, alternatives: int) -> PlanResult:
@@ -52,12 +55,10 @@ def plan_on_lattice(problem: Problem, *, time_limit: float, alternatives: int) -
     goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
     query = lattice_query(problem, goals)
     progress = _Progress(query, began)
-    first = first_plan(
-        query, deadline=deadline, max_expansions=problem.search.max_expansions, table=table
-    )
+    first = _first(query, table, deadline, progress)
     found = time.monotonic()
-    if first.word is None:
-        timing = _timing(began, found, found, found)
+    if not progress.words:
+        timing = _timing(began, found, found, found, found - began)
         status, reason = _why_none(query, first, time_limit)
         return PlanResult(
             problem=problem,
@@ -67,11 +68,13 @@ def plan_on_lattice(problem: Problem, *, time_limit: float, alternatives: int) -
             counts={"expansions": first.expansions, "collision_queries": first.queries},
             nodes=first.nodes,
         )
-    progress.heard(with_cost(first.word, query))
+    if problem.moves:
+        _let_pass(query, table, deadline, progress)
+    word = progress.words[-1]
     bound = lattice_bound(query)
     better = improve(
         query,
-        first.word,
+        word,
         deadline=deadline,
         patience=Patience(),
         floor=bound,
@@ -82,7 +85,8 @@ def plan_on_lattice(problem: Problem, *, time_limit: float, alternatives: int) -
     )
     refined = time.monotonic()
     chosen = _checked(progress, better, alternatives)
-    timing = _timing(began, found, refined, time.monotonic())
+    first_s = progress.improvements[0][0]
+    timing = _timing(began, found, refined, time.monotonic(), first_s)
     counts = {
         "expansions": first.expansions + better.expansions,
         "collision_queries": first.queries,
@@ -129,6 +133,54 @@ def plan_on_lattice(problem: Problem, *, time_limit: float, alternatives: int) -
         improvements=tuple(progress.improvements),
         nodes=first.nodes,
     )
+
+
+def _first(
+    query: LatticeQuery, table: CostTable, deadline: float, progress: _Progress
+) -> FirstPlan:
+    """The first plan; where something moves, a way that lets it pass if a quick look finds none."""
+    most = query.problem.search.max_expansions
+    if query.problem.moves:
+        quick = min(most or QUICK, QUICK)
+        first = first_plan(query, deadline=deadline, max_expansions=quick, table=table)
+        if first.word is not None:
+            progress.heard(with_cost(first.word, query))
+            return first
+        calm = _among_what_stands(query)
+        way = first_plan(calm, deadline=deadline, max_expansions=most, table=table)
+        timed = None if way.word is None else with_waits(query, way.word)
+        if timed is not None:
+            progress.heard(timed)
+            return first
+    first = first_plan(query, deadline=deadline, max_expansions=most, table=table)
+    if first.word is not None:
+        progress.heard(with_cost(first.word, query))
+    return first
+
+
+def _let_pass(query: LatticeQuery, table: CostTable, deadline: float, progress: _Progress) -> None:
+    """Hear of the cheapest way among what stands still, with rests that let pass what moves."""
+    calm = _among_what_stands(query)
+    begin = time.monotonic()
+    soon = begin + 0.3 * (deadline - begin)
+    most = query.problem.search.max_expansions
+    found = first_plan(calm, deadline=soon, max_expansions=most, table=table)
+    if found.word is None:
+        return
+    better = improve(calm, found.word, deadline=soon, patience=BRIEF, table=table)
+    ways = sorted([found.word, better.word, *better.others], key=lambda one: one.cost)
+    distinct = {tuple(way.trims.tolist()): way for way in reversed(ways)}
+    for way in list(distinct.values())[::-1][:MOST_WAYS]:
+        timed = with_waits(query, way)
+        if timed is not None and timed.cost < progress.words[-1].cost:
+            progress.heard(timed)
+
+
+def _among_what_stands(query: LatticeQuery) -> LatticeQuery:
+    """The query without what moves."""
+    problem = query.problem
+    still = tuple(obstacle for obstacle in problem.obstacles if not moves(obstacle))
+    return lattice_query(replace(problem, obstacles=still), query.goal_index)
 
 
 def prepare_lattice(problem: Problem) -> None:
@@ -224,10 +276,12 @@ def _left(problem: Problem, first: FirstPlan) -> int | None:
     return None if most is None else max(0, most - first.expansions)
 
 
-def _timing(began: float, found: float, refined: float, checked: float) -> dict[str, float]:
+def _timing(
+    began: float, found: float, refined: float, checked: float, first: float
+) -> dict[str, float]:
     return {
         "search": found - began,
-        "first_plan": found - began,
+        "first_plan": first,
         "refine": refined - found,
         "audit": checked - refined,
     }

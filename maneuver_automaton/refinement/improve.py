@@ -224,7 +224,14 @@ class _Improvement:
         if self.max_expansions is not None:
             cap = min(cap, self.max_expansions - self.expansions)
         tight = bool(step % 5 == 4)
-        rung = Rung(scale=scale, quanta=quanta, weight=weight, contact=tight, stop=step % 3 == 1)
+        rung = Rung(
+            scale=scale,
+            quanta=quanta,
+            weight=weight,
+            contact=tight,
+            stop=step % 3 == 1,
+            layered=step % 4 >= 2,
+        )
         sign = -1.0 if step % 2 and not self.query.problem.moves else 1.0
         (one,) = both_ends(
             self.query, rung, grids=grids, table=self.table, arrays=memory[0], ends=(sign,)

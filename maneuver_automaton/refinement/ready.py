@@ -8,6 +8,7 @@ import math
 from maneuver_automaton.refinement.improve import Patience, improve
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.ready import smallest_lattice_query
+from maneuver_automaton.search.waiting import with_waits
 
 
 @functools.cache
@@ -16,4 +17,5 @@ def load_lattice() -> None:
     query = smallest_lattice_query()
     found = first_plan(query, deadline=math.inf)
     assert found.word is not None
+    with_waits(query, found.word)
     improve(query, found.word, deadline=math.inf, patience=Patience(attempts=1, passes=1))

@@ -43,6 +43,7 @@ class Rung:
     margin: float = 1.0  # of the proven clearance
     guided: bool = False  # by the table of the cost to go
     stop: bool = True  # at the first connection
+    layered: bool = False  # whether cells know the gear and the trim that prices ask for
 
 
 class Task(NamedTuple):
@@ -175,7 +176,7 @@ def _pass(
     quanta = np.where(library.quanta > 0.0, quanta, 0.0)
     moves = moves_of(library.twists[: library.n_trims], sign * quanta)
     scaled = library._replace(quanta=quanta, moves=moves)
-    task = _task(query, rung, sign)
+    task = task_of(query, rung, sign)
     n_triples = max(len(library.triples), len(library.free_triples))
     room = search_arrays(n_triples) if arrays is None else arrays
     room = with_room(room, len(task.roots) + 4)
@@ -183,7 +184,8 @@ def _pass(
     return Pass(query, rung, task, grid, table, room, scaled)
 
 
-def _task(query: LatticeQuery, rung: Rung, sign: float) -> Task:
+def task_of(query: LatticeQuery, rung: Rung, sign: float) -> Task:
+    """Limits and sizes of a pass, as the kernels see them."""
     library, problem = query.library, query.problem
     settings = problem.search
     radius, body = library.radius, query.world.body
@@ -228,8 +230,8 @@ def _task(query: LatticeQuery, rung: Rung, sign: float) -> Task:
         clock=float(problem.start_time),
         most_time=float(query.most_time),
         most_trims=int(problem.horizon.max_trims or 0),
-        by_gear=bool(cost.direction_change > 0.0),
-        by_trim=bool(cost.switch > 0.0 or cost.min_coast > 0.0),
+        by_gear=bool(rung.layered and cost.direction_change > 0.0),
+        by_trim=bool(cost.min_coast > 0.0 or (rung.layered and cost.switch > 0.0)),
         by_count=problem.horizon.max_trims is not None,
         window=query.window,
     )

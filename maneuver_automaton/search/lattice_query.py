@@ -38,6 +38,14 @@ class LatticeQuery:
     most_time: float  # [s] inf if free
 
     @property
+    def padding(self) -> float:
+        """What the rest that pads a fixed time costs every word, its switch included."""
+        library, fixed = self.library, self.problem.horizon.time
+        if fixed is None or library.rest is None:
+            return 0.0
+        return library.rest_rate * fixed + library.arrays.switch
+
+    @property
     def keep(self) -> float:
         """Distance kept from everything [m]."""
         return self.problem.margin

@@ -67,6 +67,8 @@ def load_times_kernels() -> None:
 def smallest_lattice_query() -> LatticeQuery:
     """A wall and a map beside the way: what compiles every kernel of the lattice."""
     from maneuver_automaton.collision import Box, Obstacle, OccupancyMap
+    from maneuver_automaton.search._kernels_distance import distances
+    from maneuver_automaton.search.distance_grid import distance_grid
     from maneuver_automaton.search.lattice_query import lattice_query
     from maneuver_automaton.search.plane_bound import plane_bound
 
@@ -74,6 +76,8 @@ def smallest_lattice_query() -> LatticeQuery:
     room = OccupancyMap(np.eye(2, dtype=np.bool_), resolution=0.5, origin=[5.0, 9.0, 0.1])
     query = lattice_query(replace(_smallest_problem(), obstacles=(wall, room)), (0,))
     plane_bound(query)
+    grid = distance_grid(query.world, query.box, query.goals, query.start)
+    distances(grid, query.world.arrays.field, np.zeros((1, 2)))
     return query
 
 
