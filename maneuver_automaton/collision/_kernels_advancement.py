@@ -9,6 +9,7 @@ import numpy as np
 from maneuver_automaton._compile import bare_inner_kernel, kernel
 from maneuver_automaton.collision._kernels_gap import (
     NEAR,
+    SHARP,
     field_bound,
     near_step,
     piece_gap,
@@ -43,8 +44,11 @@ def mover_pose(movers, m, time):
 
 
 @bare_inner_kernel
-def mover_gap(movers, m, body, x, y, heading, time, enough):
-    """Gap to one obstacle that moves, at `time`; a lower bound, not exact above `enough`."""
+def mover_gap(movers, m, body, x, y, heading, time, keep, enough):
+    """Gap to one obstacle that moves, at `time`: a lower bound, not exact above `enough`.
+
+    Exact around the distance `keep` too.
+    """
     o_x, o_y, o_heading = mover_pose(movers, m, time)
     c, s = math.cos(o_heading), math.sin(o_heading)
     d_x, d_y = x - o_x, y - o_y
@@ -57,7 +61,7 @@ def mover_gap(movers, m, body, x, y, heading, time, enough):
     if best > enough:
         return best
     best = math.inf
-    near = NEAR * (body.reach + movers.reach[m])
+    near = NEAR * (body.reach + movers.reach[m]) + keep / SHARP
     for p in range(movers.first_piece[m], movers.first_piece[m + 1]):
         for b in range(body.first.shape[0] - 1):
             gap, _, _ = piece_gap(body, b, r_x, r_y, c, s, movers.solids, p, near, best)
@@ -135,7 +139,7 @@ def free_time(
             fast = speed + world.movers.speed[m]
             time = clock + sign * t
             enough = keep + margin + fast * step
-            gap = mover_gap(world.movers, m, body, p_x, p_y, p_heading, time, enough) - keep
+            gap = mover_gap(world.movers, m, body, p_x, p_y, p_heading, time, keep, enough) - keep
             if gap <= margin:
                 return t, gap
             nearest = min(nearest, gap)
@@ -177,6 +181,7 @@ def gaps(world, body, poses, times):
         x, y, heading = poses[k, 0], poses[k, 1], poses[k, 2]
         best = still_gap(world, body, x, y, math.cos(heading), math.sin(heading))
         for m in range(world.movers.speed.shape[0]):
-            best = min(best, mover_gap(world.movers, m, body, x, y, heading, times[k], best))
+            gap = mover_gap(world.movers, m, body, x, y, heading, times[k], 0.0, best)
+            best = min(best, gap)
         out[k] = best
     return out

@@ -127,7 +127,9 @@ def piece_gap(body, b, x, y, c, s, solids, p, near, enough):
     rounding = body.radius[b] + solids.plates[p, 4]
     gap, axis_x, axis_y = separation(body, b, x, y, c, s, solids, p, enough + rounding)
     exact = near if rounding > 0.0 else SHARP * near
-    if not -math.inf < gap <= 0.0 and gap - rounding <= min(exact, enough):
+    corners = body.first[b + 1] - body.first[b] + solids.first[p + 1] - solids.first[p]
+    apart = not -math.inf < gap <= 0.0 or corners <= 3  # two points, or a point and a line
+    if apart and gap - rounding <= min(exact, enough):
         gap, axis_x, axis_y = core_distance(body, b, x, y, c, s, solids, p)
     return gap - rounding, axis_x, axis_y
 
@@ -253,6 +255,7 @@ def near_step(
     """
     m_x = x + c * body.middle_x - s * body.middle_y
     m_y = y + s * body.middle_x + c * body.middle_y
+    near_enough = near + keep / SHARP  # for gaps to be exact where the distance to keep begins
     nearest = buckets.reach - keep
     if nearest <= margin:  # the distance to keep is beyond what the buckets know
         return -1.0, nearest
@@ -272,7 +275,7 @@ def near_step(
             continue
         for b in range(body.first.shape[0] - 1):
             enough = step * speed + keep
-            gap, axis_x, axis_y = piece_gap(body, b, x, y, c, s, solids, p, near, enough)
+            gap, axis_x, axis_y = piece_gap(body, b, x, y, c, s, solids, p, near_enough, enough)
             gap -= keep
             nearest = min(nearest, gap)
             if gap <= margin:

@@ -12,7 +12,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.shapes import Box, Disc, Polygon, Shape
 
-NOWHERE = np.zeros(2)
+TINY_EDGE = 1e-6  # [m]
 DIGITS = 9  # decimals of coordinates seen from a frame [m, rad]
 
 
@@ -24,10 +24,8 @@ class Solids(NamedTuple):
     plates: Array  # (P, 5) [low x, low y, high x, high y], rounding included, and the rounding
 
 
-def convex_pieces(shape: Shape, origin: Array = NOWHERE) -> list[tuple[Array, float]]:
+def convex_pieces(shape: Shape) -> list[tuple[Array, float]]:
     """Convex pieces (corners counter-clockwise, rounding) that together are the shape.
-
-    Counted from `origin` (2,): it is taken off first, so that no digit is lost far away.
 
     Examples
     --------
@@ -38,26 +36,45 @@ def convex_pieces(shape: Shape, origin: Array = NOWHERE) -> list[tuple[Array, fl
     2
     """
     if isinstance(shape, Disc):
-        return [(shape.center[None] - origin, shape.radius)]
+        return [(shape.center[None].copy(), shape.radius)]
     if isinstance(shape, Box):
-        return [(Box(shape.size, shape.center - origin, shape.heading).corners, 0.0)]
-    corners = shape.corners - origin
-    if not shape.holes and len(simple := _simple(corners)) >= 3 and _is_convex(simple):
+        return [(shape.corners, 0.0)]
+    if not shape.holes and len(simple := _simple(shape.corners)) >= 3 and _is_convex(simple):
         return [(simple, 0.0)]
-    holes = [hole - origin for hole in shape.holes]
-    return [(piece, 0.0) for piece in _decomposed(corners, holes)]
+    return [(piece, 0.0) for piece in _decomposed(shape)]
 
 
-def plain_pieces(rings: list[Array], origin: Array) -> list[tuple[Array, float]]:
-    """Convex pieces of many polygons without holes, counted from `origin` (2,).
+def pieces_seen_from(shapes: list[Shape], frame: Array) -> list[tuple[Array, float]]:
+    """Convex pieces of many shapes seen from a frame (3,), polygons first, then boxes, then discs.
 
-    The convex ones, most as a rule, are found all at once.
+    Places are counted from the frame before they are turned, and rounded before they are cut, so
+    that no digit is lost far away and a moved scene comes out the same.
     """
+    polygons = [shape for shape in shapes if isinstance(shape, Polygon)]
+    pieces = _plain_pieces([one.corners for one in polygons if not one.holes], frame)
+    for one in polygons:
+        if one.holes:
+            holes = [seen_from(hole, frame) for hole in one.holes]
+            pieces += convex_pieces(Polygon(seen_from(one.corners, frame), holes))
+    pieces += _box_pieces([shape for shape in shapes if isinstance(shape, Box)], frame)
+    discs = [shape for shape in shapes if isinstance(shape, Disc)]
+    return pieces + [(seen_from(disc.center[None], frame), disc.radius) for disc in discs]
+
+
+def seen_from(points: Array, frame: Array) -> Array:
+    """Points (..., 2) seen from a frame (3,), rounded."""
+    c, s = math.cos(frame[2]), math.sin(frame[2])
+    turned = (points - frame[:2]) @ np.array([[c, -s], [s, c]])
+    return np.asarray(np.round(turned, DIGITS) + 0.0)
+
+
+def _plain_pieces(rings: list[Array], frame: Array) -> list[tuple[Array, float]]:
+    """Pieces of polygons without holes; the convex ones, most as a rule, are found all at once."""
     if not rings:
         return []
     counts = np.array([len(ring) for ring in rings])
     first = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    corners = np.concatenate(rings) - origin
+    corners = seen_from(np.concatenate(rings), frame)
     after = np.arange(1, len(corners) + 1)
     after[first + counts - 1] = first
     edge = corners[after] - corners
@@ -77,25 +94,24 @@ def plain_pieces(rings: list[Array], origin: Array) -> list[tuple[Array, float]]
         elif once[k] and right[k]:
             pieces.append((ring[::-1], 0.0))
         else:
-            pieces += convex_pieces(Polygon(rings[k]), origin)
+            pieces += convex_pieces(Polygon(ring))
     return pieces
 
 
-def box_pieces(boxes: list[Box], origin: Array) -> list[tuple[Array, float]]:
-    """Pieces of many boxes, counted from `origin` (2,)."""
+def _box_pieces(boxes: list[Box], frame: Array) -> list[tuple[Array, float]]:
     if not boxes:
         return []
-    center = np.array([box.center for box in boxes]) - origin
+    center = seen_from(np.array([box.center for box in boxes]), frame)
     half = 0.5 * np.array([box.size for box in boxes])
-    heading = np.array([box.heading for box in boxes])
+    heading = np.array([box.heading for box in boxes]) - frame[2]
     along = half[:, :1] * np.stack([np.cos(heading), np.sin(heading)], axis=1)
     aside = half[:, 1:] * np.stack([-np.sin(heading), np.cos(heading)], axis=1)
     rings = np.stack([-along - aside, along - aside, along + aside, aside - along], axis=1)
-    return [(ring, 0.0) for ring in rings + center[:, None]]
+    return [(ring, 0.0) for ring in np.round(rings + center[:, None], DIGITS)]
 
 
-def solids_of(pieces: Iterable[tuple[Array, float]], frame: Array | None = None) -> Solids:
-    """Arrays of pieces for the kernels, seen along the heading of a frame (3,), and rounded."""
+def solids_of(pieces: Iterable[tuple[Array, float]]) -> Solids:
+    """Arrays of pieces for the kernels."""
     rings, rounding = [], []
     for ring, round_by in pieces:
         rings.append(ring)
@@ -103,9 +119,6 @@ def solids_of(pieces: Iterable[tuple[Array, float]], frame: Array | None = None)
     counts = np.array([len(ring) for ring in rings], dtype=np.int64)
     first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     corners = np.concatenate([np.zeros((0, 2)), *rings])
-    if frame is not None:
-        c, s = math.cos(frame[2]), math.sin(frame[2])
-        corners = np.round(corners @ np.array([[c, -s], [s, c]]), DIGITS)
     radius = np.array(rounding, dtype=np.float64)
     if not rings:
         return Solids(np.zeros((0, 5)), first, np.zeros((0, 5)))
@@ -114,17 +127,25 @@ def solids_of(pieces: Iterable[tuple[Array, float]], frame: Array | None = None)
     edge = corners - corners[before]
     length = np.hypot(edge[:, 0], edge[:, 1])
     single = np.repeat(counts == 1, counts)
-    if not (length[~single] > 0.0).all():
-        raise ValueError("a convex piece repeats a corner")
+    if not (length[~single] > 0.0).all():  # corners that rounding has made one
+        return solids_of(_without_repeats(ring, by) for ring, by in zip(rings, radius, strict=True))
     normal = np.stack([edge[:, 1], -edge[:, 0]], axis=1) / np.where(single, 1.0, length)[:, None]
     low = np.minimum.reduceat(corners, first[:-1]) - radius[:, None]
     high = np.maximum.reduceat(corners, first[:-1]) + radius[:, None]
     offset = np.einsum("ij,ij->i", normal, corners)
+    for k in np.flatnonzero((length < TINY_EDGE) & ~single):  # its normal is rounded, like its ends
+        piece = int(np.searchsorted(first, k, side="right")) - 1
+        offset[k] = (corners[first[piece] : first[piece + 1]] @ normal[k]).max()
     return Solids(
         edges=np.column_stack([corners, normal, offset]),
         first=first,
         plates=np.column_stack([low, high, radius]),
     )
+
+
+def _without_repeats(ring: Array, rounding: float) -> tuple[Array, float]:
+    kept = ring[(ring != _next(ring)).any(axis=1)]
+    return (kept if len(kept) else ring[:1]), float(rounding)
 
 
 def _simple(ring: Array) -> Array:
@@ -154,11 +175,11 @@ def _is_convex(ring: Array) -> bool:
     return bool(turns.sum() < 3.0 * math.pi)
 
 
-def _decomposed(corners: Array, holes: list[Array]) -> list[Array]:
+def _decomposed(shape: Polygon) -> list[Array]:
     """Pieces of a polygon that is concave, has holes, or is none: nothing solid is lost."""
     import shapely
 
-    polygon = shapely.Polygon(corners, holes)
+    polygon = shapely.Polygon(shape.corners, shape.holes)
     if not polygon.is_valid:
         polygon = shapely.make_valid(polygon)
     pieces: list[Array] = []

@@ -97,7 +97,8 @@ def convex_hull(points: Array) -> Array:
     """Corners (m, 2) of the convex hull of points (n, 2) that are not all on one line."""
     import shapely
 
-    hull = shapely.convex_hull(shapely.multipoints(points))
+    normal = np.where(np.abs(points) < 1e-150, 0.0, points)  # products must not underflow
+    hull = shapely.convex_hull(shapely.multipoints(normal))
     return np.asarray(shapely.get_coordinates(hull)[:-1])
 
 

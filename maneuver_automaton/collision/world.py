@@ -13,15 +13,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._arrays import Array, IntArray, wrapped
 from maneuver_automaton.collision import _kernels_field
 from maneuver_automaton.collision.body import Body, body_of
 from maneuver_automaton.collision.convex import (
     DIGITS,
     Solids,
-    box_pieces,
     convex_pieces,
-    plain_pieces,
+    pieces_seen_from,
+    seen_from,
     solids_of,
 )
 from maneuver_automaton.collision.rectangles import blocked_rectangles
@@ -32,7 +32,6 @@ from maneuver_automaton.collision.shapes import (
     Motion,
     Obstacle,
     OccupancyMap,
-    Polygon,
     Shape,
 )
 from maneuver_automaton.groups import SE2
@@ -101,8 +100,12 @@ class World:
         """A pose (..., 3) seen from the world's frame: places first, so that no digit is lost."""
         near = np.array(pose, dtype=np.float64)
         near[..., :2] -= self.frame[:2]
-        turned = SE2(np.array([0.0, 0.0, -self.frame[2]])) @ SE2(near)
-        return np.round(turned.pose, DIGITS)
+        turned = (SE2(np.array([0.0, 0.0, -self.frame[2]])) @ SE2(near)).pose.copy()
+        turned[..., 2] = wrapped(turned[..., 2])
+        seen = np.round(turned, DIGITS)
+        half = seen[..., 2] <= -np.round(np.pi, DIGITS)  # half a turn to either side is one pose
+        seen[..., 2] = np.where(half, -seen[..., 2], seen[..., 2])
+        return seen
 
 
 @functools.lru_cache(maxsize=8)
@@ -129,19 +132,12 @@ def world_of(
     still = [o for o in obstacles if isinstance(o, Obstacle) and o.motion is None]
     moving = [o for o in obstacles if isinstance(o, Obstacle) and o.motion is not None]
     maps = [_seen_map(o, pose) for o in obstacles if isinstance(o, OccupancyMap)]
-    shapes = [o.shape for o in still]
-    plain = [s.corners for s in shapes if isinstance(s, Polygon) and not s.holes]
-    pieces = plain_pieces(plain, pose[:2])
-    pieces += box_pieces([shape for shape in shapes if isinstance(shape, Box)], pose[:2])
-    for shape in shapes:
-        if isinstance(shape, Disc) or (isinstance(shape, Polygon) and shape.holes):
-            pieces += convex_pieces(shape, pose[:2])
+    pieces = pieces_seen_from([o.shape for o in still], pose)
     listed = len(pieces)
-    shift = SE2(np.array([-pose[0], -pose[1], 0.0]))
-    for obstacle in obstacles:
-        if isinstance(obstacle, OccupancyMap):
-            pieces += [(ring, 0.0) for ring in _cells(obstacle.moved(shift))]
-    solids = solids_of(pieces, pose)
+    for one in obstacles:
+        if isinstance(one, OccupancyMap):
+            pieces += [(ring, 0.0) for ring in _cells(one, pose)]
+    solids = solids_of(pieces)
     movers = _movers(moving, pose)
     box = _box(solids.plates[:, :4], movers)
     arrays = WorldArrays(
@@ -185,11 +181,14 @@ def _seen_map(one: OccupancyMap, frame: Array) -> OccupancyMap:
     return there.moved(SE2(np.array([0.0, 0.0, -frame[2]])))
 
 
-def _cells(one: OccupancyMap) -> list[Array]:
-    """Corners (4, 2) of the blocked rectangles of a map."""
+def _cells(one: OccupancyMap, frame: Array) -> Array:
+    """Corners (n, 4, 2) of the blocked rectangles of a map, seen from a frame."""
     boxes = one.resolution * blocked_rectangles(one.blocked).astype(np.float64)
     rings = boxes[:, [[0, 1], [2, 1], [2, 3], [0, 3]]]
-    return list(np.asarray(SE2(one.origin).act(rings.reshape(-1, 2))).reshape(-1, 4, 2))
+    c, s = math.cos(one.origin[2]), math.sin(one.origin[2])
+    turned = rings @ np.array([[c, s], [-s, c]])
+    shift = one.origin[:2] - frame[:2]  # places first, so that no digit is lost
+    return seen_from(turned + shift, np.array([0.0, 0.0, frame[2]]))
 
 
 def _box(boxes: Array, movers: Movers) -> Array:
@@ -212,7 +211,9 @@ def _field(solids: Solids, listed: int, maps: list[OccupancyMap], body: Body, ke
     width = high - low
     most = MOST_MAP_CELLS if maps else MOST_FIELD_CELLS
     scale = body.half_width or 0.25 * float(np.median(solids.plates[:, 2:4] - solids.plates[:, :2]))
-    cell = max(0.25 * scale, math.sqrt(max(float(width.prod()), 1e-12) / most), width.max() / most)
+    padded = width + 2.0 * (keep + 4.0 * body.half_width)
+    area, longest = max(float(padded.prod()), 1e-12), float(padded.max())
+    cell = max(0.25 * scale, math.sqrt(area / most), longest / most)
     cap = keep + max(4.0 * body.half_width, 8.0 * cell)
     columns, rows = np.ceil((width + 2.0 * cap) / cell).astype(int)
     distance = np.full((rows, columns), cap)

@@ -48,6 +48,9 @@ class _Progress:
 
 def plan_on_lattice(problem: Problem, *, time_limit: float, alternatives: int) -> PlanResult:
     """The cheapest free plan found within the time."""
+    impossible = why_impossible(problem)
+    if impossible:
+        return PlanResult(problem=problem, status=PlanStatus.UNREACHABLE, reason=impossible)
     load_lattice()
     table = library_table(problem)
     began = time.monotonic()
@@ -231,6 +234,9 @@ def _checked(progress: _Progress, better: Improved, alternatives: int) -> _Chose
         if chosen.rejected_by_fcl + chosen.rejected_by_audit >= REJECTED and not chosen.plans:
             break
         plan = plan_of_word(query, word)
+        most = query.problem.horizon.max_trims
+        if most is not None and len(plan.trims) > most:
+            continue
         index = query.goal_index[word.goal]
         checked = check_plan(query.problem, plan, query.problem.goals[index])
         if checked.passed:
@@ -290,9 +296,6 @@ def _timing(
 def _why_none(query: LatticeQuery, first: FirstPlan, time_limit: float) -> tuple[PlanStatus, str]:
     if first.enclosed:
         return PlanStatus.UNREACHABLE, first.enclosed
-    impossible = why_impossible(query.problem)
-    if impossible:
-        return PlanStatus.UNREACHABLE, impossible
     nearest = (
         "" if math.isinf(first.nearest) else f"; the nearest node is {first.nearest:.3g} m off"
     )

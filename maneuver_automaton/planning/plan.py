@@ -62,6 +62,15 @@ def prepare(problem: Problem) -> None:
 
 
 def uses_lattice(problem: Problem) -> bool:
-    """Whether the lattice is what plans: it was asked for, or there is something in the way."""
+    """Whether the lattice is what plans: it was asked for, or there is something in the way.
+
+    It needs trims in the plane of which one turns, and a rest where the time is fixed; otherwise
+    words are searched, and what is in the way sorts them out.
+    """
+    velocities = problem.automaton.body_velocities
+    moving = velocities[velocities.any(axis=1)]
+    steers = len(moving) > 1 and bool(moving[:, 2].any()) and velocities.shape[1] == 3
+    if not steers or (problem.horizon.time is not None and len(moving) == len(velocities)):
+        return False
     method = problem.search.method
     return method == "lattice" or (method == "auto" and bool(problem.obstacles))

@@ -16,7 +16,7 @@ import numpy as np
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Obstacle
-from maneuver_automaton.planning.tracking import Tracked, clearance_at, track
+from maneuver_automaton.planning.tracking import Tracked, clearance_at, stands_free, track
 from maneuver_automaton.problem import Bounds, Horizon, Problem
 from maneuver_automaton.receding_horizon.candidates import Candidate, Settings, allowed
 from maneuver_automaton.receding_horizon.harm import least_harmful
@@ -29,6 +29,7 @@ from maneuver_automaton.search.inside import outside
 SEARCHING = 0.6  # share of a step's budget after which no plan to the goal is searched
 LATE = 0.8  # after which no way to the goal is; the rest is for a way out
 MOST_EXPANSIONS = 4_000  # of such a search, where something moves
+MOMENT = 1e-9  # [s]
 SHARES = (1.0, 0.5, 0.25)  # of a step that a way is gone towards the goal before it is left
 
 
@@ -107,10 +108,11 @@ class AmongObstacles:
         return track(problem, time_limit=max(left, 1e-6), known=known, max_expansions=most)
 
     def _candidate(self, found: Tracked) -> Candidate | None:
+        """What was found; it is proven free, but where something moves its end may not stay so."""
         if found.plan is None or found.goal_index is None:
             return None
         one = self.now.candidate(found.plan, found.goal_index, Origin.SEARCHED)
-        return one if self._is_safe(one.plan) else None
+        return one if not self.here.moves or self._is_safe(one.plan) else None
 
     def _late(self) -> Candidate | None:
         """No plan arrives in time: one that takes longer."""
@@ -122,7 +124,8 @@ class AmongObstacles:
         if found is None:
             return None
         padded = self.now.padded(found.plan)
-        return replace(found, plan=padded) if self._is_safe(padded) else None
+        late = self.now.candidate(padded, found.goal_index, Origin.SEARCHED)
+        return late if self._is_safe(padded) else None
 
     def _is_safe(self, plan: Plan) -> bool:
         if self.outlook.is_safe(plan):
@@ -201,15 +204,16 @@ def decide_among_obstacles(
     bounds is not held by them.
     """
     flagged: list[Violation] = []
-    gap = float(clearance_at(here, here.start[None], np.array([here.start_time]))[0])
-    if gap <= here.margin:
+    at = here.start_time
+    if not stands_free(here, here.start, time=at, duration=MOMENT) > 0.0:
+        gap = max(float(clearance_at(here, here.start[None], np.array([at]))[0]), 0.0)
         flagged.append(
             Violation(
                 guarantee=Guarantee.SAFETY,
-                reason=f"the clearance is {max(gap, 0.0):.3g} m, need more than {here.margin:g} m",
+                reason=f"the clearance is {gap:.3g} m, need more than {here.margin:g} m",
             )
         )
-        here = replace(here, margin=max(0.5 * gap, 0.0))
+        here = replace(here, margin=0.5 * min(gap, here.margin))
     if outside(here.start, here.bounds):
         here = replace(here, bounds=Bounds())
     now = Situation(settings, here, last, passed, began)

@@ -59,7 +59,7 @@ class Outlook:
         return escape(there, until=max(self.until, time + SAME), deadline=self.deadline)
 
     def continued(self, plan: Plan, after: float) -> Plan | None:
-        """The first seconds of a plan, then a way out; None if they are not free or there is none."""
+        """The first seconds of a plan, then a way out; None if either is not free."""
         piece = first_part(plan, after)
         if not self.is_free(piece):
             return None

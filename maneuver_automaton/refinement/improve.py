@@ -329,7 +329,7 @@ def improve_task(query: LatticeQuery, word: Word) -> ImproveTask:
         window=query.window,
         clock=float(query.problem.start_time),
         most_time=float(query.most_time),
-        most_trims=int(query.problem.horizon.max_trims or 0),
+        most_trims=query.most_trims,
         per_metre=float(library.per_metre),
         radius=float(library.radius),
         shortest_span=float(0.25 * library.radius / max(float(speed), 1e-9)),

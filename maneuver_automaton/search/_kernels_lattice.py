@@ -32,12 +32,12 @@ def cell_key(task, x, y, heading, layer, time, fine):
     c, s = task.frame_cos, task.frame_sin
     cell = task.fine_cell if fine else task.cell
     n_headings = task.fine_headings if fine else task.headings
-    i = math.floor((c * d_x + s * d_y) / cell + 0.5) & 0xFFFF
-    j = math.floor((c * d_y - s * d_x) / cell + 0.5) & 0xFFFF
+    i = math.floor((c * d_x + s * d_y) / cell + 0.5) & 0x7FFF
+    j = math.floor((c * d_y - s * d_x) / cell + 0.5) & 0x7FFF
     turn = (heading - task.frame_heading) / FULL_TURN
     k = math.floor((turn - math.floor(turn)) * n_headings + 0.5) % n_headings
-    tick = math.floor(time / task.tick) & 0x1FF if task.tick > 0.0 else 0
-    return ((((layer * 2 + fine) * 512 + tick) * 512 + k) * 65536 + j) * 65536 + i
+    tick = math.floor(time / task.tick) & 0x7FF if task.tick > 0.0 else 0
+    return ((((layer * 2 + fine) * 2048 + tick) * 512 + k) * 32768 + j) * 32768 + i
 
 
 @inlined_kernel

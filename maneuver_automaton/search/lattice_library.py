@@ -21,6 +21,7 @@ from maneuver_automaton.search.setup import moving_library
 MOST_TRIMS = 10  # of a larger library the most useful ones
 QUANTA = (0.17, 0.5)  # lengths of the edges, in turning radii
 SPIN_QUANTA = (math.pi / 12.0, math.pi / 4.0)  # [rad] of turns on the spot
+STRAIGHT = 1e-12  # [rad/s] turn rates below it are none
 SHORTEST = 1e-9  # [s] coasting times below it are none
 TOLERANCE = 1e-10  # of the steering function
 
@@ -88,6 +89,7 @@ def _library(
     chosen = _most_useful(library.twists, rates)
     trims = library.trims[chosen]
     twists, rates, periods = library.twists[chosen, :3], rates[chosen], library.periods[chosen]
+    twists[np.abs(twists[:, 2]) < STRAIGHT, 2] = 0.0
     radius = _length_scale(twists, body.half_width, body.reach)
     if waits and library.rest is not None:
         trims = np.append(trims, library.rest)
@@ -198,6 +200,7 @@ def _most_useful(twists: Array, rates: Array) -> IntArray:
             kinds += [turning & ~gentle, gentle]
     for side in (1.0, -1.0):
         kinds.append(~drives & (np.sign(turn) == side))
+        kinds.append((twists[:, 0] == 0.0) & (np.sign(twists[:, 1]) == side) & (turn == 0.0))
     chosen: list[int] = []
     amount = np.where(drives, speed, np.abs(turn))
     for kind in kinds:

@@ -229,7 +229,7 @@ def task_of(query: LatticeQuery, rung: Rung, sign: float) -> Task:
         margin=float(query.margin * rung.margin),
         clock=float(problem.start_time),
         most_time=float(query.most_time),
-        most_trims=int(problem.horizon.max_trims or 0),
+        most_trims=query.most_trims,
         by_gear=bool(rung.layered and cost.direction_change > 0.0),
         by_trim=bool(cost.min_coast > 0.0 or (rung.layered and cost.switch > 0.0)),
         by_count=problem.horizon.max_trims is not None,

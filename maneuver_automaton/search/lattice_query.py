@@ -46,6 +46,15 @@ class LatticeQuery:
         return library.rest_rate * fixed + library.arrays.switch
 
     @property
+    def most_trims(self) -> int:
+        """Trims a word may have before the rest that pads it; 0: no limit."""
+        most = self.problem.horizon.max_trims
+        if most is None:
+            return 0
+        pads = self.problem.horizon.time is not None and self.library.rest is not None
+        return max(1, most - int(pads))
+
+    @property
     def keep(self) -> float:
         """Distance kept from everything [m]."""
         return self.problem.margin

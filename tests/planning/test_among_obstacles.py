@@ -129,28 +129,24 @@ def test_plans_keep_what_is_promised(name):
     assert costs[-1] == pytest.approx(result.cost, rel=1e-7)  # before its end is closed
 
 
-@pytest.mark.xfail(strict=True, reason="the rest that fills a fixed time is not counted as a trim")
 def test_the_rest_that_pads_is_a_trim():
     fixed = replace(EASY, cost=Cost(effort=1.0), horizon=Horizon(time=20.0, max_trims=3))
     result = plan(fixed, time_limit=LIMIT)
     assert result.plan is None or len(result.plan.word) <= 3
 
 
-@pytest.mark.xfail(strict=True, reason="without a rest the time of a fixed horizon is not met")
 def test_without_a_rest_a_fixed_time_is_driven():
     fixed = replace(EASY, automaton=scenes.dubins(1.0), horizon=Horizon(time=20.0))
     result = plan(fixed, time_limit=LIMIT)
     assert result.plan is None or result.plan.duration == pytest.approx(20.0, abs=1e-8)
 
 
-@pytest.mark.xfail(strict=True, reason="the switch to the rest that pads has no price on the way")
 def test_improvements_cost_what_the_plan_does():
     prices = replace(EASY, cost=Cost(effort=1.0, switch=0.3), horizon=Horizon(time=20.0))
     result = found(prices)
     assert result.improvements[-1][1] == pytest.approx(result.cost, rel=1e-9)
 
 
-@pytest.mark.xfail(strict=True, reason="where turns are all but none, steering misses the goal")
 def test_hardly_turning_costs_what_driving_straight_does():
     costs = []
     for turn in (0.0, 5.6e-17):
@@ -176,7 +172,6 @@ UNSTEERED = {  # what no three trims with a turn among them can reach
 }  # fmt: skip
 
 
-@pytest.mark.xfail(strict=True, reason="the steering function needs a turn and two neighbours")
 @pytest.mark.parametrize("name", UNSTEERED)
 def test_libraries_that_cannot_be_steered(name):
     model, controls, goal = UNSTEERED[name]
@@ -189,7 +184,6 @@ def test_libraries_that_cannot_be_steered(name):
     assert result.cost == pytest.approx(free.cost)
 
 
-@pytest.mark.xfail(strict=True, raises=ValueError, reason="the least of no prices is asked for")
 def test_a_library_that_does_not_move():
     still = Automaton.of_controls(Unicycle(), {"rest": (0, 0)})
     result = plan(replace(EASY, automaton=still), time_limit=LIMIT)
@@ -198,7 +192,6 @@ def test_a_library_that_does_not_move():
     )  # fmt: skip
 
 
-@pytest.mark.xfail(strict=True, reason="only moves along the body are looked at in a large library")
 def test_the_bound_knows_every_trim_of_a_large_library():
     controls = {f"{v} {w}": (v, 0.0, w) for v in (1.0, -1.0) for w in (-1.0, -0.5, 0.0, 0.5, 1.0)}
     sideways = {"left": (0.0, 0.5, 0.0), "right": (0.0, -0.5, 0.0)}
@@ -210,7 +203,6 @@ def test_the_bound_knows_every_trim_of_a_large_library():
     assert result.lower_bound <= 4.0 + 1e-9  # straight to the left at 0.5 m/s, for 16 s
 
 
-@pytest.mark.xfail(strict=True, raises=ValueError, reason="altitude is cut off, then missed")
 def test_the_lattice_and_altitude():
     glider = Automaton.of_controls(
         UserModel(name="glider", group=SE2xR, control_names=("speed", "turn", "climb"),
@@ -227,7 +219,6 @@ def test_the_lattice_and_altitude():
     assert result.plan is None or result.plan.end[3] == pytest.approx(0.1)
 
 
-@pytest.mark.xfail(strict=True, reason="with a margin, corners are measured along normals")
 def test_a_start_that_keeps_the_margin_at_a_corner_is_left():
     place = 1.0 - 0.27 / math.sqrt(2.0)  # corner to corner 0.27 m
     problem = replace(ROBOTS, start=np.array([place, place, 0.0]), footprint=(Box([2.0, 2.0]),),
@@ -328,7 +319,6 @@ def test_an_open_court_is_never_said_to_be_closed(width):
         assert result.status is PlanStatus.UNREACHABLE
 
 
-@pytest.mark.xfail(strict=True, reason="the far rim of the bounds belongs to no cell of the plane")
 def test_a_goal_on_the_rim_of_the_bounds_can_be_reached():
     wall = (Obstacle(Box([1.0, 4.0], [5.5, 0.0])),)
     problem = replace(ROBOTS, start=np.array([1.0, 0.0, 0.0]), goals=(Goal(pose=[10, 0, 0]),),

