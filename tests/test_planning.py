@@ -485,7 +485,8 @@ def _with_spin(spin, times):
         ([0, 0, 0], [9, 0, 0], PlanStatus.GOAL_BLOCKED,
          "the goal is outside the bounds: x = 9 m, need -1 to 1 m"),
         ([0, 0, 0], [[0, 9, 0], [9, 0, 0]], PlanStatus.GOAL_BLOCKED,
-         "every goal is blocked; the first: the goal is outside the bounds: y = 9 m, need -2 to 2 m"),
+         "every goal is blocked; the first: "
+         "the goal is outside the bounds: y = 9 m, need -2 to 2 m"),
     ],
 )  # fmt: skip
 def test_start_and_goal_must_be_inside_the_bounds(start, goals, status, reason):

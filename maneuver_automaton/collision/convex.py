@@ -13,6 +13,7 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.shapes import Box, Disc, Polygon, Shape
 
 TINY_EDGE = 1e-6  # [m]
+MOST_JOINED = 60  # triangles that are joined to larger pieces; more stay as they are
 DIGITS = 9  # decimals of coordinates seen from a frame [m, rad]
 
 
@@ -211,7 +212,7 @@ def _ring_of(triangle: object) -> Array:
 def _merged(pieces: list[Array]) -> list[Array]:
     """Join neighbours across an edge as long as what comes out is convex."""
     pieces = [piece for piece in pieces if len(piece) >= 3]
-    joined = True
+    joined = len(pieces) <= MOST_JOINED
     while joined:
         joined = False
         edges: dict[tuple[tuple[float, ...], tuple[float, ...]], int] = {}

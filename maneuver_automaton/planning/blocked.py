@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton.collision import Disc
 from maneuver_automaton.collision.blocked import touched
+from maneuver_automaton.collision.body import body_of
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.inside import outside
@@ -37,8 +40,13 @@ def why_goal_blocked(problem: Problem, goal: Goal) -> str:
     reason = outside(goal.pose, problem.bounds)
     if reason:
         return f"the goal is outside the bounds: {reason}"
-    if goal.free_heading or not problem.obstacles:
+    if not problem.obstacles:
         return ""
+    if goal.free_heading and problem.footprint:  # only what touches at every heading counts
+        inside = body_of(problem.footprint).inscribed
+        if not inside > 0.0:
+            return ""
+        problem = replace(problem, footprint=(Disc(inside),))
     said = where_touched(problem, goal.pose, math.inf)
     return f"at the goal {said}" if said else ""
 

@@ -304,7 +304,7 @@ def expand(search, task, lib, world, body, grid, table, n, ceiling):
                 else:
                     proven = t
                 if proven < t:
-                    if not task.contact:
+                    if not task.contact or not lib.speeds[trim] > 0.0:
                         break
                     t = proven - task.back_off / lib.speeds[trim]
                     if t * lib.speeds[trim] < task.shortest_contact:

@@ -11,6 +11,7 @@ import hashlib
 import math
 import os
 import tempfile
+import zipfile
 from pathlib import Path
 from typing import NamedTuple
 
@@ -126,7 +127,7 @@ def _load(path: Path) -> NDArray[np.float32] | None:
     """A table from a file; None if there is none that can be used."""
     try:
         value = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError):
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile):
         return None
     right = value.shape == (HEADINGS, 2 * HALF + 1, 2 * HALF + 1) and value.dtype == np.float32
     return np.ascontiguousarray(value) if right else None

@@ -54,8 +54,8 @@ def distance_grid(world: World, box: Array, seeds: Array, aim: Array) -> Distanc
     cell = stride * field.cell
     origin = np.array([field.origin_x, field.origin_y]) - (stride // 2) * field.cell
     first = np.floor((low - origin) / cell).astype(int)
-    columns, rows = (int(n) for n in np.ceil((high - origin) / cell).astype(int) - first)
-    columns, rows = max(columns, 1), max(rows, 1)
+    last = np.floor((high - origin) / cell).astype(int)  # the far rim belongs to it too
+    columns, rows = (int(n) for n in np.maximum(last - first, 0) + 1)
     start = origin + first * cell
     n = columns * rows
     aim_i, aim_j = (int(k) for k in np.floor((aim[:2] - start) / cell))

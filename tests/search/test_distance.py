@@ -130,7 +130,6 @@ def test_many_cells_are_made_larger():
     assert off == pytest.approx(round(off), abs=1e-6)
 
 
-@pytest.mark.xfail(strict=True, reason="the far rim of the box belongs to no cell")
 def test_on_the_rim_of_what_is_searched():
     # the far corner of the box may be a place that is asked for
     world = world_around((Box([2.0, 2.0]),), [Obstacle(Box([1.0, 4.0], [5.5, 0.0]))])

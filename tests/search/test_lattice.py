@@ -218,7 +218,6 @@ def test_compiled_and_not_the_first_plan_is_the_same_to_the_last_bit():
     assert said[0] == said[1]
 
 
-@pytest.mark.xfail(strict=True, reason="a rest that is hit is shortened by a way over no speed")
 def test_who_waits_until_contact_is_still_somewhere():
     order = "from tests.search.test_lattice import *; grown(PROBLEMS['moving'], rung=TIGHT, n=15)"
     done = subprocess.run(
@@ -366,7 +365,6 @@ def test_bounds_are_kept_in_a_turned_world(turn):
     assert len(nodes) > (100 if COMPILED else 10)
 
 
-@pytest.mark.xfail(strict=True, reason="the far rim of the bounds belongs to no cell of the plane")
 def test_a_goal_on_the_rim_of_the_bounds_is_not_enclosed():
     wall = Box([1.0, 4.0], [5.5, 0.0])
     problem = Problem(CAR, [1, 0, 0], [10, 0, 0], obstacles=wall, footprint=Box([2.0, 2.0]),
