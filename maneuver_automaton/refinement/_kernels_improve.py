@@ -13,6 +13,7 @@ from maneuver_automaton.search._kernels_connect import (
     candidates,
     driven,
     free_candidate,
+    may_stay,
     trim_free,
 )
 
@@ -130,7 +131,7 @@ def still_free(lib, task, world, body, work, size, begin):
             return False
         x, y, heading = driven(lib, trim, x, y, heading, t)
         time += t
-    return True
+    return may_stay(task, world, body, x, y, heading, task.clock + time)
 
 
 @bare_inner_kernel

@@ -78,6 +78,7 @@ class ImproveTask(NamedTuple):
     window: Array
     clock: float
     most_time: float
+    stay_until: float
     most_trims: int
     per_metre: float
     radius: float
@@ -329,6 +330,7 @@ def improve_task(query: LatticeQuery, word: Word) -> ImproveTask:
         window=query.window,
         clock=float(query.problem.start_time),
         most_time=float(query.most_time),
+        stay_until=query.stay_until,
         most_trims=query.most_trims,
         per_metre=float(library.per_metre),
         radius=float(library.radius),

@@ -109,6 +109,18 @@ def trim_free(lib, task, world, body, trim, x, y, heading, t, clock):
 
 
 @bare_inner_kernel
+def may_stay(task, world, body, x, y, heading, clock):
+    """Whether a vehicle that arrives at `clock` is free until the plan's time is over."""
+    if not task.stay_until > clock or world.movers.speed.shape[0] == 0:
+        return True
+    t = task.stay_until - clock
+    proven, _ = free_time(
+        world, body, x, y, heading, 0.0, 0.0, 0.0, 0.0, t, task.keep, task.margin, clock
+    )
+    return proven >= t
+
+
+@bare_inner_kernel
 def free_candidate(lib, task, world, body, triples, pose, n, most_cost, most_time, clock, scratch):
     """Cheapest of `n` candidates from `pose` that is proven free; -1 if none of `task.tries` is.
 

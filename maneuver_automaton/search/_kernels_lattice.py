@@ -17,6 +17,7 @@ from maneuver_automaton.search._kernels_connect import (
     candidates,
     free_candidate,
     inside_window,
+    may_stay,
     price_of_switch,
 )
 from maneuver_automaton.search._kernels_distance import distance_at, pop, push
@@ -142,6 +143,10 @@ def connect_ends(search, task, lib, world, body, node, ceiling, estimate):
         left = task.most_time - spent
         which = free_candidate(lib, task, world, body, triples, pose, n, most, left, clock, scratch)
         state[QUERIES] += 1
+        if which >= 0 and task.sign > 0.0:
+            arrival = clock + scratch.durations[which]
+            if not may_stay(task, world, body, a_x, a_y, a_heading, arrival):
+                which = -1
         if which >= 0:
             found[0] = done + scratch.costs[which]
             for n_th in range(3):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from maneuver_automaton._compile import bare_kernel
-from maneuver_automaton.search._kernels_connect import driven, trim_free
+from maneuver_automaton.search._kernels_connect import driven, may_stay, trim_free
 
 UNREACHED = -1
 WAITED = -2  # stood since the tick before
@@ -54,7 +54,8 @@ def earliest_arrival(lib, task, world, body, way, rest, tick):
                 x, y, heading = driven(lib, trim, x, y, heading, t)
                 time += t
                 if k + 1 == n:
-                    if time < best and time <= task.most_time:
+                    stays = may_stay(task, world, body, x, y, heading, task.clock + time)
+                    if stays and time < best and time <= task.most_time:
                         best, best_joint, best_tick = time, i, j
                     break
                 then = math.ceil(time / tick)

@@ -80,6 +80,7 @@ class Task(NamedTuple):
     margin: float
     clock: float
     most_time: float
+    stay_until: float
     most_trims: int
     by_gear: bool
     by_trim: bool
@@ -229,6 +230,7 @@ def task_of(query: LatticeQuery, rung: Rung, sign: float) -> Task:
         margin=float(query.margin * rung.margin),
         clock=float(problem.start_time),
         most_time=float(query.most_time),
+        stay_until=query.stay_until,
         most_trims=query.most_trims,
         by_gear=bool(rung.layered and cost.direction_change > 0.0),
         by_trim=bool(cost.min_coast > 0.0 or (rung.layered and cost.switch > 0.0)),

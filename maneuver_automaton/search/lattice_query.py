@@ -55,6 +55,12 @@ class LatticeQuery:
         return max(1, most - int(pads))
 
     @property
+    def stay_until(self) -> float:
+        """Time of the world [s] until which a plan rests at its goal; -inf if it need not."""
+        fixed = self.problem.horizon.time
+        return -math.inf if fixed is None else self.problem.start_time + fixed
+
+    @property
     def keep(self) -> float:
         """Distance kept from everything [m]."""
         return self.problem.margin

@@ -145,9 +145,6 @@ def test_with_a_fixed_time_rest_fills_it():
     assert result.plan.word[-1] == "rest" or "rest" in result.plan.word
 
 
-@pytest.mark.xfail(
-    strict=True, reason="the rest at the goal is checked after the search, not in it"
-)
 def test_with_a_fixed_time_it_does_not_rest_where_something_comes():
     # it may arrive before 12 s, but not stay: wait at the start, and arrive when it has passed
     problem = replace(FIXED, obstacles=(crossing(6.0, time=12.0),))
