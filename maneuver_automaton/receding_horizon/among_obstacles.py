@@ -153,11 +153,18 @@ class AmongObstacles:
                     return self._leading_nowhere(towards, Deed.APPROACHED, self.outlook.until)
         out = self.outlook.way_out(here.start, here.start_time)
         if out.complete:
-            deed = Deed.EVADED
-            if out.plan.trims and out.plan.trims[0].is_rest:
-                deed = Deed.STOPPED
-            return self._leading_nowhere(out.plan, deed, out.free_until)
-        return self._harmful((out.plan,) if now.rest is None else (out.plan, now.rest))
+            return self._evading(out.plan)
+        if now.rest is None:
+            return self._harmful((out.plan,))
+        tail = self.outlook.continued(now.rest, now.rest.duration)  # a way out a step ago
+        return self._harmful((out.plan, now.rest)) if tail is None else self._evading(tail)
+
+    def _evading(self, plan: Plan) -> Chosen:
+        """To wait, or to go out of the way."""
+        waits = bool(plan.trims) and plan.trims[0].is_rest
+        return self._leading_nowhere(
+            plan, Deed.STOPPED if waits else Deed.EVADED, self.outlook.until
+        )
 
     def _ambitions(self) -> Iterator[Plan]:
         """Ways to the goal that may be followed for a moment."""

@@ -39,7 +39,7 @@ def seeded(seed: int) -> Problem:
             return replace(problem, start=start)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(12))
 def test_undisturbed_all_that_is_promised_is_kept(seed):
     loop = simulate(seeded(seed), step=1.0)
     assert loop.reached
@@ -67,7 +67,7 @@ def test_a_margin_is_kept_and_what_is_promised_too(seed):
     assert clearances(loop).min() >= 0.05
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(6))
 def test_with_noise_it_arrives_free_and_says_what_the_noise_broke(seed):
     problem = replace(
         seeded(seed), goals=(Goal(pose=[6, 0, 0], tolerance_m=0.1, tolerance_rad=0.1),)
