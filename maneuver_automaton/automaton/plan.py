@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,22 +13,18 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.groups import LieGroup, group_of
 from maneuver_automaton.groups.chain import chained
-from maneuver_automaton.primitives import Trim
+from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Trajectory:
-    """Samples of a motion: `control[i]` holds from time i to i + 1; the last one is repeated."""
-
-    time: Array  # (n,) [s]
-    pose: Array  # (n, dof), headings continuous [m, m, rad(, m)]
-    reduced_state: Array  # (n, n_z)
-    control: Array  # (n, n_u)
+Primitive: TypeAlias = Trim | Maneuver
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
     """A word of trims, each with its coasting time, from a start pose.
+
+    Between two trims stands a maneuver, or nothing where the vehicle switches at will: `maneuvers`
+    is empty for a kinematic vehicle, otherwise it has one entry for every switch, None for those
+    that change nothing. A trim between two maneuvers may last no time.
 
     Examples
     --------
@@ -36,11 +32,18 @@ class Plan:
     >>> plan = Plan([0.0, 0.0, 0.0], (ahead,), durations=[2.0])
     >>> plan.duration, plan.pose_at(1.5).tolist()
     (2.0, [1.5, 0.0, 0.0])
+    >>> rest = Trim(name="rest", body_velocity=[0.0, 0.0, 0.0], control=[0.0, 0.0])
+    >>> brake = Maneuver(name="brake", source="ahead", target="rest", displacement=[0.5, 0, 0],
+    ...                  duration=1.0)
+    >>> plan = Plan([0, 0, 0], (ahead, rest), durations=[2.0, 0.0], maneuvers=(brake,))
+    >>> plan.word, plan.duration, plan.end.tolist()
+    (('ahead', 'brake'), 3.0, [2.5, 0.0, 0.0])
     """
 
     start: Array  # (dof,) [m, m, rad(, m)]
     trims: tuple[Trim, ...]
-    durations: Array = field(kw_only=True)  # (n,) [s]
+    durations: Array = field(kw_only=True)  # (n,) [s] of the trims
+    maneuvers: tuple[Maneuver | None, ...] = field(default=(), kw_only=True)  # (n - 1,) or none
     start_time: float = field(default=0.0, kw_only=True)  # [s]
 
     if TYPE_CHECKING:  # any numbers will do
@@ -51,12 +54,14 @@ class Plan:
             trims: Sequence[Trim],
             *,
             durations: ArrayLike,
+            maneuvers: Sequence[Maneuver | None] = (),
             start_time: float = 0.0,
         ) -> None: ...
 
     def __post_init__(self) -> None:
         freeze(self, "start", last=(3, 4))
         object.__setattr__(self, "trims", tuple(self.trims))
+        object.__setattr__(self, "maneuvers", tuple(self.maneuvers))
         freeze(self, "durations")
         if self.durations.shape != (len(self.trims),):
             raise ValueError(
@@ -64,30 +69,77 @@ class Plan:
             )
         if (self.durations < 0.0).any():
             raise ValueError(f"plan: durations must not be negative, got {self.durations.min()} s")
+        if self.maneuvers and len(self.maneuvers) != len(self.trims) - 1:
+            raise ValueError(
+                f"plan: got {len(self.maneuvers)} maneuvers for {len(self.trims)} trims, "
+                "need one between each two"
+            )
+        for source, maneuver, target in zip(
+            self.trims, self.maneuvers, self.trims[1:], strict=False
+        ):
+            if maneuver and (maneuver.source, maneuver.target) != (source.name, target.name):
+                raise ValueError(
+                    f"plan: maneuver {maneuver.name!r} leads from {maneuver.source!r} to "
+                    f"{maneuver.target!r}, but stands between {source.name!r} and {target.name!r}"
+                )
+
+    @cached_property
+    def primitives(self) -> tuple[Primitive, ...]:
+        """Trims and maneuvers in order; beside maneuvers without the trims that last no time."""
+        return tuple(primitive for primitive, _ in self._pieces)
+
+    @cached_property
+    def primitive_durations(self) -> Array:
+        """Duration (m,) of each primitive [s]."""
+        return np.array([duration for _, duration in self._pieces], dtype=np.float64)
+
+    @cached_property
+    def _pieces(self) -> list[tuple[Primitive, float]]:
+        durations: list[float] = self.durations.tolist()
+        if not any(self.maneuvers):
+            return list(zip(self.trims, durations, strict=True))
+        pieces: list[tuple[Primitive, float]] = []
+        for k, (trim, duration) in enumerate(zip(self.trims, durations, strict=True)):
+            if duration > 0.0:
+                pieces.append((trim, duration))
+            maneuver = self.maneuvers[k] if k < len(self.maneuvers) else None
+            if maneuver is not None:
+                pieces.append((maneuver, maneuver.duration))
+        return pieces
 
     @property
     def word(self) -> tuple[str, ...]:
-        """Names of the trims, in order."""
-        return tuple(trim.name for trim in self.trims)
+        """Names of the primitives, in order."""
+        return tuple(primitive.name for primitive in self.primitives)
 
     @property
     def duration(self) -> float:
         """Time the plan takes [s], rest included."""
-        return float(self.durations.sum())
+        return float(self.primitive_durations.sum())
 
     @cached_property
     def switching_times(self) -> Array:
-        """Times (n + 1,) at which trims begin and the plan ends [s]."""
-        return self.start_time + np.concatenate([[0.0], np.cumsum(self.durations)])
+        """Times (m + 1,) at which primitives begin and the plan ends [s]."""
+        return self.start_time + np.concatenate([[0.0], np.cumsum(self.primitive_durations)])
 
     @cached_property
     def switching_poses(self) -> Array:
-        """Poses (n + 1, dof) at the switching times."""
-        if not self.trims:
+        """Poses (m + 1, dof) at the switching times."""
+        if not self.primitives:
             return self.start[None].copy()
-        twists = np.array([trim.body_velocity for trim in self.trims])
-        steps = group_of(self.start.size).exp(self.durations[:, None] * twists)
-        return chained(self.start, steps.pose)
+        steps = group_of(self.start.size).exp(self.primitive_durations[:, None] * self._twists).pose
+        steps = steps.copy()
+        for k, primitive in enumerate(self.primitives):
+            if isinstance(primitive, Maneuver):
+                steps[k] = primitive.displacement
+        return chained(self.start, steps)
+
+    @cached_property
+    def _twists(self) -> Array:
+        """Twist (m, dof) of every trim; zero for maneuvers."""
+        still = np.zeros(self.start.size)
+        rows = [p.body_velocity if isinstance(p, Trim) else still for p in self.primitives]
+        return np.array(rows).reshape(-1, self.start.size)
 
     @property
     def end(self) -> Array:
@@ -97,56 +149,128 @@ class Plan:
     def pose_at(self, time: ArrayLike) -> Array:
         """Poses (..., dof) at `time` (...,) [s]; held before the start and after the end."""
         times = np.asarray(time, dtype=np.float64)
-        if not self.trims:
+        if not self.primitives:
             return np.broadcast_to(self.start, (*times.shape, self.start.size)).copy()
         index = self._index_at(times)
         begin = group_of(self.start.size)(self.switching_poses[index])
-        since = np.clip(times - self.switching_times[index], 0.0, self.durations[index])
-        twists = np.array([trim.body_velocity for trim in self.trims])[index]
-        return (begin @ begin.exp(since[..., None] * twists)).pose
+        since = np.clip(times - self.switching_times[index], 0.0, self.primitive_durations[index])
+        steps = begin.exp(since[..., None] * self._twists[index]).pose
+        for k, primitive in enumerate(self.primitives):
+            if isinstance(primitive, Maneuver) and (here := index == k).any():
+                steps = np.where(here[..., None], _within(primitive, since), steps)
+        return (begin @ type(begin)(steps)).pose
 
     def control_at(self, time: ArrayLike) -> Array:
-        """Controls (..., n_u) at `time` (...,) [s]; at a switch, that of the trim that begins."""
-        if not self.trims:
+        """Controls (..., n_u) at `time` (...,) [s]; at a switch, that of what begins."""
+        if not self.primitives:
             raise ValueError("plan: an empty word has no control")
+        times = np.asarray(time, dtype=np.float64)
+        samples = self.sample()
+        if any(self.maneuvers):
+            after = np.searchsorted(samples.time[1:-1], times, side="right")
+            return np.asarray(samples.control[after])
         controls = np.array([trim.control for trim in self.trims])
-        return np.asarray(controls[self._index_at(np.asarray(time, dtype=np.float64))])
+        return np.asarray(controls[self._index_at(times)])
 
     def _index_at(self, times: Array) -> np.ndarray[tuple[int, ...], np.dtype[np.intp]]:
         after = np.searchsorted(self.switching_times[1:-1], times, side="right")
         return np.asarray(after, dtype=np.intp)
 
     def sample(self, *, max_step_m: float = 0.05, max_step_rad: float = 0.05) -> Trajectory:
-        """Samples at every switching time and closer than both steps in between."""
-        times, owners = [self.start_time], [0]
-        for k, (trim, duration) in enumerate(zip(self.trims, self.durations, strict=True)):
-            twist = trim.body_velocity
-            speed = float(np.linalg.norm(twist[[0, 1, *range(3, twist.size)]]))
-            steps = max(speed * duration / max_step_m, abs(twist[2]) * duration / max_step_rad)
-            n = max(1, int(np.ceil(steps * (1.0 + 1e-9))))
-            begin, end = self.switching_times[k], self.switching_times[k + 1]
-            times += [*np.linspace(begin, end, n + 1)[1:-1].tolist(), float(end)]
-            owners += [k] * (n - 1) + [min(k + 1, len(self.trims) - 1)]
-        time = np.array(times)
+        """Samples at every switching time and closer than both steps in between.
+
+        Maneuvers are sampled where their courses are, and between if that is too wide.
+
+        Raises
+        ------
+        ValueError
+            If a maneuver has no course.
+        """
+        if not self.primitives:
+            states = [trim.reduced_state for trim in self.trims]
+            return Trajectory(
+                time=np.array([self.start_time]),
+                pose=self.start[None].copy(),
+                reduced_state=np.array(states[:1]).reshape(1, -1) if states else np.zeros((1, 0)),
+                control=np.array([trim.control for trim in self.trims[:1]]).reshape(1, -1),
+            )
+        parts = [
+            _trim_samples(primitive, duration, max_step_m, max_step_rad)
+            if isinstance(primitive, Trim)
+            else _finer(_course(primitive), max_step_m, max_step_rad)
+            for primitive, duration in self._pieces
+        ]
+        group = group_of(self.start.size)
+        begins = zip(self.switching_poses, self.switching_times, parts, strict=False)
+        moved = [
+            ((group(pose) @ group(part.pose[:-1])).pose, time + part.time[:-1])
+            for pose, time, part in begins
+        ]
+        last = parts[-1]
         return Trajectory(
-            time=time,
-            pose=self._poses_of(time),
-            reduced_state=self._rows(owners, [trim.reduced_state for trim in self.trims]),
-            control=self._rows(owners, [trim.control for trim in self.trims]),
+            time=np.concatenate([*(times for _, times in moved), self.switching_times[-1:]]),
+            pose=np.concatenate([*(poses for poses, _ in moved), self.end[None]]),
+            reduced_state=np.concatenate(
+                [*(part.reduced_state[:-1] for part in parts), last.reduced_state[-1:]]
+            ),
+            control=np.concatenate([*(part.control[:-1] for part in parts), last.control[-1:]]),
         )
-
-    def _poses_of(self, time: Array) -> Array:
-        poses = self.pose_at(time).copy()
-        if self.trims:
-            poses[-1] = self.end
-        return poses
-
-    def _rows(self, owners: list[int], values: Sequence[Array]) -> Array:
-        if not values:
-            return np.zeros((1, 0))
-        return np.array(values)[owners]
 
     def moved(self, by: LieGroup) -> Plan:
         """The same word from a start moved by the group element `by`: the law of the project."""
-        start = by @ type(by)(self.start)
-        return Plan(start.pose, self.trims, durations=self.durations, start_time=self.start_time)
+        return replace(self, start=(by @ type(by)(self.start)).pose)
+
+
+def _within(maneuver: Maneuver, since: Array) -> Array:
+    """Poses (..., dof) of a maneuver at times since its begin; of one twist if it has no course."""
+    if maneuver.course is not None:
+        return maneuver.course.pose_at(since)
+    group = group_of(maneuver.displacement.size)
+    share = since / maneuver.duration if maneuver.duration > 0.0 else np.ones_like(since)
+    return group.exp(share[..., None] * group(maneuver.displacement).log()).pose
+
+
+def _course(maneuver: Maneuver) -> Trajectory:
+    if maneuver.course is None:
+        raise ValueError(f"maneuver {maneuver.name!r}: has no course, so it cannot be sampled")
+    return maneuver.course
+
+
+def _trim_samples(
+    trim: Trim, duration: float, max_step_m: float, max_step_rad: float
+) -> Trajectory:
+    """Samples of a trim from the identity."""
+    twist = trim.body_velocity
+    speed = float(np.linalg.norm(twist[[0, 1, *range(3, twist.size)]]))
+    steps = max(speed * duration / max_step_m, abs(twist[2]) * duration / max_step_rad)
+    n = max(1, int(np.ceil(steps * (1.0 + 1e-9))))
+    time = np.linspace(0.0, duration, n + 1)
+    return Trajectory(
+        time=time,
+        pose=group_of(twist.size).exp(time[:, None] * twist).pose,
+        reduced_state=np.tile(trim.reduced_state, (n + 1, 1)),
+        control=np.tile(trim.control, (n + 1, 1)),
+    )
+
+
+def _finer(course: Trajectory, max_step_m: float, max_step_rad: float) -> Trajectory:
+    """The course with poses between its samples where these are too far apart."""
+    steps = np.abs(np.diff(course.pose, axis=0))
+    places = [0, 1, *range(3, steps.shape[1])]
+    ways = np.linalg.norm(steps[:, places], axis=1)
+    parts = np.ceil(np.maximum(ways / max_step_m, steps[:, 2] / max_step_rad) - 1e-9)
+    count = np.maximum(parts, 1.0).astype(np.int64)
+    if not (count > 1).any():
+        return course
+    index = np.repeat(np.arange(count.size), count)
+    first = np.concatenate([[0], np.cumsum(count)[:-1]])
+    share = (np.arange(index.size) - first[index]) / count[index]
+    time = np.append(course.time[index] + share * np.diff(course.time)[index], course.time[-1])
+    change = np.diff(course.reduced_state, axis=0)
+    reduced = course.reduced_state[index] + share[:, None] * change[index]
+    return Trajectory(
+        time=time,
+        pose=course.pose_at(time),
+        reduced_state=np.concatenate([reduced, course.reduced_state[-1:]]),
+        control=np.concatenate([course.control[index], course.control[-1:]]),
+    )

@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton.groups import LieGroup
+from maneuver_automaton.primitives.trajectory import Trajectory
+
+Pose = TypeVar("Pose", bound=LieGroup)
+CLOSED = 1e-9  # [m, rad, s] between what a maneuver states and where its course ends
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Maneuver:
     """A transition of fixed displacement, duration and cost from one trim to another.
+
+    Its `course` runs from the identity pose and time 0, under controls that are constant between
+    samples; without one it is not known what happens in between.
 
     Source: Frazzoli, Dahleh, Feron (2005), Sec. III-B.
 
@@ -25,6 +36,7 @@ class Maneuver:
     target: str  # name of the trim it reaches
     displacement: Array  # (dof,) pose gained, in the frame where it starts
     duration: float = 0.0  # [s]
+    course: Trajectory | None = None
 
     def __post_init__(self) -> None:
         freeze(self, "displacement", last=(3, 4))
@@ -32,8 +44,26 @@ class Maneuver:
             raise ValueError(
                 f"maneuver {self.name!r}: duration must not be negative, got {self.duration} s"
             )
+        if self.course is None:
+            return
+        off = max(
+            float(np.abs(self.course.pose[-1] - self.displacement).max()),
+            float(np.abs(self.course.pose[0]).max()),
+            abs(float(self.course.time[-1]) - self.duration),
+            abs(float(self.course.time[0])),
+        )
+        scale = max(1.0, self.duration, float(np.abs(self.displacement).max()))
+        if not off <= CLOSED * scale:
+            raise ValueError(
+                f"maneuver {self.name!r}: its course must run from the identity and time 0 to its "
+                f"displacement and duration, got a difference of {off:.3g}"
+            )
 
     @property
     def is_identity(self) -> bool:
         """Whether it changes nothing and takes no time: the switch of a kinematic vehicle."""
         return self.duration == 0.0 and not self.displacement.any()
+
+    def carry(self, start: Pose) -> Pose:
+        """Pose after the maneuver from `start`."""
+        return start @ type(start)(self.displacement)
