@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 import time
+from collections import Counter
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
-from maneuver_automaton.audit import terminal_error
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import lattice_bound
-from maneuver_automaton.planning.checking import Checked, check_plan, load_checks
-from maneuver_automaton.planning.result import Alternative, PlanResult, PlanStatus
+from maneuver_automaton.planning.checking import check_plan, load_checks
+from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
 from maneuver_automaton.problem import Problem, moves
 from maneuver_automaton.refinement.improve import Improved, Patience, improve
-from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable, cost_to_go_table
 from maneuver_automaton.search.lattice import FirstPlan, first_plan
 from maneuver_automaton.search.lattice_pass import Word, with_cost
@@ -33,144 +33,131 @@ REJECTED = 8  # plans in a row that the checks may refuse before it is given up
 
 @dataclass(slots=True, eq=False)
 class _Progress:
-    """What was found so far, the cheapest last."""
+    """What was found so far, the cheapest last, and what it took."""
 
     query: LatticeQuery
-    began: float
+    table: CostTable
+    began: float  # as `time.monotonic` counts
+    deadline: float
     words: list[Word] = field(default_factory=list)
     improvements: list[tuple[float, float]] = field(default_factory=list)
+    counts: Counter[str] = field(default_factory=Counter)
 
     def heard(self, word: Word) -> None:
         """A better word was found."""
         self.words.append(word)
         self.improvements.append((time.monotonic() - self.began, word.cost + self.query.padding))
 
+    def first_plan(
+        self, query: LatticeQuery, *, most: int | None, deadline: float | None = None
+    ) -> FirstPlan:
+        """A first plan for a query, its expansions counted."""
+        limit = self.deadline if deadline is None else deadline
+        found = first_plan(query, deadline=limit, max_expansions=most, table=self.table)
+        self.counts["expansions"] += found.expansions
+        self.counts["collision_queries"] += found.queries
+        self.counts["searches"] += 1
+        return found
 
-def plan_on_lattice(problem: Problem, *, time_limit: float, alternatives: int) -> PlanResult:
-    """The cheapest free plan found within the time."""
-    impossible = why_impossible(problem)
-    if impossible:
-        return PlanResult(problem=problem, status=PlanStatus.UNREACHABLE, reason=impossible)
-    load_lattice()
-    table = library_table(problem)
-    began = time.monotonic()
-    deadline = began + time_limit
+    def improve(
+        self, query: LatticeQuery, word: Word, *, deadline: float, patience: Patience, **more: Any
+    ) -> Improved:
+        """A better word for a query, its attempts and expansions counted."""
+        found = improve(query, word, deadline=deadline, patience=patience, table=self.table, **more)
+        self.counts["expansions"] += found.expansions
+        self.counts["collision_queries"] += found.queries
+        self.counts["searches"] += found.passes
+        self.counts["attempts"] += found.attempts
+        return found
+
+
+def plan_on_lattice(
+    problem: Problem, *, began: float, time_limit: float, alternatives: int
+) -> PlanResult:
+    """The cheapest free plan found within the time limit [s], counted from `began`."""
     goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
     query = lattice_query(problem, goals)
-    progress = _Progress(query, began)
-    first = _first(query, table, deadline, progress)
+    progress = _Progress(query, library_table(problem), began, began + time_limit)
+    first = _first(progress)
     found = time.monotonic()
+    timing = {"search": found - began, "first_plan": found - began, "refine": 0.0, "audit": 0.0}
     if not progress.words:
-        timing = _timing(began, found, found, found, found - began)
         status, reason = _why_none(query, first, time_limit)
         return PlanResult(
             problem=problem,
             status=status,
             reason=reason,
             timing_s=timing,
-            counts={"expansions": first.expansions, "collision_queries": first.queries},
+            counts=dict(progress.counts),
             nodes=first.nodes,
         )
     if problem.moves:
-        _let_pass(query, table, deadline, progress)
-    word = progress.words[-1]
+        _let_pass(progress)
     bound = lattice_bound(query)
-    better = improve(
+    better = progress.improve(
         query,
-        word,
-        deadline=deadline,
+        progress.words[-1],
+        deadline=progress.deadline,
         patience=Patience(),
-        floor=bound,
-        max_expansions=_left(problem, first),
-        table=table,
+        floor=bound - query.padding,
+        max_expansions=_left(progress),
         better=progress.heard,
         meanwhile=lambda: load_checks(problem),
     )
     refined = time.monotonic()
     chosen = _checked(progress, better, alternatives)
-    first_s = progress.improvements[0][0]
-    timing = _timing(began, found, refined, time.monotonic(), first_s)
-    counts = {
-        "expansions": first.expansions + better.expansions,
-        "collision_queries": first.queries,
-        "attempts": better.attempts,
-        "searches": 1 + better.passes,
-        "rejected_by_fcl": chosen.rejected_by_fcl,
-        "rejected_by_audit": chosen.rejected_by_audit,
-    }
+    timing["first_plan"] = progress.improvements[0][0]
+    timing["refine"], timing["audit"] = refined - found, time.monotonic() - refined
     if not chosen.plans:
         return PlanResult(
             problem=problem,
             status=PlanStatus.NO_PLAN,
             reason=f"every plan found was refused: {chosen.reason}",
             timing_s=timing,
-            counts=counts,
+            counts=dict(progress.counts),
         )
-    best = chosen.plans[0]
-    audit = best.checked.audit
-    assert audit is not None
-    goal = problem.goals[best.goal_index]
-    bound = min(best.cost, bound)
-    return PlanResult(
-        problem=problem,
-        status=PlanStatus.FOUND,
-        reason="",
-        plan=best.plan,
-        goal_index=best.goal_index,
-        cost=best.cost,
-        lower_bound=bound,
-        gap=0.0 if best.cost <= bound else (best.cost - bound) / best.cost,
-        terminal_error=terminal_error(best.plan, goal),
-        clearance_m=audit.min_clearance_m,
-        audit=audit,
-        alternatives=tuple(
-            Alternative(
-                plan=other.plan,
-                cost=other.cost,
-                terminal_error=terminal_error(other.plan, problem.goals[other.goal_index]),
-            )
-            for other in chosen.plans[1:]
-        ),
+    return found_plans(
+        problem,
+        chosen.plans,
+        bound=bound,
         timing_s=timing,
-        counts=counts,
+        counts=dict(progress.counts),
         improvements=tuple(progress.improvements),
         nodes=first.nodes,
     )
 
 
-def _first(
-    query: LatticeQuery, table: CostTable, deadline: float, progress: _Progress
-) -> FirstPlan:
+def _first(progress: _Progress) -> FirstPlan:
     """The first plan; where something moves, a way that lets it pass if a quick look finds none."""
+    query = progress.query
     most = query.problem.search.max_expansions
     if query.problem.moves:
-        quick = min(most or QUICK, QUICK)
-        first = first_plan(query, deadline=deadline, max_expansions=quick, table=table)
+        first = progress.first_plan(query, most=min(most or QUICK, QUICK))
         if first.word is not None:
             progress.heard(with_cost(first.word, query))
             return first
-        calm = _among_what_stands(query)
-        way = first_plan(calm, deadline=deadline, max_expansions=most, table=table)
+        way = progress.first_plan(_among_what_stands(query), most=most)
         timed = None if way.word is None else with_waits(query, way.word)
         if timed is not None:
             progress.heard(timed)
             return first
-    first = first_plan(query, deadline=deadline, max_expansions=most, table=table)
+    first = progress.first_plan(query, most=most)
     if first.word is not None:
         progress.heard(with_cost(first.word, query))
     return first
 
 
-def _let_pass(query: LatticeQuery, table: CostTable, deadline: float, progress: _Progress) -> None:
+def _let_pass(progress: _Progress) -> None:
     """Hear of the cheapest way among what stands still, with rests that let pass what moves."""
+    query = progress.query
     calm = _among_what_stands(query)
     begin = time.monotonic()
-    soon = begin + 0.3 * (deadline - begin)
+    soon = begin + 0.3 * (progress.deadline - begin)
     most = query.problem.search.max_expansions
-    found = first_plan(calm, deadline=soon, max_expansions=most, table=table)
+    found = progress.first_plan(calm, most=most, deadline=soon)
     if found.word is None:
         return
-    better = improve(calm, found.word, deadline=soon, patience=BRIEF, table=table)
+    better = progress.improve(calm, found.word, deadline=soon, patience=BRIEF)
     ways = sorted([found.word, better.word, *better.others], key=lambda one: one.cost)
     distinct = {tuple(way.trims.tolist()): way for way in reversed(ways)}
     for way in list(distinct.values())[::-1][:MOST_WAYS]:
@@ -186,10 +173,8 @@ def _among_what_stands(query: LatticeQuery) -> LatticeQuery:
     return lattice_query(replace(problem, obstacles=still), query.goal_index)
 
 
-def prepare_lattice(problem: Problem) -> None:
-    """Kernels, the table, and the map as the search, FCL and the audit see it."""
-    load_lattice()
-    library_table(problem)
+def prepare_map(problem: Problem) -> None:
+    """The map as the search, FCL and the audit see it."""
     lattice_query(problem, tuple(range(len(problem.goals))))
     load_checks(problem)
 
@@ -201,29 +186,19 @@ def library_table(problem: Problem) -> CostTable:
     return cost_to_go_table(problem)
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _Accepted:
-    """A plan that passed every check."""
-
-    plan: Plan
-    goal_index: int
-    cost: float
-    checked: Checked
-
-
 @dataclass(slots=True, eq=False)
 class _Chosen:
     """What the checks left, cheapest first."""
 
-    plans: list[_Accepted] = field(default_factory=list)
-    rejected_by_fcl: int = 0
-    rejected_by_audit: int = 0
+    plans: list[Accepted] = field(default_factory=list)
+    rejected: int = 0
     reason: str = ""
 
 
 def _checked(progress: _Progress, better: Improved, alternatives: int) -> _Chosen:
     """The cheapest plans that pass; of equal words one."""
-    query = progress.query
+    query, problem = progress.query, progress.query.problem
+    progress.counts["rejected_by_fcl"] = progress.counts["rejected_by_audit"] = 0
     chosen = _Chosen()
     seen: set[tuple[int, ...]] = set()
     words = sorted([*progress.words, *better.others], key=lambda word: word.cost)
@@ -231,30 +206,25 @@ def _checked(progress: _Progress, better: Improved, alternatives: int) -> _Chose
         key = (word.goal, *word.trims.tolist())
         if len(chosen.plans) > alternatives or key in seen:
             continue
-        if chosen.rejected_by_fcl + chosen.rejected_by_audit >= REJECTED and not chosen.plans:
+        if chosen.rejected >= REJECTED and not chosen.plans:
             break
         plan = plan_of_word(query, word)
-        most = query.problem.horizon.max_trims
+        most = problem.horizon.max_trims
         if most is not None and len(plan.trims) > most:
             continue
         index = query.goal_index[word.goal]
-        checked = check_plan(query.problem, plan, query.problem.goals[index])
-        if checked.passed:
+        checked = check_plan(problem, plan, problem.goals[index])
+        if checked.audit is not None and checked.passed:
             seen.add(key)
+            cost = problem.cost_of(plan)
             chosen.plans.append(
-                _Accepted(
-                    plan=plan,
-                    goal_index=index,
-                    cost=query.problem.cost_of(plan),
-                    checked=checked,
-                )
+                Accepted(plan=plan, goal_index=index, cost=cost, audit=checked.audit)
             )
-        elif checked.audit is None:
-            chosen.rejected_by_fcl += 1
-            chosen.reason = chosen.reason or checked.reason
-        else:
-            chosen.rejected_by_audit += 1
-            chosen.reason = chosen.reason or checked.reason
+            continue
+        by = "fcl" if checked.audit is None else "audit"
+        progress.counts[f"rejected_by_{by}"] += 1
+        chosen.rejected += 1
+        chosen.reason = chosen.reason or checked.reason
     chosen.plans.sort(key=lambda one: one.cost)
     return chosen
 
@@ -276,26 +246,18 @@ def plan_of_word(query: LatticeQuery, word: Word) -> Plan:
     return Plan(problem.start, tuple(trims), durations=durations, start_time=problem.start_time)
 
 
-def _left(problem: Problem, first: FirstPlan) -> int | None:
+def _left(progress: _Progress) -> int | None:
     """Expansions that may still be spent."""
-    most = problem.search.max_expansions
-    return None if most is None else max(0, most - first.expansions)
-
-
-def _timing(
-    began: float, found: float, refined: float, checked: float, first: float
-) -> dict[str, float]:
-    return {
-        "search": found - began,
-        "first_plan": first,
-        "refine": refined - found,
-        "audit": checked - refined,
-    }
+    most = progress.query.problem.search.max_expansions
+    return None if most is None else max(0, most - progress.counts["expansions"])
 
 
 def _why_none(query: LatticeQuery, first: FirstPlan, time_limit: float) -> tuple[PlanStatus, str]:
     if first.enclosed:
         return PlanStatus.UNREACHABLE, first.enclosed
+    impossible = why_impossible(query.problem)
+    if impossible:
+        return PlanStatus.UNREACHABLE, impossible
     nearest = (
         "" if math.isinf(first.nearest) else f"; the nearest node is {first.nearest:.3g} m off"
     )

@@ -7,11 +7,16 @@ from dataclasses import replace
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision import Disc
+from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.collision.blocked import touched
 from maneuver_automaton.collision.body import body_of
+from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
-from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.problem import Goal, Problem, moves
 from maneuver_automaton.search.inside import outside
+from maneuver_automaton.search.lattice_query import world_around
+
+CLEARLY = 1e-6  # [m] a clearance beyond the margin that leaves no doubt
 
 
 def blocked_ends(problem: Problem) -> PlanResult | None:
@@ -52,16 +57,25 @@ def why_goal_blocked(problem: Problem, goal: Goal) -> str:
 
 
 def where_touched(problem: Problem, pose: Array, time: float) -> str:
-    """What the vehicle touches at a pose and a time; inf: only what stands still counts."""
-    still = tuple(o for o in problem.obstacles if getattr(o, "motion", None) is None)
+    """What the vehicle touches at a pose and a time; inf: only what stands still counts.
+
+    The kernels prove most poses free; where they do not, shapely decides.
+    """
+    still = tuple(obstacle for obstacle in problem.obstacles if not moves(obstacle))
     obstacles = problem.obstacles if math.isfinite(time) else still
     if not obstacles:
         return ""
+    at = time if math.isfinite(time) else 0.0
+    if obstacles == problem.obstacles:
+        world = world_around(problem)
+        (gap,) = clearances(world, world.into(pose), times=at)
+        if gap > problem.margin + CLEARLY:
+            return ""
     return touched(
         problem.footprint,
         obstacles,
         pose,
-        time=time if math.isfinite(time) else 0.0,
+        time=at,
         margin=problem.margin,
-        origin=(float(pose[0]), float(pose[1])),
+        origin=origin_near(pose[:2]),
     )

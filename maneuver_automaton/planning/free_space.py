@@ -9,24 +9,27 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from maneuver_automaton.audit import Audit, terminal_error
+from maneuver_automaton.audit import Audit
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.planning.checking import check_plan
-from maneuver_automaton.planning.result import Alternative, PlanResult, PlanStatus
+from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search import SearchStatus, Solution
 from maneuver_automaton.search.certificate import certificate
-from maneuver_automaton.search.choose import load_search, search_goal
+from maneuver_automaton.search.choose import search_goal
 from maneuver_automaton.search.inside import outside
 from maneuver_automaton.search.limits import closed_bound, why_impossible
 from maneuver_automaton.search.result import plan_of
 
 
-def plan_by_words(problem: Problem, *, time_limit: float, alternatives: int) -> PlanResult:
-    """The cheapest word, by exhaustive search or insertion, that stays free and inside."""
-    load_search(problem)
-    began = time.monotonic()
-    found = _search_goals(problem, alternatives, began + time_limit)
+def plan_by_words(
+    problem: Problem, *, began: float, time_limit: float, alternatives: int
+) -> PlanResult:
+    """The cheapest word, by exhaustive search or insertion, that stays free and inside.
+
+    The time limit [s] counts from `began`, as `time.monotonic` does.
+    """
+    found = _search_goals(problem, alternatives, began, began + time_limit)
     searched = time.monotonic()
     chosen = _audited(problem, found.candidates, alternatives)
     audited = time.monotonic()
@@ -46,28 +49,12 @@ def plan_by_words(problem: Problem, *, time_limit: float, alternatives: int) -> 
         )
     best = chosen.plans[0]
     free = found.candidates[0].cost if found.proven else None
-    bound = _lower_bound(problem, best, free)
-    return PlanResult(
-        problem=problem,
-        status=PlanStatus.FOUND,
-        reason="",
-        plan=best.plan,
-        goal_index=best.goal_index,
-        cost=best.cost,
-        lower_bound=bound,
-        gap=_gap(best.cost, bound),
-        certificate=certificate(problem, problem.goals[best.goal_index], best.solution),
-        terminal_error=terminal_error(best.plan, problem.goals[best.goal_index]),
-        clearance_m=None if best.audit is None else best.audit.min_clearance_m,
-        audit=best.audit,
-        alternatives=tuple(
-            Alternative(
-                plan=other.plan,
-                cost=other.cost,
-                terminal_error=terminal_error(other.plan, problem.goals[other.goal_index]),
-            )
-            for other in chosen.plans[1:]
-        ),
+    goal = problem.goals[best.goal_index]
+    return found_plans(
+        problem,
+        [_accepted(candidate) for candidate in chosen.plans],
+        bound=_lower_bound(problem, free),
+        certificate=certificate(problem, goal, best.solution),
         timing_s=timing,
         counts=counts,
     )
@@ -109,14 +96,13 @@ class _Chosen:
     complaint: str
 
 
-def _search_goals(problem: Problem, alternatives: int, deadline: float) -> _Found:
+def _search_goals(problem: Problem, alternatives: int, began: float, deadline: float) -> _Found:
     """Search for every goal that is inside the bounds; all candidates, cheapest first."""
     bounded = any(getattr(problem.bounds, name) is not None for name in ("x", "y", "z"))
     sorted_out = bounded or bool(problem.obstacles)
     counts: dict[str, int] = {}
     candidates: list[_Candidate] = []
     exhausted = proven = True
-    began = time.monotonic()
     first_plan = math.nan
     for index, goal in enumerate(problem.goals):
         if outside(goal.pose, problem.bounds):
@@ -254,13 +240,18 @@ def _least_time(problem: Problem) -> tuple[PlanStatus, str] | None:
     )
 
 
-def _lower_bound(problem: Problem, best: _Candidate, free: float | None) -> float:
+def _lower_bound(problem: Problem, free: float | None) -> float:
     """No admitted plan is cheaper: the optimum `free` of bounds if proven, or a closed bound."""
     if free is not None:
-        return min(best.cost, free)
-    bounds = [closed_bound(problem, goal) for goal in problem.goals]
-    return min(best.cost, min(bounds))
+        return free
+    return min(closed_bound(problem, goal) for goal in problem.goals)
 
 
-def _gap(cost: float, bound: float) -> float:
-    return 0.0 if cost <= bound else (cost - bound) / cost
+def _accepted(candidate: _Candidate) -> Accepted:
+    assert candidate.audit is not None
+    return Accepted(
+        plan=candidate.plan,
+        goal_index=candidate.goal_index,
+        cost=candidate.cost,
+        audit=candidate.audit,
+    )

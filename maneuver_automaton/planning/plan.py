@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
-from maneuver_automaton.planning.among_obstacles import plan_on_lattice, prepare_lattice
+import time
+
+from maneuver_automaton.planning.among_obstacles import (
+    library_table,
+    plan_on_lattice,
+    prepare_map,
+)
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.free_space import plan_by_words
 from maneuver_automaton.planning.result import PlanResult
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.search.choose import load_search
 
 
@@ -45,18 +52,29 @@ def plan(problem: Problem, *, time_limit: float = 5.0, alternatives: int = 0) ->
         raise ValueError(f"time_limit must be positive, got {time_limit} s")
     if alternatives < 0:
         raise ValueError(f"alternatives must be at least 0, got {alternatives}")
+    among = uses_lattice(problem)
+    _load(problem)
+    began = time.monotonic()
     blocked = blocked_ends(problem)
     if blocked is not None:
         return blocked
-    if uses_lattice(problem):
-        return plan_on_lattice(problem, time_limit=time_limit, alternatives=alternatives)
-    return plan_by_words(problem, time_limit=time_limit, alternatives=alternatives)
+    how = plan_on_lattice if among else plan_by_words
+    return how(problem, began=began, time_limit=time_limit, alternatives=alternatives)
 
 
 def prepare(problem: Problem) -> None:
     """Have ready what every problem on the map of this one needs."""
+    _load(problem)
     if uses_lattice(problem):
-        prepare_lattice(problem)
+        prepare_map(problem)
+
+
+def _load(problem: Problem) -> None:
+    """Compile or load what planning needs, before the clock runs."""
+    if problem.obstacles or uses_lattice(problem):
+        load_lattice()
+    if uses_lattice(problem):
+        library_table(problem)
     else:
         load_search(problem)
 

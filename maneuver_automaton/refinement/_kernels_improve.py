@@ -18,7 +18,7 @@ from maneuver_automaton.search._kernels_connect import (
 )
 
 GAIN = 1e-9  # share of the cost that counts as a gain
-LENGTH, ACCEPTED, LAST, TRIED = range(4)
+LENGTH = 0  # place of the word's length in `state`
 
 
 @bare_inner_kernel
@@ -176,7 +176,7 @@ def gear_after(lib, work, n, k):
 
 @bare_kernel
 def attempt_all(lib, task, world, body, work, state, uniform, normal):
-    """Try one shortcut or via-point per row of the draws; counts in `state`; returns the cost.
+    """Try one shortcut or via-point per row of the draws; the length in `state`; returns the cost.
 
     `uniform` (k, 6): kind, middle, span, two chances to snap to a switch, spread of the via-point;
     `normal` (k, 3): its place and heading.
@@ -185,7 +185,6 @@ def attempt_all(lib, task, world, body, work, state, uniform, normal):
     cost = word_cost(lib, work.trims, work.durations, n)
     unroll(lib, work, n)
     for row in range(uniform.shape[0]):
-        state[TRIED] += 1
         total = work.times[n]
         if n == 0 or not total > 0.0:
             return cost
@@ -320,8 +319,6 @@ def attempt_all(lib, task, world, body, work, state, uniform, normal):
         take(work, state, size)
         n, cost = size, new_cost
         unroll(lib, work, n)
-        state[ACCEPTED] += 1
-        state[LAST] = row
     return cost
 
 
@@ -414,6 +411,5 @@ def dynamic_programming(lib, task, world, body, work, state, points):
     new_cost = word_cost(lib, work.new_trims, work.new_durations, size)
     if new_cost < cost - GAIN * cost:
         take(work, state, size)
-        state[ACCEPTED] += 1
         return new_cost
     return cost

@@ -42,7 +42,6 @@ WEIGHTS = (2.0, 1.5, 1.25, 1.1, 1.0)
 VIA = 0.6  # share of attempts with a via-point
 SNAP = 0.25  # chance of an end to snap to a switch
 SEED = 20_09  # of the random draws
-MOST_WORD = 4096  # trims
 MOST_OTHERS = 50  # words kept beside the best
 TIMELY = 400  # attempts between two looks at the clock
 
@@ -96,6 +95,7 @@ class Improved:
     word: Word
     attempts: int
     expansions: int
+    queries: int  # collision queries of the new searches
     passes: int  # new searches
     finished: bool  # nothing gained for as long as the settings ask
     others: tuple[Word, ...] = ()  # what other searches came to, cheapest first
@@ -147,6 +147,7 @@ class _Improvement:
     better: Better
     attempts: int = 0
     expansions: int = 0
+    queries: int = 0
     passes: int = 0
     others: list[Word] = field(default_factory=list)
 
@@ -187,6 +188,7 @@ class _Improvement:
             word=self.best,
             attempts=self.attempts,
             expansions=self.expansions,
+            queries=self.queries,
             passes=self.passes,
             finished=not self._late(),
             others=tuple(sorted(self.others, key=lambda other: other.cost)[:MOST_OTHERS]),
@@ -240,6 +242,7 @@ class _Improvement:
         word = one.run(cap, PRUNE * self.best.cost, deadline=self.deadline)
         memory[0] = one.arrays
         self.expansions += one.expansions
+        self.queries += one.queries
         self.passes += 1
         return None if word is None else with_cost(word, self.query)
 
@@ -309,7 +312,7 @@ def work_of(query: LatticeQuery, word: Word) -> tuple[Work, IntArray]:
     )
     work.trims[: len(word.trims)] = word.trims
     work.durations[: len(word.trims)] = word.durations
-    return work, np.array([len(word.trims), 0, -1, 0], dtype=np.int64)
+    return work, np.array([len(word.trims)], dtype=np.int64)
 
 
 def word_of(work: Work, state: IntArray, word: Word, query: LatticeQuery) -> Word:

@@ -130,7 +130,7 @@ def _outcome(
     return FirstPlan(
         word=word,
         expansions=expansions,
-        queries=sum(int(one.arrays.state[kernels.QUERIES]) for one in passes),
+        queries=sum(one.queries for one in passes),
         exhausted=exhausted,
         enclosed=enclosed,
         nearest=nearest,

@@ -117,6 +117,11 @@ class Pass:
         """Nodes expanded so far."""
         return int(self.arrays.state[kernels.EXPANSIONS])
 
+    @property
+    def queries(self) -> int:
+        """Motions and connections whose collisions were asked for."""
+        return int(self.arrays.state[kernels.QUERIES])
+
     def run(self, n: int, ceiling: float, *, deadline: float = math.inf) -> Word | None:
         """Expand up to `n` more nodes; a plan, if one was found that costs less than `ceiling`."""
         query = self.query

@@ -69,9 +69,7 @@ class LatticeQuery:
 def lattice_query(problem: Problem, goal_index: tuple[int, ...]) -> LatticeQuery:
     """Start and the goals of these numbers, with the world around them."""
     library = lattice_library(problem)
-    first = problem.goals[goal_index[0]].pose
-    frame = own_frame(problem.obstacles, first)
-    world = world_of(problem.obstacles, problem.footprint, frame, keep=problem.margin)
+    world = world_around(problem)
     start = world.into(problem.start)
     goals = world.into(np.array([problem.goals[k].pose for k in goal_index]))
     box, window, bounded = _window(problem, world, library.radius, np.vstack([start, goals]))
@@ -91,6 +89,12 @@ def lattice_query(problem: Problem, goal_index: tuple[int, ...]) -> LatticeQuery
         margin=_margin(problem, world, start, goals),
         most_time=math.inf if limit is None else limit * (1.0 + 1e-12),
     )
+
+
+def world_around(problem: Problem) -> World:
+    """The obstacles of a problem around its footprint, prepared once for a map."""
+    frame = own_frame(problem.obstacles, problem.goals[0].pose)
+    return world_of(problem.obstacles, problem.footprint, frame, keep=problem.margin)
 
 
 def admitted_goals(problem: Problem) -> tuple[int, ...]:
