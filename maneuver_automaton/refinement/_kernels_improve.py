@@ -6,6 +6,7 @@ A word is two arrays, trims and durations, of which the first `n` entries count.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
 from maneuver_automaton.search._kernels_connect import (
@@ -174,6 +175,200 @@ def gear_after(lib, work, n, k):
     return gear
 
 
+class Section(NamedTuple):
+    """A stretch of a word for which a new middle is sought."""
+
+    begin: float  # [s]
+    end: float
+    first: int  # place of the trim that is driven at its begin
+    last: int  # and at its end
+    start: tuple[float, float, float]  # poses [m, m, rad]
+    goal: tuple[float, float, float]
+    entry: tuple[int, int]  # trim and gear before
+    leave: tuple[int, int]  # and after
+    free_heading: bool
+    budget: float  # the new middle must be cheaper
+    left: float  # [s] it may last so long
+    clock: float  # [s] time of the world at its begin
+
+
+@bare_inner_kernel
+def section_price(lib, work, begin, end, first, last):
+    """Price of the word between two times, its switches included."""
+    price = 0.0
+    for k in range(first, last + 1):
+        low, high = max(work.times[k], begin), min(work.times[k + 1], end)
+        price += lib.rates[work.trims[k]] * max(high - low, 0.0)
+    if lib.switch > 0.0:
+        price += lib.switch * (last - first)
+    for k in range(first, last):
+        if lib.gears[work.trims[k]] * lib.gears[work.trims[k + 1]] < 0:
+            price += lib.direction_change
+    return price
+
+
+@bare_inner_kernel
+def drawn_section(lib, task, work, n, cost, draw):
+    """The section of a word of `cost` that six numbers between 0 and 1 draw."""
+    total = work.times[n]
+    middle = draw[1] * total
+    shortest = min(task.shortest_span, 0.5 * total)
+    span = shortest * (total / shortest) ** draw[2]
+    begin = max(middle - 0.5 * span, 0.0)
+    end = min(middle + 0.5 * span, total)
+    first, last = owner(work, n, begin), owner(work, n, end)
+    if draw[3] < task.snap:
+        begin = work.times[first]
+    if draw[4] < task.snap:
+        end = work.times[last + 1]
+    to_end = end >= total
+    entered = first if begin > work.times[first] else first - 1
+    before = NO_TRIM if entered < 0 else work.trims[entered]
+    after = NO_TRIM if to_end else work.trims[last]
+    return Section(
+        begin,
+        end,
+        first,
+        last,
+        pose_at(lib, work, first, begin),
+        pose_at(lib, work, last, end),
+        (before, 0 if before == NO_TRIM else gear_before(lib, work, entered)),
+        (after, 0 if after == NO_TRIM else gear_after(lib, work, n, last)),
+        task.free_heading and to_end,
+        section_price(lib, work, begin, end, first, last) - GAIN * cost,
+        task.most_time - total + (end - begin),
+        task.clock + begin,
+    )
+
+
+@inlined_kernel
+def cheapest_of(scratch, n):
+    """Least cost of `n` candidates; inf if there are none."""
+    least = math.inf
+    for k in range(n):
+        least = min(least, scratch.costs[k])
+    return least
+
+
+@bare_inner_kernel
+def put_free(
+    lib, task, world, body, work, triples, pose, n, most_cost, most_time, clock, scratch, m
+):
+    """Append to the new middle, of `m` trims, the cheapest free one of `n` candidates.
+
+    Returns its number and the middle's new length; -1 and -1 if there is none.
+    """
+    which = free_candidate(
+        lib, task, world, body, triples, pose, n, most_cost, most_time, clock, scratch
+    )
+    if which < 0:
+        return -1, -1
+    return which, put_middle(lib, work, triples, scratch, which, m)
+
+
+@bare_inner_kernel
+def direct_middle(lib, task, world, body, work, section):
+    """Write into the new middle three trims that join the ends of a section.
+
+    Returns its length, -1 if there is none that is free and cheap enough; so does `via_middle`.
+    """
+    x, y, heading = section.start
+    e_x, e_y, e_heading = section.goal
+    if math.hypot(e_x - x, e_y - y) * task.per_metre >= section.budget:
+        return -1
+    triples = lib.free_triples if section.free_heading else lib.triples
+    entry, leave = section.entry, section.leave
+    n = candidates(lib, triples, x, y, heading, e_x, e_y, e_heading, entry, leave, work.one)
+    _, m = put_free(
+        lib,
+        task,
+        world,
+        body,
+        work,
+        triples,
+        section.start,
+        n,
+        section.budget,
+        section.left,
+        section.clock,
+        work.one,
+        0,
+    )
+    return m
+
+
+@bare_inner_kernel
+def via_pose(lib, task, work, n, section, size, shift):
+    """A pose near the middle of a section, shifted by normal numbers times the spread of `size`."""
+    spread = task.spread * (1.0 / 33.0) ** size
+    half = 0.5 * (section.begin + section.end)
+    x, y, heading = pose_at(lib, work, owner(work, n, half), half)
+    x += spread * shift[0]
+    y += spread * shift[1]
+    heading += 0.5 * spread / task.radius * shift[2]
+    return x, y, heading
+
+
+@bare_inner_kernel
+def via_middle(lib, task, world, body, work, section, via):
+    """Write into the new middle three trims to the pose `via`, and three from there on."""
+    x, y, heading = section.start
+    v_x, v_y, v_heading = via
+    e_x, e_y, e_heading = section.goal
+    one, two, budget = work.one, work.two, section.budget
+    way = math.hypot(v_x - x, v_y - y) + math.hypot(e_x - v_x, e_y - v_y)
+    if way * task.per_metre >= budget:
+        return -1
+    nowhere = (NO_TRIM, 0)
+    n_1 = candidates(
+        lib, lib.triples, x, y, heading, v_x, v_y, v_heading, section.entry, nowhere, one
+    )
+    cheapest = cheapest_of(one, n_1)
+    if cheapest >= budget:
+        return -1
+    triples = lib.free_triples if section.free_heading else lib.triples
+    n_2 = candidates(
+        lib, triples, v_x, v_y, v_heading, e_x, e_y, e_heading, nowhere, section.leave, two
+    )
+    rest = cheapest_of(two, n_2)
+    if cheapest + rest >= budget:
+        return -1
+    which, m = put_free(
+        lib,
+        task,
+        world,
+        body,
+        work,
+        lib.triples,
+        section.start,
+        n_1,
+        budget - rest,
+        section.left,
+        section.clock,
+        one,
+        0,
+    )
+    if which < 0:
+        return -1
+    used = one.durations[which]
+    _, m = put_free(
+        lib,
+        task,
+        world,
+        body,
+        work,
+        triples,
+        via,
+        n_2,
+        budget - one.costs[which],
+        section.left - used,
+        section.clock + used,
+        two,
+        m,
+    )
+    return m
+
+
 @bare_kernel
 def attempt_all(lib, task, world, body, work, state, uniform, normal):
     """Try one shortcut or via-point per row of the draws; the length in `state`; returns the cost.
@@ -184,136 +379,26 @@ def attempt_all(lib, task, world, body, work, state, uniform, normal):
     n = state[LENGTH]
     cost = word_cost(lib, work.trims, work.durations, n)
     unroll(lib, work, n)
+    changes = world.movers.speed.shape[0] > 0  # what comes after is driven at other times
     for row in range(uniform.shape[0]):
-        total = work.times[n]
-        if n == 0 or not total > 0.0:
+        if n == 0 or not work.times[n] > 0.0:
             return cost
-        middle = uniform[row, 1] * total
-        shortest = min(task.shortest_span, 0.5 * total)
-        span = shortest * (total / shortest) ** uniform[row, 2]
-        begin = max(middle - 0.5 * span, 0.0)
-        end = min(middle + 0.5 * span, total)
-        first, last = owner(work, n, begin), owner(work, n, end)
-        if uniform[row, 3] < task.snap:
-            begin = work.times[first]
-        if uniform[row, 4] < task.snap:
-            end = work.times[last + 1]
-        x, y, heading = pose_at(lib, work, first, begin)
-        e_x, e_y, e_heading = pose_at(lib, work, last, end)
-        to_end = end >= total
-        free_heading = task.free_heading and to_end
-        section = 0.0
-        for k in range(first, last + 1):
-            low, high = max(work.times[k], begin), min(work.times[k + 1], end)
-            section += lib.rates[work.trims[k]] * max(high - low, 0.0)
-        if lib.switch > 0.0:
-            section += lib.switch * (last - first)
-        for k in range(first, last):
-            if lib.gears[work.trims[k]] * lib.gears[work.trims[k + 1]] < 0:
-                section += lib.direction_change
-        entered = first if begin > work.times[first] else first - 1
-        before = NO_TRIM if entered < 0 else work.trims[entered]
-        after = NO_TRIM if to_end else work.trims[last]
-        entry = (before, 0 if before == NO_TRIM else gear_before(lib, work, entered))
-        leave = (after, 0 if after == NO_TRIM else gear_after(lib, work, n, last))
-        left = task.most_time - total + (end - begin)
-        clock = task.clock + begin
-        budget = section - GAIN * cost
-        m = 0
-        if uniform[row, 0] < task.via:
-            spread = task.spread * (1.0 / 33.0) ** uniform[row, 5]
-            half = 0.5 * (begin + end)
-            v_x, v_y, v_heading = pose_at(lib, work, owner(work, n, half), half)
-            v_x += spread * normal[row, 0]
-            v_y += spread * normal[row, 1]
-            v_heading += 0.5 * spread / task.radius * normal[row, 2]
-            way = math.hypot(v_x - x, v_y - y) + math.hypot(e_x - v_x, e_y - v_y)
-            if way * task.per_metre >= budget:
-                continue
-            nowhere = (NO_TRIM, 0)
-            n_1 = candidates(
-                lib, lib.triples, x, y, heading, v_x, v_y, v_heading, entry, nowhere, work.one
-            )
-            if n_1 == 0:
-                continue
-            cheapest = math.inf
-            for k in range(n_1):
-                cheapest = min(cheapest, work.one.costs[k])
-            if cheapest >= budget:
-                continue
-            triples = lib.free_triples if free_heading else lib.triples
-            n_2 = candidates(
-                lib, triples, v_x, v_y, v_heading, e_x, e_y, e_heading, nowhere, leave, work.two
-            )
-            rest = math.inf
-            for k in range(n_2):
-                rest = min(rest, work.two.costs[k])
-            if cheapest + rest >= budget:
-                continue
-            which = free_candidate(
-                lib,
-                task,
-                world,
-                body,
-                lib.triples,
-                (x, y, heading),
-                n_1,
-                budget - rest,
-                left,
-                clock,
-                work.one,
-            )
-            if which < 0:
-                continue
-            used = work.one.durations[which]
-            spent = work.one.costs[which]
-            m = put_middle(lib, work, lib.triples, work.one, which, 0)
-            which = free_candidate(
-                lib,
-                task,
-                world,
-                body,
-                triples,
-                (v_x, v_y, v_heading),
-                n_2,
-                budget - spent,
-                left - used,
-                clock + used,
-                work.two,
-            )
-            if which < 0:
-                continue
-            m = put_middle(lib, work, triples, work.two, which, m)
+        draw = uniform[row]
+        section = drawn_section(lib, task, work, n, cost, draw)
+        if draw[0] < task.via:
+            via = via_pose(lib, task, work, n, section, draw[5], normal[row])
+            m = via_middle(lib, task, world, body, work, section, via)
         else:
-            if math.hypot(e_x - x, e_y - y) * task.per_metre >= budget:
-                continue
-            triples = lib.free_triples if free_heading else lib.triples
-            n_1 = candidates(
-                lib, triples, x, y, heading, e_x, e_y, e_heading, entry, leave, work.one
-            )
-            which = free_candidate(
-                lib,
-                task,
-                world,
-                body,
-                triples,
-                (x, y, heading),
-                n_1,
-                budget,
-                left,
-                clock,
-                work.one,
-            )
-            if which < 0:
-                continue
-            m = put_middle(lib, work, triples, work.one, which, 0)
-        size = spliced(lib, work, n, begin, end, first, last, m)
+            m = direct_middle(lib, task, world, body, work, section)
+        if m < 0:
+            continue
+        begin, end = section.begin, section.end
+        size = spliced(lib, work, n, begin, end, section.first, section.last, m)
         if not admitted(lib, task, work, size):
             continue
         new_cost = word_cost(lib, work.new_trims, work.new_durations, size)
         if not new_cost < cost - GAIN * cost:
             continue
-        changes = world.movers.speed.shape[0] > 0  # what comes after is driven at other times
         if changes and not still_free(lib, task, world, body, work, size, begin):
             continue
         take(work, state, size)
