@@ -1,7 +1,4 @@
-"""Shorten a free word: dynamic programming over its points, shortcuts, and via-points.
-
-A word is two arrays, trims and durations, of which the first `n` entries count.
-"""
+"""Shorten a free word by random shortcuts and via-points."""
 
 from __future__ import annotations
 
@@ -9,6 +6,19 @@ import math
 from typing import NamedTuple
 
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
+from maneuver_automaton.refinement._kernels_word import (
+    GAIN,
+    LENGTH,
+    admitted,
+    append,
+    gear_after,
+    gear_before,
+    owner,
+    pose_at,
+    take,
+    unroll,
+    word_cost,
+)
 from maneuver_automaton.search._kernels_connect import (
     NO_TRIM,
     candidates,
@@ -17,74 +27,6 @@ from maneuver_automaton.search._kernels_connect import (
     may_stay,
     trim_free,
 )
-
-GAIN = 1e-9  # share of the cost that counts as a gain
-LENGTH = 0  # place of the word's length in `state`
-
-
-@bare_inner_kernel
-def word_cost(lib, trims, durations, n):
-    """Cost of a word with the prices of its switches."""
-    cost, gear = 0.0, 0
-    for k in range(n):
-        trim = trims[k]
-        cost += lib.rates[trim] * durations[k]
-        if k > 0:
-            cost += lib.switch
-        if lib.gears[trim] != 0:
-            if gear * lib.gears[trim] < 0:
-                cost += lib.direction_change
-            gear = lib.gears[trim]
-    return cost
-
-
-@bare_inner_kernel
-def unroll(lib, work, n):
-    """Fill the poses and times at the switches of the word in `work`."""
-    x, y, heading = work.start[0], work.start[1], work.start[2]
-    time = 0.0
-    for k in range(n):
-        work.poses[k, 0], work.poses[k, 1], work.poses[k, 2] = x, y, heading
-        work.times[k] = time
-        trim, t = work.trims[k], work.durations[k]
-        x, y, heading = driven(lib, trim, x, y, heading, t)
-        time += t
-    work.poses[n, 0], work.poses[n, 1], work.poses[n, 2] = x, y, heading
-    work.times[n] = time
-
-
-@inlined_kernel
-def owner(work, n, time):
-    """Number of the trim that is driven at a time; the later one at a switch."""
-    low, high = 0, n
-    while high - low > 1:
-        middle = (low + high) // 2
-        if work.times[middle] <= time:
-            low = middle
-        else:
-            high = middle
-    return low
-
-
-@inlined_kernel
-def pose_at(lib, work, k, time):
-    """Pose at a time within trim `k`."""
-    t = time - work.times[k]
-    return driven(lib, work.trims[k], work.poses[k, 0], work.poses[k, 1], work.poses[k, 2], t)
-
-
-@bare_inner_kernel
-def append(lib, trims, durations, n, trim, t):
-    """Put a trim at the end of a word, joined with the last one if that is the same."""
-    if t < lib.shortest:
-        return n
-    if n > 0 and trims[n - 1] == trim:
-        durations[n - 1] += t
-        return n
-    if n >= trims.shape[0] - 1:
-        return n + 1  # too long: the caller sees it
-    trims[n], durations[n] = trim, t
-    return n + 1
 
 
 @bare_inner_kernel
@@ -107,19 +49,6 @@ def spliced(lib, work, n, begin, end, first, last, m):
 
 
 @bare_inner_kernel
-def admitted(lib, task, work, size):
-    """Whether the word in `work.new_*` keeps the limits of words."""
-    if size > work.new_trims.shape[0] - 1 or (task.most_trims > 0 and size > task.most_trims):
-        return False
-    duration = 0.0
-    for k in range(size):
-        if work.new_durations[k] < lib.min_coast:
-            return False
-        duration += work.new_durations[k]
-    return duration <= task.most_time
-
-
-@bare_inner_kernel
 def still_free(lib, task, world, body, work, size, begin):
     """Whether the word in `work.new_*` is free after `begin` [s], where obstacles move."""
     x, y, heading = work.start[0], work.start[1], work.start[2]
@@ -135,14 +64,6 @@ def still_free(lib, task, world, body, work, size, begin):
     return may_stay(task, world, body, x, y, heading, task.clock + time)
 
 
-@bare_inner_kernel
-def take(work, state, size):
-    """Make the word in `work.new_*` the word."""
-    for k in range(size):
-        work.trims[k], work.durations[k] = work.new_trims[k], work.new_durations[k]
-    state[LENGTH] = size
-
-
 @inlined_kernel
 def put_middle(lib, work, triples, scratch, which, m):
     """Append a candidate to the new middle; returns its length."""
@@ -153,26 +74,6 @@ def put_middle(lib, work, triples, scratch, which, m):
             work.middle_trims[m], work.middle_durations[m] = trim, t
             m += 1
     return m
-
-
-@inlined_kernel
-def gear_before(lib, work, k):
-    """Sign of the last forward speed up to trim `k`, that included."""
-    gear = 0
-    while k >= 0 and gear == 0:
-        gear = lib.gears[work.trims[k]]
-        k -= 1
-    return gear
-
-
-@inlined_kernel
-def gear_after(lib, work, n, k):
-    """Sign of the first forward speed from trim `k` on."""
-    gear = 0
-    while k < n and gear == 0:
-        gear = lib.gears[work.trims[k]]
-        k += 1
-    return gear
 
 
 class Section(NamedTuple):
@@ -404,97 +305,4 @@ def attempt_all(lib, task, world, body, work, state, uniform, normal):
         take(work, state, size)
         n, cost = size, new_cost
         unroll(lib, work, n)
-    return cost
-
-
-@bare_kernel
-def dynamic_programming(lib, task, world, body, work, state, points):
-    """Best way over `points` poses of the word, joined by triples where that is cheaper.
-
-    Returns the cost. The word changes only if it gains; nothing may move.
-    """
-    n = state[LENGTH]
-    cost = word_cost(lib, work.trims, work.durations, n)
-    unroll(lib, work, n)
-    total = work.times[n]
-    if n == 0 or points < 2:
-        return cost
-    for j in range(points):
-        time = total * j / (points - 1)
-        k = owner(work, n, time)
-        x, y, heading = pose_at(lib, work, k, min(time, work.times[k + 1]))
-        work.at[j, 0], work.at[j, 1], work.at[j, 2], work.at[j, 3] = x, y, heading, time
-        work.best[j] = math.inf
-        work.back[j] = -1
-    work.best[0] = 0.0
-    nowhere = (NO_TRIM, 0)
-    for j in range(1, points):
-        begin, end = work.at[j - 1, 3], work.at[j, 3]
-        first, last = owner(work, n, begin), owner(work, n, end)
-        along = 0.0
-        for k in range(first, last + 1):
-            low, high = max(work.times[k], begin), min(work.times[k + 1], end)
-            along += lib.rates[work.trims[k]] * max(high - low, 0.0)
-            if k > first:
-                along += lib.switch
-                if lib.gears[work.trims[k]] * lib.gears[work.trims[k - 1]] < 0:
-                    along += lib.direction_change
-        work.best[j] = work.best[j - 1] + along
-        work.back[j] = -1
-        e_x, e_y, e_heading = work.at[j, 0], work.at[j, 1], work.at[j, 2]
-        free_heading = task.free_heading and j == points - 1
-        triples = lib.free_triples if free_heading else lib.triples
-        for i in range(j - 1):
-            x, y, heading = work.at[i, 0], work.at[i, 1], work.at[i, 2]
-            budget = work.best[j] - work.best[i]
-            if math.hypot(e_x - x, e_y - y) * task.per_metre >= budget:
-                continue
-            count = candidates(
-                lib, triples, x, y, heading, e_x, e_y, e_heading, nowhere, nowhere, work.one
-            )
-            which = free_candidate(
-                lib,
-                task,
-                world,
-                body,
-                triples,
-                (x, y, heading),
-                count,
-                budget - GAIN * cost,
-                task.most_time,
-                task.clock + work.at[i, 3],
-                work.one,
-            )
-            if which < 0:
-                continue
-            work.best[j] = work.best[i] + work.one.costs[which]
-            work.back[j] = i
-            row = work.one.rows[which]
-            for n_th in range(3):
-                work.by_trims[j, n_th] = triples[row, n_th]
-                work.by_durations[j, n_th] = work.one.times[which, n_th]
-    j, n_legs = points - 1, 0
-    while j > 0:
-        work.legs[n_legs] = j
-        n_legs += 1
-        j = work.back[j] if work.back[j] >= 0 else j - 1
-    size = 0
-    for leg in range(n_legs - 1, -1, -1):
-        j = work.legs[leg]
-        if work.back[j] >= 0:
-            for n_th in range(3):
-                trim, t = work.by_trims[j, n_th], work.by_durations[j, n_th]
-                if t > 0.0 and trim < lib.n_trims:
-                    size = append(lib, work.new_trims, work.new_durations, size, trim, t)
-            continue
-        begin, end = work.at[j - 1, 3], work.at[j, 3]
-        for k in range(owner(work, n, begin), owner(work, n, end) + 1):
-            t = min(work.times[k + 1], end) - max(work.times[k], begin)
-            size = append(lib, work.new_trims, work.new_durations, size, work.trims[k], t)
-    if not admitted(lib, task, work, size):
-        return cost
-    new_cost = word_cost(lib, work.new_trims, work.new_durations, size)
-    if new_cost < cost - GAIN * cost:
-        take(work, state, size)
-        return new_cost
     return cost
