@@ -86,17 +86,9 @@ def in_the_problem(query, nodes):
 TIGHT = Rung(contact=True, scale=0.5, quanta=0.5, stop=False)
 
 
-NAMES = [
-    pytest.param(name, marks=pytest.mark.xfail(
-        not COMPILED, strict=True, raises=OverflowError, reason="counts of trims are of 32 bits"
-    )) if name == "few" else name
-    for name in PROBLEMS
-]  # fmt: skip
-
-
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("rung", [Rung(stop=False), TIGHT])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", PROBLEMS)
 def test_nodes_are_ends_of_free_ways(name, rung, sign):
     problem = PROBLEMS[name]
     if sign < 0.0 and problem.moves:
