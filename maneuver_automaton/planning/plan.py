@@ -12,6 +12,7 @@ from maneuver_automaton.planning.among_obstacles import (
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.free_space import plan_by_words
 from maneuver_automaton.planning.result import PlanResult
+from maneuver_automaton.planning.with_inertia import plan_with_inertia
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.search.choose import load_search
@@ -58,7 +59,10 @@ def plan(problem: Problem, *, time_limit: float = 5.0, alternatives: int = 0) ->
     blocked = blocked_ends(problem)
     if blocked is not None:
         return blocked
-    how = plan_on_lattice if among else plan_by_words
+    if not problem.automaton.is_kinematic or problem.automaton.model.reduced_names:
+        how = plan_with_inertia
+    else:
+        how = plan_on_lattice if among else plan_by_words
     return how(problem, began=began, time_limit=time_limit, alternatives=alternatives)
 
 

@@ -1,0 +1,140 @@
+"""Plans of vehicles with inertia: a plan that stops and steers at once, then better ones."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.planning.checking import check_plan, load_checks
+from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
+from maneuver_automaton.planning.tracking import track
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinematic_problem
+from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
+
+FIRST_SHARE = 0.8  # of the time limit, for a first plan
+
+
+def plan_with_inertia(
+    problem: Problem, *, began: float, time_limit: float, alternatives: int
+) -> PlanResult:
+    """The cheapest plan found for a vehicle with inertia; every one that is kept was audited.
+
+    The time limit [s] counts from `began`, as `time.monotonic` does.
+    """
+    heard = _Heard(problem, began, began + time_limit)
+    for plan, goal_index in _candidates(heard):
+        heard.hear(plan, goal_index)
+        if time.monotonic() >= heard.deadline:
+            break
+    timing = {
+        "search": heard.searched - began,
+        "first_plan": heard.improvements[0][0] if heard.improvements else math.nan,
+        "refine": max(time.monotonic() - heard.searched, 0.0),
+        "audit": heard.checking,
+    }
+    if not heard.accepted:
+        status, reason = heard.why_none(time_limit)
+        timing.pop("first_plan")
+        return PlanResult(
+            problem=problem, status=status, reason=reason, timing_s=timing, counts=heard.counts
+        )
+    return found_plans(
+        problem,
+        heard.accepted[: alternatives + 1],
+        bound=_lower_bound(problem),
+        timing_s=timing,
+        counts=heard.counts,
+        improvements=tuple(heard.improvements),
+    )
+
+
+@dataclass(slots=True, eq=False)
+class _Heard:
+    """Plans that were found and passed every check, cheapest first."""
+
+    problem: Problem
+    began: float
+    deadline: float
+    searched: float = 0.0
+    accepted: list[Accepted] = field(default_factory=list)
+    improvements: list[tuple[float, float]] = field(default_factory=list)
+    counts: dict[str, int] = field(
+        default_factory=lambda: {"expansions": 0, "collision_queries": 0, "rejected": 0}
+    )
+    checking: float = 0.0
+    refused: str = ""
+    reason: str = ""
+
+    @property
+    def left(self) -> float:
+        """Time that is left [s]."""
+        return self.deadline - time.monotonic()
+
+    def hear(self, plan: Plan, goal_index: int) -> None:
+        """Keep a plan if it passes the checks."""
+        begin = time.monotonic()
+        checked = check_plan(self.problem, plan, self.problem.goals[goal_index])
+        now = time.monotonic()
+        self.checking += now - begin
+        if checked.audit is None or not checked.passed:
+            self.counts["rejected"] += 1
+            self.refused = self.refused or checked.reason
+            return
+        cost = self.problem.cost_of(plan)
+        best = self.accepted[0].cost if self.accepted else math.inf
+        self.accepted.append(
+            Accepted(plan=plan, goal_index=goal_index, cost=cost, audit=checked.audit)
+        )
+        self.accepted.sort(key=lambda one: one.cost)
+        if cost < best:
+            self.improvements.append((now - self.began, cost))
+        if not self.searched:
+            self.searched = now
+
+    def why_none(self, time_limit: float) -> tuple[PlanStatus, str]:
+        if self.refused:
+            return PlanStatus.NO_PLAN, f"every plan found was refused: {self.refused}"
+        return PlanStatus.OUT_OF_BUDGET, f"no plan within {time_limit:g} s{self.reason}"
+
+
+def _candidates(heard: _Heard) -> Iterator[tuple[Plan, int]]:
+    """Plans as they are found, and the goals they reach."""
+    problem = heard.problem
+    load_checks(problem)
+    if follows_paths(problem.automaton.model) and _rests(problem):
+        yield from _along_paths(heard)
+
+
+def _along_paths(heard: _Heard) -> Iterator[tuple[Plan, int]]:
+    problem = heard.problem
+    simpler = kinematic_problem(problem)
+    found = track(simpler, time_limit=FIRST_SHARE * heard.left)
+    if found.plan is None or found.goal_index is None:
+        heard.reason = f" ({found.reason})" if found.reason else ""
+        return
+    goal = problem.goals[found.goal_index]
+    yield (
+        stop_and_steer(
+            problem.automaton.model,  # type: ignore[arg-type]
+            found.plan,
+            first=problem.first_trim,
+            last=problem.last_trim(goal),
+        ),
+        found.goal_index,
+    )
+
+
+def _rests(problem: Problem) -> bool:
+    """Whether the vehicle starts and ends at rest."""
+    return problem.first_trim.is_rest and all(
+        problem.last_trim(goal).is_rest for goal in problem.goals
+    )
+
+
+def _lower_bound(problem: Problem) -> float:
+    """No plan is cheaper: nothing is known yet but that costs are not negative."""
+    return 0.0
