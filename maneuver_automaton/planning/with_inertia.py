@@ -8,14 +8,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.planning.among_obstacles import library_table
 from maneuver_automaton.planning.checking import check_plan, load_checks
 from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
 from maneuver_automaton.planning.tracking import track
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.refinement.improve import Patience
 from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinematic_problem
+from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
 
-FIRST_SHARE = 0.8  # of the time limit, for a first plan
+FIRST_SHARE = 0.8  # of the time limit, for a first path
+IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
+AT_ONCE = Patience(attempts=0, passes=0)
 
 
 def plan_with_inertia(
@@ -110,22 +115,34 @@ def _candidates(heard: _Heard) -> Iterator[tuple[Plan, int]]:
 
 
 def _along_paths(heard: _Heard) -> Iterator[tuple[Plan, int]]:
+    """Stop and steer along a first path, then along one that is fast to follow so."""
     problem = heard.problem
-    simpler = kinematic_problem(problem)
-    found = track(simpler, time_limit=FIRST_SHARE * heard.left)
-    if found.plan is None or found.goal_index is None:
-        heard.reason = f" ({found.reason})" if found.reason else ""
+    free = kinematic_problem(problem, switch=0.0)
+    first = track(free, time_limit=FIRST_SHARE * heard.left, patience=AT_ONCE)
+    if first.plan is None or first.goal_index is None:
+        heard.reason = f" ({first.reason})" if first.reason else ""
         return
-    goal = problem.goals[found.goal_index]
-    yield (
-        stop_and_steer(
-            problem.automaton.model,  # type: ignore[arg-type]
-            found.plan,
-            first=problem.first_trim,
-            last=problem.last_trim(goal),
-        ),
-        found.goal_index,
+    yield _stopping(problem, first.plan, first.goal_index), first.goal_index
+    left = IMPROVED_SHARE * heard.left
+    better = track(kinematic_problem(problem), time_limit=left, known=first.plan)
+    if better.plan is not None and better.goal_index is not None:
+        yield _stopping(problem, better.plan, better.goal_index), better.goal_index
+
+
+def _stopping(problem: Problem, path: Plan, goal_index: int) -> Plan:
+    return stop_and_steer(
+        problem.automaton.model,  # type: ignore[arg-type]
+        path,
+        first=problem.first_trim,
+        last=problem.last_trim(problem.goals[goal_index]),
     )
+
+
+def load_inertia(problem: Problem) -> None:
+    """Compile or load what `plan_with_inertia` needs, before the clock runs."""
+    load_lattice()
+    if follows_paths(problem.automaton.model) and _rests(problem):
+        library_table(kinematic_problem(problem, switch=0.0))
 
 
 def _rests(problem: Problem) -> bool:
