@@ -7,16 +7,21 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.among_obstacles import library_table
+from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.checking import check_plan, load_checks
 from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
-from maneuver_automaton.planning.tracking import track
+from maneuver_automaton.planning.tracking import Tracked, track
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.improve import Patience
 from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinematic_problem
 from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
+from maneuver_automaton.search.lattice_query import lattice_query
 
 FIRST_SHARE = 0.8  # of the time limit, for a first path
 IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
@@ -73,11 +78,18 @@ class _Heard:
     checking: float = 0.0
     refused: str = ""
     reason: str = ""
+    enclosed: str = ""  # why no plan can exist
 
     @property
     def left(self) -> float:
         """Time that is left [s]."""
         return self.deadline - time.monotonic()
+
+    def count(self, found: Tracked) -> Tracked:
+        """Add up what a search for a path took."""
+        self.counts["expansions"] += found.expansions
+        self.counts["collision_queries"] += found.queries
+        return found
 
     def hear(self, plan: Plan, goal_index: int) -> None:
         """Keep a plan if it passes the checks."""
@@ -101,6 +113,8 @@ class _Heard:
             self.searched = now
 
     def why_none(self, time_limit: float) -> tuple[PlanStatus, str]:
+        if self.enclosed:
+            return PlanStatus.UNREACHABLE, self.enclosed
         if self.refused:
             return PlanStatus.NO_PLAN, f"every plan found was refused: {self.refused}"
         return PlanStatus.OUT_OF_BUDGET, f"no plan within {time_limit:g} s{self.reason}"
@@ -118,13 +132,14 @@ def _along_paths(heard: _Heard) -> Iterator[tuple[Plan, int]]:
     """Stop and steer along a first path, then along one that is fast to follow so."""
     problem = heard.problem
     free = kinematic_problem(problem, switch=0.0)
-    first = track(free, time_limit=FIRST_SHARE * heard.left, patience=AT_ONCE)
+    first = heard.count(track(free, time_limit=FIRST_SHARE * heard.left, patience=AT_ONCE))
     if first.plan is None or first.goal_index is None:
+        heard.enclosed = first.reason if first.enclosed else ""
         heard.reason = f" ({first.reason})" if first.reason else ""
         return
     yield _stopping(problem, first.plan, first.goal_index), first.goal_index
     left = IMPROVED_SHARE * heard.left
-    better = track(kinematic_problem(problem), time_limit=left, known=first.plan)
+    better = heard.count(track(kinematic_problem(problem), time_limit=left, known=first.plan))
     if better.plan is not None and better.goal_index is not None:
         yield _stopping(problem, better.plan, better.goal_index), better.goal_index
 
@@ -153,5 +168,17 @@ def _rests(problem: Problem) -> bool:
 
 
 def _lower_bound(problem: Problem) -> float:
-    """No plan is cheaper: nothing is known yet but that costs are not negative."""
-    return 0.0
+    """No plan is cheaper: the shortest way, driven from rest to rest at the limits.
+
+    A way that the kinematic vehicle needs B seconds for at full speed v takes ``B + v / a`` with
+    the acceleration a, or ``2 sqrt(B v / a)`` where v is not reached.
+    """
+    model, cost = problem.automaton.model, problem.cost
+    if not (follows_paths(model) and _rests(problem) and isinstance(cost, Cost)):
+        return 0.0
+    simpler = kinematic_problem(problem, switch=0.0)
+    least = lattice_bound(lattice_query(simpler, tuple(range(len(problem.goals)))))
+    fastest = float(np.abs(model.reduced_limits[0]).max())
+    ramp = fastest / float(model.control_limits[0, 1])
+    duration = least + ramp if least >= ramp else 2.0 * math.sqrt(least * ramp)
+    return cost.time * duration + cost.length * least * fastest
