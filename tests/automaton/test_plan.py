@@ -265,8 +265,8 @@ def test_a_trim_between_maneuvers_may_last_no_time():
 def test_maneuvers_must_fit_the_trims():
     with pytest.raises(ValueError, match=r"^plan: maneuver 'brake' leads from 'ahead' to 'rest', "):
         Plan([0, 0, 0], (STOPPED, ROLLING), durations=[1, 1], maneuvers=(braking(),))
+    trims = (ROLLING, STOPPED, STOPPED)
     with pytest.raises(ValueError, match=r"^plan: got 1 maneuvers for 3 trims, need one between"):
-        trims = (ROLLING, STOPPED, STOPPED)
         Plan([0, 0, 0], trims, durations=[1, 1, 1], maneuvers=(braking(),))
 
 

@@ -102,6 +102,6 @@ def test_nothing_to_do():
 
 def test_it_must_begin_at_rest():
     moving = Trim(name="go", body_velocity=[1, 0, 0], control=[0, 0], reduced_state=[1, 0])
+    path = Plan([0, 0, 0], [], durations=[])
     with pytest.raises(ValueError, match=r"^first trim 'go': it moves, need one that stands"):
-        path = Plan([0, 0, 0], [], durations=[])
         stop_and_steer(CAR, path, first=moving, last=rest_of(CAR))
