@@ -29,12 +29,13 @@ from maneuver_automaton.optimal_control.separation import (
     Frames,
     Lines,
     Pairs,
+    Reach,
     Solid,
     Ways,
     first_lines,
     line_rows,
     near_pairs,
-    support_offsets,
+    reaches,
     ways,
 )
 from maneuver_automaton.optimal_control.solution import SolveStatus
@@ -42,6 +43,7 @@ from maneuver_automaton.optimal_control.transcription import STATUS, Transcripti
 from maneuver_automaton.optimal_control.vehicles import moving_frame
 
 LEAST_DURATION, MOST_DURATION = 1e-2, 1e4  # [s]
+SWING = 1.1  # of what corners swing out between nodes is kept as a margin
 MISSED = 0.02  # radii of the body: pairs that came nearer than this need a line
 LEAST_PACE, MOST_PACE = 0.02, 50.0  # of a phase, against the even pace of the guess
 
@@ -85,6 +87,11 @@ class Scene:
     def body(self) -> list[Solid]:
         """Solids of all parts."""
         return [solid for part in self.parts for solid in part.solids]
+
+    @property
+    def both(self) -> tuple[list[Solid], list[Solid]]:
+        """Solids of the body, and of the obstacles."""
+        return self.body, list(self.pieces)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -168,46 +175,48 @@ def polish(
     settings = settings or PolishSettings()
     began = time.perf_counter()
     program = _program(model, ends, scene, settings, stage_cost, gears, guess)
-    reach = max((part.reach for part in scene.parts), default=0.0)
     point = _Point(
         resampled(guess.state, program.count + 1),
         _held(guess.control, program.count),
         np.full(program.count, guess.duration / program.count),
     )
+    reach = max((part.reach for part in scene.parts), default=0.0)
     pairs = _near(program, point, settings.near * reach)
-    iterations, solving = 0, 0.0
+    lines = _first_lines(program, point, pairs)
+    total = _Answer(SolveStatus.OUT_OF_BUDGET, "lines were missing to the end", math.inf, 0, 0.0)
+    solver: Any = None
     for _ in range(settings.rounds):
         left = began + max_seconds - time.perf_counter()
         if left <= 0.0:
             break
-        point, answer = _solve(program, point, pairs, fixed=fixed_planes, seconds=left)
-        iterations += answer.iterations
-        solving += answer.seconds
+        if solver is None:
+            solver = _solver(program, pairs, fixed=fixed_planes, seconds=left)
+        if fixed_planes:
+            lines = lines.shifted(_reaches(program, point, pairs, lines).piece)
+        margins = _margins(program, point, pairs, lines)
+        point, lines, answer = _solve(solver, program, point, lines, margins)
+        total = _Answer(*answer[:3], total.iterations + answer.iterations,
+                        total.seconds + answer.seconds)  # fmt: skip
+        if answer.status is not SolveStatus.SOLVED:
+            break
         more = pairs.joined(_near(program, point, MISSED * reach))
-        done = len(more.interval) == len(pairs.interval)
-        if done or answer.status is not SolveStatus.SOLVED:
-            return Polished(
-                status=answer.status,
-                reason=answer.reason,
-                state=point.state,
-                control=point.control,
-                durations=point.durations,
-                objective=answer.objective,
-                iterations=iterations,
-                build_s=time.perf_counter() - began - solving,
-                solve_s=solving,
-            )
-        pairs = more
+        if len(more.interval) > len(pairs.interval):
+            new = Pairs(*(column[len(pairs.interval) :] for column in more))
+            lines = lines.joined(_first_lines(program, point, new))
+            pairs, solver = more, None
+        elif _kept(program, point, pairs, lines):
+            break
+        total = total._replace(status=SolveStatus.FAILED, reason="touches between nodes")
     return Polished(
-        status=SolveStatus.OUT_OF_BUDGET,
-        reason="lines were missing to the end",
+        status=total.status,
+        reason=total.reason,
         state=point.state,
         control=point.control,
         durations=point.durations,
-        objective=math.inf,
-        iterations=iterations,
-        build_s=time.perf_counter() - began - solving,
-        solve_s=solving,
+        objective=total.objective,
+        iterations=total.iterations,
+        build_s=time.perf_counter() - began - total.seconds,
+        solve_s=total.seconds,
     )
 
 
@@ -257,6 +266,11 @@ class _Program(NamedTuple):
     def count(self) -> int:
         """Number of intervals."""
         return self.written.grid.n_nodes - 1
+
+    @property
+    def size(self) -> int:
+        """Number of variables without lines."""
+        return len(self.written.bounds)
 
     def values(self, point: _Point) -> tuple[Array, Array, float]:
         """State, control and duration as the transcription has them."""
@@ -368,75 +382,107 @@ def _near(program: _Program, point: _Point, within: float) -> Pairs:
     return near_pairs(program.points(point), scene.body, scene.pieces, within=within)
 
 
-def _solve(
-    program: _Program, point: _Point, pairs: Pairs, *, fixed: bool, seconds: float
-) -> tuple[_Point, _Answer]:
-    """The program solved with lines for these pairs."""
-    casadi, written, settings = program.casadi, program.written, program.settings
+def _first_lines(program: _Program, point: _Point, pairs: Pairs) -> Lines:
+    return first_lines(program.points(point), program.scene.body, program.scene.pieces, pairs)
+
+
+def _reaches(program: _Program, point: _Point, pairs: Pairs, lines: Lines) -> Reach:
+    return reaches(program.points(point), program.scene.both, pairs, lines)
+
+
+def _margins(program: _Program, point: _Point, pairs: Pairs, lines: Lines) -> Array:
+    """Margins (n,) [m] at the nodes for what the corners swing out between them."""
+    reach = _reaches(program, point, pairs, lines)
+    return program.settings.gap + SWING * (reach.between - reach.nodes)
+
+
+def _kept(program: _Program, point: _Point, pairs: Pairs, lines: Lines) -> bool:
+    """Whether every way keeps half the gap to its piece."""
+    reach = _reaches(program, point, pairs, lines)
+    return bool((reach.between - reach.piece <= -0.5 * program.settings.gap).all())
+
+
+class _Solver(NamedTuple):
+    """The program with lines for some pairs, built."""
+
+    function: Any
+    bounds: Array  # (variables, 2)
+    limits: Array  # (rows, 2)
+    fixed: bool
+
+
+def _solver(program: _Program, pairs: Pairs, *, fixed: bool, seconds: float) -> _Solver:
+    casadi, written, scene = program.casadi, program.written, program.scene
     variables = [casadi.vec(written.state), casadi.vec(written.control), written.duration]
-    state, control, duration = program.values(point)
-    first = [state.ravel(), control.ravel(), np.array([duration])]
     bounds = [written.bounds]
     rows = [written.constraints, program.zero, program.below]
     equations = written.constraints.shape[0] + program.zero.shape[0]
-    if len(pairs.interval):
-        lines = first_lines(program.points(point), program.scene.body, program.scene.pieces, pairs)
-        more, start = _line_variables(program, pairs, lines, fixed=fixed)
-        rows.append(_rows_of(program, pairs, lines, more))
-        if not fixed:
-            variables += [more[0].T, more[1].T]
-            first.append(start)
-            bounds.append(np.tile([-np.inf, np.inf], (start.size, 1)))
+    count = len(pairs.interval)
+    given = casadi.SX.sym("given", 4, count)  # margin, anchor, angle
+    if count:
+        angle, offset = casadi.SX.sym("angle", 1, count), casadi.SX.sym("offset", 1, count)
+        if fixed:
+            angle, offset = given[3, :], casadi.SX.zeros(1, count)
+        else:
+            variables += [angle.T, offset.T]
+            bounds.append(np.tile([-np.inf, np.inf], (2 * count, 1)))
+        rows.append(
+            line_rows(casadi, program.ways, scene.both, pairs, anchor=given[1:3, :],
+                      lines=(angle, offset), margin=given[0, :], pieces_too=not fixed)
+        )  # fmt: skip
     constraints = casadi.vertcat(*rows)
-    high = np.zeros(constraints.shape[0])
-    low = np.where(np.arange(high.size) < equations, 0.0, -np.inf)
-    functions = {"x": casadi.vertcat(*variables), "f": program.objective, "g": constraints}
-    solver = casadi.nlpsol("solver", "ipopt", functions, _options(settings, seconds))
-    limits = np.vstack(bounds)
+    limits = np.zeros((constraints.shape[0], 2))
+    limits[equations:, 0] = -np.inf
+    functions = {
+        "x": casadi.vertcat(*variables),
+        "p": casadi.vec(given),
+        "f": program.objective,
+        "g": constraints,
+    }
+    options = _options(program.settings, seconds)
+    solver = casadi.nlpsol("solver", "ipopt", functions, options)
+    return _Solver(solver, np.vstack(bounds), limits, fixed)
+
+
+def _solve(
+    solver: _Solver,
+    program: _Program,
+    point: _Point,
+    lines: Lines,
+    margins: Array,
+) -> tuple[_Point, Lines, _Answer]:
+    """The solver's answer from a point and lines with their margins."""
+    state, control, duration = program.values(point)
+    first = [state.ravel(), control.ravel(), np.array([duration])]
+    if not solver.fixed:
+        first += [lines.angle, np.zeros(lines.angle.size)]
+    given = np.column_stack([margins, lines.anchor, lines.angle])
     began = time.perf_counter()
-    answer = solver(
-        x0=np.clip(np.concatenate(first), *limits.T),
-        lbx=limits[:, 0],
-        ubx=limits[:, 1],
-        lbg=low,
-        ubg=high,
+    answer = solver.function(
+        x0=np.clip(np.concatenate(first), *solver.bounds.T),
+        p=given.ravel(),
+        lbx=solver.bounds[:, 0],
+        ubx=solver.bounds[:, 1],
+        lbg=solver.limits[:, 0],
+        ubg=solver.limits[:, 1],
     )
     solving = time.perf_counter() - began
-    stats = solver.stats()
-    found = _point_of(program, np.asarray(answer["x"].full(), dtype=np.float64).ravel())
+    stats = solver.function.stats()
+    values = np.asarray(answer["x"].full(), dtype=np.float64).ravel()
+    if not solver.fixed:
+        angle, offset = values[program.size :].reshape(2, -1)
+        lines = Lines(angle, lines.anchor).shifted(offset)
     reason = str(stats["return_status"])
-    return found, _Answer(
-        status=STATUS.get(reason, SolveStatus.FAILED),
-        reason=reason,
-        objective=float(answer["f"]),
-        iterations=int(stats["iter_count"]),
-        seconds=solving,
-    )
-
-
-def _line_variables(
-    program: _Program, pairs: Pairs, lines: Lines, *, fixed: bool
-) -> tuple[tuple[Any, Any], Array]:
-    """Angles and offsets of the lines, as symbols or as numbers, and where they begin."""
-    casadi, count = program.casadi, len(pairs.interval)
-    if fixed:
-        offset = support_offsets(program.scene.pieces, pairs, lines)
-        return (casadi.DM(lines.angle).T, casadi.DM(offset).T), np.zeros(0)
-    angle, offset = casadi.SX.sym("angle", 1, count), casadi.SX.sym("offset", 1, count)
-    return (angle, offset), np.concatenate([lines.angle, np.zeros(count)])
-
-
-def _rows_of(program: _Program, pairs: Pairs, lines: Lines, symbols: tuple[Any, Any]) -> Any:
-    scene = program.scene
-    return line_rows(
-        program.casadi,
-        program.ways,
-        scene.body,
-        scene.pieces,
-        pairs,
-        anchor=lines.anchor,
-        lines=symbols,
-        gap=program.settings.gap,
+    return (
+        _point_of(program, values),
+        lines,
+        _Answer(
+            status=STATUS.get(reason, SolveStatus.FAILED),
+            reason=reason,
+            objective=float(answer["f"]),
+            iterations=int(stats["iter_count"]),
+            seconds=solving,
+        ),
     )
 
 

@@ -1,10 +1,10 @@
 """Lines that part a moving body from what stands in its way, interval by interval.
 
 One line for each interval, convex piece of an obstacle and convex piece of the body. It parts the
-obstacle from the whole motion between the two nodes: every corner of the body stays on its side
-with both ends of its way and with the two control points of the cubic that has the same places and
-velocities at both ends. The cubic lies in the hull of its control points, and what the corner's
-true way differs from it is of fourth order in the step, so that a small gap covers it.
+obstacle from the body at both nodes, and from how far the corners swing out between them: a margin
+that is computed from the motion and frozen while the solver runs. To check, each corner's way is a
+cubic with the same places and velocities at both nodes. It lies in the hull of its control points,
+and what the true way differs from it is of fourth order in the step, so that a small gap covers it.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.optimal_control.problem import Components
+
+TOUCHING = 1e-6  # [m] nearer solids have no direction between them
 
 Solid = tuple[Array, float]
 """Corners (n, 2) of a convex polygon, and the radius that rounds it: one corner makes a disc."""
@@ -66,18 +68,30 @@ class Pairs(NamedTuple):
 
 
 class Ways(NamedTuple):
-    """Control points of the ways of a solid's corners: rows (4 m) of points, columns intervals."""
+    """Control points of the ways of m corners: first all begins, all ends, then those between."""
 
     x: Any  # (4 m, n - 1)
     y: Any  # (4 m, n - 1)
 
 
 class Lines(NamedTuple):
-    """A line for each pair: its points p have ``normal . (p - anchor) = offset``."""
+    """A line for each pair, through its anchor; the normal points from the body to the piece."""
 
-    angle: Array  # (n,) [rad] of the normal, which points to the obstacle
+    angle: Array  # (n,) [rad] of the normal
     anchor: Array  # (n, 2) [m]
-    gap: Array  # (n,) [m] between the two at the guess, negative where they overlap
+
+    @property
+    def normal(self) -> Array:
+        """Unit normals (n, 2)."""
+        return np.stack([np.cos(self.angle), np.sin(self.angle)], axis=1)
+
+    def joined(self, other: Lines) -> Lines:
+        """These, then the others."""
+        return Lines(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
+
+    def shifted(self, offset: Array) -> Lines:
+        """The lines moved along their normals."""
+        return Lines(self.angle, self.anchor + offset[:, None] * self.normal)
 
 
 class Frames(NamedTuple):
@@ -112,8 +126,8 @@ def ways(
             x_0, y_0, v_0, w_0 = _corners(casadi, part, corners, begin)
             x_1, y_1, v_1, w_1 = _corners(casadi, part, corners, end)
             third = casadi.repmat(step / 3.0, len(corners), 1)
-            x = casadi.vertcat(x_0, x_0 + third * v_0, x_1 - third * v_1, x_1)
-            y = casadi.vertcat(y_0, y_0 + third * w_0, y_1 - third * w_1, y_1)
+            x = casadi.vertcat(x_0, x_1, x_0 + third * v_0, x_1 - third * v_1)
+            y = casadi.vertcat(y_0, y_1, y_0 + third * w_0, y_1 - third * w_1)
             found.append(Ways(x, y))
     return found
 
@@ -191,29 +205,27 @@ def first_lines(
     mine = np.array([hulls[b][k] for k, b in zip(pairs.interval, pairs.body, strict=True)],
                     dtype=object)  # fmt: skip
     if not len(mine):
-        return Lines(np.zeros(0), np.zeros((0, 2)), np.zeros(0))
+        return Lines(np.zeros(0), np.zeros((0, 2)))
     ends = shapely.get_coordinates(shapely.shortest_line(mine, solid[pairs.piece]))
     here, there = ends[0::2], ends[1::2]
-    gap = np.hypot(*(there - here).T)
     angle = np.arctan2(there[:, 1] - here[:, 1], there[:, 0] - here[:, 0])
     anchor = 0.5 * (here + there)
-    rounding = np.array([body[b][1] + pieces[p][1] for b, p in zip(*pairs[1:], strict=True)])
-    for row in np.flatnonzero(gap < 1e-6):
+    for row in np.flatnonzero(np.hypot(*(there - here).T) < TOUCHING):
         own = shapely.get_coordinates(mine[row])
-        angle[row], gap[row], anchor[row] = _least_penetration(own, pieces[pairs.piece[row]][0])
-    return Lines(angle, anchor, gap - rounding)
+        angle[row], anchor[row] = _least_penetration(own, pieces[pairs.piece[row]][0])
+    return Lines(angle, anchor)
 
 
 def line_rows(
     casadi: Any,
     found: Sequence[Ways],
-    body: Sequence[Solid],
-    pieces: Sequence[Solid],
+    scene: tuple[Sequence[Solid], Sequence[Solid]],
     pairs: Pairs,
     *,
-    anchor: Array,
+    anchor: Any,
     lines: tuple[Any, Any],
-    gap: float,
+    margin: Any,
+    pieces_too: bool,
 ) -> Any:
     """What must not be positive: how far each side reaches over its line, as one column.
 
@@ -221,12 +233,18 @@ def line_rows(
     ----------
     found : sequence of Ways
         One for each solid of the body.
-    anchor : (n, 2) array
+    scene : (body, pieces)
+        Solids of both sides.
+    anchor : (2, n) symbols
+        A place near each line [m].
     lines : (angle, offset)
-        Rows (1, n), symbols or numbers.
-    gap : float
-        Kept between the body and the line [m].
+        Rows (1, n) of symbols: how far beyond its anchor each line runs.
+    margin : (1, n) symbols
+        Kept between the body at the nodes and the line [m].
+    pieces_too : bool
+        Whether the pieces need rows of their own; not where the lines stand still.
     """
+    body, pieces = scene
     angle, offset = lines
     cosine, sine = casadi.cos(angle), casadi.sin(angle)
     rows = []
@@ -235,28 +253,56 @@ def line_rows(
         if not which:
             continue
         columns = pairs.interval[which].tolist()
-        count = way.x.shape[0]
-        c, s, o = (casadi.repmat(row[:, which], count, 1) for row in (cosine, sine, offset))
-        x = way.x[:, columns] - casadi.repmat(casadi.DM(anchor[which, 0]).T, count, 1)
-        y = way.y[:, columns] - casadi.repmat(casadi.DM(anchor[which, 1]).T, count, 1)
-        rows.append(casadi.vec(c * x + s * y - o + (body[number][1] + gap)))
-    owner = np.concatenate([np.full(len(pieces[p][0]), k) for k, p in enumerate(pairs.piece)])
-    corner = np.concatenate([pieces[p][0] for p in pairs.piece]) - anchor[owner]
-    rounding = np.array([pieces[pairs.piece[k]][1] for k in owner])
-    own = owner.tolist()
-    x, y = casadi.DM(corner[:, 0]).T, casadi.DM(corner[:, 1]).T
-    beyond = cosine[:, own] * x + sine[:, own] * y - offset[:, own] - casadi.DM(rounding).T
-    return casadi.vertcat(*rows, casadi.vec(-beyond))
+        count = way.x.shape[0] // 2
+        c, s, o = (
+            casadi.repmat(row[:, which], count, 1) for row in (cosine, sine, offset - margin)
+        )
+        x = way.x[:count, columns] - casadi.repmat(anchor[0, which], count, 1)
+        y = way.y[:count, columns] - casadi.repmat(anchor[1, which], count, 1)
+        rows.append(casadi.vec(c * x + s * y - o + body[number][1]))
+    if pieces_too:
+        owner = np.concatenate([np.full(len(pieces[p][0]), k) for k, p in enumerate(pairs.piece)])
+        corner = np.concatenate([pieces[p][0] for p in pairs.piece])
+        rounding = casadi.DM([pieces[pairs.piece[k]][1] for k in owner]).T
+        own = owner.tolist()
+        x = casadi.DM(corner[:, 0]).T - anchor[0, own]
+        y = casadi.DM(corner[:, 1]).T - anchor[1, own]
+        beyond = cosine[:, own] * x + sine[:, own] * y - offset[:, own] - rounding
+        rows.append(casadi.vec(-beyond))
+    return casadi.vertcat(*rows)
 
 
-def support_offsets(pieces: Sequence[Solid], pairs: Pairs, lines: Lines) -> Array:
-    """Offsets (n,) of the lines that touch the pieces, their angles kept."""
-    normal = np.stack([np.cos(lines.angle), np.sin(lines.angle)], axis=1)
-    nearest = [
+class Reach(NamedTuple):
+    """How far beyond its anchor each side of a line comes, along the normal."""
+
+    nodes: Array  # (n,) [m] of the body at the nodes
+    between: Array  # (n,) [m] of the body on its way
+    piece: Array  # (n,) [m] of the obstacle, that is where it begins
+
+
+def reaches(
+    points: Sequence[tuple[Array, Array]],
+    scene: tuple[Sequence[Solid], Sequence[Solid]],
+    pairs: Pairs,
+    lines: Lines,
+) -> Reach:
+    """How far both sides come, from control points in numbers."""
+    body, pieces = scene
+    normal = lines.normal
+    nodes, between = np.empty(len(normal)), np.empty(len(normal))
+    for number, (x, y) in enumerate(points):
+        which = np.flatnonzero(pairs.body == number)
+        columns = pairs.interval[which]
+        along = normal[which, 0] * (x[:, columns] - lines.anchor[which, 0])
+        along += normal[which, 1] * (y[:, columns] - lines.anchor[which, 1])
+        half = len(along) // 2
+        nodes[which] = along[:half].max(axis=0) + body[number][1]
+        between[which] = along.max(axis=0) + body[number][1]
+    begin = [
         float(((pieces[p][0] - lines.anchor[k]) @ normal[k]).min()) - pieces[p][1]
         for k, p in enumerate(pairs.piece)
     ]
-    return np.array(nearest)
+    return Reach(nodes, between, np.array(begin))
 
 
 def _geometry(corners: Array) -> Any:
@@ -276,19 +322,19 @@ def _hulls(x: Array, y: Array) -> Any:
     return shapely.convex_hull(shapely.multipoints(points, indices=owner))
 
 
-def _least_penetration(own: Array, other: Array) -> tuple[float, float, Array]:
-    """Direction, gap (negative) and a point between of two overlapping convex polygons."""
-    best = (0.0, -np.inf, own.mean(axis=0))
+def _least_penetration(own: Array, other: Array) -> tuple[float, Array]:
+    """Direction of the least penetration of two convex polygons, and a point in its middle."""
+    best, angle, anchor = -np.inf, 0.0, own.mean(axis=0)
     for ring, sign in ((own, 1.0), (other, -1.0)):
         edge = np.roll(ring, -1, axis=0) - ring
         for x, y in np.concatenate([edge, -edge]):
             length = float(np.hypot(x, y))
-            if length < 1e-9:
+            if length < TOUCHING:
                 continue
             normal = sign * np.array([y, -x]) / length
             reach, begin = float((own @ normal).max()), float((other @ normal).min())
-            if begin - reach > best[1]:
+            if begin - reach > best:
+                best, angle = begin - reach, float(np.arctan2(normal[1], normal[0]))
                 centre = own.mean(axis=0)
-                middle = centre + (0.5 * (reach + begin) - float(centre @ normal)) * normal
-                best = (float(np.arctan2(normal[1], normal[0])), begin - reach, middle)
-    return best
+                anchor = centre + (0.5 * (reach + begin) - float(centre @ normal)) * normal
+    return angle, anchor
