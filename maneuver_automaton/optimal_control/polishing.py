@@ -42,6 +42,7 @@ from maneuver_automaton.optimal_control.solution import SolveStatus
 from maneuver_automaton.optimal_control.transcription import STATUS, Transcription, transcribe
 from maneuver_automaton.optimal_control.vehicles import moving_frame
 
+WARM = {"ipopt.mu_init": 1e-5}
 LEAST_DURATION, MOST_DURATION = 1e-2, 1e4  # [s]
 SWING = 1.1  # of what corners swing out between nodes is kept as a margin
 MISSED = 0.02  # radii of the body: pairs that came nearer than this need a line
@@ -184,7 +185,8 @@ def polish(
     pairs = _near(program, point, settings.near * reach)
     lines = _first_lines(program, point, pairs)
     total = _Answer(SolveStatus.OUT_OF_BUDGET, "lines were missing to the end", math.inf, 0, 0.0)
-    solver: Any = None
+    solver: _Solver | None = None
+    margins, again = np.zeros(len(pairs.interval)), False
     for _ in range(settings.rounds):
         left = began + max_seconds - time.perf_counter()
         if left <= 0.0:
@@ -193,17 +195,23 @@ def polish(
             solver = _solver(program, pairs, fixed=fixed_planes, seconds=left)
         if fixed_planes:
             lines = lines.shifted(_reaches(program, point, pairs, lines).piece)
-        margins = _margins(program, point, pairs, lines)
-        point, lines, answer = _solve(solver, program, point, lines, margins)
+        margins = np.maximum(margins, _margins(program, point, pairs, lines))
+        point, lines, answer = _solve(solver, program, point, lines, margins, again=again)
+        again = True
         total = _Answer(*answer[:3], total.iterations + answer.iterations,
                         total.seconds + answer.seconds)  # fmt: skip
+        import os
+        if os.environ.get("VERB"):
+            rr = _reaches(program, point, pairs, lines)
+            print("    round", fixed_planes, answer.iterations, round(answer.seconds,2), round(point.durations.sum(),3), "pairs", len(pairs.interval), "more", len(pairs.joined(_near(program, point, MISSED * reach)).interval), "worst", (rr.between-rr.piece).max()*1e3, "swing", (rr.between-rr.nodes).max()*1e3, answer.reason)
         if answer.status is not SolveStatus.SOLVED:
             break
         more = pairs.joined(_near(program, point, MISSED * reach))
         if len(more.interval) > len(pairs.interval):
             new = Pairs(*(column[len(pairs.interval) :] for column in more))
             lines = lines.joined(_first_lines(program, point, new))
-            pairs, solver = more, None
+            margins = np.append(margins, np.zeros(len(new.interval)))
+            pairs, solver, again = more, None, False
         elif _kept(program, point, pairs, lines):
             break
         total = total._replace(status=SolveStatus.FAILED, reason="touches between nodes")
@@ -406,6 +414,7 @@ class _Solver(NamedTuple):
     """The program with lines for some pairs, built."""
 
     function: Any
+    warm: Any  # the same with a smaller barrier, for another solve from nearby
     bounds: Array  # (variables, 2)
     limits: Array  # (rows, 2)
     fixed: bool
@@ -441,7 +450,14 @@ def _solver(program: _Program, pairs: Pairs, *, fixed: bool, seconds: float) -> 
     }
     options = _options(program.settings, seconds)
     solver = casadi.nlpsol("solver", "ipopt", functions, options)
-    return _Solver(solver, np.vstack(bounds), limits, fixed)
+    warm = casadi.nlpsol("again", "ipopt", functions, options | WARM | _derivatives(solver))
+    return _Solver(solver, warm, np.vstack(bounds), limits, fixed)
+
+
+def _derivatives(solver: Any) -> dict[str, Any]:
+    """Derivatives that one solver has and another can use."""
+    names = {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g", "hess_lag": "nlp_hess_l"}
+    return {option: solver.get_function(name) for option, name in names.items()}
 
 
 def _solve(
@@ -450,6 +466,8 @@ def _solve(
     point: _Point,
     lines: Lines,
     margins: Array,
+    *,
+    again: bool,
 ) -> tuple[_Point, Lines, _Answer]:
     """The solver's answer from a point and lines with their margins."""
     state, control, duration = program.values(point)
@@ -458,7 +476,8 @@ def _solve(
         first += [lines.angle, np.zeros(lines.angle.size)]
     given = np.column_stack([margins, lines.anchor, lines.angle])
     began = time.perf_counter()
-    answer = solver.function(
+    function = solver.warm if again else solver.function
+    answer = function(
         x0=np.clip(np.concatenate(first), *solver.bounds.T),
         p=given.ravel(),
         lbx=solver.bounds[:, 0],
@@ -467,7 +486,7 @@ def _solve(
         ubg=solver.limits[:, 1],
     )
     solving = time.perf_counter() - began
-    stats = solver.function.stats()
+    stats = function.stats()
     values = np.asarray(answer["x"].full(), dtype=np.float64).ravel()
     if not solver.fixed:
         angle, offset = values[program.size :].reshape(2, -1)
