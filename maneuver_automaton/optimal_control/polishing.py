@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -47,13 +46,6 @@ LEAST_DURATION, MOST_DURATION = 1e-2, 1e4  # [s]
 SWING = 1.1  # of what corners swing out between nodes is kept as a margin
 MISSED = 0.02  # radii of the body: pairs that came nearer than this need a line
 LEAST_PACE, MOST_PACE = 0.02, 50.0  # of a phase, against the even pace of the guess
-
-
-class ComponentModel(Model):
-    """A model whose two functions also take symbols, component by component."""
-
-    velocity: Callable[[Components, Components], Sequence[Any]]
-    dynamics: Callable[[Components, Components], Sequence[Any]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,7 +126,7 @@ class Ends(NamedTuple):
 
 
 def polish(
-    model: ComponentModel,
+    model: Model,
     ends: Ends,
     scene: Scene,
     guess: Guess,
@@ -149,7 +141,7 @@ def polish(
 
     Parameters
     ----------
-    model : ComponentModel
+    model : Model
         The vehicle.
     ends : Ends
         First and last pose and reduced state, in the frame of the scene.
@@ -295,7 +287,7 @@ class _Program(NamedTuple):
 
 
 def _program(
-    model: ComponentModel,
+    model: Model,
     ends: Ends,
     scene: Scene,
     settings: PolishSettings,
@@ -340,7 +332,7 @@ def _program(
 
 
 def _problem(
-    model: ComponentModel, ends: Ends, settings: PolishSettings, stage_cost: RunningCost | None
+    model: Model, ends: Ends, settings: PolishSettings, stage_cost: RunningCost | None
 ) -> OptimalControlProblem:
     """Least time, a little effort, and what else is asked for."""
     dof = model.group.dof
@@ -517,7 +509,7 @@ def _point_of(program: _Program, values: Array) -> _Point:
     return _Point(state, control, durations)
 
 
-def _frames(casadi: Any, model: ComponentModel, state: Any, control: Any) -> Frames:
+def _frames(casadi: Any, model: Model, state: Any, control: Any) -> Frames:
     dof = model.group.dof
     z, u = casadi.vertsplit(state[dof:, :]), casadi.vertsplit(control)
     ones = casadi.SX.ones(1, state.shape[1])
@@ -530,20 +522,20 @@ def _frames(casadi: Any, model: ComponentModel, state: Any, control: Any) -> Fra
     )
 
 
-def _changes(casadi: Any, model: ComponentModel, control: Any) -> Any:
+def _changes(casadi: Any, model: Model, control: Any) -> Any:
     """How much the controls change from interval to interval, squared and scaled."""
     scaled = control / casadi.DM(_scales(model))
     steps = scaled[:, 1:] - scaled[:, :-1]
     return casadi.sumsqr(steps)
 
 
-def _scales(model: ComponentModel) -> Array:
+def _scales(model: Model) -> Array:
     """Sizes (n_u,) of the controls: their greatest values, 1 where there is no limit."""
     most = np.abs(model.control_limits).max(axis=1)
     return np.where(np.isfinite(most), most, 1.0)
 
 
-def _ends_in_rates(model: ComponentModel) -> list[int]:
+def _ends_in_rates(model: Model) -> list[int]:
     """Numbers of the controls that the velocity does not depend on: accelerations and such."""
     casadi = load_casadi()
     z = casadi.SX.sym("z", len(model.reduced_names))
