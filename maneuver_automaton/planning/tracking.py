@@ -15,7 +15,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision.advancement import clearances, free_times
-from maneuver_automaton.planning.among_obstacles import library_table, plan_of_word
+from maneuver_automaton.planning.among_obstacles import library_table
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.improve import Patience, improve
