@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import SE2, LieGroup
+from maneuver_automaton.models._components import Components, no_parts, on_arrays
 from maneuver_automaton.models._limits import check_positive
 
 
@@ -46,6 +47,7 @@ class LatticeBody:
     group: ClassVar[type[LieGroup]] = SE2
     control_names: ClassVar[tuple[str, ...]] = ("speed_ahead", "speed_aside", "turn_rate")
     reduced_names: ClassVar[tuple[str, ...]] = ("heading_cos", "heading_sin")
+    part_names: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
         check_positive(self.name, resolution=self.resolution, turning_radius=self.turning_radius)
@@ -60,14 +62,22 @@ class LatticeBody:
         """Those of a cosine and a sine: (2, 2)."""
         return np.tile([-1.0, 1.0], (2, 1))
 
+    def velocity(self, z: Components, u: Components, /) -> Components:
+        """Components of the twist: the control."""
+        return u
+
+    def dynamics(self, z: Components, u: Components, /) -> tuple[Any, ...]:
+        """Rates of the direction (cos, sin), which turns at the turn rate."""
+        return -z[1] * u[2], z[0] * u[2]
+
     def body_velocity(self, reduced_state: Array, control: Array) -> Array:
-        """Twist (..., 3) [m/s, m/s, rad/s]: the control."""
-        batch = np.broadcast_shapes(np.shape(reduced_state)[:-1], np.shape(control)[:-1])
-        twist = as_array("control", control, last=3)
-        return np.broadcast_to(twist, (*batch, 3)).copy()
+        """Twist (..., 3) [m/s, m/s, rad/s]; see `velocity`."""
+        return on_arrays(self.velocity, reduced_state, control, sizes=(2, 3, 3))
 
     def reduced_dynamics(self, reduced_state: Array, control: Array) -> Array:
-        """Rates (..., 2) [1/s]: the direction turns at the turn rate."""
-        cosine, sine = np.moveaxis(as_array("reduced state", reduced_state, last=2), -1, 0)
-        turn_rate = as_array("control", control, last=3)[..., 2]
-        return np.stack([-sine * turn_rate, cosine * turn_rate], axis=-1)
+        """Rates (..., 2) [1/s]; see `dynamics`."""
+        return on_arrays(self.dynamics, reduced_state, control, sizes=(2, 3, 2))
+
+    def part_poses(self, reduced_state: Array) -> Array:
+        """Carries nothing: (..., 0, 3)."""
+        return no_parts(reduced_state)
