@@ -26,6 +26,7 @@ from maneuver_automaton._arrays import Array, IntArray, freeze
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.automaton import Automaton, Trajectory
 from maneuver_automaton.errors import InvalidLibrary
+from maneuver_automaton.formats.levels import levels_of, nearest_level
 from maneuver_automaton.formats.xml_source import Element, read_xml
 from maneuver_automaton.models import SecondOrderCar
 from maneuver_automaton.primitives import Maneuver, Trim
@@ -198,8 +199,7 @@ def automaton_of_commonroad_primitives(
     Primitives that were cut at a limit end in trims of their own, which may lead nowhere.
     """
     model = vehicle_of(file) if vehicle is None else vehicle
-    speeds, steerings = (_levels(file, column) for column in (3, 4))
-    ends = [_snapped(one.states[[0, -1], 3:], speeds, steerings) for one in file.primitives]
+    ends = _ends(file)
     pairs = np.unique(np.concatenate(ends), axis=0)
     trims = tuple(
         Trim(
@@ -345,25 +345,13 @@ def _ways_and_turns(file: RoadPrimitives) -> tuple[Array, Array]:
     return np.concatenate(crossed), np.concatenate(turned)
 
 
-def _levels(file: RoadPrimitives, column: int) -> Array:
-    """Values at the ends of primitives, those that fit together as one: what most begin with."""
-    first = np.array([one.states[0, column] for one in file.primitives])
-    values = np.unique(np.concatenate([first, [one.states[-1, column] for one in file.primitives]]))
-    groups = np.split(values, np.flatnonzero(np.diff(values) > FITS) + 1)
-    levels = []
-    for group in groups:
-        begun = first[(first >= group[0]) & (first <= group[-1])]
-        levels.append(float(np.median(begun if begun.size else group)))
-    return np.round(levels, 12) + 0.0
-
-
-def _snapped(states: Array, speeds: Array, steerings: Array) -> Array:
-    """Speed and steering (n, 2) at the nearest levels."""
-    columns = [
-        levels[np.abs(levels - values[:, None]).argmin(axis=1)]
-        for levels, values in ((speeds, states[:, 0]), (steerings, states[:, 1]))
-    ]
-    return np.stack(columns, axis=-1)
+def _ends(file: RoadPrimitives) -> list[Array]:
+    """Speed and steering (2, 2) of the trims where each primitive begins and ends."""
+    stated = np.array([one.states[[0, -1], 3:] for one in file.primitives])
+    for k in range(2):
+        levels = levels_of(stated[:, 0, k], stated[:, 1, k], apart=FITS)
+        stated[..., k] = nearest_level(stated[..., k].ravel(), levels).reshape(-1, 2)
+    return list(stated)
 
 
 def _driven(model: SecondOrderCar, file: RoadPrimitives, ends: list[Array]) -> list[Trajectory]:

@@ -1,5 +1,6 @@
 """Vehicles: how a reduced state and a control become a body velocity."""
 
+from maneuver_automaton.models.accelerating_car import AcceleratingCar as AcceleratingCar
 from maneuver_automaton.models.car import Car as Car
 from maneuver_automaton.models.car_with_trailer import CarWithTrailer as CarWithTrailer
 from maneuver_automaton.models.helicopter import Helicopter as Helicopter
