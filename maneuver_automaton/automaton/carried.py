@@ -44,11 +44,11 @@ def carried(plan: Plan, model: Model, part: str) -> Plan:
     """
     if not plan.trims:
         return plan
-    which = model.part_names.index(part)  # type: ignore[attr-defined]
+    which = model.part_names.index(part)
     group = group_of(plan.start.size)
 
     def offset(states: Array) -> Array:
-        poses = model.part_poses(states)  # type: ignore[attr-defined]
+        poses = model.part_poses(states)
         return np.asarray(poses[..., which, :], dtype=np.float64)
 
     def carried_trim(trim: Trim) -> Trim:

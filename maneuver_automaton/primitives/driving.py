@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._arrays import Array, IntArray, as_array
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives._legendre import (
     INTEGRALS,
@@ -22,6 +22,9 @@ RESOLVED = 1e-13  # last terms of a series, over the greatest value or 1 [m, rad
 SETTLED = 1e-14  # change of the reduced state in an iteration, over the greatest value or 1
 FINEST = 2**16  # parts of an interval of constant control, at most
 ITERATIONS = 40  # before a stretch counts as too long to be solved at once
+HOPEFUL = 9  # iterations after which every one has to halve the change, or the stretch is too long
+
+BoolArray = NDArray[np.bool_]
 
 
 def drive(
@@ -144,7 +147,7 @@ def _resolved(model: Model, z: Array, control: Array, durations: Array) -> _Elem
         step = durations[:, owner] / parts[owner]
         elements, rough = _integrated(model, z, control[:, owner], step)
         if elements is not None:
-            rough = _is_rough(elements).any(axis=0)
+            rough = np.asarray(_is_rough(elements).any(axis=0))
             if not rough.any():
                 return elements
         parts[np.unique(owner[rough])] *= 2
@@ -159,11 +162,11 @@ def _resolved(model: Model, z: Array, control: Array, durations: Array) -> _Elem
 
 def _integrated(
     model: Model, z: Array, control: Array, step: Array
-) -> tuple[_Elements | None, np.ndarray[tuple[int, ...], np.dtype[np.bool_]]]:
+) -> tuple[_Elements | None, BoolArray]:
     """The elements; or none, and which (k,) cannot be solved for."""
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         begin, at_nodes, rates, failed = _reduced_states(model, z, control, step)
-    rough = np.arange(step.shape[1]) == failed
+    rough: BoolArray = np.asarray(np.arange(step.shape[1]) == failed)
     if rough.any():
         return None, rough
     at_ends = np.stack([begin[:, :-1], begin[:, 1:]], axis=2)
@@ -214,86 +217,101 @@ def _picard(
     before = np.inf
     for iteration in range(ITERATIONS):
         rates = np.broadcast_to(model.reduced_dynamics(nodes, control), nodes.shape)
-        ends = z[:, None] + np.cumsum(h * np.einsum("i,mkiz->mkz", WEIGHTS, rates), axis=1)
+        ends = z[:, None] + np.cumsum(h * (WEIGHTS @ rates), axis=1)
         begins = np.concatenate([z[:, None], ends[:, :-1]], axis=1)[:, :, None]
-        new = begins + h[..., None] * np.einsum("ij,mkjz->mkiz", INTEGRALS, rates)
+        new = begins + h[..., None] * (INTEGRALS @ rates)
         if not np.isfinite(new).all():
             return None
         change = float((np.abs(new - nodes) / np.maximum(1.0, np.abs(new))).max(initial=0.0))
         nodes = new
         if change <= SETTLED or (change <= 100.0 * SETTLED and change > 0.5 * before):
             return nodes, rates, ends, iteration
+        if k > 1 and iteration >= HOPEFUL and change > before / 2.0:
+            return None
         before = change
     return None
 
 
-def _is_rough(elements: _Elements) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+def _is_rough(elements: _Elements) -> BoolArray:
     """Elements (m, k) whose series have last terms that are more than rounding."""
     rough = np.zeros(elements.step.shape, dtype=bool)
+    h = elements.step[..., None]
     for values in (elements.rates, elements.twists, elements.flow):
-        last = np.abs(np.einsum("ij,mkjz->mkiz", SERIES[-2:], values)).max(axis=2, initial=0.0)
-        size = np.abs(values).max(axis=2, initial=0.0)
-        h = elements.step[..., None]
-        rough |= (h * last > RESOLVED * np.maximum(1.0, h * size)).any(axis=-1)
+        last = np.abs(SERIES[-2:] @ values)
+        size = np.maximum(np.abs(values[..., 0, :]), np.abs(values[..., -1, :]))
+        worst = np.maximum(last[..., 0, :], last[..., 1, :])
+        rough |= (h * worst > RESOLVED * np.maximum(1.0, h * size)).any(axis=-1)
     return rough
 
 
 def _sampled(elements: _Elements, max_step_m: float, max_step_rad: float) -> tuple[Trajectory, ...]:
     """Samples of every ride, in one go over all elements that last."""
-    dof = elements.twists.shape[-1]
-    poses = _chained(elements)
-    times = np.concatenate(
-        [np.zeros((elements.step.shape[0], 1)), np.cumsum(elements.step, axis=1)], axis=1
-    )
+    poses, start = _chained(elements), np.zeros((elements.step.shape[0], 1))
+    times = np.concatenate([start, np.cumsum(elements.step, axis=1)], axis=1)
     ride, place = np.nonzero(elements.step)
     count = _n_samples(elements, max_step_m, max_step_rad)[ride, place]
     of = np.repeat(np.arange(count.size), count)
-    first = np.cumsum(count) - count
-    share = (np.arange(of.size) - first[of]) / count[of]
-    at = ride[of], place[of]
-    within = integrals_to(share) * elements.step[at][:, None]
-    reduced = elements.begin[at] + _summed(within, SERIES @ elements.rates[ride, place], of)
-    steps = _summed(within, SERIES @ elements.flow[ride, place], of)
-    steps[:, 2] = _summed(within, SERIES @ elements.twists[ride, place][..., 2:3], of)[:, 0]
-    pose = _moved(poses[at], steps)
-    time = times[at] + share * elements.step[at]
-    last = np.bincount(ride, weights=count, minlength=times.shape[0]).astype(np.int64)
-    stops = np.cumsum(last)
-    courses = []
-    for r, (start, stop) in enumerate(zip(stops - last, stops, strict=True)):
-        controls = elements.control[at][start:stop] if stop > start else elements.control[r, :1]
-        courses.append(
-            Trajectory(
-                time=np.append(time[start:stop], times[r, -1]),
-                pose=np.concatenate([pose[start:stop], poses[r, -1:]]).reshape(-1, dof),
-                reduced_state=np.concatenate([reduced[start:stop], elements.begin[r, -1:]]),
-                control=np.concatenate([controls[: stop - start], controls[-1:]]),
-            )
+    share, steps, gained = _between(elements, ride, place, count)
+    at = (ride[of], place[of])
+    samples = Trajectory(
+        time=times[at] + share * elements.step[at],
+        pose=_moved(poses[at], steps),
+        reduced_state=elements.begin[at] + gained,
+        control=elements.control[at],
+    )
+    last = elements.control[np.arange(times.shape[0]), _last_place(elements.step)]
+    stops = np.searchsorted(ride[of], np.arange(times.shape[0]), side="right")
+    return tuple(
+        Trajectory(
+            time=np.append(samples.time[begin:stop], times[r, -1]),
+            pose=np.concatenate([samples.pose[begin:stop], poses[r, -1:]]),
+            reduced_state=np.concatenate(
+                [samples.reduced_state[begin:stop], elements.begin[r, -1:]]
+            ),
+            control=np.concatenate([samples.control[begin:stop], last[r][None]]),
         )
-    return tuple(courses)
+        for r, (begin, stop) in enumerate(zip([0, *stops[:-1]], stops, strict=True))
+    )
 
 
-def _summed(within: Array, series: Array, of: Array) -> Array:
-    """Integrals (n, c) of series (e, n_nodes, c), sample by sample."""
-    return np.einsum("si,sic->sc", within, series[of])
+def _between(
+    elements: _Elements, ride: IntArray, place: IntArray, count: IntArray
+) -> tuple[Array, Array, Array]:
+    """Share of the element, pose from its begin, and reduced state gained, at every sample."""
+    first = np.cumsum(count) - count
+    dof = elements.flow.shape[-1]
+    rates = np.concatenate([elements.flow, elements.rates], axis=-1)[ride, place]
+    series = SERIES @ rates * elements.step[ride, place][:, None, None]
+    share, gained = np.empty(count.sum()), np.empty((count.sum(), rates.shape[-1]))
+    for n in np.unique(count):
+        alike = np.flatnonzero(count == n)
+        shares = np.arange(n) / n
+        rows = first[alike][:, None] + np.arange(n)
+        share[rows] = shares
+        gained[rows] = integrals_to(shares) @ series[alike]
+    return share, gained[:, :dof], gained[:, dof:]
 
 
-def _n_samples(
-    elements: _Elements, max_step_m: float, max_step_rad: float
-) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
+def _last_place(step: Array) -> IntArray:
+    """Last element (m,) of each ride that lasts; any if none does."""
+    return np.asarray(step.shape[1] - 1 - np.argmax(step[:, ::-1] > 0.0, axis=1))
+
+
+def _n_samples(elements: _Elements, max_step_m: float, max_step_rad: float) -> IntArray:
     """How many equal parts (m, k) keep the samples of an element close enough."""
     twists = np.concatenate([elements.twists, elements.ends], axis=2)
     places = [0, 1, *range(3, twists.shape[-1])]
     speed = np.linalg.norm(twists[..., places], axis=-1).max(axis=2)
     turn = np.abs(twists[..., 2]).max(axis=2)
     need = elements.step * np.maximum(speed / max_step_m, turn / max_step_rad)
-    return np.maximum(np.ceil(1.001 * need), 1.0).astype(np.int64)
+    count: IntArray = np.maximum(np.ceil(1.001 * need), 1.0).astype(np.int64)
+    return count
 
 
 def _chained(elements: _Elements) -> Array:
     """Poses (m, k + 1, dof) at the ends of the elements, from the identity."""
     h = elements.step[..., None]
-    steps = h * np.einsum("i,mkid->mkd", WEIGHTS, elements.flow)
+    steps = h * (WEIGHTS @ elements.flow)
     poses = np.zeros((steps.shape[0], steps.shape[1] + 1, steps.shape[2]))
     np.cumsum(steps, axis=1, out=poses[:, 1:])
     turned = _moved(np.where(np.arange(steps.shape[2]) == 2, poses[:, :-1], 0.0), steps)
@@ -304,7 +322,7 @@ def _chained(elements: _Elements) -> Array:
 def _moved(begin: Array, steps: Array) -> Array:
     """Poses (..., dof) of `steps` from the poses `begin`."""
     cosine, sine = np.cos(begin[..., 2]), np.sin(begin[..., 2])
-    moved = begin + steps
+    moved: Array = begin + steps
     moved[..., 0] = begin[..., 0] + cosine * steps[..., 0] - sine * steps[..., 1]
     moved[..., 1] = begin[..., 1] + sine * steps[..., 0] + cosine * steps[..., 1]
     return moved
