@@ -9,33 +9,20 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control._casadi import load_casadi, numpy_on_symbols
-from maneuver_automaton.optimal_control.problem import Components, resampled
+from maneuver_automaton.optimal_control.problem import resampled
 from maneuver_automaton.optimal_control.rules import increments
 from maneuver_automaton.optimal_control.solution import SolveStatus
 from maneuver_automaton.optimal_control.transcription import STATUS, SolverSettings, ipopt_options
 
 LEAST_GUESS_S = 0.1  # a first guess of the duration is not shorter
-
-
-class ComponentModel(Model, Protocol):
-    """A model whose two functions also work component by component, on symbols too."""
-
-    def velocity(self, reduced_state: Components, control: Components) -> Sequence[Any]:
-        """Components of the twist in the body frame."""
-        ...
-
-    def dynamics(self, reduced_state: Components, control: Components) -> Sequence[Any]:
-        """Rates of the components of the reduced state."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,7 +88,7 @@ class TransferProgram:
     duration; the parameters are the controls before and after.
     """
 
-    model: ComponentModel
+    model: Model
     objective: ManeuverObjective
     settings: TransferSettings
     solver: Any
@@ -123,7 +110,7 @@ class Transfer:
 
 
 def transfer_program(
-    model: ComponentModel,
+    model: Model,
     *,
     objective: ManeuverObjective | None = None,
     settings: TransferSettings | None = None,

@@ -9,7 +9,6 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control.maneuvers import (
-    ComponentModel,
     ManeuverObjective,
     Transfer,
     TransferProgram,
@@ -52,7 +51,7 @@ class Connection:
 
 
 def connect(
-    model: ComponentModel,
+    model: Model,
     source: Trim,
     target: Trim,
     *,
@@ -71,7 +70,7 @@ def connect(
 
     Parameters
     ----------
-    model : ComponentModel
+    model : Model
         The vehicle.
     source, target : Trim
         Two trims of different reduced state.
@@ -135,7 +134,7 @@ def connect(
 
 
 def _checked(
-    model: ComponentModel, source: Trim, target: Trim, *, transfer: Transfer, limits: Array
+    model: Model, source: Trim, target: Trim, *, transfer: Transfer, limits: Array
 ) -> Connection:
     """The transfer as a maneuver if it holds, else the reason."""
     nothing = Connection(
