@@ -1,0 +1,229 @@
+"""Libraries built by optimal control: in parallel, and going on where a killed build stopped."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import itertools
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from maneuver_automaton._parallel import in_parallel
+from maneuver_automaton.automaton.automaton import Automaton
+from maneuver_automaton.automaton.journal import (
+    Entry,
+    append,
+    appending,
+    build_key,
+    journal_path,
+    pair_key,
+    read_journal,
+)
+from maneuver_automaton.automaton.library import save_library
+from maneuver_automaton.models import Model
+from maneuver_automaton.optimal_control.maneuvers import (
+    ManeuverObjective,
+    TransferProgram,
+    TransferSettings,
+    duration_guess,
+    transfer_program,
+)
+from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.primitives.connecting import ADMITTED_DEFECT, Connection, connect
+from maneuver_automaton.primitives.driving import drive
+from maneuver_automaton.primitives.mirror import Mirror, mirror_of
+from maneuver_automaton.primitives.resimulation import maneuver_defect
+
+Pair = tuple[str, str]  # names of the trims a maneuver leaves and reaches
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class LibraryBuild:
+    """A library, and what became of every pair."""
+
+    automaton: Automaton
+    failures: tuple[tuple[str, str, str], ...]  # source, target, reason
+    worst_defect: float  # of all maneuvers, against an ODE solver, in their units
+    solved: int  # maneuvers that were solved in this build
+    resumed: int  # that a build before had finished
+    mirrored: int  # that are the mirror image of another
+    build_s: float
+
+
+def build_library(
+    model: Model,
+    trims: Sequence[Trim],
+    *,
+    pairs: Iterable[Pair] | None = None,
+    objective: ManeuverObjective | None = None,
+    settings: TransferSettings | None = None,
+    mirror: bool = True,
+    jobs: int = 1,
+    scheduler: str | None = None,
+    path: Path | str | None = None,
+    name: str = "",
+    progress: Callable[[int, int], None] | None = None,
+) -> LibraryBuild:
+    """Join trims by maneuvers of least cost, each solved, closed and driven again as a proof.
+
+    With a `path`, every finished maneuver is written to a journal beside the file at once; a
+    build that was killed goes on from there, and comes to the same library to the last bit. The
+    library file is written in one step at the end, and the journal removed.
+
+    Source: Frazzoli, Dahleh, Feron (2005), Sec. III.
+
+    Parameters
+    ----------
+    model : Model
+        The vehicle.
+    trims : sequence of Trim
+        The nodes.
+    pairs : iterable of (str, str), optional
+        Names of the trims to join; all pairs of different reduced state if left out.
+    objective, settings : optional
+        See `connect`.
+    mirror : bool
+        Whether a maneuver serves its mirror image too, where model and trims have one.
+    jobs, scheduler
+        Processes at a time; a Dask scheduler, or "local"; see `in_parallel`.
+    path : Path, optional
+        The library file.
+    name : str
+        Of the library.
+    progress : callable, optional
+        Called with the number of maneuvers done and their total.
+
+    Raises
+    ------
+    MissingExtra
+        If CasADi is not installed.
+    ValueError
+        If a pair joins trims of equal reduced state.
+    UnknownTrim
+        If a pair names a trim that there is none.
+    OSError
+        If the file or its journal cannot be written.
+    """
+    began = time.perf_counter()
+    nodes = Automaton(model, tuple(trims), name=name)
+    objective, settings = objective or ManeuverObjective(), settings or TransferSettings()
+    wanted = tuple(all_pairs(nodes) if pairs is None else dict.fromkeys(pairs))
+    for source, target in wanted:
+        _check_pair(nodes, source, target)
+    images = _images(nodes, wanted) if mirror else {}
+    to_solve = [pair for pair in wanted if pair not in images]
+    build = build_key(model, objective, settings)
+    keys = {pair: pair_key(build, nodes[pair[0]], nodes[pair[1]]) for pair in to_solve}
+    journal = None if path is None else journal_path(Path(path))
+    entries = {} if journal is None else read_journal(journal)
+    resumed = sum(key in entries for key in keys.values())
+    open_pairs = [pair for pair in to_solve if keys[pair] not in entries]
+    work = functools.partial(_solved, nodes, keys, objective, settings)
+    with _lines(journal) as write:
+        for count, entry in enumerate(
+            in_parallel(work, open_pairs, jobs=jobs, scheduler=scheduler, order="as done"), 1
+        ):
+            entries[entry.key] = entry
+            write(entry)
+            if progress is not None:
+                progress(resumed + count, len(to_solve))
+    maneuvers, failures, defects = _assembled(nodes, wanted, images, keys, entries)
+    automaton = Automaton(model, nodes.trims, maneuvers, name=name)
+    if path is not None:
+        save_library(automaton, path)
+    if journal is not None:
+        journal.unlink(missing_ok=True)
+    return LibraryBuild(
+        automaton=automaton,
+        failures=failures,
+        worst_defect=max(defects, default=0.0),
+        solved=len(open_pairs),
+        resumed=resumed,
+        mirrored=len(images),
+        build_s=time.perf_counter() - began,
+    )
+
+
+def all_pairs(automaton: Automaton) -> list[Pair]:
+    """One pair for every two classes of trims, in both directions: their first trims.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import Unicycle
+    >>> all_pairs(Automaton.of_controls(Unicycle(), {"rest": (0, 0), "ahead": (1, 0)}))
+    []
+    """
+    _, firsts = np.unique(automaton.trim_classes, return_index=True)
+    names = [automaton.trim_names[k] for k in sorted(firsts.tolist())]
+    return list(itertools.permutations(names, 2))
+
+
+def nearest_pairs(automaton: Automaton, count: int) -> list[Pair]:
+    """From each class of trims to those `count` that are the fewest seconds away, and back.
+
+    Seconds are counted at the fastest rates that the limits admit, half way: a rough measure.
+    """
+    states = {name: automaton[name].reduced_state for pair in all_pairs(automaton) for name in pair}
+    names, chosen = list(states), set[Pair]()
+    for source in names:
+        away = [
+            (duration_guess(automaton.model, states[source], states[target]), k)
+            for k, target in enumerate(names)
+            if target != source
+        ]
+        for _, k in sorted(away)[:count]:
+            chosen |= {(source, names[k]), (names[k], source)}
+    return [pair for pair in all_pairs(automaton) if pair in chosen]
+
+
+@functools.lru_cache(maxsize=1)
+def _program(
+    model: Model, objective: ManeuverObjective, settings: TransferSettings
+) -> TransferProgram:
+    """One program for all pairs that a process solves."""
+    return transfer_program(model, objective=objective, settings=settings)
+
+
+def _solved(
+    nodes: Automaton,
+    keys: dict[Pair, str],
+    objective: ManeuverObjective,
+    settings: TransferSettings,
+    pair: Pair,
+) -> Entry:
+    """One maneuver, as a line of the journal."""
+    source, target = nodes[pair[0]], nodes[pair[1]]
+    program = _program(nodes.model, objective, settings)
+    found = connect(nodes.model, source, target, program=program)
+    if found.maneuver is None or found.maneuver.course is None:
+        none = np.zeros((0, len(nodes.model.control_names)))
+        return Entry(key=keys[pair], duration=np.inf, control=none, reason=found.reason)
+    return Entry(
+        key=keys[pair],
+        duration=found.inputs.duration,
+        control=found.inputs.control,
+        defect=found.defect,
+    )
+
+
+@contextlib.contextmanager
+def _lines(journal: Path | None) -> Iterator[Callable[[Entry], None]]:
+    """What writes an entry to the journal, or nothing where there is none."""
+    if journal is None:
+        yield lambda entry: None
+        return
+    with appending(journal) as stream:
+        yield functools.partial(append, stream)
+
+
+def _check_pair(nodes: Automaton, source: str, target: str) -> None:
+    a, b = nodes.index_of(source), nodes.index_of(target)
+    if nodes.trim_classes[a] == nodes.trim_classes[b]:
+        raise ValueError(
+            f"pair ({source!r}, {target!r}): has one reduced state, so the vehicle switches at "
+            "will; need trims of different reduced state"
+        )
