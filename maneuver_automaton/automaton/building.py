@@ -6,9 +6,10 @@ import contextlib
 import functools
 import itertools
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -33,12 +34,20 @@ from maneuver_automaton.optimal_control.maneuvers import (
     transfer_program,
 )
 from maneuver_automaton.primitives import Maneuver, Trim
-from maneuver_automaton.primitives.connecting import ADMITTED_DEFECT, Connection, connect
-from maneuver_automaton.primitives.driving import drive
+from maneuver_automaton.primitives.connecting import ADMITTED_DEFECT, Inputs, connect
 from maneuver_automaton.primitives.mirror import Mirror, mirror_of
 from maneuver_automaton.primitives.resimulation import maneuver_defect
 
 Pair = tuple[str, str]  # names of the trims a maneuver leaves and reaches
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Failure:
+    """Two trims that no maneuver joins, and why."""
+
+    source: str
+    target: str
+    reason: str
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -46,7 +55,7 @@ class LibraryBuild:
     """A library, and what became of every pair."""
 
     automaton: Automaton
-    failures: tuple[tuple[str, str, str], ...]  # source, target, reason
+    failures: tuple[Failure, ...]
     worst_defect: float  # of all maneuvers, against an ODE solver, in their units
     solved: int  # maneuvers that were solved in this build
     resumed: int  # that a build before had finished
@@ -131,7 +140,8 @@ def build_library(
             write(entry)
             if progress is not None:
                 progress(resumed + count, len(to_solve))
-    maneuvers, failures, defects = _assembled(nodes, wanted, images, keys, entries)
+    done = {pair: entries[key] for pair, key in keys.items()}
+    maneuvers, failures, defects = _assembled(nodes, wanted, images, done)
     automaton = Automaton(model, nodes.trims, maneuvers, name=name)
     if path is not None:
         save_library(automaton, path)
@@ -182,9 +192,9 @@ def nearest_pairs(automaton: Automaton, count: int) -> list[Pair]:
 
 @functools.lru_cache(maxsize=1)
 def _program(
-    model: Model, objective: ManeuverObjective, settings: TransferSettings
+    model: Any, objective: ManeuverObjective, settings: TransferSettings
 ) -> TransferProgram:
-    """One program for all pairs that a process solves."""
+    """One program for all pairs that a process solves; `model` is a Model, and hashable."""
     return transfer_program(model, objective=objective, settings=settings)
 
 
@@ -199,12 +209,12 @@ def _solved(
     source, target = nodes[pair[0]], nodes[pair[1]]
     program = _program(nodes.model, objective, settings)
     found = connect(nodes.model, source, target, program=program)
-    if found.maneuver is None or found.maneuver.course is None:
+    if found.maneuver is None or found.inputs is None:
         none = np.zeros((0, len(nodes.model.control_names)))
-        return Entry(key=keys[pair], duration=np.inf, control=none, reason=found.reason)
+        return Entry(key=keys[pair], interval=np.inf, control=none, reason=found.reason)
     return Entry(
         key=keys[pair],
-        duration=found.inputs.duration,
+        interval=found.inputs.interval,
         control=found.inputs.control,
         defect=found.defect,
     )
@@ -227,3 +237,74 @@ def _check_pair(nodes: Automaton, source: str, target: str) -> None:
             f"pair ({source!r}, {target!r}): has one reduced state, so the vehicle switches at "
             "will; need trims of different reduced state"
         )
+
+
+def _images(nodes: Automaton, pairs: Sequence[Pair]) -> dict[Pair, Pair]:
+    """Pairs that are the mirror image of an earlier one, and which; none without symmetry."""
+    mirror = mirror_of(nodes.model)
+    if mirror is None:
+        return {}
+    other = _other_side(nodes, mirror)
+    images: dict[Pair, Pair] = {}
+    known: set[Pair] = set()
+    for source, target in pairs:
+        known.add((source, target))
+        if source in other and target in other:
+            there = (other[source], other[target])
+            if there in known and there != (source, target) and there not in images:
+                images[source, target] = there
+    return images
+
+
+def _other_side(nodes: Automaton, mirror: Mirror) -> dict[str, str]:
+    """Names of the trims that have an image among the trims, and of the image."""
+    pairs = itertools.product(nodes.trims, repeat=2)
+    return {trim.name: image.name for trim, image in pairs if mirror.takes(trim, image)}
+
+
+def _assembled(
+    nodes: Automaton,
+    pairs: Sequence[Pair],
+    images: Mapping[Pair, Pair],
+    entries: Mapping[Pair, Entry],
+) -> tuple[tuple[Maneuver, ...], tuple[Failure, ...], list[float]]:
+    """Maneuvers in the order of the pairs, what failed, and the defects."""
+    mirror = mirror_of(nodes.model) if images else None
+    found: dict[Pair, Maneuver] = {}
+    failures: list[Failure] = []
+    defects: list[float] = []
+    for pair in pairs:
+        original = images.get(pair, pair)
+        entry = entries[original]
+        if entry.reason:
+            said = entry.reason if pair == original else f"its mirror image failed: {entry.reason}"
+            failures.append(Failure(source=pair[0], target=pair[1], reason=said))
+            continue
+        if pair == original:
+            found[pair], defect = _driven(nodes, pair, entry), entry.defect
+        else:
+            assert mirror is not None
+            found[pair] = mirror.maneuver(found[original], source=pair[0], target=pair[1])
+            source, target = nodes[pair[0]], nodes[pair[1]]
+            defect = maneuver_defect(nodes.model, found[pair], source=source, target=target)
+            if not defect <= ADMITTED_DEFECT:
+                said = f"the mirror image, driven again, ends {defect:.2g} off its target"
+                failures.append(Failure(source=pair[0], target=pair[1], reason=said))
+                del found[pair]
+                continue
+        defects.append(defect)
+    return tuple(found.values()), tuple(failures), defects
+
+
+def _driven(nodes: Automaton, pair: Pair, entry: Entry) -> Maneuver:
+    """The maneuver of a line of the journal."""
+    inputs = Inputs(control=entry.control, interval=entry.interval)
+    course = inputs.drive(nodes.model, nodes[pair[0]].reduced_state)
+    return Maneuver(
+        name=f"{pair[0]} -> {pair[1]}",
+        source=pair[0],
+        target=pair[1],
+        displacement=course.pose[-1],
+        duration=float(course.time[-1]),
+        course=course,
+    )

@@ -28,8 +28,8 @@ class Entry:
     """One line: the inputs of a maneuver, from which it can be driven again, or why it failed."""
 
     key: str
-    duration: float  # [s]
-    control: Array  # (n, n_u) in equal intervals; no row if it failed
+    interval: float  # [s]
+    control: Array  # (n, n_u), each for the interval; no row if it failed
     reason: str = ""
     defect: float = math.inf
 
@@ -38,7 +38,7 @@ class Entry:
 
     def line(self) -> str:
         """The entry as JSON; numbers read back to the last bit."""
-        numbers = {"duration": self.duration, "defect": self.defect}
+        numbers = {"interval": self.interval, "defect": self.defect}
         finite = {name: value if math.isfinite(value) else None for name, value in numbers.items()}
         content = {"key": self.key, "reason": self.reason, **finite}
         return json.dumps({**content, "control": self.control.tolist()}, allow_nan=False) + "\n"
@@ -125,11 +125,11 @@ def append(stream: TextIO, entry: Entry) -> None:
 
 def _entry(content: Mapping[str, Any]) -> Entry:
     defect = content["defect"]
-    duration = content["duration"]
+    interval = content["interval"]
     return Entry(
         key=str(content["key"]),
         reason=str(content["reason"]),
-        duration=math.inf if duration is None else float(duration),
+        interval=math.inf if interval is None else float(interval),
         defect=math.inf if defect is None else float(defect),
         control=np.array(content["control"], dtype=np.float64),
     )
@@ -143,4 +143,5 @@ def _hash(content: Any) -> str:
 def _within(limits: Array, shares: Array) -> Array:
     low = np.where(np.isfinite(limits[:, 0]), limits[:, 0], 0.0)
     high = np.where(np.isfinite(limits[:, 1]), limits[:, 1], low + 1.0)
-    return low + shares * (high - low)
+    within: Array = low + shares * (high - low)
+    return within

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control.maneuvers import (
     ManeuverObjective,
@@ -37,12 +37,29 @@ PERTURBATION = 1e-6  # [-] of the range of a control, for derivatives
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Inputs:
+    """Controls (n, n_u), each for the same `interval` [s]: from them a maneuver is driven again."""
+
+    control: Array
+    interval: float
+
+    def __post_init__(self) -> None:
+        freeze(self, "control")
+
+    def drive(self, model: Model, reduced_state: Array) -> Trajectory:
+        """Motion from the identity pose."""
+        n = len(self.control)
+        return drive(model, reduced_state, control=self.control, durations=[self.interval] * n)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Connection:
     """A maneuver from trim to trim, or the reason why there is none."""
 
     source: str
     target: str
     maneuver: Maneuver | None
+    inputs: Inputs | None = None  # of the maneuver, in equal intervals
     reason: str = ""  # empty if there is a maneuver
     defect: float = np.inf  # against an ODE solver, in the units of pose and reduced state
     cost: float = np.inf  # what the solver made it out to be
@@ -137,19 +154,17 @@ def _checked(
     model: Model, source: Trim, target: Trim, *, transfer: Transfer, limits: Array
 ) -> Connection:
     """The transfer as a maneuver if it holds, else the reason."""
-    nothing = Connection(
-        source=source.name, target=target.name, maneuver=None, cost=transfer.cost
-    )
+    nothing = Connection(source=source.name, target=target.name, maneuver=None, cost=transfer.cost)
     if transfer.status is not SolveStatus.SOLVED:
         return replace(nothing, reason=f"the solver ended with {transfer.reason}")
-    course = closed(
+    inputs = closed(
         model,
         source.reduced_state,
         target.reduced_state,
-        control=transfer.control,
-        duration=transfer.duration,
+        inputs=Inputs(control=transfer.control, interval=transfer.duration / len(transfer.control)),
         limits=limits,
     )
+    course = inputs.drive(model, source.reduced_state)
     miss = float(np.abs(course.reduced_state[-1] - target.reduced_state).max())
     if not miss <= CLOSED:
         return replace(nothing, reason=f"it could not be closed: {miss:.2g} is left")
@@ -170,19 +185,11 @@ def _checked(
         return replace(
             nothing, defect=defect, reason=f"driven again it ends {defect:.2g} off its target"
         )
-    return replace(nothing, maneuver=maneuver, defect=defect)
+    return replace(nothing, maneuver=maneuver, inputs=inputs, defect=defect)
 
 
-def closed(
-    model: Model,
-    start: Array,
-    end: Array,
-    *,
-    control: Array,
-    duration: float,
-    limits: Array,
-) -> Trajectory:
-    """Drive inputs that nearly lead from one reduced state to another, corrected until they do.
+def closed(model: Model, start: Array, end: Array, *, inputs: Inputs, limits: Array) -> Inputs:
+    """Correct inputs that nearly lead from one reduced state to another, until they do.
 
     Newton's method on all inputs and a common factor of the time; of all corrections the least,
     each input measured by its room within its limits, so that those at a limit stay there.
@@ -193,63 +200,55 @@ def closed(
         The vehicle.
     start, end : (n_z,) arrays
         Reduced states.
-    control : (n, n_u) array
-        Inputs in equal intervals.
-    duration : float
-        Of all intervals together [s].
+    inputs : Inputs
+        What nearly does.
     limits : (n_u, 2) array
         The inputs stay within.
 
     Returns
     -------
-    Trajectory
-        From the identity pose; the best that was found, whether it meets the end or not.
+    Inputs
+        The best that were found, whether they meet the end or not.
     """
-    control = np.clip(control, *limits.T)
+    control, interval = np.clip(inputs.control, *limits.T), inputs.interval
+    width = np.where(np.isfinite(limits[:, 1] - limits[:, 0]), limits[:, 1] - limits[:, 0], 2.0)
     scale = np.maximum(1.0, np.abs(end))
-    best, least = None, np.inf
+    best, least = inputs, np.inf
     for _ in range(NEWTON_STEPS):
-        course = drive(
-            model, start, control=control, durations=np.full(len(control), duration / len(control))
-        )
-        miss = course.reduced_state[-1] - end
+        tried = Inputs(control=control, interval=interval)
+        miss = tried.drive(model, start).reduced_state[-1] - end
         size = float(np.abs(miss / scale).max())
-        if best is None or size < least:
-            best, least = course, size
-        elif size > 0.5 * least:
+        if not size < 0.5 * least:
             break  # rounding
-        if size == 0.0 or not np.isfinite(size):
+        best, least = tried, size
+        if size == 0.0:
             break
-        gradient, by_duration = _sensitivities(model, start, control, duration)
-        width = np.where(np.isfinite(limits[:, 1] - limits[:, 0]), limits[:, 1] - limits[:, 0], 2.0)
+        gradient, by_duration = _sensitivities(model, start, tried)
         room = np.minimum(control - limits[:, 0], limits[:, 1] - control)
         weight = np.where(np.isfinite(room), room, width) + 1e-9 * width
         columns = np.concatenate(
-            [(gradient * weight).reshape(end.size, -1), duration * by_duration[:, None]], axis=1
+            [(gradient * weight).reshape(end.size, -1), by_duration[:, None]], axis=1
         )
         step = -np.linalg.lstsq(columns, miss, rcond=None)[0]
         control = np.clip(control + weight * step[:-1].reshape(control.shape), *limits.T)
-        duration *= 1.0 + max(-0.5, step[-1])
-    assert best is not None
+        interval *= 1.0 + max(-0.5, float(step[-1]))
     return best
 
 
-def _sensitivities(
-    model: Model, start: Array, control: Array, duration: float
-) -> tuple[Array, Array]:
-    """Derivatives of the last reduced state by the inputs (n_z, n, n_u) and the duration (n_z,)."""
+def _sensitivities(model: Model, start: Array, inputs: Inputs) -> tuple[Array, Array]:
+    """Derivatives of the last reduced state by inputs (n_z, n, n_u) and a time factor (n_z,)."""
+    control = inputs.control
     n, n_u = control.shape
     by = PERTURBATION * np.maximum(1.0, np.abs(control))
-    shifts = np.zeros((n * n_u, n, n_u))
-    shifts[np.arange(n * n_u), np.repeat(np.arange(n), n_u), np.tile(np.arange(n_u), n)] = by.ravel()
+    shifts = by.ravel()[:, None, None] * np.eye(n * n_u).reshape(n * n_u, n, n_u)
     controls = np.concatenate([control + shifts, control - shifts, control[None], control[None]])
     factors = np.ones(len(controls))
     factors[-2:] = 1.0 + PERTURBATION, 1.0 - PERTURBATION
-    ends = _last_states(model, start, controls, factors * (duration / n))
+    ends = _last_states(model, start, controls, factors * inputs.interval)
     plus, minus = ends[: n * n_u], ends[n * n_u : -2]
     gradient = (plus - minus) / (2.0 * by.reshape(-1, 1))
-    by_duration = (ends[-2] - ends[-1]) / (2.0 * PERTURBATION * duration)
-    return gradient.T.reshape(start.size, n, n_u), by_duration
+    by_factor = (ends[-2] - ends[-1]) / (2.0 * PERTURBATION)
+    return gradient.T.reshape(start.size, n, n_u), by_factor
 
 
 def _last_states(model: Model, start: Array, controls: Array, intervals: Array) -> Array:
@@ -292,4 +291,5 @@ def _excess(limits: Array, rows: Array) -> Array:
     inner = drawn_in(limits, 0.0)
     width = np.where(np.isfinite(limits[:, 1] - limits[:, 0]), limits[:, 1] - limits[:, 0], 1.0)
     out = np.maximum(inner[:, 0] - rows, rows - inner[:, 1]).max(axis=0)
-    return np.maximum(0.0, out) / np.where(width > 0.0, width, 1.0)
+    share: Array = np.maximum(0.0, out) / np.where(width > 0.0, width, 1.0)
+    return share

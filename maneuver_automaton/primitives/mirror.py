@@ -92,7 +92,7 @@ def mirror_of(model: Model, *, seed: int = 0) -> Mirror | None:
 
 def _candidates(n_z: int, n_u: int) -> Iterator[Mirror]:
     every = [
-        Mirror(reduced=np.array(reduced), control=exchange * np.array(signs)[:, None])
+        Mirror(reduced=np.array(reduced), control=exchange * np.array(signs)[:, None] + 0.0)
         for exchange in _exchanges(n_u)
         for reduced in itertools.product((1.0, -1.0), repeat=n_z)
         for signs in itertools.product((1.0, -1.0), repeat=n_u)

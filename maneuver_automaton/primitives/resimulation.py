@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.models import Model, rollout
+from maneuver_automaton.models import Model, VectorField, rollout
+from maneuver_automaton.optimal_control.vehicles import moving_frame
 from maneuver_automaton.primitives.maneuver import Maneuver
 from maneuver_automaton.primitives.trim import Trim
 
@@ -24,9 +25,8 @@ def trim_defect(model: Model, trim: Trim, *, duration: float = 5.0, rtol: float 
     """
     dof = model.group.dof
     start = np.concatenate([np.zeros(dof), trim.reduced_state])
-    end = rollout(
-        model, start, control=trim.control, times=[0.0, duration], rtol=rtol, atol=ATOL
-    )[-1]
+    times = [0.0, duration]
+    end = rollout(_rates(model), start, control=trim.control, times=times, rtol=rtol, atol=ATOL)[-1]
     pose = trim.coast(model.group.identity(), duration).pose
     return float(np.abs(end - np.concatenate([pose, trim.reduced_state])).max())
 
@@ -45,11 +45,18 @@ def maneuver_defect(
     if course is None:
         raise ValueError(f"maneuver {maneuver.name!r}: has no course, so it cannot be driven again")
     state = np.concatenate([np.zeros(model.group.dof), source.reduced_state])
+    rates = _rates(model)
     for begin, end, control in pieces(course.time, course.control):
         times = [begin, end]
-        state = rollout(model, state, control=control, times=times, rtol=rtol, atol=ATOL)[-1]
+        state = rollout(rates, state, control=control, times=times, rtol=rtol, atol=ATOL)[-1]
     claimed = np.concatenate([maneuver.displacement, target.reduced_state])
     return float(np.abs(state - claimed).max())
+
+
+def _rates(model: Model) -> VectorField:
+    """The whole vector field, component by component: quicker than on arrays."""
+    rates = moving_frame(model.group, velocity=model.velocity, reduced=model.dynamics)
+    return lambda state, control: np.array(rates(state.tolist(), control.tolist()))
 
 
 def pieces(time: Array, control: Array) -> list[tuple[float, float, Array]]:
