@@ -7,12 +7,12 @@ import functools
 import itertools
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._parallel import in_parallel
 from maneuver_automaton.automaton.automaton import Automaton
 from maneuver_automaton.automaton.journal import (
@@ -24,7 +24,7 @@ from maneuver_automaton.automaton.journal import (
     pair_key,
     read_journal,
 )
-from maneuver_automaton.automaton.library import save_library
+from maneuver_automaton.automaton.library import check_stated, save_library
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control.maneuvers import (
     ManeuverObjective,
@@ -70,6 +70,7 @@ def build_library(
     pairs: Iterable[Pair] | None = None,
     objective: ManeuverObjective | None = None,
     settings: TransferSettings | None = None,
+    keep_sign: Sequence[str] = (),
     mirror: bool = True,
     jobs: int = 1,
     scheduler: str | None = None,
@@ -95,6 +96,9 @@ def build_library(
         Names of the trims to join; all pairs of different reduced state if left out.
     objective, settings : optional
         See `connect`.
+    keep_sign : sequence of str
+        Controls that do not change their sign between two trims that have it alike: the speed of
+        a car with a trailer, say, which else might go to and fro.
     mirror : bool
         Whether a maneuver serves its mirror image too, where model and trims have one.
     jobs, scheduler
@@ -108,6 +112,8 @@ def build_library(
 
     Raises
     ------
+    InvalidLibrary
+        If a file cannot state the model.
     MissingExtra
         If CasADi is not installed.
     ValueError
@@ -118,20 +124,34 @@ def build_library(
         If the file or its journal cannot be written.
     """
     began = time.perf_counter()
+    if path is not None:
+        check_stated(model)
     nodes = Automaton(model, tuple(trims), name=name)
     objective, settings = objective or ManeuverObjective(), settings or TransferSettings()
     wanted = tuple(all_pairs(nodes) if pairs is None else dict.fromkeys(pairs))
     for source, target in wanted:
         _check_pair(nodes, source, target)
+    for control in keep_sign:
+        if control not in model.control_names:
+            raise ValueError(
+                f"keep_sign: the {model.name} has no control {control!r}, need some of "
+                f"{', '.join(model.control_names)}"
+            )
     images = _images(nodes, wanted) if mirror else {}
     to_solve = [pair for pair in wanted if pair not in images]
-    build = build_key(model, objective, settings)
-    keys = {pair: pair_key(build, nodes[pair[0]], nodes[pair[1]]) for pair in to_solve}
+    recipe = _Recipe(
+        key=build_key(model, objective, settings),
+        nodes=nodes,
+        objective=objective,
+        settings=settings,
+        keep_sign=tuple(keep_sign),
+    )
+    keys = {pair: recipe.key_of(pair) for pair in to_solve}
     journal = None if path is None else journal_path(Path(path))
     entries = {} if journal is None else read_journal(journal)
     resumed = sum(key in entries for key in keys.values())
     open_pairs = [pair for pair in to_solve if keys[pair] not in entries]
-    work = functools.partial(_solved, nodes, keys, objective, settings)
+    work = functools.partial(_solved, recipe)
     with _lines(journal) as write:
         for count, entry in enumerate(
             in_parallel(work, open_pairs, jobs=jobs, scheduler=scheduler, order="as done"), 1
@@ -190,34 +210,55 @@ def nearest_pairs(automaton: Automaton, count: int) -> list[Pair]:
     return [pair for pair in all_pairs(automaton) if pair in chosen]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Recipe:
+    """What all maneuvers of a build are made from; equal keys mean equal recipes."""
+
+    key: str
+    nodes: Automaton = field(compare=False)
+    objective: ManeuverObjective = field(compare=False)
+    settings: TransferSettings = field(compare=False)
+    keep_sign: tuple[str, ...] = field(compare=False)
+
+    def key_of(self, pair: Pair) -> str:
+        return pair_key(
+            self.key, self.nodes[pair[0]], self.nodes[pair[1]], keep_sign=self.keep_sign
+        )
+
+
 @functools.lru_cache(maxsize=1)
-def _program(
-    model: Any, objective: ManeuverObjective, settings: TransferSettings
-) -> TransferProgram:
-    """One program for all pairs that a process solves; `model` is a Model, and hashable."""
-    return transfer_program(model, objective=objective, settings=settings)
+def _program(recipe: _Recipe) -> TransferProgram:
+    """One program for all pairs that a process solves."""
+    return transfer_program(
+        recipe.nodes.model, objective=recipe.objective, settings=recipe.settings
+    )
 
 
-def _solved(
-    nodes: Automaton,
-    keys: dict[Pair, str],
-    objective: ManeuverObjective,
-    settings: TransferSettings,
-    pair: Pair,
-) -> Entry:
+def _solved(recipe: _Recipe, pair: Pair) -> Entry:
     """One maneuver, as a line of the journal."""
+    nodes, key = recipe.nodes, recipe.key_of(pair)
     source, target = nodes[pair[0]], nodes[pair[1]]
-    program = _program(nodes.model, objective, settings)
-    found = connect(nodes.model, source, target, program=program)
+    limits = _signed_limits(nodes.model, source, target, recipe.keep_sign)
+    found = connect(nodes.model, source, target, program=_program(recipe), control_limits=limits)
     if found.maneuver is None or found.inputs is None:
         none = np.zeros((0, len(nodes.model.control_names)))
-        return Entry(key=keys[pair], interval=np.inf, control=none, reason=found.reason)
+        return Entry(key=key, interval=np.inf, control=none, reason=found.reason)
     return Entry(
-        key=keys[pair],
+        key=key,
         interval=found.inputs.interval,
         control=found.inputs.control,
         defect=found.defect,
     )
+
+
+def _signed_limits(model: Model, source: Trim, target: Trim, keep_sign: Sequence[str]) -> Array:
+    """Limits (n_u, 2) of the controls, some of them on one side of zero."""
+    limits = model.control_limits.copy()
+    for name in keep_sign:
+        k = model.control_names.index(name)
+        if source.control[k] * target.control[k] > 0.0:
+            limits[k, int(source.control[k] < 0.0)] = 0.0
+    return limits
 
 
 @contextlib.contextmanager

@@ -7,7 +7,7 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, TextIO
@@ -80,12 +80,10 @@ def build_key(model: Model, objective: ManeuverObjective, settings: TransferSett
     )
 
 
-def pair_key(build: str, source: Trim, target: Trim) -> str:
+def pair_key(build: str, source: Trim, target: Trim, *, keep_sign: Sequence[str] = ()) -> str:
     """What one maneuver is made from: a hash; the names of the trims do not count."""
-    return _hash(
-        [build]
-        + [[trim.reduced_state.tolist(), trim.control.tolist()] for trim in (source, target)]
-    )
+    ends = [[trim.reduced_state.tolist(), trim.control.tolist()] for trim in (source, target)]
+    return _hash([build, *ends, *sorted(keep_sign)])
 
 
 def read_journal(path: Path) -> dict[str, Entry]:

@@ -87,10 +87,7 @@ def save_library(automaton: Automaton, path: Path | str) -> None:
     OSError
         If the file cannot be written.
     """
-    if automaton.model.name not in _KINDS:
-        raise InvalidLibrary(
-            f"model: a file cannot state {automaton.model.name!r}, only {', '.join(_KINDS)}"
-        )
+    check_stated(automaton.model)
     content = _content(automaton)
     states = {trim.name: trim.reduced_state for trim in automaton.trims}
     held = is_reproduced(automaton.model, states, automaton.maneuvers)
@@ -109,6 +106,12 @@ def save_library(automaton: Automaton, path: Path | str) -> None:
         rows = ",\n".join(f"    {_json(row)}" for row in content[key])
         lines.append(f'  "{key}": [\n{rows}\n  ]' if rows else f'  "{key}": []')
     write_text_atomically(Path(path), "{\n" + ",\n".join(lines) + "\n}\n")
+
+
+def check_stated(model: Model) -> None:
+    """Whether a file can state the model; raises InvalidLibrary if it cannot."""
+    if model.name not in _KINDS:
+        raise InvalidLibrary(f"model: a file cannot state {model.name!r}, only {', '.join(_KINDS)}")
 
 
 def load_library(path: Path | str) -> Automaton:

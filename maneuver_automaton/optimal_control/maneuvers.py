@@ -198,8 +198,9 @@ def solve_transfer(
     control_limits: Array | None = None,
     tightening: float = 0.0,
     duration: float | None = None,
+    swing: float = 0.0,
 ) -> Transfer:
-    """A local optimum from one reduced state to another, from a straight line between them.
+    """A local optimum from one reduced state to another, from a guess between them.
 
     Parameters
     ----------
@@ -215,6 +216,10 @@ def solve_transfer(
         By which share of their range the limits are drawn in; the ends stay where they are.
     duration : float, optional
         First guess [s]; from the fastest rates of the model if left out.
+    swing : float
+        The guess is a straight line if 0; else the inputs go this share of the way to one limit,
+        then to the other, and the states are where that leads. Where nothing moves on the straight
+        line, the solver sees no way out of it.
     """
     model, settings = program.model, program.settings
     limits = model.control_limits if control_limits is None else control_limits
@@ -231,13 +236,12 @@ def solve_transfer(
         ]
     )
     guess_s = duration_guess(model, start, end) if duration is None else duration
-    guess = np.concatenate(
-        [
-            resampled(np.array([start, end]), count + 1).ravel(),
-            resampled(controls, settings.intervals).ravel(),
-            [guess_s],
-        ]
-    )
+    inputs = resampled(controls, settings.intervals)
+    path = resampled(np.array([start, end]), count + 1)
+    if swing:
+        inputs = _swung(inputs, controls_within, swing)
+        path = _led_to(model, path, inputs, guess_s)
+    guess = np.concatenate([path.ravel(), inputs.ravel(), [guess_s]])
     began = time.perf_counter()
     answer = program.solver(
         x0=np.clip(guess, *bounds.T),
@@ -298,3 +302,25 @@ def duration_guess(model: Model, start: Array, end: Array) -> float:
     change = np.abs(end - start)
     seconds = change / np.where(fastest > 0.0, fastest, np.inf)
     return max(LEAST_GUESS_S, 1.5 * float(seconds.max(initial=0.0)))
+
+
+def _swung(inputs: Array, limits: Array, swing: float) -> Array:
+    """Inputs (n, n_u) that go a share of the way to one limit, then to the other."""
+    room = np.where(np.isfinite(limits), limits, np.array([-1.0, 1.0]))
+    low, high = room.T[:, None] - inputs
+    first = np.arange(len(inputs))[:, None] < len(inputs) / 2.0
+    towards = np.where(first == (swing > 0.0), high, low)
+    return np.asarray(inputs + abs(swing) * towards)
+
+
+def _led_to(model: Model, path: Array, inputs: Array, duration: float) -> Array:
+    """States (count + 1, n_z) under inputs, by Euler's method; those of `path` where it explodes."""
+    count = len(path) - 1
+    held = np.repeat(inputs, count // len(inputs), axis=0)
+    states = path.copy()
+    with np.errstate(all="ignore"):
+        for k in range(count):
+            rates = model.reduced_dynamics(states[k], held[k])
+            states[k + 1] = states[k] + duration / count * rates
+    sane = np.isfinite(states).all() and np.abs(states).max() < 1e3 * (1.0 + np.abs(path).max())
+    return states if sane else path

@@ -28,8 +28,16 @@ from maneuver_automaton.primitives.trim import Trim
 CLOSED = 1e-10  # [units of the reduced state] between the last one and the target's
 WITHIN = 1e-9  # how far a reduced state may be out of its limits, as a share of their range
 ADMITTED_DEFECT = 1e-6  # [m, rad, units of the reduced state] against an ODE solver
-TRIES = ((1e-6, 1.0), (1e-6, 3.0), (1e-4, 1.0), (1e-2, 1.5), (1e-6, 0.4), (1e-6, 8.0))
-"""(share by which the limits are drawn in, factor of the guessed duration), in turn."""
+TRIES = (
+    (1e-6, 1.0, 0.0),
+    (1e-6, 3.0, 0.0),
+    (1e-6, 2.0, 0.5),
+    (1e-4, 1.0, 0.0),
+    (1e-2, 2.0, -0.5),
+    (1e-6, 0.4, 0.0),
+    (1e-6, 8.0, 0.2),
+)
+"""(share by which the limits are drawn in, factor of the guessed duration, swing), in turn."""
 
 NEWTON_STEPS = 8
 RUNGE_KUTTA_STEPS = 4  # in an interval, for derivatives
@@ -131,7 +139,7 @@ def connect(
     limits = model.control_limits if control_limits is None else control_limits
     reasons: list[str] = []
     solve_s = 0.0
-    for tightening, factor in TRIES:
+    for tightening, factor, swing in TRIES:
         transfer = solve_transfer(
             program,
             start=source.reduced_state,
@@ -140,6 +148,7 @@ def connect(
             control_limits=limits,
             tightening=tightening,
             duration=factor * duration_guess(model, source.reduced_state, target.reduced_state),
+            swing=swing,
         )
         solve_s += transfer.solve_s
         found = _checked(model, source, target, transfer=transfer, limits=limits)

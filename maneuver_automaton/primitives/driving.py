@@ -216,9 +216,9 @@ def _picard(
     before = np.inf
     for iteration in range(ITERATIONS):
         rates = np.broadcast_to(model.reduced_dynamics(nodes, control), nodes.shape)
-        ends = z[:, None] + np.cumsum(h * np.einsum("i,mkiz->mkz", WEIGHTS, rates), axis=1)
+        ends = z[:, None] + np.cumsum(h * (WEIGHTS @ rates), axis=1)
         begins = np.concatenate([z[:, None], ends[:, :-1]], axis=1)[:, :, None]
-        new = begins + h[..., None] * np.einsum("ij,mkjz->mkiz", INTEGRALS, rates)
+        new = begins + h[..., None] * (INTEGRALS @ rates)
         if not np.isfinite(new).all():
             return None
         change = float((np.abs(new - nodes) / np.maximum(1.0, np.abs(new))).max(initial=0.0))
@@ -233,7 +233,7 @@ def _is_rough(elements: _Elements) -> BoolArray:
     """Elements (m, k) whose series have last terms that are more than rounding."""
     rough = np.zeros(elements.step.shape, dtype=bool)
     for values in (elements.rates, elements.twists, elements.flow):
-        last = np.abs(np.einsum("ij,mkjz->mkiz", SERIES[-2:], values)).max(axis=2, initial=0.0)
+        last = np.abs(SERIES[-2:] @ values).max(axis=2, initial=0.0)
         size = np.abs(values).max(axis=2, initial=0.0)
         h = elements.step[..., None]
         rough |= (h * last > RESOLVED * np.maximum(1.0, h * size)).any(axis=-1)
@@ -294,7 +294,7 @@ def _n_samples(elements: _Elements, max_step_m: float, max_step_rad: float) -> I
 def _chained(elements: _Elements) -> Array:
     """Poses (m, k + 1, dof) at the ends of the elements, from the identity."""
     h = elements.step[..., None]
-    steps = h * np.einsum("i,mkid->mkd", WEIGHTS, elements.flow)
+    steps = h * (WEIGHTS @ elements.flow)
     poses = np.zeros((steps.shape[0], steps.shape[1] + 1, steps.shape[2]))
     np.cumsum(steps, axis=1, out=poses[:, 1:])
     turned = _moved(np.where(np.arange(steps.shape[2]) == 2, poses[:, :-1], 0.0), steps)
