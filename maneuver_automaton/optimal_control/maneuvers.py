@@ -213,7 +213,7 @@ def solve_transfer(
     control_limits : (n_u, 2) array, optional
         Narrower limits than the model's.
     tightening : float
-        By which share of their range the limits are drawn in; the ends stay where they are.
+        By which share of their range the limits are drawn in, as far as the ends admit.
     duration : float, optional
         First guess [s]; from the fastest rates of the model if left out.
     swing : float
@@ -225,6 +225,8 @@ def solve_transfer(
     limits = model.control_limits if control_limits is None else control_limits
     controls_within = drawn_in(limits, tightening)
     states_within = drawn_in(model.reduced_limits, tightening)
+    states_within[:, 0] = np.minimum(states_within[:, 0], np.minimum(start, end))
+    states_within[:, 1] = np.maximum(states_within[:, 1], np.maximum(start, end))
     count = settings.intervals * settings.steps
     states = np.tile(states_within, (count + 1, 1, 1))
     states[0], states[-1] = start[:, None], end[:, None]
@@ -314,7 +316,7 @@ def _swung(inputs: Array, limits: Array, swing: float) -> Array:
 
 
 def _led_to(model: Model, path: Array, inputs: Array, duration: float) -> Array:
-    """States (count + 1, n_z) under inputs, by Euler's method; those of `path` where it explodes."""
+    """States (count + 1, n_z) under inputs, by Euler's method; `path` where that explodes."""
     count = len(path) - 1
     held = np.repeat(inputs, count // len(inputs), axis=0)
     states = path.copy()
