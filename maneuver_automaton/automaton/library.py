@@ -30,10 +30,12 @@ from maneuver_automaton.automaton.courses import (
 )
 from maneuver_automaton.errors import InvalidLibrary
 from maneuver_automaton.models import (
+    AcceleratingCar,
     Car,
     CarWithTrailer,
     Helicopter,
     Hovercraft,
+    LatticeBody,
     Model,
     SecondOrderCar,
     SecondOrderUnicycle,
@@ -58,6 +60,8 @@ _KINDS: Mapping[str, Callable[..., Model]] = {
         SingleTrack,
         Hovercraft,
         Helicopter,
+        AcceleratingCar,
+        LatticeBody,
     )
 }
 
