@@ -193,9 +193,25 @@ def polish(
         total = _Answer(*answer[:3], total.iterations + answer.iterations,
                         total.seconds + answer.seconds)  # fmt: skip
         import os
+
         if os.environ.get("VERB"):
             rr = _reaches(program, point, pairs, lines)
-            print("    round", fixed_planes, answer.iterations, round(answer.seconds,2), round(point.durations.sum(),3), "pairs", len(pairs.interval), "more", len(pairs.joined(_near(program, point, MISSED * reach)).interval), "worst", (rr.between-rr.piece).max()*1e3, "swing", (rr.between-rr.nodes).max()*1e3, answer.reason)
+            print(
+                "    round",
+                fixed_planes,
+                answer.iterations,
+                round(answer.seconds, 2),
+                round(point.durations.sum(), 3),
+                "pairs",
+                len(pairs.interval),
+                "more",
+                len(pairs.joined(_near(program, point, MISSED * reach)).interval),
+                "worst",
+                (rr.between - rr.piece).max() * 1e3,
+                "swing",
+                (rr.between - rr.nodes).max() * 1e3,
+                answer.reason,
+            )
         if answer.status is not SolveStatus.SOLVED:
             break
         more = pairs.joined(_near(program, point, MISSED * reach))

@@ -145,7 +145,14 @@ def _assembled(
     time[:-1] += np.cumsum(waits[:-1])[stroke]
     time[-1] += waits[:-1].sum()
     pace = np.sqrt(squared)[:-1]
-    rows = [time[:-1], places, pace, stroke.astype(np.float64), steering, *(pace[:, None] * twists).T]
+    rows = [
+        time[:-1],
+        places,
+        pace,
+        stroke.astype(np.float64),
+        steering,
+        *(pace[:, None] * twists).T,
+    ]
     table = np.stack(rows, axis=1)
     at = np.flatnonzero(new)
     stops = table[at].copy()  # where each stroke begins, before it has waited
@@ -182,7 +189,9 @@ def unicycle_guess(model: SecondOrderUnicycle, plan: Plan, *, intervals: Step) -
     """Guess for a unicycle whose speed and turn rate take time to change."""
     run = timed(plan, pace_of_unicycle(model))
     at = np.linspace(0.0, run.duration, intervals(run.duration) + 1)
-    turn = _followed(np.interp(at, run.time, run.twist[:, 2]), model.max_angular_acceleration, at[1])
+    turn = _followed(
+        np.interp(at, run.time, run.twist[:, 2]), model.max_angular_acceleration, at[1]
+    )
     turn[[0, -1]] = 0.0
     return _second_order(run, at, turn, model.control_limits)
 
@@ -203,7 +212,9 @@ def trailer_guess(
     angles[0] = hitch
     least, most = model.reduced_limits[0]
     for k, (speed, steering) in enumerate(control):
-        rate = speed * (math.tan(steering) / model.wheelbase - math.sin(angles[k]) / model.hitch_length)
+        rate = speed * (
+            math.tan(steering) / model.wheelbase - math.sin(angles[k]) / model.hitch_length
+        )
         angles[k + 1] = min(max(angles[k] + at[1] * rate, least), most)
     state = np.column_stack([_at(run, at), angles])
     return Guess(state=state, control=control, duration=run.duration)
