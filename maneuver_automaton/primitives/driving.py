@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._arrays import Array, IntArray, as_array
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives._legendre import (
     INTEGRALS,
@@ -22,6 +22,8 @@ RESOLVED = 1e-13  # last terms of a series, over the greatest value or 1 [m, rad
 SETTLED = 1e-14  # change of the reduced state in an iteration, over the greatest value or 1
 FINEST = 2**16  # parts of an interval of constant control, at most
 ITERATIONS = 40  # before a stretch counts as too long to be solved at once
+
+BoolArray = NDArray[np.bool_]
 
 
 def drive(
@@ -144,7 +146,7 @@ def _resolved(model: Model, z: Array, control: Array, durations: Array) -> _Elem
         step = durations[:, owner] / parts[owner]
         elements, rough = _integrated(model, z, control[:, owner], step)
         if elements is not None:
-            rough = _is_rough(elements).any(axis=0)
+            rough = np.asarray(_is_rough(elements).any(axis=0))
             if not rough.any():
                 return elements
         parts[np.unique(owner[rough])] *= 2
@@ -159,11 +161,11 @@ def _resolved(model: Model, z: Array, control: Array, durations: Array) -> _Elem
 
 def _integrated(
     model: Model, z: Array, control: Array, step: Array
-) -> tuple[_Elements | None, np.ndarray[tuple[int, ...], np.dtype[np.bool_]]]:
+) -> tuple[_Elements | None, BoolArray]:
     """The elements; or none, and which (k,) cannot be solved for."""
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         begin, at_nodes, rates, failed = _reduced_states(model, z, control, step)
-    rough = np.arange(step.shape[1]) == failed
+    rough: BoolArray = np.asarray(np.arange(step.shape[1]) == failed)
     if rough.any():
         return None, rough
     at_ends = np.stack([begin[:, :-1], begin[:, 1:]], axis=2)
@@ -227,7 +229,7 @@ def _picard(
     return None
 
 
-def _is_rough(elements: _Elements) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+def _is_rough(elements: _Elements) -> BoolArray:
     """Elements (m, k) whose series have last terms that are more than rounding."""
     rough = np.zeros(elements.step.shape, dtype=bool)
     for values in (elements.rates, elements.twists, elements.flow):
@@ -240,54 +242,53 @@ def _is_rough(elements: _Elements) -> np.ndarray[tuple[int, ...], np.dtype[np.bo
 
 def _sampled(elements: _Elements, max_step_m: float, max_step_rad: float) -> tuple[Trajectory, ...]:
     """Samples of every ride, in one go over all elements that last."""
-    dof = elements.twists.shape[-1]
-    poses = _chained(elements)
-    times = np.concatenate(
-        [np.zeros((elements.step.shape[0], 1)), np.cumsum(elements.step, axis=1)], axis=1
-    )
+    poses, start = _chained(elements), np.zeros((elements.step.shape[0], 1))
+    times = np.concatenate([start, np.cumsum(elements.step, axis=1)], axis=1)
     ride, place = np.nonzero(elements.step)
     count = _n_samples(elements, max_step_m, max_step_rad)[ride, place]
     of = np.repeat(np.arange(count.size), count)
-    first = np.cumsum(count) - count
-    share = (np.arange(of.size) - first[of]) / count[of]
-    at = ride[of], place[of]
+    share = (np.arange(of.size) - (np.cumsum(count) - count)[of]) / count[of]
+    at = (ride[of], place[of])
     within = integrals_to(share) * elements.step[at][:, None]
-    reduced = elements.begin[at] + _summed(within, SERIES @ elements.rates[ride, place], of)
-    steps = _summed(within, SERIES @ elements.flow[ride, place], of)
-    steps[:, 2] = _summed(within, SERIES @ elements.twists[ride, place][..., 2:3], of)[:, 0]
-    pose = _moved(poses[at], steps)
-    time = times[at] + share * elements.step[at]
-    last = np.bincount(ride, weights=count, minlength=times.shape[0]).astype(np.int64)
-    stops = np.cumsum(last)
-    courses = []
-    for r, (start, stop) in enumerate(zip(stops - last, stops, strict=True)):
-        controls = elements.control[at][start:stop] if stop > start else elements.control[r, :1]
-        courses.append(
-            Trajectory(
-                time=np.append(time[start:stop], times[r, -1]),
-                pose=np.concatenate([pose[start:stop], poses[r, -1:]]).reshape(-1, dof),
-                reduced_state=np.concatenate([reduced[start:stop], elements.begin[r, -1:]]),
-                control=np.concatenate([controls[: stop - start], controls[-1:]]),
-            )
+    steps, gained = (
+        np.einsum("si,sic->sc", within, (SERIES @ values[ride, place])[of])
+        for values in (elements.flow, elements.rates)
+    )
+    samples = Trajectory(
+        time=times[at] + share * elements.step[at],
+        pose=_moved(poses[at], steps),
+        reduced_state=elements.begin[at] + gained,
+        control=elements.control[at],
+    )
+    last = elements.control[np.arange(times.shape[0]), _last_place(elements.step)]
+    stops = np.searchsorted(ride[of], np.arange(times.shape[0]), side="right")
+    return tuple(
+        Trajectory(
+            time=np.append(samples.time[begin:stop], times[r, -1]),
+            pose=np.concatenate([samples.pose[begin:stop], poses[r, -1:]]),
+            reduced_state=np.concatenate(
+                [samples.reduced_state[begin:stop], elements.begin[r, -1:]]
+            ),
+            control=np.concatenate([samples.control[begin:stop], last[r][None]]),
         )
-    return tuple(courses)
+        for r, (begin, stop) in enumerate(zip([0, *stops[:-1]], stops, strict=True))
+    )
 
 
-def _summed(within: Array, series: Array, of: Array) -> Array:
-    """Integrals (n, c) of series (e, n_nodes, c), sample by sample."""
-    return np.einsum("si,sic->sc", within, series[of])
+def _last_place(step: Array) -> IntArray:
+    """Last element (m,) of each ride that lasts; any if none does."""
+    return np.asarray(step.shape[1] - 1 - np.argmax(step[:, ::-1] > 0.0, axis=1))
 
 
-def _n_samples(
-    elements: _Elements, max_step_m: float, max_step_rad: float
-) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
+def _n_samples(elements: _Elements, max_step_m: float, max_step_rad: float) -> IntArray:
     """How many equal parts (m, k) keep the samples of an element close enough."""
     twists = np.concatenate([elements.twists, elements.ends], axis=2)
     places = [0, 1, *range(3, twists.shape[-1])]
     speed = np.linalg.norm(twists[..., places], axis=-1).max(axis=2)
     turn = np.abs(twists[..., 2]).max(axis=2)
     need = elements.step * np.maximum(speed / max_step_m, turn / max_step_rad)
-    return np.maximum(np.ceil(1.001 * need), 1.0).astype(np.int64)
+    count: IntArray = np.maximum(np.ceil(1.001 * need), 1.0).astype(np.int64)
+    return count
 
 
 def _chained(elements: _Elements) -> Array:
@@ -304,7 +305,7 @@ def _chained(elements: _Elements) -> Array:
 def _moved(begin: Array, steps: Array) -> Array:
     """Poses (..., dof) of `steps` from the poses `begin`."""
     cosine, sine = np.cos(begin[..., 2]), np.sin(begin[..., 2])
-    moved = begin + steps
+    moved: Array = begin + steps
     moved[..., 0] = begin[..., 0] + cosine * steps[..., 0] - sine * steps[..., 1]
     moved[..., 1] = begin[..., 1] + sine * steps[..., 0] + cosine * steps[..., 1]
     return moved
