@@ -123,11 +123,7 @@ class ManeuverQuery:
     def margin(self) -> float:
         """Proven clearance [m]: a share of the body, at most half of what the ends have."""
         usual = MARGIN * (self.half_width or 0.1 * self.library.radius)
-        known = [
-            0.5 * gap
-            for gap in self.end_clearances().tolist()
-            if gap > 0.0
-        ]
+        known = [0.5 * gap for gap in self.end_clearances().tolist() if gap > 0.0]
         return max(LEAST_MARGIN, min([usual, *known]))
 
     def end_clearances(self) -> Array:
