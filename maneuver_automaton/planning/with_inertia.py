@@ -2,22 +2,46 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.costs import Cost
+from maneuver_automaton.models import Model, SecondOrderCar, SecondOrderUnicycle
+from maneuver_automaton.optimal_control import Guess
+from maneuver_automaton.optimal_control.polishing import PolishSettings, Scene, intervals_for
 from maneuver_automaton.planning.among_obstacles import library_table
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.checking import check_plan, load_checks
+from maneuver_automaton.planning.polishing import (
+    guess_of_plan,
+    polished_plan,
+    scene_of,
+    why_not_polished,
+)
 from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
 from maneuver_automaton.planning.tracking import Tracked, track
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.refinement.gear_sequences import (
+    Drive,
+    car_library,
+    gear_sequences,
+    unicycle_library,
+)
+from maneuver_automaton.refinement.guesses import (
+    Pace,
+    car_guess,
+    pace_of_car,
+    pace_of_unicycle,
+    timed,
+    unicycle_guess,
+)
 from maneuver_automaton.refinement.improve import Patience
 from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinematic_problem
 from maneuver_automaton.refinement.ready import load_lattice
@@ -30,6 +54,9 @@ from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
 FIRST_SHARE = 0.8  # of the time limit, for a first path
 IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
 MANEUVER_SHARE = 0.2  # of what is left, for words of maneuvers where there is a plan already
+SEQUENCES_SHARE = 0.25  # of what is left, for kinematic plans that differ
+TURNS = (1.0, 0.8)  # of the greatest curvature
+MOST_REPOLISHED = 2
 AT_ONCE = Patience(attempts=0, passes=0)
 
 
@@ -133,11 +160,92 @@ def _candidates(heard: _Heard) -> Iterator[tuple[Plan, int]]:
     if along:
         yield from _along_paths(heard)
     if problem.automaton.maneuvers:
-        yield from _over_maneuvers(heard, MANEUVER_SHARE if along else 1.0)
+        yield from _over_maneuvers(heard, MANEUVER_SHARE if heard.accepted else 1.0)
+    if not why_not_polished(problem):
+        yield from _polished(heard)
+
+
+def _polished(heard: _Heard) -> Iterator[tuple[Plan, int]]:
+    """Plans polished from kinematic ones of different gears, then from what has been found."""
+    problem, settings = heard.problem, PolishSettings()
+    scene = scene_of(problem)
+    intervals = functools.partial(intervals_for, settings=settings)
+    if follows_paths(problem.automaton.model) and _rests(problem):
+        for drive in _drives(heard):
+            seen = replace(drive.plan, start=np.zeros(problem.start.size), start_time=0.0)
+            goal_index = _reached(problem, drive.plan)
+            guess = _guess_along(problem.automaton.model, seen, intervals)
+            yield from _polished_from(heard, scene, guess, goal_index, settings)
+    for known in tuple(heard.accepted[:MOST_REPOLISHED]):
+        guess = guess_of_plan(known.plan, settings=settings)
+        yield from _polished_from(heard, scene, guess, known.goal_index, settings)
+
+
+def _polished_from(
+    heard: _Heard, scene: Scene, guess: Guess, goal_index: int, settings: PolishSettings
+) -> Iterator[tuple[Plan, int]]:
+    if heard.left <= 0.0:
+        return
+    problem = heard.problem
+    plan, answer = polished_plan(
+        problem, problem.goals[goal_index], scene, guess, settings=settings, seconds=heard.left
+    )
+    heard.counts["polished"] = heard.counts.get("polished", 0) + 1
+    heard.counts["solver_iterations"] = heard.counts.get("solver_iterations", 0) + answer.iterations
+    if plan is not None:
+        yield plan, goal_index
+
+
+def _drives(heard: _Heard) -> tuple[Drive, ...]:
+    """Kinematic plans whose gears differ, the most promising first."""
+    problem, model = heard.problem, heard.problem.automaton.model
+    simpler = kinematic_problem(problem, switch=0.0)
+    libraries, pace = _libraries_of(model)
+    return gear_sequences(
+        simpler,
+        libraries,
+        lambda plan: timed(plan, pace).duration,
+        time_limit=SEQUENCES_SHARE * heard.left,
+    )
+
+
+def _libraries_of(model: Model) -> tuple[list[Automaton], Pace]:
+    """Kinematic libraries that turn as tightly as can be, and less, and the pace along them."""
+    if isinstance(model, SecondOrderCar):
+        return (
+            [
+                car_library(wheelbase=model.wheelbase, max_steering=model.max_steering, share=share)
+                for share in TURNS
+            ],
+            pace_of_car(model),
+        )
+    assert isinstance(model, SecondOrderUnicycle)
+    return (
+        [
+            unicycle_library(
+                max_speed=model.max_speed, max_turn_rate=model.max_turn_rate, share=share
+            )
+            for share in TURNS
+        ],
+        pace_of_unicycle(model),
+    )
+
+
+def _guess_along(model: Model, path: Plan, intervals: Callable[[float], int]) -> Guess:
+    if isinstance(model, SecondOrderCar):
+        return car_guess(model, path, intervals=intervals)
+    assert isinstance(model, SecondOrderUnicycle)
+    return unicycle_guess(model, path, intervals=intervals)
+
+
+def _reached(problem: Problem, path: Plan) -> int:
+    """Which goal a plan ends at."""
+    off = [sum(goal.off(path.end)) for goal in problem.goals]
+    return int(np.argmin(off))
 
 
 def _over_maneuvers(heard: _Heard, share: float) -> Iterator[tuple[Plan, int]]:
-    """Words of trims and maneuvers, each cheaper than the one before, in a share of what is left."""
+    """Words of trims and maneuvers, the cheapest first, in a share of the time that is left."""
     problem = heard.problem
     goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
     query = maneuver_problem_query(problem, goals)
