@@ -5,43 +5,28 @@ from __future__ import annotations
 import functools
 import math
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.automaton import Plan
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.models import Model, SecondOrderCar, SecondOrderUnicycle
-from maneuver_automaton.optimal_control import Guess
-from maneuver_automaton.optimal_control.polishing import PolishSettings, Scene, intervals_for
 from maneuver_automaton.planning.among_obstacles import library_table
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.checking import check_plan, load_checks
 from maneuver_automaton.planning.polishing import (
+    SEQUENCES_SHARE,
+    Aimed,
     guess_of_plan,
-    polished_plan,
-    scene_of,
+    guesses_along_paths,
+    polish_plans,
     why_not_polished,
 )
 from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
 from maneuver_automaton.planning.tracking import Tracked, track
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.refinement.gear_sequences import (
-    Drive,
-    car_library,
-    gear_sequences,
-    unicycle_library,
-)
-from maneuver_automaton.refinement.guesses import (
-    Pace,
-    car_guess,
-    pace_of_car,
-    pace_of_unicycle,
-    timed,
-    unicycle_guess,
-)
 from maneuver_automaton.refinement.improve import Patience
 from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinematic_problem
 from maneuver_automaton.refinement.ready import load_lattice
@@ -54,9 +39,6 @@ from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
 FIRST_SHARE = 0.8  # of the time limit, for a first path
 IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
 MANEUVER_SHARE = 0.2  # of what is left, for words of maneuvers where there is a plan already
-SEQUENCES_SHARE = 0.25  # of what is left, for kinematic plans that differ
-TURNS = (1.0, 0.8)  # of the greatest curvature
-MOST_REPOLISHED = 2
 AT_ONCE = Patience(attempts=0, passes=0)
 
 
@@ -72,6 +54,7 @@ def plan_with_inertia(
         heard.hear(plan, goal_index)
         if time.monotonic() >= heard.deadline:
             break
+    _polish(heard)
     timing = {
         "search": heard.searched - began,
         "first_plan": heard.improvements[0][0] if heard.improvements else math.nan,
@@ -123,8 +106,8 @@ class _Heard:
         self.counts["collision_queries"] += found.queries
         return found
 
-    def hear(self, plan: Plan, goal_index: int) -> None:
-        """Keep a plan if it passes the checks."""
+    def hear(self, plan: Plan, goal_index: int) -> bool:
+        """Keep a plan if it passes the checks, and say so."""
         begin = time.monotonic()
         checked = check_plan(self.problem, plan, self.problem.goals[goal_index])
         now = time.monotonic()
@@ -132,7 +115,7 @@ class _Heard:
         if checked.audit is None or not checked.passed:
             self.counts["rejected"] += 1
             self.refused = self.refused or checked.reason
-            return
+            return False
         cost = self.problem.cost_of(plan)
         best = self.accepted[0].cost if self.accepted else math.inf
         self.accepted.append(
@@ -143,6 +126,7 @@ class _Heard:
             self.improvements.append((now - self.began, cost))
         if not self.searched:
             self.searched = now
+        return True
 
     def why_none(self, time_limit: float) -> tuple[PlanStatus, str]:
         if self.enclosed:
@@ -161,87 +145,29 @@ def _candidates(heard: _Heard) -> Iterator[tuple[Plan, int]]:
         yield from _along_paths(heard)
     if problem.automaton.maneuvers:
         yield from _over_maneuvers(heard, MANEUVER_SHARE if heard.accepted else 1.0)
-    if not why_not_polished(problem):
-        yield from _polished(heard)
 
 
-def _polished(heard: _Heard) -> Iterator[tuple[Plan, int]]:
-    """Plans polished from kinematic ones of different gears, then from what has been found."""
-    problem, settings = heard.problem, PolishSettings()
-    scene = scene_of(problem)
-    intervals = functools.partial(intervals_for, settings=settings)
-    if follows_paths(problem.automaton.model) and _rests(problem):
-        for drive in _drives(heard):
-            seen = replace(drive.plan, start=np.zeros(problem.start.size), start_time=0.0)
-            goal_index = _reached(problem, drive.plan)
-            guess = _guess_along(problem.automaton.model, seen, intervals)
-            yield from _polished_from(heard, scene, guess, goal_index, settings)
-    for known in tuple(heard.accepted[:MOST_REPOLISHED]):
-        guess = guess_of_plan(known.plan, settings=settings)
-        yield from _polished_from(heard, scene, guess, known.goal_index, settings)
-
-
-def _polished_from(
-    heard: _Heard, scene: Scene, guess: Guess, goal_index: int, settings: PolishSettings
-) -> Iterator[tuple[Plan, int]]:
-    if heard.left <= 0.0:
-        return
+def _polish(heard: _Heard) -> None:
+    """Polish kinematic plans of different gears, and what has been found; keep what is cheaper."""
     problem = heard.problem
-    plan, answer = polished_plan(
-        problem, problem.goals[goal_index], scene, guess, settings=settings, seconds=heard.left
-    )
-    heard.counts["polished"] = heard.counts.get("polished", 0) + 1
-    heard.counts["solver_iterations"] = heard.counts.get("solver_iterations", 0) + answer.iterations
-    if plan is not None:
-        yield plan, goal_index
-
-
-def _drives(heard: _Heard) -> tuple[Drive, ...]:
-    """Kinematic plans whose gears differ, the most promising first."""
-    problem, model = heard.problem, heard.problem.automaton.model
-    simpler = kinematic_problem(problem, switch=0.0)
-    libraries, pace = _libraries_of(model)
-    return gear_sequences(
-        simpler,
-        libraries,
-        lambda plan: timed(plan, pace).duration,
-        time_limit=SEQUENCES_SHARE * heard.left,
-    )
-
-
-def _libraries_of(model: Model) -> tuple[list[Automaton], Pace]:
-    """Kinematic libraries that turn as tightly as can be, and less, and the pace along them."""
-    if isinstance(model, SecondOrderCar):
-        return (
-            [
-                car_library(wheelbase=model.wheelbase, max_steering=model.max_steering, share=share)
-                for share in TURNS
-            ],
-            pace_of_car(model),
+    if not heard.accepted or heard.left <= 0.0 or why_not_polished(problem):
+        return
+    aimed = [Aimed(guess_of_plan(heard.accepted[0].plan), heard.accepted[0].goal_index)]
+    if _rests(problem):
+        share = SEQUENCES_SHARE * heard.left
+        along = list(guesses_along_paths(problem, time_limit=share))
+        aimed = along or aimed
+    for goal_index in dict.fromkeys(one.goal_index for one in aimed):
+        if heard.left <= 0.0:
+            return
+        found = polish_plans(
+            problem,
+            [one.guess for one in aimed if one.goal_index == goal_index],
+            goal_index,
+            time_limit=heard.left,
+            accepts=functools.partial(heard.hear, goal_index=goal_index),
         )
-    assert isinstance(model, SecondOrderUnicycle)
-    return (
-        [
-            unicycle_library(
-                max_speed=model.max_speed, max_turn_rate=model.max_turn_rate, share=share
-            )
-            for share in TURNS
-        ],
-        pace_of_unicycle(model),
-    )
-
-
-def _guess_along(model: Model, path: Plan, intervals: Callable[[float], int]) -> Guess:
-    if isinstance(model, SecondOrderCar):
-        return car_guess(model, path, intervals=intervals)
-    assert isinstance(model, SecondOrderUnicycle)
-    return unicycle_guess(model, path, intervals=intervals)
-
-
-def _reached(problem: Problem, path: Plan) -> int:
-    """Which goal a plan ends at."""
-    off = [sum(goal.off(path.end)) for goal in problem.goals]
-    return int(np.argmin(off))
+        heard.counts["polished"] = heard.counts.get("polished", 0) + len(found.attempts)
 
 
 def _over_maneuvers(heard: _Heard, share: float) -> Iterator[tuple[Plan, int]]:
