@@ -192,7 +192,11 @@ def word_free(task, lib, world, start, kinds, numbers, durations, clock):
                 return False
             if not edge_proven(task, lib, world, edge, x, y, heading, clock) >= 0.0:
                 return False
-            d_x, d_y, turn = lib.edge_shift[edge, 0], lib.edge_shift[edge, 1], lib.edge_shift[edge, 2]
+            d_x, d_y, turn = (
+                lib.edge_shift[edge, 0],
+                lib.edge_shift[edge, 1],
+                lib.edge_shift[edge, 2],
+            )
             t = lib.edge_time[edge]
         else:
             trim, t = numbers[k], durations[k]

@@ -171,7 +171,9 @@ def pieces_of(
         Whether it matters when the part is where, not only where it comes along.
     """
     if not courses:
-        return Pieces(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(1, int))
+        return Pieces(
+            np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(1, int)
+        )
     poses = np.concatenate([poses for poses, _ in courses])
     times = np.concatenate([times for _, times in courses])
     sizes = np.array([len(times) for _, times in courses])
