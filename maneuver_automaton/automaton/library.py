@@ -7,33 +7,69 @@ Numbers are written so that they read back to the last bit. The hash covers ever
 from __future__ import annotations
 
 import hashlib
+import inspect
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.automaton.automaton import Automaton
+from maneuver_automaton.automaton.courses import (
+    SAMPLED,
+    driven_courses,
+    even_times,
+    inputs_entry,
+    is_reproduced,
+    samples_entry,
+)
 from maneuver_automaton.errors import InvalidLibrary
-from maneuver_automaton.models import Car, Model, Unicycle
-from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.models import (
+    AcceleratingCar,
+    Car,
+    CarWithTrailer,
+    Helicopter,
+    Hovercraft,
+    LatticeBody,
+    Model,
+    SecondOrderCar,
+    SecondOrderUnicycle,
+    SingleTrack,
+    Unicycle,
+)
+from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 
 FORMAT = "maneuver-automaton library"
 SCHEMA = 1
 UNHASHED = ("name", "comment", "hash")
 CONSISTENT = 1e-9  # [m/s, rad/s] between a stored twist and the model's, per unit of speed
 
-_KINDS: Mapping[str, tuple[type[Unicycle | Car], tuple[str, ...]]] = {
-    "unicycle": (Unicycle, ("max_speed", "max_turn_rate")),
-    "car": (Car, ("wheelbase", "max_steering", "max_speed")),
+_KINDS: Mapping[str, Callable[..., Model]] = {
+    kind.name: kind
+    for kind in (
+        Unicycle,
+        Car,
+        SecondOrderUnicycle,
+        SecondOrderCar,
+        CarWithTrailer,
+        SingleTrack,
+        Hovercraft,
+        Helicopter,
+        AcceleratingCar,
+        LatticeBody,
+    )
 }
 
 
 def automaton_hash(automaton: Automaton) -> str:
     """SHA-256, 64 hexadecimal digits, of model, trims and maneuvers; the name does not count.
+
+    Of a maneuver's course the inputs count; its samples follow from them.
 
     Examples
     --------
@@ -55,16 +91,18 @@ def save_library(automaton: Automaton, path: Path | str) -> None:
     OSError
         If the file cannot be written.
     """
-    if automaton.model.name not in _KINDS:
-        raise InvalidLibrary(
-            f"model: a file cannot state {automaton.model.name!r}, only {', '.join(_KINDS)}"
-        )
+    check_stated(automaton.model)
     content = _content(automaton)
+    states = {trim.name: trim.reduced_state for trim in automaton.trims}
+    held = is_reproduced(automaton.model, states, automaton.maneuvers)
+    for entry, maneuver, flag in zip(content["maneuvers"], automaton.maneuvers, held, strict=True):
+        if maneuver.course is not None and not flag:
+            entry["samples"] = samples_entry(maneuver.course, _numbers)
     head = {
         "format": FORMAT,
         "schema": SCHEMA,
         "name": automaton.name,
-        "hash": _hash(content),
+        "hash": automaton_hash(automaton),
         "model": content["model"],
     }
     lines = [f"  {json.dumps(key)}: {_json(value)}" for key, value in head.items()]
@@ -72,6 +110,12 @@ def save_library(automaton: Automaton, path: Path | str) -> None:
         rows = ",\n".join(f"    {_json(row)}" for row in content[key])
         lines.append(f'  "{key}": [\n{rows}\n  ]' if rows else f'  "{key}": []')
     write_text_atomically(Path(path), "{\n" + ",\n".join(lines) + "\n}\n")
+
+
+def check_stated(model: Model) -> None:
+    """Whether a file can state the model; raises InvalidLibrary if it cannot."""
+    if model.name not in _KINDS:
+        raise InvalidLibrary(f"model: a file cannot state {model.name!r}, only {', '.join(_KINDS)}")
 
 
 def load_library(path: Path | str) -> Automaton:
@@ -125,10 +169,12 @@ def _automaton_of(document: Any) -> Automaton:
         "trims": _rows(document, "trims"),
         "maneuvers": _rows(document, "maneuvers"),
     }
+    model = _model(content["model"])
+    trims = tuple(_trim(k, row) for k, row in enumerate(content["trims"]))
     automaton = Automaton(
-        _model(content["model"]),
-        tuple(_trim(k, row) for k, row in enumerate(content["trims"])),
-        tuple(_maneuver(k, row) for k, row in enumerate(content["maneuvers"])),
+        model,
+        trims,
+        _maneuvers(model, trims, content["maneuvers"]),
         name=_text("name", document.get("name", "")),
     )
     _check_hash(document.get("hash"), automaton)
@@ -200,7 +246,7 @@ def _model_entry(model: Model) -> dict[str, Any]:
     if model.name not in _KINDS:
         names = {"controls": model.control_names, "reduced": model.reduced_names}
         return {"kind": model.name, **{key: list(value) for key, value in names.items()}}
-    values = {name: getattr(model, name) for name in _KINDS[model.name][1]}
+    values = {name: getattr(model, name) for name in inspect.signature(type(model)).parameters}
     return {"kind": model.name} | {k: float(v) for k, v in values.items() if v is not None}
 
 
@@ -218,13 +264,14 @@ def _trim_entry(trim: Trim) -> dict[str, Any]:
 
 
 def _maneuver_entry(maneuver: Maneuver) -> dict[str, Any]:
-    return {
+    entry = {
         "name": maneuver.name,
         "source": maneuver.source,
         "target": maneuver.target,
         "displacement": _numbers(maneuver.displacement),
         "duration": float(maneuver.duration),
     }
+    return entry | ({} if maneuver.course is None else inputs_entry(maneuver.course, _numbers))
 
 
 def _numbers(array: Any) -> list[float]:
@@ -235,11 +282,10 @@ def _model(entry: Any) -> Model:
     kind = entry.get("kind") if isinstance(entry, dict) else entry
     if not isinstance(kind, str) or kind not in _KINDS or not isinstance(entry, dict):
         raise InvalidLibrary(f"model: got the kind {kind!r}, need one of {', '.join(_KINDS)}")
-    make, parameters = _KINDS[kind]
-    _check_keys("model", entry, known=("kind", *parameters), needed=())
-    if "wheelbase" in parameters and "wheelbase" not in entry:
-        raise InvalidLibrary("model: the key 'wheelbase' is missing")
-    return make(**{k: _number(f"model: {k}", v) for k, v in entry.items() if k != "kind"})
+    parameters = inspect.signature(_KINDS[kind]).parameters
+    needed = [name for name, one in parameters.items() if one.default is one.empty]
+    _check_keys("model", entry, known=("kind", *parameters), needed=needed)
+    return _KINDS[kind](**{k: _number(f"model: {k}", v) for k, v in entry.items() if k != "kind"})
 
 
 def _trim(k: int, entry: Any) -> Trim:
@@ -257,10 +303,31 @@ def _trim(k: int, entry: Any) -> Trim:
     )
 
 
+def _maneuvers(model: Model, trims: Sequence[Trim], rows: Sequence[Any]) -> tuple[Maneuver, ...]:
+    """The maneuvers of a file; those that state their inputs are driven, all at once."""
+    found = [_maneuver(k, row) for k, row in enumerate(rows)]
+    states = {trim.name: trim.reduced_state for trim in trims}
+    courses: dict[int, Trajectory] = {}
+    inputs = {}
+    for k, (row, maneuver) in enumerate(zip(rows, found, strict=True)):
+        if "samples" in row:
+            courses[k] = _samples(f"maneuvers[{k}]", row["samples"])
+        elif "control" in row and maneuver.source in states:
+            inputs[k] = _inputs(f"maneuvers[{k}]", row, model, maneuver.duration)
+    starts = [states[found[k].source] for k in inputs]
+    courses |= dict(zip(inputs, driven_courses(model, starts, list(inputs.values())), strict=True))
+    return tuple(
+        replace(maneuver, course=courses[k]) if k in courses else maneuver
+        for k, maneuver in enumerate(found)
+    )
+
+
 def _maneuver(k: int, entry: Any) -> Maneuver:
-    known = ("name", "source", "target", "displacement", "duration", "comment")
+    needed = ("name", "source", "target", "displacement", "duration")
     label = f"maneuvers[{k}]"
-    _check_keys(label, entry, known=known, needed=known[:5])
+    _check_keys(
+        label, entry, known=(*needed, "control", "until", "samples", "comment"), needed=needed
+    )
     return Maneuver(
         name=_text(f"{label}: name", entry["name"]),
         source=_text(f"{label}: source", entry["source"]),
@@ -270,6 +337,50 @@ def _maneuver(k: int, entry: Any) -> Maneuver:
     )
 
 
+def _inputs(label: str, entry: Any, model: Model, duration: float) -> tuple[Array, Array]:
+    """Until when each control of a maneuver holds, and the controls."""
+    control = _table(f"{label}: control", entry["control"], width=len(model.control_names))
+    if "until" not in entry:
+        return even_times(duration, len(control)), control
+    until: Array = _list(f"{label}: until", entry["until"])
+    if until.shape != (len(control),) or not (np.diff(until, prepend=0.0) > 0.0).all():
+        raise InvalidLibrary(
+            f"{label}: until: got {until.tolist()!r:.60}, need {len(control)} rising times, one "
+            "for each control"
+        )
+    if until[-1] != duration:
+        raise InvalidLibrary(
+            f"{label}: until: ends with {until[-1]} s, need the duration {duration} s"
+        )
+    return until, control
+
+
+def _samples(label: str, entry: Any) -> Trajectory:
+    label = f"{label}: samples"
+    _check_keys(label, entry, known=SAMPLED, needed=SAMPLED)
+    time = _list(f"{label}: time", entry["time"])
+    rows = {name: _table(f"{label}: {name}", entry[name]) for name in SAMPLED[1:]}
+    for name, table in rows.items():
+        if len(table) != time.size or not time.size:
+            raise InvalidLibrary(
+                f"{label}: {name}: got {len(table)} rows, need one for each of {time.size} times, "
+                "and at least one"
+            )
+    return Trajectory(time=time, **rows)
+
+
+def _table(label: str, value: Any, *, width: int | None = None) -> Array:
+    """Rows (n, width) of numbers."""
+    if not isinstance(value, list) or not value:
+        raise InvalidLibrary(f"{label}: got {value!r:.60}, need a list of rows of numbers")
+    rows = [_list(f"{label}[{k}]", row) for k, row in enumerate(value)]
+    width = rows[0].size if width is None else width
+    for k, row in enumerate(rows):
+        if row.size != width:
+            raise InvalidLibrary(f"{label}[{k}]: got {row.size} numbers, need {width}")
+    return np.array(rows, dtype=np.float64).reshape(len(rows), width)
+
+
 def _rows(document: Mapping[str, Any], key: str) -> list[Any]:
     rows = document.get(key, [])
     if not isinstance(rows, list):
@@ -277,7 +388,7 @@ def _rows(document: Mapping[str, Any], key: str) -> list[Any]:
     return rows
 
 
-def _check_keys(label: str, entry: Any, *, known: tuple[str, ...], needed: tuple[str, ...]) -> None:
+def _check_keys(label: str, entry: Any, *, known: Sequence[str], needed: Sequence[str]) -> None:
     if not isinstance(entry, dict):
         raise InvalidLibrary(f"{label}: got {entry!r:.60}, need an object")
     for key in entry:

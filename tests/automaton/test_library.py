@@ -17,6 +17,10 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Car, Unicycle, UserModel
 from maneuver_automaton.primitives import Maneuver, Trim
 
+KINDS = (
+    "unicycle, car, second_order_unicycle, second_order_car, car_with_trailer, single_track, "
+    "hovercraft, helicopter"
+)
 ROBOT = Automaton.of_controls(Unicycle(max_speed=2.0), {"ahead": (1.5, 0.0), "spin": (0.0, 1.0)})
 
 
@@ -111,7 +115,7 @@ def test_a_model_that_no_file_can_state_has_a_hash_but_no_file(tmp_path):
     assert len(automaton_hash(library)) == 64
     with pytest.raises(InvalidLibrary) as error:
         save_library(library, tmp_path / "boat.json")
-    assert str(error.value) == "model: a file cannot state 'boat', only unicycle, car"
+    assert str(error.value) == "model: a file cannot state 'boat', only " + KINDS
 
 
 AHEAD = {"name": "ahead", "control": [1.5, 0.0], "body_velocity": [1.5, 0.0, 0.0]}
@@ -145,7 +149,7 @@ AHEAD = {"name": "ahead", "control": [1.5, 0.0], "body_velocity": [1.5, 0.0, 0.0
          ": trims[0] 'ahead': speed = 3 is outside the limits [-2, 2] of the unicycle"),
         ({"trims": [AHEAD | {"max_duration": -1}]},
          ": trim 'ahead': max_duration must be positive, got -1.0 s"),
-        ({"model": {"kind": "tank"}}, ": model: got the kind 'tank', need one of unicycle, car"),
+        ({"model": {"kind": "tank"}}, ": model: got the kind 'tank', need one of " + KINDS),
         ({"model": {"kind": "car"}}, ": model: the key 'wheelbase' is missing"),
         ({"model": {"kind": "car", "wheelbase": -1}},
          ": car: wheelbase must be positive, got -1.0 m"),
