@@ -12,6 +12,7 @@ import numpy as np
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.among_obstacles import library_table
+from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.checking import check_plan, load_checks
 from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
@@ -21,10 +22,14 @@ from maneuver_automaton.refinement.improve import Patience
 from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinematic_problem
 from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
+from maneuver_automaton.search import SearchStatus
 from maneuver_automaton.search.lattice_query import lattice_query
+from maneuver_automaton.search.maneuver_lattice import plan_of, search_maneuvers
+from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
 
 FIRST_SHARE = 0.8  # of the time limit, for a first path
 IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
+MANEUVER_SHARE = 0.2  # of what is left, for words of maneuvers where there is a plan already
 AT_ONCE = Patience(attempts=0, passes=0)
 
 
@@ -124,8 +129,31 @@ def _candidates(heard: _Heard) -> Iterator[tuple[Plan, int]]:
     """Plans as they are found, and the goals they reach."""
     problem = heard.problem
     load_checks(problem)
-    if follows_paths(problem.automaton.model) and _rests(problem):
+    along = follows_paths(problem.automaton.model) and _rests(problem)
+    if along:
         yield from _along_paths(heard)
+    if problem.automaton.maneuvers:
+        yield from _over_maneuvers(heard, MANEUVER_SHARE if along else 1.0)
+
+
+def _over_maneuvers(heard: _Heard, share: float) -> Iterator[tuple[Plan, int]]:
+    """Words of trims and maneuvers, each cheaper than the one before, in a share of what is left."""
+    problem = heard.problem
+    goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
+    query = maneuver_problem_query(problem, goals)
+    most = problem.search.max_expansions
+    until = time.monotonic() + share * heard.left
+    if not heard.accepted:
+        found = search_maneuvers(query, deadline=until, max_expansions=most, first_only=True)
+        heard.counts["expansions"] += found.expansions
+        if found.best is not None:
+            yield plan_of(query, found.best), goals[found.best.goal]
+        elif found.status is SearchStatus.EXHAUSTED:
+            heard.reason = "; none over trims and maneuvers at any resolution tried"
+    found = search_maneuvers(query, deadline=until, max_expansions=most)
+    heard.counts["expansions"] += found.expansions
+    for word in reversed(found.words):
+        yield plan_of(query, word), goals[word.goal]
 
 
 def _along_paths(heard: _Heard) -> Iterator[tuple[Plan, int]]:
