@@ -73,8 +73,8 @@ def coverage_lines(automaton: Automaton) -> list[str]:
         return [str(error)]
     return [
         f"dispersion {gap.largest:.3g} m, mean {gap.mean:.3g} m: of {settings.samples} poses "
-        f"within {settings.radius:.3g} m (1 rad counts {settings.metres_per_radian:g} m) from the nearest "
-        f"of {gap.reached} reached in at most {gap.most:.3g} s",
+        f"within {settings.radius:.3g} m (1 rad counts {settings.metres_per_radian:g} m) from the "
+        f"nearest of {gap.reached} reached in at most {gap.most:.3g} s",
         f"spanning factor {factor.largest:.3g}, median {factor.median:.3g}: time of words to "
         f"{factor.pairs} poses over that of a body that drives and turns any way as fast; worst at "
         f"{vector_text(factor.pose)}",

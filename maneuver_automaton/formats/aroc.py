@@ -156,7 +156,7 @@ def automaton_of_aroc(
     _check_successors(primitives, begin_levels, end_levels)
     trims = {
         speed: Trim(
-            name=f"speed {speed:.6g}",
+            name=f"speed {speed:.5g}",
             body_velocity=np.array([speed, 0.0, 0.0]),
             control=np.zeros(2),
             reduced_state=np.array([speed]),

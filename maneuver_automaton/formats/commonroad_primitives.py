@@ -203,7 +203,7 @@ def automaton_of_commonroad_primitives(
     pairs = np.unique(np.concatenate(ends), axis=0)
     trims = tuple(
         Trim(
-            name=f"speed {speed:.6g}, steering {steering:.6g}",
+            name=f"speed {speed:.4g}, steering {steering:.4g}",
             body_velocity=model.body_velocity(np.array([speed, steering]), np.zeros(2)),
             control=np.zeros(2),
             reduced_state=np.array([speed, steering]),
