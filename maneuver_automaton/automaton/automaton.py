@@ -177,9 +177,21 @@ class Automaton:
 
     @cached_property
     def rest(self) -> int | None:
-        """Index of the first trim that stands still, None if there is none."""
+        """Index of the trim that stands still with the least reduced state; None if there is none.
+
+        Of several, the first.
+        """
         still = np.flatnonzero(~self.body_velocities.any(axis=1))
-        return int(still[0]) if still.size else None
+        if not still.size:
+            return None
+        sizes = [float(np.abs(self.trims[k].reduced_state).sum()) for k in still]
+        return int(still[int(np.argmin(sizes))])
+
+    @cached_property
+    def is_kinematic(self) -> bool:
+        """Whether its trims can be combined at will: one class, no maneuvers, no longest time."""
+        limited = any(trim.max_duration < np.inf for trim in self.trims)
+        return not (self.trim_classes.any() or self.maneuvers or limited)
 
     def graph(self) -> networkx.MultiDiGraph[str]:
         """The automaton as a graph: trims as nodes, all maneuvers, identity ones too, as edges.

@@ -342,7 +342,7 @@ def _driven(nodes: Automaton, pair: Pair, entry: Entry) -> Maneuver:
     inputs = Inputs(control=entry.control, interval=entry.interval)
     course = inputs.drive(nodes.model, nodes[pair[0]].reduced_state)
     return Maneuver(
-        name=f"{pair[0]} -> {pair[1]}",
+        name=f"{pair[0]} to {pair[1]}",
         source=pair[0],
         target=pair[1],
         displacement=course.pose[-1],

@@ -5,12 +5,15 @@ from __future__ import annotations
 import functools
 from dataclasses import dataclass
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.audit import Audit, audit_plan
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.collision.fcl_checker import FclChecker
 from maneuver_automaton.collision.surroundings import surroundings_of
+from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.inside import stays_inside
 
@@ -42,8 +45,10 @@ def check_plan(problem: Problem, plan: Plan, goal: Goal) -> Checked:
         goal,
         problem.automaton.model,
         footprint=problem.footprint,
+        parts=problem.parts,
         obstacles=problem.obstacles,
         margin=problem.margin,
+        states=_end_states(problem, goal),
     )
     return Checked(inside=True, free=True, audit=audit, reason=audit.reason)
 
@@ -71,20 +76,42 @@ def _hit(problem: Problem, plan: Plan, goal: Goal) -> str:
     """Which edge hits what by FCL; empty if none does."""
     if not problem.obstacles:
         return ""
-    checker = checker_of(problem.footprint, problem.obstacles, problem.margin, _origin(goal))
-    if not plan.trims:
-        hit = checker.pose_hit(plan.start, time=plan.start_time)
-        return "" if hit is None else f"obstacle {hit} is hit at the start"
-    for k, trim in enumerate(plan.trims):
-        hit = checker.motion_hit(
-            plan.switching_poses[k],
-            trim.body_velocity,
-            float(plan.durations[k]),
-            start_time=float(plan.switching_times[k]),
-        )
-        if hit is not None:
-            return f"obstacle {hit} is hit in trim {k}, {trim.name!r}"
+    bodies = [("", plan, problem.footprint)]
+    for name, shapes in problem.parts.items():
+        bodies.append((f"the {name}: ", carried(plan, problem.automaton.model, name), shapes))
+    for what, moving, shapes in bodies:
+        checker = checker_of(shapes, problem.obstacles, problem.margin, _origin(goal))
+        hit = _what_hits(checker, moving)
+        if hit:
+            return what + hit
     return ""
+
+
+def _what_hits(checker: FclChecker, plan: Plan) -> str:
+    if not plan.primitives:
+        hit = checker.pose_hit(plan.start[:3], time=plan.start_time)
+        return "" if hit is None else f"obstacle {hit} is hit at the start"
+    for k, primitive in enumerate(plan.primitives):
+        start, begin = plan.switching_poses[k], float(plan.switching_times[k])
+        if isinstance(primitive, Trim):
+            duration = float(plan.primitive_durations[k])
+            hit = checker.motion_hit(start, primitive.body_velocity, duration, start_time=begin)
+        else:
+            course = primitive.course
+            if course is None:
+                return f"maneuver {primitive.name!r} has no course, so it cannot be checked"
+            hit = checker.course_hit(start, course.pose, course.time, start_time=begin)
+        if hit is not None:
+            kind = "trim" if isinstance(primitive, Trim) else "maneuver"
+            return f"obstacle {hit} is hit in {kind} {k}, {primitive.name!r}"
+    return ""
+
+
+def _end_states(problem: Problem, goal: Goal) -> tuple[Array, Array] | None:
+    """Reduced states in which a vehicle with inertia begins and ends."""
+    if problem.automaton.is_kinematic:
+        return None
+    return problem.first_trim.reduced_state, problem.last_trim(goal).reduced_state
 
 
 def _origin(goal: Goal) -> tuple[float, float]:

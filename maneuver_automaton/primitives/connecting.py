@@ -182,7 +182,7 @@ def _checked(
         worst = model.reduced_names[int(excess.argmax())]
         return replace(nothing, reason=f"{worst} leaves its limits by {excess.max():.2g} of them")
     maneuver = Maneuver(
-        name=f"{source.name} -> {target.name}",
+        name=f"{source.name} to {target.name}",
         source=source.name,
         target=target.name,
         displacement=course.pose[-1],

@@ -22,6 +22,7 @@ RESOLVED = 1e-13  # last terms of a series, over the greatest value or 1 [m, rad
 SETTLED = 1e-14  # change of the reduced state in an iteration, over the greatest value or 1
 FINEST = 2**16  # parts of an interval of constant control, at most
 ITERATIONS = 40  # before a stretch counts as too long to be solved at once
+HOPEFUL = 9  # iterations after which every one has to halve the change, or the stretch is too long
 
 BoolArray = NDArray[np.bool_]
 
@@ -225,6 +226,8 @@ def _picard(
         nodes = new
         if change <= SETTLED or (change <= 100.0 * SETTLED and change > 0.5 * before):
             return nodes, rates, ends, iteration
+        if k > 1 and iteration >= HOPEFUL and change > before / 2.0:
+            return None
         before = change
     return None
 
@@ -232,11 +235,12 @@ def _picard(
 def _is_rough(elements: _Elements) -> BoolArray:
     """Elements (m, k) whose series have last terms that are more than rounding."""
     rough = np.zeros(elements.step.shape, dtype=bool)
+    h = elements.step[..., None]
     for values in (elements.rates, elements.twists, elements.flow):
-        last = np.abs(SERIES[-2:] @ values).max(axis=2, initial=0.0)
-        size = np.abs(values).max(axis=2, initial=0.0)
-        h = elements.step[..., None]
-        rough |= (h * last > RESOLVED * np.maximum(1.0, h * size)).any(axis=-1)
+        last = np.abs(SERIES[-2:] @ values)
+        size = np.maximum(np.abs(values[..., 0, :]), np.abs(values[..., -1, :]))
+        worst = np.maximum(last[..., 0, :], last[..., 1, :])
+        rough |= (h * worst > RESOLVED * np.maximum(1.0, h * size)).any(axis=-1)
     return rough
 
 
@@ -247,13 +251,8 @@ def _sampled(elements: _Elements, max_step_m: float, max_step_rad: float) -> tup
     ride, place = np.nonzero(elements.step)
     count = _n_samples(elements, max_step_m, max_step_rad)[ride, place]
     of = np.repeat(np.arange(count.size), count)
-    share = (np.arange(of.size) - (np.cumsum(count) - count)[of]) / count[of]
+    share, steps, gained = _between(elements, ride, place, count)
     at = (ride[of], place[of])
-    within = integrals_to(share) * elements.step[at][:, None]
-    steps, gained = (
-        np.einsum("si,sic->sc", within, (SERIES @ values[ride, place])[of])
-        for values in (elements.flow, elements.rates)
-    )
     samples = Trajectory(
         time=times[at] + share * elements.step[at],
         pose=_moved(poses[at], steps),
@@ -273,6 +272,24 @@ def _sampled(elements: _Elements, max_step_m: float, max_step_rad: float) -> tup
         )
         for r, (begin, stop) in enumerate(zip([0, *stops[:-1]], stops, strict=True))
     )
+
+
+def _between(
+    elements: _Elements, ride: IntArray, place: IntArray, count: IntArray
+) -> tuple[Array, Array, Array]:
+    """Share of the element, pose from its begin, and reduced state gained, at every sample."""
+    first = np.cumsum(count) - count
+    dof = elements.flow.shape[-1]
+    rates = np.concatenate([elements.flow, elements.rates], axis=-1)[ride, place]
+    series = SERIES @ rates * elements.step[ride, place][:, None, None]
+    share, gained = np.empty(count.sum()), np.empty((count.sum(), rates.shape[-1]))
+    for n in np.unique(count):
+        alike = np.flatnonzero(count == n)
+        shares = np.arange(n) / n
+        rows = first[alike][:, None] + np.arange(n)
+        share[rows] = shares
+        gained[rows] = integrals_to(shares) @ series[alike]
+    return share, gained[:, :dof], gained[:, dof:]
 
 
 def _last_place(step: Array) -> IntArray:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, as_array, freeze
 from maneuver_automaton._parallel import in_parallel
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.receding_horizon.log import ClosedLoop, Violation
+from maneuver_automaton.receding_horizon.log import ClosedLoop, Guarantee, Violation
 from maneuver_automaton.receding_horizon.simulation import Disturbance, simulate
 
 CHUNKS = 4  # per worker, so that a slow one is not waited for
@@ -39,6 +39,12 @@ class Outcome:
     def __post_init__(self) -> None:
         freeze(self, "start", last=(3, 4))
         freeze(self, "solve_s")
+
+    @property
+    def collisions(self) -> tuple[int, ...]:
+        """Numbers of the steps that hit something, as the audit found."""
+        hits = (step for step, one in self.violations if one.guarantee is Guarantee.NO_COLLISION)
+        return tuple(hits)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

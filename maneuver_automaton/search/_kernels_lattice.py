@@ -257,11 +257,11 @@ def expand(search, task, lib, world, body, grid, table, n, ceiling):
                 return 1
         limit = min(ceiling, search.found[0])
         cos, sin = math.cos(heading), math.sin(heading)
-        before, gear = links[node, 1], links[node, 2]
+        before, gear = int(links[node, 1]), int(links[node, 2])  # of 32 bits: keys need more
         for trim in range(lib.n_trims):
             if before != NO_TRIM and before != trim and run < lib.min_coast:
                 continue
-            count = links[node, 3] + (0 if trim == before else 1)
+            count = int(links[node, 3]) + (0 if trim == before else 1)
             if task.most_trims > 0 and count > task.most_trims:
                 continue
             v_x, v_y, turn = lib.twists[trim, 0], lib.twists[trim, 1], lib.twists[trim, 2]

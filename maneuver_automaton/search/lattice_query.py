@@ -13,7 +13,6 @@ from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.collision.world import World, own_frame, world_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.inside import outside
 from maneuver_automaton.search.lattice_library import LatticeLibrary, lattice_library
 
 MARGIN = 0.005  # proven clearance of every pose looked at, in half widths of the body
@@ -95,13 +94,6 @@ def world_around(problem: Problem) -> World:
     """The obstacles of a problem around its footprint, prepared once for a map."""
     frame = own_frame(problem.obstacles, problem.goals[0].pose)
     return world_of(problem.obstacles, problem.footprint, frame, keep=problem.margin)
-
-
-def admitted_goals(problem: Problem) -> tuple[int, ...]:
-    """Numbers of the goals inside the bounds."""
-    return tuple(
-        k for k, goal in enumerate(problem.goals) if not outside(goal.pose, problem.bounds)
-    )
 
 
 def _margin(problem: Problem, world: World, start: Array, goals: Array) -> float:
