@@ -178,8 +178,11 @@ def build_library(
     )
 
 
-def all_pairs(automaton: Automaton) -> list[Pair]:
+def all_pairs(automaton: Automaton, *, keep_sign: Sequence[str] = ()) -> list[Pair]:
     """One pair for every two classes of trims, in both directions: their first trims.
+
+    Where controls keep their sign, there is one pair for every sign that both classes have, zero
+    apart: ahead to ahead, and reverse to reverse.
 
     Examples
     --------
@@ -187,27 +190,29 @@ def all_pairs(automaton: Automaton) -> list[Pair]:
     >>> all_pairs(Automaton.of_controls(Unicycle(), {"rest": (0, 0), "ahead": (1, 0)}))
     []
     """
-    _, firsts = np.unique(automaton.trim_classes, return_index=True)
-    names = [automaton.trim_names[k] for k in sorted(firsts.tolist())]
-    return list(itertools.permutations(names, 2))
+    kept = [automaton.model.control_names.index(name) for name in keep_sign]
+    signs = np.sign(automaton.controls[:, kept])
+    firsts: dict[tuple[float, ...], dict[int, str]] = {}
+    for name, kind, sign in zip(
+        automaton.trim_names, automaton.trim_classes.tolist(), signs, strict=True
+    ):
+        if sign.all():
+            firsts.setdefault(tuple(sign.tolist()), {}).setdefault(kind, name)
+    return [pair for names in firsts.values() for pair in itertools.permutations(names.values(), 2)]
 
 
-def nearest_pairs(automaton: Automaton, count: int) -> list[Pair]:
-    """From each class of trims to those `count` that are the fewest seconds away, and back.
+def nearest_pairs(automaton: Automaton, count: int, *, keep_sign: Sequence[str] = ()) -> list[Pair]:
+    """Of all pairs those from a trim to the `count` that are the fewest seconds away, and back.
 
     Seconds are counted at the fastest rates that the limits admit, half way: a rough measure.
     """
-    states = {name: automaton[name].reduced_state for pair in all_pairs(automaton) for name in pair}
-    names, chosen = list(states), set[Pair]()
-    for source in names:
-        away = [
-            (duration_guess(automaton.model, states[source], states[target]), k)
-            for k, target in enumerate(names)
-            if target != source
-        ]
-        for _, k in sorted(away)[:count]:
-            chosen |= {(source, names[k]), (names[k], source)}
-    return [pair for pair in all_pairs(automaton) if pair in chosen]
+    pairs = all_pairs(automaton, keep_sign=keep_sign)
+    away: dict[str, list[tuple[float, int, str]]] = {}
+    for k, (source, target) in enumerate(pairs):
+        states = automaton[source].reduced_state, automaton[target].reduced_state
+        away.setdefault(source, []).append((duration_guess(automaton.model, *states), k, target))
+    near = {(source, target) for source in away for *_, target in sorted(away[source])[:count]}
+    return [pair for pair in pairs if pair in near or pair[::-1] in near]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
