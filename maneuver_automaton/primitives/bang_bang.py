@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import permutations
 from typing import Literal
 
 import numpy as np
@@ -16,7 +15,7 @@ from maneuver_automaton.primitives.driving import drive_all
 from maneuver_automaton.primitives.maneuver import Maneuver
 from maneuver_automaton.primitives.trim import Trim
 
-Pairs = Literal["all", "neighbours"]
+Pairs = Literal["all", "neighbours"] | Sequence[tuple[int, int]]
 EQUAL = 1e-12  # times or states closer than this, over their size, are equal [s, units of z]
 BATCH = 2000  # maneuvers that are integrated together
 
@@ -68,9 +67,10 @@ def connect_bang_bang(
         The vehicle.
     trims : sequence of Trim
         Its trims.
-    pairs : "all" or "neighbours"
-        From every trim to every other; or to those that differ by at most one level in every
-        component, where the levels are the values that the trims take.
+    pairs : "all", "neighbours" or a sequence of pairs of int
+        From every trim to every other; to those that differ by at most one level in every
+        component, where the levels are the values that the trims take; or from and to the trims
+        of these positions.
     late : bool
         Which of the quickest maneuvers; see `bang_bang`.
 
@@ -191,13 +191,15 @@ def segments(model: Model, source: Array, target: Array, *, late: bool) -> tuple
 
 
 def _chosen(trims: Sequence[Trim], pairs: Pairs) -> list[tuple[Trim, Trim]]:
-    states = np.array([trim.reduced_state for trim in trims]).reshape(len(trims), -1)
+    if not isinstance(pairs, str):
+        return [(trims[i], trims[j]) for i, j in pairs]
     if pairs not in ("all", "neighbours"):
         raise ValueError(f"pairs: got {pairs!r}, need all or neighbours")
+    states = np.array([trim.reduced_state for trim in trims]).reshape(len(trims), -1)
     levels = np.stack([_levels(column) for column in states.T], axis=-1)
     steps = np.abs(levels[:, None] - levels).max(axis=2, initial=0)
     wanted: NDArray[np.bool_] = (steps > 0) & ((steps == 1) | (pairs == "all"))
-    return [(trims[i], trims[j]) for i, j in permutations(range(len(trims)), 2) if wanted[i, j]]
+    return [(trims[i], trims[j]) for i, j in np.argwhere(wanted)]
 
 
 def _levels(values: Array) -> IntArray:

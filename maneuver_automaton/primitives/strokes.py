@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from maneuver_automaton.errors import NotATrim
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives.bang_bang import bang_bang, check_limited_rates
-from maneuver_automaton.primitives.driving import drive
+from maneuver_automaton.primitives.driving import drive_all
 from maneuver_automaton.primitives.maneuver import Maneuver
 from maneuver_automaton.primitives.trim import Trim
 
@@ -34,8 +36,6 @@ class Ramp:
 class Stroke:
     """A motion from rest to rest in three primitives; the trim between may last no time."""
 
-    model: Model
-    rest: Trim
     speed_up: Maneuver  # from the rest to the cruise
     cruise: Trim
     cruise_duration: float  # [s]
@@ -45,25 +45,6 @@ class Stroke:
     def duration(self) -> float:
         """Time it takes [s]."""
         return self.speed_up.duration + self.cruise_duration + self.brake.duration
-
-    def whole(self, *, name: str) -> Maneuver:
-        """The same as one maneuver from the rest to itself."""
-        parts = [self.speed_up, self.brake]
-        controls = [maneuver.course.control[0] for maneuver in parts if maneuver.course is not None]
-        course = drive(
-            self.model,
-            self.rest.reduced_state,
-            control=[controls[0], self.cruise.control, controls[1]],
-            durations=[self.speed_up.duration, self.cruise_duration, self.brake.duration],
-        )
-        return Maneuver(
-            name=name,
-            source=self.rest.name,
-            target=self.rest.name,
-            displacement=course.pose[-1],
-            duration=float(course.time[-1]),
-            course=course,
-        )
 
 
 def ramp_of(
@@ -137,11 +118,20 @@ def stroke(model: Model, rest: Trim, length: float, *, max_speed: float | None =
     >>> car = SecondOrderCar(wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0,
     ...                      max_steering_rate=0.5)
     >>> (rest,) = trims_of(car, {"speed": [0.0], "steering": [0.0]}).trims
-    >>> back = stroke(car, rest, -1.0)
-    >>> back.duration, back.whole(name="back").displacement.round(12).tolist()
-    (2.0, [-1.0, 0.0, 0.0])
+    >>> back = stroke(car, rest, -10.0)
+    >>> back.speed_up.displacement.round(12).tolist(), back.cruise_duration, back.duration
+    ([-3.125, 0.0, 0.0], 1.5, 6.5)
     """
-    return _swing(model, rest, length, "speed", max_speed)
+    return _in_parts(model, _swing(model, rest, length, "speed", max_speed))
+
+
+def strokes(
+    model: Model, rests: Sequence[Trim], lengths: Sequence[float], *, max_speed: float | None = None
+) -> tuple[Maneuver, ...]:
+    """Strokes of every length from every rest, each as one maneuver from the rest to itself."""
+    return _whole(
+        model, [_swing(model, r, way, "speed", max_speed) for r in rests for way in lengths]
+    )
 
 
 def turn(model: Model, rest: Trim, angle: float, *, max_turn_rate: float | None = None) -> Stroke:
@@ -149,7 +139,14 @@ def turn(model: Model, rest: Trim, angle: float, *, max_turn_rate: float | None 
 
     See `stroke`; here the vehicle has a component `turn_rate` whose rate is a limited control.
     """
-    return _swing(model, rest, angle, "turn_rate", max_turn_rate)
+    return _in_parts(model, _swing(model, rest, angle, "turn_rate", max_turn_rate))
+
+
+def turns(
+    model: Model, rest: Trim, angles: Sequence[float], *, max_turn_rate: float | None = None
+) -> tuple[Maneuver, ...]:
+    """Turns on the spot by every angle, each as one maneuver from the rest to itself."""
+    return _whole(model, [_swing(model, rest, way, "turn_rate", max_turn_rate) for way in angles])
 
 
 def steer_at_rest(model: Model, source: Trim, target: Trim) -> Maneuver:
@@ -165,38 +162,81 @@ def steer_at_rest(model: Model, source: Trim, target: Trim) -> Maneuver:
     return bang_bang(model, source, target)
 
 
-def _swing(model: Model, rest: Trim, way: float, name: str, limit: float | None) -> Stroke:
-    """Change component `name` of the reduced state so that its integral is `way`."""
+class _Swing(NamedTuple):
+    """A rest, and how one component of its reduced state goes up and back to zero."""
+
+    name: str
+    rest: Trim
+    component: int
+    ramp: Ramp
+
+
+def _swing(model: Model, rest: Trim, way: float, component: str, limit: float | None) -> _Swing:
+    """The one whose integral is `way`."""
     check_limited_rates(model)
     _check_rest(rest)
-    if name not in model.reduced_names:
-        raise ValueError(f"stroke: the {model.name} has no {name} that changes at a limited rate")
-    k = model.reduced_names.index(name)
+    if component not in model.reduced_names:
+        raise ValueError(f"stroke: the {model.name} has no {component}, need one of limited rate")
+    k = model.reduced_names.index(component)
     (slow, fast), (least, greatest) = model.control_limits[k], model.reduced_limits[k]
     up, down, most = (fast, -slow, greatest) if way > 0.0 else (-slow, fast, -least)
     if way == 0.0 or not most > 0.0:
-        raise ValueError(f"stroke: got {way}, the {name} of the {model.name} must let it move so")
+        raise ValueError(
+            f"stroke: got {way}, but the {component} of the {model.name} is within "
+            f"[{least:.6g}, {greatest:.6g}]; need a way that is not 0 and leads there"
+        )
     ramp = ramp_of(
         way,
-        max_speed=min(most, math.inf if limit is None else limit),
-        acceleration=up,
-        deceleration=down,
+        max_speed=float(most) if limit is None else min(float(most), limit),
+        acceleration=float(up),
+        deceleration=float(down),
     )
-    state = np.array(rest.reduced_state)
-    state[k] = ramp.peak
+    return _Swing(f"{rest.name}, {component} over {way:.6g}", rest, k, ramp)
+
+
+def _in_parts(model: Model, swing: _Swing) -> Stroke:
+    state = np.array(swing.rest.reduced_state)
+    state[swing.component] = swing.ramp.peak
+    component = model.reduced_names[swing.component]
     cruise = replace(
-        rest,
-        name=f"{name} {ramp.peak:.6g} from {rest.name}",
+        swing.rest,
+        name=f"{component} {swing.ramp.peak:.6g} from {swing.rest.name}",
         reduced_state=state,
-        body_velocity=model.body_velocity(state, rest.control),
+        body_velocity=model.body_velocity(state, swing.rest.control),
     )
     return Stroke(
-        model=model,
-        rest=rest,
-        speed_up=bang_bang(model, rest, cruise),
+        speed_up=bang_bang(model, swing.rest, cruise),
         cruise=cruise,
-        cruise_duration=ramp.cruise,
-        brake=bang_bang(model, cruise, rest),
+        cruise_duration=swing.ramp.cruise,
+        brake=bang_bang(model, cruise, swing.rest),
+    )
+
+
+def _whole(model: Model, swings: Sequence[_Swing]) -> tuple[Maneuver, ...]:
+    if not swings:
+        return ()
+    ramps = [swing.ramp for swing in swings]
+    durations = np.array([[ramp.speed_up, ramp.cruise, ramp.brake] for ramp in ramps])
+    control = np.zeros((len(swings), 3, len(model.control_names)))
+    for row, swing in zip(control, swings, strict=True):
+        up, down = swing.ramp.speed_up, swing.ramp.brake
+        row[:, swing.component] = [swing.ramp.peak / up, 0.0, -swing.ramp.peak / down]
+    courses = drive_all(
+        model,
+        [swing.rest.reduced_state for swing in swings],
+        control=control,
+        durations=durations,
+    )
+    return tuple(
+        Maneuver(
+            name=swing.name,
+            source=swing.rest.name,
+            target=swing.rest.name,
+            displacement=course.pose[-1],
+            duration=float(course.time[-1]),
+            course=course,
+        )
+        for swing, course in zip(swings, courses, strict=True)
     )
 
 

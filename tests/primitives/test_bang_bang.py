@@ -26,8 +26,10 @@ from maneuver_automaton.primitives import (
     ramp_of,
     steer_at_rest,
     stroke,
+    strokes,
     trims_of,
     turn,
+    turns,
 )
 from maneuver_automaton.primitives.bang_bang import differing, has_limited_rates
 
@@ -206,7 +208,7 @@ def test_strokes_have_their_length_and_least_time(length, steering):
     short = abs(length) <= v * v / a
     expected = 2.0 * math.sqrt(abs(length) / a) if short else abs(length) / v + v / a
     assert motion.duration == pytest.approx(expected, rel=1e-12)
-    whole = motion.whole(name="stroke")
+    (whole,) = strokes(CAR, [rest], [length])
     assert whole.duration == pytest.approx(expected, rel=1e-12)
     turned = length * math.tan(steering) / CAR.wheelbase
     arc = SE2.exp([length, 0.0, turned]).pose  # the same circle, whatever the speed
@@ -225,7 +227,9 @@ def test_strokes_have_their_length_and_least_time(length, steering):
 @given(angle=st.floats(0.01, 9.0), left=st.booleans(), limit=st.floats(0.1, 0.6))
 def test_turns_on_the_spot(angle, left, limit):
     angle = angle if left else -angle
-    whole = turn(ROBOT, trim_at(ROBOT, 0.0, 0.0), angle, max_turn_rate=limit).whole(name="turn")
+    rest = trim_at(ROBOT, 0.0, 0.0)
+    (whole,) = turns(ROBOT, rest, [angle], max_turn_rate=limit)
+    assert turn(ROBOT, rest, angle, max_turn_rate=limit).duration == pytest.approx(whole.duration)
     np.testing.assert_allclose(whole.displacement, [0.0, 0.0, angle], atol=1e-12)
     assert np.abs(whole.course.reduced_state[:, 1]).max() <= limit + 1e-12
 
@@ -252,9 +256,11 @@ def test_reverse_must_be_allowed():
         max_steering_rate=0.5,
         min_speed=0.0,
     )
-    with pytest.raises(ValueError, match=r"stroke: got -1\.0, the speed of the second_order_car"):
+    with pytest.raises(
+        ValueError, match=r"stroke: got -1\.0, but the speed of the second_order_car"
+    ):
         stroke(forward, trim_at(forward, 0.0, 0.0), -1.0)
-    with pytest.raises(ValueError, match="second_order_car has no turn_rate that changes"):
+    with pytest.raises(ValueError, match="second_order_car has no turn_rate, need one"):
         turn(CAR, trim_at(CAR, 0.0, 0.0), 1.0)
     with pytest.raises(NotATrim, match=r"trim 'speed 1, steering 0': moves with .*, need a rest"):
         stroke(CAR, trim_at(CAR, 1.0, 0.0), 1.0)
