@@ -8,7 +8,8 @@ from maneuver_automaton.automaton.automaton import Automaton
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.bang_bang import Pairs, connect_bang_bang, differing
-from maneuver_automaton.primitives.strokes import stroke, turn
+from maneuver_automaton.primitives.strokes import strokes as strokes_of
+from maneuver_automaton.primitives.strokes import turns as turns_of
 
 
 def bang_bang_library(
@@ -58,14 +59,9 @@ def bang_bang_library(
     more: list[Maneuver] = []
     if late:
         more += differing(early, connect_bang_bang(model, trims, pairs=pairs, late=True))
-    for rest in trims:
-        if rest.is_rest:
-            more += [
-                stroke(model, rest, length).whole(name=f"{length:g} m from {rest.name}")
-                for length in strokes
-            ]
-            more += [
-                turn(model, rest, angle).whole(name=f"{angle:g} rad from {rest.name}")
-                for angle in turns
-            ]
+    rests = [trim for trim in trims if trim.is_rest]
+    if strokes and rests:
+        more += strokes_of(model, rests, strokes)
+    for rest in rests if turns else ():
+        more += turns_of(model, rest, turns)
     return Automaton(model, tuple(trims), (*early, *more), name=name)

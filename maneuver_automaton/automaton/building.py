@@ -6,6 +6,7 @@ import contextlib
 import functools
 import itertools
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -108,7 +109,7 @@ def build_library(
     name : str
         Of the library.
     progress : callable, optional
-        Called with the number of maneuvers done and their total.
+        Called with the number of pairs done, mirror images too, and their total.
 
     Raises
     ------
@@ -147,19 +148,20 @@ def build_library(
         keep_sign=tuple(keep_sign),
     )
     keys = {pair: recipe.key_of(pair) for pair in to_solve}
+    served = Counter(keys[images.get(pair, pair)] for pair in wanted)
     journal = None if path is None else journal_path(Path(path))
     entries = {} if journal is None else read_journal(journal)
-    resumed = sum(key in entries for key in keys.values())
     open_pairs = [pair for pair in to_solve if keys[pair] not in entries]
+    resumed = len(to_solve) - len(open_pairs)
+    ready = len(wanted) - sum(served[keys[pair]] for pair in open_pairs)
     work = functools.partial(_solved, recipe)
     with _lines(journal) as write:
-        for count, entry in enumerate(
-            in_parallel(work, open_pairs, jobs=jobs, scheduler=scheduler, order="as done"), 1
-        ):
+        for entry in in_parallel(work, open_pairs, jobs=jobs, scheduler=scheduler, order="as done"):
             entries[entry.key] = entry
             write(entry)
+            ready += served[entry.key]
             if progress is not None:
-                progress(resumed + count, len(to_solve))
+                progress(ready, len(wanted))
     done = {pair: entries[key] for pair, key in keys.items()}
     maneuvers, failures, defects = _assembled(nodes, wanted, images, done)
     automaton = Automaton(model, nodes.trims, maneuvers, name=name)

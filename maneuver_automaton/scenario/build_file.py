@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -106,7 +106,17 @@ class BuildFile:
     @property
     def at_once(self) -> bool:
         """Whether the maneuvers come in closed form, without a solver and in no time."""
-        return has_limited_rates(self.model) and self.maneuvers.effort == 0.0
+        closed = has_limited_rates(self.model) and self.maneuvers.effort == 0.0
+        return closed and not isinstance(self.maneuvers.pairs, int)
+
+    def pairs(self) -> list[Pair]:
+        """Trims to join by optimal control; none where maneuvers come at once."""
+        if self.at_once or not self.model.reduced_names:
+            return []
+        nodes, part = Automaton(self.model, self.trims), self.maneuvers
+        if isinstance(part.pairs, int):
+            return nearest_pairs(nodes, part.pairs, keep_sign=part.keep_sign)
+        return all_pairs(nodes, keep_sign=part.keep_sign)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -194,26 +204,14 @@ def build(
         If the file cannot be written.
     """
     part = asked.maneuvers
-    if not asked.model.reduced_names:
-        automaton = Automaton(asked.model, asked.trims, name=asked.name)
-        save_library(automaton, path)
-        return Built(automaton=automaton, failures=(), build=None)
-    if asked.at_once and not isinstance(part.pairs, int):
-        automaton = bang_bang_library(
-            asked.model,
-            asked.trims,
-            pairs=part.pairs,
-            late=part.late,
-            strokes=part.strokes_m,
-            turns=part.turns_rad,
-            name=asked.name,
-        )
+    if asked.at_once or not asked.model.reduced_names:
+        automaton = _made_at_once(asked)
         save_library(automaton, path)
         return Built(automaton=automaton, failures=(), build=None)
     done = build_library(
         asked.model,
         asked.trims,
-        pairs=_pairs(asked),
+        pairs=asked.pairs(),
         objective=ManeuverObjective(time=part.time, effort=part.effort, smoothness=part.smoothness),
         settings=TransferSettings(
             intervals=part.intervals, steps=part.steps, duration=(0.02, part.max_duration_s)
@@ -228,19 +226,26 @@ def build(
     return Built(automaton=done.automaton, failures=done.failures, build=done)
 
 
-def _pairs(asked: BuildFile) -> list[Pair]:
-    nodes, part = Automaton(asked.model, asked.trims), asked.maneuvers
-    if isinstance(part.pairs, int):
-        return nearest_pairs(nodes, part.pairs, keep_sign=part.keep_sign)
-    return all_pairs(nodes, keep_sign=part.keep_sign)
+def _made_at_once(asked: BuildFile) -> Automaton:
+    part = asked.maneuvers
+    if not asked.model.reduced_names:
+        return Automaton(asked.model, asked.trims, name=asked.name)
+    return bang_bang_library(
+        asked.model,
+        asked.trims,
+        pairs="neighbours" if part.pairs == "neighbours" else "all",
+        late=part.late,
+        strokes=part.strokes_m,
+        turns=part.turns_rad,
+        name=asked.name,
+    )
 
 
 def _check_maneuvers(document: Document, asked: BuildFile) -> None:
     """What is only for one way of joining trims is refused in the other."""
     part, given = asked.maneuvers, asked.maneuvers.model_fields_set
-    at_once: Mapping[str, str] = dict.fromkeys(("late", "strokes_m", "turns_rad"), "")
     if not asked.at_once:
-        for key in at_once:
+        for key in ("late", "strokes_m", "turns_rad"):
             if key in given:
                 raise document.error(
                     ("maneuvers", key),
