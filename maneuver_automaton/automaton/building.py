@@ -39,6 +39,7 @@ from maneuver_automaton.primitives.connecting import ADMITTED_DEFECT, Inputs, co
 from maneuver_automaton.primitives.mirror import Mirror, mirror_of
 from maneuver_automaton.primitives.resimulation import maneuver_defect
 
+SIDEWAYS = 1  # place of the lateral speed in a twist
 Pair = tuple[str, str]  # names of the trims a maneuver leaves and reaches
 
 
@@ -215,6 +216,22 @@ def nearest_pairs(automaton: Automaton, count: int, *, keep_sign: Sequence[str] 
         away.setdefault(source, []).append((duration_guess(automaton.model, *states), k, target))
     near = {(source, target) for source in away for *_, target in sorted(away[source])[:count]}
     return [pair for pair in pairs if pair in near or pair[::-1] in near]
+
+
+def neighbour_pairs(automaton: Automaton, *, keep_sign: Sequence[str] = ()) -> list[Pair]:
+    """Of all pairs those whose twists differ by at most one level in every component.
+
+    The levels are the values that the trims take: of speed, turn rate and climb. The lateral speed,
+    which follows from these where a vehicle drifts, does not count.
+    """
+    twists = np.delete(automaton.body_velocities, SIDEWAYS, axis=1).round(9)
+    levels = np.stack([np.unique(column, return_inverse=True)[1] for column in twists.T], axis=-1)
+    level = dict(zip(automaton.trim_names, levels, strict=True))
+    return [
+        (source, target)
+        for source, target in all_pairs(automaton, keep_sign=keep_sign)
+        if np.abs(level[source] - level[target]).max() <= 1
+    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,6 +19,7 @@ from maneuver_automaton.automaton.building import (
     all_pairs,
     build_library,
     nearest_pairs,
+    neighbour_pairs,
 )
 from maneuver_automaton.automaton.library import save_library
 from maneuver_automaton.formats.text_source import read_text
@@ -116,7 +117,8 @@ class BuildFile:
         nodes, part = Automaton(self.model, self.trims), self.maneuvers
         if isinstance(part.pairs, int):
             return nearest_pairs(nodes, part.pairs, keep_sign=part.keep_sign)
-        return all_pairs(nodes, keep_sign=part.keep_sign)
+        chosen = neighbour_pairs if part.pairs == "neighbours" else all_pairs
+        return chosen(nodes, keep_sign=part.keep_sign)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -252,12 +254,6 @@ def _check_maneuvers(document: Document, asked: BuildFile) -> None:
                     f"is for vehicles whose control is the rate of the reduced state, at no price "
                     f"of effort, not for this {asked.model.name}",
                 )
-        if part.pairs == "neighbours":
-            raise document.error(
-                ("maneuvers", "pairs"),
-                f"got neighbours, which the {asked.model.name} has not, its maneuvers being "
-                "solved for; need all or a number of nearest trims",
-            )
         with at(document, ("maneuvers",)):
             ManeuverObjective(time=part.time, effort=part.effort, smoothness=part.smoothness)
     for control in part.keep_sign:
