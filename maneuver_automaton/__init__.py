@@ -30,12 +30,20 @@ if TYPE_CHECKING:
     from maneuver_automaton.groups import SE2 as SE2
     from maneuver_automaton.groups import SE2xR as SE2xR
     from maneuver_automaton.models import Car as Car
+    from maneuver_automaton.models import CarWithTrailer as CarWithTrailer
+    from maneuver_automaton.models import Helicopter as Helicopter
+    from maneuver_automaton.models import Hovercraft as Hovercraft
+    from maneuver_automaton.models import SecondOrderCar as SecondOrderCar
+    from maneuver_automaton.models import SecondOrderUnicycle as SecondOrderUnicycle
+    from maneuver_automaton.models import SingleTrack as SingleTrack
     from maneuver_automaton.models import Unicycle as Unicycle
+    from maneuver_automaton.models import UserModel as UserModel
     from maneuver_automaton.planning import Planner as Planner
     from maneuver_automaton.planning import PlanResult as PlanResult
     from maneuver_automaton.planning import PlanStatus as PlanStatus
     from maneuver_automaton.planning import plan as plan
     from maneuver_automaton.primitives import Maneuver as Maneuver
+    from maneuver_automaton.primitives import Trajectory as Trajectory
     from maneuver_automaton.primitives import Trim as Trim
     from maneuver_automaton.problem import Bounds as Bounds
     from maneuver_automaton.problem import Goal as Goal
@@ -50,31 +58,39 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
-    "SE2": "groups",
-    "SE2xR": "groups",
     "Automaton": "automaton",
     "Bounds": "problem",
     "Box": "collision",
     "Car": "models",
+    "CarWithTrailer": "models",
     "Cost": "costs",
     "Disc": "collision",
     "Disturbance": "receding_horizon",
     "Goal": "problem",
+    "Helicopter": "models",
     "Horizon": "problem",
+    "Hovercraft": "models",
     "Maneuver": "primitives",
     "Motion": "collision",
     "Obstacle": "collision",
     "OccupancyMap": "collision",
     "Plan": "automaton",
-    "PlanResult": "planning",
     "Planner": "planning",
+    "PlanResult": "planning",
     "PlanStatus": "planning",
     "Polygon": "collision",
     "Problem": "problem",
     "RecedingHorizon": "receding_horizon",
+    "SE2": "groups",
+    "SE2xR": "groups",
     "SearchSettings": "problem",
+    "SecondOrderCar": "models",
+    "SecondOrderUnicycle": "models",
+    "SingleTrack": "models",
+    "Trajectory": "primitives",
     "Trim": "primitives",
     "Unicycle": "models",
+    "UserModel": "models",
     "load_library": "automaton.library",
     "load_plan": "formats.plan_json",
     "load_scenario": "scenario",

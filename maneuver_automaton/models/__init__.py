@@ -1,8 +1,16 @@
 """Vehicles: how a reduced state and a control become a body velocity."""
 
 from maneuver_automaton.models.car import Car as Car
+from maneuver_automaton.models.car_with_trailer import CarWithTrailer as CarWithTrailer
+from maneuver_automaton.models.helicopter import Helicopter as Helicopter
+from maneuver_automaton.models.hovercraft import Hovercraft as Hovercraft
 from maneuver_automaton.models.model import Model as Model
 from maneuver_automaton.models.rollout import rollout as rollout
+from maneuver_automaton.models.second_order_car import SecondOrderCar as SecondOrderCar
+from maneuver_automaton.models.second_order_unicycle import (
+    SecondOrderUnicycle as SecondOrderUnicycle,
+)
+from maneuver_automaton.models.single_track import SingleTrack as SingleTrack
 from maneuver_automaton.models.state import VectorField as VectorField
 from maneuver_automaton.models.state import equivariance_defect as equivariance_defect
 from maneuver_automaton.models.state import moved_rates as moved_rates

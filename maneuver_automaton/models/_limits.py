@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,8 +14,28 @@ from maneuver_automaton._arrays import Array
 def check_positive(owner: str, **values: float | None) -> None:
     """Refuse a parameter that is neither positive nor, where that is allowed, None."""
     for name, value in values.items():
-        if value is not None and not value > 0.0:
+        if value is not None and not 0.0 < value < math.inf:
             raise ValueError(f"{owner}: {name} must be positive, got {value}")
+
+
+def check_steering(owner: str, max_steering: float) -> None:
+    """Refuse wheels that can be turned across."""
+    if not max_steering < math.pi / 2:
+        raise ValueError(f"{owner}: max_steering must be less than pi / 2, got {max_steering} rad")
+
+
+def speed_limits(
+    owner: str, least: float | None, greatest: float, *, what: str = "speed", unit: str = "m/s"
+) -> tuple[float, float]:
+    """Least and greatest speed; a least one of None is as fast in reverse."""
+    if least is None:
+        return -greatest, greatest
+    if not -math.inf < least < greatest:
+        raise ValueError(
+            f"{owner}: min_{what} must be less than max_{what} {greatest} {unit}, "
+            f"got {least} {unit}"
+        )
+    return least, greatest
 
 
 def symmetric_limits(*greatest: float | None) -> Array:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.groups import SE2, LieGroup
-from maneuver_automaton.models._limits import check_positive, symmetric_limits
+from maneuver_automaton.models._components import Components, no_parts, no_rates, on_arrays
+from maneuver_automaton.models._limits import check_positive, check_steering, symmetric_limits
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,15 +47,14 @@ class Car:
     group: ClassVar[type[LieGroup]] = SE2
     control_names: ClassVar[tuple[str, ...]] = ("speed", "steering")
     reduced_names: ClassVar[tuple[str, ...]] = ()
+    part_names: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.wheelbase) and self.wheelbase > 0.0):
             raise ValueError(f"car: wheelbase must be positive, got {self.wheelbase} m")
         check_positive(self.name, max_steering=self.max_steering, max_speed=self.max_speed)
-        if self.max_steering is not None and not self.max_steering < math.pi / 2:
-            raise ValueError(
-                f"car: max_steering must be less than pi / 2, got {self.max_steering} rad"
-            )
+        if self.max_steering is not None:
+            check_steering(self.name, self.max_steering)
 
     @property
     def turning_radius(self) -> float:
@@ -74,15 +74,26 @@ class Car:
         """No reduced state: (0, 2)."""
         return np.zeros((0, 2))
 
+    def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
+        """Components of the twist: (speed, 0, speed tan(steering) / wheelbase)."""
+        return u[0], 0.0, u[0] * np.tan(u[1]) / self.wheelbase
+
+    def dynamics(self, z: Components, u: Components, /) -> tuple[Any, ...]:
+        """No reduced state: ()."""
+        return no_rates(z, u)
+
     def body_velocity(self, reduced_state: Array, control: Array) -> Array:
-        """Twist (..., 3) [m/s, m/s, rad/s]: (v, 0, v tan(steering) / wheelbase)."""
-        speed, steering = np.moveaxis(as_array("control", control, last=2), -1, 0)
-        if np.any(np.abs(steering) >= math.pi / 2):
-            worst = float(np.abs(steering).max())
+        """Twist (..., 3) [m/s, m/s, rad/s]; see `velocity`."""
+        steering = np.abs(as_array("control", control, last=2)[..., 1])
+        if np.any(steering >= math.pi / 2):
+            worst = float(steering.max())
             raise ValueError(f"car: steering must be less than pi / 2, got {worst:.6g} rad")
-        turn_rate = speed * np.tan(steering) / self.wheelbase
-        return np.stack([speed, np.zeros_like(speed), turn_rate], axis=-1)
+        return on_arrays(self.velocity, reduced_state, control, sizes=(0, 2, 3))
 
     def reduced_dynamics(self, reduced_state: Array, control: Array) -> Array:
         """No reduced state: (..., 0)."""
-        return np.zeros((*np.shape(control)[:-1], 0))
+        return on_arrays(self.dynamics, reduced_state, control, sizes=(0, 2, 0))
+
+    def part_poses(self, reduced_state: Array) -> Array:
+        """Carries nothing: (..., 0, 3)."""
+        return no_parts(reduced_state)

@@ -6,13 +6,18 @@ from typing import Protocol
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import LieGroup
+from maneuver_automaton.models._components import Components
 
 
 class Model(Protocol):
     """A vehicle whose dynamics look the same at every pose.
 
     Its state is a pose g and a reduced state z, with ``g' = g xi(z, u)`` and ``z' = f(z, u)``:
-    neither xi nor f sees the pose. Both methods broadcast over batch axes as NumPy does.
+    neither xi nor f sees the pose. Both are stated component by component, as `velocity` and
+    `dynamics`, for numbers, arrays or symbols; `body_velocity` and `reduced_dynamics` are the same
+    on arrays with components last, and broadcast over batch axes as NumPy does.
+
+    A vehicle may carry parts, such as a trailer, whose place depends on the reduced state.
 
     Source: Frazzoli, Dahleh, Feron (2005), Sec. II; reduction by symmetry.
 
@@ -55,10 +60,27 @@ class Model(Protocol):
         """Least and greatest value (n_z, 2) of each component of the reduced state."""
         ...
 
+    @property
+    def part_names(self) -> tuple[str, ...]:
+        """Names of what it carries; () if that is nothing."""
+        ...
+
+    def velocity(self, z: Components, u: Components, /) -> Components:
+        """Components of the twist xi(z, u), in the order of the pose."""
+        ...
+
+    def dynamics(self, z: Components, u: Components, /) -> Components:
+        """Rates f(z, u) of the components of the reduced state; () for a kinematic vehicle."""
+        ...
+
     def body_velocity(self, reduced_state: Array, control: Array) -> Array:
         """Twist xi(z, u) (..., dof) in the body frame, in the order of the pose."""
         ...
 
     def reduced_dynamics(self, reduced_state: Array, control: Array) -> Array:
         """Rates (..., n_z) of the reduced state per second."""
+        ...
+
+    def part_poses(self, reduced_state: Array) -> Array:
+        """Planar poses (..., n, 3) of what it carries, seen from the vehicle."""
         ...

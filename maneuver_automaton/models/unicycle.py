@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.groups import SE2, LieGroup
+from maneuver_automaton.models._components import Components, no_parts, no_rates, on_arrays
 from maneuver_automaton.models._limits import check_positive, symmetric_limits
 
 
@@ -40,6 +41,7 @@ class Unicycle:
     group: ClassVar[type[LieGroup]] = SE2
     control_names: ClassVar[tuple[str, ...]] = ("speed", "turn_rate")
     reduced_names: ClassVar[tuple[str, ...]] = ()
+    part_names: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
         check_positive(self.name, max_speed=self.max_speed, max_turn_rate=self.max_turn_rate)
@@ -54,14 +56,25 @@ class Unicycle:
         """No reduced state: (0, 2)."""
         return np.zeros((0, 2))
 
+    def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
+        """Components of the twist: (speed, 0, turn_rate)."""
+        return u[0], 0.0, u[1]
+
+    def dynamics(self, z: Components, u: Components, /) -> tuple[Any, ...]:
+        """No reduced state: ()."""
+        return no_rates(z, u)
+
     def body_velocity(self, reduced_state: Array, control: Array) -> Array:
-        """Twist (..., 3) [m/s, m/s, rad/s]: (v, 0, omega)."""
-        speed, turn_rate = np.moveaxis(as_array("control", control, last=2), -1, 0)
-        return np.stack([speed, np.zeros_like(speed), turn_rate], axis=-1)
+        """Twist (..., 3) [m/s, m/s, rad/s]; see `velocity`."""
+        return on_arrays(self.velocity, reduced_state, control, sizes=(0, 2, 3))
 
     def reduced_dynamics(self, reduced_state: Array, control: Array) -> Array:
         """No reduced state: (..., 0)."""
-        return np.zeros((*np.shape(control)[:-1], 0))
+        return on_arrays(self.dynamics, reduced_state, control, sizes=(0, 2, 0))
+
+    def part_poses(self, reduced_state: Array) -> Array:
+        """Carries nothing: (..., 0, 3)."""
+        return no_parts(reduced_state)
 
 
 def spatial_twist(state: ArrayLike, control: ArrayLike) -> Array:

@@ -6,20 +6,27 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.errors import BrokenSymmetry
 from maneuver_automaton.groups import LieGroup
+from maneuver_automaton.models._components import (
+    ComponentFunction,
+    Components,
+    no_parts,
+    no_rates,
+)
 from maneuver_automaton.models._limits import limits_of, unlimited
 from maneuver_automaton.models.state import VectorField, equivariance_defect
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class UserModel:
-    """A vehicle given by two functions of one reduced state (n_z,) and one control (n_u,).
+    """A vehicle given by two functions of one reduced state and one control, by components.
 
-    Batches are taken apart and the functions called row by row, so they need not be vectorised.
+    Written with Python's arithmetic and NumPy's functions on components, the two functions serve
+    numbers, here, and symbols, in optimal control: they are all that a vehicle needs. Batches are
+    taken apart and the functions called row by row, so they need not be vectorised.
 
     Parameters
     ----------
@@ -28,13 +35,17 @@ class UserModel:
     group : type[LieGroup]
         Group of its poses.
     control_names, reduced_names : tuple of str
-        Names of the controls and of the components of the reduced state.
+        Names of the n_u controls and of the n_z components of the reduced state.
     velocity : callable
         ``velocity(z, u)`` returns the twist (dof,) in the body frame, in the order of the pose.
     dynamics : callable, optional
         ``dynamics(z, u)`` returns the rates (n_z,) of the reduced state; needed if there is one.
     control_limits, reduced_limits : (n, 2) arrays, optional
         Least and greatest values, infinite where there is no limit; one pair serves all.
+    part_names : tuple of str
+        Names of what it carries.
+    part_poses : callable
+        Planar poses (..., n, 3) of that, seen from the vehicle, for reduced states (..., n_z).
 
     Examples
     --------
@@ -52,14 +63,16 @@ class UserModel:
     name: str
     group: type[LieGroup]
     control_names: tuple[str, ...]
-    velocity: Callable[[Array, Array], ArrayLike]
+    velocity: ComponentFunction
     reduced_names: tuple[str, ...] = ()
-    dynamics: Callable[[Array, Array], ArrayLike] | None = None
+    dynamics: ComponentFunction = no_rates
     control_limits: Array = field(default_factory=unlimited)  # (n_u, 2)
     reduced_limits: Array = field(default_factory=unlimited)  # (n_z, 2)
+    part_names: tuple[str, ...] = ()
+    part_poses: Callable[[Array], Array] = no_parts
 
     def __post_init__(self) -> None:
-        if self.reduced_names and self.dynamics is None:
+        if self.reduced_names and self.dynamics is no_rates:
             raise ValueError(
                 f"{self.name}: has the reduced state {', '.join(self.reduced_names)} but no "
                 "dynamics, need a function of (reduced_state, control)"
@@ -75,15 +88,13 @@ class UserModel:
 
     def reduced_dynamics(self, reduced_state: Array, control: Array) -> Array:
         """Rates (..., n_z) of the reduced state per second."""
-        if self.dynamics is None:
-            return np.zeros((*np.shape(control)[:-1], 0))
         n = len(self.reduced_names)
         return self._row_by_row("dynamics", self.dynamics, reduced_state, control, n)
 
     def _row_by_row(
         self,
         what: str,
-        function: Callable[[Array, Array], ArrayLike],
+        function: ComponentFunction,
         reduced_state: Array,
         control: Array,
         n: int,
@@ -154,8 +165,10 @@ def model_of_vector_field(
     names, dof, origin = tuple(reduced_names), group.dof, np.zeros(group.dof)
     n_states = dof + len(names)
 
-    def at_identity(z: Array, u: Array) -> Array:
-        return as_array(f"{name}: rates", f(np.concatenate([origin, z]), u), last=n_states)
+    def at_identity(z: Components, u: Components) -> Array:
+        return as_array(
+            f"{name}: rates", f(np.concatenate([origin, z]), np.asarray(u)), last=n_states
+        )
 
     if check:
         _try_symmetry(f, name, group, (n_states, n_controls), tolerance)
@@ -165,7 +178,7 @@ def model_of_vector_field(
         control_names=tuple(f"u{i + 1}" for i in range(n_controls)),
         reduced_names=names,
         velocity=lambda z, u: group.identity().body_twist(at_identity(z, u)[:dof]),
-        dynamics=(lambda z, u: at_identity(z, u)[dof:]) if names else None,
+        dynamics=(lambda z, u: at_identity(z, u)[dof:]) if names else no_rates,
     )
 
 
