@@ -228,6 +228,7 @@ def _goals(problem: Element, lanelets: Mapping[int, Lanelet], step: float) -> It
                 heading=None if heading is None else _interval(heading),
                 speed=None if speed is None else _interval(speed),
                 time=(step * begin, step * end),
+                lanelets=() if position is None else tuple(_refs(position, "lanelet")),
             )
         except ValueError as error:
             raise _at(state, error) from error

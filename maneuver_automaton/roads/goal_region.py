@@ -35,6 +35,7 @@ class GoalRegion:
     heading: Interval | None = None  # [rad] from the first turning left to the second
     speed: Interval | None = None  # [m/s]
     time: Interval = (0.0, math.inf)  # [s]
+    lanelets: tuple[int, ...] = ()  # numbers of those that the places are, if they are lanelets
 
     def __post_init__(self) -> None:
         if self.places is not None and not self.places:
