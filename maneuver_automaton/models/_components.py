@@ -26,10 +26,10 @@ def on_arrays(
 ) -> Array:
     """Values (..., n) of a formula on batches of reduced states (..., n_z), controls (..., n_u).
 
-    `sizes` are n_z, n_u and n. A kinematic formula, n_z = 0, takes any reduced state.
+    `sizes` are n_z, n_u and n.
     """
     n_z, n_u, n = sizes
-    z = as_array("reduced state", reduced_state, last=n_z) if n_z else np.zeros(0)
+    z = as_array("reduced state", reduced_state, last=n_z)
     u = as_array("control", control, last=n_u)
     batch = np.broadcast_shapes(z.shape[:-1], u.shape[:-1])
     result = np.empty((*batch, n))

@@ -17,8 +17,8 @@ class SecondOrderUnicycle:
 
     The reduced state is [speed, turn_rate], the control [acceleration, angular_acceleration].
 
-    Source: Ortiz-Haro, Hönig, Hartmann, Toussaint, *iDb-A: iterative search and optimization
-    for optimal kinodynamic motion planning* (2024), second-order unicycle; LaValle (2006),
+    Source: Ortiz-Haro, Hönig, Hartmann, Toussaint, iDb-A*: iterative search and optimization
+    for optimal kinodynamic motion planning (2024), second-order unicycle; LaValle (2006),
     *Planning Algorithms*, Sec. 13.2.4.
 
     Parameters

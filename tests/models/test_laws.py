@@ -13,6 +13,12 @@ from hypothesis.extra.numpy import arrays
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import (
     Car,
+    CarWithTrailer,
+    Helicopter,
+    Hovercraft,
+    SecondOrderCar,
+    SecondOrderUnicycle,
+    SingleTrack,
     Unicycle,
     UserModel,
     equivariance_defect,
@@ -49,36 +55,90 @@ BALLOON = UserModel(
     control_names=("speed", "turn_rate", "climb"),
     velocity=balloon_velocity,
 )
-MODELS = [Unicycle(), Car(wheelbase=2.0, max_steering=1.0), BOAT, BALLOON]
+MODELS = [
+    Unicycle(),
+    Car(wheelbase=2.0, max_steering=1.0),
+    SecondOrderUnicycle(
+        max_speed=0.5, max_turn_rate=0.5, max_acceleration=0.25, max_angular_acceleration=0.25
+    ),
+    SecondOrderCar(
+        wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
+    ),
+    CarWithTrailer(wheelbase=0.25, hitch_length=0.5, max_steering=1.0, max_speed=0.5),
+    SingleTrack(),
+    Hovercraft(
+        mass=2.0,
+        inertia=0.1,
+        drag=1.0,
+        lateral_drag=3.0,
+        turn_drag=0.1,
+        max_force=4.0,
+        max_torque=0.2,
+    ),
+    Helicopter(
+        max_speed=10.0,
+        max_lateral_speed=3.0,
+        max_climb=3.0,
+        max_turn_rate=1.0,
+        max_tilt=0.6,
+        max_tilt_rate=1.5,
+        max_climb_acceleration=3.0,
+        max_angular_acceleration=2.0,
+        drag=0.1,
+    ),
+    BOAT,
+    BALLOON,
+]
 KINEMATIC = [model for model in MODELS if not model.reduced_names]
 every_model = pytest.mark.parametrize("model", MODELS, ids=lambda model: model.name)
-NUMBERS = st.floats(-1.5, 1.5)
+SHARES = st.floats(-1.0, 1.0)
 
 
 def sizes(model):
     return model.group.dof, len(model.reduced_names), len(model.control_names)
 
 
+def within(limits, shares):
+    """Values in the middle half of the limits, up to 1.5 where there are none."""
+    low, high = np.clip(limits.T, -3.0, 3.0) if np.isinf(limits).any() else limits.T
+    return (low + high) / 2.0 + np.asarray(shares) * (high - low) / 4.0
+
+
+def states_of(model, shares):
+    dof = model.group.dof
+    shares = np.asarray(shares)
+    reduced = within(model.reduced_limits, shares[..., dof:])
+    return np.concatenate([1.5 * shares[..., :dof], reduced], axis=-1)
+
+
+def drawn(model, data):
+    dof, n_z, n_u = sizes(model)
+    state = states_of(model, data.draw(arrays(np.float64, dof + n_z, elements=SHARES)))
+    shares = data.draw(arrays(np.float64, n_u, elements=SHARES))
+    return state, within(model.control_limits, shares)
+
+
 @every_model
 @given(data=st.data())
 def test_vector_fields_are_equivariant(model, data):
-    dof, n_z, n_u = sizes(model)
-    by = model.group(data.draw(arrays(np.float64, dof, elements=st.floats(-100.0, 100.0))))
-    state = data.draw(arrays(np.float64, dof + n_z, elements=NUMBERS))
-    control = data.draw(arrays(np.float64, n_u, elements=NUMBERS))
+    by = model.group(
+        data.draw(arrays(np.float64, model.group.dof, elements=st.floats(-100.0, 100.0)))
+    )
+    state, control = drawn(model, data)
+    rates = vector_field(model)(state, control)
     defect = equivariance_defect(vector_field(model), by, state=state, control=control)
-    assert np.abs(defect).max() < 1e-11
+    assert np.abs(defect).max() < 1e-11 * max(1.0, np.abs(rates).max())
 
 
 @every_model
 @settings(max_examples=10)
 @given(data=st.data())
 def test_a_moved_start_has_the_moved_motion(model, data):
-    dof, n_z, n_u = sizes(model)
-    by = model.group(data.draw(arrays(np.float64, dof, elements=st.floats(-10.0, 10.0))))
-    state = data.draw(arrays(np.float64, dof + n_z, elements=NUMBERS))
-    control = data.draw(arrays(np.float64, n_u, elements=NUMBERS))
-    times = np.linspace(0.0, 2.0, 5)
+    by = model.group(
+        data.draw(arrays(np.float64, model.group.dof, elements=st.floats(-10.0, 10.0)))
+    )
+    state, control = drawn(model, data)
+    times = np.linspace(0.0, 0.4, 5)
     here = rollout(model, state, control=control, times=times)
     there = rollout(model, moved_state(by, state), control=control, times=times)
     np.testing.assert_allclose(there, moved_state(by, here), rtol=0.0, atol=1e-6)
@@ -88,9 +148,8 @@ def test_a_moved_start_has_the_moved_motion(model, data):
 @settings(max_examples=10)
 @given(data=st.data())
 def test_kinematic_models_coast_along_one_parameter_groups(model, data):
-    dof, _, n_u = sizes(model)
-    start = model.group(data.draw(arrays(np.float64, dof, elements=NUMBERS)))
-    control = data.draw(arrays(np.float64, n_u, elements=NUMBERS))
+    state, control = drawn(model, data)
+    start = model.group(state)
     times = np.array([0.0, 0.7, 3.0])
     twist = model.body_velocity(np.zeros(0), control)
     coasted = start @ model.group.exp(np.multiply.outer(times, twist))
@@ -116,15 +175,58 @@ def test_moving_twice_is_moving_once(model):
 def test_batches_are_loops(model):
     dof, n_z, n_u = sizes(model)
     rng = np.random.default_rng(4)
-    states, controls = rng.uniform(-1, 1, (3, 1, dof + n_z)), rng.uniform(-1, 1, (4, n_u))
+    states = states_of(model, rng.uniform(-1, 1, (3, 1, dof + n_z)))
+    controls = within(model.control_limits, rng.uniform(-1, 1, (4, n_u)))
     f, z = vector_field(model), states[..., dof:]
     table = f(states, controls)
     assert table.shape == (3, 4, dof + n_z)
     for i, j in np.ndindex(3, 4):
-        np.testing.assert_allclose(table[i, j], f(states[i, 0], controls[j]), atol=1e-15)
-    assert model.body_velocity(z[:, 0], controls[0]).shape[-1] == dof
-    assert model.reduced_dynamics(np.zeros((7, n_z)), np.zeros((7, n_u))).shape == (7, n_z)
-    assert model.body_velocity(np.zeros((7, n_z)), np.zeros((7, n_u))).shape == (7, dof)
+        np.testing.assert_allclose(
+            table[i, j], f(states[i, 0], controls[j]), rtol=1e-14, atol=1e-15
+        )
+    many = np.broadcast_to(z[:1, 0], (7, n_z)), np.broadcast_to(controls[0], (7, n_u))
+    assert model.body_velocity(z[:, 0], controls[0]).shape == (3, dof)
+    assert model.reduced_dynamics(*many).shape == (7, n_z)
+    assert model.body_velocity(*many).shape == (7, dof)
+    assert model.part_poses(z[:, 0]).shape == (3, len(model.part_names), 3)
+
+
+@every_model
+@given(data=st.data())
+def test_components_are_the_arrays(model, data):
+    dof, n_z, _ = sizes(model)
+    state, control = drawn(model, data)
+    z, u = state[dof:].tolist(), control.tolist()
+    np.testing.assert_array_equal(model.body_velocity(state[dof:], control), model.velocity(z, u))
+    expected = np.array(model.dynamics(z, u)).reshape(n_z)
+    np.testing.assert_allclose(
+        model.reduced_dynamics(state[dof:], control), expected, rtol=1e-14, atol=1e-14
+    )
+
+
+@every_model
+def test_symbols_are_the_numbers(model):
+    casadi = pytest.importorskip("casadi")
+    from maneuver_automaton.optimal_control._casadi import numpy_on_symbols
+
+    dof, n_z, n_u = sizes(model)
+    rng = np.random.default_rng(6)
+    z, u = casadi.SX.sym("z", n_z), casadi.SX.sym("u", n_u)
+    with numpy_on_symbols(casadi):
+        parts = casadi.vertsplit(z) if n_z else [], casadi.vertsplit(u)
+        velocity = casadi.vertcat(*model.velocity(*parts))
+        dynamics = casadi.vertcat(*model.dynamics(*parts))
+    f = casadi.Function("f", [z, u], [velocity, dynamics])
+    for _ in range(5):
+        state = states_of(model, rng.uniform(-1, 1, dof + n_z))[dof:]
+        control = within(model.control_limits, rng.uniform(-1, 1, n_u))
+        twist, rates = (np.array(value).ravel() for value in f(state, control))
+        np.testing.assert_allclose(
+            twist, model.body_velocity(state, control), rtol=1e-13, atol=1e-13
+        )
+        np.testing.assert_allclose(
+            rates, model.reduced_dynamics(state, control), rtol=1e-13, atol=1e-13
+        )
 
 
 @every_model

@@ -1,0 +1,311 @@
+"""Where piecewise constant controls lead a vehicle: its motion, to rounding."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from maneuver_automaton._arrays import Array, IntArray, as_array
+from maneuver_automaton.models import Model
+from maneuver_automaton.primitives._legendre import (
+    INTEGRALS,
+    NODES,
+    SERIES,
+    WEIGHTS,
+    integrals_to,
+)
+from maneuver_automaton.primitives.trajectory import Trajectory
+
+RESOLVED = 1e-13  # last terms of a series, over the greatest value or 1 [m, rad, units of z]
+SETTLED = 1e-14  # change of the reduced state in an iteration, over the greatest value or 1
+FINEST = 2**16  # parts of an interval of constant control, at most
+ITERATIONS = 40  # before a stretch counts as too long to be solved at once
+
+BoolArray = NDArray[np.bool_]
+
+
+def drive(
+    model: Model,
+    reduced_state: ArrayLike,
+    *,
+    control: ArrayLike,
+    durations: ArrayLike,
+    max_step_m: float = 0.05,
+    max_step_rad: float = 0.05,
+) -> Trajectory:
+    """Motion from the identity pose under controls (n, n_u), each for its duration (n,) [s].
+
+    There is a sample at every change of control, and samples are closer than both steps. Controls
+    of no duration are left out. What is computed, and how exactly, see `drive_all`.
+
+    Raises
+    ------
+    ValueError
+        If a shape is wrong, a duration negative, or the motion is no smooth one: it explodes, or
+        a reduced state leaves what the model can bear.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import SecondOrderUnicycle
+    >>> robot = SecondOrderUnicycle(max_speed=1.0, max_turn_rate=1.0, max_acceleration=1.0,
+    ...                             max_angular_acceleration=1.0)
+    >>> stroke = drive(robot, [0.0, 0.0], control=[[1.0, 0.0], [-1.0, 0.0]], durations=[1.0, 1.0])
+    >>> stroke.pose[-1].round(12).tolist(), stroke.reduced_state[-1].tolist()
+    ([1.0, 0.0, 0.0], [0.0, 0.0])
+    """
+    (course,) = drive_all(
+        model,
+        as_array("reduced state", reduced_state)[None],
+        control=as_array("control", control)[None],
+        durations=as_array("durations", durations)[None],
+        max_step_m=max_step_m,
+        max_step_rad=max_step_rad,
+    )
+    return course
+
+
+def drive_all(
+    model: Model,
+    reduced_states: ArrayLike,
+    *,
+    control: ArrayLike,
+    durations: ArrayLike,
+    max_step_m: float = 0.05,
+    max_step_rad: float = 0.05,
+) -> tuple[Trajectory, ...]:
+    """Motions of m rides at once; see `drive`.
+
+    Gauss-Legendre collocation with 16 points, on elements that are halved until the last terms of
+    the series of all rates are rounding; so what lies between the points is as exact as the ends.
+    The equations of the points are solved by Picard iteration, over all elements at once where
+    the rates do not depend on the reduced state, and over as many as converge where they do. The
+    group makes the rest a sum: poses are integrated in the frame of each element, then chained.
+
+    Source: Hairer, Lubich, Wanner (2006), *Geometric Numerical Integration*, Sec. II.1.3, for the
+    collocation; Bai, Junkins (2011), *Modified Chebyshev-Picard iteration methods for solution of
+    initial value problems*, for the iteration.
+
+    Parameters
+    ----------
+    model : Model
+        The vehicle; on SE(2) or SE(2) x R.
+    reduced_states : (m, n_z) array
+        Reduced state at the begin of each ride.
+    control : (m, n, n_u) array
+        Controls in order; not held against the limits of the model.
+    durations : (m, n) array
+        How long each control holds [s]; 0 fills up rides of fewer controls.
+    max_step_m, max_step_rad : float
+        Greatest distance [m] and change of heading [rad] between samples.
+
+    Returns
+    -------
+    tuple of m Trajectory
+
+    Raises
+    ------
+    ValueError
+        As `drive`.
+    """
+    z = as_array("reduced state", reduced_states, last=len(model.reduced_names))
+    u = as_array("control", control, last=len(model.control_names))
+    h = as_array("durations", durations)
+    if z.ndim != 2 or u.ndim != 3 or h.shape != u.shape[:2] or h.shape[0] != z.shape[0]:
+        raise ValueError(
+            f"drive: got reduced states {z.shape}, control {u.shape} and durations {h.shape}, "
+            "need (m, n_z), (m, n, n_u) and (m, n)"
+        )
+    if h.size == 0 or not (h >= 0.0).all():
+        what = f"{h.min():.6g} s" if h.size else "no control"
+        raise ValueError(f"drive: got {what}, need durations of at least 0 s")
+    for name, step in (("max_step_m", max_step_m), ("max_step_rad", max_step_rad)):
+        if not step > 0.0:
+            raise ValueError(f"drive: {name} must be positive, got {step}")
+    return _sampled(_resolved(model, z, u, h), max_step_m, max_step_rad)
+
+
+class _Elements(NamedTuple):
+    """Stretches of constant control on which all rates are short series, m rides of k each."""
+
+    step: Array  # (m, k) [s]
+    control: Array  # (m, k, n_u)
+    begin: Array  # (m, k + 1, n_z) reduced states
+    rates: Array  # (m, k, n, n_z) of the reduced state at the points
+    twists: Array  # (m, k, n, dof) at the points
+    flow: Array  # (m, k, n, dof) rates of the pose, in the frame where the element begins
+    ends: Array  # (m, k, 2, dof) twists at begin and end
+
+
+def _resolved(model: Model, z: Array, control: Array, durations: Array) -> _Elements:
+    """Elements that are fine enough for their series to be exact."""
+    parts = np.ones(durations.shape[1], dtype=np.int64)
+    while True:
+        owner = np.repeat(np.arange(parts.size), parts)
+        step = durations[:, owner] / parts[owner]
+        elements, rough = _integrated(model, z, control[:, owner], step)
+        if elements is not None:
+            rough = np.asarray(_is_rough(elements).any(axis=0))
+            if not rough.any():
+                return elements
+        parts[np.unique(owner[rough])] *= 2
+        if parts.max() > FINEST:
+            k = int(np.argmax(parts))
+            raise ValueError(
+                f"{model.name}: the motion under control {control[0, k].tolist()} cannot be "
+                f"followed for {durations[:, k].max():.6g} s: it explodes, or a reduced state "
+                "leaves what the model can bear"
+            )
+
+
+def _integrated(
+    model: Model, z: Array, control: Array, step: Array
+) -> tuple[_Elements | None, BoolArray]:
+    """The elements; or none, and which (k,) cannot be solved for."""
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        begin, at_nodes, rates, failed = _reduced_states(model, z, control, step)
+    rough: BoolArray = np.asarray(np.arange(step.shape[1]) == failed)
+    if rough.any():
+        return None, rough
+    at_ends = np.stack([begin[:, :-1], begin[:, 1:]], axis=2)
+    twists = model.body_velocity(at_nodes, control[:, :, None])
+    heading = step[..., None] * (twists[..., 2] @ INTEGRALS.T)
+    flow = twists.copy()
+    cosine, sine = np.cos(heading), np.sin(heading)
+    flow[..., 0] = cosine * twists[..., 0] - sine * twists[..., 1]
+    flow[..., 1] = sine * twists[..., 0] + cosine * twists[..., 1]
+    ends = model.body_velocity(at_ends, control[:, :, None])
+    return _Elements(step, control, begin, rates, twists, flow, ends), rough
+
+
+def _reduced_states(
+    model: Model, z: Array, control: Array, step: Array
+) -> tuple[Array, Array, Array, int]:
+    """Reduced states at the begins (m, k + 1, n_z) and points (m, k, n, n_z), rates there.
+
+    The last value is the element that no iteration solves, -1 if there is none.
+    """
+    m, k = step.shape
+    begin = np.empty((m, k + 1, z.shape[1]))
+    at_nodes = np.empty((m, k, NODES.size, z.shape[1]))
+    rates = np.empty_like(at_nodes)
+    begin[:, 0] = z
+    done, window = 0, k
+    while done < k:
+        stretch = slice(done, min(done + window, k))
+        solved = _picard(model, begin[:, done], control[:, stretch, None], step[:, stretch])
+        if solved is None:
+            if window == 1:
+                return begin, at_nodes, rates, done
+            window = max(1, min(window, k - done) // 2)
+            continue
+        at_nodes[:, stretch], rates[:, stretch], begin[:, done + 1 : stretch.stop + 1], n = solved
+        done = stretch.stop
+        window *= 2 if n < ITERATIONS // 3 else 1
+    return begin, at_nodes, rates, -1
+
+
+def _picard(
+    model: Model, z: Array, control: Array, step: Array
+) -> tuple[Array, Array, Array, int] | None:
+    """Reduced states at points and ends of a stretch, and how many iterations it took."""
+    m, k = step.shape
+    h = step[..., None]
+    nodes = np.broadcast_to(z[:, None, None], (m, k, NODES.size, z.shape[1])).copy()
+    before = np.inf
+    for iteration in range(ITERATIONS):
+        rates = np.broadcast_to(model.reduced_dynamics(nodes, control), nodes.shape)
+        ends = z[:, None] + np.cumsum(h * np.einsum("i,mkiz->mkz", WEIGHTS, rates), axis=1)
+        begins = np.concatenate([z[:, None], ends[:, :-1]], axis=1)[:, :, None]
+        new = begins + h[..., None] * np.einsum("ij,mkjz->mkiz", INTEGRALS, rates)
+        if not np.isfinite(new).all():
+            return None
+        change = float((np.abs(new - nodes) / np.maximum(1.0, np.abs(new))).max(initial=0.0))
+        nodes = new
+        if change <= SETTLED or (change <= 100.0 * SETTLED and change > 0.5 * before):
+            return nodes, rates, ends, iteration
+        before = change
+    return None
+
+
+def _is_rough(elements: _Elements) -> BoolArray:
+    """Elements (m, k) whose series have last terms that are more than rounding."""
+    rough = np.zeros(elements.step.shape, dtype=bool)
+    for values in (elements.rates, elements.twists, elements.flow):
+        last = np.abs(np.einsum("ij,mkjz->mkiz", SERIES[-2:], values)).max(axis=2, initial=0.0)
+        size = np.abs(values).max(axis=2, initial=0.0)
+        h = elements.step[..., None]
+        rough |= (h * last > RESOLVED * np.maximum(1.0, h * size)).any(axis=-1)
+    return rough
+
+
+def _sampled(elements: _Elements, max_step_m: float, max_step_rad: float) -> tuple[Trajectory, ...]:
+    """Samples of every ride, in one go over all elements that last."""
+    poses, start = _chained(elements), np.zeros((elements.step.shape[0], 1))
+    times = np.concatenate([start, np.cumsum(elements.step, axis=1)], axis=1)
+    ride, place = np.nonzero(elements.step)
+    count = _n_samples(elements, max_step_m, max_step_rad)[ride, place]
+    of = np.repeat(np.arange(count.size), count)
+    share = (np.arange(of.size) - (np.cumsum(count) - count)[of]) / count[of]
+    at = (ride[of], place[of])
+    within = integrals_to(share) * elements.step[at][:, None]
+    steps, gained = (
+        np.einsum("si,sic->sc", within, (SERIES @ values[ride, place])[of])
+        for values in (elements.flow, elements.rates)
+    )
+    samples = Trajectory(
+        time=times[at] + share * elements.step[at],
+        pose=_moved(poses[at], steps),
+        reduced_state=elements.begin[at] + gained,
+        control=elements.control[at],
+    )
+    last = elements.control[np.arange(times.shape[0]), _last_place(elements.step)]
+    stops = np.searchsorted(ride[of], np.arange(times.shape[0]), side="right")
+    return tuple(
+        Trajectory(
+            time=np.append(samples.time[begin:stop], times[r, -1]),
+            pose=np.concatenate([samples.pose[begin:stop], poses[r, -1:]]),
+            reduced_state=np.concatenate(
+                [samples.reduced_state[begin:stop], elements.begin[r, -1:]]
+            ),
+            control=np.concatenate([samples.control[begin:stop], last[r][None]]),
+        )
+        for r, (begin, stop) in enumerate(zip([0, *stops[:-1]], stops, strict=True))
+    )
+
+
+def _last_place(step: Array) -> IntArray:
+    """Last element (m,) of each ride that lasts; any if none does."""
+    return np.asarray(step.shape[1] - 1 - np.argmax(step[:, ::-1] > 0.0, axis=1))
+
+
+def _n_samples(elements: _Elements, max_step_m: float, max_step_rad: float) -> IntArray:
+    """How many equal parts (m, k) keep the samples of an element close enough."""
+    twists = np.concatenate([elements.twists, elements.ends], axis=2)
+    places = [0, 1, *range(3, twists.shape[-1])]
+    speed = np.linalg.norm(twists[..., places], axis=-1).max(axis=2)
+    turn = np.abs(twists[..., 2]).max(axis=2)
+    need = elements.step * np.maximum(speed / max_step_m, turn / max_step_rad)
+    count: IntArray = np.maximum(np.ceil(1.001 * need), 1.0).astype(np.int64)
+    return count
+
+
+def _chained(elements: _Elements) -> Array:
+    """Poses (m, k + 1, dof) at the ends of the elements, from the identity."""
+    h = elements.step[..., None]
+    steps = h * np.einsum("i,mkid->mkd", WEIGHTS, elements.flow)
+    poses = np.zeros((steps.shape[0], steps.shape[1] + 1, steps.shape[2]))
+    np.cumsum(steps, axis=1, out=poses[:, 1:])
+    turned = _moved(np.where(np.arange(steps.shape[2]) == 2, poses[:, :-1], 0.0), steps)
+    np.cumsum(turned[..., :2], axis=1, out=poses[:, 1:, :2])
+    return poses
+
+
+def _moved(begin: Array, steps: Array) -> Array:
+    """Poses (..., dof) of `steps` from the poses `begin`."""
+    cosine, sine = np.cos(begin[..., 2]), np.sin(begin[..., 2])
+    moved: Array = begin + steps
+    moved[..., 0] = begin[..., 0] + cosine * steps[..., 0] - sine * steps[..., 1]
+    moved[..., 1] = begin[..., 1] + sine * steps[..., 0] + cosine * steps[..., 1]
+    return moved
