@@ -140,9 +140,14 @@ def _traffic(root: Element, step: float) -> Iterator[Obstacle]:
             states += recorded.all("state")
         elif element.get("occupancySet") is not None:
             raise element.need("occupancySet").error("is not read, need a trajectory")
-        poses, times = np.array([_pose(one) for one in states]), [_time(one, step) for one in states]
+        poses, times = (
+            np.array([_pose(one) for one in states]),
+            [_time(one, step) for one in states],
+        )
         poses[:, 2] = unwrapped(poses[:, 2].tolist())
-        name = f"{_text(element.get('type'), 'obstacle')} {element.attributes.get('id', '')}".strip()
+        name = (
+            f"{_text(element.get('type'), 'obstacle')} {element.attributes.get('id', '')}".strip()
+        )
         for shape in shapes:
             if len(states) == 1:
                 yield Obstacle(shape.moved(SE2(poses[0])), name=name)
@@ -258,5 +263,3 @@ def _interval(element: Element) -> tuple[float, float]:
 
 def _at(element: Element, error: ValueError) -> InvalidScenario:
     return error if isinstance(error, InvalidScenario) else element.error(str(error))
-
-

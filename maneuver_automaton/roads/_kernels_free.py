@@ -87,8 +87,16 @@ def one_tick(wheelbase, tick, x, y, heading, speed, steering, acceleration, rate
         turn = h * (w_0 + 4.0 * w_m + w_e) / 6.0
         half = h * (5.0 * w_0 + 8.0 * w_m - w_e) / 24.0
         middle, end = heading + half, heading + turn
-        x += h * (speed * math.cos(heading) + 4.0 * v_m * math.cos(middle) + v_e * math.cos(end)) / 6.0
-        y += h * (speed * math.sin(heading) + 4.0 * v_m * math.sin(middle) + v_e * math.sin(end)) / 6.0
+        x += (
+            h
+            * (speed * math.cos(heading) + 4.0 * v_m * math.cos(middle) + v_e * math.cos(end))
+            / 6.0
+        )
+        y += (
+            h
+            * (speed * math.sin(heading) + 4.0 * v_m * math.sin(middle) + v_e * math.sin(end))
+            / 6.0
+        )
         heading, speed, steering = end, v_e, d_e
     return x, y, heading, speed, steering
 

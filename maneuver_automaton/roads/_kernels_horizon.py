@@ -398,9 +398,7 @@ def finish(task, horizon, search, first, node, last, shares, controls):
             controls[k, 0],
             controls[k, 1],
         )
-    more = stopped(
-        horizon, x, y, heading, speed, steering, task.tick + n, shares, controls[n:]
-    )
+    more = stopped(horizon, x, y, heading, speed, steering, task.tick + n, shares, controls[n:])
     return n, (-1 if more < 0 else n + more)
 
 
@@ -442,7 +440,15 @@ def furthest(task, horizon, search, first, levels, shares, controls):
             if whole >= 0:
                 return False, n, whole
     whole = stopped(
-        horizon, task.x, task.y, task.heading, task.speed, task.steering, task.tick, shares, controls
+        horizon,
+        task.x,
+        task.y,
+        task.heading,
+        task.speed,
+        task.steering,
+        task.tick,
+        shares,
+        controls,
     )
     return False, 0, whole
 

@@ -136,4 +136,6 @@ def maneuvers_between(limits, trims, most):
             course(limits, speed, steering, control[e, 0], control[e, 1], pose[e])
         n += added
         first[source + 1] = n
-    return Maneuvers(first, found[:n].copy(), control[:n].copy(), pose[:n].copy(), effort[:n].copy())
+    return Maneuvers(
+        first, found[:n].copy(), control[:n].copy(), pose[:n].copy(), effort[:n].copy()
+    )

@@ -6,8 +6,10 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads import _kernels_free, _kernels_horizon, _kernels_library
 from maneuver_automaton.roads._kernels_horizon import (
     GoalArrays,
@@ -30,6 +32,7 @@ SHARES = (math.nan, 0.0, 0.2, -0.2, 0.5, -0.5, 1.0, -1.0)  # of steering while i
 LONGEST_STOP = 120  # ticks
 FAR_TICK = 1 << 40
 AT_REST = 1e-9  # [m/s]
+DIGITS = 9  # of the numbers of a scene [m, rad]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,15 +91,54 @@ class RoadPlan:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RoadPlanner:
-    """All that planning needs on one scene, made once."""
+    """All that planning needs on one scene, made once.
 
-    scene: RoadScene
+    States and plans are seen from `frame`, the start of the rear axle, so that a moved scene has
+    the moved plans.
+    """
+
+    scene: RoadScene  # as it was given
+    frame: Array  # (3,) [m, m, rad]
+    local: RoadScene  # the scene seen from the frame
     vehicle: RoadVehicle
     settings: RoadSettings
     route: Route
     library: RoadLibrary
     horizon: Horizon
     memory: HorizonArrays = field(repr=False)
+
+    @property
+    def last_tick(self) -> int:
+        """Tick at which the last goal is over."""
+        return int(self.horizon.goals.tick[:, 1].max())
+
+    @property
+    def start_state(self) -> Array:
+        """State (5,) at the beginning: x, y, heading of the rear axle, speed, steering."""
+        start = self.local.start
+        steering = self.vehicle.steering_of(start.speed, start.turn_rate)
+        return np.array([*self.vehicle.rear_of(start.middle), start.speed, steering])
+
+    def world(self, poses: ArrayLike) -> Array:
+        """Poses (..., 3) in the coordinates of the scene as it was given."""
+        return (SE2(self.frame) @ SE2(poses)).pose
+
+    def time_of(self, tick: int) -> float:
+        """Time of a tick [s]."""
+        return self.scene.start.time + TICK * tick
+
+    def at_goal(self, state: Array, *, tick: int) -> bool:
+        """Whether a state (5,) at a tick is within a goal, by the goal's own words."""
+        middle = self.vehicle.middle_of(state[:3])
+        return any(
+            goal.contains(middle, speed=float(state[3]), time=self.time_of(tick))
+            for goal in self.local.goals
+        )
+
+    def warm(self) -> None:
+        """Compile, and touch the memory, before time counts."""
+        plan, _ = self.plan(self.start_state, tick=0, last=None)
+        self.plan(plan.states[1], tick=1, last=plan)
 
     def plan(self, state: Array, *, tick: int, last: RoadPlan | None) -> tuple[RoadPlan, bool]:
         """The plan from a state (5,) at a tick, and whether it is not the rest of the last one.
@@ -115,7 +157,7 @@ class RoadPlanner:
     def search(self, state: Array, *, tick: int) -> RoadPlan | None:
         """A new plan from a state (5,); None if none with a way to stop was found."""
         library, settings = self.library, self.settings
-        until = min(tick + round(settings.horizon_s / TICK), self._last_tick())
+        until = min(tick + round(settings.horizon_s / TICK), self.last_tick)
         if until <= tick:
             return None
         task = HorizonTask(
@@ -177,10 +219,11 @@ class RoadPlanner:
             return new.stops
         if not new.reaches:
             return True  # it looks a tick further
-        return self._price(new) < (1.0 - self.settings.gain) * self._price(old)
+        return self.price(new) < (1.0 - self.settings.gain) * self.price(old)
 
-    def _price(self, plan: RoadPlan) -> float:
-        n = plan.lasting
+    def price(self, plan: RoadPlan, *, ticks: int | None = None) -> float:
+        """Cost of a plan, or of its first ticks, its stop left out."""
+        n = plan.lasting if ticks is None else ticks
         return float(
             _kernels_horizon.price(
                 self.horizon, np.array(plan.states[: n + 1]), np.array(plan.controls[:n]), plan.tick
@@ -198,10 +241,6 @@ class RoadPlanner:
             controls = np.zeros((1, 2))
         return self._of_controls(state, tick, controls, 0, reaches=False)
 
-    def _last_tick(self) -> int:
-        last = int(self.horizon.goals.tick[:, 1].max())
-        return FAR_TICK if last >= FAR_TICK else last
-
 
 def road_planner(
     scene: RoadScene, vehicle: RoadVehicle | None = None, settings: RoadSettings | None = None
@@ -216,12 +255,14 @@ def road_planner(
     vehicle, settings = vehicle or RoadVehicle(), settings or RoadSettings()
     top = min(max(settings.top_speed, math.ceil(scene.start.speed)), vehicle.model.max_speed)
     library = road_library(vehicle, top_speed=top)
-    route = route_of(scene)
+    frame = vehicle.rear_of(scene.start.middle)
+    local = scene.moved(SE2(frame).inverse(), digits=DIGITS)
+    route = route_of(local)
     horizon_ticks = round(settings.horizon_s / TICK)
     last = scene.last_time if math.isfinite(scene.last_time) else scene.start.time + 60.0
     last_tick = math.ceil((last - scene.start.time) / TICK) + horizon_ticks + LONGEST_STOP
     clearing = clearing_of(
-        scene,
+        local,
         vehicle,
         tick=TICK,
         last_tick=last_tick,
@@ -237,11 +278,13 @@ def road_planner(
         route=RouteArrays(
             np.array(route.points), np.array(route.heading), np.array(route.limit), SPACING
         ),
-        goals=goal_arrays(scene, route),
+        goals=goal_arrays(local, route),
         weights=_weights(scene, vehicle),
     )
     return RoadPlanner(
         scene=scene,
+        frame=frame,
+        local=local,
         vehicle=vehicle,
         settings=settings,
         route=route,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.collision import Obstacle, Polygon
+from maneuver_automaton.groups import LieGroup
 
 CLOSED_GAP = 0.1  # [m] slivers between lanelets that ought to touch are closed up to twice this
 
@@ -62,6 +63,11 @@ class Lanelet:
                 f"{self.speed_limit} m/s"
             )
 
+    def moved(self, by: LieGroup, *, digits: int | None = None) -> Lanelet:
+        """The lanelet moved by a planar pose, its places rounded to `digits` if given."""
+        left, right = (_rounded(np.asarray(by.act(one)), digits) for one in (self.left, self.right))
+        return replace(self, left=left, right=right)
+
     @property
     def center(self) -> Array:
         """Middle between the bounds (n, 2), corner by corner if they have as many [m]."""
@@ -79,6 +85,10 @@ class Lanelet:
     def ring(self) -> Array:
         """Outline (n, 2), counter-clockwise if the left bound is on the left [m]."""
         return np.concatenate([self.right, self.left[::-1]])
+
+
+def _rounded(values: Array, digits: int | None) -> Array:
+    return values if digits is None else np.asarray(np.round(values, digits) + 0.0)
 
 
 def resampled(line: Array, n: int) -> Array:

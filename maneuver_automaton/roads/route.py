@@ -146,7 +146,9 @@ def _straight_on(lanelets: dict[int, Lanelet], number: int, *, known: set[int]) 
 
         def turn(k: int, ahead: Any = ahead) -> float:
             step = lanelets[k].center[-1] - lanelets[k].center[-2]
-            return abs(float(np.remainder(np.arctan2(*step[::-1]) - ahead + np.pi, 2 * np.pi) - np.pi))
+            return abs(
+                float(np.remainder(np.arctan2(*step[::-1]) - ahead + np.pi, 2 * np.pi) - np.pi)
+            )
 
         number = min(after, key=turn)
         known.add(number)
@@ -199,9 +201,7 @@ def _way(goal: GoalRegion, points: Array, heading: Array) -> Array:
             for ring in outlines_of(goal.places)
         ]
     )
-    nearest = np.argmin(
-        np.hypot(*np.moveaxis(corners[:, None] - points[None], -1, 0)), axis=1
-    )
+    nearest = np.argmin(np.hypot(*np.moveaxis(corners[:, None] - points[None], -1, 0)), axis=1)
     apart = corners - points[nearest]
     c, s = np.cos(heading[nearest]), np.sin(heading[nearest])
     stations = SPACING * nearest + c * apart[:, 0] + s * apart[:, 1]

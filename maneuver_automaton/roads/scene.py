@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
-from maneuver_automaton.collision import Obstacle
+from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Polygon, Shape
+from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads.goal_region import GoalRegion
 from maneuver_automaton.roads.lanelets import Lanelet
 
@@ -67,6 +68,56 @@ class RoadScene:
     def present(self, time: float) -> list[Obstacle]:
         """Who is on the road at `time` [s]."""
         return [one for one in self.traffic if is_present(one, time)]
+
+    def moved(self, by: SE2, *, digits: int | None = None) -> RoadScene:
+        """The scene moved by a planar pose; its numbers rounded to `digits` if given.
+
+        Rounded, a scene and the moved scene are the same to the last bit where they start.
+        """
+        turn = float(by.pose[2])
+
+        def turned(interval: tuple[float, float] | None) -> tuple[float, float] | None:
+            if interval is None:
+                return None
+            low, high = _near(np.array(interval) + turn, digits).tolist()
+            return low, high
+
+        return replace(
+            self,
+            lanelets=tuple(one.moved(by, digits=digits) for one in self.lanelets),
+            start=replace(self.start, middle=_near((by @ SE2(self.start.middle)).pose, digits)),
+            goals=tuple(
+                replace(
+                    goal,
+                    places=goal.places
+                    and tuple(_near_shape(place.moved(by), digits) for place in goal.places),
+                    heading=turned(goal.heading),
+                )
+                for goal in self.goals
+            ),
+            traffic=tuple(_near_obstacle(one.moved(by), digits) for one in self.traffic),
+        )
+
+
+def _near(values: Array, digits: int | None) -> Array:
+    return values if digits is None else np.asarray(np.round(values, digits) + 0.0)
+
+
+def _near_shape(shape: Shape, digits: int | None) -> Shape:
+    if digits is None:
+        return shape
+    if isinstance(shape, Disc):
+        return Disc(shape.radius, _near(shape.center, digits))
+    if isinstance(shape, Box):
+        return Box(shape.size, _near(shape.center, digits), round(shape.heading, digits))
+    rings = [_near(ring, digits) for ring in (shape.corners, *shape.holes)]
+    return Polygon(rings[0], rings[1:])
+
+
+def _near_obstacle(one: Obstacle, digits: int | None) -> Obstacle:
+    if one.motion is None:
+        return replace(one, shape=_near_shape(one.shape, digits))
+    return replace(one, motion=Motion(one.motion.time, _near(one.motion.pose, digits)))
 
 
 def is_present(one: Obstacle, time: float, *, tolerance: float = 1e-9) -> bool:
