@@ -35,6 +35,12 @@ MOST_BYTES = 50_000_000
 STEP = "timeStepSize"
 
 
+def is_commonroad(path: Path) -> bool:
+    """Whether an XML file begins like a scenario of CommonRoad."""
+    with path.open("rb") as stream:
+        return b"<commonRoad" in stream.read(4000)
+
+
 def read_commonroad(path: Path) -> tuple[Statement, ...]:
     """One problem of driving on roads for every planning problem of a file.
 

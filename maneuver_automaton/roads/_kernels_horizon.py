@@ -23,7 +23,6 @@ from maneuver_automaton.search._kernels_distance import pop, push
 PARENT, MANEUVER, TRIM, NEAR = range(4)
 N_NODES, HEAP, KEPT, CHECKS = range(4)
 EMPTY = -1
-BACK, FORTH = 4, 30  # points of the route looked at around the last nearest one
 TRIES = 16  # nodes of a level from which a way to stop is looked for
 IMPOSSIBLE = 1e4  # cost of what cannot be reached any more
 
@@ -33,6 +32,7 @@ class RouteArrays(NamedTuple):
 
     point: np.ndarray  # (n, 2), equally spaced
     heading: np.ndarray  # (n,)
+    direction: np.ndarray  # (n, 2) cosine and sine of it
     limit: np.ndarray  # (n,) [m/s]
     spacing: float  # [m]
 
@@ -108,31 +108,33 @@ class Horizon(NamedTuple):
 
 
 @inner_kernel
-def nearest_point(route, x, y, near):
-    """Index of the point of the route that is nearest, not far from the last one."""
-    best, index = math.inf, near
-    for k in range(max(0, near - BACK), min(route.point.shape[0], near + FORTH)):
-        d_x, d_y = x - route.point[k, 0], y - route.point[k, 1]
-        square = d_x * d_x + d_y * d_y
-        if square < best:
-            best, index = square, k
-    return index
+def nearest_point(route, x, y, guess):
+    """Index of the point of the route that is nearest, downhill from a guess."""
+    last = route.point.shape[0] - 1
+    k = min(max(guess, 0), last)
+    best = (x - route.point[k, 0]) ** 2 + (y - route.point[k, 1]) ** 2
+    for step in (1, -1):
+        while 0 <= k + step <= last:
+            d_x, d_y = x - route.point[k + step, 0], y - route.point[k + step, 1]
+            square = d_x * d_x + d_y * d_y
+            if square >= best:
+                break
+            best, k = square, k + step
+    return k
 
 
 @inner_kernel
 def on_route(route, x, y, near):
     """Station and offset of a place whose nearest point of the route is known."""
-    c, s = math.cos(route.heading[near]), math.sin(route.heading[near])
+    c, s = route.direction[near, 0], route.direction[near, 1]
     d_x, d_y = x - route.point[near, 0], y - route.point[near, 1]
     return route.spacing * near + c * d_x + s * d_y, c * d_y - s * d_x
 
 
 @inner_kernel
-def stage(weights, route, x, y, heading, speed, near):
-    """Cost per second of being at a place, the effort of the maneuver apart."""
-    _, offset = on_route(route, x, y, near)
-    turned = nearest_turn(heading - route.heading[near])
-    over = max(speed - route.limit[near], 0.0)
+def stage(weights, limit, offset, turned, speed):
+    """Cost per second of being on the road, the effort of the maneuver apart."""
+    over = max(speed - limit, 0.0)
     cost = weights.offset * offset * offset + weights.turned * turned * turned
     cost += weights.hurry * over * over
     if weights.progress == weights.progress:  # the pace is given
@@ -193,11 +195,10 @@ def rest_of_the_way(weights, goals, g, station, offset, speed, drift, least, mos
 
 
 @inner_kernel
-def cost_to_go(horizon, x, y, heading, speed, near, tick):
+def cost_to_go(horizon, station, offset, turned, speed, tick):
     """Estimate of what the rest costs to the goal that is nearest."""
     goals = horizon.goals
-    station, offset = on_route(horizon.route, x, y, near)
-    drift = speed * math.sin(nearest_turn(heading - horizon.route.heading[near]))
+    drift = speed * math.sin(turned)
     best = math.inf
     for g in range(goals.tick.shape[0]):
         if tick > goals.tick[g, 1]:
@@ -252,9 +253,9 @@ def goal_at(horizon, x, y, heading, speed, tick):
 @inner_kernel
 def is_new(task, cells, x, y, heading, speed):
     """Mark the cell of a node; whether it was free."""
-    i = int(math.floor((x - task.x) / task.cell + 0.5)) & 0xFFF
-    j = int(math.floor((y - task.y) / task.cell + 0.5)) & 0xFFF
-    k = int(math.floor((heading - task.heading) / task.turn_cell + 0.5)) & 0xFF
+    i = math.floor((x - task.x) / task.cell + 0.5) & 0xFFF
+    j = math.floor((y - task.y) / task.cell + 0.5) & 0xFFF
+    k = math.floor((heading - task.heading) / task.turn_cell + 0.5) & 0xFF
     v = int(speed / task.speed_cell) & 0xFF
     key = (((v << 8 | k) << 12 | j) << 12) | i
     mask = cells.shape[0] - 1
@@ -269,8 +270,11 @@ def is_new(task, cells, x, y, heading, speed):
 
 
 @inner_kernel
-def add_children(task, horizon, search, node, maneuvers, low, high, tick):
-    """Queue the nodes that maneuvers lead to at a tick, their edges not yet proven."""
+def add_children(task, horizon, search, node, maneuvers, low, high, tick, bound):
+    """Queue the nodes that maneuvers lead to at a tick, their edges not yet proven.
+
+    Those that cost `bound` or more are left out.
+    """
     pose, links, state = search.pose, search.links, search.state
     limits, ahead = horizon.limits, horizon.clearing.body.ahead
     duration = limits.tick * limits.ticks
@@ -284,23 +288,28 @@ def add_children(task, horizon, search, node, maneuvers, low, high, tick):
         n_x, n_y = x + c * d_x - s * d_y, y + s * d_x + c * d_y
         n_heading = heading + maneuvers.pose[e, limits.ticks - 1, 2]
         m_x, m_y = n_x + ahead * math.cos(n_heading), n_y + ahead * math.sin(n_heading)
-        near = nearest_point(horizon.route, m_x, m_y, links[node, NEAR])
         trim = maneuvers.target[e]
         speed = horizon.trims.speed[trim]
-        minded = stage(horizon.weights, horizon.route, m_x, m_y, n_heading, speed, near)
+        guess = links[node, NEAR] + int(d_x / horizon.route.spacing)
+        near = nearest_point(horizon.route, m_x, m_y, guess)
+        station, offset = on_route(horizon.route, m_x, m_y, near)
+        turned = nearest_turn(n_heading - horizon.route.heading[near])
+        minded = stage(horizon.weights, horizon.route.limit[near], offset, turned, speed)
         cost = come + maneuvers.effort[e] + duration * minded
+        if cost >= bound:
+            continue
         pose[child, 0], pose[child, 1], pose[child, 2], pose[child, 3] = n_x, n_y, n_heading, cost
         links[child, PARENT], links[child, MANEUVER] = node, e
         links[child, TRIM], links[child, NEAR] = trim, near
         state[N_NODES] = child + 1
-        to_go = cost_to_go(horizon, m_x, m_y, n_heading, speed, near, tick)
+        to_go = cost_to_go(horizon, station, offset, turned, speed, tick)
         push(search.heap_key, search.heap_node, state[HEAP], cost + task.greed * to_go, child)
         state[HEAP] += 1
 
 
 @inner_kernel
 def prove_edge(task, horizon, search, maneuvers, node, tick):
-    """Prove the edge into a node from `tick` on; (whether it is free, tick of a goal on it or -1)."""
+    """Prove the edge into a node from `tick` on: whether it is free; tick of a goal on it or -1."""
     pose, links, limits = search.pose, search.links, horizon.limits
     parent, e = links[node, PARENT], links[node, MANEUVER]
     speed = task.speed if parent == 0 else horizon.trims.speed[links[parent, TRIM]]
@@ -426,7 +435,7 @@ def begin(task, horizon, search, first):
     links[0, NEAR] = nearest_of_all(horizon.route, m_x, m_y)
     state[N_NODES] = 1
     tick = task.tick + horizon.limits.ticks
-    add_children(task, horizon, search, 0, first, 0, first.target.shape[0], tick)
+    add_children(task, horizon, search, 0, first, 0, first.target.shape[0], tick, math.inf)
 
 
 @inner_kernel
@@ -506,7 +515,7 @@ def search_horizon(task, horizon, first, search, shares, controls):
             trim = search.links[node, TRIM]
             low, high = horizon.maneuvers.first[trim], horizon.maneuvers.first[trim + 1]
             add_children(
-                task, horizon, search, node, horizon.maneuvers, low, high, tick + 2 * ticks
+                task, horizon, search, node, horizon.maneuvers, low, high, tick + 2 * ticks, best
             )
     if best_node >= 0:
         n, whole = finish(task, horizon, search, first, best_node, best_tick, shares, controls)
@@ -529,9 +538,11 @@ def price(horizon, states, controls, tick):
         speed = states[k + 1, 3]
         m_x, m_y = x + ahead * math.cos(heading), y + ahead * math.sin(heading)
         near = nearest_point(horizon.route, m_x, m_y, near)
+        _, offset = on_route(horizon.route, m_x, m_y, near)
+        turned = nearest_turn(heading - horizon.route.heading[near])
         after = speed**2 * math.tan(states[k + 1, 4]) / limits.wheelbase
         jerk = (after - across) / limits.tick
-        cost = stage(horizon.weights, horizon.route, m_x, m_y, heading, speed, near)
+        cost = stage(horizon.weights, horizon.route.limit[near], offset, turned, speed)
         cost += limits.mind_braking * controls[k, 0] ** 2
         cost += limits.mind_lateral * after * after + limits.mind_jerk * jerk * jerk
         total += limits.tick * cost

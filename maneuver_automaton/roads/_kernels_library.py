@@ -41,6 +41,7 @@ class Limits(NamedTuple):
     friction: float  # [m/s^2] along and across together
     engine: float  # [m/s^2] up to `power_speed`, less beyond it
     power_speed: float  # [m/s]
+    left_out: tuple[float, float]  # [m/s] between these, changes of speed are left out
     fastest_change: int  # steps of the speed grid that a maneuver spans at most
     mind_braking: float  # per (m/s^2)^2 s
     mind_lateral: float  # per (m/s^2)^2 s
@@ -90,6 +91,9 @@ def leading_from(limits, trims, speed, steering, low, high, found, control, effo
     """Trims numbered from `low` to `high` that a ramp from a state reaches; how many."""
     n = 0
     for target in range(low, high):
+        change = abs(trims.speed[target] - speed)
+        if limits.left_out[0] < change < limits.left_out[1]:
+            continue
         possible, acceleration, rate, price = admitted(
             limits, speed, steering, trims.speed[target], trims.steering[target]
         )

@@ -171,7 +171,7 @@ def traffic_arrays(
 
     A rectangle is as much larger as its owner leaves the straight motion between two ticks.
     """
-    times = start + tick * np.arange(last_tick + 2)
+    times: Array = start + tick * np.arange(last_tick + 2, dtype=np.float64)
     poses = np.zeros((len(users), len(times), 3))
     first = np.zeros(len(users), dtype=np.int64)
     last = np.full(len(users), ALWAYS, dtype=np.int64)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -46,7 +46,8 @@ class RoadSettings:
     """
 
     horizon_s: float = 6.0  # how far a plan looks ahead at most, its stop apart
-    width: int = 100  # nodes of a level that the search goes on from
+    width: int = 80  # nodes of a level that the search goes on from
+    narrow: int = 40  # the same where the last plan leads to a goal and is only to be improved
     off_edge_m: float = 0.04  # distances kept from the edge of the area
     off_traffic_m: float = 0.15  # and from everybody
     top_speed: float = 36.0  # [m/s] of the trims, if the start is not faster still
@@ -77,6 +78,11 @@ class RoadPlan:
     def stops(self) -> bool:
         """Whether it ends at rest."""
         return bool(self.states[-1, 3] <= AT_REST)
+
+    @property
+    def duration(self) -> float:
+        """Time until it stops, or the goal is reached [s]."""
+        return TICK * self.lasting
 
     def rest(self) -> RoadPlan:
         """What remains of it a tick later."""
@@ -121,7 +127,7 @@ class RoadPlanner:
 
     def world(self, poses: ArrayLike) -> Array:
         """Poses (..., 3) in the coordinates of the scene as it was given."""
-        return (SE2(self.frame) @ SE2(poses)).pose
+        return (SE2(self.frame) @ SE2(np.asarray(poses))).pose
 
     def time_of(self, tick: int) -> float:
         """Time of a tick [s]."""
@@ -135,6 +141,11 @@ class RoadPlanner:
             for goal in self.local.goals
         )
 
+    def wider(self, width: int) -> RoadPlanner:
+        """The same planner with another width of its search."""
+        settings = replace(self.settings, width=width)
+        return replace(self, settings=settings, memory=_memory(settings))
+
     def warm(self) -> None:
         """Compile, and touch the memory, before time counts."""
         plan, _ = self.plan(self.start_state, tick=0, last=None)
@@ -147,32 +158,36 @@ class RoadPlanner:
         one is better. A plan that is not free is driven only where none is: then braking.
         """
         old = None if last is None else self._again(state, last.rest())
-        new = self.search(state, tick=tick)
+        settled = old is not None and old.reaches
+        new = self.search(state, tick=tick, narrow=settled)
         if old is None:
             return (self._emergency(state, tick) if new is None else new), True
         if new is None or not self._better(new, old):
             return old, False
         return new, True
 
-    def search(self, state: Array, *, tick: int) -> RoadPlan | None:
+    def search(self, state: Array, *, tick: int, narrow: bool = False) -> RoadPlan | None:
         """A new plan from a state (5,); None if none with a way to stop was found."""
         library, settings = self.library, self.settings
         until = min(tick + round(settings.horizon_s / TICK), self.last_tick)
         if until <= tick:
             return None
+        x, y, heading, speed, steering = state.tolist()
         task = HorizonTask(
-            *(float(value) for value in state),
+            x=x,
+            y=y,
+            heading=heading,
+            speed=speed,
+            steering=steering,
             tick=tick,
             until=until,
             cell=CELL,
             turn_cell=TURN_CELL,
             speed_cell=SPEED_CELL,
-            width=settings.width,
+            width=min(settings.narrow, settings.width) if narrow else settings.width,
             greed=settings.greed,
         )
-        first = _kernels_library.maneuvers_from(
-            library.limits, library.trims, float(state[3]), float(state[4])
-        )
+        first = _kernels_library.maneuvers_from(library.limits, library.trims, speed, steering)
         controls = np.zeros((until - tick + library.limits.ticks + LONGEST_STOP, 2))
         reaches, n, whole = _kernels_horizon.search_horizon(
             task,
@@ -276,7 +291,11 @@ def road_planner(
         trims=library.trims,
         maneuvers=library.maneuvers,
         route=RouteArrays(
-            np.array(route.points), np.array(route.heading), np.array(route.limit), SPACING
+            np.array(route.points),
+            np.array(route.heading),
+            np.stack([np.cos(route.heading), np.sin(route.heading)], axis=-1),
+            np.array(route.limit),
+            SPACING,
         ),
         goals=goal_arrays(local, route),
         weights=_weights(scene, vehicle),

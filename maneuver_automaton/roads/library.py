@@ -21,7 +21,8 @@ TICKS = 5  # of a maneuver
 SPEED_STEP = 1.0  # [m/s]
 SHARES = (0.0, 0.05, 0.16, 0.36, 0.66, 1.0)  # of the sharpest angle, to either side
 SHARPEST = 0.6  # [rad] of the angles of a trim
-CHANGES = (4, 2)  # steps of speed down and up
+FASTEST = 4  # steps of speed that a maneuver spans at most
+LEFT_OUT = (2.5, 3.5)  # [m/s] changes of speed that others do as well
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -60,7 +61,8 @@ def road_library(vehicle: RoadVehicle, *, top_speed: float) -> RoadLibrary:
         friction=vehicle.friction,
         engine=min(vehicle.engine, vehicle.model.max_acceleration),
         power_speed=vehicle.power_speed,
-        fastest_change=max(CHANGES),
+        left_out=LEFT_OUT,
+        fastest_change=FASTEST,
         mind_braking=0.05,
         mind_lateral=0.05,
         mind_jerk=0.002,
@@ -70,7 +72,7 @@ def road_library(vehicle: RoadVehicle, *, top_speed: float) -> RoadLibrary:
         steering=(sharpest[:, None] * shares).ravel(),
         per_speed=shares.size,
     )
-    most = trims.speed.size * (2 * max(CHANGES) + 1) * shares.size
+    most = trims.speed.size * (2 * FASTEST + 1) * shares.size
     return RoadLibrary(
         limits=limits,
         trims=trims,

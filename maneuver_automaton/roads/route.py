@@ -1,4 +1,4 @@
-"""The way through the lanelets to a goal: the line that is followed, and where the goal lies on it."""
+"""The way through the lanelets to a goal: the line to follow, and where the goal lies on it."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Route:
     @property
     def stations(self) -> Array:
         """Distance (n,) along the line [m]."""
-        return SPACING * np.arange(len(self.points))
+        return np.asarray(SPACING * np.arange(len(self.points)), dtype=np.float64)
 
 
 def route_of(scene: RoadScene) -> Route:
@@ -64,7 +64,7 @@ def route_of(scene: RoadScene) -> Route:
 
 
 def lanelets_at(lanelets: Sequence[Lanelet], middle: Array) -> list[int]:
-    """Numbers of the lanelets around a pose (3,) that lead its way; the nearest one if none does."""
+    """Numbers of the lanelets around a pose (3,) that lead its way; else of the nearest."""
     import shapely
 
     place = shapely.Point(middle[:2])
@@ -121,6 +121,8 @@ def _path(lanelets: dict[int, Lanelet], sources: list[int], targets: list[int]) 
     best: tuple[float, list[int]] | None = None
     for source in sources:
         costs, paths = networkx.single_source_dijkstra(graph, source, weight="cost")
+        assert isinstance(costs, dict)  # without a target
+        assert isinstance(paths, dict)
         for target in targets:
             if target in costs and (best is None or costs[target] < best[0]):
                 best = (float(costs[target]), list(paths[target]))

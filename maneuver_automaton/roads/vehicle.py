@@ -74,11 +74,11 @@ class RoadVehicle:
 
     def middle_of(self, rear: ArrayLike) -> Array:
         """Pose (..., 3) of the body's middle where the rear axle is at `rear` (..., 3)."""
-        return (SE2(rear) @ SE2([self.ahead, 0.0, 0.0])).pose
+        return (SE2(np.asarray(rear)) @ SE2(np.array([self.ahead, 0.0, 0.0]))).pose
 
     def rear_of(self, middle: ArrayLike) -> Array:
         """Pose (..., 3) of the rear axle where the body's middle is at `middle` (..., 3)."""
-        return (SE2(middle) @ SE2([-self.ahead, 0.0, 0.0])).pose
+        return (SE2(np.asarray(middle)) @ SE2(np.array([-self.ahead, 0.0, 0.0]))).pose
 
     def steering_of(self, speed: float, turn_rate: float) -> float:
         """Steering angle that turns at a rate [rad/s], within the limit; zero at rest [rad]."""
