@@ -143,10 +143,16 @@ def turn(model: Model, rest: Trim, angle: float, *, max_turn_rate: float | None 
 
 
 def turns(
-    model: Model, rest: Trim, angles: Sequence[float], *, max_turn_rate: float | None = None
+    model: Model,
+    rests: Sequence[Trim],
+    angles: Sequence[float],
+    *,
+    max_turn_rate: float | None = None,
 ) -> tuple[Maneuver, ...]:
-    """Turns on the spot by every angle, each as one maneuver from the rest to itself."""
-    return _whole(model, [_swing(model, rest, way, "turn_rate", max_turn_rate) for way in angles])
+    """Turns on the spot by every angle at every rest, each as one maneuver to the same rest."""
+    return _whole(
+        model, [_swing(model, r, way, "turn_rate", max_turn_rate) for r in rests for way in angles]
+    )
 
 
 def steer_at_rest(model: Model, source: Trim, target: Trim) -> Maneuver:

@@ -228,7 +228,7 @@ def test_strokes_have_their_length_and_least_time(length, steering):
 def test_turns_on_the_spot(angle, left, limit):
     angle = angle if left else -angle
     rest = trim_at(ROBOT, 0.0, 0.0)
-    (whole,) = turns(ROBOT, rest, [angle], max_turn_rate=limit)
+    (whole,) = turns(ROBOT, [rest], [angle], max_turn_rate=limit)
     assert turn(ROBOT, rest, angle, max_turn_rate=limit).duration == pytest.approx(whole.duration)
     np.testing.assert_allclose(whole.displacement, [0.0, 0.0, angle], atol=1e-12)
     assert np.abs(whole.course.reduced_state[:, 1]).max() <= limit + 1e-12
