@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -11,7 +11,6 @@ from annotated_types import Ge
 from pydantic import AllowInfNan, BeforeValidator, Field, Strict
 
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.automaton.bang_bang_library import bang_bang_library
 from maneuver_automaton.automaton.building import (
     Failure,
     LibraryBuild,
@@ -83,9 +82,7 @@ class LibraryFile(Part):
     schema_version: Literal[1] = Field(alias="schema", description="1")
     library: Text = Field(description="what the library is called")
     vehicle: VehiclePart = Field(description="a mapping {model, ...}")
-    trims: Annotated[tuple[Grid, ...], Several("a list of at least one grid", at_least=1)] = Field(
-        description="grids of trims, each a mapping of names to values"
-    )
+    trims: Grid = Field(description="a grid of trims, a mapping of names to lists of values")
     max_lateral_acceleration_m_s2: Positive | None = Field(
         None, description="what the tyres hold; left out: no limit"
     )
@@ -100,6 +97,8 @@ class BuildFile:
 
     name: str
     model: Model
+    grid: Mapping[str, tuple[float, ...]]
+    max_lateral_acceleration: float | None  # [m/s^2]
     trims: tuple[Trim, ...]
     missing: tuple[MissingTrim, ...]
     maneuvers: ManeuversPart
@@ -156,7 +155,7 @@ def build_file_of_text(text: str, *, name: str) -> BuildFile:
     Examples
     --------
     >>> asked = build_file_of_text(
-    ...     "{schema: 1, library: robots, vehicle: {model: unicycle}, trims: [{speed: [0, 1]}]}",
+    ...     "{schema: 1, library: robots, vehicle: {model: unicycle}, trims: {speed: [0, 1]}}",
     ...     name="robots.yaml")
     >>> [trim.name for trim in asked.trims]
     ['speed 0', 'speed 1']
@@ -165,23 +164,20 @@ def build_file_of_text(text: str, *, name: str) -> BuildFile:
     file = checked(document, LibraryFile)
     with at(document, ("vehicle",)):
         model = model_of(file.vehicle)
-    trims: dict[str, Trim] = {}
-    missing: dict[str, MissingTrim] = {}
-    for k, grid in enumerate(file.trims):
-        with at(document, ("trims", k)):
-            found = trims_of(
-                model, grid, max_lateral_acceleration=file.max_lateral_acceleration_m_s2
-            )
-        trims |= {trim.name: trim for trim in found.trims}
-        missing |= {point.name: point for point in found.missing}
-    if not trims:
-        reason = next(iter(missing.values())).reason
+    with at(document, ("trims",)):
+        found = trims_of(
+            model, file.trims, max_lateral_acceleration=file.max_lateral_acceleration_m_s2
+        )
+    if not found.trims:
+        reason = found.missing[0].reason
         raise document.error(("trims",), f"the {model.name} has none of these trims: {reason}")
     asked = BuildFile(
         name=file.library,
         model=model,
-        trims=tuple(trims.values()),
-        missing=tuple(missing.values()),
+        grid=file.trims,
+        max_lateral_acceleration=file.max_lateral_acceleration_m_s2,
+        trims=found.trims,
+        missing=found.missing,
         maneuvers=file.maneuvers,
     )
     _check_maneuvers(document, asked)
@@ -230,17 +226,17 @@ def build(
 
 def _made_at_once(asked: BuildFile) -> Automaton:
     part = asked.maneuvers
-    if not asked.model.reduced_names:
-        return Automaton(asked.model, asked.trims, name=asked.name)
-    return bang_bang_library(
+    made = Automaton.of_model(
         asked.model,
-        asked.trims,
+        asked.grid,
         pairs="neighbours" if part.pairs == "neighbours" else "all",
         late=part.late,
-        strokes=part.strokes_m,
-        turns=part.turns_rad,
-        name=asked.name,
+        strokes_m=part.strokes_m,
+        turns_rad=part.turns_rad,
+        max_lateral_acceleration=asked.max_lateral_acceleration,
+        leave_out=True,
     )
+    return replace(made, name=asked.name)
 
 
 def _check_maneuvers(document: Document, asked: BuildFile) -> None:
