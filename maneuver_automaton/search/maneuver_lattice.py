@@ -112,7 +112,7 @@ class ManeuverPass:
                     self.arrays,
                     self.task,
                     library,
-                    self.query.world.arrays,
+                    self.query.layers,
                     self.grid,
                     step,
                     ceiling,
@@ -181,7 +181,7 @@ def search_maneuvers(
     """
     begun = time.monotonic()
     room = 2**62 if max_expansions is None else max_expansions
-    grid = distance_grid(query.world, query.window[0], query.seen_goals, query.seen_start)
+    grid = distance_grid(query.plane, query.window[0], query.seen_goals, query.seen_start)
     word, total = _first(query, grid, room=room, deadline=deadline)
     first = total
     found: list[tuple[ManeuverWord, int, float]] = []
@@ -279,7 +279,7 @@ def pass_of(
     steps = quanta[..., None] * library.transfer.twists[:, None]
     task = task_of(query, rung)
     room = _search_arrays(query) if arrays is None else arrays
-    kernels.begin(room, task, query.world.arrays, grid)
+    kernels.begin(room, task, query.layers, grid)
     return ManeuverPass(
         query=query,
         rung=rung,
