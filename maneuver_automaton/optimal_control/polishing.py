@@ -45,6 +45,7 @@ POINT = BodyPart(solids=((np.zeros((1, 2)), 0.0),))  # the reference point alone
 WARM = {"ipopt.mu_init": 1e-5}
 LEAST_DURATION, MOST_DURATION = 1e-2, 1e4  # [s]
 TOO_DEEP = 0.2  # radii of the body inside obstacles from where fixed planes lead nowhere
+PRICE = 2.0  # of being inside obstacles, in durations of the guess per radius of the body
 TRUST = 0.6  # share of the distance within which pairs have lines
 CURVED = 20.0  # times the tightening for reduced states that do not run straight
 SWING = 1.1  # of what corners swing out between nodes is kept as a margin
@@ -140,6 +141,7 @@ def polish(
     stage_cost: RunningCost | None = None,
     settings: PolishSettings | None = None,
     fixed_planes: bool = False,
+    elastic: bool = False,
     gears: Array | None = None,
     max_seconds: float = 10.0,
 ) -> Polished:
@@ -161,6 +163,9 @@ def polish(
     settings : PolishSettings, optional
     fixed_planes : bool
         Keep the lines as the guess has them: quicker, and harder to fail.
+    elastic : bool
+        Let the body into obstacles at a price: a way out for guesses that are inside. Solved means
+        that it is out of them, as far as the lines of the guess reach.
     gears : (n - 1,) array, optional
         Sign of the speed ahead in every interval; stretches of one sign take their own time.
     max_seconds : float
@@ -195,7 +200,8 @@ def polish(
             total = total._replace(status=SolveStatus.OUT_OF_BUDGET, reason="no time was left")
             break
         if solver is None:
-            solver = _solver(program, pairs, fixed=fixed_planes, seconds=left)
+            price = PRICE * guess.duration / reach if elastic else math.inf
+            solver = _solver(program, pairs, fixed=fixed_planes, price=price, seconds=left)
         if fixed_planes:
             lines = lines.shifted(_reaches(program, point, pairs, lines).piece)
         margins = np.maximum(margins, _margins(program, point, pairs, lines))
@@ -205,7 +211,7 @@ def polish(
         )
         total = _Answer(*answer[:3], total.iterations + answer.iterations,
                         total.seconds + answer.seconds)  # fmt: skip
-        if answer.status is not SolveStatus.SOLVED:
+        if elastic or answer.status is not SolveStatus.SOLVED:
             point = found
             break
         missed = _near(program, found, MISSED * reach)
@@ -492,7 +498,9 @@ class _Solver(NamedTuple):
     fixed: bool
 
 
-def _solver(program: _Program, pairs: Pairs, *, fixed: bool, seconds: float) -> _Solver:
+def _solver(
+    program: _Program, pairs: Pairs, *, fixed: bool, price: float, seconds: float
+) -> _Solver:
     casadi, written, scene = program.casadi, program.written, program.scene
     variables = [casadi.vec(written.state), casadi.vec(written.control), written.duration]
     bounds = [written.bounds]
@@ -500,6 +508,7 @@ def _solver(program: _Program, pairs: Pairs, *, fixed: bool, seconds: float) -> 
     equations = written.constraints.shape[0] + program.zero.shape[0]
     count = len(pairs.interval)
     given = casadi.SX.sym("given", 4, count)  # margin, anchor, angle
+    objective = program.objective
     if count:
         angle, offset = casadi.SX.sym("angle", 1, count), casadi.SX.sym("offset", 1, count)
         if fixed:
@@ -507,9 +516,16 @@ def _solver(program: _Program, pairs: Pairs, *, fixed: bool, seconds: float) -> 
         else:
             variables += [angle.T, offset.T]
             bounds.append(np.tile([-np.inf, np.inf], (2 * count, 1)))
+        margin = given[0, :]
+        if math.isfinite(price):
+            inside = casadi.SX.sym("inside", 1, program.count)
+            variables.append(inside.T)
+            bounds.append(np.tile([0.0, np.inf], (program.count, 1)))
+            objective += price * casadi.sum2(inside)
+            margin -= inside[:, pairs.interval.tolist()]
         rows.append(
             line_rows(casadi, program.ways, scene.both, pairs, anchor=given[1:3, :],
-                      lines=(angle, offset), margin=given[0, :], pieces_too=not fixed)
+                      lines=(angle, offset), margin=margin, pieces_too=not fixed)
         )  # fmt: skip
     constraints = casadi.vertcat(*rows)
     limits = np.zeros((constraints.shape[0], 2))
@@ -517,7 +533,7 @@ def _solver(program: _Program, pairs: Pairs, *, fixed: bool, seconds: float) -> 
     functions = {
         "x": casadi.vertcat(*variables),
         "p": casadi.vec(given),
-        "f": program.objective,
+        "f": objective,
         "g": constraints,
     }
     most = program.settings.fixed_iterations if fixed else program.settings.max_iterations
@@ -548,6 +564,7 @@ def _solve(
     first = [state.ravel(), control.ravel(), np.array([duration])]
     if not solver.fixed:
         first += [lines.angle, np.zeros(lines.angle.size)]
+    first.append(np.zeros(len(solver.bounds) - sum(map(len, first))))  # how deep inside
     given = np.column_stack([margins, lines.anchor, lines.angle])
     began = time.perf_counter()
     bounds = solver.bounds.copy()
@@ -569,7 +586,8 @@ def _solve(
     stats = function.stats()
     values = np.asarray(answer["x"].full(), dtype=np.float64).ravel()
     if not solver.fixed:
-        angle, offset = values[program.size :].reshape(2, -1)
+        both = values[program.size :][: 2 * lines.angle.size]
+        angle, offset = both.reshape(2, -1)
         lines = Lines(angle, lines.anchor).shifted(offset)
     reason = str(stats["return_status"])
     return (
