@@ -37,6 +37,8 @@ from maneuver_automaton.plotting.library_size import draw_library_sizes as draw_
 from maneuver_automaton.plotting.library_size import (
     save_library_size_figure as save_library_size_figure,
 )
+from maneuver_automaton.plotting.maneuvers import draw_maneuvers as draw_maneuvers
+from maneuver_automaton.plotting.maneuvers import save_maneuvers_figure as save_maneuvers_figure
 from maneuver_automaton.plotting.nodes import draw_nodes as draw_nodes
 from maneuver_automaton.plotting.obstacles import draw_obstacles as draw_obstacles
 from maneuver_automaton.plotting.paths import draw_plan as draw_plan
