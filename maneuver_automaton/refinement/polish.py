@@ -267,6 +267,9 @@ class _Polishing:
             found = self._solve("fixed planes", number, guess, fixed_planes=True)
             if found.status is SolveStatus.SOLVED:
                 return found
+            out = self._solve("elastic", number, guess, elastic=True)
+            if out.status is SolveStatus.SOLVED:
+                guess = out.as_guess
             found = self._solve("lines", number, guess)
             if found.status is SolveStatus.SOLVED:
                 self._consider(found)
@@ -310,6 +313,7 @@ class _Polishing:
         guess: Guess,
         *,
         fixed_planes: bool = False,
+        elastic: bool = False,
         gears: Array | None = None,
     ) -> Polished:
         began = time.monotonic()
@@ -321,6 +325,7 @@ class _Polishing:
             stage_cost=self.stage_cost,
             settings=self.settings,
             fixed_planes=fixed_planes,
+            elastic=elastic,
             gears=gears,
             max_seconds=max(self._left(), 0.05),
         )

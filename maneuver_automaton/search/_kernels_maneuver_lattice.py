@@ -186,7 +186,8 @@ def expand(search, task, lib, world, grid, n, ceiling):
         state[PATIENCE] -= 1
         if state[PATIENCE] < 0:
             here = cost_to_go(task, grid, world, x, y, z, trim)
-            state[PATIENCE] = int(min(here / task.per_shot, task.most_patience))
+            wait = min(here / task.per_shot, task.most_patience)
+            state[PATIENCE] = int(max(wait, task.least_patience))
             connect(search, task, lib, world, node, ceiling, here)
             if state[FOUND] == 1 and task.stop_at_first:
                 return 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -21,7 +22,7 @@ from maneuver_automaton.search.maneuver_query import maneuver_query
 from maneuver_automaton.search.maneuver_shortcuts import word_is_free
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.search.transfer import transfer_library
-from tests.search.automata import inertial_unicycle
+from tests.search.automata import inertial_unicycle, truck_with_trailer
 
 BODY = Box([0.5, 0.25])
 WALLS = (Obstacle(Box([0.2, 3.0], [1.5, -0.6])), Obstacle(Box([0.2, 3.0], [3.0, 1.4])))
@@ -40,35 +41,33 @@ def query(start=START, goal=GOAL, **changes):
     return maneuver_query(*library(), start, goal, start_trim="0 0", goal_trim="0 0", **settings)
 
 
-def least_gap(plan, obstacles, *, body=((BODY, np.zeros(3)),)):
+def least_gap(plan, obstacles, *, model=None, carried=()):
     """Least distance of dense poses from the obstacles, by shapely, at the times of the plan."""
     times = np.linspace(0.0, plan.duration, 4000)
     poses = plan.pose_at(times)
-    half = 0.5 * BODY.size
-    ring = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * half
-    corners = np.stack([np.asarray(SE2(poses).act(corner)) for corner in ring], axis=1)
-    vehicles = shapely.polygons(corners)
+    vehicles = [outlines(poses, BODY)]
+    if carried:
+        samples = plan.sample(max_step_m=0.01, max_step_rad=0.01)
+        state = np.interp(times, samples.time, samples.reduced_state[:, 0])[:, None]
+        there = (SE2(poses) @ SE2(model.part_poses(state)[:, 0])).pose
+        vehicles.append(outlines(there, carried[0]))
     gap = np.inf
     for obstacle in obstacles:
         box = obstacle.shape
-        around = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * 0.5 * box.size
-        around = np.asarray(SE2([*box.center, box.heading]).act(around))
-        if obstacle.motion is None:
-            there = shapely.polygons(np.asarray(around))
-        else:
-            knots = obstacle.motion
-            moved = np.stack(
-                [
-                    np.interp(times + plan.start_time, knots.time, knots.pose[:, k])
-                    for k in range(3)
-                ],
-                axis=1,
-            )
-            there = shapely.polygons(
-                np.stack([np.asarray(SE2(moved).act(corner)) for corner in around], axis=1)
-            )
-        gap = min(gap, float(shapely.distance(vehicles, there).min()))
+        place = SE2([*box.center, box.heading]).pose[None]
+        if obstacle.motion is not None:
+            knots, now = obstacle.motion, times + plan.start_time
+            columns = [np.interp(now, knots.time, knots.pose[:, k]) for k in range(3)]
+            place = (SE2(np.stack(columns, axis=1)) @ SE2(place)).pose
+        solid = outlines(place, Box(box.size))
+        gap = min(gap, *(float(shapely.distance(one, solid).min()) for one in vehicles))
     return gap
+
+
+def outlines(poses, box):
+    half = 0.5 * box.size
+    ring = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * half + box.center
+    return shapely.polygons(np.stack([np.asarray(SE2(poses).act(c)) for c in ring], axis=1))
 
 
 def off_goal(plan, goal):
@@ -174,10 +173,26 @@ def test_what_moves_is_let_pass():
         assert least_gap(plan, (crossing,)) > 0.0
 
 
+def test_a_trailer_stays_free_too():
+    automaton, trailer = truck_with_trailer(levels=3), Box([0.3, 0.25])
+    parts = parts_of(automaton, (BODY,), ((trailer,),))
+    goal = np.array([3.0, 1.5, 1.0])
+    here = maneuver_query(
+        transfer_library(automaton), parts, START, goal,
+        start_trim="0 at 0.00", goal_trim="0 at 0.00",
+        obstacles=(Obstacle(Box([0.2, 3.0], [1.5, -1.0])), Obstacle(Box([0.2, 3.0], [3.5, 2.6]))),
+    )  # fmt: skip
+    result = search_maneuvers(here, max_expansions=3000)
+    assert result.status is SearchStatus.FOUND
+    for word in result.words:
+        plan = plan_of(here, word)
+        assert off_goal(plan, goal) < 1e-12
+        assert abs(plan.sample().reduced_state[-1, 0]) < 1e-9
+        assert least_gap(plan, here.obstacles, model=automaton.model, carried=(trailer,)) > 0.0
+
+
 def test_a_limit_of_time_is_kept():
     free = search_maneuvers(query(), max_expansions=2000).best
-    from dataclasses import replace
-
     short = replace(query(), most_time=free.duration * 1.1)
     result = search_maneuvers(short, max_expansions=20000)
     assert all(word.duration <= free.duration * 1.1 for word in result.words)
