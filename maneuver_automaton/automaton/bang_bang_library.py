@@ -6,10 +6,9 @@ from collections.abc import Sequence
 
 from maneuver_automaton.automaton.automaton import Automaton
 from maneuver_automaton.models import Model
-from maneuver_automaton.primitives import Maneuver, Trim
-from maneuver_automaton.primitives.bang_bang import Pairs, connect_bang_bang, differing
-from maneuver_automaton.primitives.strokes import strokes as strokes_of
-from maneuver_automaton.primitives.strokes import turns as turns_of
+from maneuver_automaton.primitives import Trim
+from maneuver_automaton.primitives.bang_bang import Pairs
+from maneuver_automaton.primitives.quickest import quickest_maneuvers
 
 
 def bang_bang_library(
@@ -24,25 +23,7 @@ def bang_bang_library(
 ) -> Automaton:
     """Trims joined by the quickest maneuvers, and rest to rest by strokes of given lengths.
 
-    In narrow places a maneuver between speed trims is longer than the room there is: short
-    strokes, one for every rest, are what parking is made of.
-
-    Parameters
-    ----------
-    model : Model
-        A vehicle whose control is the rate of its reduced state.
-    trims : sequence of Trim
-        The nodes.
-    pairs : "all" or "neighbours"
-        See `connect_bang_bang`.
-    late : bool
-        Whether to add the maneuvers that wait first, where they lead elsewhere.
-    strokes : sequence of float
-        Lengths, negative in reverse [m].
-    turns : sequence of float
-        Angles of turns on the spot [rad], for vehicles that can.
-    name : str
-        Of the library.
+    The arguments are those of `quickest_maneuvers`; `Automaton.of_model` finds the trims as well.
 
     Examples
     --------
@@ -55,13 +36,7 @@ def bang_bang_library(
     >>> len(bang_bang_library(car, trims, strokes=[0.5, -0.5]).maneuvers)
     46
     """
-    early = connect_bang_bang(model, trims, pairs=pairs)
-    more: list[Maneuver] = []
-    if late:
-        more += differing(early, connect_bang_bang(model, trims, pairs=pairs, late=True))
-    rests = [trim for trim in trims if trim.is_rest]
-    if strokes and rests:
-        more += strokes_of(model, rests, strokes)
-    for rest in rests if turns else ():
-        more += turns_of(model, rest, turns)
-    return Automaton(model, tuple(trims), (*early, *more), name=name)
+    maneuvers = quickest_maneuvers(
+        model, trims, pairs=pairs, late=late, strokes=strokes, turns=turns
+    )
+    return Automaton(model, tuple(trims), maneuvers, name=name)

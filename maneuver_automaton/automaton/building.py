@@ -25,7 +25,7 @@ from maneuver_automaton.automaton.journal import (
     pair_key,
     read_journal,
 )
-from maneuver_automaton.automaton.library import check_stated, save_library
+from maneuver_automaton.automaton.library import save_library
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control.maneuvers import (
     ManeuverObjective,
@@ -114,8 +114,6 @@ def build_library(
 
     Raises
     ------
-    InvalidLibrary
-        If a file cannot state the model.
     MissingExtra
         If CasADi is not installed.
     ValueError
@@ -126,8 +124,6 @@ def build_library(
         If the file or its journal cannot be written.
     """
     began = time.perf_counter()
-    if path is not None:
-        check_stated(model)
     nodes = Automaton(model, tuple(trims), name=name)
     objective, settings = objective or ManeuverObjective(), settings or TransferSettings()
     wanted = tuple(all_pairs(nodes) if pairs is None else dict.fromkeys(pairs))
