@@ -188,7 +188,9 @@ def near_pairs(
         intervals.append(interval[close])
         bodies.append(np.full(int(close.sum()), k))
         found.append(piece[close])
-    return Pairs(*(np.concatenate(column).astype(np.int64) for column in (intervals, bodies, found)))
+    return Pairs(
+        *(np.concatenate(column).astype(np.int64) for column in (intervals, bodies, found))
+    )
 
 
 def first_lines(

@@ -20,14 +20,13 @@ from maneuver_automaton.collision.convex import pieces_seen_from
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control import Guess, SolveStatus
-from maneuver_automaton.optimal_control.polishing import (
+from maneuver_automaton.optimal_control.polish_values import (
     Ends,
     Polished,
     PolishSettings,
     Scene,
-    intervals_for,
-    polish,
 )
+from maneuver_automaton.optimal_control.polishing import intervals_for, polish
 from maneuver_automaton.optimal_control.problem import RunningCost, resampled
 from maneuver_automaton.optimal_control.separation import BodyPart
 from maneuver_automaton.primitives import Maneuver, Trajectory
