@@ -73,6 +73,8 @@ class Program(NamedTuple):
 
     def points(self, point: Point) -> list[tuple[Array, Array]]:
         """Control points of every solid of the body, in numbers."""
+        if not self.ways:
+            return []
         state, control, duration = self.values(point)
         found = [m.full() for m in self.numbers(state.T, control.T, duration)]
         return list(zip(found[0::2], found[1::2], strict=True))
