@@ -71,8 +71,8 @@ def polish(
     fixed_planes : bool
         Keep the lines as the guess has them: quicker, and harder to fail.
     elastic : bool
-        Let the body into obstacles at a price: a way out for guesses that are inside. Solved means
-        that it is out of them, as far as the lines of the guess reach.
+        Let the body into obstacles at a price: a way out for guesses that are inside. What comes
+        out may still touch, and is a guess itself.
     gears : (n - 1,) array, optional
         Sign of the speed ahead in every interval; stretches of one sign take their own time.
     max_seconds : float

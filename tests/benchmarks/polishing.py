@@ -30,7 +30,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import CarWithTrailer, Model, SecondOrderCar, SecondOrderUnicycle
 from maneuver_automaton.optimal_control import Guess
 from maneuver_automaton.optimal_control.polish_values import PolishSettings
-from maneuver_automaton.optimal_control.separation import BodyPart
+from maneuver_automaton.optimal_control.separation import BodyPart, trailer_pose
 from maneuver_automaton.problem import Bounds, Problem
 from maneuver_automaton.refinement.gear_sequences import (
     car_library,
@@ -116,7 +116,7 @@ def dynobench_vehicle(name: str, hitch: float) -> Vehicle:
                            min_speed=-0.1, max_hitch=math.pi / 4)  # fmt: skip
     trailer = BodyPart(
         solids=tuple(convex_pieces(Box([0.3, 0.25]))),
-        pose=lambda z: (-0.5 * np.cos(z[0]), 0.5 * np.sin(z[0]), -z[0]),
+        pose=trailer_pose(0.5),
     )
     return Vehicle(
         truck,
@@ -255,16 +255,19 @@ def main() -> None:
     options = parser.parse_args()
     head = ["case", "plans", "search [s]", "polish [s]", "clock [s]", "duration [s]", "aim [s]",
             "closed to", "driven again", "gap [mm]", ""]  # fmt: skip
-    rows = []
+    rows: list[list[Any]] = []
     if cases.present("tpcap") and options.tpcap:
         problems = cases.tpcap()
-        for n in map(int, options.tpcap.split(",")):
-            rows.append(row(f"TPCAP {n}", AIMS.get(n, math.nan), problems[n],
-                            tpcap_task(problems[n]), tpcap_car(), options.time_limit))  # fmt: skip
+        rows += [
+            row(f"TPCAP {n}", AIMS.get(n, math.nan), problems[n], tpcap_task(problems[n]),
+                tpcap_car(), options.time_limit)
+            for n in map(int, options.tpcap.split(","))
+        ]  # fmt: skip
     if cases.present("dynobench") and options.dynobench:
-        for name in options.dynobench.split(","):
-            rows.append(row(name, DYNOBENCH.get(name, math.nan), *dynobench(name),
-                            options.long_limit))  # fmt: skip
+        rows += [
+            row(name, DYNOBENCH.get(name, math.nan), *dynobench(name), options.long_limit)
+            for name in options.dynobench.split(",")
+        ]
     show(head, rows)
 
 

@@ -17,6 +17,7 @@ from maneuver_automaton.optimal_control.separation import (
     first_lines,
     near_pairs,
     reaches,
+    trailer_pose,
 )
 
 casadi = pytest.importorskip("casadi")
@@ -27,9 +28,14 @@ ROBOT = SecondOrderUnicycle(
 BODY = BodyPart(solids=((0.4 * SQUARE, 0.0),))
 
 
+def moved(x: float, y: float) -> np.ndarray:
+    """The unit square somewhere."""
+    return SQUARE + np.array([x, y])
+
+
 def standing(x: float, y: float = 0.0) -> list[tuple[np.ndarray, np.ndarray]]:
     """Control points of the unit square that stands at a place for one interval."""
-    ring = SQUARE + [x, y]
+    ring = moved(x, y)
     return [(np.tile(ring[:, :1], (4, 1)), np.tile(ring[:, 1:], (4, 1)))]
 
 
@@ -48,7 +54,7 @@ def at_rest(x: float, y: float = 0.0, heading: float | None = 0.0) -> Ends:
 
 
 def test_a_line_lies_midway_between_nearest_points() -> None:
-    body, pieces = [(SQUARE, 0.0)], [(SQUARE + [3.0, 0.0], 0.0)]
+    body, pieces = [(SQUARE, 0.0)], [(moved(3.0, 0.0), 0.0)]
     pairs = near_pairs(standing(0.0), body, pieces, within=2.5)
     lines = first_lines(standing(0.0), body, pieces, pairs)
     assert [column.tolist() for column in pairs] == [[0], [0], [0]]
@@ -57,7 +63,7 @@ def test_a_line_lies_midway_between_nearest_points() -> None:
 
 
 def test_where_solids_overlap_the_line_shows_the_shortest_way_out() -> None:
-    body, pieces = [(SQUARE, 0.0)], [(SQUARE + [0.1, 0.8], 0.0)]
+    body, pieces = [(SQUARE, 0.0)], [(moved(0.1, 0.8), 0.0)]
     pairs = near_pairs(standing(0.0), body, pieces, within=0.1)
     lines = first_lines(standing(0.0), body, pieces, pairs)
     assert lines.angle == pytest.approx([np.pi / 2])
@@ -153,7 +159,7 @@ def test_a_trailer_is_part_of_the_body() -> None:
     )
     trailer = BodyPart(
         solids=((SQUARE * [0.3, 0.25], 0.0),),
-        pose=lambda z: (-0.5 * np.cos(z[0]), 0.5 * np.sin(z[0]), -z[0]),
+        pose=trailer_pose(0.5),
     )
     car = BodyPart(solids=((SQUARE * [0.5, 0.25], 0.0),))
     box = SQUARE * [0.5, 0.5] + [1.5, -0.45]

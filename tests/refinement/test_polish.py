@@ -1,4 +1,4 @@
-"""Guesses from kinematic plans, polished and closed: exact, inside limits, moved with the problem."""
+"""Guesses from kinematic plans, polished and closed: exact, inside limits, equivariant."""
 
 from __future__ import annotations
 
@@ -35,6 +35,7 @@ CAR = SecondOrderCar(
 )
 BODY = Box([4.689, 1.942], [1.4155, 0.0])
 SETTINGS = PolishSettings()
+HERE = SE2([0.0, 0.0, 0.0])
 STEPS = guess_intervals(SETTINGS)
 
 
@@ -52,9 +53,9 @@ def plan(*pieces: tuple[float, float, float]) -> Plan:
     return Plan([0.0, 0.0, 0.0], trims, durations=[one[2] for one in pieces])
 
 
-def swerve(place: SE2 = SE2([0.0, 0.0, 0.0]), goal: tuple[float, ...] = (14.0, 0.0, 0.0)):
+def swerve(place: SE2 = HERE) -> PolishTask:
     """Past a box, from rest to rest, wherever that is."""
-    end = (place @ SE2(list(goal))).pose
+    end = (place @ SE2([14.0, 0.0, 0.0])).pose
     return PolishTask(
         model=CAR,
         start=place.pose,
