@@ -11,6 +11,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import AnyObstacle, OccupancyMap, Shape
 from maneuver_automaton.problem import Bounds
+from maneuver_automaton.roads import RoadScene
 
 Unknown: TypeAlias = Literal["blocked", "free"]
 
@@ -51,3 +52,4 @@ class Statement:
     footprint: tuple[Shape, ...] | None = None
     vehicle: StatedVehicle | None = None
     maps: tuple[MapFile, ...] = ()  # those of the obstacles that are in the format of Nav2
+    road: RoadScene | None = None  # lanelets, traffic, start and goals of a drive on roads

@@ -41,8 +41,13 @@ from maneuver_automaton.optimal_control.solution import SolveStatus
 from maneuver_automaton.optimal_control.transcription import STATUS, Transcription, transcribe
 from maneuver_automaton.optimal_control.vehicles import moving_frame
 
+POINT = BodyPart(solids=((np.zeros((1, 2)), 0.0),))  # the reference point alone
 WARM = {"ipopt.mu_init": 1e-5}
 LEAST_DURATION, MOST_DURATION = 1e-2, 1e4  # [s]
+TOO_DEEP = 0.2  # radii of the body inside obstacles from where fixed planes lead nowhere
+PRICE = 2.0  # of being inside obstacles, in durations of the guess per radius of the body
+TRUST = 0.6  # share of the distance within which pairs have lines
+CURVED = 20.0  # times the tightening for reduced states that do not run straight
 SWING = 1.1  # of what corners swing out between nodes is kept as a margin
 MISSED = 0.02  # radii of the body: pairs that came nearer than this need a line
 LEAST_PACE, MOST_PACE = 0.02, 50.0  # of a phase, against the even pace of the guess
@@ -54,7 +59,8 @@ class PolishSettings:
 
     step: float = 0.12  # [s] between nodes, as far as their number allows
     nodes: tuple[int, int] = (40, 300)  # fewest and most intervals
-    near: float = 0.8  # pairs nearer than this at the guess get a line, in radii of the body
+    near: float = 0.8  # pairs nearer than this get a line, in radii of the body ...
+    ahead: float = 0.8  # ... or than the guess drives at its fastest in this time [s]
     gap: float = 1e-4  # [m] kept between body and line, for the way between nodes
     tightening: float = 1e-6  # of all limits, in their units, so that closure has room
     effort: float = 3e-3  # price of full control, per second, for those that end in rates
@@ -64,8 +70,9 @@ class PolishSettings:
     acceptable: float = 1e-4
     acceptable_iterations: int = 8
     max_iterations: int = 300
+    fixed_iterations: int = 150  # with fixed planes
     mu_init: float = 1e-3
-    rounds: int = 4  # solves with pairs added after each
+    rounds: int = 8  # solves at most, with lines or margins added after each
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -134,6 +141,7 @@ def polish(
     stage_cost: RunningCost | None = None,
     settings: PolishSettings | None = None,
     fixed_planes: bool = False,
+    elastic: bool = False,
     gears: Array | None = None,
     max_seconds: float = 10.0,
 ) -> Polished:
@@ -155,6 +163,9 @@ def polish(
     settings : PolishSettings, optional
     fixed_planes : bool
         Keep the lines as the guess has them: quicker, and harder to fail.
+    elastic : bool
+        Let the body into obstacles at a price: a way out for guesses that are inside. Solved means
+        that it is out of them, as far as the lines of the guess reach.
     gears : (n - 1,) array, optional
         Sign of the speed ahead in every interval; stretches of one sign take their own time.
     max_seconds : float
@@ -174,55 +185,57 @@ def polish(
         np.full(program.count, guess.duration / program.count),
     )
     reach = max((part.reach for part in scene.parts), default=0.0)
-    pairs = _near(program, point, settings.near * reach)
+    near = max(settings.near * reach, settings.ahead * _fastest(point))
+    pairs = _near(program, point, near)
     lines = _first_lines(program, point, pairs)
     total = _Answer(SolveStatus.OUT_OF_BUDGET, "lines were missing to the end", math.inf, 0, 0.0)
     solver: _Solver | None = None
-    margins, again = np.zeros(len(pairs.interval)), False
+    margins, again, trust = np.zeros(len(pairs.interval)), False, math.inf
+    if fixed_planes and _depth(program, point, pairs, lines) > TOO_DEEP * reach:
+        total = total._replace(reason="the guess is too deep inside obstacles for fixed planes")
+        return _polished(point, total, began)
     for _ in range(settings.rounds):
         left = began + max_seconds - time.perf_counter()
         if left <= 0.0:
+            total = total._replace(status=SolveStatus.OUT_OF_BUDGET, reason="no time was left")
             break
         if solver is None:
-            solver = _solver(program, pairs, fixed=fixed_planes, seconds=left)
+            price = PRICE * guess.duration / reach if elastic else math.inf
+            solver = _solver(program, pairs, fixed=fixed_planes, price=price, seconds=left)
         if fixed_planes:
             lines = lines.shifted(_reaches(program, point, pairs, lines).piece)
         margins = np.maximum(margins, _margins(program, point, pairs, lines))
-        point, lines, answer = _solve(solver, program, point, lines, margins, again=again)
-        again = True
+        before = point
+        found, moved, answer = _solve(
+            solver, program, point, lines, margins, again=again, trust=trust
+        )
         total = _Answer(*answer[:3], total.iterations + answer.iterations,
                         total.seconds + answer.seconds)  # fmt: skip
-        import os
-
-        if os.environ.get("VERB"):
-            rr = _reaches(program, point, pairs, lines)
-            print(
-                "    round",
-                fixed_planes,
-                answer.iterations,
-                round(answer.seconds, 2),
-                round(point.durations.sum(), 3),
-                "pairs",
-                len(pairs.interval),
-                "more",
-                len(pairs.joined(_near(program, point, MISSED * reach)).interval),
-                "worst",
-                (rr.between - rr.piece).max() * 1e3,
-                "swing",
-                (rr.between - rr.nodes).max() * 1e3,
-                answer.reason,
-            )
-        if answer.status is not SolveStatus.SOLVED:
+        if elastic or answer.status is not SolveStatus.SOLVED:
+            point = found
             break
-        more = pairs.joined(_near(program, point, MISSED * reach))
+        missed = _near(program, found, MISSED * reach)
+        far = float(np.abs(found.state[:, :2] - before.state[:, :2]).max())
+        total = total._replace(status=SolveStatus.FAILED, reason="touches between nodes")
+        if trust > near and far > near and len(pairs.joined(missed).interval) > len(pairs.interval):
+            trust = TRUST * near  # it went through what was not near: once more, in short steps
+            continue
+        point, lines, again = found, moved, True
+        if trust < near:
+            missed = _near(program, found, near)
+        more = pairs.joined(missed)
         if len(more.interval) > len(pairs.interval):
             new = Pairs(*(column[len(pairs.interval) :] for column in more))
             lines = lines.joined(_first_lines(program, point, new))
             margins = np.append(margins, np.zeros(len(new.interval)))
             pairs, solver, again = more, None, False
-        elif _kept(program, point, pairs, lines):
+        elif far < 0.99 * trust and _kept(program, point, pairs, lines):
+            total = total._replace(status=answer.status, reason=answer.reason)
             break
-        total = total._replace(status=SolveStatus.FAILED, reason="touches between nodes")
+    return _polished(point, total, began)
+
+
+def _polished(point: _Point, total: _Answer, began: float) -> Polished:
     return Polished(
         status=total.status,
         reason=total.reason,
@@ -324,9 +337,13 @@ def _program(
         begin = _frames(casadi, model, state[:, :count], control)
         end = _frames(casadi, model, state[:, 1:], control)
         found = ways(casadi, scene.parts, begin, end, step=step)
-    below, zero = [], []
+        (swing,) = ways(casadi, (POINT,), begin, end, step=step)
+        below = _between(model, begin, end, step=step, settings=settings)
+    zero = []
     for a, b, c in scene.walls:
-        below.append((a * state[0, 1:count] + b * state[1, 1:count] - c).T)
+        along = a * swing.x + b * swing.y - (c - settings.tightening)
+        below.append(casadi.vec(along[1, : count - 1]))  # nodes but for the first and the last
+        below.append(casadi.vec(along[2:, :]) - 2.0 * settings.tightening)
     if gears is not None:
         sign = casadi.DM(np.asarray(gears, dtype=np.float64)).T
         below += [-(sign * at.twist[0]).T for at in (begin, end)]
@@ -347,6 +364,45 @@ def _program(
     )
 
 
+def _between(
+    model: Model, begin: Frames, end: Frames, *, step: Any, settings: PolishSettings
+) -> list[Any]:
+    """What keeps reduced states inside their limits between nodes, where they do not run straight.
+
+    The control points of the cubic with the same values and rates at both nodes are kept inside.
+    """
+    rows = []
+    limits = _tight(model, settings)
+    for k in _curved(model):
+        low, high = limits[k]
+        points = (begin.reduced[k, :] + step / 3.0 * begin.reduced_rates[k, :],
+                  end.reduced[k, :] - step / 3.0 * end.reduced_rates[k, :])  # fmt: skip
+        for point in points:
+            rows += [(point - high).T] if np.isfinite(high) else []
+            rows += [(low - point).T] if np.isfinite(low) else []
+    return rows
+
+
+def _tight(model: Model, settings: PolishSettings) -> Array:
+    """Limits (n_z, 2) of the reduced state with room for closure, more where it runs curved."""
+    by = np.full((len(model.reduced_names), 1), settings.tightening)
+    by[_curved(model)] *= CURVED
+    return np.asarray(model.reduced_limits + by * np.array([1.0, -1.0]))
+
+
+def _curved(model: Model) -> list[int]:
+    """Numbers of the reduced states whose rates depend on reduced states."""
+    casadi = load_casadi()
+    z = casadi.SX.sym("z", len(model.reduced_names))
+    u = casadi.SX.sym("u", len(model.control_names))
+    with numpy_on_symbols(casadi):
+        rates = list(model.dynamics(casadi.vertsplit(z), casadi.vertsplit(u)))
+    if not rates:
+        return []
+    depends = casadi.which_depends(casadi.vertcat(*map(casadi.SX, rates)), z, 1, True)
+    return [k for k, bent in enumerate(depends) if bent]
+
+
 def _problem(
     model: Model, ends: Ends, settings: PolishSettings, stage_cost: RunningCost | None
 ) -> OptimalControlProblem:
@@ -360,8 +416,10 @@ def _problem(
         more = 0.0 if stage_cost is None else stage_cost(x[dof:], u)
         return 1.0 + settings.effort * effort + more
 
-    limits = np.vstack([np.tile([-np.inf, np.inf], (dof, 1)), _within(model.reduced_limits,
-                        settings.tightening)])  # fmt: skip
+    limits = np.vstack([np.tile([-np.inf, np.inf], (dof, 1)), _tight(model, settings)])
+    for state in ends:
+        values = np.array([math.nan if value is None else value for value in state])
+        limits[:, 0], limits[:, 1] = np.fmin(limits[:, 0], values), np.fmax(limits[:, 1], values)
     return OptimalControlProblem(
         state_names=(*model.group.coordinates, *model.reduced_names),
         control_names=model.control_names,
@@ -390,6 +448,12 @@ def _paced(problem: OptimalControlProblem, duration: float) -> OptimalControlPro
     )
 
 
+def _fastest(point: _Point) -> float:
+    """Greatest speed of the reference point from node to node [m/s]."""
+    steps = np.hypot(*np.diff(point.state[:, :2], axis=0).T)
+    return float((steps / point.durations).max(initial=0.0))
+
+
 def _near(program: _Program, point: _Point, within: float) -> Pairs:
     scene = program.scene
     if not (scene.pieces and scene.parts):
@@ -412,6 +476,12 @@ def _margins(program: _Program, point: _Point, pairs: Pairs, lines: Lines) -> Ar
     return program.settings.gap + SWING * (reach.between - reach.nodes)
 
 
+def _depth(program: _Program, point: _Point, pairs: Pairs, lines: Lines) -> float:
+    """How deep the body is inside obstacles [m]."""
+    reach = _reaches(program, point, pairs, lines)
+    return float((reach.between - reach.piece).max(initial=0.0))
+
+
 def _kept(program: _Program, point: _Point, pairs: Pairs, lines: Lines) -> bool:
     """Whether every way keeps half the gap to its piece."""
     reach = _reaches(program, point, pairs, lines)
@@ -428,7 +498,9 @@ class _Solver(NamedTuple):
     fixed: bool
 
 
-def _solver(program: _Program, pairs: Pairs, *, fixed: bool, seconds: float) -> _Solver:
+def _solver(
+    program: _Program, pairs: Pairs, *, fixed: bool, price: float, seconds: float
+) -> _Solver:
     casadi, written, scene = program.casadi, program.written, program.scene
     variables = [casadi.vec(written.state), casadi.vec(written.control), written.duration]
     bounds = [written.bounds]
@@ -436,6 +508,7 @@ def _solver(program: _Program, pairs: Pairs, *, fixed: bool, seconds: float) -> 
     equations = written.constraints.shape[0] + program.zero.shape[0]
     count = len(pairs.interval)
     given = casadi.SX.sym("given", 4, count)  # margin, anchor, angle
+    objective = program.objective
     if count:
         angle, offset = casadi.SX.sym("angle", 1, count), casadi.SX.sym("offset", 1, count)
         if fixed:
@@ -443,9 +516,16 @@ def _solver(program: _Program, pairs: Pairs, *, fixed: bool, seconds: float) -> 
         else:
             variables += [angle.T, offset.T]
             bounds.append(np.tile([-np.inf, np.inf], (2 * count, 1)))
+        margin = given[0, :]
+        if math.isfinite(price):
+            inside = casadi.SX.sym("inside", 1, program.count)
+            variables.append(inside.T)
+            bounds.append(np.tile([0.0, np.inf], (program.count, 1)))
+            objective += price * casadi.sum2(inside)
+            margin -= inside[:, pairs.interval.tolist()]
         rows.append(
             line_rows(casadi, program.ways, scene.both, pairs, anchor=given[1:3, :],
-                      lines=(angle, offset), margin=given[0, :], pieces_too=not fixed)
+                      lines=(angle, offset), margin=margin, pieces_too=not fixed)
         )  # fmt: skip
     constraints = casadi.vertcat(*rows)
     limits = np.zeros((constraints.shape[0], 2))
@@ -453,10 +533,11 @@ def _solver(program: _Program, pairs: Pairs, *, fixed: bool, seconds: float) -> 
     functions = {
         "x": casadi.vertcat(*variables),
         "p": casadi.vec(given),
-        "f": program.objective,
+        "f": objective,
         "g": constraints,
     }
-    options = _options(program.settings, seconds)
+    most = program.settings.fixed_iterations if fixed else program.settings.max_iterations
+    options = _options(program.settings, most, seconds)
     solver = casadi.nlpsol("solver", "ipopt", functions, options)
     warm = casadi.nlpsol("again", "ipopt", functions, options | WARM | _derivatives(solver))
     return _Solver(solver, warm, np.vstack(bounds), limits, fixed)
@@ -476,20 +557,28 @@ def _solve(
     margins: Array,
     *,
     again: bool,
+    trust: float,
 ) -> tuple[_Point, Lines, _Answer]:
-    """The solver's answer from a point and lines with their margins."""
+    """The solver's answer from a point and lines with their margins, places within `trust` [m]."""
     state, control, duration = program.values(point)
     first = [state.ravel(), control.ravel(), np.array([duration])]
     if not solver.fixed:
         first += [lines.angle, np.zeros(lines.angle.size)]
+    first.append(np.zeros(len(solver.bounds) - sum(map(len, first))))  # how deep inside
     given = np.column_stack([margins, lines.anchor, lines.angle])
     began = time.perf_counter()
+    bounds = solver.bounds.copy()
+    if math.isfinite(trust):
+        n_x = state.shape[1]
+        for axis in (0, 1):
+            inner = slice(n_x + axis, n_x * program.count + axis, n_x)  # nodes but for the ends
+            bounds[inner] = state[1:-1, axis, None] + np.array([-trust, trust])
     function = solver.warm if again else solver.function
     answer = function(
-        x0=np.clip(np.concatenate(first), *solver.bounds.T),
+        x0=np.clip(np.concatenate(first), *bounds.T),
         p=given.ravel(),
-        lbx=solver.bounds[:, 0],
-        ubx=solver.bounds[:, 1],
+        lbx=bounds[:, 0],
+        ubx=bounds[:, 1],
         lbg=solver.limits[:, 0],
         ubg=solver.limits[:, 1],
     )
@@ -497,7 +586,8 @@ def _solve(
     stats = function.stats()
     values = np.asarray(answer["x"].full(), dtype=np.float64).ravel()
     if not solver.fixed:
-        angle, offset = values[program.size :].reshape(2, -1)
+        both = values[program.size :][: 2 * lines.angle.size]
+        angle, offset = both.reshape(2, -1)
         lines = Lines(angle, lines.anchor).shifted(offset)
     reason = str(stats["return_status"])
     return (
@@ -573,7 +663,7 @@ def _held(control: Array, count: int) -> Array:
     return control[np.minimum((at * len(control)).astype(np.int64), len(control) - 1)]
 
 
-def _options(settings: PolishSettings, seconds: float) -> dict[str, Any]:
+def _options(settings: PolishSettings, most: int, seconds: float) -> dict[str, Any]:
     return {
         "print_time": False,
         "error_on_fail": False,
@@ -585,6 +675,6 @@ def _options(settings: PolishSettings, seconds: float) -> dict[str, Any]:
         "ipopt.constr_viol_tol": settings.violation,
         "ipopt.acceptable_tol": settings.acceptable,
         "ipopt.acceptable_iter": settings.acceptable_iterations,
-        "ipopt.max_iter": settings.max_iterations,
+        "ipopt.max_iter": most,
         "ipopt.max_wall_time": seconds,
     }

@@ -64,12 +64,13 @@ def connect(search, task, lib, world, node, ceiling, estimate):
     done, spent = nodes[node, 4], nodes[node, 5]
     trim = links[node, 1]
     start = (nodes[node, 0], nodes[node, 1], nodes[node, 2], nodes[node, 3])
+    n_words = lib.transfer.words.shape[0] if links[node, 0] < 0 else lib.transfer.n_few
     for g in range(task.aims.shape[0]):
         goal = (task.aims[g, 0], task.aims[g, 1], task.aims[g, 2], task.aims[g, 3])
         goal_trim = task.aim_trims[g]
         most = min(ceiling, found[0]) - done
         most = min(most, task.patience * estimate + task.slack)
-        n = transfer_candidates(lib.transfer, start, trim, goal, goal_trim, most, scratch)
+        n = transfer_candidates(lib.transfer, n_words, start, trim, goal, goal_trim, most, scratch)
         state[QUERIES] += 1
         left = task.most_time - spent
         for _ in range(task.tries):
@@ -185,7 +186,8 @@ def expand(search, task, lib, world, grid, n, ceiling):
         state[PATIENCE] -= 1
         if state[PATIENCE] < 0:
             here = cost_to_go(task, grid, world, x, y, z, trim)
-            state[PATIENCE] = int(min(here / task.per_shot, task.most_patience))
+            wait = min(here / task.per_shot, task.most_patience)
+            state[PATIENCE] = int(max(wait, task.least_patience))
             connect(search, task, lib, world, node, ceiling, here)
             if state[FOUND] == 1 and task.stop_at_first:
                 return 1

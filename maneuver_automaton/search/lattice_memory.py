@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +65,7 @@ def search_arrays(n_triples: int) -> SearchArrays:
 
 def with_room(search: SearchArrays, nodes: int) -> SearchArrays:
     """The same search in arrays that hold at least so many nodes."""
-    return widened(search, nodes)
+    return cast(SearchArrays, widened(search, nodes))
 
 
 def widened(search: Any, nodes: int) -> Any:

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ from maneuver_automaton.search import _kernels_maneuver_lattice as kernels
 from maneuver_automaton.search.distance_grid import DistanceGrid, distance_grid
 from maneuver_automaton.search.lattice_memory import widened
 from maneuver_automaton.search.maneuver_query import ManeuverQuery
+from maneuver_automaton.search.maneuver_shortcuts import LEAST, shortened
+from maneuver_automaton.search.maneuver_task import Rung, Task, task_of, transfer_steps
 from maneuver_automaton.search.maneuver_word import (
     EDGE,
     TRIM,
@@ -27,35 +29,18 @@ from maneuver_automaton.search.maneuver_word import (
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.search.transfer import TransferScratch
 
-CELL = 0.122  # of the first pass, in length scales
-HEADINGS = 72
-FIRST_CHUNK = 256  # expansions
+FIRST_CHUNK = 128  # expansions
 MOST_CHUNK = 16384
 TIMELY = 256  # expansions between two looks at the clock
-TRIES = 6  # candidates of one transfer that are tried
-PATIENCE = 1.5  # a connection may cost so much more than the estimate ...
-SLACK = 6.0  # ... and so many times the way of a length scale
-SHOTS = 0.5  # of a length scale's cost between two transfers that are tried, times the estimate
-MOST_PATIENCE = 200.0  # expansions between two transfers
 SMALLEST = 4096  # nodes
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Rung:
-    """One resolution and weight of the lattice."""
-
-    scale: float = 1.0  # of the cells
-    quanta: float = 1.0  # of the lengths of coasts
-    weight: float = 2.0
-    stop: bool = False  # at the first connection
-    margin: float = 1.0  # of the proven clearance
-
-
-FIRST: tuple[tuple[int, Rung], ...] = (
-    # a pass begins when all passes together have expanded so many nodes, or are exhausted
-    (0, Rung(stop=True)),
-    (4000, Rung(scale=0.5, quanta=0.5, stop=True)),
-    (40000, Rung(scale=0.25, quanta=0.25, stop=True, margin=0.1)),
+FIRST: tuple[tuple[int, tuple[Rung, ...]], ...] = (
+    # after so many expansions of all passes together, or when all are exhausted
+    (0, (Rung(stop=True),)),
+    (300, (Rung(scale=0.5, quanta=0.5, stop=True), Rung(quanta=0.7, stop=True))),
+    (2000, (Rung(scale=0.25, quanta=0.25, stop=True), Rung(scale=0.5, quanta=0.7, stop=True))),
+    (40000, (Rung(scale=0.25, quanta=0.25, stop=True, margin=0.1),)),
 )
 LATER: tuple[Rung, ...] = (
     Rung(weight=1.5),
@@ -64,40 +49,6 @@ LATER: tuple[Rung, ...] = (
     Rung(scale=0.5, quanta=0.5, weight=1.2),
     Rung(scale=0.5, quanta=0.5, weight=1.0),
 )
-
-
-class Task(NamedTuple):
-    """One pass, as the kernels see it."""
-
-    start: Array  # (4,)
-    start_trim: int
-    aims: Array  # (A, 4)
-    aim_trims: IntArray  # (A,)
-    lag: Array  # (m,) least surplus of maneuvers to a goal's trim
-    frame_x: float
-    frame_y: float
-    frame_heading: float
-    frame_cos: float
-    frame_sin: float
-    cell: float
-    headings: int
-    tick: float
-    weight: float
-    per_metre: float
-    per_climb: float
-    per_shot: float
-    most_patience: float
-    patience: float
-    slack: float
-    tries: int
-    stop_at_first: bool
-    keep: float
-    margin: float
-    far: float  # [m] clearance that is as good as any
-    clock: float
-    most_time: float
-    window: Array
-    edge_window: Array  # narrower by what courses may be off
 
 
 class ManeuverSearchArrays(NamedTuple):
@@ -128,6 +79,14 @@ class ManeuverResult:
     def best(self) -> ManeuverWord | None:
         """The cheapest word, None if there is none."""
         return self.words[-1] if self.words else None
+
+
+class Heard(NamedTuple):
+    """What a search has to say: a better word, or how it ended."""
+
+    word: ManeuverWord | None
+    expansions: int
+    status: SearchStatus
 
 
 @dataclass(slots=True, eq=False)
@@ -168,7 +127,7 @@ class ManeuverPass:
                     ceiling,
                 )
             )
-            if self.arrays.state[kernels.FOUND] and self.task.stop_at_first:
+            if self.arrays.found[0] < ceiling * (1.0 - LEAST):
                 break
         return self._word() if self.arrays.state[kernels.FOUND] else None
 
@@ -192,7 +151,7 @@ class ManeuverPass:
         tail = [int(trim) for trim in query.transfer.arrays.words[state[kernels.ROW]]]
         times = arrays.found[1:5].tolist()
         tail += [int(state[kernels.CLIMB]), int(query.goal_trims[goal])]
-        ahead, beyond = transfer_steps(self.query, last, tail, [*times, 0.0])
+        ahead, beyond = transfer_steps(query.transfer, last, tail, [*times, 0.0])
         return word_of(
             query.transfer,
             start_trim=query.start_trim,
@@ -202,24 +161,6 @@ class ManeuverPass:
         )
 
 
-def transfer_steps(
-    query: ManeuverQuery, start_trim: int, trims: list[int], times: list[float]
-) -> tuple[list[tuple[int, int, float]], list[int]]:
-    """Steps of a transfer through trims (-1 for none) and the trims its maneuvers lead to."""
-    steps: list[tuple[int, int, float]] = []
-    targets: list[int] = []
-    at = start_trim
-    for trim, t in zip(trims, times, strict=True):
-        if trim < 0:
-            continue
-        for maneuver, following in query.transfer.chain(at, trim):
-            steps.append((EDGE, maneuver, 0.0))
-            targets.append(following)
-        steps.append((TRIM, trim, t))
-        at = trim
-    return steps, targets
-
-
 def search_maneuvers(
     query: ManeuverQuery,
     *,
@@ -227,10 +168,42 @@ def search_maneuvers(
     max_expansions: int | None = None,
     first_only: bool = False,
 ) -> ManeuverResult:
-    """Words from the start to a goal, each cheaper than the one before.
+    """Words from the start to a goal, each cheaper than the one before: see `maneuver_words`.
 
-    Passes of greater weight come first; later ones are pruned by the best word. What they find in
-    a number of expansions is the same at every call.
+    Returns
+    -------
+    ManeuverResult
+        EXHAUSTED without a word: none at these resolutions, which proves nothing.
+    """
+    begun = time.monotonic()
+    found: list[tuple[ManeuverWord, int, float]] = []
+    total, status = 0, SearchStatus.EXHAUSTED
+    for heard in maneuver_words(query, deadline=deadline, max_expansions=max_expansions):
+        total, status = heard.expansions, heard.status
+        if heard.word is not None:
+            found.append((heard.word, total, time.monotonic() - begun))
+            if first_only:
+                break
+    return ManeuverResult(
+        status=SearchStatus.FOUND if found else status,
+        words=tuple(word for word, _, _ in found),
+        found_after=tuple(n for _, n, _ in found),
+        found_s=tuple(s for _, _, s in found),
+        expansions=total,
+    )
+
+
+def maneuver_words(
+    query: ManeuverQuery,
+    *,
+    deadline: float = math.inf,
+    max_expansions: int | None = None,
+) -> Iterator[Heard]:
+    """Words from the start to a goal as they are found, each cheaper than the one before.
+
+    Passes of greater weight come first; every word is shortened, and later passes are pruned by the
+    best. What is found in a number of expansions is the same at every call; shortcuts are rounds
+    that are not counted. The last thing heard has no word.
 
     Parameters
     ----------
@@ -239,39 +212,23 @@ def search_maneuvers(
         Of `time.monotonic()` [s].
     max_expansions : int, optional
         Nodes of all passes together.
-    first_only : bool
-        Whether the first word will do.
-
-    Returns
-    -------
-    ManeuverResult
-        EXHAUSTED without a word: none at these resolutions, which proves nothing.
     """
-    begun = time.monotonic()
     room = 2**62 if max_expansions is None else max_expansions
+
+    def ended(total: int) -> SearchStatus:
+        over = time.monotonic() >= deadline or total >= room
+        return SearchStatus.OUT_OF_BUDGET if over else SearchStatus.EXHAUSTED
+
     grid = distance_grid(query.world, query.window[0], query.seen_goals, query.seen_start)
-    found: list[tuple[ManeuverWord, int, float]] = []
-    total = 0
-    for word, spent in _first(query, grid, room=room, deadline=deadline):
-        total = spent
-        if word is not None:
-            found.append((word, total, time.monotonic() - begun))
-    first = total
-    ended = time.monotonic() >= deadline or total >= room
-    if found and not first_only and not ended:
-        for word, spent in _later(query, grid, found[-1][0].cost, room - first, deadline):
-            total = first + spent
-            if word is not None and word.cost < found[-1][0].cost:
-                found.append((word, total, time.monotonic() - begun))
-    ended = time.monotonic() >= deadline or total >= room
-    status = SearchStatus.OUT_OF_BUDGET if ended else SearchStatus.EXHAUSTED
-    return ManeuverResult(
-        status=SearchStatus.FOUND if found else status,
-        words=tuple(word for word, _, _ in found),
-        found_after=tuple(n for _, n, _ in found),
-        found_s=tuple(s for _, _, s in found),
-        expansions=total,
-    )
+    word, first = _first(query, grid, room=room, deadline=deadline)
+    total = first
+    if word is not None:
+        yield Heard(word, first, SearchStatus.FOUND)
+        for better, more in _better(query, grid, word, room=room - first, deadline=deadline):
+            total = first + more
+            if better is not None:
+                yield Heard(better, total, SearchStatus.FOUND)
+    yield Heard(None, total, ended(total))
 
 
 def plan_of(query: ManeuverQuery, word: ManeuverWord) -> Plan:
@@ -287,16 +244,16 @@ def plan_of(query: ManeuverQuery, word: ManeuverWord) -> Plan:
 
 def _first(
     query: ManeuverQuery, grid: DistanceGrid, *, room: int, deadline: float
-) -> Iterator[tuple[ManeuverWord | None, int]]:
-    """Passes of rising resolution in turn until one connects; the word, or None, and expansions."""
+) -> tuple[ManeuverWord | None, int]:
+    """Passes of rising resolution in turn until one connects: the word, and expansions."""
     ladder = list(FIRST)
     passes: list[ManeuverPass] = []
     total = 0
     while total < room and time.monotonic() < deadline:
         alive = [one for one in passes if one.alive]
         if ladder and (not alive or total >= ladder[0][0]):
-            passes.append(pass_of(query, ladder.pop(0)[1], grid))
-            alive.append(passes[-1])
+            passes += [pass_of(query, rung, grid) for rung in ladder.pop(0)[1]]
+            alive = [one for one in passes if one.alive]
         if not alive:
             break
         for one in alive:
@@ -306,27 +263,33 @@ def _first(
             total += one.expansions - before
             one.chunk = min(2 * one.chunk, MOST_CHUNK)
             if word is not None:
-                yield word, total
-                return
-    yield None, total
+                return word, total
+    return None, total
 
 
-def _later(
-    query: ManeuverQuery, grid: DistanceGrid, ceiling: float, room: int, deadline: float
+def _better(
+    query: ManeuverQuery, grid: DistanceGrid, best: ManeuverWord, *, room: int, deadline: float
 ) -> Iterator[tuple[ManeuverWord | None, int]]:
-    """Passes of falling weight, one after the other, below the cost of the best word."""
+    """Shortcuts, then passes of falling weight below the cost of the best word, one by one."""
     total = 0
+    for shorter in shortened(query, best, deadline=deadline):
+        best = shorter
+        yield best, total
     arrays: ManeuverSearchArrays | None = None
     for rung in LATER:
         one = pass_of(query, rung, grid, arrays=arrays)
         while one.alive and total < room and time.monotonic() < deadline:
             before = one.expansions
-            word = one.run(min(one.chunk, room - total), ceiling, deadline=deadline)
+            word = one.run(min(one.chunk, room - total), best.cost, deadline=deadline)
             total += one.expansions - before
             one.chunk = min(2 * one.chunk, MOST_CHUNK)
-            if word is not None and word.cost < ceiling * (1.0 - 1e-9):
-                ceiling = word.cost
-                yield word, total
+            if word is None or not word.cost < best.cost * (1.0 - LEAST):
+                continue
+            best = word
+            yield best, total
+            for shorter in shortened(query, best, deadline=deadline):
+                best = shorter
+                yield best, total
         arrays = one.arrays
         yield None, total
 
@@ -356,55 +319,9 @@ def pass_of(
     )
 
 
-def task_of(query: ManeuverQuery, rung: Rung) -> Task:
-    """Limits and sizes of a pass, as the kernels see them."""
-    library, world = query.library, query.world
-    scale = library.radius * library.per_metre
-    frame = query.seen_goals[0]
-    window = query.window[1]
-    edge_window = window.copy()
-    edge_window[8] -= library.worst_error
-    goal_trims = query.goal_trims
-    tick = 0.0
-    if query.moves or math.isfinite(query.most_time):
-        lengths = library.arrays.quanta[library.arrays.quanta > 0.0]
-        tick = rung.quanta * float(lengths.min()) if lengths.size else 1.0
-    return Task(
-        start=np.array(query.seen_start),
-        start_trim=int(query.start_trim),
-        aims=np.array(query.seen_goals),
-        aim_trims=np.array(goal_trims),
-        lag=library.lag[:, goal_trims].min(axis=1),
-        frame_x=float(frame[0]),
-        frame_y=float(frame[1]),
-        frame_heading=float(frame[2]),
-        frame_cos=math.cos(float(frame[2])),
-        frame_sin=math.sin(float(frame[2])),
-        cell=float(rung.scale * CELL * library.radius),
-        headings=HEADINGS,
-        tick=float(tick),
-        weight=float(rung.weight),
-        per_metre=library.per_metre,
-        per_climb=library.per_climb,
-        per_shot=float(SHOTS * scale) or 1.0,
-        most_patience=MOST_PATIENCE,
-        patience=PATIENCE,
-        slack=float(SLACK * scale) or math.inf,
-        tries=TRIES,
-        stop_at_first=rung.stop,
-        keep=float(query.keep),
-        margin=float(query.margin * rung.margin),
-        far=float(world.arrays.field.outside),
-        clock=float(query.start_time),
-        most_time=float(query.most_time),
-        window=window,
-        edge_window=edge_window,
-    )
-
-
 def with_room(search: ManeuverSearchArrays, nodes: int) -> ManeuverSearchArrays:
     """The same search in arrays that hold at least so many nodes."""
-    return widened(search, nodes)
+    return cast(ManeuverSearchArrays, widened(search, nodes))
 
 
 def _moves(steps: Array) -> Array:

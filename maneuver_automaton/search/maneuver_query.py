@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -61,7 +61,7 @@ class ManeuverQuery:
     start_trim: int
     goal_trims: IntArray
     obstacles: tuple[AnyObstacle, ...] = ()
-    bounds: Bounds = Bounds()
+    bounds: Bounds = field(default_factory=Bounds)
     keep: float = 0.0
     start_time: float = 0.0
     most_time: float = math.inf
@@ -107,7 +107,7 @@ class ManeuverQuery:
     @cached_property
     def seen_start(self) -> Array:
         """Start (4,) seen from the world's frame."""
-        return self._seen(self.start[None])[0]
+        return np.asarray(self._seen(self.start[None])[0])
 
     @cached_property
     def seen_goals(self) -> Array:
@@ -124,7 +124,7 @@ class ManeuverQuery:
         """Proven clearance [m]: a share of the body, at most half of what the ends have."""
         usual = MARGIN * (self.half_width or 0.1 * self.library.radius)
         known = [0.5 * gap for gap in self.end_clearances().tolist() if gap > 0.0]
-        return max(LEAST_MARGIN, min([usual, *known]))
+        return float(max(LEAST_MARGIN, min([usual, *known])))
 
     def end_clearances(self) -> Array:
         """Clearance (1 + n,) beyond `keep` at the start and every goal, over all parts [m].
@@ -142,13 +142,7 @@ class ManeuverQuery:
             gaps = []
             for part in self.parts:
                 there = (SE2(pose[:3]) @ SE2(part.trim_poses[trim])).pose
-                own = self.world.__class__(
-                    frame=self.world.frame,
-                    body=body_of(part.shapes),
-                    arrays=self.world.arrays,
-                    box=self.world.box,
-                    last_event=self.world.last_event,
-                )
+                own = replace(self.world, body=body_of(part.shapes))
                 gaps.append(float(clearances(own, there, times=time)[0]))
             rows.append(min(gaps) - self.keep)
         return np.array(rows)

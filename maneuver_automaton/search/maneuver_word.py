@@ -127,7 +127,7 @@ def plan_of_word(
     goal: Array,
     start_time: float = 0.0,
 ) -> Plan:
-    """The word as a plan from `start` (dof,), its times corrected until it ends at `goal` (dof,)."""
+    """The word as a plan from `start` (dof,), its times corrected to end at `goal` (dof,)."""
     automaton = library.automaton
     maneuvers: list[Maneuver | None] = [
         None if k < 0 else automaton.maneuvers[k] for k in word.maneuvers
