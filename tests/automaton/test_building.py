@@ -227,5 +227,6 @@ def test_the_file_reads_back(tmp_path):
     assert read.model == CRAFT
     for a, b in zip(build.automaton.maneuvers, read.maneuvers, strict=True):
         assert np.array_equal(a.displacement, b.displacement)
-        assert b.course.pose == pytest.approx(a.course.pose, abs=1e-12)
-        assert b.course.reduced_state == pytest.approx(a.course.reduced_state, abs=1e-12)
+        assert b.course.time[-1] == a.course.time[-1]
+        assert b.course.pose[-1] == pytest.approx(a.course.pose[-1], abs=1e-12)
+        assert b.course.reduced_state[-1] == pytest.approx(a.course.reduced_state[-1], abs=1e-12)
