@@ -9,10 +9,12 @@ from typing import Any
 from maneuver_automaton.automaton._library_values import check_keys, number_of
 from maneuver_automaton.errors import InvalidLibrary
 from maneuver_automaton.models import (
+    AcceleratingCar,
     Car,
     CarWithTrailer,
     Helicopter,
     Hovercraft,
+    LatticeBody,
     Model,
     SecondOrderCar,
     SecondOrderUnicycle,
@@ -31,6 +33,8 @@ KINDS: Mapping[str, Any] = {
         SingleTrack,
         Hovercraft,
         Helicopter,
+        AcceleratingCar,
+        LatticeBody,
     )
 }
 

@@ -203,19 +203,26 @@ def automaton_build(
 
 @automaton_app.command("show")
 @exits
-def automaton_show(file: Library) -> int:
-    """List the trims of a scenario or a library file."""
+def automaton_show(
+    file: Library,
+    coverage: Annotated[
+        bool,
+        typer.Option("--coverage", help="How well its words cover the poses around, by samples."),
+    ] = False,
+) -> int:
+    """List the trims and maneuvers of a scenario, a library or another file of primitives."""
     from maneuver_automaton.cli import automaton_command
 
-    return automaton_command.show(file)
+    return automaton_command.show(file, coverage=coverage)
 
 
 @automaton_app.command("draw")
 @exits
 def automaton_draw(file: Library, out: Out = Path("out")) -> int:
-    """Draw the trims of a scenario or a library file.
+    """Draw the trims and maneuvers of a scenario, a library or another file of primitives.
 
-    The picture is DIR/automaton.png, or DIR itself if it ends in .png, .pdf or .svg.
+    The picture is DIR/automaton.png, or DIR itself if it ends in .png, .pdf or .svg; that of the
+    maneuvers stands beside it, its name ending in _maneuvers.
     """
     from maneuver_automaton.cli import automaton_command
 
@@ -230,10 +237,12 @@ def convert(
     with_file: With = None,
     case: Case = None,
 ) -> int:
-    """Write a problem as a scenario, its trims listed, or a map in another format.
+    """Write a problem as a scenario, its trims listed, or a map or primitives in another format.
 
     OUT ends in .yaml or .yml, or, for a map, in .map (MovingAI). A map without --with becomes
-    a Nav2 map: OUT and an image beside it.
+    a Nav2 map: OUT and an image beside it. Primitives end in .json (a library), .nav2.json
+    (Nav2), .mprim (SBPL) or .xml (CommonRoad); IN is one of these, a scenario, or a folder
+    exported by AROC.
     """
     from maneuver_automaton.cli import convert_command
     from maneuver_automaton.cli.inputs import Parts

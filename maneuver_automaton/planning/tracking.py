@@ -15,7 +15,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision.advancement import clearances, free_times
-from maneuver_automaton.planning.among_obstacles import library_table, plan_of_word
+from maneuver_automaton.planning.among_obstacles import library_table
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.improve import Patience, improve
@@ -23,6 +23,7 @@ from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_pass import Word
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
+from maneuver_automaton.search.word_plan import plan_of_word
 
 LITTLE = Patience(attempts=800, passes=2)  # where a step's budget is short
 PROVEN = 1e-6  # [m] what a search has proven with its margin passes with this one, once more

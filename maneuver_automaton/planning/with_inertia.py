@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import time
 from collections.abc import Iterator
@@ -12,8 +13,17 @@ import numpy as np
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.among_obstacles import library_table
+from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.checking import check_plan, load_checks
+from maneuver_automaton.planning.polishing import (
+    SEQUENCES_SHARE,
+    Aimed,
+    guess_of_plan,
+    guesses_along_paths,
+    polish_plans,
+    why_not_polished,
+)
 from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
 from maneuver_automaton.planning.tracking import Tracked, track
 from maneuver_automaton.problem import Problem
@@ -21,10 +31,14 @@ from maneuver_automaton.refinement.improve import Patience
 from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinematic_problem
 from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
+from maneuver_automaton.search import SearchStatus
 from maneuver_automaton.search.lattice_query import lattice_query
+from maneuver_automaton.search.maneuver_lattice import plan_of, search_maneuvers
+from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
 
 FIRST_SHARE = 0.8  # of the time limit, for a first path
 IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
+MANEUVER_SHARE = 0.2  # of what is left, for words of maneuvers where there is a plan already
 AT_ONCE = Patience(attempts=0, passes=0)
 
 
@@ -40,6 +54,7 @@ def plan_with_inertia(
         heard.hear(plan, goal_index)
         if time.monotonic() >= heard.deadline:
             break
+    _polish(heard)
     timing = {
         "search": heard.searched - began,
         "first_plan": heard.improvements[0][0] if heard.improvements else math.nan,
@@ -91,8 +106,8 @@ class _Heard:
         self.counts["collision_queries"] += found.queries
         return found
 
-    def hear(self, plan: Plan, goal_index: int) -> None:
-        """Keep a plan if it passes the checks."""
+    def hear(self, plan: Plan, goal_index: int) -> bool:
+        """Keep a plan if it passes the checks, and say so."""
         begin = time.monotonic()
         checked = check_plan(self.problem, plan, self.problem.goals[goal_index])
         now = time.monotonic()
@@ -100,7 +115,7 @@ class _Heard:
         if checked.audit is None or not checked.passed:
             self.counts["rejected"] += 1
             self.refused = self.refused or checked.reason
-            return
+            return False
         cost = self.problem.cost_of(plan)
         best = self.accepted[0].cost if self.accepted else math.inf
         self.accepted.append(
@@ -111,6 +126,7 @@ class _Heard:
             self.improvements.append((now - self.began, cost))
         if not self.searched:
             self.searched = now
+        return True
 
     def why_none(self, time_limit: float) -> tuple[PlanStatus, str]:
         if self.enclosed:
@@ -124,8 +140,54 @@ def _candidates(heard: _Heard) -> Iterator[tuple[Plan, int]]:
     """Plans as they are found, and the goals they reach."""
     problem = heard.problem
     load_checks(problem)
-    if follows_paths(problem.automaton.model) and _rests(problem):
+    along = follows_paths(problem.automaton.model) and _rests(problem)
+    if along:
         yield from _along_paths(heard)
+    if problem.automaton.maneuvers:
+        yield from _over_maneuvers(heard, MANEUVER_SHARE if heard.accepted else 1.0)
+
+
+def _polish(heard: _Heard) -> None:
+    """Polish kinematic plans of different gears, and what has been found; keep what is cheaper."""
+    problem = heard.problem
+    if not heard.accepted or heard.left <= 0.0 or why_not_polished(problem):
+        return
+    aimed = [Aimed(guess_of_plan(heard.accepted[0].plan), heard.accepted[0].goal_index)]
+    if _rests(problem):
+        share = SEQUENCES_SHARE * heard.left
+        along = list(guesses_along_paths(problem, time_limit=share))
+        aimed = along or aimed
+    for goal_index in dict.fromkeys(one.goal_index for one in aimed):
+        if heard.left <= 0.0:
+            return
+        found = polish_plans(
+            problem,
+            [one.guess for one in aimed if one.goal_index == goal_index],
+            goal_index,
+            time_limit=heard.left,
+            accepts=functools.partial(heard.hear, goal_index=goal_index),
+        )
+        heard.counts["polished"] = heard.counts.get("polished", 0) + len(found.attempts)
+
+
+def _over_maneuvers(heard: _Heard, share: float) -> Iterator[tuple[Plan, int]]:
+    """Words of trims and maneuvers, the cheapest first, in a share of the time that is left."""
+    problem = heard.problem
+    goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
+    query = maneuver_problem_query(problem, goals)
+    most = problem.search.max_expansions
+    until = time.monotonic() + share * heard.left
+    if not heard.accepted:
+        found = search_maneuvers(query, deadline=until, max_expansions=most, first_only=True)
+        heard.counts["expansions"] += found.expansions
+        if found.best is not None:
+            yield plan_of(query, found.best), goals[found.best.goal]
+        elif found.status is SearchStatus.EXHAUSTED:
+            heard.reason = "; none over trims and maneuvers at any resolution tried"
+    found = search_maneuvers(query, deadline=until, max_expansions=most)
+    heard.counts["expansions"] += found.expansions
+    for word in reversed(found.words):
+        yield plan_of(query, word), goals[word.goal]
 
 
 def _along_paths(heard: _Heard) -> Iterator[tuple[Plan, int]]:

@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, as_array, freeze
 from maneuver_automaton._parallel import in_parallel
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.receding_horizon.disturbance import Disturbance
 from maneuver_automaton.receding_horizon.log import ClosedLoop, Guarantee, Violation
-from maneuver_automaton.receding_horizon.simulation import Disturbance, simulate
+from maneuver_automaton.receding_horizon.simulation import simulate
 
 CHUNKS = 4  # per worker, so that a slow one is not waited for
 

@@ -249,8 +249,8 @@ def _made_at_once(asked: BuildFile) -> Automaton:
         asked.grid,
         pairs="neighbours" if part.pairs == "neighbours" else "all",
         late=part.late,
-        strokes_m=part.strokes_m,
-        turns_rad=part.turns_rad,
+        strokes=part.strokes_m,
+        turns=part.turns_rad,
         max_lateral_acceleration=asked.max_lateral_acceleration,
         leave_out=True,
     )
