@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import pytest
 
+from maneuver_automaton.automaton.courses import inputs_of
 from maneuver_automaton.automaton.library import load_library
 from maneuver_automaton.cli import run
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.models import Car
 from maneuver_automaton.scenario import load_scenario
 from maneuver_automaton.scenario.build_file import (
+    build,
     build_file_of_text,
     is_build_file,
     load_build_file,
@@ -47,6 +49,53 @@ def test_from_the_command_line(tmp_path, monkeypatch, capsys):
     assert load_library("cars.json").name == "slow cars"
     assert run(["automaton", "build", "cars.yaml", "-o", "quiet.json", "--quiet"]) == 0
     assert capsys.readouterr().out == ""
+
+
+CRAFT = """\
+schema: 1
+library: craft
+model: {kind: hovercraft, mass: 2, inertia: 0.1, drag: 1, lateral_drag: 3, turn_drag: 0.1,
+        max_force: 4, max_torque: 0.2}
+trims: {speed: [0, 1.5], turn_rate: [0, 0.5]}
+maneuvers: {pairs: 1, intervals: 10}
+"""
+
+
+def test_maneuvers_by_optimal_control(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("casadi")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "craft.yaml").write_text(CRAFT)
+    assert run(["automaton", "build", "craft.yaml", "-o", "craft.json"]) == 0
+    counts, solved = capsys.readouterr().out.splitlines()
+    library = load_library("craft.json")
+    assert counts.startswith(f"craft.json: 4 trims, {len(library.maneuvers)} maneuvers, hash ")
+    assert solved.startswith(f"  {len(library.maneuvers)} solved, 0 from the journal")
+    assert {inputs_of(one.course)[0].size for one in library.maneuvers} == {10}
+
+
+def test_maneuvers_at_once(tmp_path):
+    asked = build_file_of_text(
+        "{schema: 1, library: cars, model: {kind: second_order_car, wheelbase: 2.8, "
+        "max_steering: 0.7, max_speed: 2.0, max_acceleration: 1.0, max_steering_rate: 0.5}, "
+        "trims: {speed: [-1, 0, 2], steering: [-0.7, 0, 0.7]}, "
+        "maneuvers: {pairs: neighbours, strokes_m: [0.5, -0.5]}}",
+        name="cars.yaml",
+    )
+    built = build(asked, tmp_path / "cars.json")
+    assert built.build is None
+    assert (len(built.automaton), len(built.automaton.maneuvers)) == (9, 46)
+    assert built.automaton.name == load_library(tmp_path / "cars.json").name == "cars"
+
+
+def test_the_model_of_a_library_file_is_checked():
+    with pytest.raises(InvalidScenario) as error:
+        build_file_of_text(CRAFT.replace("mass: 2, ", ""), name="x.yaml")
+    assert str(error.value) == "x.yaml:3: model: the key 'mass' is missing"
+    with pytest.raises(InvalidScenario) as error:
+        build_file_of_text(CRAFT + "vehicle: {model: unicycle}\n", name="x.yaml")
+    assert str(error.value) == (
+        "x.yaml:1: got vehicle and model, need exactly one of vehicle, model"
+    )
 
 
 def test_a_build_file_is_no_scenario(tmp_path):
