@@ -41,6 +41,7 @@ from maneuver_automaton.search.maneuver_ready import load_maneuver_kernels
 FIRST_SHARE = 0.8  # of the time limit, for a first path
 IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
 MANEUVER_SHARE = 0.2  # of what is left, for words of maneuvers where there is a plan already
+ONLY_MANEUVERS_SHARE = 0.4  # of what is left, where there is none; the rest is for polishing
 AT_ONCE = Patience(attempts=0, passes=0)
 
 
@@ -146,7 +147,10 @@ def _candidates(heard: _Heard) -> Iterator[tuple[Plan, int]]:
     if along:
         yield from _along_paths(heard)
     if problem.automaton.maneuvers:
-        yield from _over_maneuvers(heard, MANEUVER_SHARE if heard.accepted else 1.0)
+        share = MANEUVER_SHARE if heard.accepted else ONLY_MANEUVERS_SHARE
+        yield from _over_maneuvers(heard, 1.0 if why_not_polished(problem) else share)
+        if not heard.accepted:
+            yield from _over_maneuvers(heard, 1.0)
 
 
 def _polish(heard: _Heard) -> None:
