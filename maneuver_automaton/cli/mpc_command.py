@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from maneuver_automaton.cli import road_command
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, scenario_of
@@ -39,6 +40,8 @@ class Settings:
 
 def drive_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> int:
     """Close the loop of one problem into the folder `out`, print it, return the exit code."""
+    if road_command.is_road(path):
+        return road_command.drive_file(path, out, settings=settings, parts=parts)
     scenario = scenario_of(path, parts)
     if scenario.receding_horizon is None:
         raise InvalidScenario(
@@ -62,7 +65,7 @@ def drive_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> in
         complain(f"{path}: step {number} broke a guarantee: {violation}")
     if not loop.reached:
         complain(f"{path}: {loop.status}: {loop.reason}")
-    return FOUND if loop.reached else NO_PLAN
+    return FOUND if loop.reached and not any(loop.collisions) else NO_PLAN
 
 
 def drive_folder(folder: Path, out: Path, *, settings: Settings, parts: Parts) -> int:
@@ -73,7 +76,9 @@ def drive_folder(folder: Path, out: Path, *, settings: Settings, parts: Parts) -
     codes = []
     for path, needs in problems_in(folder, parts):
         try:
-            if scenario_of(path, needs).receding_horizon is None:
+            if not (
+                road_command.is_road(path) or scenario_of(path, needs).receding_horizon is not None
+            ):
                 continue  # for plan, not for mpc
             codes.append(drive_file(path, out / path.stem, settings=settings, parts=needs))
         except Exception as error:  # noqa: BLE001, one bad file must not stop the others
@@ -148,6 +153,7 @@ def _statistics(path: Path, scenario: Scenario, out: Path, settings: Settings) -
                 time_limit=settings.time_limit or scenario.time_limit_s,
                 stay=part.stay,
                 retimed=part.retimed,
+                audit=bool(scenario.problem.obstacles),  # else nothing looks for collisions
                 jobs=settings.jobs,
                 scheduler=settings.scheduler,
                 progress=count,
@@ -162,11 +168,12 @@ def _statistics(path: Path, scenario: Scenario, out: Path, settings: Settings) -
         from maneuver_automaton.cli.loop_tables import print_statistics
 
         print_statistics(scenario.name, statistics, folder=str(out))
-    return FOUND if _all_reached(statistics) else NO_PLAN
+    return FOUND if _all_well(statistics) else NO_PLAN
 
 
-def _all_reached(statistics: Statistics) -> bool:
-    return all(one.reached for one in statistics.outcomes)
+def _all_well(statistics: Statistics) -> bool:
+    """Whether every loop reached the goal, and hit nothing."""
+    return all(one.reached and not any(one.collisions) for one in statistics.outcomes)
 
 
 def _in_file(path: Path, error: ValueError) -> InvalidScenario:

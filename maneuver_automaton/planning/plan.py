@@ -12,6 +12,7 @@ from maneuver_automaton.planning.among_obstacles import (
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.free_space import plan_by_words
 from maneuver_automaton.planning.result import PlanResult
+from maneuver_automaton.planning.with_inertia import load_inertia, plan_with_inertia
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.search.choose import load_search
@@ -58,7 +59,8 @@ def plan(problem: Problem, *, time_limit: float = 5.0, alternatives: int = 0) ->
     blocked = blocked_ends(problem)
     if blocked is not None:
         return blocked
-    how = plan_on_lattice if among else plan_by_words
+    kinematic = plan_on_lattice if among else plan_by_words
+    how = plan_with_inertia if has_inertia(problem) else kinematic
     return how(problem, began=began, time_limit=time_limit, alternatives=alternatives)
 
 
@@ -71,12 +73,21 @@ def prepare(problem: Problem) -> None:
 
 def _load(problem: Problem) -> None:
     """Compile or load what planning needs, before the clock runs."""
+    if has_inertia(problem):
+        load_inertia(problem)
+        return
     if problem.obstacles or uses_lattice(problem):
         load_lattice()
     if uses_lattice(problem):
         library_table(problem)
     else:
         load_search(problem)
+
+
+def has_inertia(problem: Problem) -> bool:
+    """Whether the vehicle cannot switch at will between the trims that it needs."""
+    automaton = problem.automaton
+    return bool(automaton.model.reduced_names) or not automaton.is_kinematic
 
 
 def uses_lattice(problem: Problem) -> bool:

@@ -38,6 +38,10 @@ class Tracked:
     goal_index: int | None
     cost: float
     reason: str = ""
+    expansions: int = 0
+    queries: int = 0  # collision queries
+    others: tuple[Plan, ...] = ()  # dearer plans of other words, cheapest first
+    enclosed: bool = False  # proven: obstacles enclose the start or every goal
 
 
 def free_until(problem: Problem, plan: Plan, *, margin: float = PROVEN) -> float:
@@ -159,19 +163,30 @@ def track(
         return Tracked(plan=None, goal_index=None, cost=math.inf, reason="every goal is blocked")
     query = lattice_query(problem, goals)
     word = None if known is None else word_of_plan(query, known)
+    expansions = queries = 0
     if word is None:
         most = max_expansions or problem.search.max_expansions
         found = first_plan(query, deadline=deadline, max_expansions=most, table=table)
-        word = found.word
+        word, expansions, queries = found.word, found.expansions, found.queries
         if word is None:
-            reason = found.enclosed or "no plan was found in the time given"
-            return Tracked(plan=None, goal_index=None, cost=math.inf, reason=reason)
+            return Tracked(
+                plan=None,
+                goal_index=None,
+                cost=math.inf,
+                reason=found.enclosed or "no plan was found in the time given",
+                expansions=expansions,
+                queries=queries,
+                enclosed=bool(found.enclosed),
+            )
     better = improve(query, word, deadline=deadline, patience=patience, table=table)
     plan = plan_of_word(query, better.word)
     return Tracked(
         plan=plan,
         goal_index=query.goal_index[better.word.goal],
         cost=problem.cost_of(plan),
+        expansions=expansions + better.expansions,
+        queries=queries + better.queries,
+        others=tuple(plan_of_word(query, other) for other in better.others),
     )
 
 

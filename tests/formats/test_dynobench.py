@@ -7,7 +7,8 @@ import itertools
 import pytest
 
 from maneuver_automaton.collision import Box
-from maneuver_automaton.formats.dynobench import READ, read_dynobench
+from maneuver_automaton.formats.dynobench import read_dynobench
+from maneuver_automaton.formats.dynobench_models import READ
 from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import parse
 from tests.formats.outside import DATA, message_of, needs_data
