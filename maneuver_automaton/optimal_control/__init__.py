@@ -1,5 +1,7 @@
 """Optimal control by direct transcription: the one room that imports CasADi, when it is used."""
 
+from maneuver_automaton.optimal_control._casadi import has_casadi as has_casadi
+from maneuver_automaton.optimal_control._casadi import load_casadi as load_casadi
 from maneuver_automaton.optimal_control.polish_values import PolishSettings as PolishSettings
 from maneuver_automaton.optimal_control.polishing import polish as polish
 from maneuver_automaton.optimal_control.problem import Grid as Grid

@@ -15,12 +15,13 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.among_obstacles import library_table
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import lattice_bound
-from maneuver_automaton.planning.checking import check_plan, load_checks
+from maneuver_automaton.planning.checking import check_plan, load_checking, load_checks
 from maneuver_automaton.planning.polishing import (
     SEQUENCES_SHARE,
     Aimed,
     guess_of_plan,
     guesses_along_paths,
+    load_polishing,
     polish_plans,
     why_not_polished,
 )
@@ -35,6 +36,7 @@ from maneuver_automaton.search import SearchStatus
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.maneuver_lattice import plan_of, search_maneuvers
 from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
+from maneuver_automaton.search.maneuver_ready import load_maneuver_search
 
 FIRST_SHARE = 0.8  # of the time limit, for a first path
 IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
@@ -218,8 +220,13 @@ def _stopping(problem: Problem, path: Plan, goal_index: int) -> Plan:
 def load_inertia(problem: Problem) -> None:
     """Compile or load what `plan_with_inertia` needs, before the clock runs."""
     load_lattice()
+    load_checking()
     if follows_paths(problem.automaton.model) and _rests(problem):
         library_table(kinematic_problem(problem, switch=0.0))
+        if not why_not_polished(problem):
+            load_polishing(problem)
+    if problem.automaton.maneuvers:
+        load_maneuver_search()
 
 
 def _rests(problem: Problem) -> bool:
