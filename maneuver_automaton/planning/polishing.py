@@ -14,8 +14,7 @@ from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Model, SecondOrderCar, SecondOrderUnicycle
-from maneuver_automaton.optimal_control import Guess, has_casadi, load_casadi
-from maneuver_automaton.optimal_control.polish_values import PolishSettings
+from maneuver_automaton.optimal_control import Guess, PolishSettings, has_casadi, load_casadi
 from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.problem import Components, RunningCost
 from maneuver_automaton.optimal_control.separation import BodyPart
