@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import time
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +24,7 @@ class Solver(NamedTuple):
     """The program with lines for some pairs, built."""
 
     function: Any
-    warm: Any  # the same with a smaller barrier, for another solve from nearby
+    warm: Callable[[], Any]  # the same with a smaller barrier, for another solve from nearby
     bounds: Array  # (variables, 2)
     limits: Array  # (rows, 2)
     fixed: bool
@@ -82,7 +84,11 @@ def solver_of(
     most = program.settings.fixed_iterations if fixed else program.settings.max_iterations
     options = _options(program.settings, most, seconds)
     solver = casadi.nlpsol("solver", "ipopt", functions, options)
-    warm = casadi.nlpsol("again", "ipopt", functions, options | WARM | _derivatives(solver))
+
+    @functools.cache
+    def warm() -> Any:
+        return casadi.nlpsol("again", "ipopt", functions, options | WARM | _derivatives(solver))
+
     return Solver(solver, warm, np.vstack(bounds), limits, fixed)
 
 
@@ -117,7 +123,7 @@ def solve_from(
             # nodes but for the ends
             inner = slice(n_x + axis, n_x * program.n_intervals + axis, n_x)
             bounds[inner] = state[1:-1, axis, None] + np.array([-trust, trust])
-    function = solver.warm if again else solver.function
+    function = solver.warm() if again else solver.function
     answer = function(
         x0=np.clip(np.concatenate(first), *bounds.T),
         p=given.ravel(),

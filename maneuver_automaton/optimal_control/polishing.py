@@ -91,8 +91,9 @@ def polish(
         held(guess.control, program.n_intervals),
         np.full(program.n_intervals, guess.duration / program.n_intervals),
     )
-    reach = max((part.reach for part in scene.parts), default=0.0)
-    near = max(settings.near * reach, settings.ahead * _fastest(point))
+    ahead = settings.ahead * _fastest(point)
+    reach = max((part.reach for part in scene.parts), default=0.0) or 0.5 * ahead or 1.0
+    near = max(settings.near * reach, ahead)
     pairs = pairs_near(program, point, near)
     lines = lines_at(program, point, pairs)
     total = Answer(SolveStatus.OUT_OF_BUDGET, "lines were missing to the end", math.inf, 0, 0.0)

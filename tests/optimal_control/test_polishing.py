@@ -127,6 +127,17 @@ def test_a_guess_inside_is_led_out() -> None:
     assert found.state[20, 1] < -0.3  # on the nearer side
 
 
+def test_a_point_is_a_body_too() -> None:
+    point = BodyPart(solids=((np.zeros((1, 2)), 0.0),))
+    scene = Scene(parts=(point,), pieces=((moved(2.0, 0.1), 0.0),))
+    out = polish(ROBOT, at_rest(4.0), scene, guess(), elastic=True)
+    found = polish(ROBOT, at_rest(4.0), scene, out.as_guess)
+    assert found.status is SolveStatus.SOLVED
+    poses = simulated(found.state, found.control, found.durations)
+    box = shapely.Polygon(moved(2.0, 0.1))
+    assert min(shapely.Point(x, y).distance(box) for x, y, _ in poses) > 0.0
+
+
 def test_walls_hold_between_nodes_too() -> None:
     walls = ((0.0, 1.0, 0.3), (0.0, -1.0, 0.05))  # -0.05 <= y <= 0.3
     found = polish(ROBOT, at_rest(1.0, 0.2), Scene(walls=walls), guess(length=1.0, duration=4.0))
