@@ -6,6 +6,7 @@ import contextlib
 import functools
 import itertools
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,7 +25,7 @@ from maneuver_automaton.automaton.journal import (
     pair_key,
     read_journal,
 )
-from maneuver_automaton.automaton.library import check_stated, save_library
+from maneuver_automaton.automaton.library import save_library
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control.maneuvers import (
     ManeuverObjective,
@@ -38,6 +39,7 @@ from maneuver_automaton.primitives.connecting import ADMITTED_DEFECT, Inputs, co
 from maneuver_automaton.primitives.mirror import Mirror, mirror_of
 from maneuver_automaton.primitives.resimulation import maneuver_defect
 
+SIDEWAYS = 1  # place of the lateral speed in a twist
 Pair = tuple[str, str]  # names of the trims a maneuver leaves and reaches
 
 
@@ -108,12 +110,10 @@ def build_library(
     name : str
         Of the library.
     progress : callable, optional
-        Called with the number of maneuvers done and their total.
+        Called with the number of pairs done, mirror images too, and their total.
 
     Raises
     ------
-    InvalidLibrary
-        If a file cannot state the model.
     MissingExtra
         If CasADi is not installed.
     ValueError
@@ -124,8 +124,6 @@ def build_library(
         If the file or its journal cannot be written.
     """
     began = time.perf_counter()
-    if path is not None:
-        check_stated(model)
     nodes = Automaton(model, tuple(trims), name=name)
     objective, settings = objective or ManeuverObjective(), settings or TransferSettings()
     wanted = tuple(all_pairs(nodes) if pairs is None else dict.fromkeys(pairs))
@@ -147,19 +145,20 @@ def build_library(
         keep_sign=tuple(keep_sign),
     )
     keys = {pair: recipe.key_of(pair) for pair in to_solve}
+    served = Counter(keys[images.get(pair, pair)] for pair in wanted)
     journal = None if path is None else journal_path(Path(path))
     entries = {} if journal is None else read_journal(journal)
-    resumed = sum(key in entries for key in keys.values())
     open_pairs = [pair for pair in to_solve if keys[pair] not in entries]
+    resumed = len(to_solve) - len(open_pairs)
+    ready = len(wanted) - sum(served[keys[pair]] for pair in open_pairs)
     work = functools.partial(_solved, recipe)
     with _lines(journal) as write:
-        for count, entry in enumerate(
-            in_parallel(work, open_pairs, jobs=jobs, scheduler=scheduler, order="as done"), 1
-        ):
+        for entry in in_parallel(work, open_pairs, jobs=jobs, scheduler=scheduler, order="as done"):
             entries[entry.key] = entry
             write(entry)
+            ready += served[entry.key]
             if progress is not None:
-                progress(resumed + count, len(to_solve))
+                progress(ready, len(wanted))
     done = {pair: entries[key] for pair, key in keys.items()}
     maneuvers, failures, defects = _assembled(nodes, wanted, images, done)
     automaton = Automaton(model, nodes.trims, maneuvers, name=name)
@@ -178,8 +177,11 @@ def build_library(
     )
 
 
-def all_pairs(automaton: Automaton) -> list[Pair]:
+def all_pairs(automaton: Automaton, *, keep_sign: Sequence[str] = ()) -> list[Pair]:
     """One pair for every two classes of trims, in both directions: their first trims.
+
+    Where controls keep their sign, there is one pair for every sign that both classes have, zero
+    apart: ahead to ahead, and reverse to reverse.
 
     Examples
     --------
@@ -187,27 +189,45 @@ def all_pairs(automaton: Automaton) -> list[Pair]:
     >>> all_pairs(Automaton.of_controls(Unicycle(), {"rest": (0, 0), "ahead": (1, 0)}))
     []
     """
-    _, firsts = np.unique(automaton.trim_classes, return_index=True)
-    names = [automaton.trim_names[k] for k in sorted(firsts.tolist())]
-    return list(itertools.permutations(names, 2))
+    kept = [automaton.model.control_names.index(name) for name in keep_sign]
+    signs = np.sign(automaton.controls[:, kept])
+    firsts: dict[tuple[float, ...], dict[int, str]] = {}
+    for name, kind, sign in zip(
+        automaton.trim_names, automaton.trim_classes.tolist(), signs, strict=True
+    ):
+        if sign.all():
+            firsts.setdefault(tuple(sign.tolist()), {}).setdefault(kind, name)
+    return [pair for names in firsts.values() for pair in itertools.permutations(names.values(), 2)]
 
 
-def nearest_pairs(automaton: Automaton, count: int) -> list[Pair]:
-    """From each class of trims to those `count` that are the fewest seconds away, and back.
+def nearest_pairs(automaton: Automaton, count: int, *, keep_sign: Sequence[str] = ()) -> list[Pair]:
+    """Of all pairs those from a trim to the `count` that are the fewest seconds away, and back.
 
     Seconds are counted at the fastest rates that the limits admit, half way: a rough measure.
     """
-    states = {name: automaton[name].reduced_state for pair in all_pairs(automaton) for name in pair}
-    names, chosen = list(states), set[Pair]()
-    for source in names:
-        away = [
-            (duration_guess(automaton.model, states[source], states[target]), k)
-            for k, target in enumerate(names)
-            if target != source
-        ]
-        for _, k in sorted(away)[:count]:
-            chosen |= {(source, names[k]), (names[k], source)}
-    return [pair for pair in all_pairs(automaton) if pair in chosen]
+    pairs = all_pairs(automaton, keep_sign=keep_sign)
+    away: dict[str, list[tuple[float, int, str]]] = {}
+    for k, (source, target) in enumerate(pairs):
+        states = automaton[source].reduced_state, automaton[target].reduced_state
+        away.setdefault(source, []).append((duration_guess(automaton.model, *states), k, target))
+    near = {(source, target) for source in away for *_, target in sorted(away[source])[:count]}
+    return [pair for pair in pairs if pair in near or pair[::-1] in near]
+
+
+def neighbour_pairs(automaton: Automaton, *, keep_sign: Sequence[str] = ()) -> list[Pair]:
+    """Of all pairs those whose twists differ by at most one level in every component.
+
+    The levels are the values that the trims take: of speed, turn rate and climb. The lateral speed,
+    which follows from these where a vehicle drifts, does not count.
+    """
+    twists = np.delete(automaton.body_velocities, SIDEWAYS, axis=1).round(9)
+    levels = np.stack([np.unique(column, return_inverse=True)[1] for column in twists.T], axis=-1)
+    level = dict(zip(automaton.trim_names, levels, strict=True))
+    return [
+        (source, target)
+        for source, target in all_pairs(automaton, keep_sign=keep_sign)
+        if np.abs(level[source] - level[target]).max() <= 1
+    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -342,7 +362,7 @@ def _driven(nodes: Automaton, pair: Pair, entry: Entry) -> Maneuver:
     inputs = Inputs(control=entry.control, interval=entry.interval)
     course = inputs.drive(nodes.model, nodes[pair[0]].reduced_state)
     return Maneuver(
-        name=f"{pair[0]} -> {pair[1]}",
+        name=f"{pair[0]} to {pair[1]}",
         source=pair[0],
         target=pair[1],
         displacement=course.pose[-1],

@@ -6,12 +6,14 @@ inputs do not lead along the course, because it came from elsewhere, its samples
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton._library_values import listed
 from maneuver_automaton.errors import InvalidLibrary
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Maneuver, Trajectory
@@ -22,24 +24,22 @@ EVEN = 1e-12  # by which share of a maneuver's duration equal intervals may diff
 SAME = 1e-9  # [m, rad, units of the reduced state] between a course and its inputs driven again
 SAMPLED = ("time", "pose", "reduced_state", "control")
 
-Numbers = Callable[[Any], list[float]]
+Inputs = tuple[Array, Array]  # until when (n,) [s], and the controls (n, n_u)
 Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 
-def inputs_entry(course: Trajectory, numbers: Numbers) -> dict[str, Any]:
+def inputs_entry(until: Array, control: Array) -> dict[str, Any]:
     """Controls in order, and until when each holds [s] unless they all take equally long."""
-    until, control = inputs_of(course)
-    entry: dict[str, Any] = {"control": [numbers(row) for row in control]}
-    if not np.array_equal(until, even_times(float(course.time[-1]), until.size)):
-        entry["until"] = numbers(until)
+    entry: dict[str, Any] = {"control": [listed(row) for row in control]}
+    if not np.array_equal(until, even_times(float(until[-1]), until.size)):
+        entry["until"] = listed(until)
     return entry
 
 
-def samples_entry(course: Trajectory, numbers: Numbers) -> dict[str, Any]:
+def samples_entry(course: Trajectory) -> dict[str, Any]:
     """All samples."""
-    rows = {"time": numbers(course.time)}
-    others = {name: [numbers(row) for row in getattr(course, name)] for name in SAMPLED[1:]}
-    return rows | others
+    others = {name: [listed(row) for row in getattr(course, name)] for name in SAMPLED[1:]}
+    return {"time": listed(course.time)} | others
 
 
 def even_times(duration: float, count: int) -> Array:
@@ -73,19 +73,30 @@ def is_reproduced(
 
 
 def driven_courses(
-    model: Model, starts: Sequence[Array], inputs: Sequence[tuple[Array, Array]]
+    model: Model, starts: Sequence[Array], inputs: Sequence[Inputs]
 ) -> list[Trajectory]:
     """Courses from reduced states under inputs (until (n,) [s], control (n, n_u)), all at once.
 
-    Their times are those of the inputs to the last bit.
+    Rides of about as many inputs go together. The times are those of the inputs to the last bit.
 
     Raises
     ------
     InvalidLibrary
         If the inputs lead nowhere.
     """
-    if not inputs:
-        return []
+    groups: defaultdict[int, list[int]] = defaultdict(list)
+    for k, (until, _) in enumerate(inputs):
+        groups[(until.size - 1).bit_length()].append(k)
+    courses: dict[int, Trajectory] = {}
+    for ks in groups.values():
+        rides = _driven_together(model, [starts[k] for k in ks], [inputs[k] for k in ks])
+        courses |= dict(zip(ks, rides, strict=True))
+    return [courses[k] for k in range(len(inputs))]
+
+
+def _driven_together(
+    model: Model, starts: Sequence[Array], inputs: Sequence[Inputs]
+) -> list[Trajectory]:
     most = max(until.size for until, _ in inputs)
     control = np.zeros((len(inputs), most, len(model.control_names)))
     durations = np.zeros((len(inputs), most))
@@ -111,7 +122,7 @@ def _timed(course: Trajectory, until: Array) -> Trajectory:
     )
 
 
-def inputs_of(course: Trajectory) -> tuple[Array, Array]:
+def inputs_of(course: Trajectory) -> Inputs:
     """Until when (n,) [s] each control (n, n_u) holds."""
     parts = pieces(course.time, course.control)
     until = np.array([end for _, end, _ in parts])

@@ -28,7 +28,7 @@ app.add_typer(automaton_app, name="automaton")
 
 File = Annotated[Path, typer.Argument(metavar="FILE", help="Scenario (YAML), or another format.")]
 Library = Annotated[Path, typer.Argument(metavar="FILE", help="Scenario or library file.")]
-Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")]
+Out = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results.")]
 TimeLimit = Annotated[
     float | None,
     typer.Option("--time-limit", metavar="S", help="Ceiling for search and refinement [s]."),
@@ -178,14 +178,27 @@ def check(file: File, with_file: With = None, case: Case = None) -> int:
 
 @automaton_app.command("build")
 @exits
-def automaton_build(file: Library, out: Out = Path("out")) -> int:
-    """Write the library of a scenario as a file.
+def automaton_build(
+    file: Library,
+    out: Out = Path("out"),
+    quiet: Quiet = False,
+    jobs: Annotated[
+        int, typer.Option("--jobs", min=1, metavar="N", help="Maneuvers solved at a time.")
+    ] = 1,
+    dask: Annotated[
+        str | None,
+        typer.Option("--dask", metavar="ADDRESS", help="Dask scheduler for them, or local."),
+    ] = None,
+) -> int:
+    """Write the library of a scenario, or of a build file, as a file.
 
-    It is DIR/library.json, or DIR itself if it ends in .json.
+    It is DIR/library.json, or DIR itself if it ends in .json. A build that was killed goes on
+    where it was when it is called again.
     """
     from maneuver_automaton.cli import automaton_command
 
-    return automaton_command.build(file, out)
+    settings = automaton_command.Settings(jobs=jobs, scheduler=dask, quiet=quiet)
+    return automaton_command.build(file, out, settings=settings)
 
 
 @automaton_app.command("show")

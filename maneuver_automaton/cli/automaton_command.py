@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from rich.table import Table
@@ -10,26 +11,86 @@ from maneuver_automaton._arrays import vector_text
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import automaton_hash, save_library
 from maneuver_automaton.automaton.validation import AutomatonReport, validate
-from maneuver_automaton.cli.guard import FOUND
+from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
 from maneuver_automaton.cli.inputs import automaton_of, make_folder, not_written, target
+from maneuver_automaton.cli.progress import progress_bar
 from maneuver_automaton.cli.tables import console, table
+from maneuver_automaton.errors import InvalidScenario, ManeuverAutomatonError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """The options of `automaton build`."""
+
+    jobs: int = 1
+    scheduler: str | None = None
+    quiet: bool = False
+
 
 MOST_ROWS = 200  # trims, and maneuvers, that `show` lists
 
 
-def build(file: Path, out: Path) -> int:
-    """Write the library of a scenario."""
-    automaton = automaton_of(file)
+def build(file: Path, out: Path, *, settings: Settings) -> int:
+    """Write the library of a scenario, or of a build file."""
+    from maneuver_automaton.scenario.build_file import is_build_file
+
     path = target(out, "library.json")
+    if is_build_file(file):
+        return _build_maneuvers(file, path, settings)
+    automaton = automaton_of(file)
     make_folder(path.parent)
     try:
         save_library(automaton, path)
     except OSError as error:
         raise not_written(path, error) from error
-    console().print(
-        f"{path}: {_count(automaton)}, hash {automaton_hash(automaton)}", soft_wrap=True
-    )
+    _print_library(path, automaton, settings)
     return FOUND
+
+
+def _build_maneuvers(file: Path, path: Path, settings: Settings) -> int:
+    """Trims of a build file and their maneuvers, with a bar; trims and pairs without are listed."""
+    from maneuver_automaton.scenario import build_file
+
+    asked = build_file.load_build_file(file)
+    make_folder(path.parent)
+    done = 0
+    with progress_bar("maneuvers", len(asked.pairs()), quiet=settings.quiet) as advance:
+
+        def count(n: int, _total: int) -> None:
+            nonlocal done
+            advance(n - done)
+            done = n
+
+        try:
+            built = build_file.build(
+                asked, path, jobs=settings.jobs, scheduler=settings.scheduler, progress=count
+            )
+        except OSError as error:
+            raise not_written(Path(error.filename or path), error) from error
+        except ManeuverAutomatonError:
+            raise
+        except ValueError as error:
+            raise InvalidScenario(f"{file}: {error}") from error
+    for missing in asked.missing:
+        complain(f"{file}: no trim at {missing.name}: {missing.reason}")
+    for failure in built.failures:
+        complain(f"{file}: no maneuver from {failure.source} to {failure.target}: {failure.reason}")
+    _print_library(path, built.automaton, settings)
+    if built.build is not None and not settings.quiet:
+        one = built.build
+        console().print(
+            f"  {one.solved} solved, {one.resumed} from the journal of a build before, "
+            f"{one.mirrored} mirror images in {one.build_s:.1f} s; driven again they end "
+            f"{one.worst_defect:.1e} off at most",
+            soft_wrap=True,
+        )
+    return NO_PLAN if built.failures else FOUND
+
+
+def _print_library(path: Path, automaton: Automaton, settings: Settings) -> None:
+    if not settings.quiet:
+        said = f"{path}: {_count(automaton)}, hash {automaton_hash(automaton)}"
+        console().print(said, soft_wrap=True)
 
 
 def show(file: Path, *, coverage: bool = False) -> int:
@@ -73,8 +134,8 @@ def coverage_lines(automaton: Automaton) -> list[str]:
         return [str(error)]
     return [
         f"dispersion {gap.largest:.3g} m, mean {gap.mean:.3g} m: of {settings.samples} poses "
-        f"within {settings.radius:.3g} m (1 rad counts {settings.metres_per_radian:g} m) from the nearest "
-        f"of {gap.reached} reached in at most {gap.most:.3g} s",
+        f"within {settings.radius:.3g} m (1 rad counts {settings.metres_per_radian:g} m) from the "
+        f"nearest of {gap.reached} reached in at most {gap.most:.3g} s",
         f"spanning factor {factor.largest:.3g}, median {factor.median:.3g}: time of words to "
         f"{factor.pairs} poses over that of a body that drives and turns any way as fast; worst at "
         f"{vector_text(factor.pose)}",

@@ -80,10 +80,11 @@ class ArocDeviation:
 
     def __str__(self) -> str:
         """One line for people."""
+        plural = "" if self.added == 1 else "s"
         return (
             f"driven with the inputs of the files, motions are at most {self.position:.2g} m, "
             f"{self.heading:.2g} rad and {self.speed:.2g} m/s off their states ({self.worst}); "
-            f"{self.added} pairs may follow each other that AROC does not let follow"
+            f"{self.added} pair{plural} may follow each other that AROC does not let follow"
         )
 
 
@@ -156,7 +157,7 @@ def automaton_of_aroc(
     _check_successors(primitives, begin_levels, end_levels)
     trims = {
         speed: Trim(
-            name=f"speed {speed:.6g}",
+            name=f"speed {speed:.5g}",
             body_velocity=np.array([speed, 0.0, 0.0]),
             control=np.zeros(2),
             reduced_state=np.array([speed]),

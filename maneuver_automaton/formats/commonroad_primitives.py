@@ -92,8 +92,9 @@ class Deviation:
 
     def __str__(self) -> str:
         """One line for people."""
+        many = "primitive is" if self.beyond == 1 else "primitives are"
         return (
-            f"driven with controls that are constant in each step, {self.beyond} primitives are "
+            f"driven with controls that are constant in each step, {self.beyond} {many} "
             f"more than {LARGE:g} m or rad off their states; at most {self.position:.2g} m and "
             f"{self.heading:.2g} rad (primitive {self.worst + 1}); their ends were moved by "
             f"{self.speed:.2g} m/s and {self.steering:.2g} rad to meet"
@@ -203,7 +204,7 @@ def automaton_of_commonroad_primitives(
     pairs = np.unique(np.concatenate(ends), axis=0)
     trims = tuple(
         Trim(
-            name=f"speed {speed:.6g}, steering {steering:.6g}",
+            name=f"speed {speed:.4g}, steering {steering:.4g}",
             body_velocity=model.body_velocity(np.array([speed, steering]), np.zeros(2)),
             control=np.zeros(2),
             reduced_state=np.array([speed, steering]),

@@ -14,7 +14,6 @@ YAML_ENDINGS = (".yaml", ".yml")
 SBPL_ENDINGS = (".cfg", ".env", ".nav2d", ".nav3d")
 PRIMITIVES = "motion primitives, need a file that states a problem (see automaton show, convert)"
 NOT_READ: Mapping[str, str] = {
-    ".xml": "CommonRoad files are not read in this version",
     ".mprim": f"holds {PRIMITIVES}",
     ".pgm": "is the image of a map, need the YAML file that states its resolution",
 }
@@ -50,6 +49,10 @@ def reader_of(path: Path) -> Reader | None:
         from maneuver_automaton.formats.sbpl_cfg import read_sbpl
 
         return read_sbpl
+    if ending == ".xml":
+        from maneuver_automaton.formats.commonroad import read_commonroad
+
+        return read_commonroad
     if ending == ".svg":
         from maneuver_automaton.formats.benchmr_svg import read_benchmr
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import time
 from collections.abc import Iterator
@@ -14,7 +15,16 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.among_obstacles import library_table
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import lattice_bound
-from maneuver_automaton.planning.checking import check_plan, load_checks
+from maneuver_automaton.planning.checking import check_plan, load_checking, load_checks
+from maneuver_automaton.planning.polishing import (
+    SEQUENCES_SHARE,
+    Aimed,
+    guess_of_plan,
+    guesses_along_paths,
+    load_polishing,
+    polish_plans,
+    why_not_polished,
+)
 from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
 from maneuver_automaton.planning.tracking import Tracked, track
 from maneuver_automaton.problem import Problem
@@ -26,6 +36,7 @@ from maneuver_automaton.search import SearchStatus
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.maneuver_lattice import plan_of, search_maneuvers
 from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
+from maneuver_automaton.search.maneuver_ready import load_maneuver_search
 
 FIRST_SHARE = 0.8  # of the time limit, for a first path
 IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
@@ -45,6 +56,7 @@ def plan_with_inertia(
         heard.hear(plan, goal_index)
         if time.monotonic() >= heard.deadline:
             break
+    _polish(heard)
     timing = {
         "search": heard.searched - began,
         "first_plan": heard.improvements[0][0] if heard.improvements else math.nan,
@@ -96,8 +108,8 @@ class _Heard:
         self.counts["collision_queries"] += found.queries
         return found
 
-    def hear(self, plan: Plan, goal_index: int) -> None:
-        """Keep a plan if it passes the checks."""
+    def hear(self, plan: Plan, goal_index: int) -> bool:
+        """Keep a plan if it passes the checks, and say so."""
         begin = time.monotonic()
         checked = check_plan(self.problem, plan, self.problem.goals[goal_index])
         now = time.monotonic()
@@ -105,7 +117,7 @@ class _Heard:
         if checked.audit is None or not checked.passed:
             self.counts["rejected"] += 1
             self.refused = self.refused or checked.reason
-            return
+            return False
         cost = self.problem.cost_of(plan)
         best = self.accepted[0].cost if self.accepted else math.inf
         self.accepted.append(
@@ -116,6 +128,7 @@ class _Heard:
             self.improvements.append((now - self.began, cost))
         if not self.searched:
             self.searched = now
+        return True
 
     def why_none(self, time_limit: float) -> tuple[PlanStatus, str]:
         if self.enclosed:
@@ -133,11 +146,34 @@ def _candidates(heard: _Heard) -> Iterator[tuple[Plan, int]]:
     if along:
         yield from _along_paths(heard)
     if problem.automaton.maneuvers:
-        yield from _over_maneuvers(heard, MANEUVER_SHARE if along else 1.0)
+        yield from _over_maneuvers(heard, MANEUVER_SHARE if heard.accepted else 1.0)
+
+
+def _polish(heard: _Heard) -> None:
+    """Polish kinematic plans of different gears, and what has been found; keep what is cheaper."""
+    problem = heard.problem
+    if not heard.accepted or heard.left <= 0.0 or why_not_polished(problem):
+        return
+    aimed = [Aimed(guess_of_plan(heard.accepted[0].plan), heard.accepted[0].goal_index)]
+    if _rests(problem):
+        share = SEQUENCES_SHARE * heard.left
+        along = list(guesses_along_paths(problem, time_limit=share))
+        aimed = along or aimed
+    for goal_index in dict.fromkeys(one.goal_index for one in aimed):
+        if heard.left <= 0.0:
+            return
+        found = polish_plans(
+            problem,
+            [one.guess for one in aimed if one.goal_index == goal_index],
+            goal_index,
+            time_limit=heard.left,
+            accepts=functools.partial(heard.hear, goal_index=goal_index),
+        )
+        heard.counts["polished"] = heard.counts.get("polished", 0) + len(found.attempts)
 
 
 def _over_maneuvers(heard: _Heard, share: float) -> Iterator[tuple[Plan, int]]:
-    """Words of trims and maneuvers, each cheaper than the one before, in a share of what is left."""
+    """Words of trims and maneuvers, the cheapest first, in a share of the time that is left."""
     problem = heard.problem
     goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
     query = maneuver_problem_query(problem, goals)
@@ -184,8 +220,13 @@ def _stopping(problem: Problem, path: Plan, goal_index: int) -> Plan:
 def load_inertia(problem: Problem) -> None:
     """Compile or load what `plan_with_inertia` needs, before the clock runs."""
     load_lattice()
+    load_checking()
     if follows_paths(problem.automaton.model) and _rests(problem):
         library_table(kinematic_problem(problem, switch=0.0))
+        if not why_not_polished(problem):
+            load_polishing(problem)
+    if problem.automaton.maneuvers:
+        load_maneuver_search()
 
 
 def _rests(problem: Problem) -> bool:

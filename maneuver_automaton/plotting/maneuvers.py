@@ -22,10 +22,11 @@ from maneuver_automaton.primitives import Maneuver
 
 MOST_SINGLE = 48  # maneuvers that have a panel each
 MOST_PANELS = 120
-PANEL, TITLE, GAP = 1.35, 0.34, 0.16  # [in]
+PANEL, TITLE, GAP, EDGE = 1.35, 0.34, 0.2, 0.34  # [in]
 COLUMNS = 8
-NAME_LENGTH = 22
+NAME_LENGTH = 25
 FULL_COLOR = 0.6  # [rad] of a change of heading
+ROOM = 1.35  # side of a panel, over the size of what is in it
 DART_SIZE = 0.075  # of the side of a panel
 
 
@@ -37,39 +38,20 @@ class ManeuverArtists:
     darts: PolyCollection
 
 
-def draw_maneuvers(
-    ax: Axes,
-    automaton: Automaton,
-    maneuvers: Sequence[Maneuver],
-    *,
-    half_width: float | None = None,
-) -> ManeuverArtists:
+def draw_maneuvers(ax: Axes, maneuvers: Sequence[Maneuver]) -> ManeuverArtists:
     """Draw `maneuvers` on `ax`, to scale from the origin, which heads right.
 
     The colour of a path tells its change of heading: orange to the left, blue to the right, grey
     for none. Dots are a second apart. A motion that is not known is a dashed straight line.
 
-    Parameters
-    ----------
-    ax : Axes
-        Where to draw; its limits are set.
-    automaton : Automaton
-        Whose maneuvers they are.
-    maneuvers : sequence of Maneuver
-        Those to draw.
-    half_width : float, optional
-        Limits of the axes to each side of the origin [m]; those of these maneuvers if None.
-
     Examples
     --------
     >>> from matplotlib.figure import Figure
-    >>> from maneuver_automaton.models import Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "ahead": (1, 0)})
     >>> go = Maneuver(name="go", source="rest", target="ahead", displacement=[1.0, 0.0, 0.0])
-    >>> len(draw_maneuvers(Figure().add_subplot(), robot, [go]).paths.get_segments())
+    >>> len(draw_maneuvers(Figure().add_subplot(), [go]).paths.get_segments())
     1
     """
-    half = half_width or _half_width(maneuvers)
+    center, half = _frame_of(maneuvers)
     ways = [_way(maneuver) for maneuver in maneuvers]
     colors = [_color(maneuver) for maneuver in maneuvers]
     paths = LineCollection(
@@ -89,12 +71,12 @@ def draw_maneuvers(
         seconds[:, 0], seconds[:, 1], linestyle="none", marker="o", markersize=1.8, color=INK,
         zorder=3.5,
     )  # fmt: skip
-    _frame(ax, half)
+    _frame(ax, center, half)
     return ManeuverArtists(paths=paths, darts=darts)
 
 
 def save_maneuvers_figure(automaton: Automaton, path: str | Path) -> None:
-    """Write pictures of every maneuver of an `automaton`, all to one scale.
+    """Write pictures of every maneuver of an `automaton`, each panel to its own scale.
 
     Up to 48 have a panel each; more are drawn together with those that leave the same trim, in at
     most 120 panels. The file is replaced in one step; its ending chooses the format.
@@ -110,26 +92,29 @@ def save_maneuvers_figure(automaton: Automaton, path: str | Path) -> None:
     left_out, panels = len(panels) - MOST_PANELS, panels[:MOST_PANELS]
     columns = min(COLUMNS, len(panels))
     rows = math.ceil(len(panels) / columns)
-    top, width = 0.62, max(columns * (PANEL + GAP) + GAP, 4.2)
+    top, width = 0.62, max(columns * (PANEL + GAP) - GAP + 2.0 * EDGE, 4.8)
     figure = new_figure(width, top + rows * (PANEL + TITLE + GAP) + 0.1)
     high = float(figure.get_size_inches()[1])
-    half = _half_width(automaton.maneuvers)
     for k, (title, maneuvers) in enumerate(panels):
         row, column = divmod(k, columns)
         ax = axes_at(
-            figure, left=GAP + column * (PANEL + GAP),
+            figure, left=EDGE + column * (PANEL + GAP),
             bottom=high - top - (row + 1) * (PANEL + TITLE + GAP) + GAP, width=PANEL, height=PANEL,
         )  # fmt: skip
-        draw_maneuvers(ax, automaton, maneuvers, half_width=half)
-        ax.set_title(title, fontsize=SMALL_PT - 1.6, color=INK, parse_math=False, pad=2.5)
+        draw_maneuvers(ax, maneuvers)
+        ax.text(
+            0.04, 0.04, f"{np.ptp(ax.get_xlim()):.2g} m", transform=ax.transAxes, color=INK,
+            fontsize=SMALL_PT - 2.0,
+        )  # fmt: skip
+        ax.set_title(title, fontsize=SMALL_PT - 2.0, color=INK, parse_math=False, pad=2.5)
     more = f"; {left_out} more trims are left out" if left_out > 0 else ""
     name = shortened(automaton.name or automaton.model.name, 40)
-    legend = f"panels are {2.0 * half:.3g} m wide, dots 1 s apart; orange turns left, blue right"
+    legend = "how wide a panel is stands in it; dots are 1 s apart; orange turns left, blue right"
     lines = [
         (f"{name}: {_count(automaton)}", 10.0, "bold"),
         (legend + more, SMALL_PT, "normal"),
     ]
-    heading_text(figure, lines, left=GAP)
+    heading_text(figure, lines, left=EDGE)
     write_figure(figure, path)
 
 
@@ -187,15 +172,17 @@ def _color(maneuver: Maneuver) -> Color:
     return red, green, blue
 
 
-def _half_width(maneuvers: Sequence[Maneuver]) -> float:
-    most = max((float(np.abs(_way(one)[:, :2]).max()) for one in maneuvers), default=0.0)
-    return 1.12 * most or 1.0
+def _frame_of(maneuvers: Sequence[Maneuver]) -> tuple[Array, float]:
+    """Centre (2,) and half the width [m] of a square around the origin and all paths."""
+    points = np.concatenate([np.zeros((1, 2)), *(_way(one)[:, :2] for one in maneuvers)])
+    low, high = points.min(axis=0), points.max(axis=0)
+    return 0.5 * (low + high), 0.5 * ROOM * float((high - low).max()) or 1.0
 
 
-def _frame(ax: Axes, half: float) -> None:
+def _frame(ax: Axes, center: Array, half: float) -> None:
     ax.set_aspect("equal")
-    ax.set_xlim(-half, half)
-    ax.set_ylim(-half, half)
+    ax.set_xlim(center[0] - half, center[0] + half)
+    ax.set_ylim(center[1] - half, center[1] + half)
     ax.set_xticks([0.0])
     ax.set_yticks([0.0])
     ax.tick_params(labelbottom=False, labelleft=False, length=0.0)

@@ -40,6 +40,7 @@ TRIES = (
 """(share by which the limits are drawn in, factor of the guessed duration, swing), in turn."""
 
 NEWTON_STEPS = 8
+DIGITS = 7  # after the point, of inputs and intervals that need no more
 RUNGE_KUTTA_STEPS = 4  # in an interval, for derivatives
 PERTURBATION = 1e-6  # [-] of the range of a control, for derivatives
 
@@ -166,7 +167,7 @@ def _checked(
     nothing = Connection(source=source.name, target=target.name, maneuver=None, cost=transfer.cost)
     if transfer.status is not SolveStatus.SOLVED:
         return replace(nothing, reason=f"the solver ended with {transfer.reason}")
-    inputs = closed(
+    inputs = _closed_in_short(
         model,
         source.reduced_state,
         target.reduced_state,
@@ -182,7 +183,7 @@ def _checked(
         worst = model.reduced_names[int(excess.argmax())]
         return replace(nothing, reason=f"{worst} leaves its limits by {excess.max():.2g} of them")
     maneuver = Maneuver(
-        name=f"{source.name} -> {target.name}",
+        name=f"{source.name} to {target.name}",
         source=source.name,
         target=target.name,
         displacement=course.pose[-1],
@@ -197,7 +198,31 @@ def _checked(
     return replace(nothing, maneuver=maneuver, inputs=inputs, defect=defect)
 
 
-def closed(model: Model, start: Array, end: Array, *, inputs: Inputs, limits: Array) -> Inputs:
+def _closed_in_short(
+    model: Model, start: Array, end: Array, *, inputs: Inputs, limits: Array
+) -> Inputs:
+    """Closed inputs of few digits but in the last third, so that files are half as long."""
+    last = max(1, len(inputs.control) // 3)
+    short = Inputs(control=inputs.control.round(DIGITS), interval=round(inputs.interval, DIGITS))
+    found = closed(model, start, end, inputs=short, limits=limits, last=last)
+    if _miss(model, start, end, found) <= CLOSED / 100.0:
+        return found
+    return closed(model, start, end, inputs=inputs, limits=limits)
+
+
+def _miss(model: Model, start: Array, end: Array, inputs: Inputs) -> float:
+    return float(np.abs(inputs.drive(model, start).reduced_state[-1] - end).max())
+
+
+def closed(
+    model: Model,
+    start: Array,
+    end: Array,
+    *,
+    inputs: Inputs,
+    limits: Array,
+    last: int | None = None,
+) -> Inputs:
     """Correct inputs that nearly lead from one reduced state to another, until they do.
 
     Newton's method on all inputs and a common factor of the time; of all corrections the least,
@@ -213,6 +238,8 @@ def closed(model: Model, start: Array, end: Array, *, inputs: Inputs, limits: Ar
         What nearly does.
     limits : (n_u, 2) array
         The inputs stay within.
+    last : int, optional
+        Correct the inputs of that many last intervals alone, and no times.
 
     Returns
     -------
@@ -235,8 +262,11 @@ def closed(model: Model, start: Array, end: Array, *, inputs: Inputs, limits: Ar
         gradient, by_duration = _sensitivities(model, start, tried)
         room = np.minimum(control - limits[:, 0], limits[:, 1] - control)
         weight = np.where(np.isfinite(room), room, width) + 1e-9 * width
+        if last is not None:
+            weight[: len(weight) - last] = 0.0
         columns = np.concatenate(
-            [(gradient * weight).reshape(end.size, -1), by_duration[:, None]], axis=1
+            [(gradient * weight).reshape(end.size, -1), by_duration[:, None] * (last is None)],
+            axis=1,
         )
         step = -np.linalg.lstsq(columns, miss, rcond=None)[0]
         control = np.clip(control + weight * step[:-1].reshape(control.shape), *limits.T)

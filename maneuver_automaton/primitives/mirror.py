@@ -43,7 +43,7 @@ class Mirror:
         """The maneuver on the other side, between the trims of these names."""
         course = maneuver.course
         return Maneuver(
-            name=f"{source} -> {target}",
+            name=f"{source} to {target}",
             source=source,
             target=target,
             displacement=maneuver.displacement * _pose_signs(maneuver.displacement.size),

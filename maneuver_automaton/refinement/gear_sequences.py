@@ -119,7 +119,8 @@ def gear_sequences(
     """
     deadline = time.monotonic() + time_limit
     found: list[Drive] = []
-    variants = [(prices, library) for prices in PRICES for library in libraries]
+    order = sorted(np.ndindex(len(PRICES), len(libraries)), key=sum)
+    variants = [(PRICES[i], libraries[j]) for i, j in order]
     for k, ((turning, switching), library) in enumerate(variants):
         now = time.monotonic()
         if now >= deadline:
