@@ -191,6 +191,17 @@ def test_a_trailer_stays_free_too():
         assert least_gap(plan, here.obstacles, model=automaton.model, carried=(trailer,)) > 0.0
 
 
+def test_a_trailer_wider_than_its_truck_does_not_close_the_way_of_the_truck():
+    automaton = truck_with_trailer(levels=3)
+    parts = parts_of(automaton, (Box([0.1, 0.1]),), ((Box([0.3, 0.6]),),))
+    beside = Obstacle(Box([0.1, 1.0], [0.1, 0.6]))  # nearer to the truck than half the trailer
+    here = maneuver_query(
+        transfer_library(automaton), parts, np.zeros(3), [0.2, 0.0, 0.0],
+        start_trim="0 at 0.00", goal_trim="0 at 0.00", obstacles=(beside,),
+    )  # fmt: skip
+    assert search_maneuvers(here, max_expansions=20, first_only=True).best is not None
+
+
 @pytest.mark.parametrize("height", [1.5, -0.5])
 def test_altitude_is_gained_on_the_way(height):
     flying = [[0.0] * 4, [1.0, 0, 0, 0], [0.7, 0, 0.8, 0], [0.7, 0, -0.8, 0],
