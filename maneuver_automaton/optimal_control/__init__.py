@@ -1,5 +1,9 @@
 """Optimal control by direct transcription: the one room that imports CasADi, when it is used."""
 
+from maneuver_automaton.optimal_control.maneuvers import ManeuverObjective as ManeuverObjective
+from maneuver_automaton.optimal_control.maneuvers import TransferSettings as TransferSettings
+from maneuver_automaton.optimal_control.maneuvers import solve_transfer as solve_transfer
+from maneuver_automaton.optimal_control.maneuvers import transfer_program as transfer_program
 from maneuver_automaton.optimal_control.problem import Grid as Grid
 from maneuver_automaton.optimal_control.problem import Guess as Guess
 from maneuver_automaton.optimal_control.problem import (
