@@ -11,14 +11,15 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.audit import Audit, audit_plan
-from maneuver_automaton.automaton import Plan, Primitive
+from maneuver_automaton.automaton import Automaton, Plan, Primitive
 from maneuver_automaton.automaton.carried import carried
-from maneuver_automaton.collision import AnyObstacle, Shape
+from maneuver_automaton.collision import AnyObstacle, Box, Shape
 from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.collision.fcl_checker import FclChecker
 from maneuver_automaton.collision.heights import Layer, layers_of
 from maneuver_automaton.collision.surroundings import surroundings_of
 from maneuver_automaton.groups import group_of
+from maneuver_automaton.models import Unicycle
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.inside import stays_inside
@@ -66,6 +67,15 @@ def load_checks(problem: Problem) -> None:
     for layer in layers_of(problem.obstacles, in_space=problem.start.size > 3):
         checker_of(problem.footprint, layer.obstacles, problem.margin, origin)
         surroundings_of(layer.obstacles, origin)
+
+
+@functools.cache
+def load_checking() -> None:
+    """Import what checks: the ODE solver, shapely, FCL."""
+    ahead = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0)})
+    wall = Box([1.0, 1.0], [5.0, 5.0])
+    problem = Problem(ahead, [0, 0, 0], [1, 0, 0], obstacles=wall, footprint=Box([0.1, 0.1]))
+    check_plan(problem, Plan([0, 0, 0], ahead.trims, durations=[1.0]), problem.goals[0])
 
 
 @functools.lru_cache(maxsize=4)

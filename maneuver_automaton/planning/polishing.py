@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import importlib.util
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,8 +14,8 @@ from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Model, SecondOrderCar, SecondOrderUnicycle
-from maneuver_automaton.optimal_control import Guess
-from maneuver_automaton.optimal_control.polishing import PolishSettings, intervals_for
+from maneuver_automaton.optimal_control import Guess, PolishSettings, has_casadi, load_casadi
+from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.problem import Components, RunningCost
 from maneuver_automaton.optimal_control.separation import BodyPart
 from maneuver_automaton.problem import Problem, moves
@@ -41,6 +40,7 @@ from maneuver_automaton.refinement.polish import (
     PolishTask,
     polish_guesses,
 )
+from maneuver_automaton.search.cost_to_go import cost_to_go_table
 
 POINT = ((np.zeros((1, 2)), 0.0),)  # the body of a vehicle without a footprint
 SEQUENCES_SHARE = 0.2  # of the time, for kinematic plans that differ
@@ -67,9 +67,16 @@ def why_not_polished(problem: Problem) -> str:
         return "time costs nothing"
     if problem.horizon.time is not None:
         return "the time is fixed"
-    if importlib.util.find_spec("casadi") is None:
+    if not has_casadi():
         return "CasADi is not installed"
     return ""
+
+
+def load_polishing(problem: Problem) -> None:
+    """Have ready what polishing needs: the solver, and tables of the kinematic libraries."""
+    load_casadi()
+    for library in _libraries_of(problem.automaton.model)[0]:
+        cost_to_go_table(replace(kinematic_problem(problem, switch=0.0), automaton=library))
 
 
 def guesses_along_paths(problem: Problem, *, time_limit: float) -> Iterator[Aimed]:

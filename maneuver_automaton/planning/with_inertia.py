@@ -15,12 +15,13 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.among_obstacles import library_table
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import lattice_bound
-from maneuver_automaton.planning.checking import check_plan, load_checks
+from maneuver_automaton.planning.checking import check_plan, load_checking, load_checks
 from maneuver_automaton.planning.polishing import (
     SEQUENCES_SHARE,
     Aimed,
     guess_of_plan,
     guesses_along_paths,
+    load_polishing,
     polish_plans,
     why_not_polished,
 )
@@ -33,8 +34,9 @@ from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
 from maneuver_automaton.search import SearchStatus
 from maneuver_automaton.search.lattice_query import lattice_query
-from maneuver_automaton.search.maneuver_lattice import plan_of, search_maneuvers
+from maneuver_automaton.search.maneuver_lattice import maneuver_words, plan_of
 from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
+from maneuver_automaton.search.maneuver_ready import load_maneuver_kernels
 
 FIRST_SHARE = 0.8  # of the time limit, for a first path
 IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
@@ -177,17 +179,13 @@ def _over_maneuvers(heard: _Heard, share: float) -> Iterator[tuple[Plan, int]]:
     query = maneuver_problem_query(problem, goals)
     most = problem.search.max_expansions
     until = time.monotonic() + share * heard.left
-    if not heard.accepted:
-        found = search_maneuvers(query, deadline=until, max_expansions=most, first_only=True)
-        heard.counts["expansions"] += found.expansions
-        if found.best is not None:
-            yield plan_of(query, found.best), goals[found.best.goal]
-        elif found.status is SearchStatus.EXHAUSTED:
+    before = heard.counts["expansions"]
+    for found in maneuver_words(query, deadline=until, max_expansions=most):
+        heard.counts["expansions"] = before + found.expansions
+        if found.word is not None:
+            yield plan_of(query, found.word), goals[found.word.goal]
+        elif found.status is SearchStatus.EXHAUSTED and not heard.accepted:
             heard.reason = "; none over trims and maneuvers at any resolution tried"
-    found = search_maneuvers(query, deadline=until, max_expansions=most)
-    heard.counts["expansions"] += found.expansions
-    for word in reversed(found.words):
-        yield plan_of(query, word), goals[word.goal]
 
 
 def _along_paths(heard: _Heard) -> Iterator[tuple[Plan, int]]:
@@ -218,8 +216,13 @@ def _stopping(problem: Problem, path: Plan, goal_index: int) -> Plan:
 def load_inertia(problem: Problem) -> None:
     """Compile or load what `plan_with_inertia` needs, before the clock runs."""
     load_lattice()
+    load_checking()
     if follows_paths(problem.automaton.model) and _rests(problem):
         library_table(kinematic_problem(problem, switch=0.0))
+        if not why_not_polished(problem):
+            load_polishing(problem)
+    if problem.automaton.maneuvers:
+        load_maneuver_kernels()
 
 
 def _rests(problem: Problem) -> bool:
