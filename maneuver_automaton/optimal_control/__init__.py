@@ -2,6 +2,10 @@
 
 from maneuver_automaton.optimal_control._casadi import has_casadi as has_casadi
 from maneuver_automaton.optimal_control._casadi import load_casadi as load_casadi
+from maneuver_automaton.optimal_control.maneuvers import ManeuverObjective as ManeuverObjective
+from maneuver_automaton.optimal_control.maneuvers import TransferSettings as TransferSettings
+from maneuver_automaton.optimal_control.maneuvers import solve_transfer as solve_transfer
+from maneuver_automaton.optimal_control.maneuvers import transfer_program as transfer_program
 from maneuver_automaton.optimal_control.polish_values import PolishSettings as PolishSettings
 from maneuver_automaton.optimal_control.polishing import polish as polish
 from maneuver_automaton.optimal_control.problem import Grid as Grid

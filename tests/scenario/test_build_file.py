@@ -70,7 +70,7 @@ def test_maneuvers_by_optimal_control(tmp_path, monkeypatch, capsys):
     library = load_library("craft.json")
     assert counts.startswith(f"craft.json: 4 trims, {len(library.maneuvers)} maneuvers, hash ")
     assert solved.startswith(f"  {len(library.maneuvers)} solved, 0 from the journal")
-    assert {inputs_of(one.course)[0].size for one in library.maneuvers} == {10}
+    assert max(inputs_of(one.course)[0].size for one in library.maneuvers) == 10
 
 
 def test_maneuvers_at_once(tmp_path):
