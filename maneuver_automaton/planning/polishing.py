@@ -94,9 +94,16 @@ def guesses_along_paths(problem: Problem, *, time_limit: float) -> Iterator[Aime
         lambda plan: timed(plan, pace).duration,
         time_limit=time_limit,
     ):
-        seen = replace(drive.plan, start=np.zeros(problem.start.size), start_time=0.0)
-        off = [sum(goal.off(drive.plan.end)) for goal in problem.goals]
-        yield Aimed(_guess_along(model, seen), int(np.argmin(off)))
+        yield guess_along(problem, drive.plan)
+
+
+def guess_along(problem: Problem, path: Plan) -> Aimed:
+    """A guess along a kinematic plan, seen from its start, and the goal where it ends."""
+    model = problem.automaton.model
+    seen = replace(path, start=np.zeros(problem.start.size), start_time=0.0)
+    how = car_guess if isinstance(model, SecondOrderCar) else unicycle_guess
+    off = [sum(goal.off(path.end)) for goal in problem.goals]
+    return Aimed(how(model, seen, intervals=_intervals()), int(np.argmin(off)))  # type: ignore[arg-type]
 
 
 def guess_of_plan(plan: Plan) -> Guess:
@@ -204,13 +211,6 @@ def _libraries_of(model: Model) -> tuple[list[Automaton], Pace]:
         unicycle_library, max_speed=model.max_speed, max_turn_rate=model.max_turn_rate
     )
     return [robot(share=share) for share in TURNS], pace_of_unicycle(model)
-
-
-def _guess_along(model: Model, path: Plan) -> Guess:
-    if isinstance(model, SecondOrderCar):
-        return car_guess(model, path, intervals=_intervals())
-    assert isinstance(model, SecondOrderUnicycle)
-    return unicycle_guess(model, path, intervals=_intervals())
 
 
 def _intervals() -> Callable[[float], int]:

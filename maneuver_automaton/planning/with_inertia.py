@@ -19,6 +19,7 @@ from maneuver_automaton.planning.checking import check_plan, load_checking, load
 from maneuver_automaton.planning.polishing import (
     SEQUENCES_SHARE,
     Aimed,
+    guess_along,
     guess_of_plan,
     guesses_along_paths,
     load_polishing,
@@ -58,6 +59,7 @@ def plan_with_inertia(
         if time.monotonic() >= heard.deadline:
             break
     _polish(heard)
+    heard.searched = heard.searched or time.monotonic()
     timing = {
         "search": heard.searched - began,
         "first_plan": heard.improvements[0][0] if heard.improvements else math.nan,
@@ -97,6 +99,7 @@ class _Heard:
     refused: str = ""
     reason: str = ""
     enclosed: str = ""  # why no plan can exist
+    paths: list[Aimed] = field(default_factory=list)  # guesses along kinematic plans
 
     @property
     def left(self) -> float:
@@ -162,7 +165,7 @@ def _polish(heard: _Heard) -> None:
     if _rests(problem):
         share = SEQUENCES_SHARE * heard.left
         along = list(guesses_along_paths(problem, time_limit=share))
-        aimed = along or aimed
+        aimed = along or [*heard.paths, *aimed]
     for goal_index in dict.fromkeys(one.goal_index for one in aimed):
         if heard.left <= 0.0:
             return
@@ -202,6 +205,7 @@ def _along_paths(heard: _Heard) -> Iterator[tuple[Plan, int]]:
         heard.reason = f" ({first.reason})" if first.reason else ""
         return
     yield _stopping(problem, first.plan, first.goal_index), first.goal_index
+    heard.paths.append(guess_along(problem, first.plan))
     left = IMPROVED_SHARE * heard.left
     better = heard.count(track(kinematic_problem(problem), time_limit=left, known=first.plan))
     if better.plan is not None and better.goal_index is not None:
