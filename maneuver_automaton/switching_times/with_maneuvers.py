@@ -72,8 +72,8 @@ def solve_times_with_maneuvers(
         Cost per second of each trim; what maneuvers cost is added by the caller.
     goal : (dof,) array_like
         Pose relative to the start; its heading counts modulo a full turn.
-    displacements : (n - 1, dof) array_like
-        Of the maneuver between each two trims; zero where there is none.
+    displacements : (n - 1, dof) or (n, dof) array_like
+        Of the maneuver between each two trims, and after the last; zero where there is none.
     total : float, optional
         [s] the coasting times must add up to: what is given less what the maneuvers take.
     free_heading : bool
@@ -110,7 +110,7 @@ def solve_times_with_maneuvers(
     rows = as_array("twists", twists, last=(3, 4))
     n, dof = rows.shape
     steps = as_array("displacements", displacements).reshape(-1, dof)
-    if len(steps) != n - 1:
+    if len(steps) not in (n - 1, n):
         raise ValueError(f"displacements: got {len(steps)}, need {n - 1}, one between each two")
     prices = as_array("rates", rates)
     if prices.shape != (n,):
@@ -190,7 +190,7 @@ class _Word:
     ) -> None:
         group = group_of(goal.size)
         least = group.exp(floors[:, None] * twists)
-        after = np.vstack([steps, np.zeros(goal.size)])
+        after = steps if len(steps) == len(twists) else np.vstack([steps, np.zeros(goal.size)])
         self.floors = floors
         self.twists, product = conjugated(twists, (least @ group(after)).pose)
         self.goal = _goal_before(goal, product)
