@@ -37,7 +37,7 @@ def check_plan(problem: Problem, plan: Plan, goal: Goal) -> Checked:
     """Bounds, FCL, audit, in this order; the first that fails ends it."""
     if not stays_inside(plan, problem.bounds):
         return Checked(inside=False, free=True, audit=None, reason="it leaves the bounds")
-    hit = _hit(problem, plan, goal)
+    hit = what_is_hit(problem, plan, goal)
     if hit:
         return Checked(inside=True, free=False, audit=None, reason=hit)
     audit = audit_plan(
@@ -72,7 +72,7 @@ def checker_of(
     return FclChecker(footprint, obstacles, margin=margin, origin=origin)
 
 
-def _hit(problem: Problem, plan: Plan, goal: Goal) -> str:
+def what_is_hit(problem: Problem, plan: Plan, goal: Goal) -> str:
     """Which edge hits what by FCL; empty if none does."""
     if not problem.obstacles:
         return ""

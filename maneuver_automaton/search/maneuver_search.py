@@ -14,6 +14,7 @@ from maneuver_automaton.search.result import SearchStatus
 SCANNED_TRIMS = 14  # that words of four trims are made of
 SCANNED = 4  # trims of a scanned word
 SCAN_SHARE = 0.4  # of the time that is left, for scanning
+SEED_SLACK = 0.1  # share by which words may be dearer than a plan that is known, and yet be seeds
 SEEDS = 4  # words that insertion begins with
 SAME = 1e-6  # [s] durations that differ by less are the same
 
@@ -24,6 +25,7 @@ def search_words_with_maneuvers(
     *,
     time_limit: float = math.inf,
     alternatives: int = 0,
+    ceiling: float = math.inf,
 ) -> ManeuverSearch:
     """Plans to a goal in free space: words of up to four trims, and what insertion makes of them.
 
@@ -37,6 +39,9 @@ def search_words_with_maneuvers(
         [s] after which the search ends with what it has.
     alternatives : int
         How many plans beside the cheapest.
+    ceiling : float
+        Cost of a plan that is known: what costs as much is left out. Insertion still begins with
+        words that are a little dearer.
 
     Returns
     -------
@@ -56,8 +61,14 @@ def search_words_with_maneuvers(
     """
     deadline = time.monotonic() + time_limit
     asked = max(alternatives, SEEDS - 1)
+    near = ceiling * (1.0 + SEED_SLACK)
     short = search_maneuver_words(
-        problem, goal, alternatives=asked, most_letters=CLOSED_FORM, time_limit=time_limit
+        problem,
+        goal,
+        alternatives=asked,
+        most_letters=CLOSED_FORM,
+        time_limit=time_limit,
+        ceiling=near,
     )
     left = max(deadline - time.monotonic(), 0.0)
     found = list(short.solutions)
@@ -70,6 +81,7 @@ def search_words_with_maneuvers(
             most_letters=SCANNED,
             most_trims=SCANNED_TRIMS,
             time_limit=SCAN_SHARE * left,
+            ceiling=near,
         )
         found = _distinct([*found, *longer.solutions])
         _add(counts, longer.counts)
@@ -84,6 +96,7 @@ def search_words_with_maneuvers(
         )
         found = _distinct([*found, *better.solutions])
         _add(counts, better.counts)
+    found = [one for one in found if one.cost < ceiling]
     if found:
         status = SearchStatus.FOUND
     else:
