@@ -289,10 +289,12 @@ class _Decision:
         if found is None:
             left = max(self.deadline - time.monotonic(), 1e-3)
             result = planned(here, time_limit=left)
-            if result.plan is None or result.goal_index is None:
+            late = result.plan is not None and self._is_late(result.plan)
+            if result.plan is None or result.goal_index is None or late:
                 still = Plan(here.start, (here.first_trim,), durations=[0.0])
                 still = replace(still, start_time=here.start_time)
-                return self._helpless(still, 0, reason=f": {result.reason}")
+                why = "it takes too long" if late else result.reason
+                return self._helpless(still, 0, reason=f": {why}")
             found = result.plan, result.goal_index
         return self._as_first(self._padded(found[0]), found[1])
 
@@ -388,6 +390,11 @@ class _Decision:
         if not (outside(plan.start, self.here.bounds) or stays_inside(plan, self.here.bounds)):
             return False
         return not what_is_hit(self.here, plan, goal)
+
+    def _is_late(self, plan: Plan) -> bool:
+        """Whether a plan takes longer than it may."""
+        limit = self.here.horizon.time or self.here.horizon.max_time
+        return limit is not None and plan.duration > limit * (1.0 + EXACT)
 
     def _padded(self, plan: Plan) -> Plan:
         """The plan, then rest for what is left of a fixed time."""
