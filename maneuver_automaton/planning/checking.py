@@ -13,6 +13,7 @@ from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.collision.fcl_checker import FclChecker
 from maneuver_automaton.collision.surroundings import surroundings_of
+from maneuver_automaton.planning.zones import what_zone_forbids
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.inside import stays_inside
@@ -49,6 +50,7 @@ def check_plan(problem: Problem, plan: Plan, goal: Goal) -> Checked:
         obstacles=problem.obstacles,
         margin=problem.margin,
         states=_end_states(problem, goal),
+        zones=problem.zones,
     )
     return Checked(inside=True, free=True, audit=audit, reason=audit.reason)
 
@@ -73,9 +75,10 @@ def checker_of(
 
 
 def what_is_hit(problem: Problem, plan: Plan, goal: Goal) -> str:
-    """Which edge hits what by FCL; empty if none does."""
-    if not problem.obstacles:
-        return ""
+    """Which edge hits what, or what a zone does not admit, by FCL; empty if none does."""
+    forbidden = what_zone_forbids(problem, plan, _origin(goal)) if problem.zones else ""
+    if forbidden or not problem.obstacles:
+        return forbidden
     bodies = [("", plan, problem.footprint)]
     for name, shapes in problem.parts.items():
         bodies.append((f"the {name}: ", carried(plan, problem.automaton.model, name), shapes))

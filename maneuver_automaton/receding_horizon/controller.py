@@ -122,6 +122,10 @@ class RecedingHorizon:
             raise ValueError(f"receding horizon: margin must be at least 0, got {margin}")
         if not stand >= 0.0:
             raise ValueError(f"receding horizon: stand must be at least 0, got {stand} s")
+        if problem.zones:
+            raise ValueError(
+                "receding horizon: this controller knows no zones; ManeuverHorizon does"
+            )
         pad = _pad(problem)
         _check_horizon(problem, step, pad, retimed=retimed)
         if last is not None and not 0 <= last.goal_index < len(problem.goals):

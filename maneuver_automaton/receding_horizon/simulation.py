@@ -132,7 +132,7 @@ def simulate(
     upset = _checked(upset, problem.start.size)
     random = _draws(upset, problem.start.size)
     controller: RecedingHorizon | ManeuverHorizon
-    inertia = has_inertia(problem)
+    inertia = has_inertia(problem) or bool(problem.zones)
     if inertia:
         _check_inertia(upset, stay=stay, retimed=retimed, seen=obstacles)
         controller = ManeuverHorizon(
@@ -280,7 +280,9 @@ def _check_inertia(upset: Disturbance, *, stay: bool, retimed: bool, seen: Seen 
     }
     for name, given in asked.items():
         if given:
-            raise ValueError(f"receding horizon: {name} is for vehicles without inertia")
+            raise ValueError(
+                f"receding horizon: {name} is for vehicles without inertia, and no zones"
+            )
 
 
 def _spent(last: Step | None) -> float:
@@ -338,6 +340,7 @@ def _audited(problem: Problem, piece: Plan) -> Audit:
         problem.automaton.model,
         footprint=problem.footprint,
         obstacles=problem.obstacles,
+        zones=problem.zones,
     )
 
 

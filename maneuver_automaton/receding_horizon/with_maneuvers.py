@@ -348,7 +348,7 @@ class _Decision:
             return None
         driven = here.cost_of(done) if done is not None and self.busy else 0.0
         best: tuple[Plan, int] | None = None
-        guarded = bool(here.obstacles) or _bounded(here)
+        guarded = bool(here.obstacles or here.zones) or _bounded(here)
         for index, goal in enumerate(here.goals):
             left = self.deadline - time.monotonic()
             if left <= 0.0:

@@ -154,7 +154,7 @@ def test_the_log_can_be_written():
 def test_what_is_not_known_is_refused():
     with pytest.raises(ValueError) as error:
         simulate(posed(), step=0.5, stay=True)
-    assert str(error.value) == "receding horizon: stay is for vehicles without inertia"
+    assert str(error.value).startswith("receding horizon: stay is for vehicles without inertia")
     with pytest.raises(ValueError) as error:
         ManeuverHorizon(posed(), step=0.0)
     assert str(error.value) == "receding horizon: step must be positive, got 0.0 s"
