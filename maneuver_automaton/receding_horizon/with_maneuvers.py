@@ -141,7 +141,7 @@ class ManeuverHorizon:
         passed = 0.0 if last is None else (last.applied if elapsed is None else elapsed)
         if not 0.0 <= passed < math.inf:
             raise ValueError(f"elapsed must be at least 0, got {passed} s")
-        if last is not None and passed != last.applied:
+        if last is not None:
             last = self._cut(last, passed)
         at = self.problem.start_time if last is None else last.time + passed
         here = replace(self.problem, start=pose, start_time=at)
@@ -155,6 +155,8 @@ class ManeuverHorizon:
         if passed < last.applied and self.most_steps is not None:
             self.most_steps += 1
         plan = with_samples_at(last.plan, [last.time + passed], self.problem.automaton.model)
+        if passed == last.applied:
+            return replace(last, plan=plan)
         spent = self.problem.cost_of(plan) - self.problem.cost_of(tail_of(plan, passed))
         return replace(last, plan=plan, applied=passed, applied_cost=spent)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,11 @@ import pytest
 from maneuver_automaton.automaton.cutting import NOTHING, committed, head_of
 from maneuver_automaton.collision import Box
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.formats.closed_loop_json import closed_loop_to_dict
+from maneuver_automaton.formats.closed_loop_json import (
+    closed_loop_to_dict,
+    load_steps,
+    save_closed_loop,
+)
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Goal, Horizon, Problem
 from maneuver_automaton.receding_horizon import (
@@ -149,6 +154,20 @@ def test_the_log_can_be_written():
     document = json.loads(json.dumps(closed_loop_to_dict(loop), allow_nan=False))
     assert document["reached"] is True
     assert document["steps"][0]["control"] == loop.steps[0].control.tolist()
+
+
+def test_a_loop_that_was_stopped_goes_on_from_its_file(tmp_path):
+    problem = posed()
+    whole = simulate(problem, step=0.4, time_limit=5.0)
+    begun = simulate(problem, step=0.4, time_limit=5.0, steps=2)
+    save_closed_loop(begun, tmp_path / "loop.json")
+    steps, poses = load_steps(tmp_path / "loop.json", problem.automaton)
+    assert committed(steps[-1].plan, steps[-1].applied) > 0.0  # in the midst of a maneuver
+    there = replace(problem, start=poses[-1])
+    rest = simulate(there, step=0.4, time_limit=5.0, last=steps[-1])
+    assert rest.reached
+    assert np.abs(rest.poses - whole.poses[2:]).max() < 1e-9
+    assert rest.cost == pytest.approx(whole.cost, abs=1e-9)
 
 
 def test_what_is_not_known_is_refused():
