@@ -20,6 +20,7 @@ from maneuver_automaton.collision.heights import Layer, layers_of
 from maneuver_automaton.collision.surroundings import surroundings_of
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Unicycle
+from maneuver_automaton.planning.zones import what_zone_forbids
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.inside import stays_inside
@@ -44,7 +45,7 @@ def check_plan(problem: Problem, plan: Plan, goal: Goal) -> Checked:
     """Bounds, FCL, audit, in this order; the first that fails ends it."""
     if not stays_inside(plan, problem.bounds):
         return Checked(inside=False, free=True, audit=None, reason="it leaves the bounds")
-    hit = _hit(problem, plan, goal)
+    hit = what_is_hit(problem, plan, goal)
     if hit:
         return Checked(inside=True, free=False, audit=None, reason=hit)
     audit = audit_plan(
@@ -57,6 +58,7 @@ def check_plan(problem: Problem, plan: Plan, goal: Goal) -> Checked:
         body_height=problem.body_height,
         margin=problem.margin,
         states=_end_states(problem, goal),
+        zones=problem.zones,
     )
     return Checked(inside=True, free=True, audit=audit, reason=audit.reason)
 
@@ -89,10 +91,11 @@ def checker_of(
     return FclChecker(footprint, obstacles, margin=margin, origin=origin)
 
 
-def _hit(problem: Problem, plan: Plan, goal: Goal) -> str:
-    """Which edge hits what by FCL; empty if none does."""
-    if not problem.obstacles:
-        return ""
+def what_is_hit(problem: Problem, plan: Plan, goal: Goal) -> str:
+    """Which edge hits what, or what a zone does not admit, by FCL; empty if none does."""
+    forbidden = what_zone_forbids(problem, plan, _origin(goal)) if problem.zones else ""
+    if forbidden or not problem.obstacles:
+        return forbidden
     bodies = [("", plan, problem.footprint)]
     for name, shapes in problem.parts.items():
         bodies.append((f"the {name}: ", carried(plan, problem.automaton.model, name), shapes))
