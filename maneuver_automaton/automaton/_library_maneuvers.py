@@ -1,43 +1,43 @@
-"""Maneuvers in library files: their controls, from which their courses are driven again."""
+"""Maneuvers in library files: read, driven along their inputs, and held against the model."""
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, vector_text
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton._library_values import (
     check_keys,
     listed,
     number_of,
     numbers_of,
-    rows_of,
+    table_of,
     text_of,
 )
 from maneuver_automaton.automaton.automaton import Automaton
+from maneuver_automaton.automaton.courses import (
+    SAMPLED,
+    Inputs,
+    driven_courses,
+    even_times,
+    inputs_entry,
+    inputs_of,
+)
 from maneuver_automaton.errors import InvalidLibrary
 from maneuver_automaton.models import Model
-from maneuver_automaton.primitives import Maneuver, Trajectory, drive_all
+from maneuver_automaton.primitives import Maneuver, Trajectory
+from maneuver_automaton.primitives.maneuver import CLOSED
 
-CONSISTENT = 1e-9  # [m, rad, s] between what a maneuver states and where its controls lead
-REACHED = 1e-9  # between reduced states and their limits, over their size or 1
-KEYS = ("name", "source", "target", "displacement", "duration", "controls", "comment")
-
-
-def controls_of(maneuver: Maneuver) -> Array:
-    """Controls of a maneuver as a file has them (k, 1 + n_u): until when [s], then the control."""
-    if maneuver.course is None:
-        return np.zeros((0, 0))
-    until, controls = maneuver.course.control_pieces()
-    return np.column_stack([until, controls])
+WITHIN = 1e-9  # by which share of its size, at least 1, a value may exceed a limit
+NEEDED = ("name", "source", "target", "displacement", "duration")
+KNOWN = (*NEEDED, "control", "until", "samples", "comment")
 
 
-def maneuver_entry(maneuver: Maneuver, controls: Array) -> dict[str, Any]:
-    """The maneuver as a file states it; without controls it has no course."""
+def maneuver_entry(maneuver: Maneuver, inputs: Inputs | None) -> dict[str, Any]:
+    """The maneuver as a file states it; without inputs it has no course, or one of samples."""
     entry: dict[str, Any] = {
         "name": maneuver.name,
         "source": maneuver.source,
@@ -45,15 +45,15 @@ def maneuver_entry(maneuver: Maneuver, controls: Array) -> dict[str, Any]:
         "displacement": listed(maneuver.displacement),
         "duration": float(maneuver.duration),
     }
-    if controls.size:
-        entry["controls"] = [listed(row) for row in controls]
-    return entry
+    if inputs is None:
+        inputs = None if maneuver.course is None else inputs_of(maneuver.course)
+    return entry if inputs is None else entry | inputs_entry(*inputs)
 
 
-def maneuver_of(k: int, entry: Any, model: Model) -> tuple[Maneuver, Array]:
-    """Entry k of a file as a maneuver without its course, and its controls."""
+def maneuver_of(k: int, entry: Any, model: Model) -> tuple[Maneuver, Inputs | None]:
+    """Entry k of a file, with the course of its samples, if it has them; else with its inputs."""
     label = f"maneuvers[{k}]"
-    check_keys(label, entry, known=KEYS, needed=KEYS[:5])
+    check_keys(label, entry, known=KNOWN, needed=NEEDED)
     maneuver = Maneuver(
         name=text_of(f"{label}: name", entry["name"]),
         source=text_of(f"{label}: source", entry["source"]),
@@ -61,109 +61,75 @@ def maneuver_of(k: int, entry: Any, model: Model) -> tuple[Maneuver, Array]:
         displacement=numbers_of(f"{label}: displacement", entry["displacement"]),
         duration=number_of(f"{label}: duration", entry["duration"]),
     )
-    width = 1 + len(model.control_names)
-    found = rows_of(entry, "controls", label=f"{label}: ")
-    controls = [numbers_of(f"{label}: controls", row) for row in found]
-    for row in controls:
-        if row.size != width:
-            raise InvalidLibrary(
-                f"{label}: controls: got {row.size} numbers, need {width}: until when, then "
-                f"{', '.join(model.control_names)}"
-            )
-    table = np.array(controls).reshape(-1, width)
-    if (np.diff(table[:, 0], prepend=0.0) < 0.0).any():
-        raise InvalidLibrary(f"{label}: controls: their times must rise from 0")
-    return maneuver, table
+    if "samples" in entry:
+        return replace(maneuver, course=_samples(label, entry["samples"])), None
+    if "control" in entry:
+        return maneuver, _inputs(label, entry, model, maneuver.duration)
+    return maneuver, None
 
 
-def with_courses(
-    maneuvers: Sequence[Maneuver], controls: Sequence[Array], *, automaton: Automaton
-) -> tuple[Maneuver, ...]:
-    """The maneuvers with the courses that their controls lead along.
+def driven(automaton: Automaton, inputs: Sequence[Inputs | None]) -> tuple[Maneuver, ...]:
+    """The maneuvers of an automaton, those with inputs along the courses these lead.
 
     Raises
     ------
     InvalidLibrary
-        If one leads elsewhere than it says, or breaks a limit of the model.
+        If the inputs of one, or the reduced states of its course, break a limit of the model.
+    ValueError
+        If one leads elsewhere than it says.
     """
     model = automaton.model
-    rides = {}
-    for k, (stated, table) in enumerate(zip(maneuvers, controls, strict=True)):
-        if table.size:
-            label = f"maneuvers[{k}] {stated.name!r}"
-            _check_limits(label, model.control_limits, table[:, 1:], model.control_names)
-            rides[k] = (automaton[stated.source].reduced_state, table)
-    courses = _driven(model, rides)
+    given = {k: one for k, one in enumerate(inputs) if one is not None}
+    labels = {k: f"maneuvers[{k}] {automaton.maneuvers[k].name!r}" for k in given}
+    for k, (_, control) in given.items():
+        _check_limits(labels[k], model.control_limits, control, model.control_names)
+    starts = [automaton[automaton.maneuvers[k].source].reduced_state for k in given]
+    rides = driven_courses(model, starts, list(given.values()))
+    courses = dict(zip(given, rides, strict=True))
     for k, course in courses.items():
-        _check(f"maneuvers[{k}] {maneuvers[k].name!r}", maneuvers[k], course, model)
+        _check_limits(labels[k], model.reduced_limits, course.reduced_state, model.reduced_names)
     return tuple(
-        replace(stated, course=courses[k]) if k in courses else stated
-        for k, stated in enumerate(maneuvers)
+        replace(maneuver, course=courses[k]) if k in courses else maneuver
+        for k, maneuver in enumerate(automaton.maneuvers)
     )
 
 
-def check_courses(automaton: Automaton, controls: Sequence[Array]) -> None:
-    """Refuse a maneuver whose course is not where its controls lead: a file could not tell it."""
-    without = [replace(maneuver, course=None) for maneuver in automaton.maneuvers]
-    with_courses(without, controls, automaton=automaton)
-
-
-def _driven(model: Model, pieces: Mapping[int, tuple[Array, Array]]) -> dict[int, Trajectory]:
-    """Courses from reduced states (n_z,) under controls (k, 1 + n_u), until when and which.
-
-    Rides of about as many controls go together.
-    """
-    groups: dict[int, list[int]] = defaultdict(list)
-    for key, (_, controls) in pieces.items():
-        groups[(controls.shape[0] - 1).bit_length()].append(key)
-    courses = {}
-    for keys in groups.values():
-        most = max(pieces[key][1].shape[0] for key in keys)
-        control = np.zeros((len(keys), most, len(model.control_names)))
-        durations = np.zeros((len(keys), most))
-        for row, key in enumerate(keys):
-            until = pieces[key][1]
-            control[row, : until.shape[0]] = until[:, 1:]
-            durations[row, : until.shape[0]] = np.diff(until[:, 0], prepend=0.0)
-        begins = [pieces[key][0] for key in keys]
-        rides = drive_all(model, np.array(begins), control=control, durations=durations)
-        for key, course in zip(keys, rides, strict=True):
-            courses[key] = _at_times(course, pieces[key][1][:, 0])
-    return courses
-
-
-def _at_times(course: Trajectory, until: Array) -> Trajectory:
-    """The course with its switches at exactly these times: sums of differences are off by a bit."""
-    changes = course.control_changes()
-    if changes.size != until.size:
-        return course
-    time = course.time.copy()
-    time[np.append(changes[1:], time.size - 1)] = until
-    return replace(course, time=time)
-
-
-def _check(label: str, stated: Maneuver, course: Trajectory, model: Model) -> None:
-    """A course leads where the maneuver says, within the limits of the reduced state."""
-    off = float(np.abs(course.pose[-1] - stated.displacement).max())
-    scale = max(1.0, stated.duration, float(np.abs(stated.displacement).max()))
-    if not off <= CONSISTENT * scale:
+def _inputs(label: str, entry: Any, model: Model, duration: float) -> Inputs:
+    """Until when each control of a maneuver holds, and the controls."""
+    control = table_of(f"{label}: control", entry["control"], width=len(model.control_names))
+    if "until" not in entry:
+        return even_times(duration, len(control)), control
+    until: Array = numbers_of(f"{label}: until", entry["until"])
+    if until.shape != (len(control),) or not (np.diff(until, prepend=0.0) > 0.0).all():
         raise InvalidLibrary(
-            f"{label}: got the displacement {vector_text(stated.displacement)}, but its controls "
-            f"lead the {model.name} to {vector_text(course.pose[-1])}, {off:.3g} off"
+            f"{label}: until: got {until.tolist()!r:.60}, need {len(control)} rising times, one "
+            "for each control"
         )
-    late = abs(float(course.time[-1]) - stated.duration)
-    if not late <= CONSISTENT * scale:
+    if not abs(until[-1] - duration) <= CLOSED * max(1.0, duration):
         raise InvalidLibrary(
-            f"{label}: got the duration {stated.duration:.6g} s, but its controls end at "
-            f"{course.time[-1]:.6g} s"
+            f"{label}: until: ends with {until[-1]} s, need the duration {duration} s"
         )
-    _check_limits(label, model.reduced_limits, course.reduced_state, model.reduced_names)
+    return until, control
+
+
+def _samples(label: str, entry: Any) -> Trajectory:
+    label = f"{label}: samples"
+    check_keys(label, entry, known=SAMPLED, needed=SAMPLED)
+    time = numbers_of(f"{label}: time", entry["time"])
+    tables = {name: table_of(f"{label}: {name}", entry[name]) for name in SAMPLED[1:]}
+    for name, table in tables.items():
+        if len(table) != time.size or not time.size:
+            raise InvalidLibrary(
+                f"{label}: {name}: got {len(table)} rows, need one for each of {time.size} times, "
+                "and at least one"
+            )
+    return Trajectory(time=time, **tables)
 
 
 def _check_limits(label: str, limits: Array, values: Array, names: Sequence[str]) -> None:
     low, high = limits.T
     beyond = np.maximum(low - values, values - high)
-    outside = beyond > REACHED * np.maximum(1.0, np.abs(values))
+    outside = beyond > WITHIN * np.maximum(1.0, np.abs(values))
     if outside.any():
         row, i = np.argwhere(outside)[0]
         raise InvalidLibrary(

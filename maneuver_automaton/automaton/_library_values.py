@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,15 +12,15 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.errors import InvalidLibrary
 
 
-def rows_of(document: Mapping[str, Any], key: str, *, label: str = "") -> list[Any]:
-    """The list at a key, empty if there is none; `label` stands before the key in messages."""
+def rows_of(document: Mapping[str, Any], key: str) -> list[Any]:
+    """The list at a key, empty if there is none."""
     found = document.get(key, [])
     if not isinstance(found, list):
-        raise InvalidLibrary(f"{label}{key}: got {found!r:.60}, need a list")
+        raise InvalidLibrary(f"{key}: got {found!r:.60}, need a list")
     return found
 
 
-def check_keys(label: str, entry: Any, *, known: tuple[str, ...], needed: tuple[str, ...]) -> None:
+def check_keys(label: str, entry: Any, *, known: Sequence[str], needed: Sequence[str]) -> None:
     """Refuse what is no object, has an unknown key, or lacks one."""
     if not isinstance(entry, dict):
         raise InvalidLibrary(f"{label}: got {entry!r:.60}, need an object")
@@ -54,6 +54,18 @@ def numbers_of(label: str, value: Any) -> Array:
     if not isinstance(value, list):
         raise InvalidLibrary(f"{label}: got {value!r:.60}, need a list of numbers")
     return np.array([number_of(label, item) for item in value], dtype=np.float64)
+
+
+def table_of(label: str, value: Any, *, width: int | None = None) -> Array:
+    """Rows (n, width) of numbers, at least one."""
+    if not isinstance(value, list) or not value:
+        raise InvalidLibrary(f"{label}: got {value!r:.60}, need a list of rows of numbers")
+    rows = [numbers_of(f"{label}[{k}]", row) for k, row in enumerate(value)]
+    width = rows[0].size if width is None else width
+    for k, row in enumerate(rows):
+        if row.size != width:
+            raise InvalidLibrary(f"{label}[{k}]: got {row.size} numbers, need {width}")
+    return np.array(rows, dtype=np.float64).reshape(len(rows), width)
 
 
 def listed(array: Array) -> list[float]:

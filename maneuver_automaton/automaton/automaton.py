@@ -15,15 +15,9 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, IntArray, as_array, vector_text
 from maneuver_automaton.errors import InvalidAutomaton, UnknownTrim
 from maneuver_automaton.models import Model
-from maneuver_automaton.primitives import (
-    Maneuver,
-    Trim,
-    connect_bang_bang,
-    strokes,
-    trims_of,
-    turns,
-)
-from maneuver_automaton.primitives.bang_bang import Pairs, differing, has_limited_rates
+from maneuver_automaton.primitives import Maneuver, Trim, trims_of
+from maneuver_automaton.primitives.bang_bang import Pairs, has_limited_rates
+from maneuver_automaton.primitives.quickest import quickest_maneuvers
 
 if TYPE_CHECKING:
     import networkx
@@ -116,8 +110,8 @@ class Automaton:
         *,
         pairs: Pairs = "neighbours",
         late: bool = False,
-        strokes_m: Sequence[float] = (),
-        turns_rad: Sequence[float] = (),
+        strokes: Sequence[float] = (),
+        turns: Sequence[float] = (),
         max_lateral_acceleration: float | None = None,
         leave_out: bool = False,
     ) -> Automaton:
@@ -138,9 +132,9 @@ class Automaton:
         late : bool
             Whether to add, where it differs, the maneuver that is as quick but changes late what
             has time.
-        strokes_m, turns_rad : sequences of float
-            Lengths [m] of strokes from rest to rest, ahead and, negative, back, from every rest;
-            angles [rad] of turns on the spot. See `strokes` and `turns`.
+        strokes, turns : sequences of float
+            Lengths of strokes [m] and angles of turns on the spot [rad], from rest to rest; see
+            `quickest_maneuvers`.
         max_lateral_acceleration : float, optional
             Greatest speed times turn rate of a trim [m/s^2]; no limit if None.
         leave_out : bool
@@ -160,7 +154,7 @@ class Automaton:
         >>> car = SecondOrderCar(wheelbase=2.8, max_steering=0.75, max_speed=2.5,
         ...                      max_acceleration=1.0, max_steering_rate=0.5)
         >>> grid = {"speed": [-2.5, 0.0, 2.5], "steering": [-0.75, 0.0, 0.75]}
-        >>> library = Automaton.of_model(car, grid, strokes_m=[-0.5, 0.5])
+        >>> library = Automaton.of_model(car, grid, strokes=[-0.5, 0.5])
         >>> len(library), len(library.maneuvers)
         (9, 46)
         """
@@ -173,15 +167,10 @@ class Automaton:
             )
         if not has_limited_rates(model):
             return cls(model, found.trims)
-        rests = [trim for trim in found.trims if trim.is_rest]
-        early = connect_bang_bang(model, found.trims, pairs=pairs)
-        others = connect_bang_bang(model, found.trims, pairs=pairs, late=True) if late else early
-        maneuvers = [*early, *differing(early, others)]
-        if strokes_m:
-            maneuvers += strokes(model, rests, strokes_m)
-        if turns_rad:
-            maneuvers += turns(model, rests, turns_rad)
-        return cls(model, found.trims, tuple(maneuvers))
+        maneuvers = quickest_maneuvers(
+            model, found.trims, pairs=pairs, late=late, strokes=strokes, turns=turns
+        )
+        return cls(model, found.trims, maneuvers)
 
     @classmethod
     def of_grid(cls, model: Model, axes: Sequence[ArrayLike]) -> Automaton:

@@ -16,15 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import write_text_atomically
-from maneuver_automaton.automaton._library_maneuvers import (
-    check_courses,
-    controls_of,
-    maneuver_entry,
-    maneuver_of,
-    with_courses,
-)
+from maneuver_automaton.automaton._library_maneuvers import driven, maneuver_entry, maneuver_of
 from maneuver_automaton.automaton._library_models import model_entry, model_of
 from maneuver_automaton.automaton._library_values import (
     check_keys,
@@ -35,6 +28,7 @@ from maneuver_automaton.automaton._library_values import (
     text_of,
 )
 from maneuver_automaton.automaton.automaton import Automaton
+from maneuver_automaton.automaton.courses import Inputs, is_reproduced, samples_entry
 from maneuver_automaton.errors import InvalidLibrary
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Trim
@@ -49,6 +43,8 @@ STEADY = 1e-8  # rates of the reduced state of a trim, in its units per second
 def automaton_hash(automaton: Automaton) -> str:
     """SHA-256, 64 hexadecimal digits, of model, trims and maneuvers; the name does not count.
 
+    Of a maneuver's course the inputs count; its samples follow from them.
+
     Examples
     --------
     >>> from maneuver_automaton.models import Unicycle
@@ -57,31 +53,33 @@ def automaton_hash(automaton: Automaton) -> str:
     >>> automaton_hash(robot) == automaton_hash(renamed)
     True
     """
-    return _hash(_content(automaton, [controls_of(one) for one in automaton.maneuvers]))
+    return _hash(_content(automaton, [None] * len(automaton.maneuvers)))
 
 
 def save_library(automaton: Automaton, path: Path | str) -> None:
     """Write an automaton to the file `path`, in one step.
 
-    Of a maneuver the controls are written, as rows of the time until which one holds and the
-    control; its course is driven again when it is read. Of a user's own model the names are
-    written, so that `load_library` can tell that it is given the right one.
+    Of a maneuver's course the inputs are written, along which it is driven again when it is read;
+    where they do not lead along it, its samples. Of a user's own model the names are written, so
+    that `load_library` can tell that it is given the right one.
 
     Raises
     ------
-    InvalidLibrary
-        If the course of a maneuver is not where its controls lead.
     OSError
         If the file cannot be written.
     """
-    controls = [controls_of(maneuver) for maneuver in automaton.maneuvers]
-    check_courses(automaton, controls)
-    content = _content(automaton, controls)
+    content = _content(automaton, [None] * len(automaton.maneuvers))
+    digest = _hash(content)
+    states = {trim.name: trim.reduced_state for trim in automaton.trims}
+    held = is_reproduced(automaton.model, states, automaton.maneuvers)
+    for entry, maneuver, flag in zip(content["maneuvers"], automaton.maneuvers, held, strict=True):
+        if maneuver.course is not None and not flag:
+            entry["samples"] = samples_entry(maneuver.course)
     head = {
         "format": FORMAT,
         "schema": SCHEMA,
         "name": automaton.name,
-        "hash": _hash(content),
+        "hash": digest,
         "model": content["model"],
     }
     lines = [f"  {json.dumps(key)}: {_json(value)}" for key, value in head.items()]
@@ -148,13 +146,13 @@ def _automaton_of(document: Any, own: Model | None) -> Automaton:
     trims = tuple(_trim(k, row) for k, row in enumerate(rows_of(document, "trims")))
     entries = enumerate(rows_of(document, "maneuvers"))
     stated = [maneuver_of(k, entry, model) for k, entry in entries]
-    maneuvers, controls = [one for one, _ in stated], [table for _, table in stated]
+    inputs = [one for _, one in stated]
     name = text_of("name", document.get("name", ""))
-    automaton = Automaton(model, trims, tuple(maneuvers), name=name)
-    _check_hash(document.get("hash"), _hash(_content(automaton, controls)))
+    automaton = Automaton(model, trims, tuple(maneuver for maneuver, _ in stated), name=name)
+    _check_hash(document.get("hash"), _hash(_content(automaton, inputs)))
     _check_limits(automaton)
     _check_trims(automaton)
-    return replace(automaton, maneuvers=with_courses(maneuvers, controls, automaton=automaton))
+    return replace(automaton, maneuvers=driven(automaton, inputs))
 
 
 def _check_hash(stated: Any, actual: str) -> None:
@@ -204,13 +202,14 @@ def _check_trims(automaton: Automaton) -> None:
         )
 
 
-def _content(automaton: Automaton, controls: Sequence[Array]) -> dict[str, Any]:
+def _content(automaton: Automaton, inputs: Sequence[Inputs | None]) -> dict[str, Any]:
+    """What a file says of an automaton; inputs of maneuvers whose course is not driven yet."""
     return {
         "model": model_entry(automaton.model),
         "trims": [_trim_entry(trim) for trim in automaton.trims],
         "maneuvers": [
-            maneuver_entry(maneuver, table)
-            for maneuver, table in zip(automaton.maneuvers, controls, strict=True)
+            maneuver_entry(maneuver, one)
+            for maneuver, one in zip(automaton.maneuvers, inputs, strict=True)
         ],
     }
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import group_of
 
 
@@ -47,22 +47,3 @@ class Trajectory:
         poses = (begin @ group.exp(share[..., None] * step)).pose
         at_end = (share == 1.0)[..., None]
         return np.where(at_end, self.pose[k + 1], poses)
-
-    def control_pieces(self) -> tuple[Array, Array]:
-        """Times (k,) until which one control holds [s], and these controls (k, n_u).
-
-        Examples
-        --------
-        >>> course = Trajectory(time=np.array([0.0, 1.0, 2.0]), pose=np.zeros((3, 3)),
-        ...                     reduced_state=np.zeros((3, 0)), control=np.array([[1.0], [2], [2]]))
-        >>> [values.tolist() for values in course.control_pieces()]
-        [[1.0, 2.0], [[1.0], [2.0]]]
-        """
-        begin = self.control_changes()
-        return np.append(self.time[begin[1:]], self.time[-1]), self.control[begin]
-
-    def control_changes(self) -> IntArray:
-        """Samples (k,) at which a control begins that differs from the one before."""
-        holds = self.control[:-1] if self.time.size > 1 else self.control
-        changed = (holds[1:] != holds[:-1]).any(axis=1)
-        return np.flatnonzero(np.append(True, changed)).astype(np.int64)

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from annotated_types import Ge
 from pydantic import AllowInfNan, BeforeValidator, Field, Strict
 
 from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.automaton._library_models import model_of as model_of_entry
 from maneuver_automaton.automaton.building import (
     Failure,
     LibraryBuild,
@@ -45,6 +46,13 @@ def _grid(value: Any) -> Any:
     return value
 
 
+def _mapping(value: Any) -> Any:
+    if not isinstance(value, dict):
+        raise need("a mapping with the key kind, and the parameters of this kind")
+    return value
+
+
+Mapped = Annotated[dict[str, Any], BeforeValidator(_mapping)]
 Grid = Annotated[
     dict[str, Annotated[tuple[Number, ...], Several("a list of numbers", at_least=1)]],
     BeforeValidator(_grid),
@@ -79,9 +87,12 @@ class ManeuversPart(Part):
 class LibraryFile(Part):
     """A library to be built: vehicle, trims, maneuvers."""
 
+    one_of: ClassVar = ("vehicle", "model")
+
     schema_version: Literal[1] = Field(alias="schema", description="1")
     library: Text = Field(description="what the library is called")
-    vehicle: VehiclePart = Field(description="a mapping {model, ...}")
+    vehicle: VehiclePart | None = Field(None, description="as in a scenario: {model, ...}")
+    model: Mapped | None = Field(None, description="as in a library file: {kind, ...}, SI units")
     trims: Grid = Field(description="a grid of trims, a mapping of names to lists of values")
     max_lateral_acceleration_m_s2: Positive | None = Field(
         None, description="what the tyres hold; left out: no limit"
@@ -162,8 +173,7 @@ def build_file_of_text(text: str, *, name: str) -> BuildFile:
     """
     document = parse(text, name=name, what="a build file")
     file = checked(document, LibraryFile)
-    with at(document, ("vehicle",)):
-        model = model_of(file.vehicle)
+    model = _model(document, file)
     with at(document, ("trims",)):
         found = trims_of(
             model, file.trims, max_lateral_acceleration=file.max_lateral_acceleration_m_s2
@@ -182,6 +192,14 @@ def build_file_of_text(text: str, *, name: str) -> BuildFile:
     )
     _check_maneuvers(document, asked)
     return asked
+
+
+def _model(document: Document, file: LibraryFile) -> Model:
+    if file.vehicle is not None:
+        with at(document, ("vehicle",)):
+            return model_of(file.vehicle)
+    with at(document, ("model",)):
+        return model_of_entry(file.model, own=None)
 
 
 def build(
@@ -231,8 +249,8 @@ def _made_at_once(asked: BuildFile) -> Automaton:
         asked.grid,
         pairs="neighbours" if part.pairs == "neighbours" else "all",
         late=part.late,
-        strokes_m=part.strokes_m,
-        turns_rad=part.turns_rad,
+        strokes=part.strokes_m,
+        turns=part.turns_rad,
         max_lateral_acceleration=asked.max_lateral_acceleration,
         leave_out=True,
     )

@@ -33,7 +33,12 @@ from maneuver_automaton.scenario.schema import (
     ScenarioFile,
     SearchPart,
 )
-from maneuver_automaton.scenario.shapes import footprint_of, obstacles_of, stated_footprint
+from maneuver_automaton.scenario.shapes import (
+    footprint_of,
+    obstacles_of,
+    stated_footprint,
+    zones_of,
+)
 from maneuver_automaton.scenario.vehicles import described, model_of
 
 MAX_GRID_TRIMS = 100_000
@@ -251,6 +256,9 @@ def _problem(
         _check_trim(document, (*where, "trim"), goal.trim, automaton)
     if file.bounds_m.z is not None and dof == 3:
         raise document.error(("bounds_m", "z"), f"the {automaton.model.name} has no height")
+    for k, zone in enumerate(file.zones):
+        for n, name in enumerate(zone.trims or ()):
+            _check_trim(document, ("zones", k, "trims", n), name, automaton)
     cost, horizon = _cost(document, file.cost, automaton), _horizon(document, file.horizon)
     with at(document, ()):
         return Problem(
@@ -266,6 +274,7 @@ def _problem(
             obstacles=obstacles,
             footprint=footprint,
             margin=file.margin_m,
+            zones=zones_of(document, file.zones),
         )
 
 

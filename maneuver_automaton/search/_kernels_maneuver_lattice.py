@@ -38,7 +38,8 @@ def cell_key(task, x, y, heading, z, trim, time):
     turn = (heading - task.frame_heading) / FULL_TURN
     k = math.floor((turn - math.floor(turn)) * task.headings + 0.5) % task.headings
     tick = math.floor(time / task.tick) & 0x7FF if task.tick > 0.0 else 0
-    return ((((trim * 2048 + tick) * 256 + level) * 128 + k) * 16384 + j) * 16384 + i
+    key = ((int(trim) * 2048 + tick) * 256 + level) * 128 + k
+    return (key * 16384 + j) * 16384 + i
 
 
 @inlined_kernel
@@ -187,7 +188,8 @@ def expand(search, task, lib, layers, grid, n, ceiling):
         state[PATIENCE] -= 1
         if state[PATIENCE] < 0:
             here = cost_to_go(task, grid, layers, x, y, z, trim)
-            state[PATIENCE] = int(min(here / task.per_shot, task.most_patience))
+            wait = min(here / task.per_shot, task.most_patience)
+            state[PATIENCE] = int(max(wait, task.least_patience))
             connect(search, task, lib, layers, node, ceiling, here)
             if state[FOUND] == 1 and task.stop_at_first:
                 return 1

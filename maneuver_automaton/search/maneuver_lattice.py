@@ -29,17 +29,18 @@ from maneuver_automaton.search.maneuver_word import (
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.search.transfer import TransferScratch
 
-FIRST_CHUNK = 256  # expansions
+FIRST_CHUNK = 128  # expansions
 MOST_CHUNK = 16384
 TIMELY = 256  # expansions between two looks at the clock
 SMALLEST = 4096  # nodes
 
 
-FIRST: tuple[tuple[int, Rung], ...] = (
-    # a pass begins when all passes together have expanded so many nodes, or are exhausted
-    (0, Rung(stop=True)),
-    (4000, Rung(scale=0.5, quanta=0.5, stop=True)),
-    (40000, Rung(scale=0.25, quanta=0.25, stop=True, margin=0.1)),
+FIRST: tuple[tuple[int, tuple[Rung, ...]], ...] = (
+    # after so many expansions of all passes together, or when all are exhausted
+    (0, (Rung(stop=True),)),
+    (300, (Rung(scale=0.5, quanta=0.5, stop=True), Rung(quanta=0.7, stop=True))),
+    (2000, (Rung(scale=0.25, quanta=0.25, stop=True), Rung(scale=0.5, quanta=0.7, stop=True))),
+    (40000, (Rung(scale=0.25, quanta=0.25, stop=True, margin=0.1),)),
 )
 LATER: tuple[Rung, ...] = (
     Rung(weight=1.5),
@@ -78,6 +79,14 @@ class ManeuverResult:
     def best(self) -> ManeuverWord | None:
         """The cheapest word, None if there is none."""
         return self.words[-1] if self.words else None
+
+
+class Heard(NamedTuple):
+    """What a search has to say: a better word, or how it ended."""
+
+    word: ManeuverWord | None
+    expansions: int
+    status: SearchStatus
 
 
 @dataclass(slots=True, eq=False)
@@ -159,10 +168,42 @@ def search_maneuvers(
     max_expansions: int | None = None,
     first_only: bool = False,
 ) -> ManeuverResult:
-    """Words from the start to a goal, each cheaper than the one before.
+    """Words from the start to a goal, each cheaper than the one before: see `maneuver_words`.
 
-    Passes of greater weight come first; later ones are pruned by the best word. What they find in
-    a number of expansions is the same at every call.
+    Returns
+    -------
+    ManeuverResult
+        EXHAUSTED without a word: none at these resolutions, which proves nothing.
+    """
+    begun = time.monotonic()
+    found: list[tuple[ManeuverWord, int, float]] = []
+    total, status = 0, SearchStatus.EXHAUSTED
+    for heard in maneuver_words(query, deadline=deadline, max_expansions=max_expansions):
+        total, status = heard.expansions, heard.status
+        if heard.word is not None:
+            found.append((heard.word, total, time.monotonic() - begun))
+            if first_only:
+                break
+    return ManeuverResult(
+        status=SearchStatus.FOUND if found else status,
+        words=tuple(word for word, _, _ in found),
+        found_after=tuple(n for _, n, _ in found),
+        found_s=tuple(s for _, _, s in found),
+        expansions=total,
+    )
+
+
+def maneuver_words(
+    query: ManeuverQuery,
+    *,
+    deadline: float = math.inf,
+    max_expansions: int | None = None,
+) -> Iterator[Heard]:
+    """Words from the start to a goal as they are found, each cheaper than the one before.
+
+    Passes of greater weight come first; every word is shortened, and later passes are pruned by the
+    best. What is found in a number of expansions is the same at every call; shortcuts are rounds
+    that are not counted. The last thing heard has no word.
 
     Parameters
     ----------
@@ -171,36 +212,24 @@ def search_maneuvers(
         Of `time.monotonic()` [s].
     max_expansions : int, optional
         Nodes of all passes together.
-    first_only : bool
-        Whether the first word will do.
-
-    Returns
-    -------
-    ManeuverResult
-        EXHAUSTED without a word: none at these resolutions, which proves nothing.
     """
-    begun = time.monotonic()
     room = 2**62 if max_expansions is None else max_expansions
-    grid = distance_grid(query.plane, query.window[0], query.seen_goals, query.seen_start)
-    word, total = _first(query, grid, room=room, deadline=deadline)
-    first = total
-    found: list[tuple[ManeuverWord, int, float]] = []
+
+    def ended(total: int) -> SearchStatus:
+        over = time.monotonic() >= deadline or total >= room
+        return SearchStatus.OUT_OF_BUDGET if over else SearchStatus.EXHAUSTED
+
+    own = query.around(query.parts[0], query.plane)
+    grid = distance_grid(own, query.window[0], query.seen_goals, query.seen_start)
+    word, first = _first(query, grid, room=room, deadline=deadline)
+    total = first
     if word is not None:
-        found.append((word, total, time.monotonic() - begun))
-        if not first_only:
-            for better, more in _better(query, grid, word, room=room - first, deadline=deadline):
-                if better is not None:
-                    found.append((better, first + more, time.monotonic() - begun))
-                total = first + more
-    ended = time.monotonic() >= deadline or total >= room
-    status = SearchStatus.OUT_OF_BUDGET if ended else SearchStatus.EXHAUSTED
-    return ManeuverResult(
-        status=SearchStatus.FOUND if found else status,
-        words=tuple(word for word, _, _ in found),
-        found_after=tuple(n for _, n, _ in found),
-        found_s=tuple(s for _, _, s in found),
-        expansions=total,
-    )
+        yield Heard(word, first, SearchStatus.FOUND)
+        for better, more in _better(query, grid, word, room=room - first, deadline=deadline):
+            total = first + more
+            if better is not None:
+                yield Heard(better, total, SearchStatus.FOUND)
+    yield Heard(None, total, ended(total))
 
 
 def plan_of(query: ManeuverQuery, word: ManeuverWord) -> Plan:
@@ -224,8 +253,8 @@ def _first(
     while total < room and time.monotonic() < deadline:
         alive = [one for one in passes if one.alive]
         if ladder and (not alive or total >= ladder[0][0]):
-            passes.append(pass_of(query, ladder.pop(0)[1], grid))
-            alive.append(passes[-1])
+            passes += [pass_of(query, rung, grid) for rung in ladder.pop(0)[1]]
+            alive = [one for one in passes if one.alive]
         if not alive:
             break
         for one in alive:

@@ -144,6 +144,10 @@ class ManeuverQuery:
         low, high = self.bounds.z
         return low - self.level - ROUNDED, high - self.level + ROUNDED
 
+    def around(self, part: Part, world: World) -> World:
+        """A world around one part."""
+        return replace(world, body=body_of(part.shapes))
+
     @property
     def moves(self) -> bool:
         """Whether an obstacle moves."""
@@ -193,7 +197,7 @@ class ManeuverQuery:
             for part in self.parts:
                 there = (SE2(pose[:3]) @ SE2(part.trim_poses[trim])).pose
                 for band in self.bands:
-                    own = replace(self._world_of(band.obstacles), body=body_of(part.shapes))
+                    own = self.around(part, self._world_of(band.obstacles))
                     aside = float(clearances(own, there, times=time)[0])
                     beside = band.gap(pose[3:] + self.level, self.body_height)[0]
                     gaps.append(max(aside, float(beside)))

@@ -18,7 +18,8 @@ from maneuver_automaton.search.maneuver_task import Rung, task_of, transfer_step
 from maneuver_automaton.search.maneuver_word import EDGE, TRIM, ManeuverWord, word_of
 
 MOST_POINTS = 32
-LEAST = 1e-6  # share of the cost that a shortcut has to save
+LEAST = 1e-5  # share of the cost that a shortcut has to save
+WORTH = 1e-3  # share that a round has to save for another one of its kind
 ROUNDS = 8
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
@@ -64,12 +65,12 @@ def shortened(
         for n in range(rounds):
             if time.monotonic() >= deadline:
                 return
-            cut = (GOLDEN * n) % 1.0
+            before, cut = best.cost, (GOLDEN * n) % 1.0
             better = _once(query, best, cut=cut, n_words=n_words, deadline=deadline)
             if better is not None:
                 best = better
                 yield best
-            elif n >= 1:
+            if n >= 1 and before - best.cost < WORTH * before:
                 break
 
 

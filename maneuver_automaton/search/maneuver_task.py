@@ -21,6 +21,7 @@ PATIENCE = 1.5  # a connection may cost so much more than the estimate ...
 SLACK = 6.0  # ... and so many times the way of a length scale
 SHOTS = 0.25  # of a length scale's cost between two transfers that are tried, times the estimate
 MOST_PATIENCE = 400.0  # expansions between two transfers
+WORDS_AN_EXPANSION = 150.0  # words of a transfer that take as long as an expansion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +56,8 @@ class Task(NamedTuple):
     per_metre: float
     per_climb: float
     per_shot: float
-    most_patience: float
+    most_patience: float  # expansions between two transfers
+    least_patience: float
     patience: float
     slack: float
     tries: int
@@ -104,6 +106,7 @@ def task_of(query: ManeuverQuery, rung: Rung) -> Task:
         per_climb=library.per_climb,
         per_shot=float(SHOTS * scale) or 1.0,
         most_patience=MOST_PATIENCE,
+        least_patience=float(query.transfer.arrays.n_few / WORDS_AN_EXPANSION),
         patience=PATIENCE,
         slack=float(SLACK * scale) or math.inf,
         tries=TRIES,

@@ -204,7 +204,7 @@ def test_a_library_of_a_model_in_one_call():
     # steering alone, and speed alone, have no late maneuver of their own
     both = Automaton.of_model(CAR, grid, late=True).maneuvers
     assert sum(m.name.endswith(", late") for m in both) == 16
-    strokes = Automaton.of_model(CAR, grid, strokes_m=[-1.0, 0.5]).maneuvers[40:]
+    strokes = Automaton.of_model(CAR, grid, strokes=[-1.0, 0.5]).maneuvers[40:]
     assert [m.name for m in strokes[:2]] == [
         "speed 0, steering -0.75, speed over -1",
         "speed 0, steering -0.75, speed over 0.5",

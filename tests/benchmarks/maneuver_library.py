@@ -11,7 +11,6 @@ import argparse
 import sys
 import tempfile
 import time
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import load_library, save_library
 from maneuver_automaton.models import SecondOrderCar, rollout
+from maneuver_automaton.primitives.resimulation import pieces
 
 CAR = SecondOrderCar(
     wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
@@ -32,9 +32,8 @@ def error(maneuver) -> float:
     """Distance of the displacement from that of the ODE solver."""
     course = maneuver.course
     state = np.concatenate([np.zeros(3), course.reduced_state[0]])
-    stops = [*course.control_changes().tolist(), course.time.size - 1]
-    for begin, end in pairwise(stops):
-        control, times = course.control[begin], course.time[[begin, end]]
+    for begin, end, control in pieces(course.time, course.control):
+        times = [begin, end]
         state = rollout(CAR, state, control=control, times=times, rtol=1e-12, atol=1e-13)[-1]
     return float(np.abs(state[:3] - maneuver.displacement).max())
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -21,7 +22,7 @@ from maneuver_automaton.search.maneuver_query import maneuver_query
 from maneuver_automaton.search.maneuver_shortcuts import word_is_free
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.search.transfer import transfer_library
-from tests.search.automata import inertial_unicycle
+from tests.search.automata import inertial_unicycle, linked, truck_with_trailer
 
 BODY = Box([0.5, 0.25])
 WALLS = (Obstacle(Box([0.2, 3.0], [1.5, -0.6])), Obstacle(Box([0.2, 3.0], [3.0, 1.4])))
@@ -40,35 +41,33 @@ def query(start=START, goal=GOAL, **changes):
     return maneuver_query(*library(), start, goal, start_trim="0 0", goal_trim="0 0", **settings)
 
 
-def least_gap(plan, obstacles, *, body=((BODY, np.zeros(3)),)):
+def least_gap(plan, obstacles, *, model=None, carried=()):
     """Least distance of dense poses from the obstacles, by shapely, at the times of the plan."""
     times = np.linspace(0.0, plan.duration, 4000)
     poses = plan.pose_at(times)
-    half = 0.5 * BODY.size
-    ring = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * half
-    corners = np.stack([np.asarray(SE2(poses).act(corner)) for corner in ring], axis=1)
-    vehicles = shapely.polygons(corners)
+    vehicles = [outlines(poses, BODY)]
+    if carried:
+        samples = plan.sample(max_step_m=0.01, max_step_rad=0.01)
+        state = np.interp(times, samples.time, samples.reduced_state[:, 0])[:, None]
+        there = (SE2(poses) @ SE2(model.part_poses(state)[:, 0])).pose
+        vehicles.append(outlines(there, carried[0]))
     gap = np.inf
     for obstacle in obstacles:
         box = obstacle.shape
-        around = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * 0.5 * box.size
-        around = np.asarray(SE2([*box.center, box.heading]).act(around))
-        if obstacle.motion is None:
-            there = shapely.polygons(np.asarray(around))
-        else:
-            knots = obstacle.motion
-            moved = np.stack(
-                [
-                    np.interp(times + plan.start_time, knots.time, knots.pose[:, k])
-                    for k in range(3)
-                ],
-                axis=1,
-            )
-            there = shapely.polygons(
-                np.stack([np.asarray(SE2(moved).act(corner)) for corner in around], axis=1)
-            )
-        gap = min(gap, float(shapely.distance(vehicles, there).min()))
+        place = SE2([*box.center, box.heading]).pose[None]
+        if obstacle.motion is not None:
+            knots, now = obstacle.motion, times + plan.start_time
+            columns = [np.interp(now, knots.time, knots.pose[:, k]) for k in range(3)]
+            place = (SE2(np.stack(columns, axis=1)) @ SE2(place)).pose
+        solid = outlines(place, Box(box.size))
+        gap = min(gap, *(float(shapely.distance(one, solid).min()) for one in vehicles))
     return gap
+
+
+def outlines(poses, box):
+    half = 0.5 * box.size
+    ring = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * half + box.center
+    return shapely.polygons(np.stack([np.asarray(SE2(poses).act(c)) for c in ring], axis=1))
 
 
 def off_goal(plan, goal):
@@ -79,7 +78,7 @@ def off_goal(plan, goal):
 
 def test_plans_are_exact_free_inside_and_cheaper_one_by_one():
     here = query()
-    result = search_maneuvers(here, max_expansions=3000)
+    result = search_maneuvers(here, max_expansions=600)
     assert result.status is SearchStatus.FOUND
     costs = [word.cost for word in result.words]
     assert costs == sorted(costs, reverse=True)
@@ -97,7 +96,7 @@ def test_plans_are_exact_free_inside_and_cheaper_one_by_one():
 
 
 def test_the_same_expansions_find_the_same_plan():
-    first, second = (search_maneuvers(query(), max_expansions=1500) for _ in range(2))
+    first, second = (search_maneuvers(query(), max_expansions=400) for _ in range(2))
     assert first.best.trims == second.best.trims
     assert first.best.durations.tolist() == second.best.durations.tolist()
     assert first.found_after == second.found_after
@@ -114,7 +113,7 @@ def test_a_moved_problem_has_the_moved_plan():
         goal_trim="0 0",
         obstacles=tuple(obstacle.moved(by) for obstacle in WALLS),
     )
-    here, there = (search_maneuvers(one, max_expansions=1500) for one in (still, moved))
+    here, there = (search_maneuvers(one, max_expansions=400) for one in (still, moved))
     assert here.best.trims == there.best.trims
     a, b = plan_of(still, here.best), plan_of(moved, there.best)
     assert np.abs(a.durations - b.durations).max() < 1e-7
@@ -165,7 +164,7 @@ def test_what_moves_is_let_pass():
         *library(), START, [4.0, 0.0, 0.0], start_trim="0 0", goal_trim="0 0",
         obstacles=(crossing,),
     )  # fmt: skip
-    result = search_maneuvers(here, max_expansions=20000)
+    result = search_maneuvers(here, max_expansions=2500)
     assert result.status is SearchStatus.FOUND
     for word in result.words:
         plan = plan_of(here, word)
@@ -174,14 +173,60 @@ def test_what_moves_is_let_pass():
         assert least_gap(plan, (crossing,)) > 0.0
 
 
-def test_a_limit_of_time_is_kept():
-    free = search_maneuvers(query(), max_expansions=2000).best
-    from dataclasses import replace
+def test_a_trailer_stays_free_too():
+    automaton, trailer = truck_with_trailer(levels=3), Box([0.3, 0.25])
+    parts = parts_of(automaton, (BODY,), ((trailer,),))
+    goal = np.array([3.0, 1.5, 1.0])
+    here = maneuver_query(
+        transfer_library(automaton), parts, START, goal,
+        start_trim="0 at 0.00", goal_trim="0 at 0.00",
+        obstacles=(Obstacle(Box([0.2, 3.0], [1.5, -1.0])), Obstacle(Box([0.2, 3.0], [3.5, 2.6]))),
+    )  # fmt: skip
+    result = search_maneuvers(here, max_expansions=600)
+    assert result.status is SearchStatus.FOUND
+    for word in result.words:
+        plan = plan_of(here, word)
+        assert off_goal(plan, goal) < 1e-12
+        assert abs(plan.sample().reduced_state[-1, 0]) < 1e-9
+        assert least_gap(plan, here.obstacles, model=automaton.model, carried=(trailer,)) > 0.0
 
+
+def test_a_trailer_wider_than_its_truck_does_not_close_the_way_of_the_truck():
+    automaton = truck_with_trailer(levels=3)
+    parts = parts_of(automaton, (Box([0.1, 0.1]),), ((Box([0.3, 0.6]),),))
+    beside = Obstacle(Box([0.1, 1.0], [0.1, 0.6]))  # nearer to the truck than half the trailer
+    here = maneuver_query(
+        transfer_library(automaton), parts, np.zeros(3), [0.2, 0.0, 0.0],
+        start_trim="0 at 0.00", goal_trim="0 at 0.00", obstacles=(beside,),
+    )  # fmt: skip
+    assert search_maneuvers(here, max_expansions=20, first_only=True).best is not None
+
+
+@pytest.mark.parametrize("height", [1.5, -0.5])
+def test_altitude_is_gained_on_the_way(height):
+    flying = [[0.0] * 4, [1.0, 0, 0, 0], [0.7, 0, 0.8, 0], [0.7, 0, -0.8, 0],
+              [0.8, 0, 0, 0.2], [0.0, 0, 0, 0.5], [0.0, 0, 0, -0.5]]  # fmt: skip
+    automaton = linked(flying, size=0.1)
+    towers = (Obstacle(Box([0.3, 3.0], [2.0, -0.8])), Obstacle(Box([0.3, 3.0], [4.0, 2.0])))
+    goal = np.array([6.0, 1.0, 1.0, height])
+    here = maneuver_query(
+        transfer_library(automaton), parts_of(automaton, (BODY,)), np.zeros(4), goal,
+        start_trim="t0", goal_trim="t0", obstacles=towers,
+    )  # fmt: skip
+    result = search_maneuvers(here, max_expansions=8000, first_only=True)
+    assert result.status is SearchStatus.FOUND
+    for word in result.words:
+        plan = plan_of(here, word)
+        assert off_goal(plan, goal) < 1e-12
+        assert word_is_free(here, word)
+
+
+def test_a_limit_of_time_is_kept():
+    free = search_maneuvers(query(), max_expansions=400).best
     short = replace(query(), most_time=free.duration * 1.1)
-    result = search_maneuvers(short, max_expansions=20000)
+    result = search_maneuvers(short, max_expansions=1500)
     assert all(word.duration <= free.duration * 1.1 for word in result.words)
-    none = search_maneuvers(replace(query(), most_time=3.0), max_expansions=20000)
+    none = search_maneuvers(replace(query(), most_time=3.0), max_expansions=1500)
     assert none.best is None
 
 
