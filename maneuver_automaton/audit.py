@@ -13,11 +13,12 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, wrapped
 from maneuver_automaton.automaton import Plan, Trajectory
 from maneuver_automaton.automaton.carried import carried
-from maneuver_automaton.collision import AnyObstacle, Shape
+from maneuver_automaton.collision import AnyObstacle, Obstacle, Shape, Zone
 from maneuver_automaton.collision.approach import Approach, closest_approach
 from maneuver_automaton.collision.blocked import too_close, touched_near
 from maneuver_automaton.collision.checker import origin_near
@@ -78,6 +79,7 @@ def audit_plan(
     body_height: tuple[float, float] = (0.0, 0.0),
     margin: float = 0.0,
     states: tuple[Array, Array] | None = None,
+    zones: tuple[Zone, ...] = (),
 ) -> Audit:
     """Drive a finished plan again with an ODE solver, and measure its distance to the obstacles.
 
@@ -101,13 +103,16 @@ def audit_plan(
         Distance to keep [m].
     states : two (n_z,) arrays, optional
         Reduced states in which it must begin and end.
+    zones : tuple of Zone
+        Where not every motion is admitted.
 
     Returns
     -------
     Audit
         ``passed`` if no sample is further than 1e-7 (relative to the way driven) from the solver's,
         the last pose is within 1e-9 of the goal, reduced states and controls keep the model's
-        limits, and no obstacle is touched or closer than the margin, to within 1 mm.
+        limits, no obstacle is touched or closer than the margin, to within 1 mm, and no zone is
+        entered with a motion that it does not admit.
         ``min_clearance_m`` is the least distance measured, between poses it is at most a tenth
         less; None without obstacles.
     """
@@ -138,6 +143,7 @@ def audit_plan(
         if not least.distance > too_close(margin):
             what = f"the {name}: " if name else ""
             reasons.append(what + _what_is_hit(moving, scene, least.time))
+    reasons += _zones_broken(near, model, footprint, zones, place)
     return Audit(
         passed=not reasons,
         max_dynamics_defect=defect,
@@ -361,6 +367,70 @@ def _what_is_hit(plan: Plan, scene: _Scene, time: float) -> str:
         origin=scene.origin,
     )
     return f"at {scene.clock + time:.6g} s {what}"
+
+
+def _zones_broken(
+    plan: Plan, model: Model, footprint: tuple[Shape, ...], zones: tuple[Zone, ...], place: Array
+) -> list[str]:
+    """Which zones a plan is in while it moves as they do not admit."""
+    reasons: list[str] = []
+    if not (zones and plan.primitives):
+        return reasons
+    pieces = _pieces_of(plan)
+    if not pieces.lengths.size:
+        return reasons
+    times = np.concatenate([[0.0], np.cumsum(pieces.lengths)])
+    group, dof = group_of(plan.start.size), plan.start.size
+    steps = (group(pieces.begins).inverse() @ group(pieces.ends)).log().reshape(-1, dof)
+    rates = fastest_point(parts_of(footprint), steps[:, :3] / pieces.lengths[:, None])
+    moving = [
+        model.body_velocity(states, pieces.controls)
+        for states in (pieces.states, pieces.end_states)
+    ]
+    for zone in zones:
+        admitted = zone.admits(moving[0]) & zone.admits(moving[1])
+        admitted &= _named(plan, zone, 0.5 * (times[:-1] + times[1:]))
+        where = (Obstacle(zone.shape),)
+        scene = _Scene(footprint, where, 0.0, origin_near(place), place, 0.0, (0.0, 0.0))
+        least = _closest_while(plan, scene, times, rates, ~admitted)
+        if not least.distance > too_close(0.0):
+            reasons.append(
+                f"at {least.time:.6g} s the vehicle moves as {zone.words} does not admit"
+            )
+    return reasons
+
+
+def _named(plan: Plan, zone: Zone, times: Array) -> NDArray[np.bool_]:
+    """Whether the names of what is driven at `times` (n,) are admitted in a zone."""
+    index = np.searchsorted(plan.switching_times[1:-1], times, side="right")
+    known = [
+        zone.admits_names([one.name] if isinstance(one, Trim) else [one.source, one.target])
+        for one in plan.primitives
+    ]
+    return np.array(known, dtype=np.bool_)[index]
+
+
+def _closest_while(
+    plan: Plan, scene: _Scene, times: Array, rates: Array, counted: NDArray[np.bool_]
+) -> Approach:
+    """When the plan is closest, in the stretches between `times` (n + 1,) that are `counted`."""
+    around, body = surroundings_of(scene.obstacles, scene.origin), parts_of(scene.footprint)
+
+    def distances(when: Array) -> Array:
+        return around.nearest(body, scene.seen(plan, when), when).distance
+
+    least = Approach(0.0, math.inf)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], counted, [False]]).astype(np.int8)))
+    for first, last in edges.reshape(-1, 2):
+        near = closest_approach(
+            distances,
+            times[first : last + 1],
+            rates[first:last],
+            resolution=CLEARANCE_TOLERANCE,
+            enough=too_close(0.0),
+        )
+        least = min(least, near, key=lambda one: one.distance)
+    return least
 
 
 def _seen_from(plan: Plan, goal: Goal) -> Plan:

@@ -13,7 +13,14 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, freeze
 from maneuver_automaton.automaton import Automaton, Plan, Primitive
-from maneuver_automaton.collision import AnyObstacle, Obstacle, Shape, as_footprint, as_obstacles
+from maneuver_automaton.collision import (
+    AnyObstacle,
+    Obstacle,
+    Shape,
+    Zone,
+    as_footprint,
+    as_obstacles,
+)
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.groups import SE2, LieGroup, SE2xR
 from maneuver_automaton.models import Model
@@ -159,6 +166,7 @@ class Problem:
     parts: Mapping[str, tuple[Shape, ...]] = field(default_factory=dict, kw_only=True)  # carried
     body_height: tuple[float, float] = field(default=(0.0, 0.0), kw_only=True)  # [m] about z
     margin: float = field(default=0.0, kw_only=True)  # [m] distance kept from every obstacle
+    zones: tuple[Zone, ...] = field(default=(), kw_only=True)  # where not every motion is admitted
 
     if TYPE_CHECKING:  # numbers, group elements, one goal or several will do
 
@@ -179,6 +187,7 @@ class Problem:
             parts: Mapping[str, Shape | Sequence[Shape]] = ...,
             body_height: tuple[float, float] = (0.0, 0.0),
             margin: float = 0.0,
+            zones: Sequence[Zone] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -214,6 +223,10 @@ class Problem:
             raise ValueError(
                 f"body_height must be [low, high] with low <= high, got {self.body_height} m"
             )
+        object.__setattr__(self, "zones", tuple(self.zones))
+        for zone in self.zones:
+            for trim in zone.trims or ():
+                self.automaton.index_of(trim)
         if not (math.isfinite(self.margin) and self.margin >= 0.0):
             raise ValueError(f"margin must be a number of at least 0, got {self.margin} m")
         if not self.automaton.is_kinematic:
@@ -315,7 +328,7 @@ class Problem:
         return np.asarray(rows[np.append(True, signs[1:] != signs[:-1])])
 
     def moved(self, by: LieGroup) -> Problem:
-        """The problem moved by the group element `by`, obstacles too; bounds must be open."""
+        """The problem moved by the group element `by`, all around it too; bounds must be open."""
         if any(getattr(self.bounds, name) is not None for name in ("x", "y", "z")):
             raise ValueError("problem: bounds do not move with the symmetry")
         group = type(by)
@@ -324,6 +337,7 @@ class Problem:
             start=(by @ group(self.start)).pose,
             goals=tuple(replace(goal, pose=(by @ group(goal.pose)).pose) for goal in self.goals),
             obstacles=tuple(obstacle.moved(by) for obstacle in self.obstacles),
+            zones=tuple(zone.moved(by) for zone in self.zones),
         )
 
     @property

@@ -49,6 +49,9 @@ from maneuver_automaton.analysis.suboptimality import continuous_index as contin
 from maneuver_automaton.analysis.suboptimality import discrete_index as discrete_index
 from maneuver_automaton.analysis.symmetry import check_flow as check_flow
 from maneuver_automaton.analysis.symmetry import check_vector_field as check_vector_field
+from maneuver_automaton.analysis.turnpike import Turnpike as Turnpike
+from maneuver_automaton.analysis.turnpike import TurnpikeCase as TurnpikeCase
+from maneuver_automaton.analysis.turnpike import turnpike as turnpike
 from maneuver_automaton.analysis.unit_cost import unit_cost as unit_cost
 from maneuver_automaton.refinement.effort import EffortReport as EffortReport
 from maneuver_automaton.refinement.effort import effort_report as effort_report

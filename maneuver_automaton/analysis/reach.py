@@ -15,6 +15,7 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.primitives import Maneuver, Trim
 
+EVEN = 16  # the number of bins of headings is a multiple: usual headings lie within, not between
 MEASURES = ("time", "length")
 SHORTEST = 1e-9  # of the greatest cost: steps that cost less are not taken
 
@@ -27,7 +28,7 @@ class ReachSettings:
     most: float = 8.0  # greatest cost of a word [s or m]
     quantum: float = 0.5  # trims last a multiple of what costs this [s or m]
     same_m: float = 0.02  # poses of one trim in one cell of this side count as one
-    same_rad: float = 0.02  # [rad]
+    same_rad: float = 0.02  # [rad], or a little less
     most_nodes: int = 100_000
 
     def __post_init__(self) -> None:
@@ -177,7 +178,7 @@ class _Nodes:
 
     def keys(self, settings: ReachSettings) -> IntArray:
         """One number for each cell and class."""
-        bins = max(1, round(2.0 * math.pi / settings.same_rad))
+        bins = EVEN * math.ceil(2.0 * math.pi / (EVEN * settings.same_rad))
         x, y = np.round(self.poses[:, :2].T / settings.same_m).astype(np.int64)
         heading = np.mod(np.round(self.poses[:, 2] * bins / (2.0 * math.pi)).astype(np.int64), bins)
         wide = 1 << 20

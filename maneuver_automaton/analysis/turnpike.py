@@ -62,7 +62,7 @@ def turnpike(
     target: Trim,
     stage_cost: RunningCost,
     coasts: Sequence[float],
-    distance: float = 0.05,
+    distance: float = 0.1,
     step: float = 0.1,
     settings: SolverSettings | None = None,
 ) -> Turnpike:

@@ -29,6 +29,7 @@ from maneuver_automaton.automaton.courses import (
 from maneuver_automaton.errors import InvalidLibrary
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Maneuver, Trajectory
+from maneuver_automaton.primitives.maneuver import CLOSED
 
 WITHIN = 1e-9  # by which share of its size, at least 1, a value may exceed a limit
 NEEDED = ("name", "source", "target", "displacement", "duration")
@@ -104,7 +105,7 @@ def _inputs(label: str, entry: Any, model: Model, duration: float) -> Inputs:
             f"{label}: until: got {until.tolist()!r:.60}, need {len(control)} rising times, one "
             "for each control"
         )
-    if until[-1] != duration:
+    if not abs(until[-1] - duration) <= CLOSED * max(1.0, duration):
         raise InvalidLibrary(
             f"{label}: until: ends with {until[-1]} s, need the duration {duration} s"
         )

@@ -50,7 +50,7 @@ def even_times(duration: float, count: int) -> Array:
     >>> even_times(3.0, 2).tolist()
     [1.5, 3.0]
     """
-    return duration * np.arange(1, count + 1) / max(count, 1)
+    return duration * (np.arange(1, count + 1) / max(count, 1))  # the last one is the duration
 
 
 def is_reproduced(

@@ -80,10 +80,11 @@ class ArocDeviation:
 
     def __str__(self) -> str:
         """One line for people."""
+        plural = "" if self.added == 1 else "s"
         return (
             f"driven with the inputs of the files, motions are at most {self.position:.2g} m, "
             f"{self.heading:.2g} rad and {self.speed:.2g} m/s off their states ({self.worst}); "
-            f"{self.added} pairs may follow each other that AROC does not let follow"
+            f"{self.added} pair{plural} may follow each other that AROC does not let follow"
         )
 
 

@@ -92,8 +92,9 @@ class Deviation:
 
     def __str__(self) -> str:
         """One line for people."""
+        many = "primitive is" if self.beyond == 1 else "primitives are"
         return (
-            f"driven with controls that are constant in each step, {self.beyond} primitives are "
+            f"driven with controls that are constant in each step, {self.beyond} {many} "
             f"more than {LARGE:g} m or rad off their states; at most {self.position:.2g} m and "
             f"{self.heading:.2g} rad (primitive {self.worst + 1}); their ends were moved by "
             f"{self.speed:.2g} m/s and {self.steering:.2g} rad to meet"

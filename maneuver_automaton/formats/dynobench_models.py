@@ -213,9 +213,10 @@ _MAKERS: Mapping[str, Callable[[str, Document, Sequence[Array]], StatedVehicle]]
 
 
 def _with(levels: Array, values: Array) -> Array:
-    """Levels and values, rising; a value next to a level takes its place."""
-    kept = levels[(np.abs(levels[:, None] - values) > NEXT_TO).all(axis=1)]
-    return np.unique(np.concatenate([kept, values])) + 0.0
+    """Levels and the values among them, rising; a value next to a level takes its place."""
+    within = values[(values >= levels.min()) & (values <= levels.max())]
+    kept = levels[(np.abs(levels[:, None] - within) > NEXT_TO).all(axis=1)]
+    return np.unique(np.concatenate([kept, within])) + 0.0
 
 
 def _model_file(path: Path, name: str) -> Path | None:

@@ -122,10 +122,7 @@ def primitives_of(controls: Array, states: Array) -> list[dict[str, Any]]:
         return []
     changes = np.flatnonzero((np.abs(np.diff(controls, axis=0)) > SAME).any(axis=1)) + 1
     bounds = [0, *changes.tolist(), len(controls)]
-    return [
-        _primitive(controls[a], states[a], b - a)
-        for a, b in itertools.pairwise(bounds)
-    ]
+    return [_primitive(controls[a], states[a], b - a) for a, b in itertools.pairwise(bounds)]
 
 
 def library_hash(library: RoadLibrary) -> str:

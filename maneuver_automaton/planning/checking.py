@@ -11,14 +11,16 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.audit import Audit, audit_plan
-from maneuver_automaton.automaton import Plan, Primitive
+from maneuver_automaton.automaton import Automaton, Plan, Primitive
 from maneuver_automaton.automaton.carried import carried
-from maneuver_automaton.collision import AnyObstacle, Shape
+from maneuver_automaton.collision import AnyObstacle, Box, Shape
 from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.collision.fcl_checker import FclChecker
 from maneuver_automaton.collision.heights import Layer, layers_of
 from maneuver_automaton.collision.surroundings import surroundings_of
 from maneuver_automaton.groups import group_of
+from maneuver_automaton.models import Unicycle
+from maneuver_automaton.planning.zones import what_zone_forbids
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.inside import stays_inside
@@ -43,7 +45,7 @@ def check_plan(problem: Problem, plan: Plan, goal: Goal) -> Checked:
     """Bounds, FCL, audit, in this order; the first that fails ends it."""
     if not stays_inside(plan, problem.bounds):
         return Checked(inside=False, free=True, audit=None, reason="it leaves the bounds")
-    hit = _hit(problem, plan, goal)
+    hit = what_is_hit(problem, plan, goal)
     if hit:
         return Checked(inside=True, free=False, audit=None, reason=hit)
     audit = audit_plan(
@@ -56,6 +58,7 @@ def check_plan(problem: Problem, plan: Plan, goal: Goal) -> Checked:
         body_height=problem.body_height,
         margin=problem.margin,
         states=_end_states(problem, goal),
+        zones=problem.zones,
     )
     return Checked(inside=True, free=True, audit=audit, reason=audit.reason)
 
@@ -66,6 +69,15 @@ def load_checks(problem: Problem) -> None:
     for layer in layers_of(problem.obstacles, in_space=problem.start.size > 3):
         checker_of(problem.footprint, layer.obstacles, problem.margin, origin)
         surroundings_of(layer.obstacles, origin)
+
+
+@functools.cache
+def load_checking() -> None:
+    """Import what checks: the ODE solver, shapely, FCL."""
+    ahead = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0)})
+    wall = Box([1.0, 1.0], [5.0, 5.0])
+    problem = Problem(ahead, [0, 0, 0], [1, 0, 0], obstacles=wall, footprint=Box([0.1, 0.1]))
+    check_plan(problem, Plan([0, 0, 0], ahead.trims, durations=[1.0]), problem.goals[0])
 
 
 @functools.lru_cache(maxsize=4)
@@ -79,10 +91,11 @@ def checker_of(
     return FclChecker(footprint, obstacles, margin=margin, origin=origin)
 
 
-def _hit(problem: Problem, plan: Plan, goal: Goal) -> str:
-    """Which edge hits what by FCL; empty if none does."""
-    if not problem.obstacles:
-        return ""
+def what_is_hit(problem: Problem, plan: Plan, goal: Goal) -> str:
+    """Which edge hits what, or what a zone does not admit, by FCL; empty if none does."""
+    forbidden = what_zone_forbids(problem, plan, _origin(goal)) if problem.zones else ""
+    if forbidden or not problem.obstacles:
+        return forbidden
     bodies = [("", plan, problem.footprint)]
     for name, shapes in problem.parts.items():
         bodies.append((f"the {name}: ", carried(plan, problem.automaton.model, name), shapes))

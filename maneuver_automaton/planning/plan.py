@@ -9,6 +9,7 @@ from maneuver_automaton.planning.among_obstacles import (
     plan_on_lattice,
     prepare_map,
 )
+from maneuver_automaton.planning.among_zones import plan_among_zones
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.free_space import plan_by_words
 from maneuver_automaton.planning.result import PlanResult
@@ -53,13 +54,23 @@ def plan(problem: Problem, *, time_limit: float = 5.0, alternatives: int = 0) ->
         raise ValueError(f"time_limit must be positive, got {time_limit} s")
     if alternatives < 0:
         raise ValueError(f"alternatives must be at least 0, got {alternatives}")
-    among = uses_lattice(problem)
     _load(problem)
     began = time.monotonic()
     blocked = blocked_ends(problem)
     if blocked is not None:
         return blocked
-    kinematic = plan_on_lattice if among else plan_by_words
+    if problem.zones:
+        return plan_among_zones(
+            problem, _searched, began=began, time_limit=time_limit, alternatives=alternatives
+        )
+    return _searched(problem, began=began, time_limit=time_limit, alternatives=alternatives)
+
+
+def _searched(
+    problem: Problem, /, *, began: float, time_limit: float, alternatives: int
+) -> PlanResult:
+    """The answer of the search that suits a problem without zones."""
+    kinematic = plan_on_lattice if uses_lattice(problem) else plan_by_words
     how = plan_with_inertia if has_inertia(problem) else kinematic
     return how(problem, began=began, time_limit=time_limit, alternatives=alternatives)
 
@@ -76,7 +87,7 @@ def _load(problem: Problem) -> None:
     if has_inertia(problem):
         load_inertia(problem)
         return
-    if problem.obstacles or uses_lattice(problem):
+    if problem.obstacles or problem.zones or uses_lattice(problem):
         load_lattice()
     if uses_lattice(problem):
         library_table(problem)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import importlib.util
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,8 +14,8 @@ from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Model, SecondOrderCar, SecondOrderUnicycle
-from maneuver_automaton.optimal_control import Guess
-from maneuver_automaton.optimal_control.polishing import PolishSettings, intervals_for
+from maneuver_automaton.optimal_control import Guess, PolishSettings, has_casadi, load_casadi
+from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.problem import Components, RunningCost
 from maneuver_automaton.optimal_control.separation import BodyPart
 from maneuver_automaton.problem import Problem, moves
@@ -41,6 +40,7 @@ from maneuver_automaton.refinement.polish import (
     PolishTask,
     polish_guesses,
 )
+from maneuver_automaton.search.cost_to_go import cost_to_go_table
 
 POINT = ((np.zeros((1, 2)), 0.0),)  # the body of a vehicle without a footprint
 SEQUENCES_SHARE = 0.2  # of the time, for kinematic plans that differ
@@ -67,9 +67,16 @@ def why_not_polished(problem: Problem) -> str:
         return "time costs nothing"
     if problem.horizon.time is not None:
         return "the time is fixed"
-    if importlib.util.find_spec("casadi") is None:
+    if not has_casadi():
         return "CasADi is not installed"
     return ""
+
+
+def load_polishing(problem: Problem) -> None:
+    """Have ready what polishing needs: the solver, and tables of the kinematic libraries."""
+    load_casadi()
+    for library in _libraries_of(problem.automaton.model)[0]:
+        cost_to_go_table(replace(kinematic_problem(problem, switch=0.0), automaton=library))
 
 
 def guesses_along_paths(problem: Problem, *, time_limit: float) -> Iterator[Aimed]:
@@ -87,9 +94,16 @@ def guesses_along_paths(problem: Problem, *, time_limit: float) -> Iterator[Aime
         lambda plan: timed(plan, pace).duration,
         time_limit=time_limit,
     ):
-        seen = replace(drive.plan, start=np.zeros(problem.start.size), start_time=0.0)
-        off = [sum(goal.off(drive.plan.end)) for goal in problem.goals]
-        yield Aimed(_guess_along(model, seen), int(np.argmin(off)))
+        yield guess_along(problem, drive.plan)
+
+
+def guess_along(problem: Problem, path: Plan) -> Aimed:
+    """A guess along a kinematic plan, seen from its start, and the goal where it ends."""
+    model = problem.automaton.model
+    seen = replace(path, start=np.zeros(problem.start.size), start_time=0.0)
+    how = car_guess if isinstance(model, SecondOrderCar) else unicycle_guess
+    off = [sum(goal.off(path.end)) for goal in problem.goals]
+    return Aimed(how(model, seen, intervals=_intervals()), int(np.argmin(off)))  # type: ignore[arg-type]
 
 
 def guess_of_plan(plan: Plan) -> Guess:
@@ -197,13 +211,6 @@ def _libraries_of(model: Model) -> tuple[list[Automaton], Pace]:
         unicycle_library, max_speed=model.max_speed, max_turn_rate=model.max_turn_rate
     )
     return [robot(share=share) for share in TURNS], pace_of_unicycle(model)
-
-
-def _guess_along(model: Model, path: Plan) -> Guess:
-    if isinstance(model, SecondOrderCar):
-        return car_guess(model, path, intervals=_intervals())
-    assert isinstance(model, SecondOrderUnicycle)
-    return unicycle_guess(model, path, intervals=_intervals())
 
 
 def _intervals() -> Callable[[float], int]:

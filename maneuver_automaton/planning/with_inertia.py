@@ -15,12 +15,14 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.among_obstacles import library_table
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import lattice_bound
-from maneuver_automaton.planning.checking import check_plan, load_checks
+from maneuver_automaton.planning.checking import check_plan, load_checking, load_checks
 from maneuver_automaton.planning.polishing import (
     SEQUENCES_SHARE,
     Aimed,
+    guess_along,
     guess_of_plan,
     guesses_along_paths,
+    load_polishing,
     polish_plans,
     why_not_polished,
 )
@@ -33,12 +35,14 @@ from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
 from maneuver_automaton.search import SearchStatus
 from maneuver_automaton.search.lattice_query import lattice_query
-from maneuver_automaton.search.maneuver_lattice import plan_of, search_maneuvers
+from maneuver_automaton.search.maneuver_lattice import maneuver_words, plan_of
 from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
+from maneuver_automaton.search.maneuver_ready import load_maneuver_kernels
 
 FIRST_SHARE = 0.8  # of the time limit, for a first path
 IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
 MANEUVER_SHARE = 0.2  # of what is left, for words of maneuvers where there is a plan already
+ONLY_MANEUVERS_SHARE = 0.4  # of what is left, where there is none; the rest is for polishing
 AT_ONCE = Patience(attempts=0, passes=0)
 
 
@@ -55,6 +59,7 @@ def plan_with_inertia(
         if time.monotonic() >= heard.deadline:
             break
     _polish(heard)
+    heard.searched = heard.searched or time.monotonic()
     timing = {
         "search": heard.searched - began,
         "first_plan": heard.improvements[0][0] if heard.improvements else math.nan,
@@ -94,6 +99,7 @@ class _Heard:
     refused: str = ""
     reason: str = ""
     enclosed: str = ""  # why no plan can exist
+    paths: list[Aimed] = field(default_factory=list)  # guesses along kinematic plans
 
     @property
     def left(self) -> float:
@@ -144,7 +150,10 @@ def _candidates(heard: _Heard) -> Iterator[tuple[Plan, int]]:
     if along:
         yield from _along_paths(heard)
     if problem.automaton.maneuvers:
-        yield from _over_maneuvers(heard, MANEUVER_SHARE if heard.accepted else 1.0)
+        share = MANEUVER_SHARE if heard.accepted else ONLY_MANEUVERS_SHARE
+        yield from _over_maneuvers(heard, 1.0 if why_not_polished(problem) else share)
+        if not heard.accepted:
+            yield from _over_maneuvers(heard, 1.0)
 
 
 def _polish(heard: _Heard) -> None:
@@ -156,7 +165,7 @@ def _polish(heard: _Heard) -> None:
     if _rests(problem):
         share = SEQUENCES_SHARE * heard.left
         along = list(guesses_along_paths(problem, time_limit=share))
-        aimed = along or aimed
+        aimed = along or [*heard.paths, *aimed]
     for goal_index in dict.fromkeys(one.goal_index for one in aimed):
         if heard.left <= 0.0:
             return
@@ -177,17 +186,13 @@ def _over_maneuvers(heard: _Heard, share: float) -> Iterator[tuple[Plan, int]]:
     query = maneuver_problem_query(problem, goals)
     most = problem.search.max_expansions
     until = time.monotonic() + share * heard.left
-    if not heard.accepted:
-        found = search_maneuvers(query, deadline=until, max_expansions=most, first_only=True)
-        heard.counts["expansions"] += found.expansions
-        if found.best is not None:
-            yield plan_of(query, found.best), goals[found.best.goal]
-        elif found.status is SearchStatus.EXHAUSTED:
+    before = heard.counts["expansions"]
+    for found in maneuver_words(query, deadline=until, max_expansions=most):
+        heard.counts["expansions"] = before + found.expansions
+        if found.word is not None:
+            yield plan_of(query, found.word), goals[found.word.goal]
+        elif found.status is SearchStatus.EXHAUSTED and not heard.accepted:
             heard.reason = "; none over trims and maneuvers at any resolution tried"
-    found = search_maneuvers(query, deadline=until, max_expansions=most)
-    heard.counts["expansions"] += found.expansions
-    for word in reversed(found.words):
-        yield plan_of(query, word), goals[word.goal]
 
 
 def _along_paths(heard: _Heard) -> Iterator[tuple[Plan, int]]:
@@ -200,6 +205,7 @@ def _along_paths(heard: _Heard) -> Iterator[tuple[Plan, int]]:
         heard.reason = f" ({first.reason})" if first.reason else ""
         return
     yield _stopping(problem, first.plan, first.goal_index), first.goal_index
+    heard.paths.append(guess_along(problem, first.plan))
     left = IMPROVED_SHARE * heard.left
     better = heard.count(track(kinematic_problem(problem), time_limit=left, known=first.plan))
     if better.plan is not None and better.goal_index is not None:
@@ -218,8 +224,13 @@ def _stopping(problem: Problem, path: Plan, goal_index: int) -> Plan:
 def load_inertia(problem: Problem) -> None:
     """Compile or load what `plan_with_inertia` needs, before the clock runs."""
     load_lattice()
+    load_checking()
     if follows_paths(problem.automaton.model) and _rests(problem):
         library_table(kinematic_problem(problem, switch=0.0))
+        if not why_not_polished(problem):
+            load_polishing(problem)
+    if problem.automaton.maneuvers:
+        load_maneuver_kernels()
 
 
 def _rests(problem: Problem) -> bool:

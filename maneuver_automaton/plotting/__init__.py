@@ -54,3 +54,4 @@ from maneuver_automaton.plotting.stability import draw_growth as draw_growth
 from maneuver_automaton.plotting.stability import draw_indices as draw_indices
 from maneuver_automaton.plotting.stability import draw_loops as draw_loops
 from maneuver_automaton.plotting.stability import save_stability_figure as save_stability_figure
+from maneuver_automaton.plotting.turnpike import save_turnpike_figure as save_turnpike_figure

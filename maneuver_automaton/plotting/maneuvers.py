@@ -22,7 +22,7 @@ from maneuver_automaton.primitives import Maneuver
 
 MOST_SINGLE = 48  # maneuvers that have a panel each
 MOST_PANELS = 120
-PANEL, TITLE, GAP = 1.35, 0.34, 0.16  # [in]
+PANEL, TITLE, GAP, EDGE = 1.35, 0.34, 0.2, 0.34  # [in]
 COLUMNS = 8
 NAME_LENGTH = 25
 FULL_COLOR = 0.6  # [rad] of a change of heading
@@ -92,13 +92,13 @@ def save_maneuvers_figure(automaton: Automaton, path: str | Path) -> None:
     left_out, panels = len(panels) - MOST_PANELS, panels[:MOST_PANELS]
     columns = min(COLUMNS, len(panels))
     rows = math.ceil(len(panels) / columns)
-    top, width = 0.62, max(columns * (PANEL + GAP) + GAP, 4.2)
+    top, width = 0.62, max(columns * (PANEL + GAP) - GAP + 2.0 * EDGE, 4.8)
     figure = new_figure(width, top + rows * (PANEL + TITLE + GAP) + 0.1)
     high = float(figure.get_size_inches()[1])
     for k, (title, maneuvers) in enumerate(panels):
         row, column = divmod(k, columns)
         ax = axes_at(
-            figure, left=GAP + column * (PANEL + GAP),
+            figure, left=EDGE + column * (PANEL + GAP),
             bottom=high - top - (row + 1) * (PANEL + TITLE + GAP) + GAP, width=PANEL, height=PANEL,
         )  # fmt: skip
         draw_maneuvers(ax, maneuvers)
@@ -114,7 +114,7 @@ def save_maneuvers_figure(automaton: Automaton, path: str | Path) -> None:
         (f"{name}: {_count(automaton)}", 10.0, "bold"),
         (legend + more, SMALL_PT, "normal"),
     ]
-    heading_text(figure, lines, left=GAP)
+    heading_text(figure, lines, left=EDGE)
     write_figure(figure, path)
 
 

@@ -31,3 +31,4 @@ from maneuver_automaton.receding_horizon.unconstrained_loop import (
 from maneuver_automaton.receding_horizon.unconstrained_loop import (
     simulate_unconstrained as simulate_unconstrained,
 )
+from maneuver_automaton.receding_horizon.with_maneuvers import ManeuverHorizon as ManeuverHorizon

@@ -110,6 +110,10 @@ class RecedingHorizon:
         look_ahead: float = 60.0,
         stand: float = 2.0,
     ) -> None:
+        if problem.zones:
+            raise ValueError(
+                "receding horizon: this controller knows no zones; ManeuverHorizon does"
+            )
         settings = Settings(
             step=step,
             margin=margin,

@@ -10,9 +10,11 @@ import numpy as np
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.audit import Audit, audit_plan
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.cutting import NOTHING, tail_of
 from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.collision.blocked import too_close
 from maneuver_automaton.groups import group_of
+from maneuver_automaton.planning.plan import has_inertia
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.controller import RecedingHorizon
@@ -23,6 +25,7 @@ from maneuver_automaton.receding_horizon.disturbance import (
     draws,
 )
 from maneuver_automaton.receding_horizon.log import ClosedLoop, Guarantee, Step, Violation
+from maneuver_automaton.receding_horizon.with_maneuvers import ManeuverHorizon, moves_on
 
 Seen = Callable[[int], Sequence[AnyObstacle | Shape]]
 
@@ -98,18 +101,26 @@ def simulate(
     upset = Disturbance() if disturbance is None else disturbance
     upset = checked(upset, problem.start.size)
     random = draws(upset, problem.start.size)
-    controller = RecedingHorizon(
-        problem,
-        step=step,
-        margin=margin,
-        time_limit=time_limit,
-        last=last,
-        first=first,
-        hold=stay,
-        retimed=retimed,
-        look_ahead=look_ahead,
-        stand=stand,
-    )
+    controller: RecedingHorizon | ManeuverHorizon
+    inertia = has_inertia(problem) or bool(problem.zones)
+    if inertia:
+        _check_inertia(upset, stay=stay, retimed=retimed, seen=obstacles)
+        controller = ManeuverHorizon(
+            problem, step=step, margin=margin, time_limit=time_limit, last=last, first=first
+        )
+    else:
+        controller = RecedingHorizon(
+            problem,
+            step=step,
+            margin=margin,
+            time_limit=time_limit,
+            last=last,
+            first=first,
+            hold=stay,
+            retimed=retimed,
+            look_ahead=look_ahead,
+            stand=stand,
+        )
     begin = 0 if last is None else last.number + 1
     for _ in range(begin):  # the numbers that the steps before have used
         next(random)
@@ -121,6 +132,8 @@ def simulate(
     poses, times, driven, audits = [where], [_begin(problem, last)], [], []
     inside: list[bool] = [_inside(problem, where)]
     arrived = inside[-1] and (last is None or last.deed.leads)
+    if inertia:  # it may pass the goal before it gets there
+        arrived = inside[-1] and (problem.first_trim.is_rest if last is None else _stands(last))
     for number in range(begin, begin + steps):
         if arrived and not stay:
             break
@@ -136,6 +149,7 @@ def simulate(
         before = now
         log.append(now)
         stuck = not (now.deed.leads or problem.moves or obstacles is not None)
+        stuck = stuck and not (inertia and moves_on(now.plan))  # nothing stops at once
         if stuck:
             break
         piece = replace(now.piece, start=where)
@@ -155,6 +169,8 @@ def simulate(
         times.append(now.time + now.applied)
         inside.append(_inside(problem, where))
         arrived = inside[-1] and now.deed.leads  # not on the way past it
+        if inertia:
+            arrived = inside[-1] and _stands(now)
     return _closed_loop(
         problem,
         controller,
@@ -172,7 +188,7 @@ def simulate(
 
 def _closed_loop(
     problem: Problem,
-    controller: RecedingHorizon,
+    controller: RecedingHorizon | ManeuverHorizon,
     log: list[Step],
     poses: list[Array],
     times: list[float],
@@ -218,6 +234,27 @@ def _closed_loop(
     )
 
 
+def _stands(step: Step) -> bool:
+    """Whether a vehicle with inertia is at the end of its plan once a step is driven."""
+    left = tail_of(step.plan, step.applied)
+    return left.duration <= NOTHING or not moves_on(left)
+
+
+def _check_inertia(upset: Disturbance, *, stay: bool, retimed: bool, seen: Seen | None) -> None:
+    """Refuse what loops of vehicles with inertia do not know."""
+    asked = {
+        "stay": stay,
+        "retimed": retimed,
+        "obstacles": seen is not None,
+        "disturbance: twist_scale": upset.twist_scale is not None,
+    }
+    for name, given in asked.items():
+        if given:
+            raise ValueError(
+                f"receding horizon: {name} is for vehicles without inertia, and no zones"
+            )
+
+
 def _spent(last: Step | None) -> float:
     return 0.0 if last is None else last.accumulated_cost + last.applied_cost
 
@@ -235,6 +272,7 @@ def _audited(problem: Problem, piece: Plan) -> Audit:
         problem.automaton.model,
         footprint=problem.footprint,
         obstacles=problem.obstacles,
+        zones=problem.zones,
     )
 
 

@@ -96,9 +96,8 @@ def _why_not(model: Model, found: Closed) -> str:
     worst = over.max(axis=0, initial=-math.inf)
     if worst.size and worst.max() > INSIDE:
         k = int(np.argmax(worst))
-        return (
-            f"{model.reduced_names[k]} exceeds its limit by {worst[k]:.3g} once the end is closed"
-        )
+        name = model.reduced_names[k]
+        return f"{name} exceeds its limit by {worst[k]:.3g} once the end is closed"
     return ""
 
 

@@ -84,11 +84,15 @@ def timed(plan: Plan, pace: Pace) -> Timed:
     mean = 0.5 * (np.sqrt(squared[:-1]) + np.sqrt(squared[1:]))
     passed = width / mean
     steering = _steering(twists, pace.wheelbase)
-    waits = _waits(steering, stroke_of, np.bincount(stroke_of[owner], passed), pace.steering_rate)
+    waits = _waits(steering, stroke_of, _sums(stroke_of[owner], passed), pace.steering_rate)
     return _assembled(
         plan, begins[owner] + share * durations[owner], passed, squared, twists[owner],
         steering[owner], stroke_of[owner], waits,
     )  # fmt: skip
+
+
+def _sums(owner: IntArray, values: Array) -> Array:
+    return np.asarray(np.bincount(owner, values), dtype=np.float64)
 
 
 def _limits(twists: Array, pace: Pace) -> tuple[Array, Array]:
@@ -126,7 +130,8 @@ def _waits(steering: Array, stroke_of: IntArray, strokes: Array, rate: float) ->
     first = steering[np.flatnonzero(np.diff(np.concatenate([[-1], stroke_of])))]
     turned = np.abs(np.append(first, 0.0) - last)
     before = np.concatenate([[0.0], 0.5 * strokes])
-    return np.maximum(0.0, turned / rate - before - np.append(0.5 * strokes, 0.0))
+    spare = before + np.append(0.5 * strokes, 0.0)
+    return np.asarray(np.maximum(0.0, turned / rate - spare))
 
 
 def _assembled(
@@ -145,15 +150,8 @@ def _assembled(
     time[:-1] += np.cumsum(waits[:-1])[stroke]
     time[-1] += waits[:-1].sum()
     pace = np.sqrt(squared)[:-1]
-    rows = [
-        time[:-1],
-        places,
-        pace,
-        stroke.astype(np.float64),
-        steering,
-        *(pace[:, None] * twists).T,
-    ]
-    table = np.stack(rows, axis=1)
+    number = stroke.astype(np.float64)
+    table = np.column_stack([time[:-1], places, pace, number, steering, pace[:, None] * twists])
     at = np.flatnonzero(new)
     stops = table[at].copy()  # where each stroke begins, before it has waited
     stops[:, 0] -= waits[:-1][stroke[at]]
@@ -189,9 +187,8 @@ def unicycle_guess(model: SecondOrderUnicycle, plan: Plan, *, intervals: Step) -
     """Guess for a unicycle whose speed and turn rate take time to change."""
     run = timed(plan, pace_of_unicycle(model))
     at = np.linspace(0.0, run.duration, intervals(run.duration) + 1)
-    turn = _followed(
-        np.interp(at, run.time, run.twist[:, 2]), model.max_angular_acceleration, at[1]
-    )
+    wanted = np.interp(at, run.time, run.twist[:, 2])
+    turn = _followed(wanted, model.max_angular_acceleration, at[1])
     turn[[0, -1]] = 0.0
     return _second_order(run, at, turn, model.control_limits)
 
@@ -212,10 +209,8 @@ def trailer_guess(
     angles[0] = hitch
     least, most = model.reduced_limits[0]
     for k, (speed, steering) in enumerate(control):
-        rate = speed * (
-            math.tan(steering) / model.wheelbase - math.sin(angles[k]) / model.hitch_length
-        )
-        angles[k + 1] = min(max(angles[k] + at[1] * rate, least), most)
+        bend = math.tan(steering) / model.wheelbase - math.sin(angles[k]) / model.hitch_length
+        angles[k + 1] = min(max(angles[k] + at[1] * speed * bend, least), most)
     state = np.column_stack([_at(run, at), angles])
     return Guess(state=state, control=control, duration=run.duration)
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -20,14 +20,13 @@ from maneuver_automaton.collision.convex import pieces_seen_from
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control import Guess, SolveStatus
-from maneuver_automaton.optimal_control.polishing import (
+from maneuver_automaton.optimal_control.polish_values import (
     Ends,
     Polished,
     PolishSettings,
     Scene,
-    intervals_for,
-    polish,
 )
+from maneuver_automaton.optimal_control.polishing import intervals_for, polish
 from maneuver_automaton.optimal_control.problem import RunningCost, resampled
 from maneuver_automaton.optimal_control.separation import BodyPart
 from maneuver_automaton.primitives import Maneuver, Trajectory
@@ -35,6 +34,7 @@ from maneuver_automaton.problem import Bounds
 from maneuver_automaton.refinement.closure import closed
 
 NEAR = 1.12  # share of the best cost so far up to which free lines are tried
+DEEP_ITERATIONS = 150  # from a guess inside obstacles, before it is led out of them
 SHUFFLE = 6  # changes of gear from which on gears are fixed first
 FINER = 0.6  # share of the step with which the best is solved once more
 
@@ -139,7 +139,7 @@ class Attempt:
     """One call of the solver."""
 
     guess: int  # number of the guess
-    kind: str  # fixed planes | lines | gears | finer
+    kind: str  # fixed planes | lines | elastic | gears | finer
     duration: float  # [s] of what came out
     status: str
     iterations: int
@@ -267,10 +267,11 @@ class _Polishing:
             found = self._solve("fixed planes", number, guess, fixed_planes=True)
             if found.status is SolveStatus.SOLVED:
                 return found
-            out = self._solve("elastic", number, guess, elastic=True)
-            if out.status is SolveStatus.SOLVED:
-                guess = out.as_guess
-            found = self._solve("lines", number, guess)
+            found = self._solve("lines", number, guess, most=DEEP_ITERATIONS)
+            if found.status is not SolveStatus.SOLVED:
+                out = self._solve("elastic", number, guess, elastic=True)
+                if out.status is SolveStatus.SOLVED:
+                    found = self._solve("lines", number, out.as_guess)
             if found.status is SolveStatus.SOLVED:
                 self._consider(found)
                 return None
@@ -315,15 +316,19 @@ class _Polishing:
         fixed_planes: bool = False,
         elastic: bool = False,
         gears: Array | None = None,
+        most: int | None = None,
     ) -> Polished:
         began = time.monotonic()
+        settings = self.settings
+        if most is not None:
+            settings = replace(settings, max_iterations=min(most, settings.max_iterations))
         found = polish(
             self.task.model,
             self.task.ends(float(guess.state[-1, 2])),
             self.scene,
             guess,
             stage_cost=self.stage_cost,
-            settings=self.settings,
+            settings=settings,
             fixed_planes=fixed_planes,
             elastic=elastic,
             gears=gears,

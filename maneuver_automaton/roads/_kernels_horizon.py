@@ -23,6 +23,7 @@ from maneuver_automaton.search._kernels_distance import pop, push
 PARENT, MANEUVER, TRIM, NEAR = range(4)
 N_NODES, HEAP, KEPT, CHECKS = range(4)
 EMPTY = -1
+STRIP = 1.0  # [m] width of a strip along the route
 TRIES = 16  # nodes of a level from which a way to stop is looked for
 IMPOSSIBLE = 1e4  # cost of what cannot be reached any more
 
@@ -48,6 +49,7 @@ class GoalArrays(NamedTuple):
     speed: np.ndarray  # (G, 2)
     tick: np.ndarray  # (G, 2)
     way: np.ndarray  # (G, 4) stations and offsets
+    turned: np.ndarray  # (G, 2) least and greatest heading, seen from the route's direction there
 
 
 class Weights(NamedTuple):
@@ -79,6 +81,7 @@ class HorizonTask(NamedTuple):
     turn_cell: float  # [rad]
     speed_cell: float  # [m/s]
     width: int  # nodes of a level that go on at most
+    abreast: int  # of these, in one strip along the route
     greed: float  # weight of the cost-to-go
 
 
@@ -89,6 +92,7 @@ class HorizonArrays(NamedTuple):
     links: np.ndarray  # (N, 4)
     kept: np.ndarray  # (levels, W) nodes that go on, best first
     counts: np.ndarray  # (levels,) how many
+    strips: np.ndarray  # (n,) how many in each strip, the first and last without an end
     cells: np.ndarray  # (4 W,) a power of two
     heap_key: np.ndarray  # (N,)
     heap_node: np.ndarray  # (N,)
@@ -143,7 +147,7 @@ def stage(weights, limit, offset, turned, speed):
 
 
 @inner_kernel
-def rest_of_the_way(weights, goals, g, station, offset, speed, drift, least, most):
+def rest_of_the_way(weights, goals, g, station, offset, turned, speed, least, most):
     """Estimate of what it costs to be at goal `g` between two times from now [s].
 
     Constant accelerations along the route and across it that lead there in the time that suits.
@@ -181,7 +185,7 @@ def rest_of_the_way(weights, goals, g, station, offset, speed, drift, least, mos
         cost += weights.ahead * wrong * wrong / max(time, 0.5)
     if goals.way[g, 2] > -math.inf:
         aside = 0.0
-        reach = offset + drift * time
+        reach = offset + speed * math.sin(turned) * time
         if reach < goals.way[g, 2]:
             aside = goals.way[g, 2] - reach
         elif reach > goals.way[g, 3]:
@@ -191,6 +195,12 @@ def rest_of_the_way(weights, goals, g, station, offset, speed, drift, least, mos
             cost += weights.aside * needed * needed * time
             if needed > weights.lateral:
                 cost += IMPOSSIBLE * (needed / weights.lateral - 1.0)
+    askew = max(max(goals.turned[g, 0] - turned, turned - goals.turned[g, 1]), 0.0)
+    if askew > 0.0:
+        needed = askew * speed / max(time, 0.1)
+        cost += weights.aside * needed * needed * time
+        if needed > weights.lateral:
+            cost += IMPOSSIBLE * (needed / weights.lateral - 1.0)
     return cost
 
 
@@ -198,7 +208,6 @@ def rest_of_the_way(weights, goals, g, station, offset, speed, drift, least, mos
 def cost_to_go(horizon, station, offset, turned, speed, tick):
     """Estimate of what the rest costs to the goal that is nearest."""
     goals = horizon.goals
-    drift = speed * math.sin(turned)
     best = math.inf
     for g in range(goals.tick.shape[0]):
         if tick > goals.tick[g, 1]:
@@ -207,7 +216,7 @@ def cost_to_go(horizon, station, offset, turned, speed, tick):
         least = max(goals.tick[g, 0] - tick, 0) * horizon.limits.tick
         most = (goals.tick[g, 1] - tick) * horizon.limits.tick
         cost = rest_of_the_way(
-            horizon.weights, goals, g, station, offset, speed, drift, least, most
+            horizon.weights, goals, g, station, offset, turned, speed, least, most
         )
         best = min(best, cost)
     return best
@@ -267,6 +276,15 @@ def is_new(task, cells, x, y, heading, speed):
         slot = (slot + 1) & mask
     cells[slot] = key
     return True
+
+
+@inner_kernel
+def strip_of(horizon, search, node):
+    """Which strip along the route a node is in."""
+    pose, near = search.pose, search.links[node, NEAR]
+    _, offset = on_route(horizon.route, pose[node, 0], pose[node, 1], near)
+    n = search.strips.shape[0]
+    return min(max(math.floor(offset / STRIP) + n // 2, 0), n - 1)
 
 
 @inner_kernel
@@ -479,6 +497,7 @@ def search_horizon(task, horizon, first, search, shares, controls):
     levels = (task.until - task.tick + ticks - 1) // ticks
     for level in range(levels):
         search.cells[:] = EMPTY
+        search.strips[:] = 0
         tick = task.tick + level * ticks
         maneuvers = first if level == 0 else horizon.maneuvers
         kept = 0
@@ -486,6 +505,9 @@ def search_horizon(task, horizon, first, search, shares, controls):
             node = pop(search.heap_key, search.heap_node, state[HEAP])
             state[HEAP] -= 1
             if pose[node, 3] >= best:
+                continue
+            strip = strip_of(horizon, search, node)
+            if search.strips[strip] >= task.abreast:
                 continue
             speed = horizon.trims.speed[search.links[node, TRIM]]
             if not is_new(task, search.cells, pose[node, 0], pose[node, 1], pose[node, 2], speed):
@@ -496,6 +518,7 @@ def search_horizon(task, horizon, first, search, shares, controls):
                 continue
             if goal_tick < 0:
                 search.kept[level, kept] = node
+                search.strips[strip] += 1
                 kept += 1
                 continue
             _, whole = finish(task, horizon, search, first, node, goal_tick, shares, controls)

@@ -20,7 +20,7 @@ from maneuver_automaton.roads._kernels_horizon import (
     Weights,
 )
 from maneuver_automaton.roads.clearing import clearing_of
-from maneuver_automaton.roads.goal_region import outlines_of
+from maneuver_automaton.roads.goal_region import GoalRegion, outlines_of
 from maneuver_automaton.roads.library import TICK, TICKS, RoadLibrary, road_library
 from maneuver_automaton.roads.route import SPACING, Route, route_of
 from maneuver_automaton.roads.scene import RoadScene
@@ -29,6 +29,8 @@ from maneuver_automaton.roads.vehicle import RoadVehicle
 CHILDREN = 64  # rows for the children of a node
 CELL, TURN_CELL, SPEED_CELL = 0.5, 0.06, 2.0  # [m], [rad], [m/s] of equal nodes
 SHARES = (math.nan, 0.0, 0.2, -0.2, 0.5, -0.5, 1.0, -1.0)  # of steering while it stops; nan: held
+SHARE = 0.25  # of the nodes of a level that one strip along the route may hold
+STRIPS = 17
 LONGEST_STOP = 120  # ticks
 FAR_TICK = 1 << 40
 AT_REST = 1e-9  # [m/s]
@@ -173,6 +175,7 @@ class RoadPlanner:
         if until <= tick:
             return None
         x, y, heading, speed, steering = state.tolist()
+        width = min(settings.narrow, settings.width) if narrow else settings.width
         task = HorizonTask(
             x=x,
             y=y,
@@ -184,7 +187,8 @@ class RoadPlanner:
             cell=CELL,
             turn_cell=TURN_CELL,
             speed_cell=SPEED_CELL,
-            width=min(settings.narrow, settings.width) if narrow else settings.width,
+            width=width,
+            abreast=max(math.ceil(SHARE * width), 1),
             greed=settings.greed,
         )
         first = _kernels_library.maneuvers_from(library.limits, library.trims, speed, steering)
@@ -339,7 +343,21 @@ def goal_arrays(scene: RoadScene, route: Route) -> GoalArrays:
         speed=np.array(speeds),
         tick=np.array(ticks, dtype=np.int64),
         way=np.array(route.ways),
+        turned=np.array(
+            [_turned(goal, way, route) for goal, way in zip(scene.goals, route.ways, strict=True)]
+        ),
     )
+
+
+def _turned(goal: GoalRegion, way: Array, route: Route) -> tuple[float, float]:
+    """Headings of a goal, seen from the route's direction in the middle of the goal."""
+    if goal.heading is None or not np.isfinite(way).all():
+        return -math.inf, math.inf
+    low, high = goal.heading
+    middle = round(0.5 * (way[0] + way[1]) / SPACING)
+    ahead = float(route.heading[min(max(middle, 0), len(route.heading) - 1)])
+    center = math.remainder(0.5 * (low + high) - ahead, 2.0 * math.pi)
+    return center - 0.5 * (high - low), center + 0.5 * (high - low)
 
 
 def _weights(scene: RoadScene, vehicle: RoadVehicle) -> Weights:
@@ -366,6 +384,7 @@ def _memory(settings: RoadSettings) -> HorizonArrays:
         links=np.empty((nodes, 4), dtype=np.int64),
         kept=np.empty((levels, settings.width), dtype=np.int64),
         counts=np.zeros(levels, dtype=np.int64),
+        strips=np.zeros(STRIPS, dtype=np.int64),
         cells=np.empty(1 << (64 * settings.width).bit_length(), dtype=np.int64),
         heap_key=np.empty(nodes),
         heap_node=np.empty(nodes, dtype=np.int64),

@@ -46,8 +46,8 @@ class RoadVehicle:
     >>> car = RoadVehicle()
     >>> car.middle_of([0.0, 0.0, 0.0]).round(4).tolist()
     [1.4227, 0.0, 0.0]
-    >>> car.rear_of([1.4227, 0.0, 0.0]).round(4).tolist()
-    [0.0, 0.0, 0.0]
+    >>> car.rear_of([3.0, 0.0, 0.0]).round(4).tolist()
+    [1.5773, 0.0, 0.0]
     """
 
     model: SecondOrderCar = field(default_factory=bmw_320i)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from annotated_types import Ge
 from pydantic import AllowInfNan, BeforeValidator, Field, Strict
 
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.automaton.bang_bang_library import bang_bang_library
+from maneuver_automaton.automaton._library_models import model_of as model_of_entry
 from maneuver_automaton.automaton.building import (
     Failure,
     LibraryBuild,
@@ -57,6 +57,13 @@ def _grid(value: Any) -> Any:
     return value
 
 
+def _mapping(value: Any) -> Any:
+    if not isinstance(value, dict):
+        raise need("a mapping with the key kind, and the parameters of this kind")
+    return value
+
+
+Mapped = Annotated[dict[str, Any], BeforeValidator(_mapping)]
 Grid = Annotated[
     dict[str, Annotated[tuple[Number, ...], Several("a list of numbers", at_least=1)]],
     BeforeValidator(_grid),
@@ -91,12 +98,13 @@ class ManeuversPart(Part):
 class LibraryFile(Part):
     """A library to be built: vehicle, trims, maneuvers."""
 
+    one_of: ClassVar = ("vehicle", "model")
+
     schema_version: Literal[1] = Field(alias="schema", description="1")
     library: Text = Field(description="what the library is called")
-    vehicle: VehiclePart = Field(description="a mapping {model, ...}")
-    trims: Annotated[tuple[Grid, ...], Several("a list of at least one grid", at_least=1)] = Field(
-        description="grids of trims, each a mapping of names to values"
-    )
+    vehicle: VehiclePart | None = Field(None, description="as in a scenario: {model, ...}")
+    model: Mapped | None = Field(None, description="as in a library file: {kind, ...}, SI units")
+    trims: Grid = Field(description="a grid of trims, a mapping of names to lists of values")
     max_lateral_acceleration_m_s2: Positive | None = Field(
         None, description="what the tyres hold; left out: no limit"
     )
@@ -111,6 +119,8 @@ class BuildFile:
 
     name: str
     model: Model
+    grid: Mapping[str, tuple[float, ...]]
+    max_lateral_acceleration: float | None  # [m/s^2]
     trims: tuple[Trim, ...]
     missing: tuple[MissingTrim, ...]
     maneuvers: ManeuversPart
@@ -167,36 +177,40 @@ def build_file_of_text(text: str, *, name: str) -> BuildFile:
     Examples
     --------
     >>> asked = build_file_of_text(
-    ...     "{schema: 1, library: robots, vehicle: {model: unicycle}, trims: [{speed: [0, 1]}]}",
+    ...     "{schema: 1, library: robots, vehicle: {model: unicycle}, trims: {speed: [0, 1]}}",
     ...     name="robots.yaml")
     >>> [trim.name for trim in asked.trims]
     ['speed 0', 'speed 1']
     """
     document = parse(text, name=name, what="a build file")
     file = checked(document, LibraryFile)
-    with at(document, ("vehicle",)):
-        model = model_of(file.vehicle)
-    trims: dict[str, Trim] = {}
-    missing: dict[str, MissingTrim] = {}
-    for k, grid in enumerate(file.trims):
-        with at(document, ("trims", k)):
-            found = trims_of(
-                model, grid, max_lateral_acceleration=file.max_lateral_acceleration_m_s2
-            )
-        trims |= {trim.name: trim for trim in found.trims}
-        missing |= {point.name: point for point in found.missing}
-    if not trims:
-        reason = next(iter(missing.values())).reason
+    model = _model(document, file)
+    with at(document, ("trims",)):
+        found = trims_of(
+            model, file.trims, max_lateral_acceleration=file.max_lateral_acceleration_m_s2
+        )
+    if not found.trims:
+        reason = found.missing[0].reason
         raise document.error(("trims",), f"the {model.name} has none of these trims: {reason}")
     asked = BuildFile(
         name=file.library,
         model=model,
-        trims=tuple(trims.values()),
-        missing=tuple(missing.values()),
+        grid=file.trims,
+        max_lateral_acceleration=file.max_lateral_acceleration_m_s2,
+        trims=found.trims,
+        missing=found.missing,
         maneuvers=file.maneuvers,
     )
     _check_maneuvers(document, asked)
     return asked
+
+
+def _model(document: Document, file: LibraryFile) -> Model:
+    if file.vehicle is not None:
+        with at(document, ("vehicle",)):
+            return model_of(file.vehicle)
+    with at(document, ("model",)):
+        return model_of_entry(file.model, own=None)
 
 
 def build(
@@ -241,17 +255,17 @@ def build(
 
 def _made_at_once(asked: BuildFile) -> Automaton:
     part = asked.maneuvers
-    if not asked.model.reduced_names:
-        return Automaton(asked.model, asked.trims, name=asked.name)
-    return bang_bang_library(
+    made = Automaton.of_model(
         asked.model,
-        asked.trims,
+        asked.grid,
         pairs="neighbours" if part.pairs == "neighbours" else "all",
         late=part.late,
         strokes=part.strokes_m,
         turns=part.turns_rad,
-        name=asked.name,
+        max_lateral_acceleration=asked.max_lateral_acceleration,
+        leave_out=True,
     )
+    return replace(made, name=asked.name)
 
 
 def _check_maneuvers(document: Document, asked: BuildFile) -> None:

@@ -15,7 +15,7 @@ File = TypeVar("File", bound=BaseModel)
 OTHER_KINDS: Mapping[str, set[str]] = {  # and what only they have
     "a library of trims": {"format", "trims"},
     "a plan": {"status", "primitives"},
-    "a build file": {"library", "vehicle"},
+    "a build file": {"library", "trims"},
 }
 
 

@@ -27,7 +27,12 @@ from maneuver_automaton.scenario.schema import (
     ScenarioFile,
     SearchPart,
 )
-from maneuver_automaton.scenario.shapes import footprint_of, obstacles_of, stated_footprint
+from maneuver_automaton.scenario.shapes import (
+    footprint_of,
+    obstacles_of,
+    stated_footprint,
+    zones_of,
+)
 from maneuver_automaton.scenario.vehicles import carried_of, model_of
 
 Footprint = tuple[Mapping[str, Any], ...]  # shapes, each {rectangle_m, reference_m} and so on
@@ -155,6 +160,9 @@ def _problem(
         _check_trim(document, (*where, "trim"), goal.trim, automaton)
     if file.bounds_m.z is not None and dof == 3:
         raise document.error(("bounds_m", "z"), f"the {automaton.model.name} has no height")
+    for k, zone in enumerate(file.zones):
+        for n, name in enumerate(zone.trims or ()):
+            _check_trim(document, ("zones", k, "trims", n), name, automaton)
     cost, horizon = _cost(document, file.cost, automaton), _horizon(document, file.horizon)
     with at(document, ()):
         return Problem(
@@ -171,6 +179,7 @@ def _problem(
             footprint=bodies.vehicle,
             parts=bodies.parts,
             margin=file.margin_m,
+            zones=zones_of(document, file.zones),
         )
 
 

@@ -37,7 +37,7 @@ def cell_key(task, x, y, heading, trim, time):
     turn = (heading - task.frame_heading) / FULL_TURN
     k = math.floor((turn - math.floor(turn)) * task.headings + 0.5) % task.headings
     tick = math.floor(time / task.tick) & 0x7FF if task.tick > 0.0 else 0
-    return (((trim * 2048 + tick) * 512 + k) * 32768 + j) * 32768 + i
+    return (((int(trim) * 2048 + tick) * 512 + k) * 32768 + j) * 32768 + i
 
 
 @inlined_kernel

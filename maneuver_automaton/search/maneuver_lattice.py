@@ -219,7 +219,8 @@ def maneuver_words(
         over = time.monotonic() >= deadline or total >= room
         return SearchStatus.OUT_OF_BUDGET if over else SearchStatus.EXHAUSTED
 
-    grid = distance_grid(query.world, query.window[0], query.seen_goals, query.seen_start)
+    own = query.around(query.parts[0])
+    grid = distance_grid(own, query.window[0], query.seen_goals, query.seen_start)
     word, first = _first(query, grid, room=room, deadline=deadline)
     total = first
     if word is not None:

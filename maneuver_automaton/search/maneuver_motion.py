@@ -217,7 +217,7 @@ def course_of(maneuver: Maneuver, poses: Array) -> tuple[Array, Array]:
         times = np.array([0.0, max(maneuver.duration, 1e-9)])
     else:
         own, times = course.pose[:, :3], course.time
-    return (SE2(own) @ SE2(poses)).pose, times
+    return ((SE2(own) @ SE2(poses)).pose if poses.any() else own), times
 
 
 def _moves(begin: Array, end: Array) -> Array:

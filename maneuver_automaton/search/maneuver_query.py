@@ -94,6 +94,10 @@ class ManeuverQuery:
         frame = own_frame(self.obstacles, self.goals[0])
         return world_of(self.obstacles, largest.shapes, frame, keep=self.keep)
 
+    def around(self, part: Part) -> World:
+        """The same obstacles around one part."""
+        return replace(self.world, body=body_of(part.shapes))
+
     @property
     def moves(self) -> bool:
         """Whether an obstacle moves."""
@@ -142,8 +146,7 @@ class ManeuverQuery:
             gaps = []
             for part in self.parts:
                 there = (SE2(pose[:3]) @ SE2(part.trim_poses[trim])).pose
-                own = replace(self.world, body=body_of(part.shapes))
-                gaps.append(float(clearances(own, there, times=time)[0]))
+                gaps.append(float(clearances(self.around(part), there, times=time)[0]))
             rows.append(min(gaps) - self.keep)
         return np.array(rows)
 

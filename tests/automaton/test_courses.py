@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.automaton.courses import even_times
 from maneuver_automaton.automaton.library import automaton_hash, load_library, save_library
 from maneuver_automaton.errors import InvalidLibrary
 from maneuver_automaton.models import SecondOrderUnicycle
@@ -121,3 +122,10 @@ def test_what_is_wrong_is_said(tmp_path, changes, message):
     with pytest.raises(InvalidLibrary) as error:
         load_library(path)
     assert str(error.value) == f"{path}: {message}"
+
+
+def test_equal_intervals_end_with_the_duration_itself():
+    rng = np.random.default_rng(0)
+    for duration in rng.uniform(0.01, 9.0, size=200):
+        for count in (3, 7, 10, 12, 20):
+            assert even_times(float(duration), count)[-1] == duration

@@ -22,7 +22,7 @@ from maneuver_automaton.search.maneuver_query import maneuver_query
 from maneuver_automaton.search.maneuver_shortcuts import word_is_free
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.search.transfer import transfer_library
-from tests.search.automata import inertial_unicycle, truck_with_trailer
+from tests.search.automata import inertial_unicycle, linked, truck_with_trailer
 
 BODY = Box([0.5, 0.25])
 WALLS = (Obstacle(Box([0.2, 3.0], [1.5, -0.6])), Obstacle(Box([0.2, 3.0], [3.0, 1.4])))
@@ -78,7 +78,7 @@ def off_goal(plan, goal):
 
 def test_plans_are_exact_free_inside_and_cheaper_one_by_one():
     here = query()
-    result = search_maneuvers(here, max_expansions=3000)
+    result = search_maneuvers(here, max_expansions=600)
     assert result.status is SearchStatus.FOUND
     costs = [word.cost for word in result.words]
     assert costs == sorted(costs, reverse=True)
@@ -96,7 +96,7 @@ def test_plans_are_exact_free_inside_and_cheaper_one_by_one():
 
 
 def test_the_same_expansions_find_the_same_plan():
-    first, second = (search_maneuvers(query(), max_expansions=1500) for _ in range(2))
+    first, second = (search_maneuvers(query(), max_expansions=400) for _ in range(2))
     assert first.best.trims == second.best.trims
     assert first.best.durations.tolist() == second.best.durations.tolist()
     assert first.found_after == second.found_after
@@ -113,7 +113,7 @@ def test_a_moved_problem_has_the_moved_plan():
         goal_trim="0 0",
         obstacles=tuple(obstacle.moved(by) for obstacle in WALLS),
     )
-    here, there = (search_maneuvers(one, max_expansions=1500) for one in (still, moved))
+    here, there = (search_maneuvers(one, max_expansions=400) for one in (still, moved))
     assert here.best.trims == there.best.trims
     a, b = plan_of(still, here.best), plan_of(moved, there.best)
     assert np.abs(a.durations - b.durations).max() < 1e-7
@@ -164,7 +164,7 @@ def test_what_moves_is_let_pass():
         *library(), START, [4.0, 0.0, 0.0], start_trim="0 0", goal_trim="0 0",
         obstacles=(crossing,),
     )  # fmt: skip
-    result = search_maneuvers(here, max_expansions=20000)
+    result = search_maneuvers(here, max_expansions=2500)
     assert result.status is SearchStatus.FOUND
     for word in result.words:
         plan = plan_of(here, word)
@@ -182,7 +182,7 @@ def test_a_trailer_stays_free_too():
         start_trim="0 at 0.00", goal_trim="0 at 0.00",
         obstacles=(Obstacle(Box([0.2, 3.0], [1.5, -1.0])), Obstacle(Box([0.2, 3.0], [3.5, 2.6]))),
     )  # fmt: skip
-    result = search_maneuvers(here, max_expansions=3000)
+    result = search_maneuvers(here, max_expansions=600)
     assert result.status is SearchStatus.FOUND
     for word in result.words:
         plan = plan_of(here, word)
@@ -191,12 +191,42 @@ def test_a_trailer_stays_free_too():
         assert least_gap(plan, here.obstacles, model=automaton.model, carried=(trailer,)) > 0.0
 
 
+def test_a_trailer_wider_than_its_truck_does_not_close_the_way_of_the_truck():
+    automaton = truck_with_trailer(levels=3)
+    parts = parts_of(automaton, (Box([0.1, 0.1]),), ((Box([0.3, 0.6]),),))
+    beside = Obstacle(Box([0.1, 1.0], [0.1, 0.6]))  # nearer to the truck than half the trailer
+    here = maneuver_query(
+        transfer_library(automaton), parts, np.zeros(3), [0.2, 0.0, 0.0],
+        start_trim="0 at 0.00", goal_trim="0 at 0.00", obstacles=(beside,),
+    )  # fmt: skip
+    assert search_maneuvers(here, max_expansions=20, first_only=True).best is not None
+
+
+@pytest.mark.parametrize("height", [1.5, -0.5])
+def test_altitude_is_gained_on_the_way(height):
+    flying = [[0.0] * 4, [1.0, 0, 0, 0], [0.7, 0, 0.8, 0], [0.7, 0, -0.8, 0],
+              [0.8, 0, 0, 0.2], [0.0, 0, 0, 0.5], [0.0, 0, 0, -0.5]]  # fmt: skip
+    automaton = linked(flying, size=0.1)
+    towers = (Obstacle(Box([0.3, 3.0], [2.0, -0.8])), Obstacle(Box([0.3, 3.0], [4.0, 2.0])))
+    goal = np.array([6.0, 1.0, 1.0, height])
+    here = maneuver_query(
+        transfer_library(automaton), parts_of(automaton, (BODY,)), np.zeros(4), goal,
+        start_trim="t0", goal_trim="t0", obstacles=towers,
+    )  # fmt: skip
+    result = search_maneuvers(here, max_expansions=8000, first_only=True)
+    assert result.status is SearchStatus.FOUND
+    for word in result.words:
+        plan = plan_of(here, word)
+        assert off_goal(plan, goal) < 1e-12
+        assert word_is_free(here, word)
+
+
 def test_a_limit_of_time_is_kept():
-    free = search_maneuvers(query(), max_expansions=2000).best
+    free = search_maneuvers(query(), max_expansions=400).best
     short = replace(query(), most_time=free.duration * 1.1)
-    result = search_maneuvers(short, max_expansions=20000)
+    result = search_maneuvers(short, max_expansions=1500)
     assert all(word.duration <= free.duration * 1.1 for word in result.words)
-    none = search_maneuvers(replace(query(), most_time=3.0), max_expansions=20000)
+    none = search_maneuvers(replace(query(), most_time=3.0), max_expansions=1500)
     assert none.best is None
 
 
