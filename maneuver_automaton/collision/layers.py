@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -72,10 +73,10 @@ def always(bands: Sequence[Layer], *, low: float, high: float) -> tuple[AnyObsta
     >>> [len(always(bands_of((tower,), in_space=True), low=1.0, high=h)) for h in (9.0, 30.0)]
     [1, 0]
     """
-    inside = sorted((band for band in bands if band.low < high and band.high > low))
+    inside = sorted(band for band in bands if band.low < high and band.high > low)
     if not inside or inside[0].low > low or inside[-1].high < high:
         return ()
-    if any(a.high < b.low for a, b in zip(inside, inside[1:], strict=False)):
+    if any(a.high < b.low for a, b in pairwise(inside)):
         return ()
     numbers = set(inside[0].numbers).intersection(*(band.numbers for band in inside))
     return tuple(
@@ -85,9 +86,7 @@ def always(bands: Sequence[Layer], *, low: float, high: float) -> tuple[AnyObsta
     )
 
 
-def layer_arrays(
-    worlds: Sequence[World], *, low: Array, high: Array, plane: World
-) -> LayerArrays:
+def layer_arrays(worlds: Sequence[World], *, low: Array, high: Array, plane: World) -> LayerArrays:
     """Worlds as the kernels see them, each for poses between the altitudes `low` and `high`."""
     arrays = [world.arrays for world in worlds]
     solids, still, moving = _joined([(one.solids, one.movers.solids) for one in arrays])
@@ -133,11 +132,10 @@ def layer_arrays(
 def _thick(heights: Sequence[float]) -> list[tuple[float, float]]:
     """Bands between sorted heights, at most so many: the thinnest join their lower neighbour."""
     kept = list(heights)
-    while len(kept) > MOST_LAYERS + 1:
-        widths = np.diff(kept)
-        k = int(np.argmin(widths))
-        del kept[k if 0 < k else 1]
-    return list(zip(kept, kept[1:], strict=False))
+    while len(kept) - 1 > MOST_LAYERS:
+        thinnest = int(np.argmin(np.diff(kept)))
+        del kept[max(thinnest, 1)]
+    return list(pairwise(kept))
 
 
 def _joined(pairs: Sequence[tuple[Solids, Solids]]) -> tuple[Solids, list[int], list[int]]:

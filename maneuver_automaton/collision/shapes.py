@@ -184,10 +184,12 @@ class Obstacle:
         return self.shape if self.motion is None else self.shape.moved(SE2(self.motion.at(time)))
 
     def moved(self, by: LieGroup) -> Obstacle:
-        """The obstacle moved by a planar pose."""
+        """The obstacle moved by a pose, its heights too where that has an altitude."""
+        rise = float(by.pose[..., 3:].sum())
+        height = None if self.height is None else (self.height[0] + rise, self.height[1] + rise)
         if self.motion is not None:
-            return replace(self, motion=self.motion.moved(by))
-        return replace(self, shape=self.shape.moved(by))
+            return replace(self, motion=self.motion.moved(by), height=height)
+        return replace(self, shape=self.shape.moved(by), height=height)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

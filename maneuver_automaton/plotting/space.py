@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,7 @@ from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
 
 WIDTH, SPACE, FLAT = 9.6, 5.3, 1.75  # [in] of the page; heights of the axes
+HIGHEST = 2.6  # [in] of the plane
 LEFT, GAP = 0.7, 0.62  # [in]
 ELEVATION, AZIMUTH = 42.0, -68.0  # [deg] from where space is seen
 LIGHT = np.array([0.42, -0.76, 0.5])  # direction from which walls are lit
@@ -97,14 +99,15 @@ def draw_space(ax: Axes3D, result: PlanResult) -> SpaceArtists:
     collection = Poly3DCollection(
         faces, facecolors=inner, edgecolors=rims, linewidths=RIM, zsort="average", clip_on=False
     )
-    ax.add_collection3d(collection)
+    if faces:
+        ax.add_collection3d(collection)
     path = [(places, color) for places, color, _ in _strokes(result, track, ground=None)]
-    ax.add_collection3d(
-        Line3DCollection(
+    if path:
+        through = Line3DCollection(
             [places for places, _ in path], colors=[color for _, color in path],
             linewidths=1.6, alpha=HIDDEN, zorder=5, clip_on=False,
-        )
-    )  # fmt: skip
+        )  # fmt: skip
+        ax.add_collection3d(through)
     ends = [_mark(ax, track.start, START, "o")]
     ends += [_mark(ax, goal.pose, GOAL, "*") for goal in problem.goals]
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
@@ -132,7 +135,7 @@ def save_space_figure(result: PlanResult, path: str | Path) -> None:
 
 
 def _figure(result: PlanResult) -> Figure:
-    from mpl_toolkits.mplot3d import Axes3D as _registered  # noqa: F401
+    import mpl_toolkits.mplot3d  # noqa: F401 - Matplotlib knows the projection from then on
 
     track, problem = _track(result), result.problem
     handles, names = _legend(result, track)
@@ -140,19 +143,17 @@ def _figure(result: PlanResult) -> Figure:
     low, high = _box(problem, track)
     span = high - low
     room = WIDTH - LEFT - 0.2 - GAP
-    above = room * span[0] / (span[0] + span[0])
-    height = max(FLAT, min(above * span[1] / span[0], 2.6))
+    each = 0.5 * room
+    height = max(FLAT, min(each * span[1] / span[0], HIGHEST))
     figure = new_figure(WIDTH, bottom + height + 0.35 + SPACE)
-    wide, tall = figure.get_size_inches()
+    tall = float(figure.get_size_inches()[1])
     base = bottom + height + 0.15
     box = (0.0, base / tall, 1.0, (tall - base - 0.3) / tall)
     space: Any = figure.add_axes(box, projection="3d", computed_zorder=False)
     space.patch.set_alpha(0.0)
     draw_space(space, result)
-    from_above = axes_at(figure, left=LEFT, bottom=bottom, width=above, height=height)
-    aside = axes_at(
-        figure, left=LEFT + above + GAP, bottom=bottom, width=room - above, height=height
-    )
+    from_above = axes_at(figure, left=LEFT, bottom=bottom, width=each, height=height)
+    aside = axes_at(figure, left=LEFT + each + GAP, bottom=bottom, width=each, height=height)
     _draw_flat(from_above, result, track, across=1, low=low, high=high)
     _draw_flat(aside, result, track, across=2, low=low, high=high)
     heading_text(figure, [(_headline(result), 10.0, "bold")], left=0.35)
@@ -173,9 +174,7 @@ def _draw_flat(
         top = min(heights[1], high[2])
         if across == 2:
             left, right = ring[:, 0].min(), ring[:, 0].max()
-            ring = np.array(
-                [[left, heights[0]], [right, heights[0]], [right, top], [left, top]]
-            )
+            ring = np.array([[left, heights[0]], [right, heights[0]], [right, top], [left, top]])
         tint = shaded(BUILDING, 0.45 - 0.75 * (top - low[2]) / (high[2] - low[2]))
         face = tint if across == 1 else (*BUILDING, 0.55)
         ax.add_collection(
@@ -186,7 +185,7 @@ def _draw_flat(
             ax.text(
                 *ring.mean(axis=0), f"{top:g}", fontsize=SMALL_PT - 2.0, color=INK,
                 ha="center", va="center",
-            )  # fmt: skip
+            )  # type: ignore[call-arg] # fmt: skip
     lines, colors = [], []
     for stroke, color, _ in _strokes(result, track, ground=None):
         lines.append(stroke[:, [0, across]])
@@ -257,8 +256,8 @@ def _prism(obstacle: Obstacle, bottom: float, top: float) -> list[tuple[Array, f
         shade = -0.12 + 0.3 * float(outward @ LIGHT[:2])
         pieces = max(1, math.ceil(length / STORY))
         corners = begin + np.linspace(0.0, 1.0, pieces + 1)[:, None] * along
-        for low, high in zip(levels[:-1], levels[1:], strict=True):
-            for a, b in zip(corners[:-1], corners[1:], strict=True):
+        for low, high in pairwise(levels):
+            for a, b in pairwise(corners):
                 wall = [[*a, low], [*b, low], [*b, high], [*a, high]]
                 faces.append((np.array(wall), shade))
     roof = np.column_stack([ring, np.full(len(ring), top)])
@@ -327,6 +326,7 @@ def _box(problem: Problem, track: Track) -> tuple[Array, Array]:
 
 
 def _mark(ax: Axes3D, pose: Array, color: Color, marker: str) -> Line2D:
+    mark: Line2D
     (mark,) = ax.plot(
         pose[[0]], pose[[1]], pose[[3]], marker=marker, color=color, linestyle="none",
         markersize=7 if marker == "o" else 12, markeredgecolor="white", markeredgewidth=0.6,
@@ -340,8 +340,8 @@ def _bare_axes(ax: Axes3D) -> None:
     for axis, name in ((ax.xaxis, "x [m]"), (ax.yaxis, "y [m]"), (ax.zaxis, "altitude [m]")):
         axis.set_label_text(name, fontsize=TEXT_PT, color=INK)
         axis.set_tick_params(labelsize=SMALL_PT, labelcolor=INK, pad=0.0)
-        axis.pane.set_facecolor((0.965, 0.97, 0.975, 1.0))  # type: ignore[attr-defined]
-        axis.pane.set_edgecolor((*GREY, 0.4))  # type: ignore[attr-defined]
+        axis.pane.set_facecolor((0.965, 0.97, 0.975, 1.0))
+        axis.pane.set_edgecolor((*GREY, 0.4))
         axis._axinfo["grid"].update(color=(*GREY, 0.25), linewidth=0.5)
     ax.locator_params(axis="z", nbins=4)
 
