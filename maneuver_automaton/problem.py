@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -12,13 +12,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, freeze
-from maneuver_automaton.automaton import Automaton, Plan
-from maneuver_automaton.collision import AnyObstacle, Obstacle, Shape, as_footprint, as_obstacles
+from maneuver_automaton.automaton import Automaton, Plan, Primitive
+from maneuver_automaton.collision import (
+    AnyObstacle,
+    Obstacle,
+    Shape,
+    Zone,
+    as_footprint,
+    as_obstacles,
+)
 from maneuver_automaton.costs import Cost, StageCost
-from maneuver_automaton.errors import InvalidAutomaton
 from maneuver_automaton.groups import SE2, LieGroup, SE2xR
-from maneuver_automaton.primitives import Trim
+from maneuver_automaton.models import Model
+from maneuver_automaton.primitives import Maneuver, Trim
 
+STANDING = 1e-3  # [m/s] slower is no direction of travel
 SEARCH_METHODS = ("auto", "words", "insertion", "lattice")
 
 
@@ -155,7 +163,10 @@ class Problem:
     search: SearchSettings = field(default_factory=SearchSettings, kw_only=True)
     obstacles: tuple[AnyObstacle, ...] = field(default=(), kw_only=True)
     footprint: tuple[Shape, ...] = field(default=(), kw_only=True)  # empty: the vehicle is a point
+    parts: Mapping[str, tuple[Shape, ...]] = field(default_factory=dict, kw_only=True)  # carried
+    body_height: tuple[float, float] = field(default=(0.0, 0.0), kw_only=True)  # [m] about z
     margin: float = field(default=0.0, kw_only=True)  # [m] distance kept from every obstacle
+    zones: tuple[Zone, ...] = field(default=(), kw_only=True)  # where not every motion is admitted
 
     if TYPE_CHECKING:  # numbers, group elements, one goal or several will do
 
@@ -173,11 +184,13 @@ class Problem:
             search: SearchSettings = ...,
             obstacles: AnyObstacle | Shape | Sequence[AnyObstacle | Shape] = (),
             footprint: Shape | Sequence[Shape] = (),
+            parts: Mapping[str, Shape | Sequence[Shape]] = ...,
+            body_height: tuple[float, float] = (0.0, 0.0),
             margin: float = 0.0,
+            zones: Sequence[Zone] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        _check_automaton(self.automaton)
         dof = self.automaton.model.group.dof
         if isinstance(self.start, SE2 | SE2xR):
             object.__setattr__(self, "start", self.start.pose)
@@ -204,10 +217,48 @@ class Problem:
             raise ValueError(f"start: time must be finite, got {self.start_time} s")
         object.__setattr__(self, "obstacles", as_obstacles(self.obstacles))
         object.__setattr__(self, "footprint", as_footprint(self.footprint))
+        object.__setattr__(self, "parts", _as_parts(self.automaton.model, self.parts))
+        low, high = self.body_height
+        if not (math.isfinite(low) and math.isfinite(high) and low <= high):
+            raise ValueError(
+                f"body_height must be [low, high] with low <= high, got {self.body_height} m"
+            )
+        object.__setattr__(self, "zones", tuple(self.zones))
+        for zone in self.zones:
+            for trim in zone.trims or ():
+                self.automaton.index_of(trim)
         if not (math.isfinite(self.margin) and self.margin >= 0.0):
             raise ValueError(f"margin must be a number of at least 0, got {self.margin} m")
-        if self.obstacles and dof != 3:
+        if not self.automaton.is_kinematic:
+            self._check_ends()
+        elif self.obstacles and dof != 3:
             raise ValueError("obstacles: this version knows them for vehicles in the plane only")
+
+    def _check_ends(self) -> None:
+        """A vehicle with inertia begins and ends in a trim."""
+        named = [("start", self.start_trim), *(("goal", goal.trim) for goal in self.goals)]
+        for what, trim in named:
+            if trim is None and self.automaton.rest is None:
+                raise ValueError(
+                    f"{what}: the {self.automaton.model.name} has no trim that stands still, need "
+                    f"the name of one of its trims: {', '.join(self.automaton.trim_names[:12])}"
+                )
+
+    @property
+    def first_trim(self) -> Trim:
+        """The trim in which the vehicle starts; rest unless one is named."""
+        return self._trim_or_rest(self.start_trim)
+
+    def last_trim(self, goal: Goal) -> Trim:
+        """The trim in which the vehicle ends at `goal`; rest unless one is named."""
+        return self._trim_or_rest(goal.trim)
+
+    def _trim_or_rest(self, name: str | None) -> Trim:
+        if name is not None:
+            return self.automaton[name]
+        if self.automaton.rest is None:
+            raise ValueError(f"the {self.automaton.model.name} has no trim that stands still")
+        return self.automaton.trims[self.automaton.rest]
 
     @property
     def rates(self) -> Array:
@@ -226,14 +277,58 @@ class Problem:
         return self.cost.rates(controls, np.array([trim.body_velocity for trim in plan.trims]))
 
     def cost_of(self, plan: Plan) -> float:
-        """Cost of a plan, whatever trims it uses: their rates, and the prices of its switches."""
+        """Cost of a plan, whatever primitives it uses: their rates, and the prices of switches.
+
+        Along a maneuver the rates are integrated from sample to sample by the trapezoidal rule:
+        exact for time and effort, and for the length wherever the speed is linear.
+        """
         if not plan.trims:
             return 0.0
-        velocities = np.array([trim.body_velocity for trim in plan.trims])
-        return float(self.rates_of(plan) @ plan.durations) + self.cost.switching(velocities)
+        coasting = float(self.rates_of(plan) @ plan.durations)
+        if not any(plan.maneuvers):
+            velocities = np.array([trim.body_velocity for trim in plan.trims])
+            return coasting + self.cost.switching(velocities)
+        maneuvers = sum(self.maneuver_cost(one) for one in plan.maneuvers if one)
+        driven = [self._velocities(one) for one in plan.primitives]
+        return coasting + maneuvers + self.cost.switching(np.concatenate(driven))
+
+    def maneuver_cost(self, maneuver: Maneuver) -> float:
+        """Cost of a maneuver without the prices of switches.
+
+        Raises
+        ------
+        ValueError
+            If it has no course.
+        """
+        course, model = maneuver.course, self.automaton.model
+        if maneuver.duration == 0.0:
+            return 0.0
+        if course is None:
+            raise ValueError(f"maneuver {maneuver.name!r}: has no course, so its cost is not known")
+        controls = course.control[:-1]
+        ends = [
+            self.cost.rates(controls, model.body_velocity(states, controls))
+            for states in (course.reduced_state[:-1], course.reduced_state[1:])
+        ]
+        return float(np.diff(course.time) @ (ends[0] + ends[1])) / 2.0
+
+    def _velocities(self, primitive: Primitive) -> Array:
+        """Body velocities (n, dof) of a primitive, one for every stretch in one direction."""
+        if isinstance(primitive, Trim):
+            return primitive.body_velocity[None]
+        if primitive.course is None:
+            return primitive.displacement[None]
+        course = primitive.course
+        between = (course.reduced_state[:-1] + course.reduced_state[1:]) / 2.0
+        rows = self.automaton.model.body_velocity(between, course.control[:-1])
+        rows = rows[np.abs(rows[:, 0]) > STANDING]
+        if not len(rows):
+            return np.zeros((1, self.start.size))
+        signs = np.sign(rows[:, 0])
+        return np.asarray(rows[np.append(True, signs[1:] != signs[:-1])])
 
     def moved(self, by: LieGroup) -> Problem:
-        """The problem moved by the group element `by`, obstacles too; bounds must be open."""
+        """The problem moved by the group element `by`, all around it too; bounds must be open."""
         if any(getattr(self.bounds, name) is not None for name in ("x", "y", "z")):
             raise ValueError("problem: bounds do not move with the symmetry")
         group = type(by)
@@ -242,6 +337,7 @@ class Problem:
             start=(by @ group(self.start)).pose,
             goals=tuple(replace(goal, pose=(by @ group(goal.pose)).pose) for goal in self.goals),
             obstacles=tuple(obstacle.moved(by) for obstacle in self.obstacles),
+            zones=tuple(zone.moved(by) for zone in self.zones),
         )
 
     @property
@@ -269,20 +365,17 @@ def _is_known(trim: Trim, known: dict[str, tuple[Trim, float]]) -> bool:
     return entry is not None and entry[0] is trim
 
 
-@functools.lru_cache(maxsize=8)
-def _check_automaton(automaton: Automaton) -> None:
-    """Trims that cannot be combined at will are refused, not taken for others."""
-    what = "this version plans for kinematic vehicles only"
-    if automaton.trim_classes.any() or automaton.maneuvers:
-        raise InvalidAutomaton(
-            f"automaton: {what}; need trims of one reduced state, and no maneuvers"
-        )
-    for trim in automaton.trims:
-        if math.isfinite(trim.max_duration):
-            raise InvalidAutomaton(
-                f"trim {trim.name!r}: got max_duration {trim.max_duration:g} s, but {what}, "
-                "whose trims last as long as one likes"
+def _as_parts(
+    model: Model, parts: Mapping[str, Shape | Sequence[Shape]]
+) -> dict[str, tuple[Shape, ...]]:
+    """Shapes of what the vehicle carries, by name; each in the frame of its part."""
+    known: tuple[str, ...] = getattr(model, "part_names", ())
+    for name in parts:
+        if name not in known:
+            raise ValueError(
+                f"parts: the {model.name} carries no {name!r}, only {', '.join(known) or 'nothing'}"
             )
+    return {name: as_footprint(shapes) for name, shapes in parts.items()}
 
 
 def _as_goals(value: Any) -> tuple[Goal, ...]:

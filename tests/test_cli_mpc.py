@@ -18,6 +18,11 @@ SHAKEN = (
     but("pose: [1.0, 1.0, 0.0]", "pose: [1.0, 1.0, 0.0], tolerance_m: 0.2, tolerance_rad: 0.2")
     + f"receding_horizon: {{step_s: 0.5, steps: 40, {NOISE}}}\n"
 )
+CART = "{box_m: {center: [0, 0], size: [0.5, 20]}, motion: [[0, -3, 0, 0], [2, 9, 0, 0]]}"
+HIT = LOOP.replace("model: unicycle", "model: unicycle, footprint: {rectangle_m: [0.4, 0.4]}") + (
+    f"obstacles: [{CART}]\n"  # faster than the vehicle, and on both sides of it
+)
+CLEAR = HIT.replace("[[0, -3, 0, 0], [2, 9, 0, 0]]", "[[0, -5, 0, 0], [2, -4, 0, 0]]")
 AHEAD_ONLY = LOOP.replace("    - {name: spin, control: [0.0, 1.0]}\n", "")
 SEEDS = ["--seeds", "2"]
 QUICK = ["--no-plot", "--quiet"]
@@ -52,6 +57,9 @@ def test_it_drives_to_the_goal(folder, capsys):
     printed = capsys.readouterr()
     assert "reached" in printed.out
     assert "hold in every step" in printed.out
+    assert "planned" in printed.out
+    assert "kept" in printed.out
+    assert "collisions" not in printed.out
     assert "broke" not in printed.err
     document = log()
     assert (document["status"], document["reached"]) == ("reached", True)
@@ -99,6 +107,35 @@ def test_the_start_is_the_goal(folder, capsys):
     assert run(["mpc", "x.yaml"]) == 0
     assert "nothing to do: the start is the goal" in capsys.readouterr().out
     assert len(log()["steps"]) == 1
+
+
+class TestAmongObstacles:
+    def test_what_is_hit_is_told(self, folder, capsys):
+        Path("x.yaml").write_text(HIT)
+        assert run(["mpc", "x.yaml", "--no-plot"]) == 1
+        printed = capsys.readouterr()
+        document = log()
+        assert document["reached"] is True
+        steps = {one["step"] for one in document["broken_guarantees"]
+                 if one["guarantee"] == "no collision"}  # fmt: skip
+        assert steps
+        assert f"collisions:     in {len(steps)} step" in printed.out
+        assert "least clearance:0 m" in printed.out.replace(": ", ":")
+        assert "harmful" in printed.out
+        assert all(f"step {k} broke a guarantee: no collision" in printed.err for k in steps)
+
+    def test_what_is_kept_clear_of_is_told(self, folder, capsys):
+        Path("x.yaml").write_text(CLEAR)
+        assert run(["mpc", "x.yaml", "--no-plot"]) == 0
+        printed = capsys.readouterr().out
+        assert "collisions:     none" in printed
+        assert f"least clearance:{log()['min_clearance_m']:.4g} m" in printed.replace(": ", ":")
+        assert "harmful" not in printed
+
+    def test_over_seeds_it_counts_as_much(self, folder, capsys):
+        Path("x.yaml").write_text(HIT)
+        assert run(["mpc", "x.yaml", *SEEDS, "--no-plot"]) == 1
+        assert "broken: no collision" in capsys.readouterr().out
 
 
 class TestSeed:

@@ -11,12 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.errors import InvalidAutomaton, UnknownTrim
+from maneuver_automaton.errors import UnknownTrim
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import Unicycle, UserModel
-from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
 
 ROBOT = Automaton.of_controls(
@@ -288,8 +288,7 @@ def test_bounds_break_the_symmetry(bounds):
         problem(bounds=bounds).moved(SE2([1, 0, 0]))
 
 
-def test_only_what_combines_at_will_is_planned_with():
-    """Several reduced states, maneuvers, longest durations would be ignored in silence."""
+def boat_automaton(*maneuvers):
     boat = UserModel(
         name="boat",
         group=SE2,
@@ -298,19 +297,49 @@ def test_only_what_combines_at_will_is_planned_with():
         velocity=lambda z, u: [z[0], 0.0, 0.0],
         dynamics=lambda z, u: [u[0] - z[0]],
     )
-    slow, fast = (
+    trims = tuple(
         Trim(name=name, body_velocity=[v, 0, 0], control=[v], reduced_state=[v])
         for name, v in (("slow", 1.0), ("fast", 2.0))
     )
-    hurry = Maneuver(name="hurry", source="slow", target="fast", displacement=[1, 0, 0])
-    need = "for kinematic vehicles only; need trims of one reduced state, and no maneuvers"
-    for automaton in (Automaton(boat, (slow, fast), (hurry,)), Automaton(boat, (slow, fast))):
-        with pytest.raises(InvalidAutomaton, match=f"^automaton: this version plans {need}$"):
-            Problem(automaton, [0, 0, 0], [1, 0, 0])
-    assert len(Problem(Automaton(boat, (slow,)), [0, 0, 0], [1, 0, 0]).rates) == 1
-    short = Trim(name="short", body_velocity=[1, 0, 0], control=[1, 0], max_duration=0.5)
-    with pytest.raises(InvalidAutomaton, match=r"^trim 'short': got max_duration 0.5 s, but this"):
-        Problem(Automaton(Unicycle(), (short,)), [0, 0, 0], [1, 0, 0])
+    return Automaton(boat, trims, maneuvers)
+
+
+def test_a_vehicle_with_inertia_begins_and_ends_in_a_trim():
+    need = "the boat has no trim that stands still, need the name of one of its trims: slow, fast"
+    with pytest.raises(ValueError, match=f"^start: {need}$"):
+        Problem(boat_automaton(), [0, 0, 0], [1, 0, 0])
+    with pytest.raises(ValueError, match=f"^goal: {need}$"):
+        Problem(boat_automaton(), [0, 0, 0], [1, 0, 0], start_trim="slow")
+    goal = Goal(pose=[1, 0, 0], trim="fast")
+    boat = Problem(boat_automaton(), [0, 0, 0], goal, start_trim="slow")
+    assert (boat.first_trim.name, boat.last_trim(goal).name) == ("slow", "fast")
+
+
+def test_the_cost_of_a_maneuver_is_integrated_along_its_course():
+    """From 1 to 2 m/s in a second, pushed with 2.58...: effort u^2, length, and time by hand."""
+    course = Trajectory(
+        time=np.array([0.0, 1.0]),
+        pose=np.array([[0, 0, 0], [1.5, 0, 0.0]]),
+        reduced_state=np.array([[1.0], [2.0]]),
+        control=np.array([[2.5], [2.5]]),
+    )
+    hurry = Maneuver(
+        name="hurry",
+        source="slow",
+        target="fast",
+        displacement=[1.5, 0, 0],
+        duration=1.0,
+        course=course,
+    )
+    automaton = boat_automaton(hurry)
+    goal = Goal(pose=[5.5, 0, 0], trim="fast")
+    cost = Cost(effort=1.0, length=10.0, time=100.0)
+    boat = Problem(automaton, [0, 0, 0], goal, start_trim="slow", cost=cost)
+    plan = Plan([0, 0, 0], automaton.trims, durations=[2.0, 1.0], maneuvers=(hurry,))
+    assert plan.word == ("slow", "hurry", "fast")
+    assert plan.end.tolist() == [5.5, 0, 0]
+    coasting = 2.0 * (1.0 + 10.0 + 100.0) + 1.0 * (4.0 + 20.0 + 100.0)
+    assert boat.cost_of(plan) == pytest.approx(coasting + 2.5**2 + 15.0 + 100.0)
 
 
 def test_a_cost_is_a_value():

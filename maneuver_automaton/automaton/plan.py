@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
@@ -82,6 +82,70 @@ class Plan:
                     f"plan: maneuver {maneuver.name!r} leads from {maneuver.source!r} to "
                     f"{maneuver.target!r}, but stands between {source.name!r} and {target.name!r}"
                 )
+
+    @classmethod
+    def of_primitives(
+        cls,
+        start: ArrayLike,
+        primitives: Sequence[Primitive],
+        *,
+        durations: ArrayLike,
+        trims: Mapping[str, Trim],
+        start_time: float = 0.0,
+    ) -> Plan:
+        """Plan of trims and maneuvers in order; `trims` has those that last no time, by name.
+
+        Parameters
+        ----------
+        start : (dof,) array
+            Pose at the begin.
+        primitives : sequence of Trim or Maneuver
+            In order; a maneuver may follow a maneuver.
+        durations : (n,) array
+            Of all of them [s]; those of maneuvers are their own.
+        trims : mapping of str to Trim
+            Trims that stand between maneuvers, or at the ends, for no time.
+        start_time : float
+            [s].
+
+        Examples
+        --------
+        >>> rest = Trim(name="rest", body_velocity=[0.0, 0.0, 0.0], control=[0.0])
+        >>> hop = Maneuver(name="hop", source="rest", target="rest", displacement=[1, 0, 0],
+        ...                duration=2.0)
+        >>> plan = Plan.of_primitives([0, 0, 0], [hop, hop], durations=[2, 2], trims={"rest": rest})
+        >>> len(plan.trims), plan.word, plan.duration
+        (3, ('hop', 'hop'), 4.0)
+        """
+        word: list[Trim] = []
+        lasting: list[float] = []
+        between: list[Maneuver | None] = []
+
+        def put(trim: Trim, duration: float) -> None:
+            arrived = word and len(between) == len(word) and between[-1]
+            if arrived and arrived.target != trim.name:
+                word.append(trims[arrived.target])
+                lasting.append(0.0)
+            if len(between) < len(word):
+                between.append(None)
+            word.append(trim)
+            lasting.append(duration)
+
+        for primitive, duration in zip(primitives, np.asarray(durations, float), strict=True):
+            if isinstance(primitive, Trim):
+                put(primitive, float(duration))
+                continue
+            ready = len(between) < len(word) and word[-1].name == primitive.source
+            if not ready:
+                put(trims[primitive.source], 0.0)
+            between.append(primitive)
+        if word and len(between) == len(word):
+            last = primitives[-1]
+            assert isinstance(last, Maneuver)
+            word.append(trims[last.target])
+            lasting.append(0.0)
+        maneuvers = tuple(between) if any(between) else ()
+        return cls(start, word, durations=lasting, maneuvers=maneuvers, start_time=start_time)
 
     @cached_property
     def primitives(self) -> tuple[Primitive, ...]:

@@ -25,17 +25,20 @@ def print_loop(name: str, loop: ClosedLoop, *, folder: str) -> None:
             f"{step.value:.6g}",
             f"{step.accumulated_cost:.6g}",
             " - ".join(step.plan.word),
-            "replanned" if step.replanned else step.origin.value,
+            step.deed.value,
+            step.origin.value,
             f"{1e3 * step.solve_s:.2f}",
         ]
         for step in loop.steps
     ]
-    columns = ["", "time [s]", "pose", "control", "value", "spent", "word", "plan", "solved [ms]"]
-    shown = rows if len(rows) <= MOST_ROWS else [*rows[: MOST_ROWS - 5], ["..."] + [""] * 8]
+    columns = ["", "time [s]", "pose", "control", "value", "spent", "word", "deed", "plan",
+               "solved [ms]"]  # fmt: skip
+    gap = ["...", *[""] * (len(columns) - 1)]
+    shown = rows if len(rows) <= MOST_ROWS else [*rows[: MOST_ROWS - 5], gap]
     if shown is not rows:
         shown += rows[-4:]
     if rows:
-        out.print(table(name, columns, shown, numbers=(0, 1, 4, 5, 8)))
+        out.print(table(name, columns, shown, numbers=(0, 1, 4, 5, 9)))
     else:
         out.print(Text(f"{name}\n\n  nothing to do: the start is the goal\n"))
     broken = len({number for number, _ in loop.violations})
@@ -45,8 +48,10 @@ def print_loop(name: str, loop: ClosedLoop, *, folder: str) -> None:
         "cost": f"{loop.cost:.9g}",
         "steps": f"{len(loop.steps)}{bound}",
         "guarantees": f"broken in {broken} steps" if broken else "hold in every step",
-        "written to": folder,
     }
+    if loop.problem.obstacles:
+        facts |= {"least clearance": _clearance(loop), "collisions": _collisions(loop)}
+    facts["written to"] = folder
     if rows:
         milliseconds = 1e3 * loop.solve_s
         facts["time per step"] = (
@@ -54,6 +59,16 @@ def print_loop(name: str, loop: ClosedLoop, *, folder: str) -> None:
         )
     for what, value in facts.items():
         out.print(Text(f"  {what + ':':<16}{value}"), soft_wrap=True)
+
+
+def _clearance(loop: ClosedLoop) -> str:
+    least = loop.min_clearance_m
+    return "nothing was driven" if least is None else f"{least:.4g} m"
+
+
+def _collisions(loop: ClosedLoop) -> str:
+    hits = len({number for number, _ in loop.collisions})
+    return f"in {hits} step{'' if hits == 1 else 's'}" if hits else "none"
 
 
 def print_statistics(name: str, statistics: Statistics, *, folder: str) -> None:

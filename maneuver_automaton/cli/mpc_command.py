@@ -65,7 +65,7 @@ def drive_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> in
         complain(f"{path}: step {number} broke a guarantee: {violation}")
     if not loop.reached:
         complain(f"{path}: {loop.status}: {loop.reason}")
-    return FOUND if loop.reached else NO_PLAN
+    return FOUND if loop.reached and not any(loop.collisions) else NO_PLAN
 
 
 def drive_folder(folder: Path, out: Path, *, settings: Settings, parts: Parts) -> int:
@@ -153,6 +153,7 @@ def _statistics(path: Path, scenario: Scenario, out: Path, settings: Settings) -
                 time_limit=settings.time_limit or scenario.time_limit_s,
                 stay=part.stay,
                 retimed=part.retimed,
+                audit=bool(scenario.problem.obstacles),  # else nothing looks for collisions
                 jobs=settings.jobs,
                 scheduler=settings.scheduler,
                 progress=count,
@@ -167,11 +168,12 @@ def _statistics(path: Path, scenario: Scenario, out: Path, settings: Settings) -
         from maneuver_automaton.cli.loop_tables import print_statistics
 
         print_statistics(scenario.name, statistics, folder=str(out))
-    return FOUND if _all_reached(statistics) else NO_PLAN
+    return FOUND if _all_well(statistics) else NO_PLAN
 
 
-def _all_reached(statistics: Statistics) -> bool:
-    return all(one.reached for one in statistics.outcomes)
+def _all_well(statistics: Statistics) -> bool:
+    """Whether every loop reached the goal, and hit nothing."""
+    return all(one.reached and not any(one.collisions) for one in statistics.outcomes)
 
 
 def _in_file(path: Path, error: ValueError) -> InvalidScenario:

@@ -5,17 +5,18 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
 from rich import box
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 if TYPE_CHECKING:
-    from maneuver_automaton.automaton import Plan
+    from maneuver_automaton.automaton import Plan, Primitive
     from maneuver_automaton.planning import PlanResult
+    from maneuver_automaton.problem import Problem
 
 WIDE = 160  # columns where the output goes to no terminal
 
@@ -54,10 +55,12 @@ def print_result(name: str, result: PlanResult, *, folder: str) -> None:
         return
     out, names = console(), result.problem.automaton.model.control_names
     rows = [
-        [str(k + 1), trim.name, _numbers(trim.control), f"{duration:.6g}"]
-        for k, (trim, duration) in enumerate(zip(plan.trims, plan.durations, strict=True))
+        [str(k + 1), one.name, _control(one), f"{duration:.6g}"]
+        for k, (one, duration) in enumerate(
+            zip(plan.primitives, plan.primitive_durations, strict=True)
+        )
     ]
-    columns = ["", "trim", ", ".join(names), "duration [s]"]
+    columns = ["", "primitive" if any(plan.maneuvers) else "trim", ", ".join(names), "duration [s]"]
     if rows:
         out.print(table(name, columns, rows, numbers=(0, 2, 3)))
     else:
@@ -65,7 +68,7 @@ def print_result(name: str, result: PlanResult, *, folder: str) -> None:
     facts = {
         "cost": f"{result.cost:.9g}{_bound(result)}",
         "duration": f"{plan.duration:.9g} s",
-        "turning points": f"{_direction_changes(plan)} between forward and reverse",
+        "turning points": f"{_direction_changes(result.problem, plan)} between forward and reverse",
         "clearance": _clearance(result),
         "terminal error": f"{error.position_m:.2g} m, {error.heading_rad:.2g} rad",
         "timing": ", ".join(f"{_spoken(k)} {v:.3f} s" for k, v in result.timing_s.items()),
@@ -102,11 +105,18 @@ def _clearance(result: PlanResult) -> str:
     return f"{result.clearance_m:.3g} m to the nearest obstacle{kept}"
 
 
-def _direction_changes(plan: Plan) -> int:
+def _control(primitive: Primitive) -> str:
+    """The control of a trim; that of a maneuver varies."""
+    from maneuver_automaton.primitives import Maneuver
+
+    return "maneuver" if isinstance(primitive, Maneuver) else _numbers(primitive.control)
+
+
+def _direction_changes(problem: Problem, plan: Plan) -> int:
+    """How often the plan changes between ahead and back: its price, where that is all."""
     from maneuver_automaton.costs import Cost
 
-    velocities = [trim.body_velocity for trim in plan.trims]
-    return round(Cost(direction_change=1.0).switching(np.array(velocities))) if velocities else 0
+    return round(replace(problem, cost=Cost(direction_change=1.0)).cost_of(plan))
 
 
 def _spoken(name: str) -> str:

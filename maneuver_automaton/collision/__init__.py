@@ -32,3 +32,4 @@ from maneuver_automaton.collision.shapes import (
 from maneuver_automaton.collision.shapes import (
     as_obstacles as as_obstacles,
 )
+from maneuver_automaton.collision.zones import Zone as Zone

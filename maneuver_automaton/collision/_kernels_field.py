@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from maneuver_automaton._compile import inner_kernel, kernel
+from maneuver_automaton._compile import inlined_kernel, inner_kernel, kernel
 from maneuver_automaton.collision._kernels_gap import point_to_segment
 
 
@@ -122,16 +122,21 @@ def write_map(distance, origin_x, origin_y, cell, cap, blocked, resolution, m_x,
             distance[j, i] = min(distance[j, i], resolution * value)
 
 
+@inlined_kernel
+def cells_between(low, high, origin, cell, n):
+    """First cell of a row of `n` that an interval touches, and the one after the last."""
+    return max(0, math.floor((low - origin) / cell)), min(n, math.floor((high - origin) / cell) + 1)
+
+
 @kernel
 def count_buckets(start, plates, origin_x, origin_y, cell, columns, rows, reach):
     """How many pieces each bucket holds, one place late: `start[k + 1]`."""
     for p in range(plates.shape[0]):
-        i_0 = max(0, math.floor((plates[p, 0] - reach - origin_x) / cell))
-        i_1 = min(columns - 1, math.floor((plates[p, 2] + reach - origin_x) / cell))
-        j_0 = max(0, math.floor((plates[p, 1] - reach - origin_y) / cell))
-        j_1 = min(rows - 1, math.floor((plates[p, 3] + reach - origin_y) / cell))
-        for j in range(j_0, j_1 + 1):
-            for i in range(i_0, i_1 + 1):
+        plate = plates[p]
+        i_0, i_1 = cells_between(plate[0] - reach, plate[2] + reach, origin_x, cell, columns)
+        j_0, j_1 = cells_between(plate[1] - reach, plate[3] + reach, origin_y, cell, rows)
+        for j in range(j_0, j_1):
+            for i in range(i_0, i_1):
                 start[j * columns + i + 1] += 1
 
 
@@ -139,12 +144,11 @@ def count_buckets(start, plates, origin_x, origin_y, cell, columns, rows, reach)
 def fill_buckets(start, items, plates, origin_x, origin_y, cell, columns, rows, reach):
     """Write the pieces of each bucket; `start` is moved on by the count, and must be moved back."""
     for p in range(plates.shape[0]):
-        i_0 = max(0, math.floor((plates[p, 0] - reach - origin_x) / cell))
-        i_1 = min(columns - 1, math.floor((plates[p, 2] + reach - origin_x) / cell))
-        j_0 = max(0, math.floor((plates[p, 1] - reach - origin_y) / cell))
-        j_1 = min(rows - 1, math.floor((plates[p, 3] + reach - origin_y) / cell))
-        for j in range(j_0, j_1 + 1):
-            for i in range(i_0, i_1 + 1):
+        plate = plates[p]
+        i_0, i_1 = cells_between(plate[0] - reach, plate[2] + reach, origin_x, cell, columns)
+        j_0, j_1 = cells_between(plate[1] - reach, plate[3] + reach, origin_y, cell, rows)
+        for j in range(j_0, j_1):
+            for i in range(i_0, i_1):
                 k = j * columns + i
                 items[start[k]] = p
                 start[k] += 1

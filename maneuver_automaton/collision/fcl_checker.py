@@ -34,6 +34,8 @@ from maneuver_automaton.collision.swept import (
     Windows,
     along,
     body_of,
+    chunks,
+    course_hulls,
     fastest,
     halves,
     slice_excess,
@@ -146,6 +148,51 @@ class FclChecker:
         if hit is not None or not self._ground.movers:
             return hit
         return self._moving_hit_on_way(here, twist, duration, start_time)
+
+    def course_hit(
+        self, start: ArrayLike, poses: ArrayLike, times: ArrayLike, *, start_time: float = 0.0
+    ) -> int | None:
+        """Which obstacle the body touches along a course; None if the way is free.
+
+        The course is sampled at `poses` (n, 3), seen from `start`, and `times` (n,) [s] since its
+        begin, and runs with a constant twist from sample to sample. One solid serves several
+        samples; where it touches, halves of it are tried, down to single ones.
+
+        Raises
+        ------
+        ValueError
+            If a number is not finite.
+        """
+        frame = SE2(self._seen("start", start))
+        seen = (frame @ SE2(as_array("poses", poses, last=3))).pose
+        clock = as_array("times", times) + start_time
+        spans = np.diff(clock)
+        steps = (SE2(seen[:-1]).inverse() @ SE2(seen[1:])).log()
+        twists = steps / np.maximum(spans, 1e-300)[:, None]
+        if self._ground.still is not None:
+            todo = chunks(steps)[::-1]
+            while todo:
+                first, last = todo.pop()
+                if last - first == 1:
+                    twist = (*steps[first].tolist(),)
+                    hit = self._still_hit_on_way(seen[first], (twist[0], twist[1], twist[2]), 1.0)
+                    if hit is not None:
+                        return hit
+                    continue
+                skin = body_skin(
+                    course_hulls(self._body, seen[first : last + 1], steps[first:last])
+                )
+                if _touching(_object(skin), np.zeros((1, 3)), self._ground.still, most=1):
+                    middle = (first + last) // 2
+                    todo += [(middle, last), (first, middle)]
+        if self._ground.movers:
+            for pose, twist, span, time in zip(
+                seen[:-1], twists.tolist(), spans.tolist(), clock.tolist(), strict=False
+            ):
+                hit = self._moving_hit_on_way(pose, (twist[0], twist[1], twist[2]), span, time)
+                if hit is not None:
+                    return hit
+        return None
 
     def clearance(self, poses: ArrayLike, *, times: ArrayLike | None = None) -> float:
         """Least distance [m] to any obstacle at poses (n, 3) and times (n,) [s], 0 if none given.

@@ -20,6 +20,7 @@ from maneuver_automaton.groups import SE2
 
 Twist = tuple[float, float, float]  # [m/s, m/s, rad/s]
 MOST_TURN = 0.25  # [rad] of one slice
+MOST_STEPS = 32  # of a course in one hull
 STANDING = 1e-12  # [m] a body that moves no point further is taken to stand
 
 
@@ -88,6 +89,58 @@ def slice_hulls(body: Body, twist: Twist, duration: float) -> list[Array]:
             points.append(corners + to_tangents * rates)
         hulls.append(convex_hull(np.concatenate(points)))
     return hulls
+
+
+def course_hulls(body: Body, poses: Array, steps: Array) -> list[Array]:
+    """Convex polygons that hold every point of the body along a course.
+
+    It stands at `poses` (n + 1, 3) and moves from each to the next with a constant twist, which
+    makes the step of `steps` (n, 3) in the frame of the first: hulls as in `slice_hulls`, in the
+    frame of the poses.
+
+    Examples
+    --------
+    >>> square = Body((np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),))
+    >>> steps = np.array([[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    >>> poses = np.array([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0]])
+    >>> (ahead,) = course_hulls(square, poses, steps)
+    >>> ahead.min(axis=0).tolist(), ahead.max(axis=0).tolist()
+    ([-1.0, -1.0], [3.0, 1.0])
+    """
+    v_x, v_y, turn = (column[:, None] for column in steps.T)
+    half = np.where(turn == 0.0, 1.0, 0.5 * turn)
+    to_tangents = np.where(turn == 0.0, 0.5, 0.5 * np.tan(half) / half)
+    hulls = []
+    for corners in body.pieces:
+        x, y = corners.T
+        rates = np.stack([v_x - turn * y, v_y + turn * x], axis=-1)
+        meeting = corners + to_tangents[..., None] * rates
+        points = [
+            SE2(poses[:, None]).act(np.broadcast_to(corners, (len(poses), *corners.shape))),
+            SE2(poses[:-1, None]).act(meeting),
+        ]
+        hulls.append(convex_hull(np.concatenate([one.reshape(-1, 2) for one in points])))
+    return hulls
+
+
+def chunks(steps: Array) -> list[tuple[int, int]]:
+    """Runs [first, last) of steps (n, 3) that turn by at most `MOST_TURN` together, in order.
+
+    Examples
+    --------
+    >>> chunks(np.array([[1.0, 0.0, 0.1], [1.0, 0.0, 0.1], [1.0, 0.0, 0.1]]))
+    [(0, 2), (2, 3)]
+    """
+    runs: list[tuple[int, int]] = []
+    first, turned = 0, 0.0
+    for k, turn in enumerate(np.abs(steps[:, 2]).tolist()):
+        if k > first and (turned + turn > MOST_TURN or k - first >= MOST_STEPS):
+            runs.append((first, k))
+            first, turned = k, 0.0
+        turned += turn
+    if len(steps):
+        runs.append((first, len(steps)))
+    return runs
 
 
 def slice_excess(body: Body, twist: Twist, duration: float) -> float:

@@ -16,11 +16,12 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton._files import write_text_atomically
-from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.automaton import Automaton, Plan, Primitive
+from maneuver_automaton.automaton.cutting import tail_of, with_samples_at
 from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.plan_json import package_version, read_json
-from maneuver_automaton.primitives import Trim
+from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.receding_horizon import (
     ClosedLoop,
     Deed,
@@ -143,13 +144,10 @@ def _step(step: Step, vehicle_pose: list[float]) -> dict[str, Any]:
         "control": None if step.control is None else step.control.tolist(),
         "word": list(step.plan.word),
         "plan": [
-            {
-                "kind": "trim",
-                "name": trim.name,
-                "control": trim.control.tolist(),
-                "duration_s": float(duration),
-            }
-            for trim, duration in zip(step.plan.trims, step.plan.durations, strict=True)
+            _primitive(primitive, float(duration))
+            for primitive, duration in zip(
+                step.plan.primitives, step.plan.primitive_durations, strict=True
+            )
         ],
         "replanned": step.replanned,
         "solve_s": step.solve_s,
@@ -175,6 +173,23 @@ def _step(step: Step, vehicle_pose: list[float]) -> dict[str, Any]:
     }
 
 
+def _primitive(primitive: Primitive, duration: float) -> dict[str, Any]:
+    if isinstance(primitive, Trim):
+        return {
+            "kind": "trim",
+            "name": primitive.name,
+            "control": primitive.control.tolist(),
+            "duration_s": duration,
+        }
+    return {
+        "kind": "maneuver",
+        "name": primitive.name,
+        "source": primitive.source,
+        "target": primitive.target,
+        "duration_s": duration,
+    }
+
+
 def _last(loop: ClosedLoop) -> dict[str, Any]:
     pose = loop.poses[-1].tolist()
     return {
@@ -190,12 +205,7 @@ def _last(loop: ClosedLoop) -> dict[str, Any]:
 def _step_of(number: int, entry: Mapping[str, Any], automaton: Automaton) -> Step:
     where = f"steps[{number}]"
     pose = as_array(f"{where}.pose", entry["pose"], last=automaton.model.group.dof)
-    plan = Plan(
-        pose,
-        tuple(_trim(one, automaton) for one in entry["plan"]),
-        durations=[one["duration_s"] for one in entry["plan"]],
-        start_time=float(entry["time_s"]),
-    )
+    plan = _plan(pose, entry["plan"], float(entry["time_s"]), automaton)
     return Step(
         time=float(entry["time_s"]),
         pose=pose,
@@ -223,6 +233,47 @@ def _step_of(number: int, entry: Mapping[str, Any], automaton: Automaton) -> Ste
             for one in entry["broken_guarantees"]
         ),
     )
+
+
+def _plan(
+    pose: Array, entries: list[Mapping[str, Any]], start_time: float, automaton: Automaton
+) -> Plan:
+    """The plan of a step; one with maneuvers has those of the library, the first cut if need be."""
+    durations = [float(one["duration_s"]) for one in entries]
+    if all(one["kind"] == "trim" for one in entries) and automaton.is_kinematic:
+        trims = tuple(_trim(one, automaton) for one in entries)
+        return Plan(pose, trims, durations=durations, start_time=start_time)
+    primitives = [
+        automaton[one["name"]] if one["kind"] == "trim" else _maneuver(one, automaton)
+        for one in entries
+    ]
+    if not primitives and automaton.rest is not None:
+        at_rest = (automaton.trims[automaton.rest],)
+        return Plan(pose, at_rest, durations=[0.0], start_time=start_time)
+    return Plan.of_primitives(
+        pose,
+        primitives,
+        durations=durations,
+        trims={trim.name: trim for trim in automaton.trims},
+        start_time=start_time,
+    )
+
+
+def _maneuver(entry: Mapping[str, Any], automaton: Automaton) -> Maneuver:
+    """The maneuver of the library, or what was left of it when the step began."""
+    for one in automaton.maneuvers:
+        if (one.name, one.source, one.target) != (entry["name"], entry["source"], entry["target"]):
+            continue
+        begun = one.duration - float(entry["duration_s"])
+        if begun <= 0.0:
+            return one
+        trims = (automaton[one.source], automaton[one.target])
+        still = np.zeros(automaton.model.group.dof)
+        whole = Plan(still, trims, durations=[0.0, 0.0], maneuvers=(one,))
+        rest = tail_of(with_samples_at(whole, [begun], automaton.model), begun)
+        assert rest.maneuvers[0] is not None
+        return rest.maneuvers[0]
+    raise ValueError(f"maneuver {entry['name']!r}: the library has none of this name and ends")
 
 
 def _trim(entry: Mapping[str, Any], automaton: Automaton) -> Trim:

@@ -20,12 +20,12 @@ import numpy as np
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.audit import Audit, TerminalError
-from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton import Plan, Primitive
 from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.planning import Alternative, PlanResult
-from maneuver_automaton.primitives import Trim
+from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 
 SCHEMA = 1
 FAR = 1e6  # [m] from here on poses are written relative to the start
@@ -181,15 +181,20 @@ def _trajectory(plan: Plan) -> dict[str, Any]:
 
 
 def _primitives(plan: Plan) -> list[dict[str, Any]]:
-    return [
-        {
-            "kind": "trim",
-            "name": trim.name,
-            "control": trim.control.tolist(),
+    """Trims and maneuvers in order; a maneuver has no control of its own, but two ends."""
+    entries: list[dict[str, Any]] = []
+    for primitive, duration in zip(plan.primitives, plan.primitive_durations, strict=True):
+        trim = primitive if isinstance(primitive, Trim) else None
+        entry: dict[str, Any] = {
+            "kind": "maneuver" if trim is None else "trim",
+            "name": primitive.name,
+            "control": None if trim is None else trim.control.tolist(),
             "duration_s": float(duration),
         }
-        for trim, duration in zip(plan.trims, plan.durations, strict=True)
-    ]
+        if isinstance(primitive, Maneuver):
+            entry |= {"source": primitive.source, "target": primitive.target}
+        entries.append(entry)
+    return entries
 
 
 def _alternative(one: Alternative) -> dict[str, Any]:
@@ -257,26 +262,86 @@ def _plan_of(document: Mapping[str, Any]) -> Plan:
         raise ValueError(
             f"trajectory: got {len(time)} times and {len(pose)} poses, need one pose per time"
         )
-    reduced = trajectory["reduced_state"]
+    samples = Trajectory(
+        time=time,
+        pose=pose,
+        reduced_state=_rows(trajectory, "reduced_state", len(time)),
+        control=_rows(trajectory, "control", len(time)),
+    )
     durations = [_duration(k, entry) for k, entry in enumerate(primitives)]
     switches = _switches(time, durations)
-    trims = tuple(
-        Trim(
-            name=entry["name"],
-            control=entry["control"],
-            body_velocity=_twist(time[begin : end + 1], pose[begin : end + 1]),
-            reduced_state=reduced[begin],
-        )
+    pieces = [
+        _primitive(entry, _stretch(samples, begin, end))
         for entry, begin, end in zip(primitives, switches[:-1], switches[1:], strict=True)
-    )
+    ]
+    passed = {
+        name: _passed(name, course, at)
+        for one in pieces
+        if isinstance(one, Maneuver) and (course := one.course) is not None
+        for name, at in ((one.source, 0), (one.target, -1))
+    }
     start = pose[0].copy()
     start[:2] += origin
-    return Plan(start, trims, durations=np.array(durations), start_time=float(time[0]))
+    return Plan.of_primitives(
+        start, pieces, durations=durations, trims=passed, start_time=float(time[0])
+    )
+
+
+def _rows(trajectory: Mapping[str, Any], key: str, count: int) -> Array:
+    """One row of numbers (n,) for every sample; rows may be empty."""
+    rows = np.array(trajectory[key], dtype=np.float64).reshape(len(trajectory[key]), -1)
+    if len(rows) != count:
+        raise ValueError(f"trajectory.{key}: got {len(rows)} rows for {count} times")
+    return rows
+
+
+def _stretch(samples: Trajectory, begin: int, end: int) -> Trajectory:
+    """The samples from one to another, from time 0 and seen from the first pose."""
+    rows = slice(begin, end + 1)
+    group = group_of(samples.pose.shape[1])
+    pose = (group(samples.pose[begin]).inverse() @ group(samples.pose[rows])).pose.copy()
+    pose[0] = 0.0
+    control = samples.control[rows].copy()
+    control[-1] = control[max(len(control) - 2, 0)]
+    return Trajectory(
+        time=samples.time[rows] - samples.time[begin],
+        pose=pose,
+        reduced_state=samples.reduced_state[rows],
+        control=control,
+    )
+
+
+def _primitive(entry: Mapping[str, Any], course: Trajectory) -> Primitive:
+    if entry["kind"] == "trim":
+        return Trim(
+            name=entry["name"],
+            control=entry["control"],
+            body_velocity=_twist(course.time, course.pose),
+            reduced_state=course.reduced_state[0],
+        )
+    return Maneuver(
+        name=entry["name"],
+        source=entry["source"],
+        target=entry["target"],
+        displacement=course.pose[-1],
+        duration=float(course.time[-1]),
+        course=course,
+    )
+
+
+def _passed(name: str, course: Trajectory, at: int) -> Trim:
+    """A trim that lasts no time, before or after a maneuver: its twist does not matter."""
+    return Trim(
+        name=name,
+        control=np.zeros(course.control.shape[1]),
+        body_velocity=np.zeros(course.pose.shape[1]),
+        reduced_state=course.reduced_state[at],
+    )
 
 
 def _duration(k: int, entry: Mapping[str, Any]) -> float:
-    if entry["kind"] != "trim":
-        raise ValueError(f"primitives[{k}].kind: got {entry['kind']!r}, need 'trim'")
+    if entry["kind"] not in ("trim", "maneuver"):
+        raise ValueError(f"primitives[{k}].kind: got {entry['kind']!r}, need 'trim' or 'maneuver'")
     return float(as_array(f"primitives[{k}].duration_s", entry["duration_s"]))
 
 

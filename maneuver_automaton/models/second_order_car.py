@@ -17,6 +17,7 @@ from maneuver_automaton.models._limits import (
     speed_limits,
     symmetric_limits,
 )
+from maneuver_automaton.models.car import Car
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,6 +95,24 @@ class SecondOrderCar:
         limits = symmetric_limits(self.max_speed, self.max_steering)
         limits[0] = speed_limits(self.name, self.min_speed, self.max_speed)
         return limits
+
+    @property
+    def kinematic(self) -> Car:
+        """The car whose paths it can follow if it stops where the curvature jumps."""
+        return Car(wheelbase=self.wheelbase, max_steering=self.max_steering)
+
+    def state_along(self, twist: Array, pace: float) -> Array:
+        """Reduced state (2,) in which it moves with ``pace * twist``: the wheel stays as it is.
+
+        Examples
+        --------
+        >>> car = SecondOrderCar(wheelbase=2.0, max_steering=1.0, max_speed=2.0,
+        ...                      max_acceleration=1.0, max_steering_rate=0.5)
+        >>> car.state_along(np.array([-1.0, 0.0, 0.5]), 0.0).round(4).tolist()
+        [-0.0, -0.7854]
+        """
+        steering = math.atan(self.wheelbase * float(twist[2]) / float(twist[0]))
+        return np.array([pace * float(twist[0]), steering])
 
     def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
         """Components of the twist: (speed, 0, speed tan(steering) / wheelbase)."""

@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import SE2, LieGroup
 from maneuver_automaton.models._components import Components, no_parts, on_arrays
 from maneuver_automaton.models._limits import check_positive, speed_limits, symmetric_limits
+from maneuver_automaton.models.unicycle import Unicycle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,6 +75,15 @@ class SecondOrderUnicycle:
         limits = symmetric_limits(self.max_speed, self.max_turn_rate)
         limits[0] = speed_limits(self.name, self.min_speed, self.max_speed)
         return limits
+
+    @property
+    def kinematic(self) -> Unicycle:
+        """The unicycle whose paths it can follow if it stops where the twist jumps."""
+        return Unicycle()
+
+    def state_along(self, twist: Array, pace: float) -> Array:
+        """Reduced state (2,) in which it moves with ``pace * twist``."""
+        return np.array([pace * float(twist[0]), pace * float(twist[2])])
 
     def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
         """Components of the twist: (speed, 0, turn_rate)."""

@@ -9,9 +9,11 @@ from maneuver_automaton.planning.among_obstacles import (
     plan_on_lattice,
     prepare_map,
 )
+from maneuver_automaton.planning.among_zones import plan_among_zones
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.free_space import plan_by_words
 from maneuver_automaton.planning.result import PlanResult
+from maneuver_automaton.planning.with_inertia import load_inertia, plan_with_inertia
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.search.choose import load_search
@@ -52,13 +54,24 @@ def plan(problem: Problem, *, time_limit: float = 5.0, alternatives: int = 0) ->
         raise ValueError(f"time_limit must be positive, got {time_limit} s")
     if alternatives < 0:
         raise ValueError(f"alternatives must be at least 0, got {alternatives}")
-    among = uses_lattice(problem)
     _load(problem)
     began = time.monotonic()
     blocked = blocked_ends(problem)
     if blocked is not None:
         return blocked
-    how = plan_on_lattice if among else plan_by_words
+    if problem.zones:
+        return plan_among_zones(
+            problem, _searched, began=began, time_limit=time_limit, alternatives=alternatives
+        )
+    return _searched(problem, began=began, time_limit=time_limit, alternatives=alternatives)
+
+
+def _searched(
+    problem: Problem, /, *, began: float, time_limit: float, alternatives: int
+) -> PlanResult:
+    """The answer of the search that suits a problem without zones."""
+    kinematic = plan_on_lattice if uses_lattice(problem) else plan_by_words
+    how = plan_with_inertia if has_inertia(problem) else kinematic
     return how(problem, began=began, time_limit=time_limit, alternatives=alternatives)
 
 
@@ -71,12 +84,21 @@ def prepare(problem: Problem) -> None:
 
 def _load(problem: Problem) -> None:
     """Compile or load what planning needs, before the clock runs."""
-    if problem.obstacles or uses_lattice(problem):
+    if has_inertia(problem):
+        load_inertia(problem)
+        return
+    if problem.obstacles or problem.zones or uses_lattice(problem):
         load_lattice()
     if uses_lattice(problem):
         library_table(problem)
     else:
         load_search(problem)
+
+
+def has_inertia(problem: Problem) -> bool:
+    """Whether the vehicle cannot switch at will between the trims that it needs."""
+    automaton = problem.automaton
+    return bool(automaton.model.reduced_names) or not automaton.is_kinematic
 
 
 def uses_lattice(problem: Problem) -> bool:

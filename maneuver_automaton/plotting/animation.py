@@ -22,7 +22,7 @@ from maneuver_automaton.plotting.scene import (
     view_box,
 )
 from maneuver_automaton.plotting.stage import stage_of
-from maneuver_automaton.plotting.track import track_of_plan
+from maneuver_automaton.plotting.track import Track, track_of_plan
 from maneuver_automaton.problem import Problem
 
 
@@ -80,12 +80,12 @@ def _film(plan: Plan, problem: Problem | None, footprint: Any) -> Film:
         trail.set_segments([places for _, places in driven])
         trail.set_color([colors[name] for name, _ in driven])
         vehicle.set_verts(placed(body, plan.pose_at(time)[None]))
-        vehicle.set_facecolor((*_color_at(plan, time, colors), 0.55))
+        vehicle.set_facecolor((*_color_at(track, time, colors), 0.55))
         stage.clock.set_text(f"{time:.2f} s")
 
     times = picture_times(plan.start_time, plan.start_time + plan.duration)
     # one picture of each trim: its colour is in none of the others
-    first = {trim.name: time for trim, time in zip(plan.trims, plan.switching_times, strict=False)}
+    first = {piece.name: float(piece.time[0]) for piece in reversed(track.pieces)}
     return Film(
         figure=stage.figure,
         moving=[stage.traffic, trail, vehicle, stage.clock],
@@ -95,8 +95,8 @@ def _film(plan: Plan, problem: Problem | None, footprint: Any) -> Film:
     )
 
 
-def _color_at(plan: Plan, time: float, colors: dict[str, Color]) -> Color:
-    if not plan.trims:
+def _color_at(track: Track, time: float, colors: dict[str, Color]) -> Color:
+    if not track.pieces:
         return INK
-    after = np.searchsorted(plan.switching_times[1:-1], time, side="right")
-    return colors.get(plan.trims[int(after)].name, GREY)
+    after = np.searchsorted(track.switching_times[1:-1], time, side="right")
+    return colors.get(track.pieces[int(after)].name, GREY)

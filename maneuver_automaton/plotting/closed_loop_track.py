@@ -90,4 +90,5 @@ def _joined(one: Piece, other: Piece) -> Piece:
         time=np.concatenate([one.time, other.time[1:]]),
         pose=np.concatenate([one.pose, other.pose[1:]]),
         control=np.concatenate([one.control, other.control[1:]]),
+        state=np.concatenate([one.state, other.state[1:]]),
     )

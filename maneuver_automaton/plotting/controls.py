@@ -136,6 +136,22 @@ def draw_track_altitude(ax: Axes, track: Track, *, colors: Mapping[str, Color]) 
     return draw_over_time(ax, track, curves, label="z [m]", colors=colors)
 
 
+def draw_track_states(
+    axes: Sequence[Axes], track: Track, *, labels: Sequence[str], colors: Mapping[str, Color]
+) -> tuple[StepArtists, ...]:
+    """Draw the first components of the reduced state of a `track` over time, one on each axes."""
+    return tuple(
+        draw_over_time(
+            ax,
+            track,
+            [np.stack([piece.time, piece.state[:, k]], axis=-1) for piece in track.pieces],
+            label=label,
+            colors=colors,
+        )
+        for k, (ax, label) in enumerate(zip(axes, labels, strict=True))
+    )
+
+
 def step_curves(track: Track, k: int) -> list[Array]:
     """Control `k` over time, corners (n, 2) of its steps for each piece."""
     return [_steps(piece, k) for piece in track.pieces]

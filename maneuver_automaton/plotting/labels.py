@@ -15,7 +15,9 @@ UNITS = {
     "steering": "rad",
     "steering_rate": "rad/s",
     "acceleration": "m/s²",
+    "angular_acceleration": "rad/s²",
     "turn_acceleration": "rad/s²",
+    "hitch": "rad",
 }
 ARROW = " → "
 

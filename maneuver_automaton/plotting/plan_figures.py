@@ -17,7 +17,11 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.planning import PlanResult
 from maneuver_automaton.plotting.colors import Color, trim_colors
-from maneuver_automaton.plotting.controls import draw_track_altitude, draw_track_controls
+from maneuver_automaton.plotting.controls import (
+    draw_track_altitude,
+    draw_track_controls,
+    draw_track_states,
+)
 from maneuver_automaton.plotting.labels import control_labels, result_text, word_text
 from maneuver_automaton.plotting.nodes import draw_cost_bar, draw_nodes
 from maneuver_automaton.plotting.pages import (
@@ -49,6 +53,7 @@ PANEL, FLAT_PANEL, GAP = 1.25, 1.35, 0.75  # [in] heights over time, and beside 
 LABELS, BAR = 0.56, 0.3  # [in] below axes with numbers, and for a colour bar
 FLAT = 1.7  # a plane so much wider than high is given the width of the page
 WORD_WIDTH, WORD_LINES, HEADLINE_WIDTH = 112, 2, 96  # [characters]
+MOST_PANELS = 4  # over time: of reduced state and controls
 MOST_NAMES = 34
 
 
@@ -60,7 +65,8 @@ class _Sheet:
     scene: Scene
     word: str
     headline: str
-    labels: Sequence[str]
+    labels: Sequence[str]  # of the controls
+    state_labels: Sequence[str] = ()
     nodes: Array | None = None  # (n, 3) or (n, 4)
 
 
@@ -114,6 +120,7 @@ def save_plan_figure(
         word="" if plan is None else word_text(plan.word, width=WORD_WIDTH, lines=WORD_LINES),
         headline=headline,
         labels=control_labels(problem.automaton.model.control_names),
+        state_labels=control_labels(problem.automaton.model.reduced_names),
         nodes=None if nodes is None else as_array("nodes", nodes, last=(3, 4)),
     )
     write_figure(_plan_figure(sheet), path)
@@ -164,8 +171,8 @@ def _plan_figure(sheet: _Sheet) -> Figure:
     track = sheet.track
     colors = trim_colors(track.twists)
     handles, names = _legend_entries(sheet, colors)
-    many = track.pieces[0].control.shape[1] if track.pieces else 0
-    panels = many + track.climbs if track.pieces else 0
+    states, many = _panels(track)
+    panels = states + many + track.climbs if track.pieces else 0
     bottom = 0.6 + 0.2 * legend_rows(names, INNER)
     top = 0.36 + 0.2 * sheet.headline.count("\n")
     top += 0.2 + 0.18 * sheet.word.count("\n") if sheet.word else 0.0
@@ -188,7 +195,12 @@ def _plan_figure(sheet: _Sheet) -> Figure:
     draw_track(ax, track, sheet.scene, colors=colors, legend=False)
     _draw_nodes(figure, ax, sheet)
     if side:
-        draw_track_controls(side[:many], track, labels=sheet.labels, colors=colors)
+        named = list(sheet.state_labels) or [f"state {k + 1}" for k in range(states)]
+        draw_track_states(side[:states], track, labels=named[:states], colors=colors)
+        if many:
+            draw_track_controls(
+                side[states : states + many], track, labels=sheet.labels, colors=colors
+            )
         if track.climbs:
             draw_track_altitude(side[-1], track, colors=colors)
     if not flat:
@@ -200,6 +212,15 @@ def _plan_figure(sheet: _Sheet) -> Figure:
     )
     bottom_legend(figure, handles, names, left=LEFT, width=INNER)
     return figure
+
+
+def _panels(track: Track) -> tuple[int, int]:
+    """How many components of the reduced state and controls there is room for over time."""
+    if not track.pieces:
+        return 0, 0
+    states = min(track.pieces[0].state.shape[1], MOST_PANELS)
+    controls = track.pieces[0].control.shape[1]
+    return states, controls if states + controls <= MOST_PANELS else 0
 
 
 def _beside(figure: Figure, count: int, *, bottom: float) -> list[Axes]:

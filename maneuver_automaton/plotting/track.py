@@ -7,14 +7,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.groups import SE2
+from maneuver_automaton.groups import SE2, group_of
+from maneuver_automaton.primitives import Maneuver
 
+TURNING_M = 1e-4  # [m] between samples: less is no direction of travel
 CHORD_RAD = 0.03  # [rad] between drawn points of an arc
 
 
@@ -27,6 +29,7 @@ class Piece:
     time: Array  # (n,) [s]
     pose: Array  # (n, dof), headings continuous
     control: Array  # (n, n_u), row i holds from time i on
+    state: Array  # (n, n_z) reduced state; no column for a kinematic vehicle
 
     @property
     def drives(self) -> bool:
@@ -123,13 +126,14 @@ class Track:
 
 
 def track_of_plan(plan: Plan) -> Track:
-    """The track of a `plan`."""
+    """The track of a `plan`; a maneuver that changes its direction is a piece for each."""
     return Track(
         plan.start,
         tuple(
-            _coasted(plan, k, steps=math.ceil(abs(trim.body_velocity[2]) * duration / CHORD_RAD))
-            for k, (trim, duration) in enumerate(zip(plan.trims, plan.durations, strict=True))
+            piece
+            for k, duration in enumerate(plan.primitive_durations.tolist())
             if duration > 0.0
+            for piece in _pieces(plan, k, duration)
         ),
     )
 
@@ -157,34 +161,90 @@ def track_of_document(document: Mapping[str, Any]) -> Track | None:
     durations = np.array([primitive["duration_s"] for primitive in primitives], dtype=np.float64)
     times = time[0] + np.concatenate([[0.0], np.cumsum(durations)])
     control = as_array("plan: trajectory.control", trajectory["control"]).reshape(len(time), -1)
+    state = as_array("plan: trajectory.reduced_state", trajectory["reduced_state"])
+    samples = _Samples(time, pose, control, state.reshape(len(time), -1))
     return Track(
         pose[0],
         tuple(
-            Piece(
-                name=str(primitive["name"]),
-                twist=_twist(time[rows], pose[rows]),
-                time=time[rows],
-                pose=pose[rows],
-                control=_held(control[rows]),
-            )
+            piece
             for primitive, rows in zip(primitives, _rows_between(time, times), strict=True)
             if rows.size > 1
+            for piece in _sampled(str(primitive["name"]), primitive["kind"], samples.part(rows))
         ),
     )
 
 
-def _coasted(plan: Plan, k: int, *, steps: int) -> Piece:
-    """Trim `k` of a plan, at `steps` steps and at least one."""
-    trim = plan.trims[k]
-    begin, end = plan.switching_times[k : k + 2].tolist()
-    time = np.linspace(begin, end, max(1, steps) + 1)
-    return Piece(
-        name=trim.name,
-        twist=trim.body_velocity,
-        time=time,
-        pose=plan.pose_at(time),
-        control=np.broadcast_to(trim.control, (time.size, trim.control.size)),
-    )
+class _Samples(NamedTuple):
+    """Columns of a trajectory."""
+
+    time: Array
+    pose: Array
+    control: Array
+    state: Array
+
+    def part(self, rows: Any) -> _Samples:
+        return _Samples(*(column[rows] for column in self))
+
+
+def _pieces(plan: Plan, k: int, duration: float) -> list[Piece]:
+    primitive, begin = plan.primitives[k], float(plan.switching_times[k])
+    if isinstance(primitive, Maneuver):
+        if (course := primitive.course) is None:
+            time = np.array([begin, begin + duration])
+            empty = np.zeros((2, 0))
+            return _sampled(
+                primitive.name, "maneuver", _Samples(time, plan.pose_at(time), empty, empty)
+            )
+        group = group_of(plan.start.size)
+        pose = (group(plan.switching_poses[k]) @ group(course.pose)).pose
+        samples = _Samples(begin + course.time, pose, course.control, course.reduced_state)
+        return _sampled(primitive.name, "maneuver", samples)
+    steps = math.ceil(abs(primitive.body_velocity[2]) * duration / CHORD_RAD)
+    time = np.linspace(begin, float(plan.switching_times[k + 1]), max(1, steps) + 1)
+    return [
+        Piece(
+            name=primitive.name,
+            twist=primitive.body_velocity,
+            time=time,
+            pose=plan.pose_at(time),
+            control=np.broadcast_to(primitive.control, (time.size, primitive.control.size)),
+            state=np.broadcast_to(
+                primitive.reduced_state, (time.size, primitive.reduced_state.size)
+            ),
+        )
+    ]
+
+
+def _sampled(name: str, kind: str, samples: _Samples) -> list[Piece]:
+    """Pieces of a primitive; a maneuver is cut where it turns from ahead to back."""
+    cuts = _turning_points(samples) if kind == "maneuver" else []
+    bounds = [0, *cuts, len(samples.time) - 1]
+    pieces = []
+    for first, last in pairwise(bounds):
+        part = samples.part(slice(first, last + 1))
+        twist = _twist(part.time, part.pose)
+        back = bool(cuts) and twist[0] < 0.0
+        pieces.append(
+            Piece(
+                name=f"{name}, {'back' if back else 'ahead'}" if cuts else name,
+                twist=twist,
+                time=part.time,
+                pose=part.pose,
+                control=_held(part.control),
+                state=part.state,
+            )
+        )
+    return pieces
+
+
+def _turning_points(samples: _Samples) -> list[int]:
+    """Where the direction of travel changes, among the samples."""
+    ways = np.diff(samples.pose[:, :2], axis=0)
+    heading = samples.pose[:-1, 2]
+    ahead = np.cos(heading) * ways[:, 0] + np.sin(heading) * ways[:, 1]
+    driven = np.flatnonzero(np.abs(ahead) > TURNING_M)
+    changes = np.flatnonzero(np.diff(np.sign(ahead[driven])))
+    return [int(driven[k + 1]) for k in changes]
 
 
 def _rows_between(time: Array, switching_times: Array) -> Sequence[np.ndarray[Any, Any]]:

@@ -231,7 +231,8 @@ def _slopes(missed: Callable[[Array], Array], x: Array) -> Array:
         (missed(x + step) - missed(x - step)) / (2.0 * width)
         for step, width in zip(steps, widths, strict=True)
     ]
-    return np.stack(columns, axis=-1) if columns else np.zeros((missed(x).size, 0))
+    slopes: Array = np.stack(columns, axis=-1) if columns else np.zeros((missed(x).size, 0))
+    return slopes
 
 
 def _inside(balance: _Balance, low: Array, high: Array) -> Array:
@@ -239,7 +240,7 @@ def _inside(balance: _Balance, low: Array, high: Array) -> Array:
     from scipy.optimize import least_squares
 
     high = np.maximum(high, low + 1e-9)
-    start = np.clip(0.0, low, high)
+    start: Array = np.clip(0.0, low, high)
     if not np.isfinite(balance.missed(start)).all():
         return start
     fit = least_squares(

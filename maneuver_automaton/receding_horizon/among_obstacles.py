@@ -15,14 +15,14 @@ from dataclasses import replace
 import numpy as np
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.planning.tracking import Tracked, clearance_at, stands_free, track
-from maneuver_automaton.problem import Bounds, Horizon, Problem
-from maneuver_automaton.receding_horizon.candidates import Candidate, Settings, allowed
+from maneuver_automaton.problem import Bounds, Horizon, Problem, moves
+from maneuver_automaton.receding_horizon.candidates import Candidate, allowed
 from maneuver_automaton.receding_horizon.harm import least_harmful
 from maneuver_automaton.receding_horizon.holding import holding
 from maneuver_automaton.receding_horizon.log import Deed, Guarantee, Origin, Step, Violation
 from maneuver_automaton.receding_horizon.outlook import Outlook, outlook
+from maneuver_automaton.receding_horizon.settings import Settings
 from maneuver_automaton.receding_horizon.situation import Chosen, Situation
 from maneuver_automaton.search.inside import outside
 
@@ -172,7 +172,7 @@ class AmongObstacles:
         yield from self.unsafe
         if now.last is not None and now.last.deed.leads and now.rest is not None:
             yield now.rest
-        still = tuple(one for one in here.obstacles if not _moves(one))
+        still = tuple(one for one in here.obstacles if not moves(one))
         anyhow = Horizon(max_trims=here.horizon.max_trims, min_coast=here.horizon.min_coast)
         found = self._tracked(replace(here, obstacles=still, horizon=anyhow), share=LATE)
         if found.plan is not None:
@@ -227,7 +227,3 @@ def decide_among_obstacles(
     now.violations += flagged
     ahead = outlook(here, settings, deadline=began + settings.time_limit)
     return AmongObstacles(now, ahead).chosen()
-
-
-def _moves(one: object) -> bool:
-    return isinstance(one, Obstacle) and one.motion is not None

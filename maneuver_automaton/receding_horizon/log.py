@@ -11,6 +11,8 @@ import numpy as np
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.audit import Audit
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.cutting import head_of
+from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.problem import Problem
 
 
@@ -100,7 +102,12 @@ class Step:
     @property
     def control(self) -> Array | None:
         """Control (n_u,) that holds from `time`; None if there is nothing to do."""
-        return self.plan.trims[0].control if self.plan.trims else None
+        if not self.plan.primitives:
+            return self.plan.trims[0].control if self.plan.trims else None
+        first = self.plan.primitives[0]
+        if isinstance(first, Maneuver) and first.course is not None:
+            return np.asarray(first.course.control[0])
+        return first.control if isinstance(first, Trim) else None
 
     @property
     def piece(self) -> Plan:
@@ -178,6 +185,8 @@ def first_part(plan: Plan, until: float) -> Plan:
     >>> first_part(Plan([0, 0, 0], (ahead,), durations=[2.0]), 0.5).end.tolist()
     [0.5, 0.0, 0.0]
     """
+    if any(plan.maneuvers):
+        return head_of(plan, until)
     kept, durations, left = [], [], until
     for trim, duration in zip(plan.trims, plan.durations.tolist(), strict=True):
         if left <= 0.0:

@@ -1,13 +1,24 @@
-"""Shorten a free word: dynamic programming over its points, shortcuts, and via-points.
-
-A word is two arrays, trims and durations, of which the first `n` entries count.
-"""
+"""Shorten a free word by random shortcuts and via-points."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
+from maneuver_automaton.refinement._kernels_word import (
+    GAIN,
+    LENGTH,
+    admitted,
+    append,
+    gear_after,
+    gear_before,
+    owner,
+    pose_at,
+    take,
+    unroll,
+    word_cost,
+)
 from maneuver_automaton.search._kernels_connect import (
     NO_TRIM,
     candidates,
@@ -16,74 +27,6 @@ from maneuver_automaton.search._kernels_connect import (
     may_stay,
     trim_free,
 )
-
-GAIN = 1e-9  # share of the cost that counts as a gain
-LENGTH = 0  # place of the word's length in `state`
-
-
-@bare_inner_kernel
-def word_cost(lib, trims, durations, n):
-    """Cost of a word with the prices of its switches."""
-    cost, gear = 0.0, 0
-    for k in range(n):
-        trim = trims[k]
-        cost += lib.rates[trim] * durations[k]
-        if k > 0:
-            cost += lib.switch
-        if lib.gears[trim] != 0:
-            if gear * lib.gears[trim] < 0:
-                cost += lib.direction_change
-            gear = lib.gears[trim]
-    return cost
-
-
-@bare_inner_kernel
-def unroll(lib, work, n):
-    """Fill the poses and times at the switches of the word in `work`."""
-    x, y, heading = work.start[0], work.start[1], work.start[2]
-    time = 0.0
-    for k in range(n):
-        work.poses[k, 0], work.poses[k, 1], work.poses[k, 2] = x, y, heading
-        work.times[k] = time
-        trim, t = work.trims[k], work.durations[k]
-        x, y, heading = driven(lib, trim, x, y, heading, t)
-        time += t
-    work.poses[n, 0], work.poses[n, 1], work.poses[n, 2] = x, y, heading
-    work.times[n] = time
-
-
-@inlined_kernel
-def owner(work, n, time):
-    """Number of the trim that is driven at a time; the later one at a switch."""
-    low, high = 0, n
-    while high - low > 1:
-        middle = (low + high) // 2
-        if work.times[middle] <= time:
-            low = middle
-        else:
-            high = middle
-    return low
-
-
-@inlined_kernel
-def pose_at(lib, work, k, time):
-    """Pose at a time within trim `k`."""
-    t = time - work.times[k]
-    return driven(lib, work.trims[k], work.poses[k, 0], work.poses[k, 1], work.poses[k, 2], t)
-
-
-@bare_inner_kernel
-def append(lib, trims, durations, n, trim, t):
-    """Put a trim at the end of a word, joined with the last one if that is the same."""
-    if t < lib.shortest:
-        return n
-    if n > 0 and trims[n - 1] == trim:
-        durations[n - 1] += t
-        return n
-    if n >= trims.shape[0] - 1:
-        return n + 1  # too long: the caller sees it
-    trims[n], durations[n] = trim, t
-    return n + 1
 
 
 @bare_inner_kernel
@@ -106,19 +49,6 @@ def spliced(lib, work, n, begin, end, first, last, m):
 
 
 @bare_inner_kernel
-def admitted(lib, task, work, size):
-    """Whether the word in `work.new_*` keeps the limits of words."""
-    if size > work.new_trims.shape[0] - 1 or (task.most_trims > 0 and size > task.most_trims):
-        return False
-    duration = 0.0
-    for k in range(size):
-        if work.new_durations[k] < lib.min_coast:
-            return False
-        duration += work.new_durations[k]
-    return duration <= task.most_time
-
-
-@bare_inner_kernel
 def still_free(lib, task, world, body, work, size, begin):
     """Whether the word in `work.new_*` is free after `begin` [s], where obstacles move."""
     x, y, heading = work.start[0], work.start[1], work.start[2]
@@ -134,14 +64,6 @@ def still_free(lib, task, world, body, work, size, begin):
     return may_stay(task, world, body, x, y, heading, task.clock + time)
 
 
-@bare_inner_kernel
-def take(work, state, size):
-    """Make the word in `work.new_*` the word."""
-    for k in range(size):
-        work.trims[k], work.durations[k] = work.new_trims[k], work.new_durations[k]
-    state[LENGTH] = size
-
-
 @inlined_kernel
 def put_middle(lib, work, triples, scratch, which, m):
     """Append a candidate to the new middle; returns its length."""
@@ -154,24 +76,198 @@ def put_middle(lib, work, triples, scratch, which, m):
     return m
 
 
-@inlined_kernel
-def gear_before(lib, work, k):
-    """Sign of the last forward speed up to trim `k`, that included."""
-    gear = 0
-    while k >= 0 and gear == 0:
-        gear = lib.gears[work.trims[k]]
-        k -= 1
-    return gear
+class Section(NamedTuple):
+    """A stretch of a word for which a new middle is sought."""
+
+    begin: float  # [s]
+    end: float
+    first: int  # place of the trim that is driven at its begin
+    last: int  # and at its end
+    start: tuple[float, float, float]  # poses [m, m, rad]
+    goal: tuple[float, float, float]
+    entry: tuple[int, int]  # trim and gear before
+    leave: tuple[int, int]  # and after
+    free_heading: bool
+    budget: float  # the new middle must be cheaper
+    left: float  # [s] it may last so long
+    clock: float  # [s] time of the world at its begin
+
+
+@bare_inner_kernel
+def section_price(lib, work, begin, end, first, last):
+    """Price of the word between two times, its switches included."""
+    price = 0.0
+    for k in range(first, last + 1):
+        low, high = max(work.times[k], begin), min(work.times[k + 1], end)
+        price += lib.rates[work.trims[k]] * max(high - low, 0.0)
+    if lib.switch > 0.0:
+        price += lib.switch * (last - first)
+    for k in range(first, last):
+        if lib.gears[work.trims[k]] * lib.gears[work.trims[k + 1]] < 0:
+            price += lib.direction_change
+    return price
+
+
+@bare_inner_kernel
+def drawn_section(lib, task, work, n, cost, draw):
+    """The section of a word of `cost` that six numbers between 0 and 1 draw."""
+    total = work.times[n]
+    middle = draw[1] * total
+    shortest = min(task.shortest_span, 0.5 * total)
+    span = shortest * (total / shortest) ** draw[2]
+    begin = max(middle - 0.5 * span, 0.0)
+    end = min(middle + 0.5 * span, total)
+    first, last = owner(work, n, begin), owner(work, n, end)
+    if draw[3] < task.snap:
+        begin = work.times[first]
+    if draw[4] < task.snap:
+        end = work.times[last + 1]
+    to_end = end >= total
+    entered = first if begin > work.times[first] else first - 1
+    before = NO_TRIM if entered < 0 else work.trims[entered]
+    after = NO_TRIM if to_end else work.trims[last]
+    return Section(
+        begin,
+        end,
+        first,
+        last,
+        pose_at(lib, work, first, begin),
+        pose_at(lib, work, last, end),
+        (before, 0 if before == NO_TRIM else gear_before(lib, work, entered)),
+        (after, 0 if after == NO_TRIM else gear_after(lib, work, n, last)),
+        task.free_heading and to_end,
+        section_price(lib, work, begin, end, first, last) - GAIN * cost,
+        task.most_time - total + (end - begin),
+        task.clock + begin,
+    )
 
 
 @inlined_kernel
-def gear_after(lib, work, n, k):
-    """Sign of the first forward speed from trim `k` on."""
-    gear = 0
-    while k < n and gear == 0:
-        gear = lib.gears[work.trims[k]]
-        k += 1
-    return gear
+def cheapest_of(scratch, n):
+    """Least cost of `n` candidates; inf if there are none."""
+    least = math.inf
+    for k in range(n):
+        least = min(least, scratch.costs[k])
+    return least
+
+
+@bare_inner_kernel
+def put_free(
+    lib, task, world, body, work, triples, pose, n, most_cost, most_time, clock, scratch, m
+):
+    """Append to the new middle, of `m` trims, the cheapest free one of `n` candidates.
+
+    Returns its number and the middle's new length; -1 and -1 if there is none.
+    """
+    which = free_candidate(
+        lib, task, world, body, triples, pose, n, most_cost, most_time, clock, scratch
+    )
+    if which < 0:
+        return -1, -1
+    return which, put_middle(lib, work, triples, scratch, which, m)
+
+
+@bare_inner_kernel
+def direct_middle(lib, task, world, body, work, section):
+    """Write into the new middle three trims that join the ends of a section.
+
+    Returns its length, -1 if there is none that is free and cheap enough; so does `via_middle`.
+    """
+    x, y, heading = section.start
+    e_x, e_y, e_heading = section.goal
+    if math.hypot(e_x - x, e_y - y) * task.per_metre >= section.budget:
+        return -1
+    triples = lib.free_triples if section.free_heading else lib.triples
+    entry, leave = section.entry, section.leave
+    n = candidates(lib, triples, x, y, heading, e_x, e_y, e_heading, entry, leave, work.one)
+    _, m = put_free(
+        lib,
+        task,
+        world,
+        body,
+        work,
+        triples,
+        section.start,
+        n,
+        section.budget,
+        section.left,
+        section.clock,
+        work.one,
+        0,
+    )
+    return m
+
+
+@bare_inner_kernel
+def via_pose(lib, task, work, n, section, size, shift):
+    """A pose near the middle of a section, shifted by normal numbers times the spread of `size`."""
+    spread = task.spread * (1.0 / 33.0) ** size
+    half = 0.5 * (section.begin + section.end)
+    x, y, heading = pose_at(lib, work, owner(work, n, half), half)
+    x += spread * shift[0]
+    y += spread * shift[1]
+    heading += 0.5 * spread / task.radius * shift[2]
+    return x, y, heading
+
+
+@bare_inner_kernel
+def via_middle(lib, task, world, body, work, section, via):
+    """Write into the new middle three trims to the pose `via`, and three from there on."""
+    x, y, heading = section.start
+    v_x, v_y, v_heading = via
+    e_x, e_y, e_heading = section.goal
+    one, two, budget = work.one, work.two, section.budget
+    way = math.hypot(v_x - x, v_y - y) + math.hypot(e_x - v_x, e_y - v_y)
+    if way * task.per_metre >= budget:
+        return -1
+    nowhere = (NO_TRIM, 0)
+    n_1 = candidates(
+        lib, lib.triples, x, y, heading, v_x, v_y, v_heading, section.entry, nowhere, one
+    )
+    cheapest = cheapest_of(one, n_1)
+    if cheapest >= budget:
+        return -1
+    triples = lib.free_triples if section.free_heading else lib.triples
+    n_2 = candidates(
+        lib, triples, v_x, v_y, v_heading, e_x, e_y, e_heading, nowhere, section.leave, two
+    )
+    rest = cheapest_of(two, n_2)
+    if cheapest + rest >= budget:
+        return -1
+    which, m = put_free(
+        lib,
+        task,
+        world,
+        body,
+        work,
+        lib.triples,
+        section.start,
+        n_1,
+        budget - rest,
+        section.left,
+        section.clock,
+        one,
+        0,
+    )
+    if which < 0:
+        return -1
+    used = one.durations[which]
+    _, m = put_free(
+        lib,
+        task,
+        world,
+        body,
+        work,
+        triples,
+        via,
+        n_2,
+        budget - one.costs[which],
+        section.left - used,
+        section.clock + used,
+        two,
+        m,
+    )
+    return m
 
 
 @bare_kernel
@@ -184,232 +280,29 @@ def attempt_all(lib, task, world, body, work, state, uniform, normal):
     n = state[LENGTH]
     cost = word_cost(lib, work.trims, work.durations, n)
     unroll(lib, work, n)
+    changes = world.movers.speed.shape[0] > 0  # what comes after is driven at other times
     for row in range(uniform.shape[0]):
-        total = work.times[n]
-        if n == 0 or not total > 0.0:
+        if n == 0 or not work.times[n] > 0.0:
             return cost
-        middle = uniform[row, 1] * total
-        shortest = min(task.shortest_span, 0.5 * total)
-        span = shortest * (total / shortest) ** uniform[row, 2]
-        begin = max(middle - 0.5 * span, 0.0)
-        end = min(middle + 0.5 * span, total)
-        first, last = owner(work, n, begin), owner(work, n, end)
-        if uniform[row, 3] < task.snap:
-            begin = work.times[first]
-        if uniform[row, 4] < task.snap:
-            end = work.times[last + 1]
-        x, y, heading = pose_at(lib, work, first, begin)
-        e_x, e_y, e_heading = pose_at(lib, work, last, end)
-        to_end = end >= total
-        free_heading = task.free_heading and to_end
-        section = 0.0
-        for k in range(first, last + 1):
-            low, high = max(work.times[k], begin), min(work.times[k + 1], end)
-            section += lib.rates[work.trims[k]] * max(high - low, 0.0)
-        if lib.switch > 0.0:
-            section += lib.switch * (last - first)
-        for k in range(first, last):
-            if lib.gears[work.trims[k]] * lib.gears[work.trims[k + 1]] < 0:
-                section += lib.direction_change
-        entered = first if begin > work.times[first] else first - 1
-        before = NO_TRIM if entered < 0 else work.trims[entered]
-        after = NO_TRIM if to_end else work.trims[last]
-        entry = (before, 0 if before == NO_TRIM else gear_before(lib, work, entered))
-        leave = (after, 0 if after == NO_TRIM else gear_after(lib, work, n, last))
-        left = task.most_time - total + (end - begin)
-        clock = task.clock + begin
-        budget = section - GAIN * cost
-        m = 0
-        if uniform[row, 0] < task.via:
-            spread = task.spread * (1.0 / 33.0) ** uniform[row, 5]
-            half = 0.5 * (begin + end)
-            v_x, v_y, v_heading = pose_at(lib, work, owner(work, n, half), half)
-            v_x += spread * normal[row, 0]
-            v_y += spread * normal[row, 1]
-            v_heading += 0.5 * spread / task.radius * normal[row, 2]
-            way = math.hypot(v_x - x, v_y - y) + math.hypot(e_x - v_x, e_y - v_y)
-            if way * task.per_metre >= budget:
-                continue
-            nowhere = (NO_TRIM, 0)
-            n_1 = candidates(
-                lib, lib.triples, x, y, heading, v_x, v_y, v_heading, entry, nowhere, work.one
-            )
-            if n_1 == 0:
-                continue
-            cheapest = math.inf
-            for k in range(n_1):
-                cheapest = min(cheapest, work.one.costs[k])
-            if cheapest >= budget:
-                continue
-            triples = lib.free_triples if free_heading else lib.triples
-            n_2 = candidates(
-                lib, triples, v_x, v_y, v_heading, e_x, e_y, e_heading, nowhere, leave, work.two
-            )
-            rest = math.inf
-            for k in range(n_2):
-                rest = min(rest, work.two.costs[k])
-            if cheapest + rest >= budget:
-                continue
-            which = free_candidate(
-                lib,
-                task,
-                world,
-                body,
-                lib.triples,
-                (x, y, heading),
-                n_1,
-                budget - rest,
-                left,
-                clock,
-                work.one,
-            )
-            if which < 0:
-                continue
-            used = work.one.durations[which]
-            spent = work.one.costs[which]
-            m = put_middle(lib, work, lib.triples, work.one, which, 0)
-            which = free_candidate(
-                lib,
-                task,
-                world,
-                body,
-                triples,
-                (v_x, v_y, v_heading),
-                n_2,
-                budget - spent,
-                left - used,
-                clock + used,
-                work.two,
-            )
-            if which < 0:
-                continue
-            m = put_middle(lib, work, triples, work.two, which, m)
+        draw = uniform[row]
+        section = drawn_section(lib, task, work, n, cost, draw)
+        if draw[0] < task.via:
+            via = via_pose(lib, task, work, n, section, draw[5], normal[row])
+            m = via_middle(lib, task, world, body, work, section, via)
         else:
-            if math.hypot(e_x - x, e_y - y) * task.per_metre >= budget:
-                continue
-            triples = lib.free_triples if free_heading else lib.triples
-            n_1 = candidates(
-                lib, triples, x, y, heading, e_x, e_y, e_heading, entry, leave, work.one
-            )
-            which = free_candidate(
-                lib,
-                task,
-                world,
-                body,
-                triples,
-                (x, y, heading),
-                n_1,
-                budget,
-                left,
-                clock,
-                work.one,
-            )
-            if which < 0:
-                continue
-            m = put_middle(lib, work, triples, work.one, which, 0)
-        size = spliced(lib, work, n, begin, end, first, last, m)
+            m = direct_middle(lib, task, world, body, work, section)
+        if m < 0:
+            continue
+        begin, end = section.begin, section.end
+        size = spliced(lib, work, n, begin, end, section.first, section.last, m)
         if not admitted(lib, task, work, size):
             continue
         new_cost = word_cost(lib, work.new_trims, work.new_durations, size)
         if not new_cost < cost - GAIN * cost:
             continue
-        changes = world.movers.speed.shape[0] > 0  # what comes after is driven at other times
         if changes and not still_free(lib, task, world, body, work, size, begin):
             continue
         take(work, state, size)
         n, cost = size, new_cost
         unroll(lib, work, n)
-    return cost
-
-
-@bare_kernel
-def dynamic_programming(lib, task, world, body, work, state, points):
-    """Best way over `points` poses of the word, joined by triples where that is cheaper.
-
-    Returns the cost. The word changes only if it gains; nothing may move.
-    """
-    n = state[LENGTH]
-    cost = word_cost(lib, work.trims, work.durations, n)
-    unroll(lib, work, n)
-    total = work.times[n]
-    if n == 0 or points < 2:
-        return cost
-    for j in range(points):
-        time = total * j / (points - 1)
-        k = owner(work, n, time)
-        x, y, heading = pose_at(lib, work, k, min(time, work.times[k + 1]))
-        work.at[j, 0], work.at[j, 1], work.at[j, 2], work.at[j, 3] = x, y, heading, time
-        work.best[j] = math.inf
-        work.back[j] = -1
-    work.best[0] = 0.0
-    nowhere = (NO_TRIM, 0)
-    for j in range(1, points):
-        begin, end = work.at[j - 1, 3], work.at[j, 3]
-        first, last = owner(work, n, begin), owner(work, n, end)
-        along = 0.0
-        for k in range(first, last + 1):
-            low, high = max(work.times[k], begin), min(work.times[k + 1], end)
-            along += lib.rates[work.trims[k]] * max(high - low, 0.0)
-            if k > first:
-                along += lib.switch
-                if lib.gears[work.trims[k]] * lib.gears[work.trims[k - 1]] < 0:
-                    along += lib.direction_change
-        work.best[j] = work.best[j - 1] + along
-        work.back[j] = -1
-        e_x, e_y, e_heading = work.at[j, 0], work.at[j, 1], work.at[j, 2]
-        free_heading = task.free_heading and j == points - 1
-        triples = lib.free_triples if free_heading else lib.triples
-        for i in range(j - 1):
-            x, y, heading = work.at[i, 0], work.at[i, 1], work.at[i, 2]
-            budget = work.best[j] - work.best[i]
-            if math.hypot(e_x - x, e_y - y) * task.per_metre >= budget:
-                continue
-            count = candidates(
-                lib, triples, x, y, heading, e_x, e_y, e_heading, nowhere, nowhere, work.one
-            )
-            which = free_candidate(
-                lib,
-                task,
-                world,
-                body,
-                triples,
-                (x, y, heading),
-                count,
-                budget - GAIN * cost,
-                task.most_time,
-                task.clock + work.at[i, 3],
-                work.one,
-            )
-            if which < 0:
-                continue
-            work.best[j] = work.best[i] + work.one.costs[which]
-            work.back[j] = i
-            row = work.one.rows[which]
-            for n_th in range(3):
-                work.by_trims[j, n_th] = triples[row, n_th]
-                work.by_durations[j, n_th] = work.one.times[which, n_th]
-    j, n_legs = points - 1, 0
-    while j > 0:
-        work.legs[n_legs] = j
-        n_legs += 1
-        j = work.back[j] if work.back[j] >= 0 else j - 1
-    size = 0
-    for leg in range(n_legs - 1, -1, -1):
-        j = work.legs[leg]
-        if work.back[j] >= 0:
-            for n_th in range(3):
-                trim, t = work.by_trims[j, n_th], work.by_durations[j, n_th]
-                if t > 0.0 and trim < lib.n_trims:
-                    size = append(lib, work.new_trims, work.new_durations, size, trim, t)
-            continue
-        begin, end = work.at[j - 1, 3], work.at[j, 3]
-        for k in range(owner(work, n, begin), owner(work, n, end) + 1):
-            t = min(work.times[k + 1], end) - max(work.times[k], begin)
-            size = append(lib, work.new_trims, work.new_durations, size, work.trims[k], t)
-    if not admitted(lib, task, work, size):
-        return cost
-    new_cost = word_cost(lib, work.new_trims, work.new_durations, size)
-    if new_cost < cost - GAIN * cost:
-        take(work, state, size)
-        return new_cost
     return cost

@@ -16,7 +16,9 @@ from typing import NamedTuple
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.refinement import _kernels_improve as kernels
+from maneuver_automaton.refinement._kernels_improve import attempt_all
+from maneuver_automaton.refinement._kernels_points import dynamic_programming
+from maneuver_automaton.refinement._kernels_word import LENGTH
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.distance_grid import DistanceGrid
 from maneuver_automaton.search.lattice import distance_grids
@@ -251,7 +253,7 @@ class _Improvement:
         query = self.query
         work, state = work_of(query, word)
         if not query.problem.moves:
-            kernels.dynamic_programming(
+            dynamic_programming(
                 query.library.arrays,
                 improve_task(query, word),
                 query.world.arrays,
@@ -272,7 +274,7 @@ class _Improvement:
             n = min(TIMELY, attempts - done)
             uniform, normal = rng.random((n, 6)), rng.standard_normal((n, 3))
             if time.monotonic() < self.deadline:
-                kernels.attempt_all(
+                attempt_all(
                     query.library.arrays,
                     task,
                     query.world.arrays,
@@ -317,7 +319,7 @@ def work_of(query: LatticeQuery, word: Word) -> tuple[Work, IntArray]:
 
 def word_of(work: Work, state: IntArray, word: Word, query: LatticeQuery) -> Word:
     """The word that arrays hold."""
-    n = int(state[kernels.LENGTH])
+    n = int(state[LENGTH])
     held = replace(word, trims=work.trims[:n].copy(), durations=work.durations[:n].copy())
     return with_cost(held, query)
 

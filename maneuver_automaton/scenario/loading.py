@@ -80,7 +80,8 @@ def load_road(
     path = Path(path)
     if path.suffix.lower() != ".xml":
         return None
-    scene = _chosen(path, read_commonroad(path), case).road
+    read = reader_of(path) or read_commonroad  # which tells primitives from scenarios
+    scene = _chosen(path, read(path), case).road
     assert scene is not None  # every statement of this format has one
     if beside is None:
         return scene, RoadVehicle()

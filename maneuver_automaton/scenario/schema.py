@@ -412,6 +412,20 @@ class RecedingHorizonPart(Part):
     )
 
 
+class ZonePart(Part):
+    """A part of the plane in which not every motion is admitted."""
+
+    polygon_m: Polygon = Field(description="corners [x, y]")
+    max_speed_m_s: NotNegative | None = Field(None, description="greatest speed in it")
+    reverse: bool = Field(True, description="false: forwards only")
+    max_lateral_acceleration_m_s2: NotNegative | None = Field(
+        None, description="greatest speed times turn rate in it"
+    )
+    trims: (
+        Annotated[tuple[Name, ...], Several("a list of at least one trim", at_least=1)] | None
+    ) = Field(None, description="only these trims, and maneuvers between them")
+
+
 class ScenarioFile(Part):
     """A motion planning problem: vehicle, automaton, start, goal, cost."""
 
@@ -431,6 +445,9 @@ class ScenarioFile(Part):
     margin_m: NotNegative = Field(0.0, description="distance kept from everything")
     obstacles: Annotated[tuple[Obstacle, ...], Several("a list of obstacles", at_least=0)] = Field(
         (), description="what the vehicle must not touch"
+    )
+    zones: Annotated[tuple[ZonePart, ...], Several("a list of zones", at_least=0)] = Field(
+        (), description="where not every motion is admitted"
     )
     search: SearchPart = Field(default_factory=SearchPart, description="how to search")
     receding_horizon: RecedingHorizonPart | None = Field(None, description="only for mpc")

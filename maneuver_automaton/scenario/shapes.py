@@ -18,6 +18,7 @@ from maneuver_automaton.collision import (
     OccupancyMap,
     Polygon,
     Shape,
+    Zone,
 )
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.nav2_map import load_nav2_map
@@ -64,6 +65,61 @@ def obstacles_of(
         else:
             obstacles.append(_obstacle(document, part, k))
     return tuple(obstacles), tuple(maps)
+
+
+def zones_of(document: Document, parts: Sequence[schema.ZonePart]) -> tuple[Zone, ...]:
+    """Zones of a file.
+
+    Raises
+    ------
+    InvalidScenario
+        If a polygon crosses itself, or a zone forbids nothing.
+    """
+    zones = []
+    for k, part in enumerate(parts):
+        shape = _polygon(document, part.polygon_m, (), ("zones", k, "polygon_m"))
+        try:
+            zones.append(
+                Zone(
+                    shape=shape,
+                    max_speed=part.max_speed_m_s,
+                    reverse=part.reverse,
+                    max_lateral_acceleration=part.max_lateral_acceleration_m_s2,
+                    trims=part.trims,
+                    name=f"zone {k + 1}",
+                )
+            )
+        except ValueError as error:
+            raise document.error(("zones", k), str(error).removeprefix("zone: ")) from error
+    return tuple(zones)
+
+
+def stated_zone(zone: Zone) -> dict[str, Any]:
+    """A zone in the words of a scenario file.
+
+    Raises
+    ------
+    ValueError
+        If its shape has no corners, or holes.
+
+    Examples
+    --------
+    >>> stated_zone(Zone(shape=Polygon([[0, 0], [1, 0], [1, 1]]), max_speed=0.5))
+    {'polygon_m': [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], 'max_speed_m_s': 0.5}
+    """
+    shape = zone.shape
+    if isinstance(shape, Disc) or (isinstance(shape, Polygon) and shape.holes):
+        raise ValueError("zones: a scenario file states a zone by a polygon without holes")
+    entry: dict[str, Any] = {"polygon_m": shape.corners.tolist()}
+    if zone.max_speed is not None:
+        entry["max_speed_m_s"] = float(zone.max_speed)
+    if not zone.reverse:
+        entry["reverse"] = False
+    if zone.max_lateral_acceleration is not None:
+        entry["max_lateral_acceleration_m_s2"] = float(zone.max_lateral_acceleration)
+    if zone.trims is not None:
+        entry["trims"] = list(zone.trims)
+    return entry
 
 
 def stated_footprint(footprint: Sequence[Shape]) -> tuple[dict[str, Any], ...]:

@@ -15,7 +15,7 @@ from maneuver_automaton.formats.yaml_source import scalar
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.scenario.scenario import Scenario
 from maneuver_automaton.scenario.schema import ScenarioFile
-from maneuver_automaton.scenario.shapes import stated_obstacle
+from maneuver_automaton.scenario.shapes import stated_obstacle, stated_zone
 from maneuver_automaton.scenario.vehicles import described
 
 _PLAIN = re.compile(r"[A-Za-z][A-Za-z0-9_ ()-]*[A-Za-z0-9_)]|[A-Za-z]")
@@ -75,6 +75,7 @@ def to_yaml(scenario: Scenario, *, folder: Path | None = None) -> str:
         "bounds_m": {name: list(pair) for name, pair in bounds.items() if pair is not None},
         "margin_m": problem.margin or None,
         "obstacles": [stated_obstacle(one, scenario.maps, folder) for one in problem.obstacles],
+        "zones": [stated_zone(one) for one in problem.zones],
         "search": _search(problem.search, scenario.time_limit_s),
         "receding_horizon": scenario.receding_horizon
         and scenario.receding_horizon.model_dump(exclude_none=True),

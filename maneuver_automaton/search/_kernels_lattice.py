@@ -257,11 +257,11 @@ def expand(search, task, lib, world, body, grid, table, n, ceiling):
                 return 1
         limit = min(ceiling, search.found[0])
         cos, sin = math.cos(heading), math.sin(heading)
-        before, gear = links[node, 1], links[node, 2]
+        before, gear = int(links[node, 1]), int(links[node, 2])  # of 32 bits: keys need more
         for trim in range(lib.n_trims):
             if before != NO_TRIM and before != trim and run < lib.min_coast:
                 continue
-            count = links[node, 3] + (0 if trim == before else 1)
+            count = int(links[node, 3]) + (0 if trim == before else 1)
             if task.most_trims > 0 and count > task.most_trims:
                 continue
             v_x, v_y, turn = lib.twists[trim, 0], lib.twists[trim, 1], lib.twists[trim, 2]
@@ -339,10 +339,9 @@ def expand(search, task, lib, world, body, grid, table, n, ceiling):
 
 
 @bare_kernel
-def rehash(search, wide):
+def rehash(table, generation, wide):
     """Carry the entries of this generation over into a wider hash table."""
-    generation = search.state[GENERATION]
-    for k in range(search.table.shape[0]):
-        if node_in(search.table, generation, k) >= 0:
-            slot = slot_of(wide, generation, search.table[k, 0])
-            wide[slot, 0], wide[slot, 1] = search.table[k, 0], search.table[k, 1]
+    for k in range(table.shape[0]):
+        if node_in(table, generation, k) >= 0:
+            slot = slot_of(wide, generation, table[k, 0])
+            wide[slot, 0], wide[slot, 1] = table[k, 0], table[k, 1]

@@ -13,17 +13,14 @@ from dataclasses import replace
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.groups import group_of
-from maneuver_automaton.groups.chain import chained
 from maneuver_automaton.search.library_arrays import LibraryArrays
 from maneuver_automaton.search.setup import SearchSetup
+from maneuver_automaton.switching_times.closing import MET, EndConditions, closest_times
 
 DIGITS = 9  # of the goal that is searched for, after the point [m, rad]
 UNUSUAL = 1.7  # keeps steps in the number of digits away from the sizes people choose
 TINY = 1e-12  # [m, rad] below this start and goal are one
-CORRECTIONS = 6  # at most
 RANK = 1e-11  # singular values below this, relative, count as none
-MET = 1e-9  # [m, rad, s] the largest condition that may be left violated
 
 
 def with_fewer_digits(setup: SearchSetup) -> SearchSetup:
@@ -39,40 +36,17 @@ def with_fewer_digits(setup: SearchSetup) -> SearchSetup:
 def corrected(library: LibraryArrays, word: IntArray, times: Array, goal: Array) -> Array | None:
     """Times (n,) near `times` with which the word ends at `goal`; None if there are none.
 
-    The smallest change, by Gauss-Newton: the goal is less than 1e-9 away, and less for small ones.
+    The smallest change: the goal is less than 1e-9 away, and less for small ones.
     """
-    twists, rows = library.twists[word], library.rows[:, word]
-    best, least = times, math.inf
-    now = times.copy()
-    for _ in range(CORRECTIONS):
-        gap, columns = _conditions(library, twists, rows, now, goal)
-        worst = float(np.abs(gap).max())
-        if worst < least:
-            best, least = now, worst
-        elif least < MET:
-            break
-        if worst < 1e-15:
-            break
-        now = now + np.linalg.lstsq(columns, gap, rcond=RANK)[0]
-    if not least < MET or (best < -MET).any():
+    others = slice(int(library.climbs), None)  # an end's altitude is a condition anyway
+    conditions = EndConditions(
+        start=np.zeros(4),
+        twists=library.twists[word],
+        goal=goal,
+        rows=library.rows[others, word],
+        targets=library.targets[others],
+    )
+    best, missing = closest_times(conditions, times, rank=RANK, at_least=-math.inf)
+    if not missing < MET or (best < -MET).any():
         return None
     return np.asarray(best.clip(min=0.0))
-
-
-def _conditions(
-    library: LibraryArrays, twists: Array, rows: Array, times: Array, goal: Array
-) -> tuple[Array, Array]:
-    """What is missing of each condition (3 + m,), and how it follows the times (3 + m, n)."""
-    steps = group_of(4).exp(times[:, None] * twists).pose
-    poses = chained(np.zeros(4), steps)
-    after, end = poses[1:], poses[-1]
-    c, s = np.cos(after[:, 2]), np.sin(after[:, 2])
-    arm = end[:2] - after[:, :2]
-    x = c * twists[:, 0] - s * twists[:, 1] - twists[:, 2] * arm[:, 1]
-    y = s * twists[:, 0] + c * twists[:, 1] + twists[:, 2] * arm[:, 0]
-    turn = math.remainder(float(goal[2] - end[2]), 2.0 * math.pi)
-    targets = library.targets.copy()
-    if len(targets) and library.climbs:
-        targets[0] = goal[3]
-    gap = np.concatenate([goal[:2] - end[:2], [turn], targets - rows @ times])
-    return gap, np.vstack([x, y, twists[:, 2], rows])

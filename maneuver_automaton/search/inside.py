@@ -8,6 +8,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.primitives import Maneuver
 from maneuver_automaton.problem import Bounds
 
 
@@ -25,13 +26,18 @@ def stays_inside(plan: Plan, bounds: Bounds) -> bool:
     if bounds.x is None and bounds.y is None and bounds.z is None:
         return True
     times = [plan.switching_times]
-    for k, trim in enumerate(plan.trims):
-        v_x, v_y, turn_rate = trim.body_velocity[:3]
+    for k, primitive in enumerate(plan.primitives):
+        if isinstance(primitive, Maneuver):
+            if primitive.course is not None:
+                times.append(plan.switching_times[k] + primitive.course.time)
+            continue
+        v_x, v_y, turn_rate = primitive.body_velocity[:3]
+        duration = plan.primitive_durations[k]
         if turn_rate:  # the path is level with an axis where the velocity's direction is
             heading = plan.switching_poses[k][2] + math.atan2(v_y, v_x)
             quarter = 0.5 * math.pi
-            first = math.ceil(min(heading, heading + turn_rate * plan.durations[k]) / quarter)
-            last = math.floor(max(heading, heading + turn_rate * plan.durations[k]) / quarter)
+            first = math.ceil(min(heading, heading + turn_rate * duration) / quarter)
+            last = math.floor(max(heading, heading + turn_rate * duration) / quarter)
             angles = np.arange(first, last + 1) * quarter
             times.append(plan.switching_times[k] + (angles - heading) / turn_rate)
     poses = plan.pose_at(np.concatenate(times))

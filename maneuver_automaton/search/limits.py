@@ -8,10 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import StageCost
+from maneuver_automaton.groups import group_of
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.setup import SearchSetup, moving_library, search_setup
+
+MISSED = 1e-6  # [m, rad] for a goal a metre away: what is nearer may be met
+HARDLY_TURNING = 1e-6  # turn rate, as a share of a twist, that is too small to measure a way by
 
 
 def why_impossible(problem: Problem) -> str:
@@ -29,8 +34,9 @@ def _impossible(problem: Problem, setup: SearchSetup) -> str:
     if abs(setup.goal[3]) > 1e-9 and not (setup.twists[:, 3] * setup.goal[3] > 0.0).any():
         return f"no trim of the library climbs towards the goal, {setup.goal[3]:.6g} m away"
     directions = setup.twists / np.linalg.norm(setup.twists, axis=1, keepdims=True)
-    if np.linalg.matrix_rank(directions, tol=1e-9) == 1:
-        return "all trims of the library move along one and the same curve"
+    one_curve = np.linalg.matrix_rank(directions, tol=1e-9) == 1
+    if one_curve and not setup.free_heading and _misses(directions, setup.goal):
+        return "all trims of the library move along one and the same curve, which misses the goal"
     limit = problem.horizon.time or problem.horizon.max_time
     if limit is not None:
         way = float(np.linalg.norm(setup.goal[[0, 1, 3]]))
@@ -43,6 +49,31 @@ def _impossible(problem: Problem, setup: SearchSetup) -> str:
                 f"way and turn alone take at least {least:.6g} s"
             )
     return ""
+
+
+def _misses(directions: Array, goal: Array) -> bool:
+    """Whether the one curve that trims of parallel twists (n, 4) follow is proven to miss a goal.
+
+    The goal's turn, or its way where the curve is straight, or its height where that changes, says
+    how far along the curve it would lie. A circle is closed, other curves may lead one way only.
+    """
+    along = directions[0]
+    turn_rate, climb = float(along[2]), float(along[3])
+    if 0.0 < abs(turn_rate) < HARDLY_TURNING:
+        return False
+    turn = math.remainder(float(goal[2]), 2.0 * math.pi)
+    if climb:
+        length = float(goal[3]) / climb
+    elif turn_rate:
+        length = turn / turn_rate
+    else:
+        length = float(goal[:2] @ along[:2])
+    met = group_of(4).exp(length * along).pose
+    gap = np.append((goal - met)[[0, 1, 3]], math.remainder(turn - float(met[2]), 2.0 * math.pi))
+    slack = MISSED * (1.0 + float(np.linalg.norm(goal[[0, 1, 3]])))
+    closed = turn_rate and not climb
+    backwards = length < -slack and not (directions @ along < 0.0).any() and not closed
+    return bool(backwards or np.abs(gap).max() > slack)
 
 
 def closed_bound(problem: Problem, goal: Goal) -> float:

@@ -7,3 +7,6 @@ from maneuver_automaton.switching_times.solve import TimesStatus as TimesStatus
 from maneuver_automaton.switching_times.solve import (
     solve_switching_times as solve_switching_times,
 )
+from maneuver_automaton.switching_times.with_maneuvers import (
+    solve_times_with_maneuvers as solve_times_with_maneuvers,
+)

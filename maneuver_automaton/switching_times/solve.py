@@ -43,6 +43,7 @@ def solve_switching_times(
     goal: ArrayLike,
     *,
     total: float | None = None,
+    weights: ArrayLike | None = None,
     guesses: Sequence[ArrayLike] = (),
     gaps: ArrayLike | None = None,
     restarts: int = RESTARTS,
@@ -62,6 +63,8 @@ def solve_switching_times(
         Pose relative to the start; its heading counts modulo a full turn.
     total : float, optional
         [s] the times must add up to; free if None.
+    weights : (n,) array_like, optional
+        How each time counts in the total; 1 if omitted.
     guesses : sequence of (n,) array_like
         Times to start from, best first; a second per trim if empty.
     gaps : (n, 4) array_like, optional
@@ -101,7 +104,7 @@ def solve_switching_times(
         rows.append(words[:, 3])
         targets.append(end[3] - displaced[:, 3].sum())
     if total is not None:
-        rows.append(np.ones(n))
+        rows.append(np.ones(n) if weights is None else as_array("weights", weights))
         targets.append(as_array("total", total).item())
     starts = _starts(n, total, guesses, restarts)
     times = np.zeros(n)

@@ -81,7 +81,16 @@ def solve(problem: Problem, *, time_limit: float) -> Run:
 
 def solver_on(problem: Problem) -> Callable[[np.ndarray, tuple[Goal, ...], float], Run]:
     """A planner for many queries on the map of `problem`: called with start, goals, limit [s]."""
-    planner = ma.Planner(problem)
+    planner = ma.Planner(
+        problem.automaton,
+        cost=problem.cost,
+        horizon=problem.horizon,
+        bounds=problem.bounds,
+        search=problem.search,
+        obstacles=problem.obstacles,
+        footprint=problem.footprint,
+        margin=problem.margin,
+    )
 
     def query(start: np.ndarray, goals: tuple[Goal, ...], time_limit: float) -> Run:
         began = time.perf_counter()

@@ -135,6 +135,17 @@ def test_the_rest_that_pads_is_a_trim():
     assert result.plan is None or len(result.plan.word) <= 3
 
 
+def test_a_price_on_a_fixed_time_changes_no_plan():
+    # what the rest that pads costs is no reason to stop looking for something cheaper
+    horizon = Horizon(time=32.0)
+    free = found(replace(ROBOTS, cost=Cost(effort=1.0), horizon=horizon))
+    priced = found(replace(ROBOTS, cost=Cost(effort=1.0, time=1.0), horizon=horizon))
+    assert priced.counts == free.counts
+    assert priced.plan.word == free.plan.word
+    assert priced.cost == pytest.approx(free.cost + 32.0, abs=1e-9)
+    assert priced.lower_bound == pytest.approx(free.lower_bound + 32.0, abs=1e-9)
+
+
 def test_without_a_rest_a_fixed_time_is_driven():
     fixed = replace(EASY, automaton=scenes.dubins(1.0), horizon=Horizon(time=20.0))
     result = plan(fixed, time_limit=LIMIT)

@@ -13,7 +13,7 @@ from tests.scenario.files import SCENARIO, TRIMS, automaton, but, grid
 UNIT = "{min: -1, max: 1, step: 1}"
 TOP = (
     "schema, name, vehicle, automaton, start, goal, cost, horizon, bounds_m, margin_m, obstacles, "
-    "search, receding_horizon"
+    "zones, search, receding_horizon"
 )
 LAUGHS = "".join(
     f"l{i}: &l{i} [{', '.join([f'*l{i - 1}'] * 9) if i else 'lol'}]\n" for i in range(9)

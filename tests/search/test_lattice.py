@@ -21,7 +21,7 @@ from maneuver_automaton.search import _kernels_lattice as kernels
 from maneuver_automaton.search.lattice import LADDER, distance_grids, first_plan
 from maneuver_automaton.search.lattice_memory import search_arrays, with_room
 from maneuver_automaton.search.lattice_pass import Rung, both_ends, joined, with_cost
-from maneuver_automaton.search.lattice_query import admitted_goals, lattice_query
+from maneuver_automaton.search.lattice_query import lattice_query
 from tests import scenes
 from tests.collision.scenes import random_map
 from tests.reference import plain_end
@@ -86,17 +86,9 @@ def in_the_problem(query, nodes):
 TIGHT = Rung(contact=True, scale=0.5, quanta=0.5, stop=False)
 
 
-NAMES = [
-    pytest.param(name, marks=pytest.mark.xfail(
-        not COMPILED, strict=True, raises=OverflowError, reason="counts of trims are of 32 bits"
-    )) if name == "few" else name
-    for name in PROBLEMS
-]  # fmt: skip
-
-
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("rung", [Rung(stop=False), TIGHT])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", PROBLEMS)
 def test_nodes_are_ends_of_free_ways(name, rung, sign):
     problem = PROBLEMS[name]
     if sign < 0.0 and problem.moves:
@@ -343,13 +335,6 @@ def test_the_window_holds_the_ends_and_the_bounds_are_walls():
     assert not query.bounded
     assert query_of(PROBLEMS["bounds"]).bounded
     assert not query_of(replace(BASE, bounds=Bounds(x=(-9.0, 9.0)))).bounded
-
-
-def test_goals_outside_the_bounds_are_left_out():
-    bounds = Bounds(x=(-1.0, 5.0))
-    problem = replace(PROBLEMS["goals"], bounds=bounds)
-    assert admitted_goals(problem) == (0,)
-    assert admitted_goals(PROBLEMS["goals"]) == (0, 1)
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.4, -2.0])

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from maneuver_automaton.groups import SE2
-from maneuver_automaton.switching_times.closing import closed_at
+from maneuver_automaton.groups import SE2, SE2xR
+from maneuver_automaton.switching_times.closing import EndConditions, closed_at, closest_times
 from tests.reference import plain_end
 
 TWISTS = np.array([[1, 0, 0.5], [1, 0, 0], [-1, 0, 0.25], [0, 0, 1], [0.5, 0.3, -0.8]], dtype=float)
@@ -88,3 +88,50 @@ def test_the_given_times_are_not_written_on():
     goal = np.array([2.0, 1.5, 1.0])
     closed_at(np.zeros(3), twists, times, goal)
     assert times.tolist() == [1.0, 1.0, 1.0]
+
+
+CLIMBING = np.column_stack([TWISTS, [0.2, 0.0, -0.3, 0.1, 0.0]])
+
+
+@given(seed=st.integers(0, 10**6), fixed=st.booleans())
+@settings(max_examples=100)
+def test_altitude_and_the_sum_of_times_are_met_too(seed, fixed):
+    rng = np.random.default_rng(seed)
+    twists = CLIMBING[[0, 2, 3, 1, 4, 0]]
+    times = rng.uniform(0.3, 2.0, len(twists))
+    start = np.array([5.0, -3.0, rng.uniform(-3, 3), 2.0])
+    goal = (SE2xR(start) @ SE2xR(plain_end(twists, times))).pose
+    conditions = EndConditions(
+        start=start, twists=twists, goal=goal,
+        rows=np.ones((1, len(times))) if fixed else None,
+        targets=np.array([times.sum()]) if fixed else np.zeros(0),
+    )  # fmt: skip
+    off = 1e-6 * rng.standard_normal(len(times))
+    closed, missing = closest_times(conditions, times + off)
+    reached = (SE2xR(start) @ SE2xR(plain_end(twists, closed))).pose
+    assert missing < 1e-12
+    assert reached == pytest.approx(goal, abs=1e-11)
+    assert not fixed or closed.sum() == pytest.approx(times.sum(), abs=1e-12)
+    assert np.linalg.norm(closed - times - off) < 1.01 * np.linalg.norm(off) + 1e-9
+
+
+@pytest.mark.parametrize("free_heading", [False, True])
+def test_how_conditions_follow_the_times(free_heading):
+    twists, times = CLIMBING, np.array([0.7, 1.1, 0.4, 2.0, 0.9])
+    conditions = EndConditions(
+        start=np.array([1.0, 2.0, 0.3, -1.0]), twists=twists, goal=np.array([3.0, 1.0, 0.8, 0.5]),
+        free_heading=free_heading, rows=np.array([[1.0, 2.0, 0.0, 0.0, 3.0]]),
+        targets=np.array([4.0]),
+    )  # fmt: skip
+    _, columns = conditions.missing(times)
+    for k, step in enumerate(1e-6 * np.eye(len(times))):
+        change = conditions.missing(times - step)[0] - conditions.missing(times + step)[0]
+        assert change / 2e-6 == pytest.approx(columns[:, k], abs=1e-8)
+
+
+def test_what_is_then_missing_is_said():
+    straight = EndConditions(
+        start=np.zeros(3), twists=np.array([[1.0, 0.0, 0.0]]), goal=np.array([2.0, 0.05, 0.0])
+    )
+    times, missing = closest_times(straight, np.array([1.9]))
+    assert (times.tolist(), missing) == ([2.0], 0.05)

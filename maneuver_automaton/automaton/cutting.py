@@ -1,0 +1,255 @@
+"""Plans cut in time, in the midst of a maneuver too, and joined again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton.plan import Plan
+from maneuver_automaton.groups import group_of
+from maneuver_automaton.models import Model
+from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
+from maneuver_automaton.primitives.driving import drive_all
+
+NOTHING = 1e-9  # [s] what lasts no longer has passed, or has not begun
+
+
+def with_samples_at(plan: Plan, times: ArrayLike, model: Model) -> Plan:
+    """The same plan, its maneuvers sampled at `times` (n,) [s] too: there it can be cut exactly.
+
+    Raises
+    ------
+    ValueError
+        If a maneuver has no course.
+    """
+    due = np.asarray(times, dtype=np.float64)
+    maneuvers, k = list(plan.maneuvers), 0
+    for piece, begin in zip(plan.primitives, plan.switching_times, strict=False):
+        if not isinstance(piece, Maneuver):
+            continue
+        while maneuvers[k] is not piece:
+            k += 1
+        maneuvers[k] = _sampled(piece, due - begin, model)
+        k += 1
+    return replace(plan, maneuvers=tuple(maneuvers))
+
+
+def head_of(plan: Plan, until: float) -> Plan:
+    """The first `until` seconds of a plan; of a maneuver that is cut, its begin.
+
+    Examples
+    --------
+    >>> rest = Trim(name="rest", body_velocity=[0, 0, 0], control=[0])
+    >>> ahead = Trim(name="ahead", body_velocity=[1, 0, 0], control=[0])
+    >>> go = Maneuver(name="go", source="rest", target="ahead", displacement=[1, 0, 0], duration=2,
+    ...     course=Trajectory(time=np.array([0.0, 1.0, 2.0]), control=np.ones((3, 1)),
+    ...                       pose=np.array([[0, 0, 0], [0.25, 0, 0], [1.0, 0, 0]]),
+    ...                       reduced_state=np.array([[0.0], [0.5], [1.0]])))
+    >>> plan = Plan([0, 0, 0], (rest, ahead), durations=[0.0, 3.0], maneuvers=(go,))
+    >>> head_of(plan, 1.0).end.tolist(), head_of(plan, 3.0).end.tolist()
+    ([0.25, 0.0, 0.0], [2.0, 0.0, 0.0])
+    """
+    word, times, between, left = [plan.trims[0]], [0.0], list[Maneuver | None](), until
+    for k, (trim, duration) in enumerate(zip(plan.trims, plan.durations.tolist(), strict=True)):
+        if k and left <= NOTHING:
+            break
+        if k:
+            maneuver = _between(plan, k)
+            if maneuver is not None:
+                lasting = maneuver.duration
+                cut = left < lasting - NOTHING
+                maneuver, left = (_begin_of(maneuver, left) if cut else maneuver), left - lasting
+            between.append(maneuver)
+            word.append(trim)
+            times.append(0.0)
+        times[-1] += min(duration, max(left, 0.0))
+        left -= duration
+    return _plan(plan, plan.start, word, times, between, plan.start_time)
+
+
+def tail_of(plan: Plan, after: float, *, start: Array | None = None) -> Plan:
+    """What remains of a plan `after` seconds, from `start`; of a maneuver under way, its end.
+
+    Parameters
+    ----------
+    plan : Plan
+    after : float
+        [s] that have passed since its start.
+    start : (dof,) array, optional
+        Where the vehicle is [m, m, rad(, m)]; if omitted, where the plan says.
+
+    Examples
+    --------
+    >>> rest = Trim(name="rest", body_velocity=[0, 0, 0], control=[0])
+    >>> hop = Maneuver(name="hop", source="rest", target="rest", displacement=[1, 0, 0], duration=2)
+    >>> plan = Plan([0, 0, 0], (rest, rest), durations=[1.0, 3.0], maneuvers=(hop,))
+    >>> tail_of(plan, 3.5).start.tolist(), tail_of(plan, 3.5).durations.tolist()
+    ([1.0, 0.0, 0.0], [2.5])
+    """
+    word, times, between, passed = list[Trim](), list[float](), list[Maneuver | None](), after
+    for k, (trim, duration) in enumerate(zip(plan.trims, plan.durations.tolist(), strict=True)):
+        if k:
+            maneuver = _between(plan, k)
+            if word:
+                between.append(maneuver)
+            elif maneuver is not None and passed < maneuver.duration - NOTHING:
+                word, times = [plan.trims[k - 1]], [0.0]
+                between = [_end_of(maneuver, passed) if passed > NOTHING else maneuver]
+                passed = 0.0
+            elif maneuver is not None:
+                passed = max(passed - maneuver.duration, 0.0)
+        if word or duration - passed > NOTHING or k == len(plan.trims) - 1:
+            word.append(trim)
+            times.append(max(duration - passed, 0.0))
+            passed = 0.0
+        else:
+            passed = max(passed - duration, 0.0)
+    at = plan.start_time + after
+    return _plan(plan, plan.pose_at(at) if start is None else start, word, times, between, at)
+
+
+def committed(plan: Plan, after: float) -> float:
+    """Seconds until the maneuver ends that is under way `after` seconds; 0 in a trim."""
+    begins = plan.switching_times - plan.start_time
+    for k, piece in enumerate(plan.primitives):
+        inside = begins[k] + NOTHING < after < begins[k + 1] - NOTHING
+        if inside and isinstance(piece, Maneuver):
+            return float(begins[k + 1] - after)
+    return 0.0
+
+
+def joined(first: Plan, second: Plan) -> Plan:
+    """One plan after another, which starts in the trim, or its class, where the first one ends."""
+    same = first.trims[-1].name == second.trims[0].name
+    kept, times = len(first.trims) - int(same), first.durations.tolist()
+    lasting = [*second.durations.tolist()]
+    if same:
+        lasting[0] += times[-1]
+    link: tuple[Maneuver | None, ...] = () if same else (None,)
+    between = (*_all_between(first), *link, *_all_between(second))
+    return _plan(
+        first,
+        first.start,
+        [*first.trims[:kept], *second.trims],
+        [*times[:kept], *lasting],
+        list(between),
+        first.start_time,
+    )
+
+
+def _all_between(plan: Plan) -> tuple[Maneuver | None, ...]:
+    return plan.maneuvers or (None,) * (len(plan.trims) - 1)
+
+
+def _between(plan: Plan, k: int) -> Maneuver | None:
+    """What stands before trim `k`."""
+    return plan.maneuvers[k - 1] if plan.maneuvers else None
+
+
+def _plan(
+    plan: Plan,
+    start: Array,
+    word: Sequence[Trim],
+    times: Sequence[float],
+    between: Sequence[Maneuver | None],
+    start_time: float,
+) -> Plan:
+    maneuvers = tuple(between) if any(between) else ()
+    return Plan(start, word, durations=times, maneuvers=maneuvers, start_time=start_time)
+
+
+def _course(maneuver: Maneuver) -> Trajectory:
+    if maneuver.course is None:
+        raise ValueError(f"maneuver {maneuver.name!r}: has no course, so it cannot be cut")
+    return maneuver.course
+
+
+def _begin_of(maneuver: Maneuver, until: float) -> Maneuver:
+    course = _course(maneuver)
+    k = _sample_at(course, until)
+    if k is None:
+        course, k = _with_rows(course, np.array([until]), *_between_samples(course, until))
+    part = Trajectory(
+        time=course.time[: k + 1],
+        pose=course.pose[: k + 1],
+        reduced_state=course.reduced_state[: k + 1],
+        control=np.concatenate([course.control[:k], course.control[max(k - 1, 0) : max(k, 1)]]),
+    )
+    return _part(maneuver, part)
+
+
+def _end_of(maneuver: Maneuver, after: float) -> Maneuver:
+    course = _course(maneuver)
+    k = _sample_at(course, after)
+    if k is None:
+        course, k = _with_rows(course, np.array([after]), *_between_samples(course, after))
+    group = group_of(course.pose.shape[1])
+    poses = np.array((group(course.pose[k]).inverse() @ group(course.pose[k:])).pose)
+    poses[0] = 0.0
+    part = Trajectory(
+        time=course.time[k:] - course.time[k],
+        pose=poses,
+        reduced_state=course.reduced_state[k:],
+        control=course.control[k:],
+    )
+    return _part(maneuver, part)
+
+
+def _part(maneuver: Maneuver, course: Trajectory) -> Maneuver:
+    """A piece of a maneuver under its name."""
+    duration = float(course.time[-1])
+    return replace(maneuver, displacement=course.pose[-1], duration=duration, course=course)
+
+
+def _sample_at(course: Trajectory, time: float) -> int | None:
+    k = int(np.abs(course.time - time).argmin())
+    return k if abs(float(course.time[k]) - time) <= NOTHING else None
+
+
+def _between_samples(course: Trajectory, time: float) -> tuple[Array, Array]:
+    """Pose and reduced state, a row each, between two samples, as if both changed evenly."""
+    states = [np.interp(time, course.time, column) for column in course.reduced_state.T]
+    return course.pose_at(time)[None], np.array(states).reshape(1, -1)
+
+
+def _sampled(maneuver: Maneuver, since: Array, model: Model) -> Maneuver:
+    """The maneuver with samples at times `since` its begin, as the model drives there."""
+    course = _course(maneuver)
+    new = [
+        float(t)
+        for t in since
+        if NOTHING < t < maneuver.duration - NOTHING and _sample_at(course, float(t)) is None
+    ]
+    if not new:
+        return maneuver
+    times = np.unique(np.array(new))
+    k = np.searchsorted(course.time, times, side="right") - 1
+    rides = drive_all(
+        model,
+        course.reduced_state[k],
+        control=course.control[k][:, None],
+        durations=(times - course.time[k])[:, None],
+    )
+    group = group_of(course.pose.shape[1])
+    gained = np.array([ride.pose[-1] for ride in rides])
+    poses = (group(course.pose[k]) @ group(gained)).pose
+    states = np.array([ride.reduced_state[-1] for ride in rides])
+    return replace(maneuver, course=_with_rows(course, times, poses, states)[0])
+
+
+def _with_rows(
+    course: Trajectory, times: Array, poses: Array, states: Array
+) -> tuple[Trajectory, int]:
+    """The course with samples put in, and where the first of them is."""
+    at = np.searchsorted(course.time, times, side="right")
+    finer = Trajectory(
+        time=np.insert(course.time, at, times),
+        pose=np.insert(course.pose, at, poses, axis=0),
+        reduced_state=np.insert(course.reduced_state, at, states, axis=0),
+        control=np.insert(course.control, at, course.control[at - 1], axis=0),
+    )
+    return finer, int(at[0])

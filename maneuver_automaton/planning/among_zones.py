@@ -1,0 +1,263 @@
+"""Plans where not every motion is admitted everywhere.
+
+A search that knows nothing of zones is asked simpler questions, whose answers keep to all zones:
+each zone is either entered, then only motions that it admits are used, or it is an obstacle. What
+comes out is quickened outside of the zones, and the cheapest plan that passes every check is kept.
+The first question is the one without zones: if its answer keeps to them, none is better.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass, replace
+from itertools import product
+from typing import Any, Protocol
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.collision import Obstacle, Zone
+from maneuver_automaton.collision.checker import origin_near
+from maneuver_automaton.collision.surroundings import fastest_point, parts_of, surroundings_of
+from maneuver_automaton.models import Model
+from maneuver_automaton.planning.blocked import blocked_ends
+from maneuver_automaton.planning.checking import check_plan
+from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
+from maneuver_automaton.planning.zones import admitted_stretches, piece_is_admitted
+from maneuver_automaton.primitives import Trim
+from maneuver_automaton.problem import Problem
+
+MOST_QUESTIONS = 8  # ways to enter some zones and go around others
+STEP = 0.02  # [m, rad] between places where a trim may be replaced by a faster one
+PARALLEL = 1e-12  # of twists, relative
+
+
+class Search(Protocol):
+    """A planner of problems without zones."""
+
+    def __call__(
+        self, problem: Problem, /, *, began: float, time_limit: float, alternatives: int
+    ) -> PlanResult:
+        """The cheapest plan found."""
+        ...
+
+
+def plan_among_zones(
+    problem: Problem, search: Search, *, began: float, time_limit: float, alternatives: int
+) -> PlanResult:
+    """The cheapest plan found that keeps to the zones of a problem; every one was audited.
+
+    The time limit [s] counts from `began`, as `time.monotonic` does. The answer need not be the
+    best: only where the plan that knows of no zones keeps to them, it is as good as that one.
+    """
+    deadline = began + time_limit
+    free = replace(problem, zones=())
+    questions = [free, *(one for one in _questions(problem) if blocked_ends(one) is None)]
+    accepted: list[Accepted] = []
+    counts: dict[str, int] = {}
+    improvements: list[tuple[float, float]] = []
+    best: PlanResult | None = None
+    for k, question in enumerate(questions):
+        left = deadline - time.monotonic()
+        if left <= 0.0 and accepted:
+            break
+        share = max(left, 1e-3) / (len(questions) - k)
+        result = search(
+            question, began=time.monotonic(), time_limit=share, alternatives=alternatives
+        )
+        best = result if best is None else best
+        for name, value in result.counts.items():
+            counts[name] = counts.get(name, 0) + value
+        for plan in _plans(problem, result):
+            one = _checked(problem, plan, result.goal_index)
+            if one is not None:
+                if one.cost < min((other.cost for other in accepted), default=math.inf):
+                    improvements.append((time.monotonic() - began, one.cost))
+                accepted.append(one)
+        if k == 0 and accepted and result.plan is accepted[0].plan:
+            return replace(result, problem=problem)
+    timing = {"search": time.monotonic() - began, "refine": 0.0, "audit": 0.0}
+    if not accepted:
+        assert best is not None
+        reason = best.reason or (
+            "no plan was found that keeps to the zones, by going around them, or through them with "
+            "what they admit"
+        )
+        status = PlanStatus.NO_PLAN if best.plan is not None else best.status
+        return PlanResult(
+            problem=problem, status=status, reason=reason, timing_s=timing, counts=counts
+        )
+    accepted.sort(key=lambda one: one.cost)
+    timing["first_plan"] = improvements[0][0]
+    bound = 0.0 if best is None or best.lower_bound is None else best.lower_bound
+    return found_plans(
+        problem,
+        accepted[: alternatives + 1],
+        bound=bound,
+        timing_s=timing,
+        counts=counts,
+        improvements=tuple(improvements),
+    )
+
+
+def _checked(problem: Problem, plan: Plan, goal_index: int | None) -> Accepted | None:
+    """A plan that keeps to the zones and passes every other check; None if it does not."""
+    if goal_index is None:
+        return None
+    checked = check_plan(problem, plan, problem.goals[goal_index])
+    if checked.audit is None or not checked.passed:
+        return None
+    cost = problem.cost_of(plan)
+    return Accepted(plan=plan, goal_index=goal_index, cost=cost, audit=checked.audit)
+
+
+def _plans(problem: Problem, result: PlanResult) -> Iterator[Plan]:
+    """What a search found, and the same quickened outside of the zones."""
+    if result.plan is None:
+        return
+    yield result.plan
+    quick = quickened(problem, result.plan)
+    if quick is not None:
+        yield quick
+
+
+def _questions(problem: Problem) -> Iterator[Problem]:
+    """Problems without zones whose plans keep to all of them: through all, around all, mixed."""
+    choices = sorted(
+        product((True, False), repeat=len(problem.zones)),
+        key=lambda through: (len(set(through)), not through[0]),
+    )
+    for through in choices[:MOST_QUESTIONS]:
+        entered = tuple(zone for zone, enter in zip(problem.zones, through, strict=True) if enter)
+        avoided = tuple(
+            Obstacle(zone.shape, name=zone.words)
+            for zone, enter in zip(problem.zones, through, strict=True)
+            if not enter
+        )
+        automaton = admitted_automaton(problem.automaton, entered)
+        if automaton is None:
+            continue
+        named = [problem.start_trim, *(goal.trim for goal in problem.goals)]
+        if any(name is not None and name not in automaton.trim_names for name in named):
+            continue
+        yield replace(
+            problem,
+            automaton=automaton,
+            zones=(),
+            obstacles=(*problem.obstacles, *avoided),
+        )
+
+
+def admitted_automaton(automaton: Automaton, zones: tuple[Zone, ...]) -> Automaton | None:
+    """What of an automaton all of these zones admit; None if nothing of it moves.
+
+    The limits of a vehicle with inertia become those of the zones, as far as it states them.
+    """
+    if not zones:
+        return automaton
+    trims = tuple(
+        trim for trim in automaton.trims if all(piece_is_admitted(zone, trim) for zone in zones)
+    )
+    if not any(not trim.is_rest for trim in trims) and not automaton.model.reduced_names:
+        return None
+    names = {trim.name for trim in trims}
+    maneuvers = tuple(
+        maneuver
+        for maneuver in automaton.maneuvers
+        if {maneuver.source, maneuver.target} <= names
+        and maneuver.course is not None
+        and all(admitted_stretches(zone, maneuver, automaton.model).all() for zone in zones)
+    )
+    if not trims:
+        return None
+    model: Model = automaton.model
+    if model.reduced_names:
+        for zone in zones:
+            model = _limited(model, zone)
+    return replace(automaton, model=model, trims=trims, maneuvers=maneuvers)
+
+
+def _limited(model: Model, zone: Zone) -> Model:
+    """A vehicle with inertia that keeps to a zone's limits, as far as its class states them."""
+    known: set[str] = {field.name for field in fields(model)} if is_dataclass(model) else set()
+    changes: dict[str, Any] = {}
+    if zone.max_speed is not None and "max_speed" in known:
+        changes["max_speed"] = min(zone.max_speed, model.max_speed)  # type: ignore[attr-defined]
+    if not zone.reverse and "min_speed" in known:
+        changes["min_speed"] = 0.0
+    return replace(model, **changes) if changes else model  # type: ignore[type-var]
+
+
+def quickened(problem: Problem, plan: Plan) -> Plan | None:
+    """The same path with cheaper trims wherever the zones admit them; None if there is no gain.
+
+    A trim is replaced by others of a parallel twist, as from a slow one to a fast one where a
+    speed limit ends. Only for vehicles that switch at will.
+    """
+    if any(plan.maneuvers) or not problem.automaton.is_kinematic or not plan.trims:
+        return None
+    word: list[Trim] = []
+    times: list[float] = []
+    for k, (trim, duration) in enumerate(zip(plan.trims, plan.durations.tolist(), strict=True)):
+        choices = _parallel(problem, trim)
+        if trim.is_rest or len(choices) < 2:
+            word.append(trim)
+            times.append(duration)
+            continue
+        n = max(1, math.ceil(float(np.abs(trim.body_velocity).sum()) * duration / STEP))
+        clear = _clear(problem, plan, k, n)
+        for row in clear:
+            faster, pace = next(
+                (one, pace)
+                for one, pace in choices
+                if one is trim
+                or all(
+                    out or piece_is_admitted(zone, one)
+                    for zone, out in zip(problem.zones, row, strict=True)
+                )
+            )
+            if word and word[-1] is faster:
+                times[-1] += duration / n / pace
+            else:
+                word.append(faster)
+                times.append(duration / n / pace)
+    quick = replace(plan, trims=tuple(word), durations=np.array(times))
+    gains = problem.cost_of(quick) < problem.cost_of(plan)
+    most = problem.horizon.max_trims
+    fits = problem.horizon.time is None and (most is None or len(word) <= most)
+    return quick if gains and fits else None
+
+
+def _parallel(problem: Problem, trim: Trim) -> list[tuple[Trim, float]]:
+    """Trims of a parallel twist and how much faster they are, the cheapest path first."""
+    size = float(np.linalg.norm(trim.body_velocity))
+    found = []
+    for one, rate in zip(problem.automaton.trims, problem.rates.tolist(), strict=True):
+        pace = float(one.body_velocity @ trim.body_velocity) / (size * size) if size else 0.0
+        off = float(np.abs(one.body_velocity - pace * trim.body_velocity).max())
+        if pace > 0.0 and off <= PARALLEL * max(1.0, pace) * max(size, 1.0):
+            found.append((rate / pace, trim if one.name == trim.name else one, pace))
+    if not any(one is trim for _, one, _ in found):
+        found.append((math.inf, trim, 1.0))
+    found.sort(key=lambda row: row[0])
+    return [(one, pace) for _, one, pace in found]
+
+
+def _clear(problem: Problem, plan: Plan, k: int, n: int) -> Array:
+    """Whether each of `n` equal stretches of trim `k` is surely out of each zone (n, zones)."""
+    begin, duration = plan.switching_times[k], float(plan.durations[k])
+    middles = begin + duration * (np.arange(n) + 0.5) / n
+    origin = origin_near(plan.start[:2])
+    poses = plan.pose_at(middles)[:, :3].copy()
+    poses[:, :2] -= origin
+    body = parts_of(problem.footprint)
+    reach = 0.5 * duration / n * fastest_point(body, plan.trims[k].body_velocity[None, :3])[0]
+    columns = [
+        surroundings_of((Obstacle(zone.shape),), origin).nearest(body, poses, middles).distance
+        > reach + STEP / 2.0
+        for zone in problem.zones
+    ]
+    return np.array(columns).T

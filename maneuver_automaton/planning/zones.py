@@ -1,0 +1,71 @@
+"""Whether a plan keeps to the zones of its problem, by FCL."""
+
+from __future__ import annotations
+
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.collision import Obstacle, Zone
+from maneuver_automaton.collision.fcl_checker import FclChecker
+from maneuver_automaton.models import Model
+from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.problem import Problem
+
+
+def what_zone_forbids(problem: Problem, plan: Plan, origin: tuple[float, float]) -> str:
+    """The first motion of a plan that a zone does not admit where it is driven; empty if none.
+
+    A trim that a zone does not admit must not touch it; of a maneuver, what it does not admit of
+    its course. Zones are counted from `origin` [m], so that no digit is lost.
+    """
+    for zone in problem.zones:
+        checker = FclChecker(problem.footprint, (Obstacle(zone.shape),), origin=origin)
+        for k, piece in enumerate(plan.primitives):
+            start, duration = plan.switching_poses[k], float(plan.primitive_durations[k])
+            if isinstance(piece, Trim):
+                if not piece_is_admitted(zone, piece):
+                    hit = checker.motion_hit(start[:3], piece.body_velocity[:3], duration)
+                    if hit is not None:
+                        return f"{zone.words} does not admit trim {k}, {piece.name!r}"
+            elif _course_enters(zone, checker, piece, start, problem.automaton.model):
+                return f"{zone.words} does not admit maneuver {k}, {piece.name!r}"
+    return ""
+
+
+def piece_is_admitted(zone: Zone, trim: Trim) -> bool:
+    """Whether a zone admits a trim."""
+    return zone.admits_names([trim.name]) and bool(zone.admits(trim.body_velocity))
+
+
+def _course_enters(
+    zone: Zone, checker: FclChecker, maneuver: Maneuver, start: Array, model: Model
+) -> bool:
+    """Whether a maneuver touches a zone on a stretch that it does not admit."""
+    course = maneuver.course
+    if course is None:
+        return True
+    forbidden = ~admitted_stretches(zone, maneuver, model)
+    for is_forbidden, group in groupby(range(forbidden.size), key=lambda k: bool(forbidden[k])):
+        stretch = list(group)
+        if is_forbidden:
+            rows = slice(stretch[0], stretch[-1] + 2)
+            hit = checker.course_hit(start[:3], course.pose[rows, :3], course.time[rows])
+            if hit is not None:
+                return True
+    return False
+
+
+def admitted_stretches(zone: Zone, maneuver: Maneuver, model: Model) -> NDArray[np.bool_]:
+    """Which stretches (n - 1,) between samples of a maneuver a zone admits, by both their ends."""
+    course = maneuver.course
+    assert course is not None
+    if not zone.admits_names([maneuver.source, maneuver.target]):
+        return np.zeros(course.time.size - 1, dtype=np.bool_)
+    control = course.control[:-1]
+    begins = model.body_velocity(course.reduced_state[:-1], control)
+    ends = model.body_velocity(course.reduced_state[1:], control)
+    return np.asarray(zone.admits(begins) & zone.admits(ends))

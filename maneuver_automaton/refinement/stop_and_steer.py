@@ -1,0 +1,187 @@
+"""A kinematic path as a plan of a vehicle with inertia: it stops wherever the twist jumps.
+
+The path is followed exactly, so what is free for the kinematic vehicle is free for this one.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from itertools import groupby
+from typing import Protocol
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton import Plan, Primitive
+from maneuver_automaton.models import Model
+from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.primitives.driving import drive
+
+SHORTEST = 1e-12  # [s] shorter coasts are left out
+
+
+class StopsAndSteers(Model, Protocol):
+    """A vehicle that can follow kinematic paths: its controls are the rates of its state."""
+
+    @property
+    def kinematic(self) -> Model:
+        """The kinematic vehicle whose paths it can follow."""
+        ...
+
+    def state_along(self, twist: Array, pace: float) -> Array:
+        """Reduced state (n_z,) in which it moves with ``pace * twist``; linear in the pace."""
+        ...
+
+
+def stop_and_steer(model: StopsAndSteers, path: Plan, *, first: Trim, last: Trim) -> Plan:
+    """The fastest plan along a kinematic path that stops at every switch.
+
+    Every trim of the path becomes a stroke from rest to rest: full acceleration, a coast at full
+    speed where it is long enough, full braking. Between strokes the reduced state changes at rest.
+
+    Parameters
+    ----------
+    model : StopsAndSteers
+        The vehicle.
+    path : Plan
+        Of its kinematic vehicle.
+    first, last : Trim
+        Trims at rest in which it begins and ends.
+
+    Returns
+    -------
+    Plan
+        Along the same poses.
+
+    Raises
+    ------
+    ValueError
+        If the first or last trim moves.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import SecondOrderUnicycle
+    >>> robot = SecondOrderUnicycle(max_speed=1.0, max_turn_rate=1.0, max_acceleration=1.0,
+    ...                             max_angular_acceleration=1.0)
+    >>> rest = Trim(name="rest", body_velocity=[0, 0, 0], control=[0, 0], reduced_state=[0, 0])
+    >>> ahead = Trim(name="ahead", body_velocity=[0.5, 0, 0], control=[0.5, 0])
+    >>> path = Plan([0, 0, 0], (ahead,), durations=[8.0])
+    >>> plan = stop_and_steer(robot, path, first=rest, last=rest)
+    >>> plan.word, plan.duration  # 1 s to accelerate, 3 s at 1 m/s, 1 s to brake
+    (('accelerate to 1, 0', 'at 1, 0', 'brake from 1, 0'), 5.0)
+    """
+    for what, trim in (("first", first), ("last", last)):
+        if not trim.is_rest:
+            raise ValueError(f"{what} trim {trim.name!r}: it moves, need one that stands still")
+    word = _Word(model, trims={first.name: first, last.name: last})
+    at = first
+    strokes = groupby(
+        zip(path.trims, path.durations.tolist(), strict=True),
+        key=lambda one: one[0].body_velocity.tobytes(),
+    )
+    for _, group in strokes:
+        pieces = list(group)
+        twist, length = pieces[0][0].body_velocity, math.fsum(time for _, time in pieces)
+        if not twist.any() or not length > SHORTEST:
+            continue
+        standing = word.trim(model.state_along(twist, 0.0), first, last)
+        word.turn_at_rest(at, standing)
+        word.stroke(standing, twist, length)
+        at = standing
+    word.turn_at_rest(at, last)
+    if not word.primitives:
+        return Plan(path.start, (first,), durations=[0.0], start_time=path.start_time)
+    return Plan.of_primitives(
+        path.start,
+        word.primitives,
+        durations=word.durations,
+        trims=word.trims,
+        start_time=path.start_time,
+    )
+
+
+@dataclass(slots=True, eq=False)
+class _Word:
+    """Primitives put one after the other."""
+
+    model: StopsAndSteers
+    trims: dict[str, Trim]
+    primitives: list[Primitive] = field(default_factory=list)
+    durations: list[float] = field(default_factory=list)
+
+    def trim(self, state: Array, *known: Trim) -> Trim:
+        """The trim of a reduced state, one that is known if it has this state."""
+        for one in known:
+            if np.array_equal(one.reduced_state, state):
+                return one
+        name = f"at {_numbers(state)}"
+        while name in self.trims:
+            if np.array_equal(self.trims[name].reduced_state, state):
+                return self.trims[name]
+            name += "'"
+        controls = np.zeros(len(self.model.control_names))
+        velocity = np.asarray(self.model.body_velocity(state, controls))
+        self.trims[name] = Trim(
+            name=name, body_velocity=velocity, control=controls, reduced_state=state
+        )
+        return self.trims[name]
+
+    def turn_at_rest(self, source: Trim, target: Trim) -> None:
+        """Change the reduced state at full rate where the vehicle stands."""
+        change = target.reduced_state - source.reduced_state
+        duration = float(np.max(np.abs(change) / self._rates))
+        if duration > 0.0:
+            name = f"at rest to {_numbers(target.reduced_state)}"
+            self._maneuver(name, source, target, change / duration, duration)
+
+    def stroke(self, standing: Trim, twist: Array, length: float) -> None:
+        """Follow a twist for `length` times what it does in a second, from rest to rest."""
+        per_pace = self.model.state_along(twist, 1.0) - standing.reduced_state
+        growth = float(np.min(_ratio(self._rates, np.abs(per_pace))))
+        low, high = np.moveaxis(self.model.reduced_limits, -1, 0)
+        fastest = float(np.min(_ratio(np.where(per_pace > 0.0, high, -low), np.abs(per_pace))))
+        pace = min(fastest, math.sqrt(length * growth))
+        ramp = pace / growth
+        moving = self.trim(standing.reduced_state + pace * per_pace)
+        control = growth * per_pace
+        spoken = _numbers(moving.reduced_state)
+        self._maneuver(f"accelerate to {spoken}", standing, moving, control, ramp)
+        coast = length / pace - ramp
+        if coast > SHORTEST:
+            self.primitives.append(moving)
+            self.durations.append(coast)
+        self._maneuver(f"brake from {spoken}", moving, standing, -control, ramp)
+
+    @property
+    def _rates(self) -> Array:
+        """Greatest rates (n_z,) of the reduced state: its rates are the controls."""
+        return np.asarray(self.model.control_limits[:, 1])
+
+    def _maneuver(
+        self, name: str, source: Trim, target: Trim, control: Array, duration: float
+    ) -> None:
+        course = drive(
+            self.model, source.reduced_state, control=control[None], durations=[duration]
+        )
+        self.trims[source.name], self.trims[target.name] = source, target
+        self.primitives.append(
+            Maneuver(
+                name=name,
+                source=source.name,
+                target=target.name,
+                displacement=course.pose[-1],
+                duration=float(course.time[-1]),
+                course=course,
+            )
+        )
+        self.durations.append(float(course.time[-1]))
+
+
+def _ratio(limits: Array, sizes: Array) -> Array:
+    """Limits by sizes; infinite where the size is zero."""
+    return np.where(sizes > 0.0, limits / np.where(sizes > 0.0, sizes, 1.0), np.inf)
+
+
+def _numbers(state: Array) -> str:
+    return ", ".join(f"{value + 0.0:.4g}" for value in state)

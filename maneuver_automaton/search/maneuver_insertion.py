@@ -1,0 +1,270 @@
+"""Insertion of trims with their maneuvers: a local search over words.
+
+A kinematic trim is inserted by an infinitesimal time, and a price decides whether that pays. One
+that needs maneuvers to be entered and left changes the end of the word by a jump. So the price, the
+momentum of Pontryagin's condition times that jump, only says which changes to try first; each is
+tried with its best times. What no change makes cheaper is a local optimum, without a certificate.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.groups import LieGroup
+from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.search.maneuver_solution import (
+    ManeuverSearch,
+    TimedWord,
+    WordSetup,
+    word_setup,
+)
+from maneuver_automaton.search.result import SearchStatus
+
+GAIN = 1e-7  # relative: less is none
+AT_FIRST = 0.25  # [s] an inserted trim lasts before its times are solved for
+CHUNK = 30  # changes that are tried before the best of them is taken
+MOST_TRIES = 240  # changes of one word that are tried, by rising price
+MOST_TRIMS = 400  # of a larger library those that differ most
+FEW = 2  # trims of a word that may be taken out at once
+
+
+def improve_maneuver_words(
+    problem: Problem,
+    goal: Goal,
+    seeds: Sequence[tuple[Sequence[int], Array]],
+    *,
+    time_limit: float = math.inf,
+    most_tries: int = MOST_TRIES,
+) -> ManeuverSearch:
+    """Insert, replace, split and delete trims of words with maneuvers while that gains.
+
+    Parameters
+    ----------
+    problem : Problem
+    goal : Goal
+    seeds : sequence of (trims, durations)
+        Words that lead to the goal, by the indices of the trims between the first and the last.
+    time_limit : float
+        [s] after which the search ends with what it has.
+    most_tries : int
+        Changes of one word that are tried: those of the least prices.
+
+    Returns
+    -------
+    ManeuverSearch
+        One solution for each seed, cheapest first, each once. They are local optima: no single
+        change that was tried is cheaper. With maneuvers of finite size no reduced cost certifies
+        more than that.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.automaton import Automaton
+    >>> from maneuver_automaton.models import Unicycle
+    >>> controls = {"slow": (0.5, 0), "ahead": (1, 0), "left": (1, 1), "right": (1, -1)}
+    >>> robot = Automaton.of_controls(Unicycle(), controls)
+    >>> goal = Goal(pose=[3.0, 0.0, 0.0], trim="slow")
+    >>> problem = Problem(robot, [0, 0, 0], goal, start_trim="slow")
+    >>> found = improve_maneuver_words(problem, goal, [([0], np.array([6.0]))]).solutions[0]
+    >>> found.plan.word, found.cost
+    (('ahead',), 3.0)
+    """
+    setup = word_setup(problem, goal, most_trims=MOST_TRIMS, also=_used(seeds), steers=False)
+    deadline = time.monotonic() + time_limit
+    climb = _Climb(setup, deadline, most_tries)
+    found: list[TimedWord] = []
+    for trims, times in seeds:
+        word = setup.solved(tuple(trims), [np.asarray(times)])
+        if word is not None:
+            best = climb.top(word)
+            if not any(best.same_as(other) for other in found):
+                found.append(best)
+        if time.monotonic() > deadline:
+            break
+    found.sort(key=lambda one: (float(f"{one.cost:.9g}"), len(one.trims), one.trims))
+    return ManeuverSearch(
+        status=SearchStatus.FOUND if found else SearchStatus.EXHAUSTED,
+        solutions=tuple(setup.solution(word) for word in found),
+        counts={"solved": climb.solved, "changes": climb.changes},
+    )
+
+
+class _Change(NamedTuple):
+    """Another word, with times to start from."""
+
+    price: float  # estimate of its cost
+    trims: tuple[int, ...]
+    times: Array
+
+
+@dataclass(slots=True, eq=False)
+class _Climb:
+    """A local search, with what it has tried."""
+
+    setup: WordSetup
+    deadline: float
+    most_tries: int
+    solved: int = 0
+    changes: int = 0
+
+    def top(self, word: TimedWord) -> TimedWord:
+        """The word that no change makes cheaper, from this one on."""
+        seen = {word.trims}
+        while True:
+            better = self._better(word, seen)
+            if better is None:
+                return word
+            self.changes += 1
+            word = better
+
+    def _better(self, word: TimedWord, seen: set[tuple[int, ...]]) -> TimedWord | None:
+        """The best of the first changes that gain."""
+        changes = sorted(self._changes(word), key=lambda one: (one.price, one.trims))
+        best: TimedWord | None = None
+        tried = 0
+        for change in changes[: self.most_tries]:
+            if time.monotonic() > self.deadline:
+                break
+            if change.trims in seen:
+                continue
+            seen.add(change.trims)
+            least = word.cost if best is None else best.cost
+            if self.setup.fixed(change.trims)[0] >= least:
+                continue
+            tried += 1
+            self.solved += 1
+            other = self.setup.solved(change.trims, [change.times])
+            if other is not None and other.cost < least - GAIN * (1.0 + least):
+                best = other
+            if best is not None and tried >= CHUNK:
+                break
+        return best
+
+    def _changes(self, word: TimedWord) -> Iterator[_Change]:
+        """Words that differ by one trim: inserted, replaced, in the midst of another, or less."""
+        n = len(word.trims)
+        prices = _Prices(self.setup, word)
+        for k in range(n + 1):
+            yield from prices.put(k, k, AT_FIRST)
+        for k in range(n):
+            yield from prices.put(k, k + 1, max(float(word.durations[k]), AT_FIRST))
+            if word.durations[k] > 2.0 * AT_FIRST:
+                yield from prices.split(k, AT_FIRST)
+        for few in range(1, FEW + 1):
+            for k in range(n - few + 1):
+                trims = word.trims[:k] + word.trims[k + few :]
+                times = np.delete(word.durations, slice(k, k + few))
+                if trims and not (0 < k < len(trims) and trims[k - 1] == trims[k]):
+                    yield _Change(-math.inf, trims, times)
+
+
+class _Prices:
+    """Estimates of what a word costs if a trim is put somewhere in it.
+
+    The multipliers p price a displacement of the word's end, seen from its start: where all times
+    are best, ``rate + <p, Ad(pose) xi>`` is zero for every trim that lasts. A change costs what its
+    parts cost, and p times the displacement of the end that it leads to.
+    """
+
+    def __init__(self, setup: WordSetup, word: TimedWord) -> None:
+        self.setup = setup
+        self.word = word
+        self.arrays = setup.library.arrays
+        self.group = setup.group
+        self.letters = np.array(setup.letters, dtype=np.int64)
+        dof = setup.problem.start.size
+        self.twists = self.arrays.twists[:, :dof]
+        self.shift = self.arrays.shift[..., :dof]
+        chain = (setup.start_trim, *word.trims, setup.goal_trim)
+        self.chain = chain
+        group = self.group
+        pose = group(np.zeros(dof))
+        self.begins: list[LieGroup] = []  # of each trim of the word, and of the last one
+        self.ends: list[LieGroup] = [pose]  # of the first trim, and of each of the word
+        for before, trim, lasting in zip(
+            chain, chain[1:], (*word.durations.tolist(), 0.0), strict=False
+        ):
+            pose = pose @ group(self.shift[before, trim])
+            self.begins.append(pose)
+            pose = pose @ group.exp(lasting * self.twists[trim])
+            self.ends.append(pose)
+        self.end = self.ends[-1]
+        self.momentum = self._momentum()
+
+    def _momentum(self) -> Array:
+        """Prices (dof,) of a displacement of the end, seen from the start."""
+        used = [k for k in range(len(self.word.trims)) if self.word.durations[k] > 0.0]
+        if not used:
+            return np.zeros(self.twists.shape[1])
+        trims = [self.word.trims[k] for k in used]
+        rows = [self.begins[k].adjoint() @ self.twists[t] for k, t in zip(used, trims, strict=True)]
+        return np.asarray(np.linalg.lstsq(np.array(rows), -self.arrays.rates[trims], rcond=1e-9)[0])
+
+    def put(self, first: int, after: int, lasting: float) -> Iterator[_Change]:
+        """Any trim for `lasting` seconds in place of trims `first` up to `after` of the word."""
+        word, chain = self.word, self.chain
+        before, following = chain[first], chain[after + 1]
+        rest = self.begins[after].inverse() @ self.end
+        chosen = self.letters[(self.letters != before) & (self.letters != following)]
+        if first < after:
+            chosen = chosen[chosen != chain[first + 1]]
+        removed = float(
+            self.arrays.rates[list(word.trims[first:after])] @ word.durations[first:after]
+        )
+        removed += sum(self.arrays.cost[chain[k], chain[k + 1]] for k in range(first, after + 1))
+        prices = self._priced(self.ends[first], before, chosen, lasting, following, rest) - removed
+        head, tail = word.trims[:first], word.trims[after:]
+        times = np.concatenate([word.durations[:first], [lasting], word.durations[after:]])
+        for trim, price in zip(chosen.tolist(), prices.tolist(), strict=True):
+            if price < math.inf:
+                yield _Change(price, (*head, trim, *tail), times)
+
+    def split(self, k: int, lasting: float) -> Iterator[_Change]:
+        """Any trim for `lasting` seconds in the midst of trim `k` of the word."""
+        word, group = self.word, self.group
+        host, half = word.trims[k], 0.5 * float(word.durations[k])
+        chosen = self.letters[self.letters != host]
+        middle = self.begins[k] @ group.exp(half * self.twists[host])
+        rest = middle.inverse() @ self.end
+        prices = self._priced(middle, host, chosen, lasting, host, rest)
+        times = np.concatenate([word.durations[:k], [half, lasting, half], word.durations[k + 1 :]])
+        for trim, price in zip(chosen.tolist(), prices.tolist(), strict=True):
+            if price < math.inf:
+                trims = (*word.trims[:k], host, trim, host, *word.trims[k + 1 :])
+                yield _Change(price, trims, times)
+
+    def _priced(
+        self,
+        here: LieGroup,
+        before: int,
+        chosen: IntArray,
+        lasting: float,
+        following: int,
+        rest: LieGroup,
+    ) -> Array:
+        """Estimated costs (n,) of the word with each of the trims `chosen` put in."""
+        arrays, group = self.arrays, self.group
+        n, dof = chosen.size, self.twists.shape[1]
+        if not n:
+            return np.zeros(0)
+        end = group(np.tile(here.pose, (n, 1))) @ group(self.shift[before, chosen])
+        end = end @ group.exp(lasting * self.twists[chosen])
+        end = end @ group(self.shift[chosen, following]) @ group(np.tile(rest.pose, (n, 1)))
+        back = self.end.inverse()
+        moved = np.array((end @ group(np.tile(back.pose, (n, 1)))).pose)
+        moved[:, 2] = np.remainder(moved[:, 2] + np.pi, 2.0 * np.pi) - np.pi
+        jump = group(moved).log().reshape(n, dof)
+        added = arrays.cost[before, chosen] + arrays.cost[chosen, following]
+        return np.asarray(
+            self.word.cost + added + lasting * arrays.rates[chosen] + jump @ self.momentum
+        )
+
+
+def _used(seeds: Sequence[tuple[Sequence[int], Array]]) -> tuple[int, ...]:
+    return tuple(sorted({int(trim) for trims, _ in seeds for trim in trims}))

@@ -1,0 +1,125 @@
+"""Plans of trims and maneuvers where nothing is in the way: words, then insertion."""
+
+from __future__ import annotations
+
+import math
+import time
+
+from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.search.maneuver_insertion import improve_maneuver_words
+from maneuver_automaton.search.maneuver_solution import ManeuverSearch, ManeuverSolution
+from maneuver_automaton.search.maneuver_words import CLOSED_FORM, search_maneuver_words
+from maneuver_automaton.search.result import SearchStatus
+
+SCANNED_TRIMS = 14  # that words of four trims are made of
+SCANNED = 4  # trims of a scanned word
+SCAN_SHARE = 0.4  # of the time that is left, for scanning
+SEED_SLACK = 0.1  # share by which words may be dearer than a plan that is known, and yet be seeds
+SEEDS = 4  # words that insertion begins with
+SAME = 1e-6  # [s] durations that differ by less are the same
+
+
+def search_words_with_maneuvers(
+    problem: Problem,
+    goal: Goal,
+    *,
+    time_limit: float = math.inf,
+    alternatives: int = 0,
+    ceiling: float = math.inf,
+) -> ManeuverSearch:
+    """Plans to a goal in free space: words of up to four trims, and what insertion makes of them.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its first trim, and the last one of `goal`, are those named, or rest. Obstacles and bounds
+        are not looked at.
+    goal : Goal
+    time_limit : float
+        [s] after which the search ends with what it has.
+    alternatives : int
+        How many plans beside the cheapest.
+    ceiling : float
+        Cost of a plan that is known: what costs as much is left out. Insertion still begins with
+        words that are a little dearer.
+
+    Returns
+    -------
+    ManeuverSearch
+        Locally optimal words, cheapest first.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.automaton import Automaton
+    >>> from maneuver_automaton.models import Unicycle
+    >>> controls = {"ahead": (1, 0), "left": (1, 1), "right": (1, -1)}
+    >>> robot = Automaton.of_controls(Unicycle(), controls)
+    >>> goal = Goal(pose=[3.0, 1.0, 0.0], trim="ahead")
+    >>> problem = Problem(robot, [0, 0, 0], goal, start_trim="ahead")
+    >>> search_words_with_maneuvers(problem, goal).plans[0].word
+    ('left', 'ahead', 'right')
+    """
+    deadline = time.monotonic() + time_limit
+    asked = max(alternatives, SEEDS - 1)
+    near = ceiling * (1.0 + SEED_SLACK)
+    short = search_maneuver_words(
+        problem,
+        goal,
+        alternatives=asked,
+        most_letters=CLOSED_FORM,
+        time_limit=time_limit,
+        ceiling=near,
+    )
+    left = max(deadline - time.monotonic(), 0.0)
+    found = list(short.solutions)
+    counts = dict(short.counts)
+    if left > 0.0:
+        longer = search_maneuver_words(
+            problem,
+            goal,
+            alternatives=asked,
+            most_letters=SCANNED,
+            most_trims=SCANNED_TRIMS,
+            time_limit=SCAN_SHARE * left,
+            ceiling=near,
+        )
+        found = _distinct([*found, *longer.solutions])
+        _add(counts, longer.counts)
+    left = max(deadline - time.monotonic(), 0.0)
+    most = problem.horizon.max_trims
+    if left > 0.0 and found and (most is None or most > CLOSED_FORM):
+        better = improve_maneuver_words(
+            problem,
+            goal,
+            [(one.trims, one.durations) for one in found[:SEEDS]],
+            time_limit=left,
+        )
+        found = _distinct([*found, *better.solutions])
+        _add(counts, better.counts)
+    found = [one for one in found if one.cost < ceiling]
+    if found:
+        status = SearchStatus.FOUND
+    else:
+        out = time.monotonic() > deadline
+        status = SearchStatus.OUT_OF_BUDGET if out else SearchStatus.EXHAUSTED
+    return ManeuverSearch(status=status, solutions=tuple(found[: alternatives + 1]), counts=counts)
+
+
+def _distinct(solutions: list[ManeuverSolution]) -> list[ManeuverSolution]:
+    """Each motion once, by rising cost, then fewer trims, then word."""
+    order = sorted(solutions, key=lambda one: (float(f"{one.cost:.9g}"), len(one.trims), one.trims))
+    kept: list[ManeuverSolution] = []
+    for one in order:
+        same = (
+            abs(one.durations - other.durations).max(initial=0.0) <= SAME
+            for other in kept
+            if other.trims == one.trims
+        )
+        if not any(same):
+            kept.append(one)
+    return kept
+
+
+def _add(counts: dict[str, int], more: dict[str, int]) -> None:
+    for name, value in more.items():
+        counts[name] = counts.get(name, 0) + value

@@ -1,0 +1,183 @@
+"""The closed loop of vehicles with inertia: guarantees from step to step, maneuvers finished."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from maneuver_automaton.automaton.cutting import NOTHING, committed, head_of
+from maneuver_automaton.collision import Box
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.formats.closed_loop_json import (
+    closed_loop_to_dict,
+    load_steps,
+    save_closed_loop,
+)
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.problem import Goal, Horizon, Problem
+from maneuver_automaton.receding_horizon import (
+    Deed,
+    Disturbance,
+    Guarantee,
+    ManeuverHorizon,
+    Origin,
+    simulate,
+)
+from tests.inertia import car_automaton, unicycle_automaton
+from tests.search.cases import compiled_only
+
+pytestmark = compiled_only
+NEAR = Goal(pose=[3.0, 1.0, 1.0], tolerance_m=0.06, tolerance_rad=0.06)
+
+
+def posed(goal=(3.0, 1.0, 1.0), *, automaton=None, **changed) -> Problem:
+    return Problem(automaton or unicycle_automaton(), [0.0, 0.0, 0.0], goal, **changed)
+
+
+def assert_nothing_interrupted(loop) -> None:
+    """Every maneuver that a step leaves under way is finished by the following ones."""
+    for now, then in itertools.pairwise(loop.steps):
+        busy = committed(now.plan, now.applied)
+        if not busy:
+            continue
+        promised = now.plan.primitives[len(head_of(now.plan, now.applied).primitives) - 1]
+        first = then.plan.primitives[0]
+        assert first.name == promised.name
+        assert then.plan.primitive_durations[0] == pytest.approx(busy, abs=10 * NOTHING)
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [
+        posed(),
+        posed([5.0, 1.0, 1.0], automaton=car_automaton()),
+        posed(cost=Cost(time=1.0, length=0.5, effort=0.1, switch=0.2)),
+        posed([3.0, 2.0, 0.0], horizon=Horizon(max_time=12.0)),
+    ],
+    ids=["unicycle", "car", "mixed cost", "longest time"],
+)
+def test_undisturbed_the_first_plan_is_what_it_costs(problem):
+    loop = simulate(problem, step=0.3, time_limit=2.0)
+    assert loop.reached, loop.reason
+    assert not list(loop.violations)
+    assert loop.cost <= loop.steps[0].value + 1e-9
+    kept = [step for step in loop.steps[1:] if not step.replanned]
+    assert all(step.origin is Origin.SHIFTED for step in kept)
+    totals = [step.value + step.accumulated_cost for step in loop.steps]
+    assert (np.diff(totals) < 1e-9).all()  # the value falls by what was applied, or more
+    assert loop.cost == pytest.approx(totals[-1], abs=1e-9)
+    assert all(audit.passed for audit in loop.audits)
+    assert max(audit.max_dynamics_defect for audit in loop.audits) < 1e-9
+    assert_nothing_interrupted(loop)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_disturbed_it_stays_feasible_and_interrupts_no_maneuver(seed):
+    upset = Disturbance(position_m=0.004, heading_rad=0.004, seed=seed)
+    loop = simulate(posed(NEAR), step=0.25, time_limit=0.5, disturbance=upset, steps=60)
+    assert loop.reached, loop.reason
+    assert loop.problem.goals[0].off(loop.poses[-1])[0] < 0.06
+    assert all(audit.passed for audit in loop.audits)
+    assert {one.guarantee for _, one in loop.violations} <= {
+        Guarantee.DECREASE,
+        Guarantee.FEASIBILITY,
+    }
+    assert all(step.off_plan for _, one in loop.violations for step in [loop.steps[_]])
+    assert_nothing_interrupted(loop)
+    assert any(step.origin is Origin.REANCHORED for step in loop.steps)
+
+
+def test_a_push_during_a_maneuver_is_answered_after_it():
+    problem = posed([4.0, 0.5, 0.0])
+    first = ManeuverHorizon(problem, step=0.25)
+    _, log = first.step([0.0, 0.0, 0.0])
+    assert committed(log.plan, 0.25) > 0.0
+    _, then = first.step(log.predicted + np.array([0.02, 0.03, 0.01]))
+    assert then.deed.leads
+    assert max(problem.goals[0].off(then.plan.end)) < 1e-8
+    assert then.plan.primitives[0].name == log.plan.primitives[0].name
+    assert then.off_plan == pytest.approx(np.hypot(0.02, 0.03), abs=1e-6)
+
+
+def test_a_fixed_time_is_prolonged_by_rest():
+    problem = posed(horizon=Horizon(time=8.0), cost=Cost(effort=1.0, time=0.1))
+    loop = simulate(problem, step=0.5, time_limit=2.0, steps=30)
+    assert loop.reached, loop.reason
+    assert all(step.plan.duration == pytest.approx(8.0, abs=1e-8) for step in loop.steps)
+    assert not list(loop.violations)
+
+
+def test_control_is_that_of_the_maneuver_under_way():
+    controller = ManeuverHorizon(posed([4.0, 0.0, 0.0]), step=0.25)
+    control, _ = controller.step([0.0, 0.0, 0.0])
+    assert np.abs(control).max() > 0.0  # rest is left by a maneuver
+
+
+def test_a_moved_loop_is_the_moved_loop():
+    by = SE2([4.0, -2.0, 1.0])
+    here = simulate(posed(), step=0.5, time_limit=5.0)
+    there = simulate(posed().moved(by), step=0.5, time_limit=5.0)
+    assert len(here.steps) == len(there.steps)
+    assert np.abs((by @ SE2(here.poses)).pose - there.poses).max() < 1e-6
+
+
+def test_a_margin_keeps_the_known_word():
+    problem = posed([5.0, 1.0, 1.0], automaton=car_automaton())
+    loop = simulate(problem, step=0.5, margin=5.0, time_limit=0.2)
+    assert loop.reached
+    assert not any(step.replanned for step in loop.steps)
+
+
+def test_among_obstacles_only_free_plans_are_driven():
+    problem = posed(
+        [4.0, 0.0, 0.0], obstacles=[Box([0.5, 2.0], [2.0, 0.0])], footprint=Box([0.4, 0.3])
+    )
+    loop = simulate(problem, step=0.5, time_limit=1.0, steps=80)
+    assert loop.reached, loop.reason
+    assert loop.min_clearance_m > 0.0
+    assert not list(loop.collisions)
+
+
+def test_what_cannot_be_reached_is_said():
+    problem = posed([3.0, 1.0, 1.0], horizon=Horizon(max_time=1.0))
+    _, log = ManeuverHorizon(problem, step=0.5, time_limit=0.2).step([0.0, 0.0, 0.0])
+    assert log.deed is Deed.STOPPED
+    assert [one.guarantee for one in log.violations] == [Guarantee.FEASIBILITY]
+
+
+def test_the_log_can_be_written():
+    loop = simulate(posed(), step=0.5, time_limit=1.0)
+    document = json.loads(json.dumps(closed_loop_to_dict(loop), allow_nan=False))
+    assert document["reached"] is True
+    assert document["steps"][0]["control"] == loop.steps[0].control.tolist()
+
+
+def test_a_loop_that_was_stopped_goes_on_from_its_file(tmp_path):
+    problem = posed()
+    whole = simulate(problem, step=0.4, time_limit=5.0)
+    begun = simulate(problem, step=0.4, time_limit=5.0, steps=2)
+    save_closed_loop(begun, tmp_path / "loop.json")
+    steps, poses = load_steps(tmp_path / "loop.json", problem.automaton)
+    assert committed(steps[-1].plan, steps[-1].applied) > 0.0  # in the midst of a maneuver
+    there = replace(problem, start=poses[-1])
+    rest = simulate(there, step=0.4, time_limit=5.0, last=steps[-1])
+    assert rest.reached
+    assert np.abs(rest.poses - whole.poses[2:]).max() < 1e-9
+    assert rest.cost == pytest.approx(whole.cost, abs=1e-9)
+
+
+def test_what_is_not_known_is_refused():
+    with pytest.raises(ValueError) as error:
+        simulate(posed(), step=0.5, stay=True)
+    assert str(error.value).startswith("receding horizon: stay is for vehicles without inertia")
+    with pytest.raises(ValueError) as error:
+        ManeuverHorizon(posed(), step=0.0)
+    assert str(error.value) == "receding horizon: step must be positive, got 0.0 s"
+    ends_moving = posed(Goal(pose=[3.0, 0.0, 0.0], trim="1, 0"), horizon=Horizon(time=9.0))
+    with pytest.raises(ValueError) as error:
+        ManeuverHorizon(ends_moving, step=0.5)
+    assert str(error.value).startswith("receding horizon: a fixed time needs goals at rest")

@@ -1,0 +1,138 @@
+"""What is said without searching: a goal is out of reach only if no plan can lead there."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from maneuver_automaton import Automaton, PlanStatus, plan
+from maneuver_automaton.collision import Box
+from maneuver_automaton.groups import SE2xR
+from maneuver_automaton.models import Unicycle, UserModel
+from maneuver_automaton.problem import Goal, Problem, SearchSettings
+from maneuver_automaton.search.limits import why_impossible
+
+MISSES = "all trims of the library move along one and the same curve, which misses the goal"
+CURVES = {
+    "straight": [1.0, 0.0, 0.0, 0.0],
+    "sideways": [0.3, -0.8, 0.0, 0.0],
+    "climb": [1.0, 0.0, 0.0, 0.2],
+    "circle": [1.0, 0.0, 0.5, 0.0],
+    "crab's circle": [0.5, 0.5, -1.0, 0.0],
+    "spin": [0.0, 0.0, 2.0, 0.0],
+    "helix": [1.0, 0.0, -0.5, 0.3],
+    "spin upwards": [0.0, 0.0, 1.0, 0.3],
+}
+CLOSED = ("circle", "crab's circle", "spin")
+ANYTHING = UserModel(
+    name="anything",
+    group=SE2xR,
+    control_names=("v_x", "v_y", "turn_rate", "v_z"),
+    velocity=lambda z, u: u,
+)
+
+
+def library(*twists):
+    """Trims of these body velocities, which are their controls."""
+    return Automaton.of_controls(ANYTHING, {f"trim {k}": twist for k, twist in enumerate(twists)})
+
+
+def reason(twists, goal, *, start=(0.0, 0.0, 0.0, 0.0), free_heading=False):
+    goals = (Goal(pose=goal, free_heading=free_heading),)
+    return why_impossible(Problem(library(*twists), start, goals))
+
+
+def after(twist, time, *, start=(0.0, 0.0, 0.0, 0.0)):
+    """Pose after a trim."""
+    return (SE2xR(start) @ SE2xR.exp(time * np.array(twist))).pose
+
+
+@given(
+    name=st.sampled_from(list(CURVES)),
+    time=st.floats(-20.0, 20.0),
+    turns=st.integers(-2, 2),
+    start=st.tuples(*[st.floats(-30.0, 30.0)] * 4),
+    scale=st.floats(0.2, 3.0),
+)
+def test_a_goal_on_the_curve_is_never_out_of_reach(name, time, turns, start, scale):
+    twist = np.array(CURVES[name])
+    goal = after(twist, time, start=start).copy()
+    goal[2] += 2.0 * math.pi * turns
+    assert reason([twist, -scale * twist], goal, start=start) == ""
+    ahead_only = reason([twist, scale * twist], goal, start=start)
+    if time >= 0.0 or name in CLOSED:
+        assert ahead_only == ""
+    elif time < -1e-3:
+        assert ahead_only
+
+
+@given(
+    name=st.sampled_from(list(CURVES)),
+    time=st.floats(-20.0, 20.0),
+    start=st.tuples(*[st.floats(-30.0, 30.0)] * 4),
+    axis=st.integers(0, 3),
+    off=st.sampled_from([0.3, 1e-3]),
+)
+def test_a_goal_beside_the_curve_is_out_of_reach(name, time, start, axis, off):
+    twist = np.array(CURVES[name])
+    beside = np.zeros(4)
+    beside[axis] = off
+    if np.linalg.matrix_rank([twist, beside]) == 1:
+        return  # it is further along the curve
+    goal = (SE2xR(after(twist, time, start=start)) @ SE2xR(beside)).pose
+    assert reason([twist, -twist], goal, start=start)
+
+
+@pytest.mark.parametrize(
+    ("name", "goal"),
+    [
+        ("straight", [1, 1, 0, 0]),
+        ("straight", [2, 1e-4, 0, 0]),
+        ("circle", [1, 0, 0, 0]),
+        ("circle", [0, 4, math.pi + 0.01, 0]),  # the far side, and a little too much of a turn
+        ("spin", [0.1, 0, 1, 0]),
+        ("helix", [0, 0, 0.1, 1.2 * math.pi]),  # after a whole turn, and a tenth too much
+    ],
+)
+def test_by_hand_a_curve_misses_the_goal(name, goal):
+    assert reason([CURVES[name], [-2 * v for v in CURVES[name]]], goal) == MISSES
+
+
+@pytest.mark.parametrize(
+    ("name", "goal"),
+    [
+        ("straight", [7, 0, 2 * math.pi, 0]),
+        ("circle", [0, 4, math.pi, 0]),
+        ("circle", [0, 4, -math.pi, 0]),  # the other way round it is the same place
+        ("spin", [0, 0, -1, 0]),
+        ("helix", [0, 0, 0, 1.2 * math.pi]),
+    ],
+)
+def test_by_hand_a_curve_meets_the_goal(name, goal):
+    assert reason([CURVES[name]], goal) == ""
+
+
+def test_behind_a_vehicle_that_only_goes_ahead():
+    assert reason([[1.0, 0.0, 0.0, 0.0], [0.5, 0.0, 0.0, 0.0]], [-1, 0, 0, 0]) == MISSES
+
+
+def test_of_a_free_heading_nothing_is_said():
+    assert reason([CURVES["circle"]], [1, 0, 0, 0], free_heading=True) == ""
+
+
+def test_two_curves_lead_anywhere():
+    assert reason([CURVES["circle"], CURVES["straight"]], [1, 1, 0, 0]) == ""
+
+
+def test_a_goal_straight_ahead_behind_a_wall_is_not_called_off_the_curve():
+    straights = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "back": (-1.0, 0.0)})
+    wall = Box([1.0, 8.0], [3.0, 0.0])
+    problem = Problem(straights, [0, 0, 0], [6, 0, 0], obstacles=wall,
+                      footprint=Box([0.5, 0.5]),
+                      search=SearchSettings(method="lattice"))  # fmt: skip
+    result = plan(problem, time_limit=0.5)
+    assert result.status in (PlanStatus.NO_PLAN, PlanStatus.OUT_OF_BUDGET)

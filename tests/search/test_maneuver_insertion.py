@@ -1,0 +1,100 @@
+"""Local search over words with maneuvers, and the planner made of it and of exhaustive search."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from maneuver_automaton.audit import audit_plan
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.problem import Horizon, Problem
+from maneuver_automaton.search.maneuver_insertion import improve_maneuver_words
+from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
+from maneuver_automaton.search.maneuver_solution import word_setup
+from maneuver_automaton.search.maneuver_words import search_maneuver_words
+from tests.inertia import car_automaton, unicycle_automaton
+from tests.search.cases import compiled_only
+
+GOALS = ([0.0, 3.0, 0.0], [5.0, 1.0, 1.0], [0.5, 0.0, 0.0], [-3.0, 2.0, 3.14])
+FEW = ((0.0, 0.0), (1.0, 0.0), (0.8, 0.8), (0.8, -0.8))
+pytestmark = compiled_only
+
+
+def posed(goal, automaton=None, **changed) -> Problem:
+    return Problem(automaton or unicycle_automaton(), [0.0, 0.0, 0.0], goal, **changed)
+
+
+def improved(one: Problem, seeds):
+    return improve_maneuver_words(
+        one, one.goals[0], [(seed.trims, seed.durations) for seed in seeds]
+    )
+
+
+@pytest.mark.parametrize("goal", GOALS)
+def test_insertion_never_ends_dearer_than_it_began(goal):
+    one = posed(goal)
+    seeds = search_maneuver_words(one, one.goals[0], alternatives=3, most_letters=3).solutions
+    best = improved(one, seeds).solutions[0]
+    assert best.cost <= seeds[0].cost + 1e-9
+    assert max(one.goals[0].off(best.plan.end)) < 1e-9
+    assert one.cost_of(best.plan) == pytest.approx(best.cost, abs=1e-9)
+
+
+@pytest.mark.parametrize("goal", GOALS)
+def test_no_single_change_is_cheaper_at_the_end(goal):
+    one = posed(goal, unicycle_automaton(FEW))
+    seeds = search_maneuver_words(one, one.goals[0], most_letters=3).solutions
+    best = improved(one, seeds).solutions[0]
+    setup = word_setup(one, one.goals[0], most_trims=99)
+    n = len(best.trims)
+    for k in range(n + 1):
+        for trim in (1, 2, 3):
+            for after in (k, k + 1):
+                word = (*best.trims[:k], trim, *best.trims[after:])
+                if any(a == b for a, b in itertools.pairwise(word)):
+                    continue
+                times = np.concatenate([best.durations[:k], [0.25], best.durations[after:]])
+                other = setup.solved(word, [times])
+                assert other is None or other.cost > best.cost - 1e-5
+
+
+@pytest.mark.parametrize("goal", GOALS)
+def test_with_exhaustive_search_it_is_as_cheap_as_all_words_of_four_trims(goal):
+    one = posed(goal, unicycle_automaton(FEW))
+    both = search_words_with_maneuvers(one, one.goals[0])
+    words = search_maneuver_words(one, one.goals[0], most_letters=4)
+    assert both.solutions[0].cost <= words.solutions[0].cost + 1e-9
+
+
+def test_the_planners_alternatives_differ_and_pass_the_audit():
+    one = posed([5.0, 1.0, 1.0], car_automaton())
+    result = search_words_with_maneuvers(one, one.goals[0], alternatives=4)
+    rest = one.automaton["rest"].reduced_state
+    assert len(result.plans) == 5
+    assert len({(s.trims, tuple(s.durations.round(6))) for s in result.solutions}) == 5
+    for plan in result.plans:
+        audit = audit_plan(plan, one.goals[0], one.automaton.model, states=(rest, rest))
+        assert audit.passed, audit.reason
+
+
+def test_a_moved_problem_has_the_moved_plan():
+    one = posed([2.0, 1.0, 0.5])
+    moved = one.moved(SE2([10.0, -3.0, 2.0]))
+    here, there = (search_words_with_maneuvers(p, p.goals[0]).solutions[0] for p in (one, moved))
+    assert there.trims == here.trims
+    assert np.abs(there.durations - here.durations).max() < 1e-6
+
+
+def test_limits_hold():
+    one = posed([5.0, 1.0, 1.0], horizon=Horizon(max_trims=4, max_time=9.0))
+    result = search_words_with_maneuvers(one, one.goals[0], alternatives=3)
+    for solution in result.solutions:
+        assert np.count_nonzero(solution.durations) <= 4
+        assert solution.plan.duration <= 9.0 + 1e-8
+
+
+def test_a_time_limit_ends_the_search_with_what_it_has():
+    one = posed([5.0, 1.0, 1.0], car_automaton())
+    assert search_words_with_maneuvers(one, one.goals[0], time_limit=0.05).solutions

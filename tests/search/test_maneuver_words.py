@@ -1,0 +1,161 @@
+"""Words of trims and maneuvers: against all words from many starts, and by laws."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import least_squares
+
+from maneuver_automaton._arrays import wrapped
+from maneuver_automaton.audit import audit_plan
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
+from maneuver_automaton.search.maneuver_solution import word_setup
+from maneuver_automaton.search.maneuver_words import search_maneuver_words
+from maneuver_automaton.search.result import SearchStatus
+from tests.inertia import car_automaton, unicycle_automaton
+from tests.search.cases import compiled_only
+
+SMALL = ((0.0, 0.0), (1.0, 0.0), (0.8, 0.8), (0.8, -0.8))
+
+
+def problem(goal, *, automaton=None, **changed) -> Problem:
+    return Problem(automaton or unicycle_automaton(), [0.0, 0.0, 0.0], goal, **changed)
+
+
+def searched(one: Problem, **options):
+    return search_maneuver_words(one, one.goals[0], **options)
+
+
+def by_brute_force(one: Problem, letters: int, starts: int):
+    """Cheapest cost over all words, each from many random times."""
+    setup = word_setup(one, one.goals[0], most_trims=99)
+    moving = [k for k, trim in enumerate(one.automaton.trims) if not trim.is_rest]
+    rng = np.random.default_rng(0)
+    best = np.inf
+    for n in range(1, letters + 1):
+        for word in itertools.product(moving, repeat=n):
+            if any(a == b for a, b in itertools.pairwise(word)):
+                continue
+            for _ in range(starts):
+                found = setup.solved(word, [rng.exponential(1.5, n)])
+                best = best if found is None else min(best, found.cost)
+    return best
+
+
+@pytest.mark.parametrize("goal", [[0.0, 3.0, 0.0], [4.0, 1.0, 1.0], [-2.0, 1.0, 3.0]])
+def test_nothing_cheaper_is_found_by_brute_force(goal):
+    one = problem(goal, automaton=unicycle_automaton(SMALL))
+    best = searched(one).solutions[0]
+    assert best.cost <= by_brute_force(one, 4, 6) + 1e-6
+
+
+def test_all_words_of_three_trims_are_listed():
+    one = problem([2.0, 1.5, 0.7], automaton=unicycle_automaton(SMALL))
+    result = searched(one, alternatives=None, most_letters=3)
+    assert result.complete
+    setup = word_setup(one, one.goals[0], most_trims=99)
+    rng = np.random.default_rng(1)
+    for word in itertools.product((1, 2, 3), repeat=3):
+        if word[0] == word[1] or word[1] == word[2]:
+            continue
+        mine = [s.durations for s in result.solutions if s.trims == word]
+
+        def miss(t, word=word):
+            gap = np.array(setup.plan(word, np.abs(t)).end - one.goals[0].pose)
+            gap[2] = wrapped(gap[2])
+            return gap
+
+        for _ in range(6):
+            root = least_squares(miss, rng.exponential(1.5, 3), xtol=1e-14, ftol=1e-14)
+            times = np.abs(root.x)
+            if root.cost < 1e-20 and (times < 2 * np.pi / 0.8).all():
+                assert min(np.abs(row - times).max() for row in mine) < 1e-5
+
+
+@compiled_only
+@pytest.mark.parametrize("make", [unicycle_automaton, car_automaton])
+def test_every_plan_passes_the_audit(make):
+    one = problem([3.0, 2.0, 1.0], automaton=make())
+    result = searched(one, alternatives=4)
+    assert len(result.solutions) == 5
+    costs = [s.cost for s in result.solutions]
+    assert costs == sorted(costs)
+    rest = one.automaton["rest"].reduced_state
+    for solution in result.solutions:
+        plan = solution.plan
+        audit = audit_plan(plan, one.goals[0], one.automaton.model, states=(rest, rest))
+        assert audit.passed, audit.reason
+        assert solution.cost == pytest.approx(plan.duration, abs=1e-9)  # the cost is time
+
+
+@given(
+    x=st.floats(-3.0, 3.0),
+    y=st.floats(-3.0, 3.0),
+    turn=st.floats(-3.0, 3.0),
+    by=st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0), st.floats(-4.0, 4.0)),
+)
+@settings(max_examples=10)
+def test_a_moved_problem_has_the_moved_words(x, y, turn, by):
+    one = problem([x, y, turn], automaton=unicycle_automaton(SMALL))
+    moved = one.moved(SE2(by))
+    here, there = (searched(p, most_letters=3).solutions for p in (one, moved))
+    assert len(here) == len(there)
+    if here:
+        assert there[0].cost == pytest.approx(here[0].cost, abs=1e-5)
+
+
+def test_a_fixed_time_is_filled_by_rest_or_met():
+    goal = [3.0, 0.5, 0.0]
+    least = searched(problem(goal)).solutions[0].cost
+    padded = searched(problem(goal, horizon=Horizon(time=least + 4.0)), alternatives=2)
+    assert all(plan.duration == pytest.approx(least + 4.0) for plan in padded.plans)
+    assert padded.plans[0].trims[-1].is_rest
+    late = searched(problem(goal, horizon=Horizon(max_time=0.9 * least)))
+    assert late.solutions == ()
+    assert late.status is SearchStatus.EXHAUSTED
+
+
+def test_without_a_rest_a_fixed_time_is_met_exactly():
+    goal = Goal(pose=[6.0, 1.0, 0.0], trim="1, 0")
+    free = problem(goal, start_trim="1, 0")
+    least = searched(free).solutions[0].plan.duration
+    fixed = problem(goal, start_trim="1, 0", horizon=Horizon(time=least + 1.0))
+    plan = searched(fixed).plans[0]
+    assert plan.duration == pytest.approx(least + 1.0, abs=1e-8)
+    assert plan.trims[0].name == plan.trims[-1].name == "1, 0"
+
+
+def test_effort_prefers_slow_words():
+    one = problem([4.0, 0.0, 0.0], cost=Cost(effort=1.0, time=0.1))
+    best = searched(one).solutions[0]
+    assert best.cost == pytest.approx(one.cost_of(best.plan), rel=1e-9)
+    assert max(goal.off(best.plan.end)[0] for goal in one.goals) < 1e-9
+
+
+def test_any_heading_costs_no_more_than_one():
+    one = problem([2.0, 2.0, 0.3])
+    fixed = searched(one).solutions[0].cost
+    either = searched(problem(Goal(pose=[2.0, 2.0, 0.3], free_heading=True))).solutions[0]
+    assert either.cost <= fixed + 1e-6
+    assert np.abs(either.plan.end[:2] - 2.0).max() < 1e-9
+
+
+def test_limits_on_trims_and_coasting_times_are_kept():
+    one = problem([3.0, 2.0, 1.0], horizon=Horizon(max_trims=3, min_coast=0.3))
+    for solution in searched(one, alternatives=5).solutions:
+        assert len(solution.trims) <= 3
+        assert (solution.durations >= 0.3 - 1e-12).all()
+
+
+def test_expansions_bound_the_search():
+    one = problem([0.0, 3.0, 0.0], search=SearchSettings(max_expansions=5))
+    first, second = searched(one), searched(one)
+    assert first.counts == second.counts
+    assert first.counts["expansions"] <= 5
+    assert first.solutions[0].cost == second.solutions[0].cost
