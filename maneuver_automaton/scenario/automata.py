@@ -10,6 +10,7 @@ from typing import Any
 
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import load_library
+from maneuver_automaton.automaton.stock import load_stock_library, stock_libraries
 from maneuver_automaton.formats.yaml_source import Document, Where, shown
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Trim, trims_of
@@ -52,6 +53,8 @@ def automaton_of(
         return _from_library(document, folder / part.file, model)
     if part.preset is not None:
         with at(document, (*WHERE, "preset")):
+            if part.preset in stock_libraries():
+                return _fitting(load_stock_library(part.preset), model)
             return preset_automaton(part.preset, model)
     if not model.reduced_names:
         if part.trims is not None:
@@ -232,12 +235,16 @@ def _values(axis: Axis) -> list[float]:
 
 def _from_library(document: Document, path: Path, model: Model) -> Automaton:
     with at(document, (*WHERE, "file")):
-        automaton = load_library(path)
-        has, needs = described(automaton.model), described(model)
-        if has["model"] != needs["model"]:
-            raise ValueError(f"got a library for {shown(has)}, but the vehicle is {shown(needs)}")
-        keys = [key for key in (*has, *needs) if has.get(key) != needs.get(key)]
-        if keys:
-            (one, other) = ({key: what.get(key) for key in keys} for what in (has, needs))
-            raise ValueError(f"got a library for {shown(one)}, but the vehicle has {shown(other)}")
+        return _fitting(load_library(path), model)
+
+
+def _fitting(automaton: Automaton, model: Model) -> Automaton:
+    """The automaton of a library, if it is one of this vehicle."""
+    has, needs = described(automaton.model), described(model)
+    if has["model"] != needs["model"]:
+        raise ValueError(f"got a library for {shown(has)}, but the vehicle is {shown(needs)}")
+    keys = [key for key in dict.fromkeys((*has, *needs)) if has.get(key) != needs.get(key)]
+    if keys:
+        one, other = ({key: what.get(key) for key in keys} for what in (has, needs))
+        raise ValueError(f"got a library for {shown(one)}, but the vehicle has {shown(other)}")
     return automaton

@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 
 from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.automaton.stock import stock_libraries
 from maneuver_automaton.models import Car, Model, SecondOrderCar, SecondOrderUnicycle, Unicycle
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.primitives.quickest import quickest_maneuvers
@@ -43,7 +44,8 @@ def preset_automaton(name: str, model: Model) -> Automaton:
     `parking` and `road` are for the second-order unicycle and car. For parking, 0, 20, 50 and
     100 % of the speed both ways, straight, half and full turns, maneuvers between neighbours, and
     short strokes from every rest. For the road, rest and five speeds ahead, turns as sharp as a
-    lateral acceleration of 4 m/s^2 allows, maneuvers between neighbours, early and late.
+    lateral acceleration of 4 m/s^2 allows, maneuvers between neighbours, early and late. The
+    libraries that come with the package have names of their own; see `load_stock_library`.
 
     Source: the paper, Table 2; LaValle (2006), *Planning Algorithms*, Sec. 15.3.1 and 15.3.2.
 
@@ -63,7 +65,8 @@ def preset_automaton(name: str, model: Model) -> Automaton:
     (35, 242)
     """
     if name not in PRESETS:
-        raise ValueError(f"got {name!r}, need one of {', '.join(PRESETS)}")
+        known = (*PRESETS, *stock_libraries())
+        raise ValueError(f"got {name!r}, need one of {', '.join(known)}")
     if name in KINEMATIC:
         if not isinstance(model, Unicycle | Car):
             raise ValueError(

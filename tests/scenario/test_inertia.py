@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.automaton.library import automaton_hash, save_library
+from maneuver_automaton.automaton.stock import load_stock_library
 from maneuver_automaton.cli import run
 from maneuver_automaton.collision import Box
 from maneuver_automaton.errors import InvalidScenario
@@ -211,6 +212,11 @@ def test_presets_for_vehicles_with_inertia(name, model):
     assert (speeds.min() < 0.0) == (name == "parking")
     lateral = np.abs(automaton.body_velocities[:, 0] * automaton.body_velocities[:, 2])
     assert name == "parking" or lateral.max() <= 4.0 + 1e-12
+
+
+def test_libraries_of_the_package_are_presets():
+    library = read(CAR, "{preset: second_order_car}").problem.automaton
+    assert automaton_hash(library) == automaton_hash(load_stock_library("second_order_car"))
 
 
 def test_presets_keep_to_a_vehicle_that_does_not_reverse():

@@ -218,7 +218,13 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
     "unknown preset": (
         automaton("preset: dubbins"),
         ":5: automaton.preset: got 'dubbins', need one of table2, reeds_shepp, dubins, parking, "
-        "road",
+        "road, car_with_trailer, helicopter, hovercraft, second_order_car, second_order_unicycle, "
+        "single_track",
+    ),
+    "stock library of another vehicle": (
+        inertia(automaton("preset: second_order_car")).replace("2.8", "3.0"),
+        ":5: automaton.preset: got a library for {wheelbase_m: 2.8}, but the vehicle has "
+        "{wheelbase_m: 3.0}",
     ),
     "preset of another vehicle": (
         car(automaton("preset: table2")),
