@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.automaton import Plan as Plan
     from maneuver_automaton.automaton.library import load_library as load_library
     from maneuver_automaton.automaton.library import save_library as save_library
+    from maneuver_automaton.automaton.stock import load_stock_library as load_stock_library
     from maneuver_automaton.collision import Box as Box
     from maneuver_automaton.collision import Disc as Disc
     from maneuver_automaton.collision import Motion as Motion
@@ -94,6 +95,7 @@ _HOMES = {
     "load_library": "automaton.library",
     "load_plan": "formats.plan_json",
     "load_scenario": "scenario",
+    "load_stock_library": "automaton.stock",
     "plan": "planning",
     "save_library": "automaton.library",
     "save_plan": "formats.plan_json",

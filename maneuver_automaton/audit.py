@@ -22,6 +22,7 @@ from maneuver_automaton.collision import AnyObstacle, Obstacle, Shape, Zone
 from maneuver_automaton.collision.approach import Approach, closest_approach
 from maneuver_automaton.collision.blocked import too_close, touched_near
 from maneuver_automaton.collision.checker import origin_near
+from maneuver_automaton.collision.heights import Layer, layers_of
 from maneuver_automaton.collision.surroundings import fastest_point, parts_of, surroundings_of
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model
@@ -75,6 +76,7 @@ def audit_plan(
     footprint: tuple[Shape, ...] = (),
     parts: Mapping[str, tuple[Shape, ...]] | None = None,
     obstacles: tuple[AnyObstacle, ...] = (),
+    body_height: tuple[float, float] = (0.0, 0.0),
     margin: float = 0.0,
     states: tuple[Array, Array] | None = None,
     zones: tuple[Zone, ...] = (),
@@ -95,6 +97,8 @@ def audit_plan(
         What the vehicle carries, by name, each in its own frame.
     obstacles : tuple of Obstacle or OccupancyMap
         What it must not touch.
+    body_height : (float, float)
+        From where to where the body reaches about its altitude [m].
     margin : float
         Distance to keep [m].
     states : two (n_z,) arrays, optional
@@ -127,12 +131,12 @@ def audit_plan(
     if states is not None:
         reasons += _wrong_ends(near, states)
     clearance = None
-    place, clock = goal.pose[:2], plan.start_time
+    place, clock = goal.pose, plan.start_time
     bodies = [("", near, footprint)] if obstacles else []
     if obstacles and parts:
         bodies += [(name, carried(near, model, name), shapes) for name, shapes in parts.items()]
     for name, moving, shapes in bodies:
-        scene = _Scene(shapes, obstacles, margin, origin_near(place), place, clock)
+        scene = _Scene(shapes, obstacles, margin, origin_near(place), place, clock, body_height)
         least = _closest(moving, scene)
         if math.isfinite(least.distance):
             clearance = min(least.distance, math.inf if clearance is None else clearance)
@@ -168,14 +172,23 @@ class _Scene(NamedTuple):
     obstacles: tuple[AnyObstacle, ...]
     margin: float  # [m]
     origin: tuple[float, float]  # where obstacles are counted from [m]
-    place: Array  # (2,) where the plan is counted from [m]
+    place: Array  # (dof,) the pose whose place the plan is counted from
     clock: float  # [s] when it starts
+    height: tuple[float, float]  # [m] of the body
 
     def seen(self, plan: Plan, times: Array) -> Array:
         """Poses (n, 3) of the plan at times since its start, counted from the origin."""
         poses = plan.pose_at(times)[..., :3].copy()
-        poses[..., :2] += self.place - self.origin
+        poses[..., :2] += self.place[:2] - self.origin
         return poses
+
+    def altitudes(self, plan: Plan, times: Array) -> Array:
+        """Altitudes (n,) [m] at times since the start; zero in the plane."""
+        return np.asarray(plan.pose_at(times)[..., 3:].sum(axis=-1) + self.place[3:].sum())
+
+    def layers(self, plan: Plan) -> tuple[Layer, ...]:
+        """The obstacles by height, all in one in the plane."""
+        return layers_of(self.obstacles, in_space=plan.start.size > 3)
 
 
 def _defect(plan: Plan, model: Model) -> float:
@@ -294,16 +307,21 @@ def _wrong_ends(plan: Plan, states: tuple[Array, Array]) -> list[str]:
 
 def _closest(plan: Plan, scene: _Scene) -> Approach:
     """When the plan is closest to an obstacle."""
-    around = surroundings_of(scene.obstacles, scene.origin)
+    layers = scene.layers(plan)
+    around = [surroundings_of(layer.obstacles, scene.origin) for layer in layers]
     body = parts_of(scene.footprint)
 
     def distances(times: Array) -> Array:
-        return around.nearest(body, scene.seen(plan, times), scene.clock + times).distance
+        poses, clock = scene.seen(plan, times), scene.clock + times
+        apart = [one.nearest(body, poses, clock).distance for one in around]
+        over = [layer.gap(scene.altitudes(plan, times), scene.height) for layer in layers]
+        return np.asarray(np.min(np.hypot(apart, over), axis=0))
 
     if not plan.primitives:
         return Approach(0.0, float(distances(np.zeros(1))[0]))
     times, twists = _constant_twists(plan)
-    rates = fastest_point(body, twists[:, :3]) + around.speed
+    rates = fastest_point(body, twists[:, :3]) + max(one.speed for one in around)
+    rates = np.hypot(rates, twists[:, 3:].sum(axis=1))
     return closest_approach(
         distances,
         times,
@@ -333,9 +351,16 @@ def _constant_twists(plan: Plan) -> tuple[Array, Array]:
 
 
 def _what_is_hit(plan: Plan, scene: _Scene, time: float) -> str:
+    at = np.array([time])
+    near = [
+        obstacle
+        for layer in scene.layers(plan)
+        if layer.gap(scene.altitudes(plan, at), scene.height)[0] <= scene.margin
+        for obstacle in layer.obstacles
+    ]
     what = touched_near(
         scene.footprint,
-        scene.obstacles,
+        tuple(near),
         scene.seen(plan, np.array([time]))[0],
         time=scene.clock + time,
         margin=scene.margin,
@@ -366,7 +391,7 @@ def _zones_broken(
         admitted = zone.admits(moving[0]) & zone.admits(moving[1])
         admitted &= _named(plan, zone, 0.5 * (times[:-1] + times[1:]))
         where = (Obstacle(zone.shape),)
-        scene = _Scene(footprint, where, 0.0, origin_near(place), place, 0.0)
+        scene = _Scene(footprint, where, 0.0, origin_near(place), place, 0.0, (0.0, 0.0))
         least = _closest_while(plan, scene, times, rates, ~admitted)
         if not least.distance > too_close(0.0):
             reasons.append(

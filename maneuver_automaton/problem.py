@@ -164,6 +164,7 @@ class Problem:
     obstacles: tuple[AnyObstacle, ...] = field(default=(), kw_only=True)
     footprint: tuple[Shape, ...] = field(default=(), kw_only=True)  # empty: the vehicle is a point
     parts: Mapping[str, tuple[Shape, ...]] = field(default_factory=dict, kw_only=True)  # carried
+    body_height: tuple[float, float] = field(default=(0.0, 0.0), kw_only=True)  # [m] about z
     margin: float = field(default=0.0, kw_only=True)  # [m] distance kept from every obstacle
     zones: tuple[Zone, ...] = field(default=(), kw_only=True)  # where not every motion is admitted
 
@@ -184,6 +185,7 @@ class Problem:
             obstacles: AnyObstacle | Shape | Sequence[AnyObstacle | Shape] = (),
             footprint: Shape | Sequence[Shape] = (),
             parts: Mapping[str, Shape | Sequence[Shape]] = ...,
+            body_height: tuple[float, float] = (0.0, 0.0),
             margin: float = 0.0,
             zones: Sequence[Zone] = (),
         ) -> None: ...
@@ -220,6 +222,11 @@ class Problem:
         for zone in self.zones:
             for trim in zone.trims or ():
                 self.automaton.index_of(trim)
+        low, high = self.body_height
+        if not (math.isfinite(low) and math.isfinite(high) and low <= high):
+            raise ValueError(
+                f"body_height must be [low, high] with low <= high, got {self.body_height} m"
+            )
         if not (math.isfinite(self.margin) and self.margin >= 0.0):
             raise ValueError(f"margin must be a number of at least 0, got {self.margin} m")
         if not self.automaton.is_kinematic:

@@ -276,7 +276,7 @@ class TestFolder:
         (["plan", "x.yaml", "--case", "1"],
          "--case: got 1, but x.yaml holds one problem, need 0 or no case"),
         (["plan", "case.csv"], "case.csv: no such file"),
-        (["plan", "road.xml"], "road.xml: CommonRoad files are not read in this version"),
+        (["plan", "road.xml"], "road.xml: no such file"),
         (["mpc", "x.yaml", "--steps", "3", "--seed", "1"],
          "x.yaml: receding_horizon: missing, need {step_s: ...}, the time between two plans"),
         (["plan", "x.yaml", "--out", "x.yaml"], "x.yaml: cannot be written: File exists"),

@@ -1,5 +1,13 @@
 """The paper's checks, for any model and for a user's own functions."""
 
+from maneuver_automaton.analysis.coverage import CoverageSettings as CoverageSettings
+from maneuver_automaton.analysis.coverage import Dispersion as Dispersion
+from maneuver_automaton.analysis.coverage import SpanningFactor as SpanningFactor
+from maneuver_automaton.analysis.coverage import dispersion as dispersion
+from maneuver_automaton.analysis.coverage import planned as planned
+from maneuver_automaton.analysis.coverage import settings_for as settings_for
+from maneuver_automaton.analysis.coverage import spanning_factor as spanning_factor
+from maneuver_automaton.analysis.coverage import straight_line as straight_line
 from maneuver_automaton.analysis.feasible import FeasibleSet as FeasibleSet
 from maneuver_automaton.analysis.feasible import feasible_set as feasible_set
 from maneuver_automaton.analysis.feasible import least_times as least_times
@@ -19,6 +27,9 @@ from maneuver_automaton.analysis.motion_primitives import Equivalence as Equival
 from maneuver_automaton.analysis.motion_primitives import (
     same_motion_primitive as same_motion_primitive,
 )
+from maneuver_automaton.analysis.reach import Reached as Reached
+from maneuver_automaton.analysis.reach import ReachSettings as ReachSettings
+from maneuver_automaton.analysis.reach import reached as reached
 from maneuver_automaton.analysis.region import Region as Region
 from maneuver_automaton.analysis.report import SymmetryReport as SymmetryReport
 from maneuver_automaton.analysis.shift import ControlProblem as ControlProblem
@@ -38,6 +49,9 @@ from maneuver_automaton.analysis.suboptimality import continuous_index as contin
 from maneuver_automaton.analysis.suboptimality import discrete_index as discrete_index
 from maneuver_automaton.analysis.symmetry import check_flow as check_flow
 from maneuver_automaton.analysis.symmetry import check_vector_field as check_vector_field
+from maneuver_automaton.analysis.turnpike import Turnpike as Turnpike
+from maneuver_automaton.analysis.turnpike import TurnpikeCase as TurnpikeCase
+from maneuver_automaton.analysis.turnpike import turnpike as turnpike
 from maneuver_automaton.analysis.unit_cost import unit_cost as unit_cost
 from maneuver_automaton.refinement.effort import EffortReport as EffortReport
 from maneuver_automaton.refinement.effort import effort_report as effort_report

@@ -12,13 +12,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, IntArray, as_array
+from maneuver_automaton._arrays import Array, IntArray, as_array, vector_text
 from maneuver_automaton.errors import InvalidAutomaton, UnknownTrim
 from maneuver_automaton.models import Model
-from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.primitives import Maneuver, Trim, trims_of
+from maneuver_automaton.primitives.bang_bang import Pairs, has_limited_rates
+from maneuver_automaton.primitives.quickest import quickest_maneuvers
 
 if TYPE_CHECKING:
     import networkx
+
+FITS = 1e-9  # between a course's ends and the reduced states of its trims, over their size or 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +55,7 @@ class Automaton:
             raise InvalidAutomaton("automaton: got no trim, need at least one")
         _check_names(self.trim_names)
         dof, n_controls = self.model.group.dof, len(self.model.control_names)
+        n_states = len(self.model.reduced_names)
         for trim in self.trims:
             if trim.body_velocity.shape != (dof,) or trim.control.shape != (n_controls,):
                 raise InvalidAutomaton(
@@ -58,9 +63,13 @@ class Automaton:
                     f"{trim.control.shape}, need ({dof},) and ({n_controls},) for the "
                     f"{self.model.name}"
                 )
+            if trim.reduced_state.shape != (n_states,):
+                raise InvalidAutomaton(
+                    f"trim {trim.name!r}: got reduced state {trim.reduced_state.shape}, need "
+                    f"({n_states},) for the {self.model.name}"
+                )
         for maneuver in self.maneuvers:
-            self.index_of(maneuver.source)
-            self.index_of(maneuver.target)
+            _check_fit(maneuver, self[maneuver.source], self[maneuver.target])
 
     @classmethod
     def of_controls(cls, model: Model, controls: Mapping[str, ArrayLike]) -> Automaton:
@@ -92,6 +101,76 @@ class Automaton:
                 for name, twist, control in zip(controls, twists, table, strict=True)
             ),
         )
+
+    @classmethod
+    def of_model(
+        cls,
+        model: Model,
+        grid: Mapping[str, ArrayLike],
+        *,
+        pairs: Pairs = "neighbours",
+        late: bool = False,
+        strokes: Sequence[float] = (),
+        turns: Sequence[float] = (),
+        max_lateral_acceleration: float | None = None,
+        leave_out: bool = False,
+    ) -> Automaton:
+        """Automaton of the trims that a model has on a grid, joined where that needs no solver.
+
+        A vehicle whose control is the rate of its reduced state, such as the second-order car,
+        gets bang-bang maneuvers; any other one, trims alone.
+
+        Parameters
+        ----------
+        model : Model
+            The vehicle.
+        grid : mapping of str to (n,) arrays
+            Values of speed [m/s], turn_rate [rad/s], climb [m/s], or of components of the reduced
+            state; see `trims_of`.
+        pairs : "all", "neighbours" or a sequence of pairs of int
+            Which trims maneuvers lead between; see `connect_bang_bang`.
+        late : bool
+            Whether to add, where it differs, the maneuver that is as quick but changes late what
+            has time.
+        strokes, turns : sequences of float
+            Lengths of strokes [m] and angles of turns on the spot [rad], from rest to rest; see
+            `quickest_maneuvers`.
+        max_lateral_acceleration : float, optional
+            Greatest speed times turn rate of a trim [m/s^2]; no limit if None.
+        leave_out : bool
+            Whether points without a trim are left out; otherwise they are refused.
+
+        Raises
+        ------
+        InvalidAutomaton
+            If no point has a trim, or one has none and is not to be left out: it is named, with
+            the limit it breaks and by how much.
+        ValueError
+            If the grid names what the model does not have.
+
+        Examples
+        --------
+        >>> from maneuver_automaton.models import SecondOrderCar
+        >>> car = SecondOrderCar(wheelbase=2.8, max_steering=0.75, max_speed=2.5,
+        ...                      max_acceleration=1.0, max_steering_rate=0.5)
+        >>> grid = {"speed": [-2.5, 0.0, 2.5], "steering": [-0.75, 0.0, 0.75]}
+        >>> library = Automaton.of_model(car, grid, strokes=[-0.5, 0.5])
+        >>> len(library), len(library.maneuvers)
+        (9, 46)
+        """
+        found = trims_of(model, grid, max_lateral_acceleration=max_lateral_acceleration)
+        if found.missing and not (leave_out and found.trims):
+            first, n = found.missing[0], len(found.trims) + len(found.missing)
+            raise InvalidAutomaton(
+                f"grid: {len(found.missing)} of {n} points have no trim, such as "
+                f"{first.name!r}: {first.reason}"
+            )
+        if not has_limited_rates(model):
+            return cls(model, found.trims)
+        maneuvers = quickest_maneuvers(
+            model, found.trims, pairs=pairs, late=late, strokes=strokes, turns=turns
+        )
+        return cls(model, found.trims, maneuvers)
 
     @classmethod
     def of_grid(cls, model: Model, axes: Sequence[ArrayLike]) -> Automaton:
@@ -218,6 +297,26 @@ class Automaton:
             target=self.trim_names[target],
             displacement=np.zeros(self.model.group.dof),
         )
+
+
+def _check_fit(maneuver: Maneuver, source: Trim, target: Trim) -> None:
+    """A maneuver moves poses of the vehicle, and its course leads from trim to trim."""
+    if maneuver.displacement.shape != source.body_velocity.shape:
+        raise InvalidAutomaton(
+            f"maneuver {maneuver.name!r}: got a displacement of {maneuver.displacement.size} "
+            f"numbers, need {source.body_velocity.size}, as the trims have"
+        )
+    if maneuver.course is None:
+        return
+    ends = (maneuver.course.reduced_state[0], maneuver.course.reduced_state[-1])
+    for word, state, trim in zip(("begins", "ends"), ends, (source, target), strict=True):
+        fits = state.shape == trim.reduced_state.shape
+        scale = np.maximum(1.0, np.abs(trim.reduced_state))
+        if not fits or (np.abs(state - trim.reduced_state) > FITS * scale).any():
+            raise InvalidAutomaton(
+                f"maneuver {maneuver.name!r}: {word} at the reduced state {vector_text(state)}, "
+                f"but trim {trim.name!r} has {vector_text(trim.reduced_state)}"
+            )
 
 
 def _frozen(array: Array) -> Array:

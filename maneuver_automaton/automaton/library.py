@@ -9,62 +9,77 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from maneuver_automaton._files import write_text_atomically
+from maneuver_automaton.automaton._library_maneuvers import driven, maneuver_entry, maneuver_of
+from maneuver_automaton.automaton._library_models import model_entry, model_of
+from maneuver_automaton.automaton._library_values import (
+    check_keys,
+    listed,
+    number_of,
+    numbers_of,
+    rows_of,
+    text_of,
+)
 from maneuver_automaton.automaton.automaton import Automaton
+from maneuver_automaton.automaton.courses import Inputs, is_reproduced, samples_entry
 from maneuver_automaton.errors import InvalidLibrary
-from maneuver_automaton.models import Car, Model, Unicycle
-from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.models import Model
+from maneuver_automaton.primitives import Trim
 
 FORMAT = "maneuver-automaton library"
 SCHEMA = 1
 UNHASHED = ("name", "comment", "hash")
 CONSISTENT = 1e-9  # [m/s, rad/s] between a stored twist and the model's, per unit of speed
-
-_KINDS: Mapping[str, tuple[type[Unicycle | Car], tuple[str, ...]]] = {
-    "unicycle": (Unicycle, ("max_speed", "max_turn_rate")),
-    "car": (Car, ("wheelbase", "max_steering", "max_speed")),
-}
+STEADY = 1e-8  # rates of the reduced state of a trim, in its units per second
 
 
 def automaton_hash(automaton: Automaton) -> str:
     """SHA-256, 64 hexadecimal digits, of model, trims and maneuvers; the name does not count.
 
+    Of a maneuver's course the inputs count; its samples follow from them.
+
     Examples
     --------
+    >>> from maneuver_automaton.models import Unicycle
     >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0)})
     >>> renamed = Automaton(robot.model, robot.trims, name="the same")
     >>> automaton_hash(robot) == automaton_hash(renamed)
     True
     """
-    return _hash(_content(automaton))
+    return _hash(_content(automaton, [None] * len(automaton.maneuvers)))
 
 
 def save_library(automaton: Automaton, path: Path | str) -> None:
     """Write an automaton to the file `path`, in one step.
 
+    Of a maneuver's course the inputs are written, along which it is driven again when it is read;
+    where they do not lead along it, its samples. Of a user's own model the names are written, so
+    that `load_library` can tell that it is given the right one.
+
     Raises
     ------
-    InvalidLibrary
-        If a file cannot state the model.
     OSError
         If the file cannot be written.
     """
-    if automaton.model.name not in _KINDS:
-        raise InvalidLibrary(
-            f"model: a file cannot state {automaton.model.name!r}, only {', '.join(_KINDS)}"
-        )
-    content = _content(automaton)
+    content = _content(automaton, [None] * len(automaton.maneuvers))
+    digest = _hash(content)
+    states = {trim.name: trim.reduced_state for trim in automaton.trims}
+    held = is_reproduced(automaton.model, states, automaton.maneuvers)
+    for entry, maneuver, flag in zip(content["maneuvers"], automaton.maneuvers, held, strict=True):
+        if maneuver.course is not None and not flag:
+            entry["samples"] = samples_entry(maneuver.course)
     head = {
         "format": FORMAT,
         "schema": SCHEMA,
         "name": automaton.name,
-        "hash": _hash(content),
+        "hash": digest,
         "model": content["model"],
     }
     lines = [f"  {json.dumps(key)}: {_json(value)}" for key, value in head.items()]
@@ -74,19 +89,26 @@ def save_library(automaton: Automaton, path: Path | str) -> None:
     write_text_atomically(Path(path), "{\n" + ",\n".join(lines) + "\n}\n")
 
 
-def load_library(path: Path | str) -> Automaton:
-    """The automaton of a library file.
+def load_library(path: Path | str, *, model: Model | None = None) -> Automaton:
+    """The automaton of a library file; what it says is held against the model.
+
+    Parameters
+    ----------
+    path : Path or str
+        The file.
+    model : Model, optional
+        The vehicle of the library; needed if it is a user's own.
 
     Raises
     ------
     InvalidLibrary
-        If the file cannot be read, says something that cannot be, or was changed after its hash
-        was written.
+        If the file cannot be read, says something that cannot be, was changed after its hash was
+        written, or is for another model.
     """
     path = Path(path)
     document = _read(path)
     try:
-        return _automaton_of(document)
+        return _automaton_of(document, model)
     except InvalidLibrary as error:
         raise InvalidLibrary(f"{path}: {error}") from error
     except (ValueError, LookupError) as error:
@@ -113,35 +135,28 @@ def _read(path: Path) -> Any:
         raise InvalidLibrary(f"{path}: not valid JSON: {error}") from error
 
 
-def _automaton_of(document: Any) -> Automaton:
+def _automaton_of(document: Any, own: Model | None) -> Automaton:
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise InvalidLibrary(f'is not a library, need an object with "format": "{FORMAT}"')
     if document.get("schema") != SCHEMA or isinstance(document["schema"], bool):
         raise InvalidLibrary(f"schema: got {document.get('schema')!r}, need {SCHEMA}")
     known = ("format", "schema", *UNHASHED, "model", "trims", "maneuvers")
-    _check_keys("library", document, known=known, needed=("model", "trims"))
-    content = {
-        "model": document["model"],
-        "trims": _rows(document, "trims"),
-        "maneuvers": _rows(document, "maneuvers"),
-    }
-    automaton = Automaton(
-        _model(content["model"]),
-        tuple(_trim(k, row) for k, row in enumerate(content["trims"])),
-        tuple(_maneuver(k, row) for k, row in enumerate(content["maneuvers"])),
-        name=_text("name", document.get("name", "")),
-    )
-    _check_hash(document.get("hash"), automaton)
+    check_keys("library", document, known=known, needed=("model", "trims"))
+    model = model_of(document["model"], own=own)
+    trims = tuple(_trim(k, row) for k, row in enumerate(rows_of(document, "trims")))
+    entries = enumerate(rows_of(document, "maneuvers"))
+    stated = [maneuver_of(k, entry, model) for k, entry in entries]
+    inputs = [one for _, one in stated]
+    name = text_of("name", document.get("name", ""))
+    automaton = Automaton(model, trims, tuple(maneuver for maneuver, _ in stated), name=name)
+    _check_hash(document.get("hash"), _hash(_content(automaton, inputs)))
     _check_limits(automaton)
-    _check_twists(automaton)
-    return automaton
+    _check_trims(automaton)
+    return replace(automaton, maneuvers=driven(automaton, inputs))
 
 
-def _check_hash(stated: Any, automaton: Automaton) -> None:
-    if stated is None:
-        return
-    actual = automaton_hash(automaton)
-    if stated != actual:
+def _check_hash(stated: Any, actual: str) -> None:
+    if stated is not None and stated != actual:
         raise InvalidLibrary(
             f"hash: got {stated!r}, but the content has {actual!r}: the file was changed after it "
             'was written; to accept it as it is, delete the line "hash"'
@@ -149,21 +164,24 @@ def _check_hash(stated: Any, automaton: Automaton) -> None:
 
 
 def _check_limits(automaton: Automaton) -> None:
-    """Every control is within the limits of the model."""
-    low, high = np.moveaxis(automaton.model.control_limits, -1, 0)
-    slack = 1e-12 * np.maximum(1.0, np.abs(automaton.controls))
-    outside = (automaton.controls < low - slack) | (automaton.controls > high + slack)
+    """Every control and reduced state is within the limits of the model."""
+    model = automaton.model
+    names = (*model.control_names, *model.reduced_names)
+    low, high = np.concatenate([model.control_limits, model.reduced_limits]).T
+    states = np.array([trim.reduced_state for trim in automaton.trims])
+    values = np.concatenate([automaton.controls, states], axis=1)
+    slack = 1e-12 * np.maximum(1.0, np.abs(values))
+    outside = (values < low - slack) | (values > high + slack)
     if outside.any():
         k, i = np.argwhere(outside)[0]
         raise InvalidLibrary(
-            f"trims[{k}] {automaton.trim_names[k]!r}: {automaton.model.control_names[i]} = "
-            f"{automaton.controls[k, i]:.6g} is outside the limits [{low[i]:.6g}, {high[i]:.6g}] "
-            f"of the {automaton.model.name}"
+            f"trims[{k}] {automaton.trim_names[k]!r}: {names[i]} = {values[k, i]:.6g} is outside "
+            f"the limits [{low[i]:.6g}, {high[i]:.6g}] of the {model.name}"
         )
 
 
-def _check_twists(automaton: Automaton) -> None:
-    """Every stored twist is what the model says of the reduced state and control."""
+def _check_trims(automaton: Automaton) -> None:
+    """Every trim is steady, and its stored twist is what the model says of it."""
     states = np.array([trim.reduced_state for trim in automaton.trims])
     expected = automaton.model.body_velocity(states, automaton.controls)
     scale = np.maximum(1.0, np.abs(expected).max(axis=1))
@@ -175,13 +193,24 @@ def _check_twists(automaton: Automaton) -> None:
             f"trims[{k}] {trim.name!r}: got the body velocity {trim.body_velocity.tolist()}, but "
             f"the {automaton.model.name} moves with {expected[k].tolist()} under this control"
         )
+    rates = np.abs(automaton.model.reduced_dynamics(states, automaton.controls))
+    if (rates > STEADY).any():
+        k, i = np.argwhere(rates > STEADY)[0]
+        raise InvalidLibrary(
+            f"trims[{k}] {automaton.trim_names[k]!r}: is no trim, its "
+            f"{automaton.model.reduced_names[i]} changes by {rates[k, i]:.4g} per second"
+        )
 
 
-def _content(automaton: Automaton) -> dict[str, Any]:
+def _content(automaton: Automaton, inputs: Sequence[Inputs | None]) -> dict[str, Any]:
+    """What a file says of an automaton; inputs of maneuvers whose course is not driven yet."""
     return {
-        "model": _model_entry(automaton.model),
+        "model": model_entry(automaton.model),
         "trims": [_trim_entry(trim) for trim in automaton.trims],
-        "maneuvers": [_maneuver_entry(maneuver) for maneuver in automaton.maneuvers],
+        "maneuvers": [
+            maneuver_entry(maneuver, one)
+            for maneuver, one in zip(automaton.maneuvers, inputs, strict=True)
+        ],
     }
 
 
@@ -196,117 +225,32 @@ def _json(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
-def _model_entry(model: Model) -> dict[str, Any]:
-    if model.name not in _KINDS:
-        names = {"controls": model.control_names, "reduced": model.reduced_names}
-        return {"kind": model.name, **{key: list(value) for key, value in names.items()}}
-    values = {name: getattr(model, name) for name in _KINDS[model.name][1]}
-    return {"kind": model.name} | {k: float(v) for k, v in values.items() if v is not None}
-
-
 def _trim_entry(trim: Trim) -> dict[str, Any]:
     entry: dict[str, Any] = {
         "name": trim.name,
-        "control": _numbers(trim.control),
-        "body_velocity": _numbers(trim.body_velocity),
+        "control": listed(trim.control),
+        "body_velocity": listed(trim.body_velocity),
     }
     if trim.reduced_state.size:
-        entry["reduced_state"] = _numbers(trim.reduced_state)
+        entry["reduced_state"] = listed(trim.reduced_state)
     if math.isfinite(trim.max_duration):
         entry["max_duration"] = float(trim.max_duration)
     return entry
 
 
-def _maneuver_entry(maneuver: Maneuver) -> dict[str, Any]:
-    return {
-        "name": maneuver.name,
-        "source": maneuver.source,
-        "target": maneuver.target,
-        "displacement": _numbers(maneuver.displacement),
-        "duration": float(maneuver.duration),
-    }
-
-
-def _numbers(array: Any) -> list[float]:
-    return [value + 0.0 for value in array.tolist()]  # -0.0 is 0.0
-
-
-def _model(entry: Any) -> Model:
-    kind = entry.get("kind") if isinstance(entry, dict) else entry
-    if not isinstance(kind, str) or kind not in _KINDS or not isinstance(entry, dict):
-        raise InvalidLibrary(f"model: got the kind {kind!r}, need one of {', '.join(_KINDS)}")
-    make, parameters = _KINDS[kind]
-    _check_keys("model", entry, known=("kind", *parameters), needed=())
-    if "wheelbase" in parameters and "wheelbase" not in entry:
-        raise InvalidLibrary("model: the key 'wheelbase' is missing")
-    return make(**{k: _number(f"model: {k}", v) for k, v in entry.items() if k != "kind"})
-
-
 def _trim(k: int, entry: Any) -> Trim:
     known = ("name", "control", "body_velocity", "reduced_state", "max_duration", "comment")
     label = f"trims[{k}]"
-    _check_keys(label, entry, known=known, needed=known[:3])
+    check_keys(label, entry, known=known, needed=known[:3])
     return Trim(
-        name=_text(f"{label}: name", entry["name"]),
-        control=_list(f"{label}: control", entry["control"]),
-        body_velocity=_list(f"{label}: body_velocity", entry["body_velocity"]),
-        reduced_state=_list(f"{label}: reduced_state", entry.get("reduced_state", [])),
-        max_duration=_number(f"{label}: max_duration", entry["max_duration"])
+        name=text_of(f"{label}: name", entry["name"]),
+        control=numbers_of(f"{label}: control", entry["control"]),
+        body_velocity=numbers_of(f"{label}: body_velocity", entry["body_velocity"]),
+        reduced_state=numbers_of(f"{label}: reduced_state", entry.get("reduced_state", [])),
+        max_duration=number_of(f"{label}: max_duration", entry["max_duration"])
         if "max_duration" in entry
         else math.inf,
     )
-
-
-def _maneuver(k: int, entry: Any) -> Maneuver:
-    known = ("name", "source", "target", "displacement", "duration", "comment")
-    label = f"maneuvers[{k}]"
-    _check_keys(label, entry, known=known, needed=known[:5])
-    return Maneuver(
-        name=_text(f"{label}: name", entry["name"]),
-        source=_text(f"{label}: source", entry["source"]),
-        target=_text(f"{label}: target", entry["target"]),
-        displacement=_list(f"{label}: displacement", entry["displacement"]),
-        duration=_number(f"{label}: duration", entry["duration"]),
-    )
-
-
-def _rows(document: Mapping[str, Any], key: str) -> list[Any]:
-    rows = document.get(key, [])
-    if not isinstance(rows, list):
-        raise InvalidLibrary(f"{key}: got {rows!r:.60}, need a list")
-    return rows
-
-
-def _check_keys(label: str, entry: Any, *, known: tuple[str, ...], needed: tuple[str, ...]) -> None:
-    if not isinstance(entry, dict):
-        raise InvalidLibrary(f"{label}: got {entry!r:.60}, need an object")
-    for key in entry:
-        if key not in known:
-            raise InvalidLibrary(f"{label}: unknown key {key!r}, need {', '.join(known)}")
-    for key in needed:
-        if key not in entry:
-            raise InvalidLibrary(f"{label}: the key {key!r} is missing")
-
-
-def _text(label: str, value: Any) -> str:
-    if not isinstance(value, str):
-        raise InvalidLibrary(f"{label}: got {value!r:.60}, need a text")
-    return value
-
-
-def _number(label: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InvalidLibrary(f"{label}: got {value!r:.60}, need a number")
-    huge = isinstance(value, int) and abs(value) > 2**63
-    if huge or not math.isfinite(value):
-        raise InvalidLibrary(f"{label}: got {value!r:.60}, need a finite number")
-    return float(value)
-
-
-def _list(label: str, value: Any) -> Any:
-    if not isinstance(value, list):
-        raise InvalidLibrary(f"{label}: got {value!r:.60}, need a list of numbers")
-    return np.array([_number(label, number) for number in value], dtype=np.float64)
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

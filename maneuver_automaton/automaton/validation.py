@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton.automaton import Automaton
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.primitives import Maneuver
 
 if TYPE_CHECKING:
     import networkx
 
-PARALLEL = 1e-9  # sine of the angle below which two twists count as parallel
+PARALLEL = 1e-9  # below this share of its size, a difference of twists or centers is none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,22 +41,24 @@ def validate(automaton: Automaton) -> AutomatonReport:
     """Dead ends, trims out of each other's reach, unused and equal trims, controllability.
 
     A class of trims that switch freely is one node here, so tens of thousands of trims are
-    quick. Poses are said to be in reach if one class by itself reaches them; that is all there
-    is for a kinematic vehicle.
+    quick. Poses are said to be in reach if one component, a set of trims that can all reach each
+    other, reaches them; that is all there is for a kinematic vehicle, which has one class.
 
-    A class reaches every pose of SE(2) if and only if one of its trims turns and another moves
-    with a twist that is not parallel to it. *Only if*: without a turning trim the heading never
-    changes; if all twists are parallel, the vehicle stays on one circle. *If*: any word can be
-    continued by turning until its heading has changed by a whole fraction 2 pi / n of a full
-    turn. It is then a rotation about some point, and n times the same is the identity; so every
-    motion can be undone, and the reachable motions form a group. Its Lie algebra holds two
-    twists that are not parallel, one of them turning, whose brackets give both translations:
-    it is the whole group.
+    In SE(2), the trims and maneuvers of a component reach every pose if and only if one of the
+    trims turns and there is no point, given in the frame of each trim, about which all of them
+    turn or stand still and which every maneuver leaves where it is. *Only if*: without a turning
+    trim the heading changes by steps, those of maneuvers, or not at all; with such a point, the
+    vehicle stays on one circle. *If*: any word that leads back to its first trim can be continued
+    by turning until its heading has changed by a whole fraction 2 pi / n of a full turn. It is
+    then a rotation about some point, and n times the same is the identity; so every motion can be
+    undone, and the motions from a trim back to itself form a group. It holds all rotations about
+    the center of the turning trim, and, as the point is not left alone, those about some other
+    center: together they make every translation.
 
     In SE(2) x R the same holds if moreover the trims can climb and sink, and their pairs (turn
-    rate, climb rate) span the plane: only then can any word be continued to no change of height
-    *and* a fraction of a turn; and without it, height and heading stay coupled, or the height
-    changes one way only.
+    rate, climb rate) span the plane: then any word can be continued to no change of height *and*
+    a fraction of a turn. Without it, height and heading stay coupled, or the height changes one
+    way only, unless maneuvers do what trims cannot, which is not looked into.
 
     Source: Jurdjevic (1997), *Geometric Control Theory*, Ch. 3, for the last step.
 
@@ -65,7 +70,7 @@ def validate(automaton: Automaton) -> AutomatonReport:
     'only straights: the heading never changes'
     """
     components, dead_ends, unused = _reach(automaton)
-    controllable, reason = _controllable(automaton)
+    controllable, reason = _controllable(automaton, components)
     return AutomatonReport(
         components=components,
         dead_ends=dead_ends,
@@ -121,29 +126,37 @@ def _duplicates(automaton: Automaton) -> tuple[tuple[str, ...], ...]:
     return tuple(tuple(names) for names in same.values() if len(names) > 1)
 
 
-def _controllable(automaton: Automaton) -> tuple[bool, str]:
-    """Whether one class reaches every pose; else why the largest one does not."""
-    classes = automaton.trim_classes
-    reasons: dict[int, str] = {}
-    for where in np.unique(classes):
-        twists = automaton.body_velocities[classes == where]
-        reason = _what_is_missing(twists)
+def _controllable(
+    automaton: Automaton, components: tuple[tuple[str, ...], ...]
+) -> tuple[bool, str]:
+    """Whether one component reaches every pose; else why the largest one does not."""
+    reasons = []
+    for names in components:
+        inside = set(names)
+        trims = np.array([automaton.index_of(name) for name in names])
+        maneuvers = [m for m in automaton.maneuvers if m.source in inside and m.target in inside]
+        reason = _what_is_missing(automaton, trims, maneuvers)
         if not reason:
             return True, ""
-        reasons[int(np.count_nonzero(classes == where))] = reason
-    if len(np.unique(classes)) == 1:
-        return False, reasons[max(reasons)]
-    return False, f"no class of trims reaches every pose by itself; {reasons[max(reasons)]}"
+        reasons.append(reason)
+    if len(components) == 1:
+        return False, reasons[0]
+    return False, f"no trims that reach each other reach every pose; {reasons[0]}"
 
 
-def _what_is_missing(twists: Array) -> str:
-    """Why trims that switch freely do not reach every pose, "" if they do: `twists` (m, dof)."""
-    if not twists.any():
+def _what_is_missing(automaton: Automaton, trims: IntArray, maneuvers: Sequence[Maneuver]) -> str:
+    """Why trims that reach each other do not reach every pose, "" if they do."""
+    twists = automaton.body_velocities[trims]
+    steps = np.array([maneuver.displacement for maneuver in maneuvers])
+    steps = steps.reshape(-1, twists.shape[1])
+    if not twists.any() and not steps.any():
         return "only rest: the vehicle never moves"
     if not twists[:, 2].any():
+        if steps[:, 2].any():
+            return "no trim turns: the heading changes in steps only, those of maneuvers"
         return "only straights: the heading never changes"
-    if _rank(twists[:, :3]) < 2:
-        if not twists[:, :2].any():
+    if _has_one_center(automaton, trims, maneuvers):
+        if not twists[:, :2].any() and not steps[:, :2].any():
             return "only spins: the position never changes"
         return "only one circle: every trim runs along the same one"
     if twists.shape[1] == 3:
@@ -158,6 +171,40 @@ def _what_is_missing(twists: Array) -> str:
     if _rank(twists[:, 2:]) < 2:
         return "turn rate and climb rate are proportional: height and heading stay coupled"
     return ""
+
+
+def _has_one_center(automaton: Automaton, trims: IntArray, maneuvers: Sequence[Maneuver]) -> bool:
+    """Whether all trims turn about, and all maneuvers keep, one and the same point.
+
+    The trims reach each other, so one turning trim tells where the point is for all the others.
+    """
+    classes = automaton.trim_classes
+    classes = automaton.trim_classes
+    twists = automaton.body_velocities[trims]
+    turning = int(np.argmax(np.abs(twists[:, 2])))
+    v_x, v_y, rate = twists[turning, :3]
+    centers = {int(classes[trims[turning]]): np.array([-v_y, v_x]) / rate}
+    lengths = [np.abs(maneuver.displacement[:2]).max() for maneuver in maneuvers]
+    length = max(np.hypot(v_x, v_y) / abs(rate), *lengths, 0.0)
+    left = [
+        (
+            int(classes[automaton.index_of(maneuver.source)]),
+            int(classes[automaton.index_of(maneuver.target)]),
+            SE2(maneuver.displacement[:3]),
+        )
+        for maneuver in maneuvers
+    ]
+    while ahead := [edge for edge in left if edge[0] in centers]:
+        left = [edge for edge in left if edge[0] not in centers]
+        for source, target, step in ahead:
+            kept = step.inverse().act(centers[source])
+            if np.abs(centers.setdefault(target, kept) - kept).max() > PARALLEL * length:
+                return False
+    known = np.array([centers[int(k)] for k in classes[trims]])
+    slip_x = twists[:, 0] - twists[:, 2] * known[:, 1]
+    slip_y = twists[:, 1] + twists[:, 2] * known[:, 0]
+    pace = np.maximum(np.linalg.norm(twists[:, :2], axis=1), np.abs(twists[:, 2]) * length)
+    return bool((np.hypot(slip_x, slip_y) <= PARALLEL * pace).all())
 
 
 def _rank(rows: Array) -> int:

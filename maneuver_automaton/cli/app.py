@@ -28,7 +28,7 @@ app.add_typer(automaton_app, name="automaton")
 
 File = Annotated[Path, typer.Argument(metavar="FILE", help="Scenario (YAML), or another format.")]
 Library = Annotated[Path, typer.Argument(metavar="FILE", help="Scenario or library file.")]
-Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")]
+Out = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results.")]
 TimeLimit = Annotated[
     float | None,
     typer.Option("--time-limit", metavar="S", help="Ceiling for search and refinement [s]."),
@@ -178,31 +178,51 @@ def check(file: File, with_file: With = None, case: Case = None) -> int:
 
 @automaton_app.command("build")
 @exits
-def automaton_build(file: Library, out: Out = Path("out")) -> int:
-    """Write the library of a scenario as a file.
+def automaton_build(
+    file: Library,
+    out: Out = Path("out"),
+    quiet: Quiet = False,
+    jobs: Annotated[
+        int, typer.Option("--jobs", min=1, metavar="N", help="Maneuvers solved at a time.")
+    ] = 1,
+    dask: Annotated[
+        str | None,
+        typer.Option("--dask", metavar="ADDRESS", help="Dask scheduler for them, or local."),
+    ] = None,
+) -> int:
+    """Write the library of a scenario, or of a build file, as a file.
 
-    It is DIR/library.json, or DIR itself if it ends in .json.
+    It is DIR/library.json, or DIR itself if it ends in .json. A build that was killed goes on
+    where it was when it is called again.
     """
     from maneuver_automaton.cli import automaton_command
 
-    return automaton_command.build(file, out)
+    settings = automaton_command.Settings(jobs=jobs, scheduler=dask, quiet=quiet)
+    return automaton_command.build(file, out, settings=settings)
 
 
 @automaton_app.command("show")
 @exits
-def automaton_show(file: Library) -> int:
-    """List the trims of a scenario or a library file."""
+def automaton_show(
+    file: Library,
+    coverage: Annotated[
+        bool,
+        typer.Option("--coverage", help="How well its words cover the poses around, by samples."),
+    ] = False,
+) -> int:
+    """List the trims and maneuvers of a scenario, a library or another file of primitives."""
     from maneuver_automaton.cli import automaton_command
 
-    return automaton_command.show(file)
+    return automaton_command.show(file, coverage=coverage)
 
 
 @automaton_app.command("draw")
 @exits
 def automaton_draw(file: Library, out: Out = Path("out")) -> int:
-    """Draw the trims of a scenario or a library file.
+    """Draw the trims and maneuvers of a scenario, a library or another file of primitives.
 
-    The picture is DIR/automaton.png, or DIR itself if it ends in .png, .pdf or .svg.
+    The picture is DIR/automaton.png, or DIR itself if it ends in .png, .pdf or .svg; that of the
+    maneuvers stands beside it, its name ending in _maneuvers.
     """
     from maneuver_automaton.cli import automaton_command
 
@@ -217,10 +237,12 @@ def convert(
     with_file: With = None,
     case: Case = None,
 ) -> int:
-    """Write a problem as a scenario, its trims listed, or a map in another format.
+    """Write a problem as a scenario, its trims listed, or a map or primitives in another format.
 
     OUT ends in .yaml or .yml, or, for a map, in .map (MovingAI). A map without --with becomes
-    a Nav2 map: OUT and an image beside it.
+    a Nav2 map: OUT and an image beside it. Primitives end in .json (a library), .nav2.json
+    (Nav2), .mprim (SBPL) or .xml (CommonRoad); IN is one of these, a scenario, or a folder
+    exported by AROC.
     """
     from maneuver_automaton.cli import convert_command
     from maneuver_automaton.cli.inputs import Parts

@@ -4,14 +4,24 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 from maneuver_automaton._files import write_text_atomically
+from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.cli.guard import FOUND
-from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, scenario_of
+from maneuver_automaton.cli.inputs import (
+    Parts,
+    automaton_of,
+    make_folder,
+    not_written,
+    scenario_of,
+)
+from maneuver_automaton.cli.tables import console
 from maneuver_automaton.collision import AnyObstacle, OccupancyMap
-from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.errors import InvalidLibrary, InvalidScenario
+from maneuver_automaton.formats.libraries import read_primitives, write_again, writer_of
 from maneuver_automaton.formats.movingai import save_movingai_map
 from maneuver_automaton.formats.nav2_map import save_nav2_map
 from maneuver_automaton.formats.recognition import YAML_ENDINGS
@@ -24,12 +34,15 @@ ANIMATION_ENDINGS = (".gif",)
 
 
 def convert(source: Path, target: Path, *, parts: Parts) -> int:
-    """Write a problem as a scenario, or a map alone in another format."""
+    """Write a problem as a scenario, a map or a library of primitives in another format."""
+    if (write := writer_of(target)) is not None:
+        return _convert_library(source, target, write)
     ending = target.suffix.lower()
     if ending not in YAML_ENDINGS + MAP_ENDINGS:
         raise InvalidScenario(
             f"{target}: is in no format that this version writes, need a scenario or a Nav2 map "
-            f"({', '.join(YAML_ENDINGS)}) or a MovingAI map ({', '.join(MAP_ENDINGS)})"
+            f"({', '.join(YAML_ENDINGS)}), a MovingAI map ({', '.join(MAP_ENDINGS)}), or "
+            "primitives (.json, .nav2.json, .mprim, .xml)"
         )
     try:
         if ending in MAP_ENDINGS:
@@ -43,6 +56,24 @@ def convert(source: Path, target: Path, *, parts: Parts) -> int:
             _write_scenario(scenario_of(source, parts), source, target)
     except OSError as error:
         raise not_written(Path(error.filename or target), error) from error
+    return FOUND
+
+
+def _convert_library(source: Path, target: Path, write: Callable[[Automaton, Path], None]) -> int:
+    """Write primitives, or the automaton of a scenario; say what is not as the source says."""
+    read = read_primitives(source)
+    automaton = automaton_of(source) if read is None else read.automaton
+    try:
+        make_folder(target.parent)
+        if read is not None and write_again(read, target):
+            return FOUND
+        write(automaton, target)
+    except InvalidLibrary as error:
+        raise InvalidLibrary(f"{target}: {error}") from error
+    except OSError as error:
+        raise not_written(Path(error.filename or target), error) from error
+    if read is not None and read.remark:
+        console().print(f"{source}: {read.remark}", soft_wrap=True)
     return FOUND
 
 

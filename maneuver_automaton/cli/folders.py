@@ -9,7 +9,15 @@ from pathlib import Path
 
 from maneuver_automaton.cli.inputs import Parts
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats import benchmr_svg, dynobench, movingai, nav2_map, sbpl_cfg, tpcap
+from maneuver_automaton.formats import (
+    benchmr_svg,
+    commonroad,
+    dynobench,
+    movingai,
+    nav2_map,
+    sbpl_cfg,
+    tpcap,
+)
 from maneuver_automaton.formats.recognition import SBPL_ENDINGS, YAML_ENDINGS
 from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import Document, parse
@@ -82,6 +90,8 @@ def _states_a_problem(path: Path, document: Document | None) -> bool:
             return benchmr_svg.n_queries(path) > 0
         if ending in SBPL_ENDINGS:
             return sbpl_cfg.is_sbpl(path)
+        if ending == ".xml":
+            return commonroad.is_commonroad(path)
     except (OSError, InvalidScenario):
         return True  # what is wrong is told when it is planned
     return ending in (".map", ".scen")
@@ -112,4 +122,4 @@ def _parts_for(path: Path, document: Document | None, parts: Parts) -> Parts:
     if ending == ".svg":
         with contextlib.suppress(InvalidScenario):
             several = benchmr_svg.n_queries(path) > 1
-    return parts if several or ending == ".scen" else replace(parts, case=None)
+    return parts if several or ending in (".scen", ".xml") else replace(parts, case=None)

@@ -30,9 +30,12 @@ def scenario_of(path: Path, parts: Parts | None = None) -> Scenario:
 
 
 def automaton_of(path: Path) -> Automaton:
-    """The automaton of a library (.json) or of a scenario."""
+    """The automaton of a library (.json), of primitives in another format, or of a scenario."""
     from maneuver_automaton.automaton.library import load_library
+    from maneuver_automaton.formats.libraries import read_primitives
 
+    if (read := read_primitives(path)) is not None:
+        return read.automaton
     return load_library(path) if path.suffix == ".json" else scenario_of(path).problem.automaton
 
 

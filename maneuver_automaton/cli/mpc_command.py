@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from maneuver_automaton.cli import road_command
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, scenario_of
@@ -39,6 +40,8 @@ class Settings:
 
 def drive_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> int:
     """Close the loop of one problem into the folder `out`, print it, return the exit code."""
+    if road_command.is_road(path):
+        return road_command.drive_file(path, out, settings=settings, parts=parts)
     scenario = scenario_of(path, parts)
     if scenario.receding_horizon is None:
         raise InvalidScenario(
@@ -73,7 +76,9 @@ def drive_folder(folder: Path, out: Path, *, settings: Settings, parts: Parts) -
     codes = []
     for path, needs in problems_in(folder, parts):
         try:
-            if scenario_of(path, needs).receding_horizon is None:
+            if not (
+                road_command.is_road(path) or scenario_of(path, needs).receding_horizon is not None
+            ):
                 continue  # for plan, not for mpc
             codes.append(drive_file(path, out / path.stem, settings=settings, parts=needs))
         except Exception as error:  # noqa: BLE001, one bad file must not stop the others

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from maneuver_automaton.cli import road_command
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, scenario_of
@@ -54,6 +55,11 @@ class Row:
 
 def plan_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> int:
     """Plan one problem into the folder `out`, print the plan, return the exit code."""
+    if road_command.is_road(path):
+        found = road_command.plan_file(path, out, settings=settings, parts=parts)
+        if found.plan is None:
+            complain(f"{path}: no_plan: {found.reason}")
+        return NO_PLAN if found.plan is None else FOUND
     scenario = scenario_of(path, parts)
     limit = settings.time_limit or scenario.time_limit_s
     with waiting(f"planning, at most {limit:g} s", quiet=settings.quiet):
@@ -140,6 +146,8 @@ def _row(path: Path, parts: Parts, out: Path, settings: Settings, folder: Path) 
     """
     try:
         with contextlib.chdir(folder):
+            if road_command.is_road(path):
+                return _road_row(path, parts, out, settings)
             result = _plan(scenario_of(path, parts), out, settings)
     except Exception as error:  # noqa: BLE001, one bad file must not stop the others
         return Row(name=path.name, code=BAD_INPUT, status="bad input", reason=explained(error))
@@ -154,6 +162,23 @@ def _row(path: Path, parts: Parts, out: Path, settings: Settings, folder: Path) 
         duration=None if result.plan is None else result.plan.duration,
         clearance=result.clearance_m,
         first_plan=result.timing_s.get("first_plan"),
+    )
+
+
+def _road_row(path: Path, parts: Parts, out: Path, settings: Settings) -> Row:
+    """Plan one drive on roads of a folder."""
+    result = road_command.plan_file(path, out, settings=replace(settings, quiet=True), parts=parts)
+    if result.plan is None or result.verdict is None:
+        reason = f"{path}: no_plan: {result.reason}"
+        return Row(name=path.name, code=NO_PLAN, status="no_plan", reason=reason)
+    return Row(
+        name=path.name,
+        code=FOUND,
+        status="found",
+        cost=result.planner.price(result.plan),
+        duration=result.plan.duration,
+        clearance=result.verdict.clearance_m,
+        first_plan=result.search_s,
     )
 
 

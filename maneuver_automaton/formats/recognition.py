@@ -12,9 +12,9 @@ from maneuver_automaton.formats.yaml_source import Document
 
 YAML_ENDINGS = (".yaml", ".yml")
 SBPL_ENDINGS = (".cfg", ".env", ".nav2d", ".nav3d")
+PRIMITIVES = "motion primitives, need a file that states a problem (see automaton show, convert)"
 NOT_READ: Mapping[str, str] = {
-    ".xml": "CommonRoad files are not read in this version",
-    ".mprim": "SBPL files of motion primitives are not read in this version",
+    ".mprim": f"holds {PRIMITIVES}",
     ".pgm": "is the image of a map, need the YAML file that states its resolution",
 }
 
@@ -30,6 +30,8 @@ def reader_of(path: Path) -> Reader | None:
         If the ending is that of a format that is not read.
     """
     ending = path.suffix.lower()
+    if ending == ".xml" and _holds_primitives(path):
+        raise InvalidScenario(f"{path}: holds {PRIMITIVES}")
     if said := NOT_READ.get(ending):
         raise InvalidScenario(f"{path}: {said}")
     if ending == ".csv":
@@ -47,6 +49,10 @@ def reader_of(path: Path) -> Reader | None:
         from maneuver_automaton.formats.sbpl_cfg import read_sbpl
 
         return read_sbpl
+    if ending == ".xml":
+        from maneuver_automaton.formats.commonroad import read_commonroad
+
+        return read_commonroad
     if ending == ".svg":
         from maneuver_automaton.formats.benchmr_svg import read_benchmr
 
@@ -56,6 +62,16 @@ def reader_of(path: Path) -> Reader | None:
 
         return read_benchmr_image
     return None
+
+
+def _holds_primitives(path: Path) -> bool:
+    """Whether an XML file holds motion primitives of CommonRoad; not if it cannot be read."""
+    from maneuver_automaton.formats.commonroad_primitives import is_commonroad_primitives
+
+    try:
+        return is_commonroad_primitives(path)
+    except (OSError, ValueError):
+        return False
 
 
 def yaml_statements(document: Document, path: Path) -> tuple[Statement, ...] | None:

@@ -1,9 +1,11 @@
 """Vehicles: how a reduced state and a control become a body velocity."""
 
+from maneuver_automaton.models.accelerating_car import AcceleratingCar as AcceleratingCar
 from maneuver_automaton.models.car import Car as Car
 from maneuver_automaton.models.car_with_trailer import CarWithTrailer as CarWithTrailer
 from maneuver_automaton.models.helicopter import Helicopter as Helicopter
 from maneuver_automaton.models.hovercraft import Hovercraft as Hovercraft
+from maneuver_automaton.models.lattice_body import LatticeBody as LatticeBody
 from maneuver_automaton.models.model import Model as Model
 from maneuver_automaton.models.rollout import rollout as rollout
 from maneuver_automaton.models.second_order_car import SecondOrderCar as SecondOrderCar

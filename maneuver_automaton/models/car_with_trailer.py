@@ -102,12 +102,15 @@ class CarWithTrailer:
         """Rate (..., 1) [rad/s]; see `dynamics`."""
         return on_arrays(self.dynamics, reduced_state, control, sizes=(1, 2, 1))
 
-    def part_poses(self, reduced_state: Array) -> Array:
-        """Pose (..., 1, 3) of the trailer, at the middle of its axle, seen from the car.
+    def part_frames(self, z: Components, /) -> tuple[tuple[Any, Any, Any], ...]:
+        """Components of the pose of each part: the middle of the trailer's axle.
 
         Source: turned back by the hitch angle, then back along the trailer by its length.
         """
+        return ((-self.hitch_length * np.cos(z[0]), self.hitch_length * np.sin(z[0]), -z[0]),)
+
+    def part_poses(self, reduced_state: Array) -> Array:
+        """Pose (..., 1, 3) of the trailer, seen from the car; see `part_frames`."""
         hitch = as_array("reduced state", reduced_state, last=1)[..., 0]
-        ahead, aside = -np.cos(hitch), np.sin(hitch)
-        poses = np.stack([ahead * self.hitch_length, aside * self.hitch_length, -hitch], axis=-1)
-        return poses[..., None, :]
+        ((x, y, heading),) = self.part_frames([hitch])
+        return np.stack([x, y, heading], axis=-1)[..., None, :]

@@ -1,11 +1,21 @@
 """Optimal control by direct transcription: the one room that imports CasADi, when it is used."""
 
+from maneuver_automaton.optimal_control._casadi import has_casadi as has_casadi
+from maneuver_automaton.optimal_control._casadi import load_casadi as load_casadi
+from maneuver_automaton.optimal_control.maneuvers import ManeuverObjective as ManeuverObjective
+from maneuver_automaton.optimal_control.maneuvers import TransferSettings as TransferSettings
+from maneuver_automaton.optimal_control.maneuvers import solve_transfer as solve_transfer
+from maneuver_automaton.optimal_control.maneuvers import transfer_program as transfer_program
+from maneuver_automaton.optimal_control.polish_values import PolishSettings as PolishSettings
+from maneuver_automaton.optimal_control.polishing import polish as polish
 from maneuver_automaton.optimal_control.problem import Grid as Grid
 from maneuver_automaton.optimal_control.problem import Guess as Guess
 from maneuver_automaton.optimal_control.problem import (
     OptimalControlProblem as OptimalControlProblem,
 )
 from maneuver_automaton.optimal_control.problem import straight_guess as straight_guess
+from maneuver_automaton.optimal_control.separation import BodyPart as BodyPart
+from maneuver_automaton.optimal_control.separation import trailer_pose as trailer_pose
 from maneuver_automaton.optimal_control.solution import (
     OptimalControlSolution as OptimalControlSolution,
 )

@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 import contextlib
+import functools
+import importlib.util
 from collections.abc import Iterator
 from typing import Any
 
 from maneuver_automaton.errors import MissingExtra
+
+
+@functools.cache
+def has_casadi() -> bool:
+    """Whether CasADi is installed; it is not imported."""
+    return importlib.util.find_spec("casadi") is not None
 
 
 def load_casadi() -> Any:

@@ -178,7 +178,7 @@ def solve(
     program = transcribe(problem, grid)
     parts = (casadi.vec(program.state), casadi.vec(program.control), program.duration)
     functions = {"x": casadi.vertcat(*parts), "f": program.objective, "g": program.constraints}
-    solver = casadi.nlpsol("solver", "ipopt", functions, _options(settings))
+    solver = casadi.nlpsol("solver", "ipopt", functions, ipopt_options(settings))
     first = np.concatenate(
         [
             resampled(guess.state, grid.n_nodes).ravel(),
@@ -210,7 +210,8 @@ def _row(casadi: Any, value: Any, count: int) -> Any:
     return row if row.shape == (1, count) else casadi.repmat(row, 1, count)
 
 
-def _options(settings: SolverSettings) -> dict[str, Any]:
+def ipopt_options(settings: SolverSettings) -> dict[str, Any]:
+    """What IPOPT is told."""
     options: dict[str, Any] = {
         "print_time": False,
         "error_on_fail": False,

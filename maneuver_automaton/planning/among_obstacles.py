@@ -8,9 +8,6 @@ from collections import Counter
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-
-from maneuver_automaton.automaton import Plan
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.checking import check_plan, load_checks
@@ -23,7 +20,7 @@ from maneuver_automaton.search.lattice_pass import Word, with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.limits import why_impossible
 from maneuver_automaton.search.waiting import with_waits
-from maneuver_automaton.switching_times.closing import closed_at
+from maneuver_automaton.search.word_plan import plan_of_word
 
 BRIEF = Patience(attempts=1000, passes=3)  # of the way among what stands still
 MOST_WAYS = 4  # that are tried with rests
@@ -227,23 +224,6 @@ def _checked(progress: _Progress, better: Improved, alternatives: int) -> _Chose
         chosen.reason = chosen.reason or checked.reason
     chosen.plans.sort(key=lambda one: one.cost)
     return chosen
-
-
-def plan_of_word(query: LatticeQuery, word: Word) -> Plan:
-    """The word from the problem's own start, its times corrected until it ends at the goal."""
-    problem = query.problem
-    goal = problem.goals[query.goal_index[word.goal]]
-    trims = [problem.automaton.trims[k] for k in query.library.trims[word.trims]]
-    twists = np.array([trim.body_velocity for trim in trims]).reshape(-1, 3)
-    durations = closed_at(
-        problem.start, twists, word.durations, goal.pose, free_heading=goal.free_heading
-    )
-    total = float(durations.sum())
-    fixed, rest = problem.horizon.time, query.library.rest
-    if fixed is not None and rest is not None and total < fixed:
-        trims.append(problem.automaton.trims[rest])
-        durations = np.append(durations, fixed - total)
-    return Plan(problem.start, tuple(trims), durations=durations, start_time=problem.start_time)
 
 
 def _left(progress: _Progress) -> int | None:

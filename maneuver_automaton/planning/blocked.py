@@ -11,6 +11,7 @@ from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.collision.blocked import touched
 from maneuver_automaton.collision.body import body_of
 from maneuver_automaton.collision.checker import origin_near
+from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.problem import Goal, Problem, moves
 from maneuver_automaton.search.inside import outside
@@ -26,6 +27,7 @@ def blocked_ends(problem: Problem) -> PlanResult | None:
         reason = f"the start is outside the bounds: {reason}"
     elif problem.obstacles:
         said = where_touched(problem, problem.start, problem.start_time)
+        said = said or _part_touched(problem, problem.start_trim, problem.start, problem.start_time)
         reason = f"at the start {said}" if said else ""
     if reason:
         return PlanResult(problem=problem, status=PlanStatus.START_BLOCKED, reason=reason)
@@ -53,7 +55,27 @@ def why_goal_blocked(problem: Problem, goal: Goal) -> str:
             return ""
         problem = replace(problem, footprint=(Disc(inside),))
     said = where_touched(problem, goal.pose, math.inf)
+    if not goal.free_heading:
+        said = said or _part_touched(problem, goal.trim, goal.pose, math.inf)
     return f"at the goal {said}" if said else ""
+
+
+def _part_touched(problem: Problem, trim: str | None, pose: Array, time: float) -> str:
+    """What something that the vehicle carries touches, in a trim at a pose; empty if nothing."""
+    automaton = problem.automaton
+    if not problem.parts or (trim is None and automaton.rest is None):
+        return ""
+    state = (
+        automaton.trims[automaton.rest or 0] if trim is None else automaton[trim]
+    ).reduced_state
+    offsets = automaton.model.part_poses(state)
+    for name, offset in zip(automaton.model.part_names, offsets, strict=True):
+        if name in problem.parts:
+            carried = replace(problem, footprint=problem.parts[name], parts={})
+            there = (SE2(pose[:3]) @ SE2(offset)).pose
+            if said := where_touched(carried, there, time):
+                return f"the {name}: {said}"
+    return ""
 
 
 def where_touched(problem: Problem, pose: Array, time: float) -> str:

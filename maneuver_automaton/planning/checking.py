@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.audit import Audit, audit_plan
-from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton import Automaton, Plan, Primitive
 from maneuver_automaton.automaton.carried import carried
-from maneuver_automaton.collision import AnyObstacle, Shape
+from maneuver_automaton.collision import AnyObstacle, Box, Shape
 from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.collision.fcl_checker import FclChecker
+from maneuver_automaton.collision.heights import Layer, layers_of
 from maneuver_automaton.collision.surroundings import surroundings_of
+from maneuver_automaton.groups import group_of
+from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning.zones import what_zone_forbids
-from maneuver_automaton.primitives import Trim
+from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.inside import stays_inside
 
@@ -48,6 +55,7 @@ def check_plan(problem: Problem, plan: Plan, goal: Goal) -> Checked:
         footprint=problem.footprint,
         parts=problem.parts,
         obstacles=problem.obstacles,
+        body_height=problem.body_height,
         margin=problem.margin,
         states=_end_states(problem, goal),
         zones=problem.zones,
@@ -57,10 +65,19 @@ def check_plan(problem: Problem, plan: Plan, goal: Goal) -> Checked:
 
 def load_checks(problem: Problem) -> None:
     """Prepare what FCL and the audit compare with, once for a map."""
-    if problem.obstacles:
-        origin = _origin(problem.goals[0])
-        checker_of(problem.footprint, problem.obstacles, problem.margin, origin)
-        surroundings_of(problem.obstacles, origin)
+    origin = _origin(problem.goals[0])
+    for layer in layers_of(problem.obstacles, in_space=problem.start.size > 3):
+        checker_of(problem.footprint, layer.obstacles, problem.margin, origin)
+        surroundings_of(layer.obstacles, origin)
+
+
+@functools.cache
+def load_checking() -> None:
+    """Import what checks: the ODE solver, shapely, FCL."""
+    ahead = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0)})
+    wall = Box([1.0, 1.0], [5.0, 5.0])
+    problem = Problem(ahead, [0, 0, 0], [1, 0, 0], obstacles=wall, footprint=Box([0.1, 0.1]))
+    check_plan(problem, Plan([0, 0, 0], ahead.trims, durations=[1.0]), problem.goals[0])
 
 
 @functools.lru_cache(maxsize=4)
@@ -82,32 +99,81 @@ def what_is_hit(problem: Problem, plan: Plan, goal: Goal) -> str:
     bodies = [("", plan, problem.footprint)]
     for name, shapes in problem.parts.items():
         bodies.append((f"the {name}: ", carried(plan, problem.automaton.model, name), shapes))
+    layers = layers_of(problem.obstacles, in_space=plan.start.size > 3)
     for what, moving, shapes in bodies:
-        checker = checker_of(shapes, problem.obstacles, problem.margin, _origin(goal))
-        hit = _what_hits(checker, moving)
-        if hit:
-            return what + hit
+        for layer in layers:
+            checker = checker_of(shapes, layer.obstacles, problem.margin, _origin(goal))
+            hit = _what_hits(checker, moving, layer, problem)
+            if hit:
+                return what + hit
     return ""
 
 
-def _what_hits(checker: FclChecker, plan: Plan) -> str:
+def _what_hits(checker: FclChecker, plan: Plan, layer: Layer, problem: Problem) -> str:
+    """Which primitive hits what of a layer, while its altitude is within reach of it."""
     if not plan.primitives:
+        height = plan.start[3:].sum(keepdims=True)
+        if layer.gap(height, problem.body_height)[0] > problem.margin:
+            return ""
         hit = checker.pose_hit(plan.start[:3], time=plan.start_time)
-        return "" if hit is None else f"obstacle {hit} is hit at the start"
+        return "" if hit is None else f"obstacle {layer.numbers[hit]} is hit at the start"
     for k, primitive in enumerate(plan.primitives):
         start, begin = plan.switching_poses[k], float(plan.switching_times[k])
-        if isinstance(primitive, Trim):
-            duration = float(plan.primitive_durations[k])
-            hit = checker.motion_hit(start, primitive.body_velocity, duration, start_time=begin)
-        else:
-            course = primitive.course
-            if course is None:
-                return f"maneuver {primitive.name!r} has no course, so it cannot be checked"
-            hit = checker.course_hit(start, course.pose, course.time, start_time=begin)
-        if hit is not None:
-            kind = "trim" if isinstance(primitive, Trim) else "maneuver"
-            return f"obstacle {hit} is hit in {kind} {k}, {primitive.name!r}"
+        if isinstance(primitive, Maneuver) and primitive.course is None:
+            return f"maneuver {primitive.name!r} has no course, so it cannot be checked"
+        for piece in _within_reach(primitive, start, plan.primitive_durations[k], layer, problem):
+            time = begin + float(piece.time[0])
+            if isinstance(primitive, Trim):
+                first, last = piece.time.tolist()
+                pose = primitive.coast(group_of(start.size)(start), first).pose
+                hit = checker.motion_hit(
+                    pose[:3], primitive.body_velocity[:3], last - first, start_time=time
+                )
+            else:
+                since = piece.time - piece.time[0]
+                hit = checker.course_hit(start[:3], piece.pose, since, start_time=time)
+            if hit is not None:
+                kind = "trim" if isinstance(primitive, Trim) else "maneuver"
+                return f"obstacle {layer.numbers[hit]} is hit in {kind} {k}, {primitive.name!r}"
     return ""
+
+
+class _Stretch(NamedTuple):
+    """A part of a primitive; of a trim the times of its ends."""
+
+    time: Array  # (n,) [s] since the primitive's begin
+    pose: Array  # (n, 3) seen from there
+
+
+def _within_reach(
+    primitive: Primitive, start: Array, duration: float, layer: Layer, problem: Problem
+) -> list[_Stretch]:
+    """The parts of a primitive in which its altitude is within the margin of a layer."""
+    if isinstance(primitive, Trim):
+        ends = np.array([0.0, duration])
+        poses = np.zeros((2, 3))
+        climb = float(primitive.body_velocity[3:].sum())
+        if math.isinf(layer.high) or start.size == 3:
+            return [_Stretch(ends, poses)]
+        low = layer.low - problem.body_height[1] - problem.margin - start[3]
+        high = layer.high - problem.body_height[0] + problem.margin - start[3]
+        if climb == 0.0:
+            return [_Stretch(ends, poses)] if low <= 0.0 <= high else []
+        first, last = sorted((low / climb, high / climb))
+        inside = np.clip([first, last], 0.0, duration)
+        return [_Stretch(inside, poses)] if last >= 0.0 and first <= duration else []
+    assert primitive.course is not None
+    time, pose = primitive.course.time, primitive.course.pose
+    if math.isinf(layer.high) or start.size == 3:
+        return [_Stretch(time, pose[:, :3])]
+    step = float(np.abs(np.diff(pose[:, 3])).max(initial=0.0))  # so that no run is a sample
+    near = layer.gap(start[3] + pose[:, 3], problem.body_height) <= problem.margin + step
+    runs = np.flatnonzero(np.diff(np.concatenate([[False], near, [False]]).astype(np.int8)))
+    return [
+        _Stretch(time[first:last], pose[first:last, :3])
+        for first, last in runs.reshape(-1, 2).tolist()
+        if last - first > 1
+    ]
 
 
 def _end_states(problem: Problem, goal: Goal) -> tuple[Array, Array] | None:

@@ -15,7 +15,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision.advancement import clearances, free_times
-from maneuver_automaton.planning.among_obstacles import library_table, plan_of_word
+from maneuver_automaton.planning.among_obstacles import library_table
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.improve import Patience, improve
@@ -23,6 +23,7 @@ from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_pass import Word
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
+from maneuver_automaton.search.word_plan import plan_of_word
 
 LITTLE = Patience(attempts=800, passes=2)  # where a step's budget is short
 PROVEN = 1e-6  # [m] what a search has proven with its margin passes with this one, once more
@@ -37,6 +38,10 @@ class Tracked:
     goal_index: int | None
     cost: float
     reason: str = ""
+    expansions: int = 0
+    queries: int = 0  # collision queries
+    others: tuple[Plan, ...] = ()  # dearer plans of other words, cheapest first
+    enclosed: bool = False  # proven: obstacles enclose the start or every goal
 
 
 def free_until(problem: Problem, plan: Plan, *, margin: float = PROVEN) -> float:
@@ -158,19 +163,30 @@ def track(
         return Tracked(plan=None, goal_index=None, cost=math.inf, reason="every goal is blocked")
     query = lattice_query(problem, goals)
     word = None if known is None else word_of_plan(query, known)
+    expansions = queries = 0
     if word is None:
         most = max_expansions or problem.search.max_expansions
         found = first_plan(query, deadline=deadline, max_expansions=most, table=table)
-        word = found.word
+        word, expansions, queries = found.word, found.expansions, found.queries
         if word is None:
-            reason = found.enclosed or "no plan was found in the time given"
-            return Tracked(plan=None, goal_index=None, cost=math.inf, reason=reason)
+            return Tracked(
+                plan=None,
+                goal_index=None,
+                cost=math.inf,
+                reason=found.enclosed or "no plan was found in the time given",
+                expansions=expansions,
+                queries=queries,
+                enclosed=bool(found.enclosed),
+            )
     better = improve(query, word, deadline=deadline, patience=patience, table=table)
     plan = plan_of_word(query, better.word)
     return Tracked(
         plan=plan,
         goal_index=query.goal_index[better.word.goal],
         cost=problem.cost_of(plan),
+        expansions=expansions + better.expansions,
+        queries=queries + better.queries,
+        others=tuple(plan_of_word(query, other) for other in better.others),
     )
 
 

@@ -37,11 +37,16 @@ from maneuver_automaton.plotting.library_size import draw_library_sizes as draw_
 from maneuver_automaton.plotting.library_size import (
     save_library_size_figure as save_library_size_figure,
 )
+from maneuver_automaton.plotting.maneuvers import draw_maneuvers as draw_maneuvers
+from maneuver_automaton.plotting.maneuvers import save_maneuvers_figure as save_maneuvers_figure
 from maneuver_automaton.plotting.nodes import draw_nodes as draw_nodes
 from maneuver_automaton.plotting.obstacles import draw_obstacles as draw_obstacles
 from maneuver_automaton.plotting.paths import draw_plan as draw_plan
 from maneuver_automaton.plotting.plan_figures import save_plan_figure as save_plan_figure
 from maneuver_automaton.plotting.plan_figures import save_plan_file_figure as save_plan_file_figure
+from maneuver_automaton.plotting.roads import draw_road as draw_road
+from maneuver_automaton.plotting.roads import save_road_animation as save_road_animation
+from maneuver_automaton.plotting.roads import save_road_figure as save_road_figure
 from maneuver_automaton.plotting.stability import CertificateCurve as CertificateCurve
 from maneuver_automaton.plotting.stability import DrivenLoop as DrivenLoop
 from maneuver_automaton.plotting.stability import draw_distances as draw_distances
@@ -49,3 +54,4 @@ from maneuver_automaton.plotting.stability import draw_growth as draw_growth
 from maneuver_automaton.plotting.stability import draw_indices as draw_indices
 from maneuver_automaton.plotting.stability import draw_loops as draw_loops
 from maneuver_automaton.plotting.stability import save_stability_figure as save_stability_figure
+from maneuver_automaton.plotting.turnpike import save_turnpike_figure as save_turnpike_figure

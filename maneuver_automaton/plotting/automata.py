@@ -16,6 +16,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.plotting.bodies import DART
 from maneuver_automaton.plotting.colors import GREY, INK, Color, trim_colors, twist_color
+from maneuver_automaton.plotting.maneuvers import draw_maneuvers
 from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
 from maneuver_automaton.plotting.paths import ARC_POINTS
 from maneuver_automaton.plotting.style import TEXT_PT, shortened, tidy
@@ -30,11 +31,11 @@ SPIN_SIZE = 0.45  # of a node, for turns on the spot
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class AutomatonArtists:
-    """What `draw_automaton` has drawn; a graph has no `points`, points have nothing else."""
+    """What `draw_automaton` has drawn; a graph has no `points`, points have `switches` besides."""
 
     nodes: PolyCollection | None = None  # a disc for each trim
     motions: LineCollection | None = None  # one second of each trim, in its disc
-    switches: LineCollection | None = None  # between trims that switch at will, both ways
+    switches: LineCollection | None = None  # between trims that switch at will; or by a maneuver
     maneuvers: tuple[FancyArrowPatch, ...] = ()
     names: tuple[Text, ...] = ()
     points: PathCollection | None = None  # turn rate and speed of each trim
@@ -45,7 +46,7 @@ def draw_automaton(ax: Axes, automaton: Automaton) -> AutomatonArtists:
 
     Up to thirty trims are nodes of a graph, each with a picture of one second of its motion;
     thin lines join trims that switch at will, arrows are maneuvers. More trims are points over
-    turn rate and speed.
+    turn rate and speed, joined by lines where there are maneuvers.
 
     Examples
     --------
@@ -99,8 +100,13 @@ def save_automaton_figure(automaton: Automaton, path: str | Path) -> None:
         figure, left=width + 0.95, bottom=0.5 + (height - 4.1) / 2.0, width=3.35, height=3.75
     )
     draw_automaton(left, automaton)
-    draw_motions(right, automaton)
-    right.set_title("1 s of each trim from the same pose", fontsize=TEXT_PT, color=INK, loc="left")
+    if automaton.maneuvers and not automaton.body_velocities.any():
+        draw_maneuvers(right, automaton.maneuvers)
+        title = f"every maneuver, {np.ptp(right.get_xlim()):.3g} m wide"
+    else:
+        draw_motions(right, automaton)
+        title = "1 s of each trim from the same pose"
+    right.set_title(title, fontsize=TEXT_PT, color=INK, loc="left")
     heading_text(figure, [(_summary(automaton), 10.0, "bold")], left=0.62 if points else 0.3)
     write_figure(figure, path)
 
@@ -133,8 +139,18 @@ def _draw_points(ax: Axes, automaton: Automaton) -> AutomatonArtists:
         twists[:, 2], twists[:, 0], s=min(26.0, 9000.0 / len(automaton)), c=_colors(automaton),
         linewidths=0.0, zorder=3.0,
     )  # fmt: skip
+    places = twists[:, [2, 0]]
+    pairs = {
+        (automaton.index_of(one.source), automaton.index_of(one.target))
+        for one in automaton.maneuvers
+    }
+    switches = LineCollection(
+        [places[list(pair)] for pair in sorted(pairs)], colors=[GREY], linewidths=0.6, zorder=2.0,
+        alpha=max(0.05, min(0.6, 60.0 / max(len(pairs), 1))),
+    )  # fmt: skip
+    ax.add_collection(switches)
     tidy(ax, x="turn rate [rad/s]", y="speed ahead [m/s]")
-    return AutomatonArtists(points=points)
+    return AutomatonArtists(points=points, switches=switches)
 
 
 def _draw_graph(ax: Axes, automaton: Automaton) -> AutomatonArtists:
@@ -181,7 +197,9 @@ def _places(automaton: Automaton) -> tuple[Array, float]:
     many = len(automaton)
     if many == 1:
         return np.zeros((1, 2)), 0.4
-    order = np.argsort(automaton.trim_classes, kind="stable")
+    classes = automaton.trim_classes
+    firsts = np.array([int(np.argmax(classes == where)) for where in classes])
+    order = np.argsort(firsts, kind="stable")
     angle = np.empty(many)
     angle[order] = 0.5 * np.pi - 2.0 * np.pi * np.arange(many) / many
     centres = np.stack([np.cos(angle), np.sin(angle)], axis=-1)

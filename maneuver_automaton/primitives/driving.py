@@ -20,8 +20,10 @@ from maneuver_automaton.primitives.trajectory import Trajectory
 
 RESOLVED = 1e-13  # last terms of a series, over the greatest value or 1 [m, rad, units of z]
 SETTLED = 1e-14  # change of the reduced state in an iteration, over the greatest value or 1
+NOISE = 1e-12  # the same, where it goes on for ever because rates are differences of great numbers
 FINEST = 2**16  # parts of an interval of constant control, at most
 ITERATIONS = 40  # before a stretch counts as too long to be solved at once
+HOPEFUL = 9  # iterations after which every one has to halve the change, or the stretch is too long
 
 BoolArray = NDArray[np.bool_]
 
@@ -139,35 +141,40 @@ class _Elements(NamedTuple):
 
 
 def _resolved(model: Model, z: Array, control: Array, durations: Array) -> _Elements:
-    """Elements that are fine enough for their series to be exact."""
-    parts = np.ones(durations.shape[1], dtype=np.int64)
+    """Elements that are fine enough for their series to be exact, for each ride by itself."""
+    parts = np.ones(durations.shape, dtype=np.int64)
     while True:
-        owner = np.repeat(np.arange(parts.size), parts)
-        step = durations[:, owner] / parts[owner]
+        most = parts.max(axis=0)
+        owner = np.repeat(np.arange(most.size), most)
+        number = np.arange(owner.size) - (np.cumsum(most) - most)[owner]
+        mine = number < parts[:, owner]
+        step = np.where(mine, durations[:, owner] / parts[:, owner], 0.0)
         elements, rough = _integrated(model, z, control[:, owner], step)
         if elements is not None:
-            rough = np.asarray(_is_rough(elements).any(axis=0))
+            rough = _is_rough(elements)
             if not rough.any():
                 return elements
-        parts[np.unique(owner[rough])] *= 2
+        ride, place = np.nonzero(rough)
+        finer = np.zeros(parts.shape, dtype=bool)
+        finer[ride, owner[place]] = True
+        parts[finer] *= 2
         if parts.max() > FINEST:
-            k = int(np.argmax(parts))
+            r, k = np.unravel_index(np.argmax(parts), parts.shape)
             raise ValueError(
-                f"{model.name}: the motion under control {control[0, k].tolist()} cannot be "
-                f"followed for {durations[:, k].max():.6g} s: it explodes, or a reduced state "
-                "leaves what the model can bear"
+                f"{model.name}: the motion under control {control[r, k].tolist()} cannot be "
+                f"followed for {durations[r, k]:.6g} s: it explodes, or a reduced state leaves "
+                "what the model can bear"
             )
 
 
 def _integrated(
     model: Model, z: Array, control: Array, step: Array
 ) -> tuple[_Elements | None, BoolArray]:
-    """The elements; or none, and which (k,) cannot be solved for."""
+    """The elements; or none, and which (m, k) cannot be solved for."""
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        begin, at_nodes, rates, failed = _reduced_states(model, z, control, step)
-    rough: BoolArray = np.asarray(np.arange(step.shape[1]) == failed)
-    if rough.any():
-        return None, rough
+        begin, at_nodes, rates, lost = _reduced_states(model, z, control, step)
+    if lost.any():
+        return None, lost
     at_ends = np.stack([begin[:, :-1], begin[:, 1:]], axis=2)
     twists = model.body_velocity(at_nodes, control[:, :, None])
     heading = step[..., None] * (twists[..., 2] @ INTEGRALS.T)
@@ -176,67 +183,81 @@ def _integrated(
     flow[..., 0] = cosine * twists[..., 0] - sine * twists[..., 1]
     flow[..., 1] = sine * twists[..., 0] + cosine * twists[..., 1]
     ends = model.body_velocity(at_ends, control[:, :, None])
-    return _Elements(step, control, begin, rates, twists, flow, ends), rough
+    return _Elements(step, control, begin, rates, twists, flow, ends), lost
 
 
 def _reduced_states(
     model: Model, z: Array, control: Array, step: Array
-) -> tuple[Array, Array, Array, int]:
+) -> tuple[Array, Array, Array, BoolArray]:
     """Reduced states at the begins (m, k + 1, n_z) and points (m, k, n, n_z), rates there.
 
-    The last value is the element that no iteration solves, -1 if there is none.
+    The last value tells the elements (m, k) that no iteration solves.
     """
     m, k = step.shape
     begin = np.empty((m, k + 1, z.shape[1]))
     at_nodes = np.empty((m, k, NODES.size, z.shape[1]))
     rates = np.empty_like(at_nodes)
+    lost = np.zeros((m, k), dtype=bool)
     begin[:, 0] = z
     done, window = 0, k
-    while done < k:
+    while done < k and not lost.any():
         stretch = slice(done, min(done + window, k))
         solved = _picard(model, begin[:, done], control[:, stretch, None], step[:, stretch])
-        if solved is None:
-            if window == 1:
-                return begin, at_nodes, rates, done
-            window = max(1, min(window, k - done) // 2)
+        if solved.lost.any():
+            if stretch.stop == done + 1:
+                lost[:, done] = solved.lost
+            window = (stretch.stop - done) // 2
             continue
-        at_nodes[:, stretch], rates[:, stretch], begin[:, done + 1 : stretch.stop + 1], n = solved
+        at_nodes[:, stretch], rates[:, stretch] = solved.nodes, solved.rates
+        begin[:, done + 1 : stretch.stop + 1] = solved.ends
         done = stretch.stop
-        window *= 2 if n < ITERATIONS // 3 else 1
-    return begin, at_nodes, rates, -1
+        window *= 2 if solved.iterations < ITERATIONS // 3 else 1
+    return begin, at_nodes, rates, lost
 
 
-def _picard(
-    model: Model, z: Array, control: Array, step: Array
-) -> tuple[Array, Array, Array, int] | None:
-    """Reduced states at points and ends of a stretch, and how many iterations it took."""
+class _Stretch(NamedTuple):
+    """Reduced states of m rides on k elements."""
+
+    nodes: Array  # (m, k, n, n_z) at the points
+    rates: Array  # (m, k, n, n_z) there
+    ends: Array  # (m, k, n_z) at the ends of the elements
+    iterations: int
+    lost: BoolArray  # (m,) rides for which the iteration came to nothing
+
+
+def _picard(model: Model, z: Array, control: Array, step: Array) -> _Stretch:
+    """Reduced states from those at the begin (m, n_z), by iteration over all elements at once."""
     m, k = step.shape
     h = step[..., None]
     nodes = np.broadcast_to(z[:, None, None], (m, k, NODES.size, z.shape[1])).copy()
     before = np.inf
     for iteration in range(ITERATIONS):
         rates = np.broadcast_to(model.reduced_dynamics(nodes, control), nodes.shape)
-        ends = z[:, None] + np.cumsum(h * np.einsum("i,mkiz->mkz", WEIGHTS, rates), axis=1)
+        ends = z[:, None] + np.cumsum(h * (WEIGHTS @ rates), axis=1)
         begins = np.concatenate([z[:, None], ends[:, :-1]], axis=1)[:, :, None]
-        new = begins + h[..., None] * np.einsum("ij,mkjz->mkiz", INTEGRALS, rates)
-        if not np.isfinite(new).all():
-            return None
-        change = float((np.abs(new - nodes) / np.maximum(1.0, np.abs(new))).max(initial=0.0))
+        new = begins + h[..., None] * (INTEGRALS @ rates)
+        changes = np.abs(new - nodes) / np.maximum(1.0, np.abs(new))
         nodes = new
-        if change <= SETTLED or (change <= 100.0 * SETTLED and change > 0.5 * before):
-            return nodes, rates, ends, iteration
+        if not np.isfinite(new).all():
+            break
+        change = float(changes.max(initial=0.0))
+        hopeless = k > 1 and iteration >= HOPEFUL and change > before / 2.0
+        if change <= SETTLED or hopeless or (change <= NOISE and change > before / 2.0):
+            break
         before = change
-    return None
+    off = changes.reshape(m, -1).max(axis=1, initial=0.0)
+    return _Stretch(nodes, rates, ends, iteration, np.asarray(~(off <= NOISE)))
 
 
 def _is_rough(elements: _Elements) -> BoolArray:
     """Elements (m, k) whose series have last terms that are more than rounding."""
     rough = np.zeros(elements.step.shape, dtype=bool)
+    h = elements.step[..., None]
     for values in (elements.rates, elements.twists, elements.flow):
-        last = np.abs(np.einsum("ij,mkjz->mkiz", SERIES[-2:], values)).max(axis=2, initial=0.0)
-        size = np.abs(values).max(axis=2, initial=0.0)
-        h = elements.step[..., None]
-        rough |= (h * last > RESOLVED * np.maximum(1.0, h * size)).any(axis=-1)
+        last = np.abs(SERIES[-2:] @ values)
+        size = np.maximum(np.abs(values[..., 0, :]), np.abs(values[..., -1, :]))
+        worst = np.maximum(last[..., 0, :], last[..., 1, :])
+        rough |= (h * worst > RESOLVED * np.maximum(1.0, h * size)).any(axis=-1)
     return rough
 
 
@@ -247,13 +268,8 @@ def _sampled(elements: _Elements, max_step_m: float, max_step_rad: float) -> tup
     ride, place = np.nonzero(elements.step)
     count = _n_samples(elements, max_step_m, max_step_rad)[ride, place]
     of = np.repeat(np.arange(count.size), count)
-    share = (np.arange(of.size) - (np.cumsum(count) - count)[of]) / count[of]
+    share, steps, gained = _between(elements, ride, place, count)
     at = (ride[of], place[of])
-    within = integrals_to(share) * elements.step[at][:, None]
-    steps, gained = (
-        np.einsum("si,sic->sc", within, (SERIES @ values[ride, place])[of])
-        for values in (elements.flow, elements.rates)
-    )
     samples = Trajectory(
         time=times[at] + share * elements.step[at],
         pose=_moved(poses[at], steps),
@@ -275,6 +291,24 @@ def _sampled(elements: _Elements, max_step_m: float, max_step_rad: float) -> tup
     )
 
 
+def _between(
+    elements: _Elements, ride: IntArray, place: IntArray, count: IntArray
+) -> tuple[Array, Array, Array]:
+    """Share of the element, pose from its begin, and reduced state gained, at every sample."""
+    first = np.cumsum(count) - count
+    dof = elements.flow.shape[-1]
+    rates = np.concatenate([elements.flow, elements.rates], axis=-1)[ride, place]
+    series = SERIES @ rates * elements.step[ride, place][:, None, None]
+    share, gained = np.empty(count.sum()), np.empty((count.sum(), rates.shape[-1]))
+    for n in np.unique(count):
+        alike = np.flatnonzero(count == n)
+        shares = np.arange(n) / n
+        rows = first[alike][:, None] + np.arange(n)
+        share[rows] = shares
+        gained[rows] = integrals_to(shares) @ series[alike]
+    return share, gained[:, :dof], gained[:, dof:]
+
+
 def _last_place(step: Array) -> IntArray:
     """Last element (m,) of each ride that lasts; any if none does."""
     return np.asarray(step.shape[1] - 1 - np.argmax(step[:, ::-1] > 0.0, axis=1))
@@ -294,7 +328,7 @@ def _n_samples(elements: _Elements, max_step_m: float, max_step_rad: float) -> I
 def _chained(elements: _Elements) -> Array:
     """Poses (m, k + 1, dof) at the ends of the elements, from the identity."""
     h = elements.step[..., None]
-    steps = h * np.einsum("i,mkid->mkd", WEIGHTS, elements.flow)
+    steps = h * (WEIGHTS @ elements.flow)
     poses = np.zeros((steps.shape[0], steps.shape[1] + 1, steps.shape[2]))
     np.cumsum(steps, axis=1, out=poses[:, 1:])
     turned = _moved(np.where(np.arange(steps.shape[2]) == 2, poses[:, :-1], 0.0), steps)

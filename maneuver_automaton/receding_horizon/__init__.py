@@ -2,6 +2,7 @@
 
 from maneuver_automaton.receding_horizon.candidates import within as within
 from maneuver_automaton.receding_horizon.controller import RecedingHorizon as RecedingHorizon
+from maneuver_automaton.receding_horizon.disturbance import Disturbance as Disturbance
 from maneuver_automaton.receding_horizon.escape import Escape as Escape
 from maneuver_automaton.receding_horizon.escape import escape as escape
 from maneuver_automaton.receding_horizon.guarantees import Promises as Promises
@@ -13,7 +14,6 @@ from maneuver_automaton.receding_horizon.log import Origin as Origin
 from maneuver_automaton.receding_horizon.log import Step as Step
 from maneuver_automaton.receding_horizon.log import Violation as Violation
 from maneuver_automaton.receding_horizon.mixed_order_cost import MixedOrderCost as MixedOrderCost
-from maneuver_automaton.receding_horizon.simulation import Disturbance as Disturbance
 from maneuver_automaton.receding_horizon.simulation import simulate as simulate
 from maneuver_automaton.receding_horizon.statistics import Outcome as Outcome
 from maneuver_automaton.receding_horizon.statistics import Statistics as Statistics

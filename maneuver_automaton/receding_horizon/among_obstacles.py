@@ -17,11 +17,12 @@ import numpy as np
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.planning.tracking import Tracked, clearance_at, stands_free, track
 from maneuver_automaton.problem import Bounds, Horizon, Problem, moves
-from maneuver_automaton.receding_horizon.candidates import Candidate, Settings, allowed
+from maneuver_automaton.receding_horizon.candidates import Candidate, allowed
 from maneuver_automaton.receding_horizon.harm import least_harmful
 from maneuver_automaton.receding_horizon.holding import holding
 from maneuver_automaton.receding_horizon.log import Deed, Guarantee, Origin, Step, Violation
 from maneuver_automaton.receding_horizon.outlook import Outlook, outlook
+from maneuver_automaton.receding_horizon.settings import Settings
 from maneuver_automaton.receding_horizon.situation import Chosen, Situation
 from maneuver_automaton.search.inside import outside
 

@@ -8,34 +8,13 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.log import Origin, first_part
 from maneuver_automaton.receding_horizon.pace import at_best_pace, base_name
+from maneuver_automaton.receding_horizon.settings import EXACT, Settings
 from maneuver_automaton.receding_horizon.shifting import costliest_first, rest_of
 from maneuver_automaton.search.inside import outside, stays_inside
 from maneuver_automaton.search.words import TIE
-
-EXACT = 1e-9  # [m, rad] a pose this close to a goal is the goal; to a plan, on it
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Settings:
-    """How a loop is closed."""
-
-    step: float  # delta [s]
-    margin: float = 0.0
-    time_limit: float = 5.0  # [s] per step
-    first: Plan | None = None
-    hold: bool = False
-    retimed: bool = False
-    pad: Trim | None = None  # the rest that prolongs a plan
-    look_ahead: float = 60.0  # [s] that a way out must be free
-    stand: float = 2.0  # [s] that the goal must stay free after arrival
-
-    def pad_of(self, problem: Problem) -> Trim | None:
-        """The rest that fills a fixed time; None where time is free."""
-        return None if problem.horizon.time is None else self.pad
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -14,20 +14,15 @@ from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import AnyObstacle, Shape, as_obstacles
 from maneuver_automaton.planning.among_obstacles import library_table
-from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon.among_obstacles import decide_among_obstacles
-from maneuver_automaton.receding_horizon.candidates import (
-    EXACT,
-    Settings,
-    cost_until,
-    is_rest_of,
-)
+from maneuver_automaton.receding_horizon.candidates import cost_until, is_rest_of
 from maneuver_automaton.receding_horizon.decision import Decision
 from maneuver_automaton.receding_horizon.escape import load_escape
 from maneuver_automaton.receding_horizon.guarantees import broken, promises, too_cheap
 from maneuver_automaton.receding_horizon.log import Deed, Origin, Step
 from maneuver_automaton.receding_horizon.pace import is_uniform
+from maneuver_automaton.receding_horizon.settings import Settings, cheapest_rest
 from maneuver_automaton.receding_horizon.situation import Chosen, Situation
 from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.search.choose import load_search
@@ -115,36 +110,29 @@ class RecedingHorizon:
         look_ahead: float = 60.0,
         stand: float = 2.0,
     ) -> None:
-        for name, value in (("step", step), ("time_limit", time_limit), ("look_ahead", look_ahead)):
-            if not value > 0.0:
-                raise ValueError(f"receding horizon: {name} must be positive, got {value} s")
-        if not margin >= 0.0:
-            raise ValueError(f"receding horizon: margin must be at least 0, got {margin}")
-        if not stand >= 0.0:
-            raise ValueError(f"receding horizon: stand must be at least 0, got {stand} s")
         if problem.zones:
             raise ValueError(
                 "receding horizon: this controller knows no zones; ManeuverHorizon does"
             )
-        pad = _pad(problem)
-        _check_horizon(problem, step, pad, retimed=retimed)
-        if last is not None and not 0 <= last.goal_index < len(problem.goals):
-            raise ValueError(
-                f"receding horizon: the last step leads to goal {last.goal_index}, need one of "
-                f"the {len(problem.goals)}, counted from 0"
-            )
-        self.problem = problem
-        self.settings = Settings(
+        settings = Settings(
             step=step,
             margin=margin,
             time_limit=time_limit,
             first=first,
             hold=hold,
             retimed=retimed,
-            pad=pad,
+            pad=cheapest_rest(problem),
             look_ahead=look_ahead,
             stand=stand,
         )
+        settings.check_horizon(problem)
+        if last is not None and not 0 <= last.goal_index < len(problem.goals):
+            raise ValueError(
+                f"receding horizon: the last step leads to goal {last.goal_index}, need one of "
+                f"the {len(problem.goals)}, counted from 0"
+            )
+        self.problem = problem
+        self.settings = settings
         self.last = last
         self.promises = promises(problem, step=step)
         self.most_steps: int | None = None
@@ -313,29 +301,3 @@ def _deed(chosen: Chosen, last: Step | None) -> Deed:
         return Deed.KEPT
     same = last.deed.leads and is_rest_of(chosen.plan, chosen.rest)
     return Deed.IMPROVED if same else Deed.REPLANNED
-
-
-def _check_horizon(problem: Problem, step: float, pad: Trim | None, *, retimed: bool) -> None:
-    horizon = problem.horizon.time
-    if horizon is not None:
-        if pad is None:
-            raise ValueError(
-                "receding horizon: a fixed time needs a rest trim, which prolongs the last "
-                "plan; the library has none"
-            )
-        if step > horizon * (1.0 + EXACT):
-            raise ValueError(
-                f"receding horizon: step is {step:g} s, need at most the horizon, {horizon:g} s"
-            )
-    if retimed and (horizon is None or not getattr(problem.cost, "effort", 0.0) > 0.0):
-        raise ValueError(
-            "receding horizon: retimed plans need a fixed horizon and a cost with effort"
-        )
-
-
-def _pad(problem: Problem) -> Trim | None:
-    """The cheapest rest of the library."""
-    still = np.flatnonzero(~problem.automaton.body_velocities.any(axis=1))
-    if not still.size:
-        return None
-    return problem.automaton.trims[int(still[np.argmin(problem.rates[still])])]

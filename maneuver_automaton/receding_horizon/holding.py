@@ -9,14 +9,9 @@ import numpy as np
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.problem import Goal, Horizon, Problem
-from maneuver_automaton.receding_horizon.candidates import (
-    EXACT,
-    Candidate,
-    Settings,
-    candidate,
-    within,
-)
+from maneuver_automaton.receding_horizon.candidates import Candidate, candidate, within
 from maneuver_automaton.receding_horizon.log import Origin
+from maneuver_automaton.receding_horizon.settings import EXACT, Settings
 from maneuver_automaton.search.choose import search_goal
 from maneuver_automaton.search.result import plan_of
 

@@ -12,9 +12,9 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.planning.tracking import free_until, stands_free
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.receding_horizon.candidates import Settings
 from maneuver_automaton.receding_horizon.escape import Escape, escape
 from maneuver_automaton.receding_horizon.log import first_part
+from maneuver_automaton.receding_horizon.settings import Settings
 from maneuver_automaton.receding_horizon.shifting import merged
 
 SAME = 1e-9  # [s]

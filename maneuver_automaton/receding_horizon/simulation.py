@@ -1,11 +1,9 @@
-"""The closed loop in simulation: what disturbs it, and how it went."""
+"""The closed loop in simulation: what was done, and how it went."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from types import MappingProxyType
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,44 +18,16 @@ from maneuver_automaton.planning.plan import has_inertia
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.controller import RecedingHorizon
+from maneuver_automaton.receding_horizon.disturbance import (
+    Disturbance,
+    as_driven,
+    checked,
+    draws,
+)
 from maneuver_automaton.receding_horizon.log import ClosedLoop, Guarantee, Step, Violation
 from maneuver_automaton.receding_horizon.with_maneuvers import ManeuverHorizon, moves_on
 
 Seen = Callable[[int], Sequence[AnyObstacle | Shape]]
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Disturbance:
-    """What a real vehicle does beside its plan; every random number comes from `seed`.
-
-    Noise shifts the pose after every step, as a person's push would: the place by a normal number
-    per axis, the heading by another. Measurement errors are seen by the controller alone. A push
-    is a displacement in the vehicle's own frame after the step of that number. A vehicle that
-    differs from its model has other body velocities: `twist_scale` times those of the library.
-    With `delay` 1 the controller sees every pose a step late, and plans from where the piece under
-    way will have led.
-    """
-
-    position_m: float = 0.0  # standard deviation per axis and step
-    heading_rad: float = 0.0  # standard deviation per step
-    measured_position_m: float = 0.0  # standard deviation of the measurement
-    measured_heading_rad: float = 0.0
-    twist_scale: tuple[float, ...] | None = None  # (dof,) none if None
-    pushes: Mapping[int, tuple[float, ...]] = field(default_factory=lambda: MappingProxyType({}))
-    delay: int = 0  # steps, 0 or 1
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        for name in ("position_m", "heading_rad", "measured_position_m", "measured_heading_rad"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"disturbance: {name} must be at least 0, got {value}")
-        if self.delay not in (0, 1):
-            raise ValueError(f"disturbance: delay must be 0 or 1 steps, got {self.delay}")
-        if not (isinstance(self.seed, int | np.integer) and self.seed >= 0):
-            raise ValueError(
-                f"disturbance: seed must be a whole number of at least 0, got {self.seed}"
-            )
 
 
 def simulate(
@@ -129,8 +99,8 @@ def simulate(
     if steps < 1:
         raise ValueError(f"steps must be at least 1, got {steps}")
     upset = Disturbance() if disturbance is None else disturbance
-    upset = _checked(upset, problem.start.size)
-    random = _draws(upset, problem.start.size)
+    upset = checked(upset, problem.start.size)
+    random = draws(upset, problem.start.size)
     controller: RecedingHorizon | ManeuverHorizon
     inertia = has_inertia(problem) or bool(problem.zones)
     if inertia:
@@ -183,7 +153,7 @@ def simulate(
         if stuck:
             break
         piece = replace(now.piece, start=where)
-        driven.append(_as_driven(piece, upset))
+        driven.append(as_driven(piece, upset))
         if audit and piece.trims:
             audits.append(_audited(problem, piece))
             real = audits[-1] if driven[-1] is piece else _audited(problem, driven[-1])
@@ -287,44 +257,6 @@ def _check_inertia(upset: Disturbance, *, stay: bool, retimed: bool, seen: Seen 
 
 def _spent(last: Step | None) -> float:
     return 0.0 if last is None else last.accumulated_cost + last.applied_cost
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Draw:
-    """The random numbers of one step."""
-
-    noise: Array
-    measurement: Array
-
-
-def _checked(upset: Disturbance, dof: int) -> Disturbance:
-    """The disturbance, if it has as many components as the pose."""
-    if upset.twist_scale is not None:
-        as_array("disturbance: twist_scale", upset.twist_scale, last=dof)
-    for after, push in upset.pushes.items():
-        as_array(f"disturbance: push after step {after}", push, last=dof)
-    return upset
-
-
-def _draws(upset: Disturbance, dof: int) -> Iterator[_Draw]:
-    """Numbers for step after step: the same for a seed, whatever the loop does with them."""
-    rng = np.random.default_rng(upset.seed)
-    spread = np.full(dof, upset.position_m)
-    spread[2] = upset.heading_rad
-    blur = np.full(dof, upset.measured_position_m)
-    blur[2] = upset.measured_heading_rad
-    while True:
-        numbers = rng.standard_normal((2, dof))
-        yield _Draw(spread * numbers[0], blur * numbers[1])
-
-
-def _as_driven(piece: Plan, upset: Disturbance) -> Plan:
-    """What the vehicle makes of a piece of plan."""
-    if upset.twist_scale is None:
-        return piece
-    scale = as_array("disturbance: twist_scale", upset.twist_scale, last=piece.start.size)
-    trims = tuple(replace(trim, body_velocity=trim.body_velocity * scale) for trim in piece.trims)
-    return replace(piece, trims=trims)
 
 
 def _after(step: Step, start: Array) -> Array:

@@ -10,13 +10,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.receding_horizon.candidates import (
-    EXACT,
-    Candidate,
-    Settings,
-    candidate,
-    within,
-)
+from maneuver_automaton.receding_horizon.candidates import Candidate, candidate, within
 from maneuver_automaton.receding_horizon.log import Deed, Guarantee, Origin, Step, Violation
 from maneuver_automaton.receding_horizon.reanchoring import (
     distance,
@@ -24,6 +18,7 @@ from maneuver_automaton.receding_horizon.reanchoring import (
     reanchored,
     same_word,
 )
+from maneuver_automaton.receding_horizon.settings import EXACT, Settings
 from maneuver_automaton.receding_horizon.shifting import merged, rest_of
 from maneuver_automaton.search.words import TIE
 

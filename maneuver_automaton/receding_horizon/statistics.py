@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, freeze
+from maneuver_automaton._parallel import in_parallel
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.receding_horizon.disturbance import Disturbance
 from maneuver_automaton.receding_horizon.log import ClosedLoop, Guarantee, Violation
-from maneuver_automaton.receding_horizon.simulation import Disturbance, simulate
+from maneuver_automaton.receding_horizon.simulation import simulate
 
 CHUNKS = 4  # per worker, so that a slow one is not waited for
 
@@ -151,7 +153,8 @@ def simulate_many(
         audit=audit,
     )
     done: list[Outcome] = []
-    for outcomes in _run(problem, chunks, settings, jobs, scheduler):
+    work = partial(_outcomes, problem, settings=settings)
+    for outcomes in in_parallel(work, chunks, jobs=jobs, scheduler=scheduler):
         done += outcomes
         if progress is not None:
             progress(len(done), len(cases))
@@ -178,46 +181,7 @@ def _chunks(cases: Sequence[Case], n: int) -> Iterator[list[Case]]:
         yield [cases[k] for k in indices]
 
 
-def _run(
-    problem: Problem,
-    chunks: Sequence[list[Case]],
-    settings: _Settings,
-    jobs: int,
-    scheduler: str | None,
-) -> Iterator[list[Outcome]]:
-    if jobs == 1 and scheduler is None:
-        for chunk in chunks:
-            yield _outcomes(problem, chunk, settings)
-        return
-    from joblib import Parallel, delayed
-
-    with _backend(scheduler, jobs):
-        ordered = "generator" if scheduler is None else "list"
-        work = Parallel(n_jobs=jobs if scheduler is None else -1, return_as=ordered)
-        yield from work(delayed(_outcomes)(problem, chunk, settings) for chunk in chunks)
-
-
-@contextlib.contextmanager
-def _backend(scheduler: str | None, jobs: int) -> Iterator[None]:
-    """Where joblib sends the work: processes on this machine, or a Dask cluster."""
-    if scheduler is None:
-        yield
-        return
-    try:
-        from dask.distributed import Client
-    except ImportError as error:
-        raise ValueError(
-            f"scheduler: got {scheduler!r}, but Dask is not installed; need `pip install "
-            "distributed`"
-        ) from error
-    from joblib import parallel_config
-
-    local = {"n_workers": jobs, "threads_per_worker": 1, "dashboard_address": None}
-    with Client(**local) if scheduler == "local" else Client(scheduler), parallel_config("dask"):
-        yield
-
-
-def _outcomes(problem: Problem, cases: Sequence[Case], settings: _Settings) -> list[Outcome]:
+def _outcomes(problem: Problem, cases: Sequence[Case], *, settings: _Settings) -> list[Outcome]:
     return [_outcome(problem, pose, seed, settings) for pose, seed in cases]
 
 

@@ -30,10 +30,11 @@ from maneuver_automaton.planning import plan as planned
 from maneuver_automaton.planning.checking import what_is_hit
 from maneuver_automaton.primitives import Maneuver
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.receding_horizon.candidates import EXACT, within
+from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.guarantees import broken, promises
 from maneuver_automaton.receding_horizon.log import Deed, Guarantee, Origin, Step, Violation
 from maneuver_automaton.receding_horizon.reanchoring import distance, missed
+from maneuver_automaton.receding_horizon.settings import EXACT
 from maneuver_automaton.search.inside import outside, stays_inside
 from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
 from maneuver_automaton.search.maneuver_words import load_maneuver_words

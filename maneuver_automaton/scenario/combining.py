@@ -6,7 +6,8 @@ heading. Cost, horizon, margin, search and closed loop are the scenario's, and s
 body, unless the file names its vehicle.
 
 Two formats do without a scenario. TPCAP has one car for every case; dynobench has its own models,
-whose trims are then all combinations of extreme controls, and whose cost is time.
+whose trims are then all combinations of extreme controls, or, with inertia, a grid of trims and the
+maneuvers between them; its cost is time.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array, vector_text
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import Shape
 from maneuver_automaton.costs import Cost
@@ -25,6 +27,7 @@ from maneuver_automaton.formats.tpcap import FORMAT
 from maneuver_automaton.problem import Bounds, Goal, Problem
 from maneuver_automaton.scenario.scenario import Scenario, scenario_of_text
 
+SAME_STATE = 1e-9  # between a reduced state that a file states and a trim's, in its units
 TPCAP = """\
 schema: 1
 name: The car of TPCAP
@@ -50,15 +53,27 @@ def combined(statement: Statement, beside: Scenario | None, *, path: Path) -> Sc
     """
     rest = _own(statement, path) if beside is None else beside
     problem = rest.problem
-    if statement.vehicle is not None:
-        problem = replace(problem, automaton=_driven(statement.vehicle, rest, path))
+    start_trim, goals = problem.start_trim, _goals(statement, problem)
+    if (vehicle := statement.vehicle) is not None:
+        automaton = _driven(vehicle, rest, path)
+        if not automaton.is_kinematic:
+            start_trim = _trim_at(automaton, statement.start_state, path=path)
+            goal_trim = _trim_at(automaton, statement.goal_state, path=path)
+            goals = tuple(replace(goal, trim=goal_trim) for goal in goals)
+        problem = replace(
+            problem,
+            automaton=automaton,
+            start_trim=start_trim,
+            goals=goals,
+            parts=dict(vehicle.parts),
+        )
     return replace(
         rest,
         name=statement.name,
         problem=replace(
             problem,
             start=problem.start if statement.start is None else statement.start,
-            goals=_goals(statement, problem),
+            goals=goals,
             bounds=_bounds(statement.bounds, problem.bounds),
             obstacles=statement.obstacles,
             footprint=_footprint(statement, problem),
@@ -98,15 +113,40 @@ def _footprint(statement: Statement, rest: Problem) -> tuple[Shape, ...]:
     return rest.footprint if statement.footprint is None else statement.footprint
 
 
+def _trim_at(automaton: Automaton, state: Array | None, *, path: Path) -> str | None:
+    """The name of a trim of a reduced state, rather one at rest; None if no state is stated."""
+    if state is None:
+        return None
+    here = [
+        trim for trim in automaton.trims if np.abs(trim.reduced_state - state).max() <= SAME_STATE
+    ]
+    if not here:
+        names = ", ".join(automaton.model.reduced_names)
+        raise InvalidScenario(
+            f"{path}: starts or ends with ({names}) = {vector_text(state)}, where the library has "
+            "no trim; need one"
+        )
+    return min(here, key=lambda trim: not trim.is_rest).name
+
+
 def _driven(vehicle: StatedVehicle, beside: Scenario, path: Path) -> Automaton:
     """The scenario's trims, driven by the vehicle that the file names."""
     given, model = beside.problem.automaton, vehicle.automaton.model
+    if given is vehicle.automaton:
+        return given
     what = f"{path}: its vehicle is {vehicle.name}"
     if given.model.name != model.name:
         raise InvalidScenario(
             f"{what}, a {model.name}, but the scenario of --with has a {given.model.name}; "
             "need the same"
         )
+    if model.reduced_names:
+        if given.model != model:
+            raise InvalidScenario(
+                f"{what}, a {model.name} of other size or limits than that of the scenario of "
+                f"--with; need {model}"
+            )
+        return given
     for trim in given.trims:
         for name, value, (low, high) in zip(
             model.control_names, trim.control, vehicle.limits, strict=True

@@ -7,11 +7,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from maneuver_automaton.collision import Box
 from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.commonroad import read_commonroad
 from maneuver_automaton.formats.recognition import reader_of, yaml_statements
 from maneuver_automaton.formats.statement import Statement
 from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import parse
+from maneuver_automaton.models import SecondOrderCar
+from maneuver_automaton.roads import RoadScene, RoadVehicle
 from maneuver_automaton.scenario.combining import combined
 from maneuver_automaton.scenario.scenario import Scenario, scenario_of_document
 
@@ -50,11 +54,54 @@ def load_scenario(
             return scenario_of_document(document, path=path, begin=begin)
         statements = found
     statement = _chosen(path, statements, case)
+    if statement.road is not None:
+        raise InvalidScenario(f"{path}: is a drive on roads, which only plan and mpc know")
     rest = None if beside is None else _scenario_beside(Path(beside))
     scenario = combined(statement, rest, path=path)
     made = scenario.timing_s.get("automaton", 0.0)
     load = time.perf_counter() - begin - made
     return replace(scenario, timing_s={"load": load, "automaton": made})
+
+
+def load_road(
+    path: Path | str, *, beside: Path | str | None = None, case: int | None = None
+) -> tuple[RoadScene, RoadVehicle] | None:
+    """The drive on roads that a file states, and who drives; None if the file is another one.
+
+    The vehicle is the BMW 320i of CommonRoad, or that of the scenario `beside`: a second-order car
+    with a rectangular body along its axis.
+
+    Raises
+    ------
+    InvalidScenario
+        If the file cannot be used, holds several problems and none is chosen, or the vehicle is
+        another one.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".xml":
+        return None
+    read = reader_of(path) or read_commonroad  # which tells primitives from scenarios
+    scene = _chosen(path, read(path), case).road
+    assert scene is not None  # every statement of this format has one
+    if beside is None:
+        return scene, RoadVehicle()
+    rest = _scenario_beside(Path(beside)).problem
+    model, footprint = rest.automaton.model, rest.footprint
+    if not isinstance(model, SecondOrderCar):
+        raise InvalidScenario(
+            f"--with: {beside}: vehicle: got the model {model.name}, need second_order_car on roads"
+        )
+    if len(footprint) != 1 or not isinstance(footprint[0], Box) or not _is_along(footprint[0]):
+        raise InvalidScenario(
+            f"--with: {beside}: vehicle: footprint: need one rectangle along the axis of the car"
+        )
+    length, width = footprint[0].size.tolist()
+    ahead = float(footprint[0].center[0])
+    return scene, RoadVehicle(model=model, length=length, width=width, ahead=ahead)
+
+
+def _is_along(body: Box) -> bool:
+    return body.heading == 0.0 and float(body.center[1]) == 0.0
 
 
 def statements_of(path: Path) -> tuple[Statement, ...] | None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeVar
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from maneuver_automaton.formats.yaml_source import Document, Where, shown
 from maneuver_automaton.models import Car, Unicycle
@@ -15,9 +15,11 @@ CONTROL_NAMES: Mapping[str, tuple[str, ...]] = {
     "unicycle": Unicycle.control_names,
     "car": Car.control_names,
 }
+File = TypeVar("File", bound=BaseModel)
 OTHER_KINDS: Mapping[str, set[str]] = {  # and what only they have
     "a library of trims": {"format", "trims"},
     "a plan": {"status", "primitives"},
+    "a build file": {"library", "trims"},
 }
 
 
@@ -30,8 +32,19 @@ def values_of(document: Document) -> ScenarioFile:
         If a key is unknown or missing, or holds what it may not: the first one in the file.
     """
     _check_schema(document)
+    return checked(document, ScenarioFile)
+
+
+def checked(document: Document, kind: type[File]) -> File:
+    """The values of a file of this kind.
+
+    Raises
+    ------
+    InvalidScenario
+        If a key is unknown or missing, or holds what it may not: the first one in the file.
+    """
     try:
-        return ScenarioFile.model_validate(document.value, context=_context(document.value))
+        return kind.model_validate(document.value, context=_context(document.value))
     except ValidationError as error:
         found = [_message(document, item) for item in error.errors(include_url=False)]
         where, what = min(found, key=lambda item: document.line_of(item[0]))

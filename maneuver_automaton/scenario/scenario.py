@@ -101,7 +101,7 @@ def scenario_of_document(document: Document, *, path: Path | None, begin: float)
     if file.search.method == "words":
         _refuse_long_words(document, file)
     folder = path.parent if path else Path()
-    with _at(document, ("vehicle",)):
+    with at(document, ("vehicle",)):
         model = model_of(file.vehicle)
     footprint = footprint_of(document, file.vehicle.footprint)
     obstacles, maps = obstacles_of(document, file.obstacles, folder)
@@ -135,7 +135,7 @@ def _refuse_long_words(document: Document, file: ScenarioFile) -> None:
 
 
 @contextlib.contextmanager
-def _at(document: Document, where: Where) -> Iterator[None]:
+def at(document: Document, where: Where) -> Iterator[None]:
     """Give what a constructor refuses the file, line and field it comes from."""
     try:
         yield
@@ -160,7 +160,7 @@ def _automaton(
         return _from_library(document, folder / part.file, model)
     where = ("automaton", "preset")
     assert part.preset is not None
-    with _at(document, where):
+    with at(document, where):
         return Automaton.of_controls(model, preset_controls(part.preset, model))
 
 
@@ -175,7 +175,7 @@ def _listed(document: Document, trims: tuple[NamedControl, ...], model: Model) -
                 f"got {trim.name!r}, the name of another trim in line {first}; need a new name",
             )
         controls[trim.name] = trim.control
-        with _at(document, (*where, "control")):
+        with at(document, (*where, "control")):
             Automaton.of_controls(model, {trim.name: trim.control})
     return Automaton.of_controls(model, controls)
 
@@ -202,7 +202,7 @@ def _grid(document: Document, grid: Grid, model: Model) -> Automaton:
         raise document.error(
             where, f"got {math.prod(counts):g} trims, need at most {MAX_GRID_TRIMS}"
         )
-    with _at(document, where):
+    with at(document, where):
         return Automaton.of_grid(model, [_values(axis) for axis in grid.control])
 
 
@@ -224,7 +224,7 @@ def _values(axis: Axis) -> list[float]:
 
 
 def _from_library(document: Document, path: Path, model: Model) -> Automaton:
-    with _at(document, ("automaton", "file")):
+    with at(document, ("automaton", "file")):
         automaton = load_library(path)
         if described(automaton.model) != described(model):
             raise ValueError(
@@ -260,7 +260,7 @@ def _problem(
         for n, name in enumerate(zone.trims or ()):
             _check_trim(document, ("zones", k, "trims", n), name, automaton)
     cost, horizon = _cost(document, file.cost, automaton), _horizon(document, file.horizon)
-    with _at(document, ()):
+    with at(document, ()):
         return Problem(
             automaton,
             file.start.pose,
@@ -286,7 +286,7 @@ def _check_pose(document: Document, where: Where, pose: tuple[float, ...], dof: 
 
 def _check_trim(document: Document, where: Where, trim: str | None, automaton: Automaton) -> None:
     if trim is not None:
-        with _at(document, where):
+        with at(document, where):
             automaton.index_of(trim)
 
 
@@ -309,7 +309,7 @@ def _cost(document: Document, part: CostPart, automaton: Automaton) -> Cost:
             where, f"got {len(matrix)} rows of {rows} numbers, need a square matrix"
         )
     order = math.inf if part.norm_order == "inf" else float(part.norm_order)
-    with _at(document, where):
+    with at(document, where):
         cost = Cost(
             effort=part.effort,
             norm=part.norm,
@@ -337,7 +337,7 @@ def _search(part: SearchPart) -> SearchSettings:
 
 def _horizon(document: Document, part: HorizonPart) -> Horizon:
     fixed = part.time_s != "free" and part.max_time_s is not None
-    with _at(document, ("horizon", "max_time_s") if fixed else ("horizon",)):
+    with at(document, ("horizon", "max_time_s") if fixed else ("horizon",)):
         return Horizon(
             time=None if part.time_s == "free" else part.time_s,
             max_trims=part.max_trims,

@@ -339,10 +339,9 @@ def expand(search, task, lib, world, body, grid, table, n, ceiling):
 
 
 @bare_kernel
-def rehash(search, wide):
+def rehash(table, generation, wide):
     """Carry the entries of this generation over into a wider hash table."""
-    generation = search.state[GENERATION]
-    for k in range(search.table.shape[0]):
-        if node_in(search.table, generation, k) >= 0:
-            slot = slot_of(wide, generation, search.table[k, 0])
-            wide[slot, 0], wide[slot, 1] = search.table[k, 0], search.table[k, 1]
+    for k in range(table.shape[0]):
+        if node_in(table, generation, k) >= 0:
+            slot = slot_of(wide, generation, table[k, 0])
+            wide[slot, 0], wide[slot, 1] = table[k, 0], table[k, 1]

@@ -136,11 +136,27 @@ def gap_of(lib, before, trim):
     )
 
 
+@inner_kernel
+def way_cost(lib, way, a, b, c):
+    """Least cost of coasting `way` by these trims: the way that transitions do not make."""
+    left, price = abs(way), math.inf
+    if a >= 0:
+        price = lib.per_metre[a]
+    if b >= 0:
+        left -= lib.length[a, b]
+        price = min(price, lib.per_metre[b])
+    if c >= 0:
+        left -= lib.length[b, c]
+        price = min(price, lib.per_metre[c])
+    return left * price if left > lib.met else 0.0
+
+
 @bare_inner_kernel
-def transfer_candidates(lib, start, start_trim, goal, goal_trim, ceiling, scratch):
+def transfer_candidates(lib, n_words, start, start_trim, goal, goal_trim, ceiling, scratch):
     """Fill `scratch` with the words that lead from one pose and trim to another; how many.
 
-    `start` and `goal` are (x, y, heading, z). Words that cost `ceiling` or more are left out.
+    The first `n_words` of the library are tried. `start` and `goal` are (x, y, heading, z). What
+    costs `ceiling` or more is left out.
     """
     x, y, heading, z = start
     g_x, g_y, g_heading, g_z = goal
@@ -153,7 +169,7 @@ def transfer_candidates(lib, start, start_trim, goal, goal_trim, ceiling, scratc
         s_x, s_y, s_heading = x, y, heading
         e_x, e_y, e_heading = g_x, g_y, g_heading
         rel = (0j, 0.0)
-        for row in range(lib.words.shape[0]):
+        for row in range(n_words):
             word = lib.words[row]
             a, b, c = word[0], word[1], word[2]
             n_trims = 3 if c >= 0 else 2 if b >= 0 else 1 if a >= 0 else 0
@@ -200,7 +216,7 @@ def transfer_candidates(lib, start, start_trim, goal, goal_trim, ceiling, scratc
                 fixed += lib.cost[a, b]
             if n_trims == 3:
                 fixed += lib.cost[b, c]
-            if not fixed < ceiling:
+            if not fixed + way_cost(lib, rel[0], a, b, c) < ceiling:
                 continue
             branches = scratch.branches
             n_branches = 1
@@ -281,11 +297,13 @@ def transfer_candidates(lib, start, start_trim, goal, goal_trim, ceiling, scratc
 
 
 @kernel
-def transfer_batch(lib, starts, start_trim, goals, goal_trim, ceiling, scratch):
+def transfer_batch(lib, n_words, starts, start_trim, goals, goal_trim, ceiling, scratch):
     """Candidates of each of many transfers (n, 4) to (n, 4); how many of the last, for timing."""
     count = 0
     for k in range(starts.shape[0]):
         start = (starts[k, 0], starts[k, 1], starts[k, 2], starts[k, 3])
         goal = (goals[k, 0], goals[k, 1], goals[k, 2], goals[k, 3])
-        count = transfer_candidates(lib, start, start_trim, goal, goal_trim, ceiling, scratch)
+        count = transfer_candidates(
+            lib, n_words, start, start_trim, goal, goal_trim, ceiling, scratch
+        )
     return count

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,19 +65,25 @@ def search_arrays(n_triples: int) -> SearchArrays:
 
 def with_room(search: SearchArrays, nodes: int) -> SearchArrays:
     """The same search in arrays that hold at least so many nodes."""
+    return cast(SearchArrays, widened(search, nodes))
+
+
+def widened(search: Any, nodes: int) -> Any:
+    """Arrays of any search with nodes, links, a hash table and a heap, with room for `nodes`."""
     n = len(search.nodes)
     if nodes <= n:
         return search
     while n < nodes:
         n *= 2
     used = int(search.state[kernels.N_NODES])
-    wide_nodes, wide_links = np.empty((n, 8)), np.empty((n, 6), dtype=np.int32)
+    wide_nodes = np.empty((n, search.nodes.shape[1]))
+    wide_links = np.empty((n, search.links.shape[1]), dtype=np.int32)
     wide_nodes[:used], wide_links[:used] = search.nodes[:used], search.links[:used]
     queued = int(search.state[kernels.HEAP])
     heap_key, heap_node = np.empty(n), np.empty(n, dtype=np.int64)
     heap_key[:queued], heap_node[:queued] = search.heap_key[:queued], search.heap_node[:queued]
     table = np.zeros((4 * n, 2), dtype=np.int64)
-    kernels.rehash(search, table)
+    kernels.rehash(search.table, int(search.state[kernels.GENERATION]), table)
     return search._replace(
         nodes=wide_nodes,
         links=wide_links,

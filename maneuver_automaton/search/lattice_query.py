@@ -12,7 +12,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.collision.world import World, own_frame, world_of
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.problem import Problem
+from maneuver_automaton.problem import Bounds, Problem
 from maneuver_automaton.search.lattice_library import LatticeLibrary, lattice_library
 
 MARGIN = 0.005  # proven clearance of every pose looked at, in half widths of the body
@@ -71,7 +71,9 @@ def lattice_query(problem: Problem, goal_index: tuple[int, ...]) -> LatticeQuery
     world = world_around(problem)
     start = world.into(problem.start)
     goals = world.into(np.array([problem.goals[k].pose for k in goal_index]))
-    box, window, bounded = _window(problem, world, library.radius, np.vstack([start, goals]))
+    box, window, bounded = window_of(
+        problem.bounds, world, np.vstack([start, goals]), radius=library.radius
+    )
     horizon = problem.horizon
     limit = horizon.time if horizon.time is not None else horizon.max_time
     return LatticeQuery(
@@ -113,11 +115,14 @@ def _typical(world: World) -> float:
     return float(np.clip(0.02 * width.max(), 1e-3, 1.0)) if np.isfinite(width).all() else 1.0
 
 
-def _window(
-    problem: Problem, world: World, radius: float, poses: Array
+def window_of(
+    bounds: Bounds, world: World, poses: Array, *, radius: float
 ) -> tuple[Array, Array, bool]:
-    """Where to search: the bounds, and where there are none, some way around everything."""
-    bounds = problem.bounds
+    """Where to search: the bounds, and where there are none, some way around everything.
+
+    A box (4,) in the world's frame, a window as in `_kernels_connect.inside_window`, and whether
+    the window's rim is a wall on every side. `poses` (n, 3 or more) lie inside.
+    """
     pad = 4.0 * radius + 4.0 * world.body.reach
     low = np.minimum(world.box[:2], poses[:, :2].min(axis=0)) - pad
     high = np.maximum(world.box[2:], poses[:, :2].max(axis=0)) + pad

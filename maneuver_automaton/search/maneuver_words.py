@@ -19,7 +19,7 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search import _kernels_transfer as kernels
-from maneuver_automaton.search.maneuver_word import (
+from maneuver_automaton.search.maneuver_setup import (
     SAME,
     ManeuverSearch,
     TimedWord,
@@ -225,6 +225,7 @@ class _Job:
         scratch = self.scratch
         n = kernels.transfer_batch(
             self.setup.library.arrays,
+            len(self.setup.library.arrays.words),
             begin[None],
             trim,
             end[None],

@@ -19,7 +19,8 @@ from maneuver_automaton._arrays import Array, IntArray, as_array
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.search import _kernels_transfer as kernels
 
-MOST_TRIMS = 14  # of a larger library those that differ most
+MOST_TRIMS = 24  # of a larger library those that differ most
+FEW_TRIMS = 14  # of these, for transfers that are tried often
 STRAIGHT = 1e-12  # [rad/s] turn rates below it are none
 SHORTEST = 1e-9  # [s] coasting times below it are none
 TOLERANCE = 1e-10  # of the steering function, relative
@@ -36,7 +37,10 @@ class TransferArrays(NamedTuple):
     shift: Array  # (m, m, 4) displacement of the transition between two trims
     cost: Array  # (m, m) of that transition, inf where there is none
     time: Array  # (m, m) [s] it lasts
-    words: IntArray  # (K, 3) trims in order, -1 for none
+    length: Array  # (m, m) [m] between the ends of that transition, in the plane
+    per_metre: Array  # (m,) least cost per metre in the plane, inf for none
+    words: IntArray  # (K, 3) trims in order, -1 for none; those of few trims first
+    n_few: int  # how many these are
     climbs: IntArray  # (C,) trims that only climb, or only sink
     tolerance: float
     shortest: float  # [s]
@@ -148,8 +152,13 @@ def transfer_library(
     shift, cost, time = _transitions(automaton, prices, via, following)
     climbs = np.flatnonzero(~twists[:, :3].any(axis=1) & (twists[:, 3] != 0.0))
     moving = np.flatnonzero(twists[:, :3].any(axis=1))
-    chosen = moving[_most_different(twists[moving], most_trims)] if trims is None else trims
-    with np.errstate(divide="ignore"):
+    chosen = (
+        moving[_most_different(twists[moving], most_trims)].tolist() if trims is None else trims
+    )
+    words, n_few = _words([int(k) for k in chosen], cost)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        speed = np.hypot(twists[:, 0], twists[:, 1])
+        per_metre = np.where(speed > 0.0, per_second / speed, np.inf)
         periods = np.where(twists[:, 2] != 0.0, 2.0 * np.pi / np.abs(twists[:, 2]), np.inf)
     arrays = TransferArrays(
         twists=twists,
@@ -159,7 +168,10 @@ def transfer_library(
         shift=shift,
         cost=cost,
         time=time,
-        words=_words([int(k) for k in chosen], cost),
+        length=np.hypot(shift[..., 0], shift[..., 1]),
+        per_metre=per_metre,
+        words=words,
+        n_few=n_few,
         climbs=np.asarray(climbs, dtype=np.int64),
         tolerance=TOLERANCE,
         shortest=SHORTEST,
@@ -212,7 +224,14 @@ def transfers(
     begin, end = _pose("start", start, dof), _pose("goal", goal, dof)
     scratch, arrays = library.scratch(), library.arrays
     n = kernels.transfer_batch(
-        arrays, begin[None], start_trim, end[None], goal_trim, float(ceiling), scratch
+        arrays,
+        len(arrays.words),
+        begin[None],
+        start_trim,
+        end[None],
+        goal_trim,
+        float(ceiling),
+        scratch,
     )
     found = []
     for k in np.argsort(scratch.costs[:n], kind="stable"):
@@ -288,34 +307,42 @@ def _transitions(
     return shift, cost, time
 
 
-def _words(trims: list[int], cost: Array) -> IntArray:
-    """Words of none to three of these trims, neighbours different, that transitions allow."""
+def _words(trims: list[int], cost: Array) -> tuple[IntArray, int]:
+    """Words of none to three of these trims, neighbours different, that transitions allow.
+
+    Those of the first few trims come first; how many they are.
+    """
     none = kernels.NONE
     words = [(none, none, none), *((a, none, none) for a in trims)]
     pairs = [(a, b) for a, b in itertools.permutations(trims, 2) if np.isfinite(cost[a, b])]
     words += [(a, b, none) for a, b in pairs]
-    triples = [(a, b, c) for a, b in pairs for c in trims if b != c and np.isfinite(cost[b, c])]
-    words += sorted(triples, key=lambda word: (word[0], word[2], word[1]))
-    return np.array(words, dtype=np.int64).reshape(-1, 3)
+    words += [(a, b, c) for a, b in pairs for c in trims if b != c and np.isfinite(cost[b, c])]
+    few = {none, *trims[:FEW_TRIMS]}
+
+    def order(word: tuple[int, int, int]) -> tuple[bool, int, int, int, int]:
+        last = next((trim for trim in reversed(word) if trim != none), none)
+        return not few.issuperset(word), 3 - word.count(none), word[0], last, word[1]
+
+    words.sort(key=order)
+    n_few = sum(few.issuperset(word) for word in words)
+    return np.array(words, dtype=np.int64).reshape(-1, 3), n_few
 
 
 def _most_different(twists: Array, n: int) -> IntArray:
-    """Rows of twists (m, 4) that are far from rest and from each other; all if there are few.
+    """Rows of twists (m, 4), at most n, far from rest and from each other.
 
     One after the other the farthest from all before, straight and forward ones first of equals.
     """
-    if len(twists) <= n:
-        return np.arange(len(twists))
     size = np.abs(twists).max(axis=0)
     rows = twists / np.where(size > 0.0, size, 1.0)
     nearest = np.linalg.norm(rows, axis=1)
     zeros = np.count_nonzero(rows == 0.0, axis=1)
     chosen: list[int] = []
-    for _ in range(n):
+    for _ in range(min(n, len(twists))):
         k = int(np.lexsort((-rows[:, 0], -zeros, -np.round(nearest, 9)))[0])
         chosen.append(k)
         nearest = np.minimum(nearest, np.linalg.norm(rows - rows[k], axis=1))
-    return np.array(sorted(chosen), dtype=np.int64)
+    return np.array(chosen, dtype=np.int64)
 
 
 def _costs(name: str, value: ArrayLike, n: int) -> Array:

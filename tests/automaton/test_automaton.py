@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.errors import InvalidAutomaton, ManeuverAutomatonError, UnknownTrim
 from maneuver_automaton.groups import SE2, SE2xR
-from maneuver_automaton.models import Car, Unicycle, UserModel
-from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.models import Car, SingleTrack, Unicycle, UserModel
+from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
+from tests.inertia import CAR
 
 TABLE_2 = {
     "rest": (0.0, 0.0),
@@ -161,6 +162,73 @@ def test_wrong_trims_are_named():
     )
     with pytest.raises(InvalidAutomaton, match=r"^trim 'a': got twist \(3,\) and control \(1,\)"):
         Automaton(Unicycle(), (trim("a", control=(1.0,)),))
+
+
+def test_maneuvers_fit_their_trims():
+    with pytest.raises(InvalidAutomaton) as error:
+        Automaton(Unicycle(), (trim("a", reduced_state=[1.0]),))
+    assert str(error.value) == "trim 'a': got reduced state (1,), need (0,) for the unicycle"
+    jump = Maneuver(name="jump", source="slow", target="fast", displacement=np.zeros(4))
+    with pytest.raises(InvalidAutomaton) as error:
+        boat(SLOW, FAST, maneuvers=(jump,))
+    assert str(error.value) == (
+        "maneuver 'jump': got a displacement of 4 numbers, need 3, as the trims have"
+    )
+    course = Trajectory(
+        time=np.array([0.0, 1.0]),
+        pose=np.zeros((2, 3)),
+        reduced_state=np.array([[1.0], [2.0]]),
+        control=np.zeros((2, 2)),
+    )
+    short = Maneuver(
+        name="short",
+        source="slow",
+        target="fast",
+        displacement=np.zeros(3),
+        duration=1.0,
+        course=course,
+    )
+    with pytest.raises(InvalidAutomaton) as error:
+        boat(SLOW, FAST, maneuvers=(short,))
+    assert str(error.value) == (
+        "maneuver 'short': ends at the reduced state (2), but trim 'fast' has (3)"
+    )
+
+
+def test_a_library_of_a_model_in_one_call():
+    grid = {"speed": [-2.5, 0.0, 2.5], "steering": [-0.75, 0.0, 0.75]}
+    library = Automaton.of_model(CAR, grid)
+    assert len(library) == 9
+    assert len(library.maneuvers) == 40
+    assert len(Automaton.of_model(CAR, grid, pairs="all").maneuvers) == 72
+    # steering alone, and speed alone, have no late maneuver of their own
+    both = Automaton.of_model(CAR, grid, late=True).maneuvers
+    assert sum(m.name.endswith(", late") for m in both) == 16
+    strokes = Automaton.of_model(CAR, grid, strokes=[-1.0, 0.5]).maneuvers[40:]
+    assert [m.name for m in strokes[:2]] == [
+        "speed 0, steering -0.75, speed over -1",
+        "speed 0, steering -0.75, speed over 0.5",
+    ]
+    assert len(strokes) == 6
+    assert all(m.source == m.target for m in strokes)
+
+
+def test_points_without_a_trim_are_refused_or_left_out():
+    grid = {"speed": [0.0, 2.5], "turn_rate": [0.0, 1.0]}
+    with pytest.raises(InvalidAutomaton) as error:
+        Automaton.of_model(CAR, grid)
+    assert str(error.value) == (
+        "grid: 2 of 4 points have no trim, such as 'speed 0, turn_rate 1': "
+        "no steady motion: turn_rate stays off by 1"
+    )
+    assert len(Automaton.of_model(CAR, grid, leave_out=True)) == 2
+    with pytest.raises(InvalidAutomaton, match="grid: 1 of 1 points have no trim"):
+        Automaton.of_model(CAR, {"speed": [9.0], "steering": [0.0]}, leave_out=True)
+
+
+def test_a_coupled_vehicle_gets_trims_alone():
+    library = Automaton.of_model(SingleTrack(), {"speed": [10.0, 20.0], "turn_rate": [0.0, 0.1]})
+    assert (len(library), library.maneuvers) == (4, ())
 
 
 @pytest.mark.parametrize("end", ["source", "target"])

@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import SE2, SE2xR
-from maneuver_automaton.primitives import Trim
+from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 
 AHEAD = Trim(name="ahead", body_velocity=[2.0, 0.0, 0.0], control=[2.0, 0.0])
 LEFT = Trim(name="left", body_velocity=[1.0, 0.0, 1.0], control=[1.0, 1.0])
@@ -210,3 +210,79 @@ def test_what_is_wrong_is_said(start, durations, message):
     with pytest.raises(ValueError) as error:
         Plan(start, (AHEAD,), durations=durations)
     assert str(error.value) == message
+
+
+def braking(duration=2.0):
+    """From 1 m/s to rest: 1 m in 2 s, three samples."""
+    time = np.linspace(0.0, duration, 3)
+    speed = 1.0 - time / duration
+    pose = np.zeros((3, 3))
+    pose[:, 0] = time - 0.5 * time**2 / duration
+    course = Trajectory(
+        time=time,
+        pose=pose,
+        reduced_state=speed[:, None],
+        control=np.full((3, 1), -1.0 / duration),
+    )
+    return Maneuver(
+        name="brake",
+        source="ahead",
+        target="rest",
+        displacement=pose[-1],
+        duration=duration,
+        course=course,
+    )
+
+
+ROLLING = Trim(name="ahead", body_velocity=[1, 0, 0], control=[0], reduced_state=[1.0])
+STOPPED = Trim(name="rest", body_velocity=[0, 0, 0], control=[0], reduced_state=[0.0])
+
+
+def test_a_plan_with_a_maneuver():
+    plan = Plan([1, 0, 0], (ROLLING, STOPPED), durations=[2, 1], maneuvers=(braking(),))
+    assert plan.word == ("ahead", "brake", "rest")
+    assert plan.primitive_durations.tolist() == [2.0, 2.0, 1.0]
+    assert plan.switching_times.tolist() == [0.0, 2.0, 4.0, 5.0]
+    assert plan.end.tolist() == [4.0, 0.0, 0.0]
+    assert plan.pose_at([1.0, 3.0, 4.5])[:, 0].tolist() == [2.0, 3.75, 4.0]
+    assert plan.control_at(2.5).tolist() == [-0.5]
+    samples = plan.sample()
+    assert samples.reduced_state[[0, -1]].ravel().tolist() == [1.0, 0.0]
+    assert np.hypot(*np.diff(samples.pose[:, :2], axis=0).T).max() <= 0.05 + 1e-12
+    assert set(plan.switching_times.tolist()) <= set(samples.time.tolist())
+
+
+def test_a_trim_between_maneuvers_may_last_no_time():
+    plan = Plan([1, 0, 0], (ROLLING, STOPPED), durations=[0, 0], maneuvers=(braking(),))
+    assert (plan.word, plan.duration) == (("brake",), 2.0)
+    again = Plan.of_primitives(
+        [1, 0, 0], [braking()], durations=[2.0], trims={"ahead": ROLLING, "rest": STOPPED}
+    )
+    assert again.word == plan.word
+    assert again.end.tolist() == plan.end.tolist()
+
+
+def test_maneuvers_must_fit_the_trims():
+    with pytest.raises(ValueError, match=r"^plan: maneuver 'brake' leads from 'ahead' to 'rest', "):
+        Plan([0, 0, 0], (STOPPED, ROLLING), durations=[1, 1], maneuvers=(braking(),))
+    trims = (ROLLING, STOPPED, STOPPED)
+    with pytest.raises(ValueError, match=r"^plan: got 1 maneuvers for 3 trims, need one between"):
+        Plan([0, 0, 0], trims, durations=[1, 1, 1], maneuvers=(braking(),))
+
+
+def test_a_moved_plan_with_maneuvers():
+    plan = Plan([1, 0, 0], (ROLLING, STOPPED), durations=[2, 1], maneuvers=(braking(),))
+    by = SE2([3.0, 1.0, 2.0])
+    moved = plan.moved(by)
+    times = np.linspace(0.0, 5.0, 21)
+    np.testing.assert_allclose(
+        moved.pose_at(times), (by @ SE2(plan.pose_at(times))).pose, atol=1e-14
+    )
+
+
+def test_a_maneuver_without_a_course_cannot_be_sampled():
+    bare = Maneuver(name="hop", source="ahead", target="rest", displacement=[1, 0, 0], duration=1)
+    plan = Plan([0, 0, 0], (ROLLING, STOPPED), durations=[1, 0], maneuvers=(bare,))
+    assert plan.end.tolist() == [2, 0, 0]
+    with pytest.raises(ValueError, match=r"^maneuver 'hop': has no course, so it cannot be"):
+        plan.sample()

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.validation import validate
 from maneuver_automaton.groups import SE2, SE2xR
-from maneuver_automaton.models import Car, Unicycle, UserModel
+from maneuver_automaton.models import (
+    Car,
+    Helicopter,
+    SecondOrderCar,
+    SecondOrderUnicycle,
+    Unicycle,
+    UserModel,
+)
 from maneuver_automaton.primitives import Maneuver, Trim
 
 GLIDER = UserModel(
@@ -113,11 +122,98 @@ def test_a_dead_end_and_an_unused_trim():
     assert report.controllable  # within the slow class
 
 
-def test_no_class_reaches_every_pose_by_itself():
+def test_two_straights_and_what_joins_them():
     whole = boat(("slow", "fast"), ("fast", "slow"))
-    straight = Automaton(whole.model, (whole.trims[0], whole.trims[2]), whole.maneuvers)
-    assert validate(straight).reason == (
-        "no class of trims reaches every pose by itself; only straights: the heading never changes"
+    straights = (whole.trims[0], whole.trims[2])
+    straight = Automaton(whole.model, straights, whole.maneuvers)
+    assert validate(straight).reason == "only straights: the heading never changes"
+    apart = Automaton(whole.model, straights)
+    assert validate(apart).reason == (
+        "no trims that reach each other reach every pose; only straights: the heading never changes"
+    )
+    swerve = tuple(replace(m, displacement=[1.0, 0.0, 0.3]) for m in whole.maneuvers)
+    assert validate(Automaton(whole.model, straights, swerve)).reason == (
+        "no trim turns: the heading changes in steps only, those of maneuvers"
+    )
+
+
+@pytest.mark.parametrize(
+    ("displacement", "reason"),
+    [
+        ([0.0, 0.0, 0.0], "only one circle: every trim runs along the same one"),
+        (SE2.exp([0.7, 0.0, 0.7]).pose, "only one circle: every trim runs along the same one"),
+        ([0.0, 0.0, 0.5], ""),  # in place: the center moves
+        ([0.5, 0.0, 0.0], ""),
+    ],
+)
+def test_one_turning_trim_and_a_maneuver_back_to_it(displacement, reason):
+    turn = Trim(name="turn", body_velocity=[1, 0, 1], control=[1], reduced_state=[1.0])
+    back = Maneuver(
+        name="hop", source="turn", target="turn", displacement=displacement, duration=1.0
+    )
+    assert validate(Automaton(boat().model, (turn,), (back,))).reason == reason
+
+
+def test_two_trims_about_one_center_joined_by_maneuvers():
+    """Circles of 1 m and 2 m about the same point, joined by steps aside."""
+    trims = tuple(
+        Trim(name=name, body_velocity=[v, 0, 1], control=[1], reduced_state=[v])
+        for name, v in (("inner", 1.0), ("outer", 2.0))
+    )
+    out, into = (
+        Maneuver(name="", source=a, target=b, displacement=[0.0, y, 0.0], duration=1.0)
+        for a, b, y in (("inner", "outer", -1.0), ("outer", "inner", 1.0))
+    )
+    report = validate(Automaton(boat().model, trims, (out, into)))
+    assert report.reason == "only one circle: every trim runs along the same one"
+    wide = replace(out, displacement=[0.0, -1.5, 0.0])
+    assert validate(Automaton(boat().model, trims, (wide, into))).controllable
+
+
+def test_libraries_of_vehicles_with_inertia():
+    car = SecondOrderCar(
+        wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
+    )
+    whole = Automaton.of_model(car, {"speed": [-1.0, 0.0, 1.0], "steering": [-0.5, 0.0, 0.5]})
+    report = validate(whole)
+    assert report.connected
+    assert report.controllable
+    straight = Automaton.of_model(car, {"speed": [-1.0, 0.0, 1.0], "steering": [0.0]})
+    assert validate(straight).reason == "only straights: the heading never changes"
+    robot = SecondOrderUnicycle(
+        max_speed=1.0, max_turn_rate=1.0, max_acceleration=1.0, max_angular_acceleration=1.0
+    )
+    spins = Automaton.of_model(robot, {"speed": [0.0], "turn_rate": [-1.0, 0.0, 1.0]})
+    assert validate(spins).reason == "only spins: the position never changes"
+    trims_alone = Automaton(car, whole.trims)
+    assert not validate(trims_alone).controllable  # every state is a class of its own
+
+
+def test_a_helicopter_that_can_turn_climb_and_sink():
+    craft = Helicopter(
+        max_speed=10.0,
+        max_lateral_speed=3.0,
+        max_climb=3.0,
+        max_turn_rate=1.0,
+        max_tilt=0.6,
+        max_tilt_rate=1.5,
+        max_climb_acceleration=3.0,
+        max_angular_acceleration=2.0,
+    )
+    grid = {"speed": [0.0, 5.0], "turn_rate": [0.0, 0.5], "climb": [-1.0, 0.0, 1.0]}
+    trims = Automaton.of_model(craft, grid).trims
+    joined = tuple(
+        Maneuver(name="", source=a.name, target=b.name, displacement=np.zeros(4), duration=1.0)
+        for a, b in zip(trims, (*trims[1:], trims[0]), strict=True)
+    )
+    assert validate(Automaton(craft, trims, joined)).controllable
+    level = [trim for trim in trims if trim.body_velocity[3] >= 0.0]
+    kept = tuple(
+        Maneuver(name="", source=a.name, target=b.name, displacement=np.zeros(4), duration=1.0)
+        for a, b in zip(level, (*level[1:], level[0]), strict=True)
+    )
+    assert validate(Automaton(craft, tuple(level), kept)).reason == (
+        "only climbing and level trims: the height never falls"
     )
 
 

@@ -7,6 +7,7 @@ import threading
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -404,3 +405,41 @@ def test_threads_do_not_disturb_each_other():
     for thread in threads:
         thread.join()
     assert answers == [expected] * 4
+
+
+def test_a_course_is_free_exactly_where_its_poses_are():
+    """Courses past a corner at many distances: shapely on dense poses, to within a millimetre."""
+    rng = np.random.default_rng(7)
+    body = (Box([4.0, 2.0], center=[1.0, 0.0]),)
+    wall = (Obstacle(Polygon([[4.0, 2.0], [9.0, 2.0], [9.0, 7.0]])),)
+    checker = FclChecker(body, wall)
+    target = shapely.Polygon([[4.0, 2.0], [9.0, 2.0], [9.0, 7.0]])
+    outline = np.array([[-1.0, -1.0], [3.0, -1.0], [3.0, 1.0], [-1.0, 1.0]])
+    hits = 0
+    for _ in range(60):
+        start = np.array([rng.uniform(-4, 0), rng.uniform(-1.5, 2.5), rng.uniform(-0.3, 0.5)])
+        turns = np.cumsum(rng.uniform(-0.01, 0.01, 80)) + rng.uniform(-0.02, 0.02)
+        steps = np.stack([np.full(80, 0.05), np.zeros(80), turns], axis=-1)
+        poses = [np.zeros(3)]
+        for step in steps:
+            poses.append((SE2(poses[-1]) @ SE2.exp(step)).pose)
+        found = checker.course_hit(start, np.array(poses), 0.1 * np.arange(81))
+        shares = np.linspace(0.0, 1.0, 20)[:, None, None]
+        within = SE2(np.array(poses)[:-1]) @ SE2.exp(shares * steps)
+        dense = (SE2(start) @ within).pose.reshape(-1, 3)
+        nearest = min(shapely.Polygon(SE2(pose).act(outline)).distance(target) for pose in dense)
+        if nearest > 2e-3:
+            assert found is None
+        if nearest == 0.0:
+            assert found == 0
+            hits += 1
+    assert 5 < hits < 55
+
+
+def test_a_course_meets_what_moves():
+    coming = Obstacle(Box([2.0, 2.0]), motion=Motion([0.0, 10.0], [[10.0, 0, 0], [0.0, 0, 0]]))
+    checker = FclChecker((Box([2.0, 2.0]),), (coming,))
+    poses = np.stack([np.linspace(0.0, 2.0, 41), np.zeros(41), np.zeros(41)], axis=-1)
+    assert checker.course_hit([0, 0, 0], poses, np.linspace(0.0, 2.0, 41)) is None
+    assert checker.course_hit([0, 0, 0], poses, np.linspace(0.0, 2.0, 41), start_time=6.0) == 0
+    assert checker.course_hit([0, 3, 0], poses, np.linspace(0.0, 2.0, 41), start_time=6.0) is None

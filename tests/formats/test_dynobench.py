@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import itertools
+import math
 
+import numpy as np
 import pytest
 
 from maneuver_automaton.collision import Box
-from maneuver_automaton.formats.dynobench import READ, read_dynobench
+from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.dynobench import read_dynobench
+from maneuver_automaton.formats.dynobench_models import BUILT_IN, READ
 from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import parse
+from maneuver_automaton.models import SecondOrderUnicycle
+from maneuver_automaton.scenario import load_scenario
 from tests.formats.outside import DATA, message_of, needs_data
+from tests.scenario.files import SCENARIO
 
 PROBLEM = """\
 name: yard
@@ -153,16 +160,129 @@ def test_what_is_wrong_with_a_model(tmp_path, old, new, message):
     assert message_of(read_problem, model, MODEL.replace(old, new)) == message
 
 
+SECOND = PROBLEM.replace("unicycle1_v0", "unicycle2_v0").replace(
+    "start: [1, 0, 0]", "start: [1, 0, 0, 0.1, 0]"
+).replace("goal: [5, 0, 1.5]", "goal: [5, 0, 1.5, 0, 0]")  # fmt: skip
+TRAILER = PROBLEM.replace("unicycle1_v0", "car1_v0").replace(
+    "start: [1, 0, 0]", "start: [1, 0, 0.2, 0.1]"
+).replace("goal: [5, 0, 1.5]", "goal: [5, 0, 1.5, 1.5]")  # fmt: skip
+
+
+def test_a_unicycle_with_inertia(tmp_path):
+    case = read(problem(tmp_path, SECOND))
+    model = case.vehicle.automaton.model
+    assert model == SecondOrderUnicycle(
+        max_speed=0.5, min_speed=-0.5, max_turn_rate=0.5, max_acceleration=0.25,
+        max_angular_acceleration=0.25,
+    )  # fmt: skip
+    assert case.start.tolist() == [1.0, 0.0, 0.0]
+    assert case.start_state.tolist() == [0.1, 0.0]
+    assert case.goal_state.tolist() == [0.0, 0.0]
+    scenario = load_scenario(problem(tmp_path, SECOND))
+    assert scenario.problem.first_trim.reduced_state.tolist() == [0.1, 0.0]
+    assert scenario.problem.last_trim(scenario.problem.goals[0]).is_rest
+    assert len(scenario.problem.automaton) == 30  # a level of speed more, that of the start
+
+
+def test_a_car_with_a_trailer(tmp_path):
+    scenario = load_scenario(problem(tmp_path, TRAILER))
+    problem_ = scenario.problem
+    model = problem_.automaton.model
+    assert (model.wheelbase, model.hitch_length, model.min_speed) == (0.25, 0.5, -0.1)
+    assert model.max_hitch == pytest.approx(math.pi / 4)
+    assert problem_.first_trim.is_rest
+    assert problem_.first_trim.reduced_state[0] == pytest.approx(0.1)
+    (trailer,) = problem_.parts["trailer"]
+    assert trailer.size.tolist() == [0.3, 0.25]
+    frame = problem_.start[:2] + _turned(model.part_poses(np.array([0.1]))[0, :2], 0.2)
+    np.testing.assert_allclose(frame, [1 - 0.5 * math.cos(0.1), -0.5 * math.sin(0.1)])
+    assert problem_.automaton.maneuvers
+
+
+def _turned(vector, angle):
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]])
+
+
+@pytest.mark.parametrize(
+    ("text", "old", "new", "message"),
+    [
+        (SECOND, "0.1, 0]", "0.1]",
+         ":11: robots[0].start: got 4 numbers, need 5: [x, y, heading, speed, turn rate]"),
+        (SECOND, "0.1, 0]", "0.7, 0]", "start: got the speed 0.7, need -0.5 to 0.5"),
+        (TRAILER, "0.2, 0.1]", "0.2, 2.1]",
+         "start: got the hitch -1.9, need -0.785398 to 0.785398"),
+    ],
+)  # fmt: skip
+def test_ends_that_cannot_be(tmp_path, text, old, new, message):
+    assert text.count(old) == 1
+    assert message_of(read, problem(tmp_path), text.replace(old, new)).endswith(message)
+
+
+@pytest.mark.parametrize(
+    ("dynamics", "old", "new", "message"),
+    [
+        ("unicycle2", "max_acc_abs: 1", "max_acc_abs: 0",
+         ":7: max_acc_abs: got 0, need a positive number"),
+        ("unicycle2", "min_angular_vel: -2", "min_angular_vel: -1",
+         ":5: min_angular_vel: got -1, need -2, the opposite of max_angular_vel"),
+        ("car_with_trailers", "num_trailers: 1", "num_trailers: 2",
+         ":12: num_trailers: got 2, need 1"),
+        ("car_with_trailers", "hitch_lengths: [1]", "hitch_lengths: [-1]",
+         ":11: hitch_lengths[0]: got -1, need a positive number"),
+        ("car_with_trailers", "max_steering_abs: 1", "max_steering_abs: 2",
+         ":10: max_steering_abs: got 2, need less than pi / 2"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_a_model_of_second_order(tmp_path, dynamics, old, new, message):
+    model = (
+        f"dynamics: {dynamics}\nmax_vel: 1.5\nmin_vel: -0.5\nmax_angular_vel: 2\n"
+        "min_angular_vel: -2\nsize: [.8, .4]\nmax_acc_abs: 1\nmax_angular_acc: 1\n"
+        "shape: box\nmax_steering_abs: 1\nhitch_lengths: [1]\nnum_trailers: 1\nl: 0.5\n"
+        "size_trailer: [.3, .4]\nshape_trailer: box\n"
+    )
+    second = SECOND if dynamics == "unicycle2" else TRAILER
+    name = "unicycle2_v0" if dynamics == "unicycle2" else "car1_v0"
+    path = problem(tmp_path, second)
+    (tmp_path / "models").mkdir()
+    assert model.count(old) == 1
+
+    def read_problem(_):
+        read(path)
+
+    file = tmp_path / "models" / f"{name}.yaml"
+    assert message_of(read_problem, file, model.replace(old, new)) == message
+
+
+def test_a_scenario_beside_has_the_same_vehicle(tmp_path):
+    path = problem(tmp_path, SECOND)
+    beside = tmp_path / "beside.yaml"
+    beside.write_text(SCENARIO)
+    with pytest.raises(InvalidScenario, match="a second_order_unicycle, but the scenario of"):
+        load_scenario(path, beside=beside)
+
+
 @needs_data
 def test_problems_of_dynobench():
     paths = sorted((DATA / "dynobench" / "envs").glob("*/*.yaml"))
     assert len(paths) == 24
     for path in paths:
-        if path.parent.name.startswith("unicycle1"):
+        if path.parent.name.startswith(("unicycle", "car1")):
             case = read(path)
             assert case.vehicle.name == path.parent.name
             assert case.bounds.x[0] < case.start[0] < case.bounds.x[1]
+            built_in = BUILT_IN[path.parent.name]
+            assert tuple(case.footprint[0].size) == tuple(built_in["size"])
             continue
-        said = message_of(read, path, path.read_bytes())
-        assert ": robots[0].type: got " in said
-        assert said.endswith(f"not in this version; need {READ}")
+        with pytest.raises(InvalidScenario, match=r": robots\[0\].type: got ") as error:
+            read(path)
+        assert str(error.value).endswith(f"not in this version; need {READ}")
+
+
+@needs_data
+@pytest.mark.parametrize("name", sorted(BUILT_IN))
+def test_built_in_models_are_those_of_dynobench(name):
+    path = DATA / "dynobench" / "models" / f"{name}.yaml"
+    stated = parse(read_text(path), name=str(path)).value
+    for key, value in BUILT_IN[name].items():
+        assert stated[key] == value

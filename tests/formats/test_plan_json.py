@@ -10,14 +10,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from maneuver_automaton.audit import Audit, TerminalError
+from maneuver_automaton.audit import Audit, TerminalError, audit_plan
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats import load_plan, plan_to_dict, save_plan
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning import Alternative, PlanResult, PlanStatus
-from maneuver_automaton.problem import Problem
+from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.refinement.kinematic_paths import extreme_automaton
+from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
+from tests.inertia import CAR, rest_of, resting
 
 KEYS = {
     "schema",
@@ -220,6 +223,29 @@ def test_the_plan_comes_back(tmp_path_factory, pieces, start):
     assert np.abs(read.pose_at(times) - plan.pose_at(times)).max() <= 1e-9
     if plan.trims:
         assert (read.control_at(times) == plan.control_at(times)).all()
+
+
+def test_a_plan_with_maneuvers_comes_back(tmp_path):
+    """Stop and steer along a path: strokes, coasts and turns of the wheel at rest."""
+    kinematic = extreme_automaton(CAR)
+    trims = [kinematic.trims[k] for k in (0, 1, 5)]
+    path = Plan([1.0, 2.0, 0.5], trims, durations=[1.0, 6.0, 0.25])
+    plan = stop_and_steer(CAR, path, first=rest_of(CAR), last=rest_of(CAR))
+    problem = Problem(resting(CAR), plan.start, plan.end)
+    save_plan(result_of(plan, problem=problem), tmp_path / "plan.json")
+    document = json.loads((tmp_path / "plan.json").read_text())
+    durations = [one["duration_s"] for one in document["primitives"]]
+    assert sum(durations) == pytest.approx(document["duration_s"], abs=1e-12)
+    kinds = {one["kind"]: one["control"] for one in document["primitives"]}
+    assert kinds == {"maneuver": None, "trim": [0.0, 0.0]}
+    read = load_plan(tmp_path / "plan.json")
+    assert read.word == plan.word
+    times = np.linspace(0.0, plan.duration, 200)
+    np.testing.assert_allclose(read.pose_at(times), plan.pose_at(times), atol=1e-9)
+    np.testing.assert_allclose(read.end, plan.end, atol=1e-9)
+    states = (np.zeros(2), np.zeros(2))
+    audit = audit_plan(read, Goal(pose=plan.end), CAR, states=states)
+    assert audit.passed, audit.reason
 
 
 def test_far_from_the_origin_no_digit_is_lost(tmp_path):

@@ -12,10 +12,12 @@ from hypothesis.extra.numpy import arrays
 
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import (
+    AcceleratingCar,
     Car,
     CarWithTrailer,
     Helicopter,
     Hovercraft,
+    LatticeBody,
     SecondOrderCar,
     SecondOrderUnicycle,
     SingleTrack,
@@ -86,6 +88,8 @@ MODELS = [
         max_angular_acceleration=2.0,
         drag=0.1,
     ),
+    AcceleratingCar(wheelbase=2.3, max_steering=0.8, max_speed=3.0, max_acceleration=2.0),
+    LatticeBody(resolution=0.1),
     BOAT,
     BALLOON,
 ]

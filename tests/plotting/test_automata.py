@@ -6,7 +6,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.models import Unicycle
+from maneuver_automaton.models import SecondOrderUnicycle, Unicycle
 from maneuver_automaton.plotting import (
     draw_automaton,
     draw_motions,
@@ -26,7 +26,7 @@ def with_inertia():
             name=f"speed {v:g}",
             body_velocity=np.array([v, 0.0, 0.0]),
             control=np.zeros(2),
-            reduced_state=np.array([v]),
+            reduced_state=np.array([v, 0.0]),
         )
         for v in speeds
     )
@@ -40,7 +40,10 @@ def with_inertia():
         )
         for a, b in ((0.0, 1.0), (1.0, 2.0), (2.0, 1.0), (1.0, 0.0))
     )
-    return Automaton(Unicycle(), trims, maneuvers, name="with inertia")
+    robot = SecondOrderUnicycle(
+        max_speed=2.0, max_turn_rate=1.0, max_acceleration=1.0, max_angular_acceleration=1.0
+    )
+    return Automaton(robot, trims, maneuvers, name="with inertia")
 
 
 def test_trims_are_nodes_and_free_switches_are_lines():

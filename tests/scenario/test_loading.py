@@ -207,7 +207,7 @@ def test_trims_that_the_vehicle_of_the_file_cannot_drive(folder, old, new, robot
          "--with: nav.yaml:1: the key 'schema' is missing: no scenario, need schema: 1"),
         ("nav.pgm", {}, "nav.pgm: is the image of a map, need the YAML file that states its "
          "resolution"),
-        ("x.xml", {}, "x.xml: CommonRoad files are not read in this version"),
+        ("x.xml", {}, "x.xml: no such file"),
         ("nowhere.csv", {}, "nowhere.csv: no such file"),
         ("nowhere.scen", {}, "nowhere.scen: no such file"),
         ("nowhere.svg", {}, "nowhere.svg: no such file"),

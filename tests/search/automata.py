@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import itertools
+import math
 
 import numpy as np
+from scipy.optimize import brentq
 
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.models import Unicycle, UserModel
+from maneuver_automaton.groups import SE2, SE2xR
+from maneuver_automaton.models import CarWithTrailer, SecondOrderUnicycle, UserModel
 from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.primitives.bang_bang import connect_bang_bang
+from maneuver_automaton.primitives.driving import drive
 
 
 def linked(twists, *, rng: np.random.Generator | None = None, size: float = 0.3) -> Automaton:
@@ -29,7 +34,7 @@ def linked(twists, *, rng: np.random.Generator | None = None, size: float = 0.3)
         )
         for a, b in itertools.permutations(trims, 2)
     )
-    return Automaton(_model(dof), trims, maneuvers)
+    return Automaton(model_of_kinds(dof), trims, maneuvers)
 
 
 def joined_end(automaton: Automaton, library, start, word, durations, start_trim, goal_trim):
@@ -46,14 +51,88 @@ def joined_end(automaton: Automaton, library, start, word, durations, start_trim
     return pose.pose
 
 
-def _model(dof: int):
-    if dof == 3:
-        return Unicycle()
-    from maneuver_automaton.groups import SE2xR
-
+def model_of_kinds(dof: int = 3) -> UserModel:
+    """A vehicle whose reduced state is no more than the number of its trim."""
     return UserModel(
-        name="lift",
-        group=SE2xR,
-        control_names=("speed", "climb"),
-        velocity=lambda z, u: [u[0], 0.0, 0.0, u[1]],
+        name="kinds",
+        group=SE2 if dof == 3 else SE2xR,
+        control_names=("speed", "turn_rate"),
+        reduced_names=("kind",),
+        velocity=lambda z, u: [u[0], 0.0, u[1], 0.0][:dof],
+        dynamics=lambda z, u: [0.0],
     )
+
+
+def inertial_unicycle(*, levels: int = 3) -> Automaton:
+    """Second-order unicycle: a grid of speeds and turn rates to 0.5, bang-bang maneuvers."""
+    model = SecondOrderUnicycle(
+        max_speed=0.5, max_turn_rate=0.5, max_acceleration=0.25, max_angular_acceleration=0.25
+    )
+    values = np.linspace(-0.5, 0.5, levels)
+    trims = [
+        Trim(
+            name=f"{speed:g} {turn:g}",
+            body_velocity=[speed, 0.0, turn],
+            control=[0.0, 0.0],
+            reduced_state=[speed, turn],
+        )
+        for speed in values
+        for turn in values
+    ]
+    near = [
+        (i, j)
+        for i, j in itertools.permutations(range(len(trims)), 2)
+        if np.abs(trims[i].reduced_state - trims[j].reduced_state).max() <= 0.5 + 1e-9
+    ]
+    return Automaton(model, tuple(trims), connect_bang_bang(model, trims, pairs=near))
+
+
+def truck_with_trailer(*, levels: int = 5) -> Automaton:
+    """dynobench's car with a trailer: steady turns both ways, each with the hitch that it keeps.
+
+    Maneuvers steer fully to one side until the hitch is that of another trim.
+    """
+    model = CarWithTrailer(
+        wheelbase=0.25, hitch_length=0.5, max_steering=math.pi / 3.0, max_speed=0.5, min_speed=-0.1,
+        max_hitch=math.pi / 4.0,
+    )  # fmt: skip
+    hitches = np.linspace(-0.9, 0.9, levels) * math.pi / 4.0
+    trims: list[Trim] = []
+    for hitch in hitches:
+        steering = math.atan(0.25 * math.sin(hitch) / 0.5)
+        for speed in (0.0, 0.5, -0.1):
+            control = np.array([speed, steering])
+            twist = model.body_velocity(np.array([hitch]), control)
+            trims.append(
+                Trim(
+                    name=f"{speed:g} at {hitch:.2f}",
+                    body_velocity=twist,
+                    control=control,
+                    reduced_state=[hitch],
+                )
+            )
+    maneuvers = []
+    for a, b in itertools.permutations(trims, 2):
+        speed = float(a.control[0])
+        before, after = float(a.reduced_state[0]), float(b.reduced_state[0])
+        if speed != b.control[0] or speed == 0.0 or before == after:
+            continue
+        control = [[speed, math.copysign(math.pi / 3.0, (after - before) * speed)]]
+
+        def left(t: float, before=before, after=after, control=control) -> float:
+            return (
+                drive(model, [before], control=control, durations=[t]).reduced_state[-1, 0] - after
+            )
+
+        course = drive(model, [before], control=control, durations=[brentq(left, 1e-6, 40.0)])
+        maneuvers.append(
+            Maneuver(
+                name=f"{a.name} to {b.name}",
+                source=a.name,
+                target=b.name,
+                displacement=course.pose[-1],
+                duration=float(course.time[-1]),
+                course=course,
+            )
+        )
+    return Automaton(model, tuple(trims), tuple(maneuvers))

@@ -15,10 +15,10 @@ from maneuver_automaton.audit import audit_plan
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.search.maneuver_word import word_setup
+from maneuver_automaton.search.maneuver_setup import word_setup
 from maneuver_automaton.search.maneuver_words import search_maneuver_words
 from maneuver_automaton.search.result import SearchStatus
-from tests.inertia import car_automaton, unicycle_automaton
+from tests.ramps import car_automaton, unicycle_automaton
 from tests.search.cases import compiled_only
 
 SMALL = ((0.0, 0.0), (1.0, 0.0), (0.8, 0.8), (0.8, -0.8))

@@ -17,7 +17,7 @@ from maneuver_automaton.models import Unicycle
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.search import steer
 from maneuver_automaton.search.transfer import transfer_library, transfers
-from tests.search.automata import joined_end, linked
+from tests.search.automata import joined_end, linked, model_of_kinds
 
 REST, AHEAD, LEFT, RIGHT = [0.0, 0, 0], [1.0, 0, 0], [1.0, 0, 1.0], [0.8, 0, -1.0]
 SIDE, SPIN, BACK = [0.2, 0.7, 0], [0.0, 0, 1.3], [-0.5, 0, 0.2]
@@ -163,14 +163,14 @@ def test_chains_of_maneuvers_are_transitions():
         for a, b, x, t in [("rest", "slow", 0.5, 1.0), ("slow", "fast", 1.5, 1.0),
                            ("rest", "fast", 9.0, 5.0), ("fast", "rest", 2.0, 2.0)]
     )  # fmt: skip
-    library = transfer_library(Automaton(Unicycle(), trims, maneuvers))
+    library = transfer_library(Automaton(model_of_kinds(), trims, maneuvers))
     assert library.chain(0, 2) == ((0, 1), (1, 2))
     assert library.arrays.cost[0, 2] == 2.0
     first, second = (SE2(maneuvers[k].displacement) for k in (0, 1))
     assert np.allclose(library.arrays.shift[0, 2, :3], (first @ second).pose, atol=1e-15)
     assert np.isfinite(library.arrays.cost).all()
     dear = transfer_library(
-        Automaton(Unicycle(), trims, maneuvers), maneuver_costs=[9.0, 9.0, 1.0, 1.0]
+        Automaton(model_of_kinds(), trims, maneuvers), maneuver_costs=[9.0, 9.0, 1.0, 1.0]
     )
     assert dear.chain(0, 2) == ((2, 2),)
 
@@ -180,7 +180,7 @@ def test_trims_without_a_way_between_them_are_named():
         Trim(name=name, body_velocity=[v, 0, 0], control=[0, 0], reduced_state=[v])
         for name, v in (("rest", 0.0), ("fast", 2.0))
     )
-    library = transfer_library(Automaton(Unicycle(), trims))
+    library = transfer_library(Automaton(model_of_kinds(), trims))
     assert transfers(library, [0, 0, 0], [1, 0, 0], start_trim=0, goal_trim=1) == []
     with pytest.raises(ValueError) as error:
         library.chain(0, 1)

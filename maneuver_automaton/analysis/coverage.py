@@ -1,0 +1,307 @@
+"""How well a library covers the poses around it: dispersion, and the factor by which it detours.
+
+Both are of free space, for words that begin and end at rest where the library has rest, and both
+are found by sampling: the true values, over all poses, may be worse than those over the samples.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray, wrapped
+from maneuver_automaton.analysis.reach import (
+    Reached,
+    ReachSettings,
+    path_length,
+    reached,
+    rest_classes,
+)
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.models import LatticeBody
+from maneuver_automaton.problem import Problem
+
+REFERENCE_S = 0.2  # for the plan of a reference to a pose
+
+Reference = Callable[[Array], float]
+"""Least cost from the origin to a pose (3,) [m, m, rad], inf if it cannot be reached."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CoverageSettings:
+    """Where poses are drawn, how far apart they are, and which words may reach them."""
+
+    radius: float = 2.0  # [m] of the disc of positions; headings are all
+    metres_per_radian: float = 1.0  # what a radian of heading counts for in a distance [m]
+    samples: int = 2000  # for the dispersion
+    pairs: int = 100  # for the spanning factor
+    seed: int = 0  # of the scrambled Halton sequence
+    reach: ReachSettings = field(default_factory=ReachSettings)
+
+    def __post_init__(self) -> None:
+        for name in ("radius", "metres_per_radian", "samples", "pairs"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"coverage: {name} must be positive, got {getattr(self, name)}")
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Dispersion:
+    """How far a pose can be from all that are reached [m]."""
+
+    largest: float
+    mean: float
+    pose: Array  # (3,) the sample that is furthest from all
+    reached: int  # poses at which words end
+    most: float  # cost of the dearest of these words [s or m]: less where the search was cut short
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class SpanningFactor:
+    """By how much the library detours at most, against a reference."""
+
+    largest: float
+    median: float
+    pose: Array  # (3,) to which the detour is largest
+    pairs: int  # poses that were compared
+
+
+def settings_for(automaton: Automaton, *, measure: str = "time") -> CoverageSettings:
+    """Settings to the size of a library: a disc of twice its longest maneuver.
+
+    Words may cost four of the dearest maneuvers, or eight quanta of half a second or metre.
+    """
+    spans = [m.duration if measure == "time" else path_length(m) for m in automaton.maneuvers]
+    ways = [float(np.linalg.norm(m.displacement[:2])) for m in automaton.maneuvers]
+    quantum = 0.5
+    most = max(4.0 * max(spans, default=0.0), 8.0 * quantum)
+    radius = 2.0 * max(ways, default=0.0) or 2.0
+    body = automaton.model
+    cell = body.resolution / 4.0 if isinstance(body, LatticeBody) else radius / 100.0
+    reach = ReachSettings(measure=measure, most=most, quantum=quantum, same_m=cell)
+    return CoverageSettings(radius=radius, reach=reach)
+
+
+def dispersion(
+    automaton: Automaton,
+    *,
+    start: str | None = None,
+    settings: CoverageSettings | None = None,
+) -> Dispersion:
+    """Distance of a pose in a ball to the nearest that words of bounded cost reach, at most.
+
+    ``max over poses g of min over reached h of d(g, h)``, with ``d^2 = dx^2 + dy^2 + (L dh)^2``,
+    L as `metres_per_radian` says and headings modulo a turn. Trims last whole quanta here, so that
+    of a library with trims is an upper bound of its own; that of a lattice is not.
+
+    Source: Niederreiter (1992), *Random Number Generation and Quasi-Monte Carlo Methods*, Ch. 6,
+    for dispersion; LaValle (2006), *Planning Algorithms*, Sec. 5.2.3; Pivtoraiko, Kelly (2005),
+    *Efficient constrained path planning via search in state lattices*, for what a lattice covers.
+
+    Parameters
+    ----------
+    automaton : Automaton
+        The library, of a vehicle in the plane.
+    start : str, optional
+        Trim at the origin; rest if None.
+    settings : CoverageSettings, optional
+        Ball, samples, and the words that count.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "back": (-1, 0)})
+    >>> coarse = CoverageSettings(radius=1.0, samples=200, reach=ReachSettings(most=1.0))
+    >>> bool(dispersion(robot, settings=coarse).largest > np.pi / 2)  # it cannot turn
+    True
+    """
+    settings = settings or CoverageSettings()
+    words = _at_rest(automaton, reached(automaton, start=start, settings=settings.reach))
+    samples = poses_in_ball(settings.radius, settings.samples, seed=settings.seed)
+    gaps, _ = _nearest(words.poses, samples, settings.metres_per_radian)
+    worst = int(gaps.argmax())
+    return Dispersion(
+        largest=float(gaps[worst]),
+        mean=float(gaps.mean()),
+        pose=samples[worst],
+        reached=len(words.poses),
+        most=float(words.costs.max()),
+    )
+
+
+def spanning_factor(
+    automaton: Automaton,
+    *,
+    reference: Reference | None = None,
+    start: str | None = None,
+    settings: CoverageSettings | None = None,
+) -> SpanningFactor:
+    """The t by which the library spans what it reaches: its cost over that of a reference, at most.
+
+    Poses are those at which words of the library end within the ball, next to the samples of a
+    Halton sequence; a pose at the origin is left out. A library t-spans a lattice if t times the
+    cost of the best motion pays for a word to each of its points.
+
+    Source: Botros, Smith (2019), *Computing a minimal set of t-spanning motion primitives for
+    lattice planners*, arXiv 1903.10483, Definition of a t-spanner, here over sampled poses.
+
+    Parameters
+    ----------
+    automaton : Automaton
+        The library, of a vehicle in the plane.
+    reference : callable, optional
+        Least cost to a pose; `straight_line` of the library if None, which no motion beats.
+    start : str, optional
+        Trim at the origin; rest if None.
+    settings : CoverageSettings, optional
+        Ball, number of pairs, and the words that count.
+
+    Raises
+    ------
+    ValueError
+        If no word ends in the ball but at the origin.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (0, 1)})
+    >>> spanning_factor(robot, settings=CoverageSettings(radius=1.0, pairs=20)).largest > 2.0
+    True
+    """
+    settings = settings or CoverageSettings()
+    words = _at_rest(automaton, reached(automaton, start=start, settings=settings.reach))
+    least = reference or straight_line(automaton, measure=settings.reach.measure)
+    inside = np.linalg.norm(words.poses[:, :2], axis=1) <= settings.radius
+    inside &= words.costs > 0.0
+    if not inside.any():
+        raise ValueError(
+            f"spanning factor: no word of at most {settings.reach.most:g} ends within "
+            f"{settings.radius:g} m"
+        )
+    poses, costs = words.poses[inside], words.costs[inside]
+    samples = poses_in_ball(settings.radius, settings.pairs, seed=settings.seed)
+    _, chosen = _nearest(poses, samples, settings.metres_per_radian)
+    chosen = np.unique(chosen)
+    references = np.array([least(pose) for pose in poses[chosen]])
+    known = np.isfinite(references) & (references > 0.0)
+    if not known.any():
+        raise ValueError("spanning factor: the reference reaches none of the poses")
+    ratios = costs[chosen][known] / references[known]
+    worst = int(ratios.argmax())
+    return SpanningFactor(
+        largest=float(ratios[worst]),
+        median=float(np.median(ratios)),
+        pose=_shown(poses[chosen][known][worst]),
+        pairs=int(known.sum()),
+    )
+
+
+def straight_line(automaton: Automaton, *, measure: str = "time") -> Reference:
+    """The least cost of a body that could drive and turn any way, as fast as the library does.
+
+    It is a lower bound for every vehicle: the distance, or the longer of the times for the distance
+    and for the turn.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (2, 0), "left": (0, 1)})
+    >>> straight_line(robot)(np.array([3.0, 4.0, 0.1]))
+    2.5
+    """
+    twists = [trim.body_velocity for trim in automaton.trims]
+    for maneuver in automaton.maneuvers:
+        if maneuver.course is not None:
+            course = maneuver.course
+            twists.extend(automaton.model.body_velocity(course.reduced_state, course.control))
+        elif maneuver.duration > 0.0:
+            twists.append(maneuver.displacement / maneuver.duration)
+    table = np.array(twists)
+    speed = float(np.hypot(table[:, 0], table[:, 1]).max())
+    turn_rate = float(np.abs(table[:, 2]).max())
+
+    def least(pose: Array) -> float:
+        distance = float(np.hypot(pose[0], pose[1]))
+        if measure == "length":
+            return distance
+        turn = abs(math.remainder(pose[2], 2.0 * math.pi))
+        times = [
+            way / rate if rate else (math.inf if way else 0.0)
+            for way, rate in ((distance, speed), (turn, turn_rate))
+        ]
+        return max(times)
+
+    return least
+
+
+def planned(automaton: Automaton, *, measure: str = "time") -> Reference:
+    """The cost of the plan that a reference library finds in free space, for each pose.
+
+    For a few trims all words are searched, so the plan is the best; for many it may be dearer than
+    that, and a spanning factor against it too small.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import Unicycle
+    >>> dubins = Automaton.of_controls(
+    ...     Unicycle(), {"ahead": (1, 0), "left": (1, 1), "right": (1, -1)})
+    >>> round(planned(dubins)(np.array([0.0, 2.0, np.pi])), 6)
+    3.141593
+    """
+    cost = Cost(time=1.0) if measure == "time" else Cost(length=1.0)
+    origin = np.zeros(automaton.model.group.dof)
+
+    def least(pose: Array) -> float:
+        from maneuver_automaton.planning import plan
+
+        result = plan(Problem(automaton, origin, pose, cost=cost), time_limit=REFERENCE_S)
+        return math.inf if result.cost is None else float(result.cost)
+
+    return least
+
+
+def poses_in_ball(radius: float, count: int, *, seed: int) -> Array:
+    """Poses (count, 3) spread evenly over a disc and all headings: a scrambled Halton sequence.
+
+    Source: Owen (2017), *A randomized Halton algorithm in R*, arXiv 1706.02808, by SciPy.
+
+    Examples
+    --------
+    >>> poses = poses_in_ball(2.0, 100, seed=1)
+    >>> poses.shape, bool(np.hypot(poses[:, 0], poses[:, 1]).max() <= 2.0)
+    ((100, 3), True)
+    """
+    from scipy.stats import qmc
+
+    share, around, heading = qmc.Halton(3, seed=seed).random(count).T
+    distance, angle = radius * np.sqrt(share), 2.0 * np.pi * around
+    turn = 2.0 * np.pi * heading - np.pi
+    return np.stack([distance * np.cos(angle), distance * np.sin(angle), turn], axis=-1)
+
+
+def _shown(pose: Array) -> Array:
+    """A pose with its heading within half a turn."""
+    return np.append(pose[:2], wrapped(pose[2]))
+
+
+def _at_rest(automaton: Automaton, words: Reached) -> Reached:
+    """Those words that end where the vehicle can stand."""
+    ends = np.isin(words.classes, list(rest_classes(automaton)))
+    return replace(
+        words, poses=words.poses[ends], costs=words.costs[ends], classes=words.classes[ends]
+    )
+
+
+def _nearest(poses: Array, samples: Array, length: float) -> tuple[Array, IntArray]:
+    """Distance (n,) of each sample to the nearest pose, and which it is (n,)."""
+    from scipy.spatial import cKDTree
+
+    turn = 2.0 * np.pi * length
+    places = np.stack([poses[:, 0], poses[:, 1], np.mod(length * poses[:, 2], turn)], axis=-1)
+    around = np.concatenate([places + np.array([0.0, 0.0, k * turn]) for k in (-1.0, 0.0, 1.0)])
+    asked = np.stack([samples[:, 0], samples[:, 1], np.mod(length * samples[:, 2], turn)], axis=-1)
+    gaps, rows = cKDTree(around).query(asked)
+    return np.asarray(gaps), np.asarray(rows, dtype=np.int64) % len(poses)

@@ -1,0 +1,226 @@
+"""Poses that words of bounded cost reach from rest, in free space."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.primitives import Maneuver, Trim
+
+EVEN = 16  # the number of bins of headings is a multiple: usual headings lie within, not between
+MEASURES = ("time", "length")
+SHORTEST = 1e-9  # of the greatest cost: steps that cost less are not taken
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReachSettings:
+    """How far to go, in which steps, and which poses count as one."""
+
+    measure: str = "time"  # time [s] | length [m]
+    most: float = 8.0  # greatest cost of a word [s or m]
+    quantum: float = 0.5  # trims last a multiple of what costs this [s or m]
+    same_m: float = 0.02  # poses of one trim in one cell of this side count as one
+    same_rad: float = 0.02  # [rad], or a little less
+    most_nodes: int = 100_000
+
+    def __post_init__(self) -> None:
+        if self.measure not in MEASURES:
+            raise ValueError(
+                f"reach: measure must be one of {', '.join(MEASURES)}, got {self.measure!r}"
+            )
+        for name in ("most", "quantum", "same_m", "same_rad", "most_nodes"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"reach: {name} must be positive, got {getattr(self, name)}")
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Reached:
+    """Poses by rising cost; the first is the start."""
+
+    poses: Array  # (n, 3) [m, m, rad]
+    costs: Array  # (n,) [s or m]
+    classes: IntArray  # (n,) of trims, in which the vehicle is there
+    complete: bool  # whether the search ended before `most_nodes` were found
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Steps:
+    """What can be done in one class of trims."""
+
+    displacements: Array  # (k, 3)
+    costs: Array  # (k,)
+    targets: IntArray  # (k,) classes
+
+
+def reached(automaton: Automaton, *, start: str | None = None, settings: ReachSettings) -> Reached:
+    """The poses that words from the origin reach, cheapest first; in the trim `start`, or at rest.
+
+    Nodes are expanded in waves: all that cost less than the cheapest one and its cheapest step; a
+    cell that is found again for less is expanded again. A cell keeps the cheapest pose found in it,
+    exactly; on a lattice whose points are further apart than the cells nothing is lost, elsewhere
+    the costs are upper bounds.
+
+    Source: Dijkstra (1959), *A note on two problems in connexion with graphs*; Barraquand, Latombe
+    (1993), *Nonholonomic multibody mobile robots*, for one node a cell.
+
+    Raises
+    ------
+    ValueError
+        If the vehicle does not move in the plane.
+    """
+    if automaton.model.group is not SE2:
+        raise ValueError(f"reach: {automaton.model.name} is no vehicle in the plane")
+    first = _start_class(automaton, start)
+    steps = _steps(automaton, settings)
+    return _searched(first, steps, settings)
+
+
+def rest_classes(automaton: Automaton) -> frozenset[int]:
+    """Classes in which the vehicle can stand still; all of them if it never can."""
+    still = ~automaton.body_velocities.any(axis=1)
+    chosen = automaton.trim_classes[still] if still.any() else automaton.trim_classes
+    return frozenset(chosen.tolist())
+
+
+def path_length(maneuver: Maneuver) -> float:
+    """Way of the reference point during a maneuver [m]; the straight line where it is not known."""
+    poses = None if maneuver.course is None else maneuver.course.pose
+    if poses is None:
+        return float(np.linalg.norm(maneuver.displacement[:2]))
+    return float(np.linalg.norm(np.diff(poses[:, :2], axis=0), axis=1).sum())
+
+
+def _start_class(automaton: Automaton, start: str | None) -> int:
+    index = automaton.rest if start is None else automaton.index_of(start)
+    return int(automaton.trim_classes[index or 0])
+
+
+def _steps(automaton: Automaton, settings: ReachSettings) -> dict[int, _Steps]:
+    """Maneuvers, and every trim for one quantum of cost, by class."""
+    rows: defaultdict[int, list[tuple[Array, float, int]]] = defaultdict(list)
+    for trim, where in zip(automaton.trims, automaton.trim_classes.tolist(), strict=True):
+        seconds = _quantum(trim, settings)
+        if seconds is not None:
+            rows[where].append(
+                (SE2.exp(seconds * trim.body_velocity).pose, settings.quantum, where)
+            )
+    for maneuver in automaton.maneuvers:
+        source, target = (
+            int(automaton.trim_classes[automaton.index_of(name)])
+            for name in (maneuver.source, maneuver.target)
+        )
+        cost = maneuver.duration if settings.measure == "time" else path_length(maneuver)
+        if maneuver.displacement.any() or source != target:
+            rows[source].append((maneuver.displacement, cost, target))
+    return {where: _table(entries) for where, entries in rows.items()}
+
+
+def _quantum(trim: Trim, settings: ReachSettings) -> float | None:
+    """How long a trim lasts in one step [s]; None if it does not move, or not at a cost."""
+    rate = 1.0 if settings.measure == "time" else float(np.hypot(*trim.body_velocity[:2]))
+    if trim.is_rest or not rate > 0.0:
+        return None
+    return min(settings.quantum / rate, trim.max_duration)
+
+
+def _table(entries: Sequence[tuple[Array, float, int]]) -> _Steps:
+    return _Steps(
+        displacements=np.array([entry[0] for entry in entries]),
+        costs=np.array([entry[1] for entry in entries]),
+        targets=np.array([entry[2] for entry in entries], dtype=np.int64),
+    )
+
+
+def _searched(first: int, steps: dict[int, _Steps], settings: ReachSettings) -> Reached:
+    least = min(
+        (float(table.costs[table.costs > 0.0].min(initial=math.inf)) for table in steps.values()),
+        default=math.inf,
+    )
+    open_ = _Nodes(np.zeros((1, 3)), np.zeros(1), np.array([first], dtype=np.int64))
+    closed: list[_Nodes] = []
+    known: dict[int, float] = {}
+    complete = True
+    while open_.costs.size:
+        limit = float(open_.costs.min()) + max(least, SHORTEST * settings.most)
+        due = open_.costs < limit
+        wave, open_ = _cheapest(open_.chosen(due), settings), open_.chosen(~due)
+        fresh = _unknown(wave, known, settings)
+        if not fresh.costs.size:
+            continue
+        closed.append(fresh)
+        if len(known) >= settings.most_nodes:
+            complete = False
+            break
+        parts = [open_, *_followers(fresh, steps, settings)]
+        open_ = _cheapest(_joined(parts), settings)
+    nodes = _cheapest(_joined(closed), settings)
+    order = np.argsort(nodes.costs, kind="stable")
+    nodes = nodes.chosen(order)
+    return Reached(poses=nodes.poses, costs=nodes.costs, classes=nodes.classes, complete=complete)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Nodes:
+    poses: Array
+    costs: Array
+    classes: IntArray
+
+    def chosen(self, rows: IntArray | NDArray[np.bool_]) -> _Nodes:
+        return _Nodes(self.poses[rows], self.costs[rows], self.classes[rows])
+
+    def keys(self, settings: ReachSettings) -> IntArray:
+        """One number for each cell and class."""
+        bins = EVEN * math.ceil(2.0 * math.pi / (EVEN * settings.same_rad))
+        x, y = np.round(self.poses[:, :2].T / settings.same_m).astype(np.int64)
+        heading = np.mod(np.round(self.poses[:, 2] * bins / (2.0 * math.pi)).astype(np.int64), bins)
+        wide = 1 << 20
+        keys: IntArray = ((self.classes * bins + heading) * wide + x + wide // 2) * wide + y
+        return keys
+
+
+def _joined(parts: Sequence[_Nodes]) -> _Nodes:
+    return _Nodes(
+        np.concatenate([part.poses for part in parts]),
+        np.concatenate([part.costs for part in parts]),
+        np.concatenate([part.classes for part in parts]),
+    )
+
+
+def _cheapest(nodes: _Nodes, settings: ReachSettings) -> _Nodes:
+    """One node for each cell and class."""
+    order = np.argsort(nodes.costs, kind="stable")
+    _, firsts = np.unique(nodes.keys(settings)[order], return_index=True)
+    return nodes.chosen(order[firsts])
+
+
+def _unknown(nodes: _Nodes, known: dict[int, float], settings: ReachSettings) -> _Nodes:
+    """Nodes whose cells were not closed before, or at a higher cost; they are now."""
+    fresh = np.zeros(nodes.costs.size, dtype=bool)
+    pairs = zip(nodes.keys(settings).tolist(), nodes.costs.tolist(), strict=True)
+    for k, (key, cost) in enumerate(pairs):
+        if cost < known.get(key, math.inf) - SHORTEST * settings.most:
+            known[key] = cost
+            fresh[k] = True
+    return nodes.chosen(fresh)
+
+
+def _followers(nodes: _Nodes, steps: dict[int, _Steps], settings: ReachSettings) -> list[_Nodes]:
+    parts = []
+    for where in np.unique(nodes.classes).tolist():
+        table = steps.get(where)
+        if table is None:
+            continue
+        here = nodes.chosen(nodes.classes == where)
+        poses = (SE2(here.poses[:, None]) @ SE2(table.displacements)).pose.reshape(-1, 3)
+        costs = (here.costs[:, None] + table.costs).ravel()
+        targets = np.broadcast_to(table.targets, (here.costs.size, table.costs.size)).ravel()
+        parts.append(_Nodes(poses, costs, targets).chosen(costs <= settings.most))
+    return parts

@@ -1,0 +1,185 @@
+"""`plan` and `mpc` of a drive on roads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from maneuver_automaton.cli.compiling import announced
+from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
+from maneuver_automaton.cli.inputs import Parts, make_folder, not_written
+from maneuver_automaton.cli.progress import progress_bar, waiting
+from maneuver_automaton.errors import InvalidScenario
+
+if TYPE_CHECKING:
+    from rich.text import Text
+
+    from maneuver_automaton.cli import mpc_command, plan_command
+    from maneuver_automaton.primitives import Trajectory
+    from maneuver_automaton.roads import RoadDrive, RoadPlanResult, RoadScene, RoadVehicle
+
+TIME_LIMIT = 10.0  # [s] of one plan
+ENDING = ".xml"
+
+
+def is_road(path: Path) -> bool:
+    """Whether a file is one of CommonRoad, by its ending."""
+    return path.suffix.lower() == ENDING
+
+
+def plan_file(
+    path: Path, out: Path, *, settings: plan_command.Settings, parts: Parts
+) -> RoadPlanResult:
+    """Plan one drive into the folder `out`, and print the plan; the result."""
+    from maneuver_automaton.formats.road_json import road_plan_to_dict, save_road_document
+    from maneuver_automaton.roads import plan_road
+
+    scene, vehicle = _road(path, parts)
+    make_folder(out)
+    limit = settings.time_limit or TIME_LIMIT
+    with (
+        announced(quiet=settings.quiet),
+        waiting(f"planning, at most {limit:g} s", quiet=settings.quiet),
+    ):
+        try:
+            result = plan_road(scene, vehicle, time_limit=limit)
+        except ValueError as error:
+            raise _in_file(path, error) from error
+    document = road_plan_to_dict(result)
+
+    def write() -> None:
+        save_road_document(document, out / "plan.json")
+        for name in ("plan.png", "plan.gif"):
+            (out / name).unlink(missing_ok=True)  # of an earlier plan
+        if result.driven is not None:
+            named = (out / "plan.png", [out / "plan.gif"])
+            _draw(scene, vehicle, result.driven, named, settings.plot, settings.animate)
+
+    _written(write, out)
+    if result.plan is not None and not settings.quiet:
+        _print(scene.name, _plan_facts(result, out))
+    return result
+
+
+def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: Parts) -> int:
+    """Close the loop of one drive into the folder `out`, print it, return the exit code."""
+    from maneuver_automaton.formats.road_json import road_drive_to_dict, save_road_document
+    from maneuver_automaton.roads import drive_scene, road_planner
+
+    for name, value in (("--seeds", settings.seeds), ("--resume", settings.resume)):
+        if value is not None:
+            raise InvalidScenario(f"{name}: drives on roads have no such option; leave it out")
+    scene, vehicle = _road(path, parts)
+    make_folder(out)
+    with announced(quiet=settings.quiet):
+        try:
+            planner = road_planner(scene, vehicle)
+        except ValueError as error:
+            raise _in_file(path, error) from error
+        most = min(settings.steps or planner.last_tick, planner.last_tick)
+        with progress_bar("steps", most, quiet=settings.quiet) as advance:
+            drive = drive_scene(planner, steps=settings.steps, progress=lambda _: advance())
+    document = road_drive_to_dict(drive)
+
+    def write() -> None:
+        save_road_document(document, out / "closed_loop.json")
+        films = [out / "closed_loop.gif", out / "closed_loop.html"]
+        for file in (out / "closed_loop.png", *films):
+            file.unlink(missing_ok=True)  # of an earlier loop
+        named = (out / "closed_loop.png", films)
+        _draw(scene, vehicle, drive.driven, named, settings.plot, settings.animate)
+
+    _written(write, out)
+    if not settings.quiet:
+        _print(scene.name, _drive_facts(drive, out))
+    for name in drive.verdict.hit:
+        complain(f"{path}: collision with {name}")
+    if drive.verdict.off_road:
+        complain(f"{path}: off the road at {drive.verdict.off_road} of {drive.verdict.poses} poses")
+    if not drive.reached:
+        complain(f"{path}: {drive.status}: {drive.reason}")
+    return FOUND if drive.reached else NO_PLAN
+
+
+def _road(path: Path, parts: Parts) -> tuple[RoadScene, RoadVehicle]:
+    from maneuver_automaton.scenario import load_road
+
+    found = load_road(path, beside=parts.beside, case=parts.case)
+    assert found is not None  # by its ending
+    return found
+
+
+def _draw(
+    scene: RoadScene,
+    vehicle: RoadVehicle,
+    driven: Trajectory,
+    files: tuple[Path, Iterable[Path]],
+    plot: bool,
+    animate: bool,
+) -> None:
+    if not (plot or animate):
+        return
+    from maneuver_automaton import plotting
+
+    if plot:
+        plotting.save_road_figure(scene, vehicle, driven, files[0])
+    if animate:
+        for file in files[1]:
+            plotting.save_road_animation(scene, vehicle, driven, file)
+
+
+def _written(write: Callable[[], None], out: Path) -> None:
+    try:
+        write()
+    except OSError as error:
+        raise not_written(Path(error.filename or out), error) from error
+
+
+def _plan_facts(result: RoadPlanResult, out: Path) -> dict[str, str]:
+    plan, verdict, driven = result.plan, result.verdict, result.driven
+    assert plan is not None
+    assert verdict is not None
+    assert driven is not None
+    return {
+        "goal": f"reached at {driven.time[-1]:.6g} s",
+        "cost": f"{result.planner.price(plan):.6g}",
+        "clearance": f"{verdict.clearance_m:.3g} m, to the edge of the road {verdict.edge_m:.3g} m",
+        "stop after it": "free" if plan.stops else "none was found",
+        "searched": f"{result.search_s:.3g} s",
+        "written to": str(out),
+    }
+
+
+def _drive_facts(drive: RoadDrive, out: Path) -> dict[str, str]:
+    verdict = drive.verdict
+    milliseconds = 1e3 * drive.solve_s
+    facts = {
+        "goal": f"reached at {drive.driven.time[-1]:.6g} s" if drive.reached else drive.reason,
+        "steps": f"{len(drive.steps)}, {sum(step.replanned for step in drive.steps)} replanned",
+        "collisions": str(len(verdict.hit)),
+        "clearance": f"{verdict.clearance_m:.3g} m, to the edge of the road {verdict.edge_m:.3g} m",
+        "written to": str(out),
+    }
+    if len(milliseconds):
+        facts["time per step"] = (
+            f"{np.median(milliseconds):.2f} ms median, {milliseconds.max():.2f} ms at most"
+        )
+    return facts
+
+
+def _print(name: str, facts: dict[str, str]) -> None:
+    from rich.text import Text
+
+    from maneuver_automaton.cli.tables import console
+
+    lines: list[Text] = [Text(name)]
+    lines += [Text(f"  {what + ':':<16}{value}") for what, value in facts.items()]
+    for line in lines:
+        console().print(line, soft_wrap=True)
+
+
+def _in_file(path: Path, error: ValueError) -> InvalidScenario:
+    return error if isinstance(error, InvalidScenario) else InvalidScenario(f"{path}: {error}")

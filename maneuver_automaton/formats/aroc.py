@@ -1,0 +1,295 @@
+"""Maneuver automata exported by AROC: a folder with `automaton.xml` and `primitives/`; read only.
+
+Every child of `automaton.xml` names a file of one primitive: numbers of those that may follow, from
+1; states and inputs; and the set that the vehicle occupies while a controller keeps it near the
+motion. The states are (x, y, speed, heading) of a car that accelerates, its steering is an input;
+the wheelbase is not stated, and is fitted to the changes of the heading.
+
+As an automaton: a speed is a trim, a primitive is a maneuver, driven anew with the inputs of the
+file. An automaton lets everything follow that begins at the speed where a primitive ends; AROC lets
+follow what its controllers were proven for. `deviation_of` counts what is added, and says how far
+from the stated states the motions lead.
+
+Source: Kochdumper et al. (2021), *AROC: a toolbox for automated reachset optimal controller
+synthesis*, HSCC.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton.automaton import Automaton, Trajectory
+from maneuver_automaton.errors import InvalidLibrary
+from maneuver_automaton.formats.levels import levels_of, nearest_level
+from maneuver_automaton.formats.xml_source import Element, read_xml
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.models import AcceleratingCar
+from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.primitives.driving import drive
+
+LIST, FOLDER = "automaton.xml", "primitives"
+MOST_BYTES = 50_000_000
+STATES = ("x", "y", "orientation", "velocity")
+INPUTS = ("acceleration", "steer")
+FITS = 0.01  # [m/s] speeds closer than this are one
+LEAST = 1e-3  # of a limit that no primitive shows [m/s, m/s^2, rad]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Occupancy:
+    """What the vehicle occupies during an interval of time, seen from where it starts."""
+
+    begin: float  # [s]
+    end: float  # [s]
+    corners: Array  # (n, 2) [m]
+
+    def __post_init__(self) -> None:
+        freeze(self, "corners", last=2)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ArocPrimitive:
+    """One primitive, as it stands in its file."""
+
+    name: str  # of the file
+    successors: tuple[int, ...]  # positions of those that may follow, from 0
+    time: Array  # (n,) [s]
+    states: Array  # (n, 4) x, y, orientation, velocity
+    inputs: Array  # (m, 2) acceleration, steering angle, each for an equal number of steps
+    occupancy: tuple[Occupancy, ...] = ()
+
+    def __post_init__(self) -> None:
+        freeze(self, "time")
+        freeze(self, "states", last=len(STATES))
+        freeze(self, "inputs", last=len(INPUTS))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ArocDeviation:
+    """How far the automaton is from the files, at most."""
+
+    position: float  # [m] of a driven motion from the stated states
+    heading: float  # [rad]
+    speed: float  # [m/s]
+    worst: str  # file of the primitive that is furthest off
+    added: int  # pairs that may follow each other in the automaton, and not in AROC
+
+    def __str__(self) -> str:
+        """One line for people."""
+        plural = "" if self.added == 1 else "s"
+        return (
+            f"driven with the inputs of the files, motions are at most {self.position:.2g} m, "
+            f"{self.heading:.2g} rad and {self.speed:.2g} m/s off their states ({self.worst}); "
+            f"{self.added} pair{plural} may follow each other that AROC does not let follow"
+        )
+
+
+def is_aroc(path: Path) -> bool:
+    """Whether a path is an export: its folder, or the list in it."""
+    folder = path if path.is_dir() else path.parent
+    named = path.is_dir() or path.name == LIST
+    return named and (folder / LIST).is_file() and (folder / FOLDER).is_dir()
+
+
+def read_aroc(path: Path) -> tuple[ArocPrimitive, ...]:
+    """The primitives of a folder, in the order of its list.
+
+    Raises
+    ------
+    InvalidScenario
+        If a file or element is missing, or holds what it may not.
+    """
+    folder = path if path.is_dir() else path.parent
+    root = read_xml(folder / LIST, what="a list of primitives", most=MOST_BYTES)
+    if not root.children:
+        raise root.error("names no primitive, need at least one")
+    return tuple(_primitive(folder, child, len(root.children)) for child in root.children)
+
+
+def wheelbase_of(primitives: tuple[ArocPrimitive, ...]) -> float:
+    """The wheelbase that fits the changes of the heading best [m].
+
+    Raises
+    ------
+    InvalidLibrary
+        If no primitive turns.
+    """
+    crossed, turned = [], []
+    for one in primitives:
+        control, spans = _controls(one), np.diff(one.time)
+        mean = 0.5 * (one.states[:-1, 3] + one.states[1:, 3])
+        crossed.append(mean * np.tan(control[:, 1]) * spans)
+        turned.append(np.diff(one.states[:, 2]))
+    way, turn = np.concatenate(crossed), np.concatenate(turned)
+    if not abs(float(way @ turn)) > 0.0:
+        raise InvalidLibrary(f"{LIST}: no primitive turns, so nothing tells the wheelbase")
+    return float(way @ way / (way @ turn))
+
+
+def automaton_of_aroc(
+    primitives: tuple[ArocPrimitive, ...], *, wheelbase: float | None = None, name: str = ""
+) -> Automaton:
+    """The automaton of an export, for a `wheelbase` [m] other than the fitted one if it is given.
+
+    Raises
+    ------
+    InvalidLibrary
+        If the wheelbase is not known, or a primitive is to follow one that ends at another speed.
+    """
+    length = wheelbase_of(primitives) if wheelbase is None else wheelbase
+    speeds = np.concatenate([one.states[:, 3] for one in primitives])
+    inputs = np.concatenate([one.inputs for one in primitives])
+    model = AcceleratingCar(
+        wheelbase=length,
+        max_steering=max(float(np.abs(inputs[:, 1]).max()), LEAST),
+        max_speed=max(float(speeds.max()), LEAST),
+        min_speed=min(float(speeds.min()), 0.0),
+        max_acceleration=max(float(np.abs(inputs[:, 0]).max()), LEAST),
+    )
+    begins = np.array([one.states[0, 3] for one in primitives])
+    ends = np.array([one.states[-1, 3] for one in primitives])
+    levels = levels_of(begins, ends, apart=FITS)
+    begin_levels, end_levels = nearest_level(begins, levels), nearest_level(ends, levels)
+    _check_successors(primitives, begin_levels, end_levels)
+    trims = {
+        speed: Trim(
+            name=f"speed {speed:.5g}",
+            body_velocity=np.array([speed, 0.0, 0.0]),
+            control=np.zeros(2),
+            reduced_state=np.array([speed]),
+        )
+        for speed in levels.tolist()
+    }
+    maneuvers = []
+    for one, begin, end in zip(primitives, begin_levels.tolist(), end_levels.tolist(), strict=True):
+        course = _driven(model, one, begin, end)
+        maneuvers.append(
+            Maneuver(
+                name=Path(one.name).stem,
+                source=trims[begin].name,
+                target=trims[end].name,
+                displacement=course.pose[-1],
+                duration=float(course.time[-1]),
+                course=course,
+            )
+        )
+    return Automaton(model, tuple(trims.values()), tuple(maneuvers), name=name)
+
+
+def deviation_of(primitives: tuple[ArocPrimitive, ...], automaton: Automaton) -> ArocDeviation:
+    """How far the maneuvers of `automaton_of_aroc` are from the files."""
+    off = []
+    for one, maneuver in zip(primitives, automaton.maneuvers, strict=True):
+        assert maneuver.course is not None  # it was made with one
+        times = one.time - one.time[0]
+        nearest = np.abs(maneuver.course.time - times[:, None]).argmin(axis=1)
+        gap = np.abs(maneuver.course.pose[nearest] - _seen(one))
+        speed = np.abs(maneuver.course.reduced_state[nearest, 0] - one.states[:, 3])
+        off.append((float(np.hypot(gap[:, 0], gap[:, 1]).max()), gap[:, 2].max(), speed.max()))
+    table = np.array(off)
+    sources = [maneuver.source for maneuver in automaton.maneuvers]
+    allowed = sum(sources.count(maneuver.target) for maneuver in automaton.maneuvers)
+    return ArocDeviation(
+        position=float(table[:, 0].max()),
+        heading=float(table[:, 1].max()),
+        speed=float(table[:, 2].max()),
+        worst=primitives[int(table.max(axis=1).argmax())].name,
+        added=allowed - sum(len(set(one.successors)) for one in primitives),
+    )
+
+
+def _primitive(folder: Path, listed: Element, n: int) -> ArocPrimitive:
+    name = listed.text.strip()
+    if not name or name != Path(name).name or "\0" in name:
+        raise listed.error(f"got {name!r:.60}, need the name of a file in {FOLDER}")
+    root = read_xml(folder / FOLDER / name, what="a primitive", most=MOST_BYTES)
+    successors = []
+    for child in root.need("successors").children:
+        number = child.number()
+        if not (number.is_integer() and 1 <= number <= n):
+            raise child.error(f"got {number:g}, need the number of a primitive, 1 to {n}")
+        successors.append(int(number) - 1)
+    rows = root.need("trajectory", "states").children
+    if len(rows) < 2:
+        raise root.need("trajectory", "states").error(f"got {len(rows)} states, need at least 2")
+    time = np.array([row.need("time").number() for row in rows])
+    for k in range(1, len(rows)):
+        if not time[k] > time[k - 1]:
+            raise (
+                rows[k]
+                .need("time")
+                .error(f"got {time[k]:g}, need more than {time[k - 1]:g}, that of the state before")
+            )
+    inputs = root.need("trajectory", "inputs")
+    given = [[row.need(name).number() for name in INPUTS] for row in inputs.children]
+    steps = len(rows) - 1
+    if len(given) == len(rows):
+        given = given[:-1]  # one for every state: nothing follows the last
+    if not given or steps % len(given):
+        raise inputs.error(
+            f"got {len(inputs.children)} inputs for {len(rows)} states, need one for every step "
+            f"or every few of the {steps}"
+        )
+    occupied = root.get("occupancySet")
+    return ArocPrimitive(
+        name=name,
+        successors=tuple(successors),
+        time=time,
+        states=np.array([[row.need(what).number() for what in STATES] for row in rows]),
+        inputs=np.array(given),
+        occupancy=tuple(_occupancy(row) for row in (occupied.children if occupied else ())),
+    )
+
+
+def _occupancy(row: Element) -> Occupancy:
+    points = row.need("set").children
+    corners = np.full((len(points), 2), np.nan)
+    for corner, point in zip(corners, points, strict=True):
+        for value in point.children:
+            axis = value.whole("dimension", least=1)
+            if axis > 2:
+                raise value.error(f"dimension: got {axis}, need 1 or 2")
+            corner[axis - 1] = value.number()
+        if np.isnan(corner).any():
+            raise point.error("misses a coordinate, need the dimensions 1 and 2")
+    if len(points) < 3:
+        raise row.need("set").error(f"got {len(points)} points, need at least 3")
+    begin, end = (row.need("time", what).number() for what in ("intervalStart", "intervalEnd"))
+    return Occupancy(begin=begin, end=end, corners=corners)
+
+
+def _controls(one: ArocPrimitive) -> Array:
+    """Inputs (n - 1, 2) from state to state."""
+    return np.repeat(one.inputs, (len(one.states) - 1) // len(one.inputs), axis=0)
+
+
+def _seen(one: ArocPrimitive) -> Array:
+    """Poses (n, 3) seen from the first one."""
+    poses = SE2(one.states[:, :3])
+    return (SE2(one.states[0, :3]).inverse() @ poses).pose
+
+
+def _driven(model: AcceleratingCar, one: ArocPrimitive, begin: float, end: float) -> Trajectory:
+    """The motion under the inputs of a file, its speeds moved to end at those of the trims."""
+    spans = np.diff(one.time)
+    control = _controls(one).copy()
+    missing = end - begin - float(control[:, 0] @ spans)
+    control[:, 0] += missing / float(spans.sum())
+    course = drive(model, [begin], control=control, durations=spans)
+    states = course.reduced_state.copy()
+    states[-1] = end
+    return replace(course, reduced_state=states)
+
+
+def _check_successors(primitives: tuple[ArocPrimitive, ...], begins: Array, ends: Array) -> None:
+    for k, one in enumerate(primitives):
+        for follower in one.successors:
+            if begins[follower] != ends[k]:
+                raise InvalidLibrary(
+                    f"{one.name}: ends at {ends[k]:g} m/s, but its successor "
+                    f"{primitives[follower].name} begins at {begins[follower]:g} m/s; need the same"
+                )

@@ -1,0 +1,144 @@
+"""Files of motion primitives in other formats, as automata: which format a file is in, and back."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.automaton.library import save_library
+from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats import aroc, commonroad_primitives, nav2_lattice, sbpl_mprim
+from maneuver_automaton.formats.text_source import read_text
+
+MPRIM, XML, JSON, NAV2_JSON = ".mprim", ".xml", ".json", ".nav2.json"
+MOST_LIBRARY_BYTES = 500_000_000
+
+File: TypeAlias = (
+    sbpl_mprim.MprimFile
+    | nav2_lattice.Nav2Lattice
+    | commonroad_primitives.RoadPrimitives
+    | tuple[aroc.ArocPrimitive, ...]
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PrimitivesRead:
+    """A file of primitives, and what it is as an automaton."""
+
+    kind: str  # SBPL, Nav2, CommonRoad, AROC
+    file: File  # as it stands there
+    automaton: Automaton
+    remark: str  # where the automaton is not what the file says; empty if it is
+
+
+def read_primitives(path: Path) -> PrimitivesRead | None:
+    """What a file of motion primitives holds; None if it is in none of these formats.
+
+    Raises
+    ------
+    InvalidScenario
+        If the file cannot be read, or not be used.
+    InvalidLibrary
+        If it makes no automaton.
+    """
+    ending = path.suffix.lower()
+    if aroc.is_aroc(path):
+        return _of_aroc(path)
+    if path.is_dir() or not path.exists():
+        return None
+    if ending == MPRIM:
+        return _of_mprim(path)
+    if ending == XML and commonroad_primitives.is_commonroad_primitives(path):
+        return _of_commonroad(path)
+    if ending == JSON and _is_nav2(path):
+        return _of_nav2(path)
+    return None
+
+
+def writer_of(target: Path) -> Callable[[Automaton, Path], None] | None:
+    """What writes an automaton to a file with this ending; None if nothing does.
+
+    `.mprim` is SBPL, `.xml` CommonRoad, `.nav2.json` Nav2, and any other `.json` a library.
+    """
+    name = target.name.lower()
+    writers = {
+        MPRIM: _write_mprim,
+        XML: _write_commonroad,
+        NAV2_JSON: _write_nav2,
+        JSON: save_library,
+    }
+    return next((write for ending, write in writers.items() if name.endswith(ending)), None)
+
+
+def write_again(read: PrimitivesRead, target: Path) -> bool:
+    """Write a file of primitives in its own format, if `target` asks for that, to the last bit."""
+    name, file = target.name.lower(), read.file
+    if isinstance(file, sbpl_mprim.MprimFile) and name.endswith(MPRIM):
+        sbpl_mprim.save_mprim(file, target)
+    elif isinstance(file, nav2_lattice.Nav2Lattice) and name.endswith(NAV2_JSON):
+        nav2_lattice.save_nav2_lattice(file, target)
+    elif isinstance(file, commonroad_primitives.RoadPrimitives) and name.endswith(XML):
+        commonroad_primitives.save_commonroad_primitives(file, target)
+    else:
+        return False
+    return True
+
+
+def _is_nav2(path: Path) -> bool:
+    """Whether a JSON file is a lattice of Nav2; what is no JSON is left to whoever reads it."""
+    try:
+        document = json.loads(read_text(path, most=MOST_LIBRARY_BYTES, what="a library"))
+    except (ValueError, RecursionError, InvalidScenario):
+        return False
+    return nav2_lattice.is_nav2_lattice(document)
+
+
+def _of_mprim(path: Path) -> PrimitivesRead:
+    file = sbpl_mprim.read_mprim(path)
+    position, heading = sbpl_mprim.end_gap(file)
+    remark = (
+        f"last poses were moved by up to {position:.2g} m and {heading:.2g} rad onto the middle of "
+        "their cells and their headings"
+    )
+    if any(one.cost_multiplier != 1 for one in file.primitives):
+        remark += "; cost multipliers are left out"
+    automaton = sbpl_mprim.automaton_of_mprim(file, name=path.stem)
+    return PrimitivesRead(kind="SBPL", file=file, automaton=automaton, remark=remark)
+
+
+def _of_nav2(path: Path) -> PrimitivesRead:
+    file = nav2_lattice.read_nav2_lattice(path)
+    automaton = nav2_lattice.automaton_of_nav2_lattice(file, name=path.name.split(".json")[0])
+    return PrimitivesRead(kind="Nav2", file=file, automaton=automaton, remark="")
+
+
+def _of_commonroad(path: Path) -> PrimitivesRead:
+    file = commonroad_primitives.read_commonroad_primitives(path)
+    automaton = commonroad_primitives.automaton_of_commonroad_primitives(file, name=path.stem)
+    remark = str(commonroad_primitives.deviation_of(file, automaton))
+    return PrimitivesRead(kind="CommonRoad", file=file, automaton=automaton, remark=remark)
+
+
+def _of_aroc(path: Path) -> PrimitivesRead:
+    folder = path if path.is_dir() else path.parent
+    file = aroc.read_aroc(path)
+    automaton = aroc.automaton_of_aroc(file, name=folder.resolve().name)
+    remark = str(aroc.deviation_of(file, automaton))
+    return PrimitivesRead(kind="AROC", file=file, automaton=automaton, remark=remark)
+
+
+def _write_mprim(automaton: Automaton, path: Path) -> None:
+    sbpl_mprim.save_mprim(sbpl_mprim.mprim_of_automaton(automaton), path)
+
+
+def _write_nav2(automaton: Automaton, path: Path) -> None:
+    nav2_lattice.save_nav2_lattice(nav2_lattice.nav2_lattice_of_automaton(automaton), path)
+
+
+def _write_commonroad(automaton: Automaton, path: Path) -> None:
+    file = commonroad_primitives.commonroad_primitives_of_automaton(automaton)
+    commonroad_primitives.save_commonroad_primitives(file, path)

@@ -1,0 +1,338 @@
+"""Lattice primitives of Nav2 (JSON): headings towards grid points, poses in the frame of the grid.
+
+The first pose is left out where a primitive moves; turns on the spot state it. Entries are sorted
+by their first heading. Motion is forward: Nav2 takes a primitive of the opposite heading for
+reverse. What a primitive says of itself, such as its lengths, is kept from file to file; from an
+automaton it is worked out of the poses.
+
+Source: the lattice generator of navigation2, `nav2_smac_planner/lattice_primitives`, and its files.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, freeze, wrapped
+from maneuver_automaton._files import write_text_atomically
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.errors import InvalidLibrary
+from maneuver_automaton.formats.json_source import Place, read_json_document
+from maneuver_automaton.formats.lattice import (
+    ON_GRID,
+    SPEED,
+    TURN_RATE,
+    Lattice,
+    Move,
+    arcs,
+    automaton_of_lattice,
+    continuous,
+    lattice_of_automaton,
+)
+
+KIND = "Nav2 lattice primitives"
+MOTIONS = ("ackermann", "diff", "omni")
+DISTINCT = "trajectory_distinctness_ratio"
+ON_HEADING = 1e-6  # [rad] between a last pose and its heading
+SIDEWAYS = 0.5  # sine of the angle to the heading above which a straight is no straight ahead
+DIGITS = 5  # after the point, of what is worked out of poses
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Nav2Primitive:
+    """One primitive, as it stands in the file."""
+
+    id: int
+    start: int
+    end: int
+    left_turn: bool  # true unless it has an arc to the right
+    radius: float  # [m] of its arc, 0 without one
+    length: float  # [m]
+    arc_length: float  # [m]
+    straight_length: float  # [m]
+    poses: Array  # (n, 3) [m, m, rad]; the first one is left out where it moves
+
+    def __post_init__(self) -> None:
+        freeze(self, "poses", last=3)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Nav2Lattice:
+    """A file of primitives."""
+
+    motion_model: str  # ackermann | diff | omni
+    turning_radius: float  # [m]
+    resolution: float  # [m] of a cell
+    headings: Array  # (k,) [rad], rising
+    primitives: tuple[Nav2Primitive, ...]
+    version: float = 1.0
+    date: str = ""  # YYYY-MM-DD, as it stands in the file
+    stopping_threshold: int | None = None  # of the generator
+    distinctness_ratio: float | None = None  # of the generator, newer files
+
+    def __post_init__(self) -> None:
+        freeze(self, "headings")
+
+
+def is_nav2_lattice(document: Any) -> bool:
+    """Whether what a JSON file holds is a lattice of Nav2."""
+    return isinstance(document, dict) and "lattice_metadata" in document
+
+
+def read_nav2_lattice(path: Path) -> Nav2Lattice:
+    """The primitives of a file, as they stand there.
+
+    Raises
+    ------
+    InvalidScenario
+        If a key is missing or holds what it may not, an end is beside the grid or its heading, or
+        the primitives are not sorted by their first heading.
+    """
+    top = read_json_document(path, what="lattice primitives")
+    head = top.get("lattice_metadata", dict)
+    angles = head.get("heading_angles", list).numbers()
+    n = head.get("num_of_headings", int)
+    if len(angles) != n.value or n.value < 1:
+        raise n.error(f"got {n.value}, but there are {len(angles)} heading_angles; need as many")
+    for k in range(n.value):
+        low = angles[k - 1] if k else -1e-12
+        if not low < angles[k] < 2.0 * math.pi:
+            raise (
+                head.get("heading_angles", list)
+                .item(k)
+                .error(f"got {angles[k]:g}, need rising angles from 0 to less than 2 pi")
+            )
+    motion = head.get("motion_model", str)
+    if motion.value not in MOTIONS:
+        raise motion.error(f"got {motion.value!r:.40}, need one of {', '.join(MOTIONS)}")
+    resolution = head.get("grid_resolution", float).positive()
+    rows = top.get("primitives", list)
+    headings = np.array(angles)
+    primitives = tuple(
+        _primitive(rows.item(k), headings, resolution) for k in range(len(rows.value))
+    )
+    _check_order(rows, primitives, headings.size)
+    count = head.get("number_of_trajectories", int)
+    if count.value != len(primitives):
+        raise count.error(f"got {count.value}, but there are {len(primitives)} primitives")
+    return Nav2Lattice(
+        motion_model=motion.value,
+        turning_radius=head.get("turning_radius", float).positive(),
+        resolution=resolution,
+        headings=headings,
+        primitives=primitives,
+        version=top.get("version", float).value if "version" in top.value else 1.0,
+        date=top.get("date_generated", str).value if "date_generated" in top.value else "",
+        stopping_threshold=_optional(head, "stopping_threshold", int),
+        distinctness_ratio=_optional(head, DISTINCT, float),
+    )
+
+
+def save_nav2_lattice(file: Nav2Lattice, path: Path) -> None:
+    """Write primitives, in one step; every number reads back to the last bit.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    text = json.dumps(nav2_lattice_to_dict(file), indent="\t", allow_nan=False)
+    write_text_atomically(path, text + "\n")
+
+
+def nav2_lattice_to_dict(file: Nav2Lattice) -> dict[str, Any]:
+    """What the file says, in the order in which Nav2 writes it."""
+    head: dict[str, Any] = {
+        "motion_model": file.motion_model,
+        "turning_radius": file.turning_radius,
+        "grid_resolution": file.resolution,
+        "stopping_threshold": file.stopping_threshold,
+        "num_of_headings": file.headings.size,
+        DISTINCT: file.distinctness_ratio,
+        "heading_angles": file.headings.tolist(),
+        "number_of_trajectories": len(file.primitives),
+    }
+    content: dict[str, Any] = {
+        "version": file.version,
+        "date_generated": file.date,
+        "lattice_metadata": {key: value for key, value in head.items() if value is not None},
+        "primitives": [
+            {
+                "trajectory_id": one.id,
+                "start_angle_index": one.start,
+                "end_angle_index": one.end,
+                "left_turn": one.left_turn,
+                "trajectory_radius": one.radius,
+                "trajectory_length": one.length,
+                "arc_length": one.arc_length,
+                "straight_length": one.straight_length,
+                "poses": one.poses.tolist(),
+            }
+            for one in file.primitives
+        ],
+    }
+    return {key: value for key, value in content.items() if value != ""}
+
+
+def automaton_of_nav2_lattice(
+    file: Nav2Lattice, *, speed: float = SPEED, turn_rate: float = TURN_RATE, name: str = ""
+) -> Automaton:
+    """The automaton of a file, its times as `automaton_of_lattice` has them."""
+    lattice = Lattice(
+        resolution=file.resolution,
+        headings=file.headings,
+        moves=tuple(_meant(file, one) for one in file.primitives),
+        turning_radius=file.turning_radius,
+        name=name,
+    )
+    return automaton_of_lattice(lattice, speed=speed, turn_rate=turn_rate)
+
+
+def nav2_lattice_of_automaton(automaton: Automaton) -> Nav2Lattice:
+    """An automaton of lattice primitives as a file; the date is left out.
+
+    The motion model is `omni` if a primitive goes aside, else `diff` if one turns on the spot, else
+    `ackermann`.
+
+    Raises
+    ------
+    InvalidLibrary
+        If the automaton is not on a grid, has a primitive that drives in reverse or none for a
+        heading, or neither a turning radius nor an arc to tell one from.
+    """
+    lattice = lattice_of_automaton(automaton, kind=KIND)
+    label = automaton.name or "automaton"
+    made = []
+    for maneuver, move in zip(automaton.maneuvers, lattice.moves, strict=True):
+        forward = _along(move)[0]
+        if forward < -SIDEWAYS:
+            raise InvalidLibrary(
+                f"maneuver {maneuver.name!r}: drives in reverse, but a file of {KIND} has forward "
+                "motion only: Nav2 drives the primitives of the opposite heading backwards"
+            )
+        made.append(move)
+    made.sort(key=lambda move: move.start)
+    left_out = set(range(lattice.headings.size)) - {move.start for move in made}
+    if left_out:
+        raise InvalidLibrary(
+            f"{label}: heading {min(left_out)} has no maneuver; a file of {KIND} needs one for each"
+        )
+    primitives = tuple(_described(k, move) for k, move in enumerate(made))
+    radii = [one.radius for one in primitives if one.radius > 0.0]
+    if lattice.turning_radius is None and not radii:
+        raise InvalidLibrary(
+            f"{label}: has neither a turning radius nor arcs; a file of {KIND} states one"
+        )
+    return Nav2Lattice(
+        motion_model=_motion(made),
+        turning_radius=min(radii) if lattice.turning_radius is None else lattice.turning_radius,
+        resolution=lattice.resolution,
+        headings=lattice.headings,
+        primitives=primitives,
+    )
+
+
+def _optional(head: Place, key: str, kind: type[int] | type[float]) -> Any:
+    return head.get(key, kind).value if key in head.value else None
+
+
+def _primitive(row: Place, headings: Array, resolution: float) -> Nav2Primitive:
+    start, end = (row.get(f"{what}_angle_index", int) for what in ("start", "end"))
+    for place in (start, end):
+        if not 0 <= place.value < headings.size:
+            raise place.error(f"got {place.value}, need 0 to {headings.size - 1}")
+    rows = row.get("poses", list)
+    poses = [rows.item(k).numbers() for k in range(len(rows.value))]
+    for k, pose in enumerate(poses):
+        if len(pose) != 3:
+            raise rows.item(k).error(f"got {len(pose)} numbers, need 3: x, y, yaw")
+    if not poses:
+        raise rows.error("is empty, need at least one pose")
+    made = Nav2Primitive(
+        id=row.get("trajectory_id", int).value,
+        start=start.value,
+        end=end.value,
+        left_turn=row.get("left_turn", bool).value,
+        radius=row.get("trajectory_radius", float).value,
+        length=row.get("trajectory_length", float).value,
+        arc_length=row.get("arc_length", float).value,
+        straight_length=row.get("straight_length", float).value,
+        poses=np.array(poses),
+    )
+    last, heading = made.poses[-1], float(headings[made.end])
+    across = last[:2] / resolution
+    if np.abs(across - np.round(across)).max() > ON_GRID:
+        raise rows.item(len(poses) - 1).error(
+            f"got ({last[0]:g}, {last[1]:g}), need a point of the grid of {resolution:g} m"
+        )
+    if abs(float(wrapped(last[2] - heading))) > ON_HEADING:
+        raise rows.item(len(poses) - 1).error(
+            f"got the yaw {last[2]:g}, need {heading:g}, that of end_angle_index {made.end}"
+        )
+    return made
+
+
+def _check_order(rows: Place, primitives: Sequence[Nav2Primitive], n: int) -> None:
+    """Sorted by the first heading, from 0 on, none left out: Nav2 counts the changes."""
+    expected = 0
+    for k, one in enumerate(primitives):
+        if one.start not in (expected, expected + 1) or (k == 0 and one.start != 0):
+            raise (
+                rows.item(k)
+                .get("start_angle_index", int)
+                .error(f"got {one.start} after {expected}, need primitives sorted by it, from 0 on")
+            )
+        expected = one.start
+    if expected != n - 1:
+        raise rows.error(f"ends with the heading {expected}, need primitives up to {n - 1}")
+
+
+def _meant(file: Nav2Lattice, one: Nav2Primitive) -> Move:
+    """A primitive with its first pose, its last one exactly on the grid and its heading."""
+    begin, end = float(file.headings[one.start]), float(file.headings[one.end])
+    first = np.array([[0.0, 0.0, begin]])
+    poses = one.poses if one.poses[0, :2].any() or len(one.poses) == 1 else one.poses[1:]
+    poses = continuous(np.concatenate([first, poses]), last_heading=end)
+    poses[-1, :2] = file.resolution * np.round(poses[-1, :2] / file.resolution)
+    return Move(start=one.start, end=one.end, poses=poses)
+
+
+def _described(number: int, move: Move) -> Nav2Primitive:
+    """A primitive with what its poses say of it."""
+    radius, arc, straight = arcs(move.poses)
+    moves = move.poses[:, :2].any()
+    poses = move.poses[1:] if moves else move.poses
+    return Nav2Primitive(
+        id=number,
+        start=move.start,
+        end=move.end,
+        left_turn=not radius < 0.0,
+        radius=round(abs(radius), DIGITS),
+        length=round(arc + straight, DIGITS),
+        arc_length=round(arc, DIGITS),
+        straight_length=round(straight, DIGITS),
+        poses=np.concatenate([poses[:, :2], np.mod(poses[:, 2:], 2.0 * np.pi)], axis=1),
+    )
+
+
+def _along(move: Move) -> tuple[float, float]:
+    """Cosine and sine of the angle from the first heading to where the first motion goes."""
+    steps = move.poses[1:, :2] - move.poses[0, :2]
+    far = steps[np.any(steps != 0.0, axis=1)]
+    if not far.size:
+        return 0.0, 0.0
+    angle = math.atan2(far[0, 1], far[0, 0]) - move.poses[0, 2]
+    return math.cos(angle), math.sin(angle)
+
+
+def _motion(moves: Sequence[Move]) -> str:
+    if any(abs(_along(move)[1]) > SIDEWAYS for move in moves):
+        return "omni"
+    turns = any(not move.poses[:, :2].any() for move in moves)
+    return "diff" if turns else "ackermann"

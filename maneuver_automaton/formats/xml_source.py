@@ -1,0 +1,128 @@
+"""XML files as small trees whose elements know their lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.parsers import expat
+
+from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.text_source import finite, read_bytes, whole
+
+
+@dataclass(slots=True)
+class Element:
+    """An element of an XML file; grows while it is read."""
+
+    tag: str
+    attributes: dict[str, str]
+    file: Path
+    line: int
+    text: str = ""
+    children: list[Element] = field(default_factory=list)
+
+    @property
+    def at(self) -> str:
+        """File, line and name, for messages."""
+        return f"{self.file}:{self.line}: {self.tag}"
+
+    def all(self, tag: str) -> Iterator[Element]:
+        """The children of a name."""
+        return (child for child in self.children if child.tag == tag)
+
+    def get(self, *tags: str) -> Element | None:
+        """The first child of the first name, its first child of the second, ...; None if missing.
+
+        Names that are joined by ``|`` are alternatives.
+        """
+        here: Element | None = self
+        for tag in tags:
+            if here is None:
+                return None
+            names = tag.split("|")
+            here = next((child for child in here.children if child.tag in names), None)
+        return here
+
+    def need(self, *tags: str) -> Element:
+        """As `get`; raises InvalidScenario if it is missing."""
+        here = self
+        for tag in tags:
+            found = here.get(tag)
+            if found is None:
+                raise here.error(f"the element {tag.replace('|', ' or ')} is missing")
+            here = found
+        return here
+
+    def number(self) -> float:
+        """The finite number that is its text; raises InvalidScenario."""
+        return finite(self.text, at=self.at)
+
+    def attribute(self, name: str) -> str:
+        """An attribute; raises InvalidScenario if it is missing."""
+        if name not in self.attributes:
+            raise self.error(f"the attribute {name!r} is missing")
+        return self.attributes[name]
+
+    def whole(self, name: str, *, least: int = 0) -> int:
+        """A whole number that is an attribute; raises InvalidScenario."""
+        return whole(self.attribute(name), at=f"{self.at}: {name}", least=least)
+
+    def error(self, what: str) -> InvalidScenario:
+        """The error of this element: raise it."""
+        return InvalidScenario(f"{self.at}: {what}")
+
+
+class _Builder:
+    """Collect the elements of one file."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.open: list[Element] = []
+        self.root: Element | None = None
+        self.parser = expat.ParserCreate()
+        self.parser.buffer_text = True
+        self.parser.StartElementHandler = self._start
+        self.parser.EndElementHandler = self._end
+        self.parser.CharacterDataHandler = self._text
+        self.parser.StartDoctypeDeclHandler = self._doctype
+
+    def read(self, content: bytes) -> Element:
+        try:
+            self.parser.Parse(content, True)
+        except expat.ExpatError as error:
+            said = expat.ErrorString(error.code)
+            raise InvalidScenario(f"{self.path}:{error.lineno}: not valid XML: {said}") from error
+        except LookupError as error:  # an encoding that Python does not know
+            raise InvalidScenario(f"{self.path}: not valid XML: {error}") from error
+        assert self.root is not None  # expat accepts no file without an element
+        return self.root
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        element = Element(tag, attributes, self.path, self.parser.CurrentLineNumber)
+        if self.open:
+            self.open[-1].children.append(element)
+        else:
+            self.root = element
+        self.open.append(element)
+
+    def _end(self, tag: str) -> None:
+        self.open.pop()
+
+    def _text(self, text: str) -> None:
+        self.open[-1].text += text
+
+    def _doctype(self, *_: object) -> None:
+        line = self.parser.CurrentLineNumber
+        raise InvalidScenario(f"{self.path}:{line}: has a document type, need a file without one")
+
+
+def read_xml(path: Path, *, what: str, most: int) -> Element:
+    """The root element of a file of at most `most` bytes; `what` is what it should hold.
+
+    Raises
+    ------
+    InvalidScenario
+        If it cannot be read, or is no XML.
+    """
+    return _Builder(path).read(read_bytes(path, most=most, what=what))

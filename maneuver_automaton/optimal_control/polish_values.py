@@ -1,0 +1,110 @@
+"""What polishing is given and what it returns, as values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.optimal_control.problem import Guess
+from maneuver_automaton.optimal_control.separation import BodyPart, Solid
+from maneuver_automaton.optimal_control.solution import SolveStatus
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PolishSettings:
+    """How the problem is put to the solver, and when that stops."""
+
+    step: float = 0.12  # [s] between nodes, as far as their number allows
+    nodes: tuple[int, int] = (40, 300)  # fewest and most intervals
+    near: float = 0.8  # pairs nearer than this get a line, in radii of the body ...
+    ahead: float = 0.8  # ... or than the guess drives at its fastest in this time [s]
+    gap: float = 1e-4  # [m] kept between body and line, for the way between nodes
+    tightening: float = 1e-6  # of all limits, in their units, so that closure has room
+    effort: float = 3e-3  # price of full control, per second, for those that end in rates
+    change: float = 1e-3  # price of a full change of control from one interval to the next
+    tolerance: float = 1e-6
+    violation: float = 1e-7
+    acceptable: float = 1e-4
+    acceptable_iterations: int = 8
+    max_iterations: int = 300
+    fixed_iterations: int = 150  # with fixed planes
+    mu_init: float = 1e-3
+    rounds: int = 8  # solves at most, with lines or margins added after each
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Scene:
+    """The body, the obstacles around it, and half-planes for the reference point."""
+
+    parts: tuple[BodyPart, ...] = ()
+    pieces: tuple[Solid, ...] = ()
+    walls: tuple[tuple[float, float, float], ...] = ()  # (a, b, c): a x + b y <= c
+
+    @property
+    def body(self) -> list[Solid]:
+        """Solids of all parts."""
+        return [solid for part in self.parts for solid in part.solids]
+
+    @property
+    def both(self) -> tuple[list[Solid], list[Solid]]:
+        """Solids of the body, and of the obstacles."""
+        return self.body, list(self.pieces)
+
+
+class Ends(NamedTuple):
+    """First and last pose and reduced state; None leaves a component free."""
+
+    start: tuple[float | None, ...]
+    end: tuple[float | None, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Polished:
+    """What the solver found: states at nodes, controls and durations between them."""
+
+    status: SolveStatus
+    reason: str  # the solver's own word
+    state: Array  # (n, n_x)
+    control: Array  # (n - 1, n_u)
+    durations: Array  # (n - 1,) [s]
+    objective: float
+    iterations: int
+    build_s: float
+    solve_s: float
+
+    @property
+    def duration(self) -> float:
+        """Final time [s]."""
+        return float(self.durations.sum())
+
+    @property
+    def as_guess(self) -> Guess:
+        """Guess for another grid of equal steps."""
+        if np.ptp(self.durations) < 1e-12:
+            return Guess(state=self.state, control=self.control, duration=self.duration)
+        nodes = np.concatenate([[0.0], np.cumsum(self.durations)])
+        even = np.linspace(0.0, nodes[-1], len(nodes))
+        state = np.stack([np.interp(even, nodes, column) for column in self.state.T], axis=1)
+        which = np.clip(np.searchsorted(nodes, even[:-1], side="right") - 1, 0, len(nodes) - 2)
+        return Guess(state=state, control=self.control[which], duration=self.duration)
+
+
+class Point(NamedTuple):
+    """Numbers of all variables but the lines."""
+
+    state: Array  # (n, n_x)
+    control: Array  # (n - 1, n_u)
+    durations: Array  # (n - 1,) [s]
+
+
+class Answer(NamedTuple):
+    """How the solver ended, and what it took."""
+
+    status: SolveStatus
+    reason: str
+    objective: float
+    iterations: int
+    seconds: float

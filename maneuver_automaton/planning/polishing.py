@@ -1,0 +1,217 @@
+"""Polish plans of vehicles with inertia: guesses of different gears, the best that is accepted."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.collision import Obstacle
+from maneuver_automaton.collision.convex import convex_pieces
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.models import Model, SecondOrderCar, SecondOrderUnicycle
+from maneuver_automaton.optimal_control import Guess, PolishSettings, has_casadi, load_casadi
+from maneuver_automaton.optimal_control.polishing import intervals_for
+from maneuver_automaton.optimal_control.problem import Components, RunningCost
+from maneuver_automaton.optimal_control.separation import BodyPart
+from maneuver_automaton.problem import Problem, moves
+from maneuver_automaton.refinement.gear_sequences import (
+    car_library,
+    gear_sequences,
+    unicycle_library,
+)
+from maneuver_automaton.refinement.guesses import (
+    Pace,
+    car_guess,
+    course_guess,
+    pace_of_car,
+    pace_of_unicycle,
+    timed,
+    unicycle_guess,
+)
+from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinematic_problem
+from maneuver_automaton.refinement.polish import (
+    PolishedMotion,
+    PolishResult,
+    PolishTask,
+    polish_guesses,
+)
+from maneuver_automaton.search.cost_to_go import cost_to_go_table
+
+POINT = ((np.zeros((1, 2)), 0.0),)  # the body of a vehicle without a footprint
+SEQUENCES_SHARE = 0.2  # of the time, for kinematic plans that differ
+TURNS = (1.0, 0.8)  # of the greatest curvature, with which they turn
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Aimed:
+    """A guess and the goal to which it leads."""
+
+    guess: Guess
+    goal_index: int
+
+
+def why_not_polished(problem: Problem) -> str:
+    """Why plans of a problem cannot be polished; empty if they can."""
+    if any(moves(obstacle) for obstacle in problem.obstacles):
+        return "something moves"
+    if not all(isinstance(obstacle, Obstacle) for obstacle in problem.obstacles):
+        return "there is an occupancy map"
+    if any(obstacle.height for obstacle in problem.obstacles if isinstance(obstacle, Obstacle)):
+        return "obstacles have heights"
+    if not isinstance(problem.cost, Cost) or problem.cost.time == 0.0:
+        return "time costs nothing"
+    if problem.horizon.time is not None:
+        return "the time is fixed"
+    if not has_casadi():
+        return "CasADi is not installed"
+    return ""
+
+
+def load_polishing(problem: Problem) -> None:
+    """Have ready what polishing needs: the solver, and tables of the kinematic libraries."""
+    load_casadi()
+    for library in _libraries_of(problem.automaton.model)[0]:
+        cost_to_go_table(replace(kinematic_problem(problem, switch=0.0), automaton=library))
+
+
+def guesses_along_paths(problem: Problem, *, time_limit: float) -> Iterator[Aimed]:
+    """Guesses from kinematic plans whose gears differ, the most promising first.
+
+    None for a vehicle that does not follow the paths of a kinematic one.
+    """
+    model = problem.automaton.model
+    if not follows_paths(model):
+        return
+    libraries, pace = _libraries_of(model)
+    for drive in gear_sequences(
+        kinematic_problem(problem, switch=0.0),
+        libraries,
+        lambda plan: timed(plan, pace).duration,
+        time_limit=time_limit,
+    ):
+        yield guess_along(problem, drive.plan)
+
+
+def guess_along(problem: Problem, path: Plan) -> Aimed:
+    """A guess along a kinematic plan, seen from its start, and the goal where it ends."""
+    model = problem.automaton.model
+    seen = replace(path, start=np.zeros(problem.start.size), start_time=0.0)
+    how = car_guess if isinstance(model, SecondOrderCar) else unicycle_guess
+    off = [sum(goal.off(path.end)) for goal in problem.goals]
+    return Aimed(how(model, seen, intervals=_intervals()), int(np.argmin(off)))  # type: ignore[arg-type]
+
+
+def guess_of_plan(plan: Plan) -> Guess:
+    """States and controls of a plan of any vehicle, seen from its start."""
+    course = replace(plan, start=np.zeros(plan.start.size), start_time=0.0).sample()
+    return course_guess(course, intervals=_intervals())
+
+
+def polish_plans(
+    problem: Problem,
+    guesses: Sequence[Guess],
+    goal_index: int,
+    *,
+    time_limit: float,
+    accepts: Callable[[Plan], bool],
+) -> PolishResult:
+    """Polish guesses that lead to one goal; `accepts` checks and audits what comes out."""
+    goal = problem.goals[goal_index]
+    first, last = problem.first_trim, problem.last_trim(goal)
+    pose: list[float | None] = goal.pose.tolist()
+    if goal.free_heading:
+        pose[2] = None
+    task = PolishTask(
+        model=problem.automaton.model,
+        start=problem.start,
+        start_state=first.reduced_state,
+        goal=tuple(pose),
+        goal_state=tuple(last.reduced_state.tolist()),
+        parts=_body_parts(problem),
+        obstacles=tuple(one.shape for one in problem.obstacles if isinstance(one, Obstacle)),
+        bounds=problem.bounds,
+        margin=problem.margin,
+    )
+
+    def sound(motion: PolishedMotion) -> bool:
+        maneuver = motion.maneuver("polished", source=first.name, target=last.name)
+        return accepts(
+            Plan(
+                problem.start,
+                (first, last),
+                durations=[0.0, 0.0],
+                maneuvers=(maneuver,),
+                start_time=problem.start_time,
+            )
+        )
+
+    return polish_guesses(
+        task,
+        guesses,
+        stage_cost=_stage_cost(problem),
+        time_limit=time_limit,
+        accepts=sound,
+    )
+
+
+def _stage_cost(problem: Problem) -> RunningCost | None:
+    """What a second costs beside the time, in units of its price: effort and length."""
+    cost, model = problem.cost, problem.automaton.model
+    assert isinstance(cost, Cost)
+    if cost.effort == 0.0 and cost.length == 0.0:
+        return None
+    count = len(model.control_names)
+    weight = np.eye(count) if cost.effort_matrix is None else cost.effort_matrix
+    effort, length = cost.effort / cost.time, cost.length / cost.time
+
+    def price(z: Components, u: Components) -> Any:
+        spent: Any = 0.0
+        if effort:
+            spent += effort * sum(
+                float(weight[i, j]) * u[i] * u[j] for i in range(count) for j in range(count)
+            )
+        if length:
+            v_x, v_y, _, *climb = model.velocity(z, u)
+            square = v_x * v_x + v_y * v_y + sum(v * v for v in climb) + 1e-9
+            spent += length * np.sqrt(square)
+        return spent
+
+    return price
+
+
+def _body_parts(problem: Problem) -> tuple[BodyPart, ...]:
+    own = tuple(piece for shape in problem.footprint for piece in convex_pieces(shape))
+    parts = [BodyPart(solids=own or POINT)] if problem.obstacles else []
+    model = problem.automaton.model
+    for name, shapes in problem.parts.items():
+        solids = tuple(piece for shape in shapes for piece in convex_pieces(shape))
+        parts.append(BodyPart(solids=solids, pose=_frame_of(model, model.part_names.index(name))))
+    return tuple(parts)
+
+
+def _frame_of(model: Model, which: int) -> Callable[[Components], Sequence[Any]]:
+    frames = model.part_frames  # type: ignore[attr-defined]
+    return lambda z: tuple(frames(z)[which])
+
+
+def _libraries_of(model: Model) -> tuple[list[Automaton], Pace]:
+    """Kinematic libraries that turn as tightly as can be, and less, and the pace along them."""
+    if isinstance(model, SecondOrderCar):
+        car = functools.partial(
+            car_library, wheelbase=model.wheelbase, max_steering=model.max_steering
+        )
+        return [car(share=share) for share in TURNS], pace_of_car(model)
+    assert isinstance(model, SecondOrderUnicycle)
+    robot = functools.partial(
+        unicycle_library, max_speed=model.max_speed, max_turn_rate=model.max_turn_rate
+    )
+    return [robot(share=share) for share in TURNS], pace_of_unicycle(model)
+
+
+def _intervals() -> Callable[[float], int]:
+    return functools.partial(intervals_for, settings=PolishSettings())

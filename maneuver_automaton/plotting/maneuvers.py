@@ -1,0 +1,191 @@
+"""Draw the maneuvers of a library: each by itself, or, where they are many, by where they begin."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.plotting.bodies import DART
+from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE, Color
+from maneuver_automaton.plotting.footprint import placed
+from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
+from maneuver_automaton.plotting.style import SMALL_PT, shortened
+from maneuver_automaton.primitives import Maneuver
+
+MOST_SINGLE = 48  # maneuvers that have a panel each
+MOST_PANELS = 120
+PANEL, TITLE, GAP, EDGE = 1.35, 0.34, 0.2, 0.34  # [in]
+COLUMNS = 8
+NAME_LENGTH = 25
+FULL_COLOR = 0.6  # [rad] of a change of heading
+ROOM = 1.35  # side of a panel, over the size of what is in it
+DART_SIZE = 0.075  # of the side of a panel
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ManeuverArtists:
+    """What `draw_maneuvers` has drawn: a path for each maneuver, darts at start and ends."""
+
+    paths: LineCollection
+    darts: PolyCollection
+
+
+def draw_maneuvers(ax: Axes, maneuvers: Sequence[Maneuver]) -> ManeuverArtists:
+    """Draw `maneuvers` on `ax`, to scale from the origin, which heads right.
+
+    The colour of a path tells its change of heading: orange to the left, blue to the right, grey
+    for none. Dots are a second apart. A motion that is not known is a dashed straight line.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> go = Maneuver(name="go", source="rest", target="ahead", displacement=[1.0, 0.0, 0.0])
+    >>> len(draw_maneuvers(Figure().add_subplot(), [go]).paths.get_segments())
+    1
+    """
+    center, half = _frame_of(maneuvers)
+    ways = [_way(maneuver) for maneuver in maneuvers]
+    colors = [_color(maneuver) for maneuver in maneuvers]
+    paths = LineCollection(
+        [way[:, :2] for way in ways], colors=colors, linewidths=1.3, zorder=3.0,
+        linestyles=["solid" if one.course is not None else (0, (3, 2)) for one in maneuvers],
+    )  # fmt: skip
+    ax.add_collection(paths)
+    size = 2.0 * half * DART_SIZE
+    ends = np.array([one.displacement[:3] for one in maneuvers]).reshape(-1, 3)
+    darts = PolyCollection(
+        [*placed([size * DART], np.zeros((1, 3))), *placed([0.85 * size * DART], ends)],
+        facecolors=[INK, *colors], linewidths=0.0, zorder=4.0,
+    )  # fmt: skip
+    ax.add_collection(darts)
+    seconds = _seconds(maneuvers)
+    ax.plot(
+        seconds[:, 0], seconds[:, 1], linestyle="none", marker="o", markersize=1.8, color=INK,
+        zorder=3.5,
+    )  # fmt: skip
+    _frame(ax, center, half)
+    return ManeuverArtists(paths=paths, darts=darts)
+
+
+def save_maneuvers_figure(automaton: Automaton, path: str | Path) -> None:
+    """Write pictures of every maneuver of an `automaton`, each panel to its own scale.
+
+    Up to 48 have a panel each; more are drawn together with those that leave the same trim, in at
+    most 120 panels. The file is replaced in one step; its ending chooses the format.
+
+    Raises
+    ------
+    ValueError
+        If there is no maneuver.
+    """
+    panels = _panels(automaton)
+    if not panels:
+        raise ValueError(f"{automaton.name or 'automaton'}: has no maneuver to draw")
+    left_out, panels = len(panels) - MOST_PANELS, panels[:MOST_PANELS]
+    columns = min(COLUMNS, len(panels))
+    rows = math.ceil(len(panels) / columns)
+    top, width = 0.62, max(columns * (PANEL + GAP) - GAP + 2.0 * EDGE, 4.8)
+    figure = new_figure(width, top + rows * (PANEL + TITLE + GAP) + 0.1)
+    high = float(figure.get_size_inches()[1])
+    for k, (title, maneuvers) in enumerate(panels):
+        row, column = divmod(k, columns)
+        ax = axes_at(
+            figure, left=EDGE + column * (PANEL + GAP),
+            bottom=high - top - (row + 1) * (PANEL + TITLE + GAP) + GAP, width=PANEL, height=PANEL,
+        )  # fmt: skip
+        draw_maneuvers(ax, maneuvers)
+        ax.text(
+            0.04, 0.04, f"{np.ptp(ax.get_xlim()):.2g} m", transform=ax.transAxes, color=INK,
+            fontsize=SMALL_PT - 2.0,
+        )  # fmt: skip
+        ax.set_title(title, fontsize=SMALL_PT - 2.0, color=INK, parse_math=False, pad=2.5)
+    more = f"; {left_out} more trims are left out" if left_out > 0 else ""
+    name = shortened(automaton.name or automaton.model.name, 40)
+    legend = "how wide a panel is stands in it; dots are 1 s apart; orange turns left, blue right"
+    lines = [
+        (f"{name}: {_count(automaton)}", 10.0, "bold"),
+        (legend + more, SMALL_PT, "normal"),
+    ]
+    heading_text(figure, lines, left=EDGE)
+    write_figure(figure, path)
+
+
+def _panels(automaton: Automaton) -> list[tuple[str, list[Maneuver]]]:
+    """Titles, and the maneuvers under each."""
+    if len(automaton.maneuvers) <= MOST_SINGLE:
+        return [
+            (f"{_short(one.source)}\nto {_short(one.target)}, {one.duration:.3g} s", [one])
+            for one in automaton.maneuvers
+        ]
+    leaving: dict[str, list[Maneuver]] = {}
+    for one in automaton.maneuvers:
+        leaving.setdefault(one.source, []).append(one)
+    return [
+        (f"from {_short(name)}\n{len(many)} maneuver{'s' if len(many) > 1 else ''}", many)
+        for name in automaton.trim_names
+        if (many := leaving.get(name))
+    ]
+
+
+def _short(name: str) -> str:
+    return shortened(name, NAME_LENGTH)
+
+
+def _count(automaton: Automaton) -> str:
+    trims, maneuvers = len(automaton), len(automaton.maneuvers)
+    plural = "s" if maneuvers > 1 else ""
+    return f"{maneuvers} maneuver{plural} between {trims} trim{'s' if trims > 1 else ''}"
+
+
+def _way(maneuver: Maneuver) -> Array:
+    """Poses (n, dof) from the origin."""
+    if maneuver.course is not None:
+        return maneuver.course.pose
+    return np.stack([np.zeros_like(maneuver.displacement), maneuver.displacement])
+
+
+def _seconds(maneuvers: Sequence[Maneuver]) -> Array:
+    """Positions (n, 2) every full second, the ends left out."""
+    rows = [
+        one.course.pose_at(np.arange(1.0, one.duration))[:, :2]
+        for one in maneuvers
+        if one.course is not None and one.duration > 1.0
+    ]
+    return np.concatenate([np.zeros((0, 2)), *rows])
+
+
+def _color(maneuver: Maneuver) -> Color:
+    turn = float(maneuver.displacement[2])
+    share = min(1.0, abs(turn) / FULL_COLOR)
+    towards = SEQUENCE[1] if turn > 0.0 else SEQUENCE[0]
+    red, green, blue = (
+        (1.0 - share) * grey + share * full for grey, full in zip(GREY, towards, strict=True)
+    )
+    return red, green, blue
+
+
+def _frame_of(maneuvers: Sequence[Maneuver]) -> tuple[Array, float]:
+    """Centre (2,) and half the width [m] of a square around the origin and all paths."""
+    points = np.concatenate([np.zeros((1, 2)), *(_way(one)[:, :2] for one in maneuvers)])
+    low, high = points.min(axis=0), points.max(axis=0)
+    return 0.5 * (low + high), 0.5 * ROOM * float((high - low).max()) or 1.0
+
+
+def _frame(ax: Axes, center: Array, half: float) -> None:
+    ax.set_aspect("equal")
+    ax.set_xlim(center[0] - half, center[0] + half)
+    ax.set_ylim(center[1] - half, center[1] + half)
+    ax.set_xticks([0.0])
+    ax.set_yticks([0.0])
+    ax.tick_params(labelbottom=False, labelleft=False, length=0.0)
+    ax.grid(visible=True, color=GREY, alpha=0.3, linewidth=0.5)
+    ax.set_axisbelow(True)
+    ax.spines[:].set(color=GREY, linewidth=0.5, alpha=0.6)

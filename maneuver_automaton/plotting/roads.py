@@ -1,0 +1,227 @@
+"""Drives on roads: lanelets, everybody at several times, the way of one vehicle, its speed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PathCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE, shaded
+from maneuver_automaton.plotting.film import Film, picture_times, write_film
+from maneuver_automaton.plotting.obstacles import MOVER, SOLID
+from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
+from maneuver_automaton.plotting.regions import shape_path
+from maneuver_automaton.plotting.style import tidy
+from maneuver_automaton.primitives import Trajectory
+from maneuver_automaton.roads import GoalRegion, RoadScene, RoadVehicle
+
+LANE = (0.91, 0.91, 0.92)
+EGO, GOAL = SEQUENCE[0], SEQUENCE[2]
+WIDTH, LEFT, BOTTOM = 9.6, 0.75, 0.6  # [in]
+INNER = WIDTH - LEFT - 0.2
+PANEL, GAP, TOP = 1.2, 0.75, 0.85  # [in]
+MARGIN = 12.0  # [m] around all that drives
+FLATTEST, HIGHEST = 1.6, 5.4  # [in] of the plane
+MOMENTS = 5  # times at which bodies are shown
+HAZE = 0.75  # of the first of them
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RoadArtists:
+    """What `draw_road` has drawn."""
+
+    lanes: PolyCollection
+    goals: PathCollection
+    traffic: PathCollection
+    bodies: PolyCollection
+    way: LineCollection
+
+
+def draw_road(
+    ax: Axes,
+    scene: RoadScene,
+    vehicle: RoadVehicle,
+    driven: Trajectory,
+    *,
+    times: Sequence[float] | None = None,
+) -> RoadArtists:
+    """Draw a drive on `ax`: bodies at `times` [s], the later the darker.
+
+    Parameters
+    ----------
+    ax : Axes
+    scene : RoadScene
+    vehicle : RoadVehicle
+    driven : Trajectory
+        Of the rear axle; its times are those of the scene.
+    times : sequence of float, optional
+        Five times from the beginning to the end if left out.
+    """
+    begin, end = driven.time[[0, -1]].tolist()
+    moments = list(np.linspace(begin, end, MOMENTS) if times is None else times)
+    lanes = PolyCollection(
+        [lanelet.ring for lanelet in scene.lanelets],
+        facecolors=[LANE],
+        edgecolors=["white"],
+        linewidths=0.8,
+        zorder=0.5,
+    )
+    goals = _goal_paths(scene.goals)
+    paths, colors = [], []
+    for k, moment in enumerate(moments):
+        for one in scene.present(moment):
+            paths.append(shape_path(one.at(moment)))
+            colors.append(SOLID if one.motion is None else shaded(MOVER, _haze(k, len(moments))))
+    traffic = PathCollection(paths, facecolors=colors, edgecolors=["white"], linewidths=0.5)
+    traffic.set_zorder(2.0)
+    bodies = PolyCollection(
+        _bodies(vehicle, driven.pose_at(moments)),
+        facecolors=[shaded(EGO, _haze(k, len(moments))) for k in range(len(moments))],
+        edgecolors=["white"],
+        linewidths=0.6,
+        zorder=3.0,
+    )
+    way = LineCollection(
+        [vehicle.middle_of(driven.pose)[:, :2]], colors=[EGO], linewidths=1.4, zorder=2.5
+    )
+    for artist in (lanes, goals, traffic, bodies, way):
+        ax.add_collection(artist, autolim=False)
+    low, high = _box(scene, vehicle, driven)
+    ax.set_xlim(low[0], high[0])
+    ax.set_ylim(low[1], high[1])
+    ax.set_aspect("equal")
+    tidy(ax, x="x [m]", y="y [m]")
+    ax.grid(visible=False)
+    return RoadArtists(lanes=lanes, goals=goals, traffic=traffic, bodies=bodies, way=way)
+
+
+def save_road_figure(
+    scene: RoadScene,
+    vehicle: RoadVehicle,
+    driven: Trajectory,
+    path: str | Path,
+    *,
+    said: str = "",
+) -> None:
+    """Write the picture of a drive: the plane, and speed and controls over time.
+
+    Raises
+    ------
+    ValueError
+        If the ending of `path` is none that Matplotlib knows.
+    OSError
+        If the file cannot be written.
+    """
+    figure, ax = _page(scene, vehicle, driven, panels=2, said=said)
+    draw_road(ax, scene, vehicle, driven)
+    speed = axes_at(figure, left=LEFT, bottom=BOTTOM + PANEL + GAP, width=INNER, height=PANEL)
+    speed.plot(driven.time, driven.reduced_state[:, 0], color=EGO, linewidth=1.4)
+    tidy(speed, x="", y="speed [m/s]")
+    across = driven.reduced_state[:, 0] ** 2 * np.tan(driven.reduced_state[:, 1])
+    rates = axes_at(figure, left=LEFT, bottom=BOTTOM, width=INNER, height=PANEL)
+    rates.step(
+        driven.time, driven.control[:, 0], where="post", color=EGO, linewidth=1.4, label="along"
+    )
+    rates.plot(
+        driven.time,
+        across / vehicle.model.wheelbase,
+        color=SEQUENCE[1],
+        linewidth=1.4,
+        label="across",
+    )
+    rates.legend(frameon=False, fontsize=8.0, ncols=2, loc="upper right")
+    tidy(rates, x="time [s]", y="acceleration [m/s²]")
+    write_figure(figure, path)
+
+
+def save_road_animation(
+    scene: RoadScene, vehicle: RoadVehicle, driven: Trajectory, path: str | Path
+) -> None:
+    """Write a moving picture of a drive, by its ending .gif, .html or .mp4.
+
+    Raises
+    ------
+    ValueError
+        If the ending is another one.
+    OSError
+        If the file cannot be written.
+    """
+    begin, end = driven.time[[0, -1]].tolist()
+    figure, ax = _page(scene, vehicle, driven, panels=0, said="")
+    drawn = draw_road(ax, scene, vehicle, driven, times=[])
+    clock: Text = ax.text(
+        0.01, 0.98, "", transform=ax.transAxes, va="top", fontsize=9.0, color=INK, zorder=9.0
+    )
+
+    def show(time: float) -> None:
+        here = scene.present(time)
+        drawn.traffic.set_paths([shape_path(one.at(time)) for one in here])
+        drawn.traffic.set_facecolor([SOLID if one.motion is None else MOVER for one in here])
+        drawn.bodies.set_verts(_bodies(vehicle, driven.pose_at([time])))
+        drawn.bodies.set_facecolor([EGO])
+        clock.set_text(f"{time:.1f} s")
+
+    times = picture_times(begin, end)
+    moving = (drawn.traffic, drawn.bodies, clock)
+    write_film(Film(figure=figure, moving=moving, show=show, times=times, samples=[begin]), path)
+
+
+def _page(
+    scene: RoadScene, vehicle: RoadVehicle, driven: Trajectory, *, panels: int, said: str
+) -> tuple[Figure, Axes]:
+    low, high = _box(scene, vehicle, driven)
+    plane = float(np.clip(INNER * (high - low)[1] / (high - low)[0], FLATTEST, HIGHEST))
+    under = BOTTOM + panels * (PANEL + GAP)
+    figure = new_figure(WIDTH, TOP + plane + under)
+    lines = [(scene.name, 12.0, "bold"), (said or scene.source, 9.0, "normal")]
+    heading_text(figure, lines, left=LEFT)
+    return figure, axes_at(figure, left=LEFT, bottom=under, width=INNER, height=plane)
+
+
+def _box(scene: RoadScene, vehicle: RoadVehicle, driven: Trajectory) -> tuple[Array, Array]:
+    """Lower left and upper right corner around all that drives, and around the goals."""
+    begin, end = driven.time[[0, -1]].tolist()
+    places = [vehicle.middle_of(driven.pose)[:, :2]]
+    for goal in scene.goals:
+        if goal.places is not None and not goal.lanelets:
+            places += [np.asarray(shape_path(place).vertices) for place in goal.places]
+    low, high = (
+        f(np.concatenate(places), axis=0) - s for f, s in ((np.min, 25.0), (np.max, -25.0))
+    )
+    for moment in np.linspace(begin, end, MOMENTS):
+        for one in scene.present(float(moment)):
+            corners = np.asarray(shape_path(one.at(float(moment))).vertices)
+            if (corners > low).all() and (corners < high).all():
+                places.append(corners)
+    every = np.concatenate(places)
+    low, high = every.min(axis=0) - MARGIN, every.max(axis=0) + MARGIN
+    return low, high
+
+
+def _goal_paths(goals: Sequence[GoalRegion]) -> PathCollection:
+    paths = [shape_path(place) for goal in goals for place in goal.places or ()]
+    return PathCollection(
+        paths,
+        facecolors=[(*GOAL, 0.18)],
+        edgecolors=[GOAL if paths else GREY],
+        linewidths=0.8,
+        zorder=1.0,
+    )
+
+
+def _bodies(vehicle: RoadVehicle, poses: Array) -> list[Array]:
+    corners = vehicle.footprint.corners
+    return [np.asarray(SE2(pose).act(corners)) for pose in poses]
+
+
+def _haze(k: int, n: int) -> float:
+    """How much lighter what is shown at the k-th of n times is."""
+    return HAZE * (1.0 - k / max(n - 1, 1))

@@ -1,0 +1,221 @@
+"""Quickest maneuvers of a vehicle whose reduced state changes at limited rates: all in one go."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.errors import NotATrim
+from maneuver_automaton.models import Model
+from maneuver_automaton.primitives.driving import drive_all
+from maneuver_automaton.primitives.maneuver import Maneuver
+from maneuver_automaton.primitives.trim import Trim
+
+Pairs = Literal["all", "neighbours"] | Sequence[tuple[int, int]]
+EQUAL = 1e-12  # times or states closer than this, over their size, are equal [s, units of z]
+BATCH = 2000  # maneuvers that are integrated together
+
+
+def bang_bang(model: Model, source: Trim, target: Trim, *, late: bool = False) -> Maneuver:
+    """Quickest maneuver between two trims of a vehicle with ``z' = u`` and limits on u.
+
+    It takes the time of the component that needs longest, ``max |z_i' - z_i| / rate_i``; that one
+    changes at its greatest rate throughout. The others do so too, and then wait; or, if `late`,
+    wait first: as quick, with another displacement.
+
+    Source: the minimum time of integrators with bounded rates; LaValle (2006), *Planning
+    Algorithms*, Sec. 14.6.3, bang-bang. The displacement is that of `drive_all`.
+
+    Raises
+    ------
+    ValueError
+        If the reduced state has other dynamics or no limit of its rates, or is the same at both
+        trims, which need no maneuver.
+    NotATrim
+        If a trim is none of this vehicle.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import SecondOrderUnicycle
+    >>> from maneuver_automaton.primitives.equilibrium import trims_of
+    >>> robot = SecondOrderUnicycle(max_speed=1.0, max_turn_rate=1.0, max_acceleration=0.5,
+    ...                             max_angular_acceleration=1.0)
+    >>> rest, ahead = trims_of(robot, {"speed": [0.0, 1.0], "turn_rate": [0.0]}).trims
+    >>> start = bang_bang(robot, rest, ahead)
+    >>> start.duration, start.displacement.round(12).tolist()
+    (2.0, [1.0, 0.0, 0.0])
+    """
+    return _maneuvers(model, [(source, target)], late=late)[0]
+
+
+def connect_bang_bang(
+    model: Model,
+    trims: Sequence[Trim],
+    *,
+    pairs: Pairs = "all",
+    late: bool = False,
+) -> tuple[Maneuver, ...]:
+    """Quickest maneuvers between trims of different reduced states; see `bang_bang`.
+
+    Parameters
+    ----------
+    model : Model
+        The vehicle.
+    trims : sequence of Trim
+        Its trims.
+    pairs : "all", "neighbours" or a sequence of pairs of int
+        From every trim to every other; to those that differ by at most one level in every
+        component, where the levels are the values that the trims take; or from and to the trims
+        of these positions.
+    late : bool
+        Which of the quickest maneuvers; see `bang_bang`.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import SecondOrderCar
+    >>> from maneuver_automaton.primitives.equilibrium import trims_of
+    >>> car = SecondOrderCar(wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0,
+    ...                      max_steering_rate=0.5)
+    >>> five = np.linspace(-1.0, 1.0, 5)
+    >>> trims = trims_of(car, {"speed": 2.5 * five, "steering": 0.75 * five}).trims
+    >>> len(connect_bang_bang(car, trims)), len(connect_bang_bang(car, trims, pairs="neighbours"))
+    (600, 144)
+    """
+    return _maneuvers(model, _chosen(trims, pairs), late=late)
+
+
+def differing(maneuvers: Sequence[Maneuver], others: Sequence[Maneuver]) -> tuple[Maneuver, ...]:
+    """Those of `others` that lead elsewhere than the maneuver at their place, or another way.
+
+    Late maneuvers are the early ones again where one component changes or both take equally long.
+    """
+    return tuple(
+        other
+        for one, other in zip(maneuvers, others, strict=True)
+        if np.abs(one.displacement - other.displacement).max() > EQUAL
+    )
+
+
+def has_limited_rates(model: Model) -> bool:
+    """Whether the control is the rate of the reduced state, component by component, and limited.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import SingleTrack, Unicycle
+    >>> has_limited_rates(Unicycle()), has_limited_rates(SingleTrack())
+    (False, False)
+    """
+    n = len(model.reduced_names)
+    if n == 0 or n != len(model.control_names) or not np.isfinite(model.control_limits).all():
+        return False
+    low, high = np.clip(np.moveaxis(model.reduced_limits, -1, 0), -1e3, 1e3)
+    shares = np.linspace(0.1, 0.8, 5)[:, None]
+    control = np.random.default_rng(0).uniform(-1.0, 1.0, (5, n))
+    rates = model.reduced_dynamics(low + shares * (high - low), control)
+    return bool((rates == control).all())
+
+
+def check_limited_rates(model: Model) -> None:
+    """Refuse a vehicle that bang-bang maneuvers are not for; raises ValueError."""
+    if not has_limited_rates(model):
+        raise ValueError(
+            f"bang-bang: the {model.name} is none of the vehicles whose control is the rate of "
+            "the reduced state, each component with limits; its maneuvers need optimal control"
+        )
+
+
+def _maneuvers(
+    model: Model, pairs: Sequence[tuple[Trim, Trim]], *, late: bool
+) -> tuple[Maneuver, ...]:
+    check_limited_rates(model)
+    for trim in {id(trim): trim for pair in pairs for trim in pair}.values():
+        _check_trim(model, trim)
+    return tuple(
+        maneuver
+        for k in range(0, len(pairs), BATCH)
+        for maneuver in _batch(model, pairs[k : k + BATCH], late=late)
+    )
+
+
+def _batch(model: Model, pairs: Sequence[tuple[Trim, Trim]], *, late: bool) -> list[Maneuver]:
+    source = np.array([source.reduced_state for source, _ in pairs])
+    target = np.array([target.reduced_state for _, target in pairs])
+    same = ~(np.abs(target - source) > EQUAL * np.maximum(1.0, np.abs(source))).any(axis=1)
+    if same.any():
+        a, b = pairs[int(np.argmax(same))]
+        raise ValueError(
+            f"bang-bang: {a.name!r} and {b.name!r} have the same reduced state, so the vehicle "
+            "switches between them without a maneuver"
+        )
+    control, durations = segments(model, source, target, late=late)
+    courses = drive_all(model, source, control=control, durations=durations)
+    return [
+        Maneuver(
+            name=f"{a.name} to {b.name}" + (", late" if late else ""),
+            source=a.name,
+            target=b.name,
+            displacement=course.pose[-1],
+            duration=float(course.time[-1]),
+            course=course,
+        )
+        for (a, b), course in zip(pairs, courses, strict=True)
+    ]
+
+
+def segments(model: Model, source: Array, target: Array, *, late: bool) -> tuple[Array, Array]:
+    """Controls (m, n, n) and durations (m, n) that lead from reduced states (m, n) to others."""
+    change = target - source
+    low, high = np.moveaxis(model.control_limits, -1, 0)
+    rate = np.where(change > 0.0, high, low)
+    stuck = (change != 0.0) & (rate * np.sign(change) <= 0.0)
+    if stuck.any():
+        k = int(np.argwhere(stuck)[0, 1])
+        raise ValueError(
+            f"bang-bang: {model.reduced_names[k]} cannot change that way, the limits of "
+            f"{model.control_names[k]} are [{low[k]:.6g}, {high[k]:.6g}]"
+        )
+    needed = np.where(change == 0.0, 0.0, change / np.where(change == 0.0, 1.0, rate))
+    longest = needed.max(axis=1, keepdims=True)
+    close = needed > longest * (1.0 - EQUAL)
+    rate = np.where(close, change / np.where(close, longest, 1.0), rate)
+    needed = np.where(close, longest, needed)
+    ends = np.sort(needed, axis=1)
+    durations = np.diff(ends, axis=1, prepend=0.0)
+    active = (needed[:, None, :] >= ends[:, :, None]) & (needed[:, None, :] > 0.0)
+    control = np.where(active, rate[:, None, :], 0.0)
+    return (control[:, ::-1], durations[:, ::-1]) if late else (control, durations)
+
+
+def _chosen(trims: Sequence[Trim], pairs: Pairs) -> list[tuple[Trim, Trim]]:
+    if not isinstance(pairs, str):
+        return [(trims[i], trims[j]) for i, j in pairs]
+    if pairs not in ("all", "neighbours"):
+        raise ValueError(f"pairs: got {pairs!r}, need all or neighbours")
+    states = np.array([trim.reduced_state for trim in trims]).reshape(len(trims), -1)
+    levels = np.stack([_levels(column) for column in states.T], axis=-1)
+    steps = np.abs(levels[:, None] - levels).max(axis=2, initial=0)
+    wanted: NDArray[np.bool_] = (steps > 0) & ((steps == 1) | (pairs == "all"))
+    return [(trims[i], trims[j]) for i, j in np.argwhere(wanted)]
+
+
+def _levels(values: Array) -> IntArray:
+    """Which of the values that occur each one is (n,), from the least up."""
+    order = np.argsort(values)
+    rises = np.diff(values[order]) > EQUAL * np.maximum(1.0, np.abs(values[order][1:]))
+    levels = np.empty(values.size, dtype=np.int64)
+    levels[order] = np.concatenate([[0], np.cumsum(rises)])
+    return levels
+
+
+def _check_trim(model: Model, trim: Trim) -> None:
+    n = len(model.reduced_names)
+    if trim.reduced_state.shape != (n,) or trim.control.shape != (n,) or trim.control.any():
+        raise NotATrim(
+            f"trim {trim.name!r}: got reduced state {trim.reduced_state.tolist()} and control "
+            f"{trim.control.tolist()}, need {n} numbers ({', '.join(model.reduced_names)}) and "
+            f"{n} zeros for the {model.name}"
+        )

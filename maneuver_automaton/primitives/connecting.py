@@ -1,0 +1,334 @@
+"""From trim to trim by optimal control: solved, closed to rounding, and driven again as a proof."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton.models import Model
+from maneuver_automaton.optimal_control.maneuvers import (
+    ManeuverObjective,
+    Transfer,
+    TransferProgram,
+    TransferSettings,
+    drawn_in,
+    duration_guess,
+    solve_transfer,
+    transfer_program,
+)
+from maneuver_automaton.optimal_control.solution import SolveStatus
+from maneuver_automaton.primitives.driving import drive
+from maneuver_automaton.primitives.maneuver import Maneuver
+from maneuver_automaton.primitives.resimulation import maneuver_defect
+from maneuver_automaton.primitives.trajectory import Trajectory
+from maneuver_automaton.primitives.trim import Trim
+
+CLOSED = 1e-10  # [units of the reduced state] between the last one and the target's
+WITHIN = 1e-9  # how far a reduced state may be out of its limits, as a share of their range
+ADMITTED_DEFECT = 1e-6  # [m, rad, units of the reduced state] against an ODE solver
+TRIES = (
+    (1e-6, 1.0, 0.0),
+    (1e-6, 3.0, 0.0),
+    (1e-6, 2.0, 0.5),
+    (1e-4, 1.0, 0.0),
+    (1e-2, 2.0, -0.5),
+    (1e-6, 0.4, 0.0),
+    (1e-6, 8.0, 0.2),
+)
+"""(share by which the limits are drawn in, factor of the guessed duration, swing), in turn."""
+
+NEWTON_STEPS = 8
+DIGITS = 7  # after the point, of inputs and intervals that need no more
+RUNGE_KUTTA_STEPS = 4  # in an interval, for derivatives
+PERTURBATION = 1e-6  # [-] of the range of a control, for derivatives
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Inputs:
+    """Controls (n, n_u), each for the same `interval` [s]: from them a maneuver is driven again."""
+
+    control: Array
+    interval: float
+
+    def __post_init__(self) -> None:
+        freeze(self, "control")
+
+    def drive(self, model: Model, reduced_state: Array) -> Trajectory:
+        """Motion from the identity pose."""
+        n = len(self.control)
+        return drive(model, reduced_state, control=self.control, durations=[self.interval] * n)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Connection:
+    """A maneuver from trim to trim, or the reason why there is none."""
+
+    source: str
+    target: str
+    maneuver: Maneuver | None
+    inputs: Inputs | None = None  # of the maneuver, in equal intervals
+    reason: str = ""  # empty if there is a maneuver
+    defect: float = np.inf  # against an ODE solver, in the units of pose and reduced state
+    cost: float = np.inf  # what the solver made it out to be
+    tries: int = 0
+    solve_s: float = 0.0
+
+
+def connect(
+    model: Model,
+    source: Trim,
+    target: Trim,
+    *,
+    objective: ManeuverObjective | None = None,
+    settings: TransferSettings | None = None,
+    program: TransferProgram | None = None,
+    control_limits: Array | None = None,
+) -> Connection:
+    """The maneuver of least cost from one trim to another, wherever it ends.
+
+    The inputs are constant in equal intervals. The solver's answer is driven again to rounding,
+    corrected until it meets the target's reduced state, and checked against an ODE solver; where
+    a step fails it is tried again from other guesses and with limits drawn in.
+
+    Source: Frazzoli, Dahleh, Feron (2005), Sec. III-B.
+
+    Parameters
+    ----------
+    model : Model
+        The vehicle.
+    source, target : Trim
+        Two trims of different reduced state.
+    objective : ManeuverObjective, optional
+        Least time if left out.
+    settings : TransferSettings, optional
+        Intervals and bounds of the duration.
+    program : TransferProgram, optional
+        What `transfer_program` made of the three above, so that it is not made again.
+    control_limits : (n_u, 2) array, optional
+        Narrower limits than the model's, say to go one way only.
+
+    Raises
+    ------
+    MissingExtra
+        If CasADi is not installed.
+    ValueError
+        If the trims do not fit the model, or are of one class.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.groups import SE2
+    >>> from maneuver_automaton.models import UserModel
+    >>> cart = UserModel(name="cart", group=SE2, control_names=("push",), reduced_names=("speed",),
+    ...                  velocity=lambda z, u: [z[0], 0.0, 0.0], dynamics=lambda z, u: [u[0]],
+    ...                  control_limits=[[-2.0, 2.0]])
+    >>> rest = Trim(name="rest", body_velocity=[0, 0, 0], control=[0.0], reduced_state=[0.0])
+    >>> ahead = Trim(name="ahead", body_velocity=[1, 0, 0], control=[0.0], reduced_state=[1.0])
+    >>> connect(cart, rest, ahead).maneuver.displacement.round(3).tolist()
+    [0.25, 0.0, 0.0]
+    """
+    program = program or transfer_program(model, objective=objective, settings=settings)
+    outside = _outside(model, source) or _outside(model, target)
+    if np.array_equal(source.reduced_state, target.reduced_state):
+        raise ValueError(
+            f"connect: trims {source.name!r} and {target.name!r} have one reduced state, so the "
+            "vehicle switches between them at will; need two trims of different reduced state"
+        )
+    if outside:
+        return Connection(source=source.name, target=target.name, maneuver=None, reason=outside)
+    limits = model.control_limits if control_limits is None else control_limits
+    reasons: list[str] = []
+    solve_s = 0.0
+    for tightening, factor, swing in TRIES:
+        transfer = solve_transfer(
+            program,
+            start=source.reduced_state,
+            end=target.reduced_state,
+            controls=np.stack([source.control, target.control]),
+            control_limits=limits,
+            tightening=tightening,
+            duration=factor * duration_guess(model, source.reduced_state, target.reduced_state),
+            swing=swing,
+        )
+        solve_s += transfer.solve_s
+        found = _checked(model, source, target, transfer=transfer, limits=limits)
+        if found.maneuver is not None:
+            return replace(found, tries=len(reasons) + 1, solve_s=solve_s)
+        reasons.append(found.reason)
+    shown = "; ".join(dict.fromkeys(reasons))
+    return replace(found, reason=shown, tries=len(reasons), solve_s=solve_s)
+
+
+def _checked(
+    model: Model, source: Trim, target: Trim, *, transfer: Transfer, limits: Array
+) -> Connection:
+    """The transfer as a maneuver if it holds, else the reason."""
+    nothing = Connection(source=source.name, target=target.name, maneuver=None, cost=transfer.cost)
+    if transfer.status is not SolveStatus.SOLVED:
+        return replace(nothing, reason=f"the solver ended with {transfer.reason}")
+    inputs = _closed_in_short(
+        model,
+        source.reduced_state,
+        target.reduced_state,
+        inputs=Inputs(control=transfer.control, interval=transfer.duration / len(transfer.control)),
+        limits=limits,
+    )
+    course = inputs.drive(model, source.reduced_state)
+    miss = float(np.abs(course.reduced_state[-1] - target.reduced_state).max())
+    if not miss <= CLOSED:
+        return replace(nothing, reason=f"it could not be closed: {miss:.2g} is left")
+    excess = _excess(model.reduced_limits, course.reduced_state)
+    if excess.max() > WITHIN:
+        worst = model.reduced_names[int(excess.argmax())]
+        return replace(nothing, reason=f"{worst} leaves its limits by {excess.max():.2g} of them")
+    maneuver = Maneuver(
+        name=f"{source.name} to {target.name}",
+        source=source.name,
+        target=target.name,
+        displacement=course.pose[-1],
+        duration=float(course.time[-1]),
+        course=course,
+    )
+    defect = maneuver_defect(model, maneuver, source=source, target=target)
+    if not defect <= ADMITTED_DEFECT:
+        return replace(
+            nothing, defect=defect, reason=f"driven again it ends {defect:.2g} off its target"
+        )
+    return replace(nothing, maneuver=maneuver, inputs=inputs, defect=defect)
+
+
+def _closed_in_short(
+    model: Model, start: Array, end: Array, *, inputs: Inputs, limits: Array
+) -> Inputs:
+    """Closed inputs of few digits but in the last third, so that files are half as long."""
+    last = max(1, len(inputs.control) // 3)
+    short = Inputs(control=inputs.control.round(DIGITS), interval=round(inputs.interval, DIGITS))
+    found = closed(model, start, end, inputs=short, limits=limits, last=last)
+    if _miss(model, start, end, found) <= CLOSED / 100.0:
+        return found
+    return closed(model, start, end, inputs=inputs, limits=limits)
+
+
+def _miss(model: Model, start: Array, end: Array, inputs: Inputs) -> float:
+    return float(np.abs(inputs.drive(model, start).reduced_state[-1] - end).max())
+
+
+def closed(
+    model: Model,
+    start: Array,
+    end: Array,
+    *,
+    inputs: Inputs,
+    limits: Array,
+    last: int | None = None,
+) -> Inputs:
+    """Correct inputs that nearly lead from one reduced state to another, until they do.
+
+    Newton's method on all inputs and a common factor of the time; of all corrections the least,
+    each input measured by its room within its limits, so that those at a limit stay there.
+
+    Parameters
+    ----------
+    model : Model
+        The vehicle.
+    start, end : (n_z,) arrays
+        Reduced states.
+    inputs : Inputs
+        What nearly does.
+    limits : (n_u, 2) array
+        The inputs stay within.
+    last : int, optional
+        Correct the inputs of that many last intervals alone, and no times.
+
+    Returns
+    -------
+    Inputs
+        The best that were found, whether they meet the end or not.
+    """
+    control, interval = np.clip(inputs.control, *limits.T), inputs.interval
+    width = np.where(np.isfinite(limits[:, 1] - limits[:, 0]), limits[:, 1] - limits[:, 0], 2.0)
+    scale = np.maximum(1.0, np.abs(end))
+    best, least = inputs, np.inf
+    for _ in range(NEWTON_STEPS):
+        tried = Inputs(control=control, interval=interval)
+        miss = tried.drive(model, start).reduced_state[-1] - end
+        size = float(np.abs(miss / scale).max())
+        if not size < 0.5 * least:
+            break  # rounding
+        best, least = tried, size
+        if size == 0.0:
+            break
+        gradient, by_duration = _sensitivities(model, start, tried)
+        room = np.minimum(control - limits[:, 0], limits[:, 1] - control)
+        weight = np.where(np.isfinite(room), room, width) + 1e-9 * width
+        if last is not None:
+            weight[: len(weight) - last] = 0.0
+        columns = np.concatenate(
+            [(gradient * weight).reshape(end.size, -1), by_duration[:, None] * (last is None)],
+            axis=1,
+        )
+        step = -np.linalg.lstsq(columns, miss, rcond=None)[0]
+        control = np.clip(control + weight * step[:-1].reshape(control.shape), *limits.T)
+        interval *= 1.0 + max(-0.5, float(step[-1]))
+    return best
+
+
+def _sensitivities(model: Model, start: Array, inputs: Inputs) -> tuple[Array, Array]:
+    """Derivatives of the last reduced state by inputs (n_z, n, n_u) and a time factor (n_z,)."""
+    control = inputs.control
+    n, n_u = control.shape
+    by = PERTURBATION * np.maximum(1.0, np.abs(control))
+    shifts = by.ravel()[:, None, None] * np.eye(n * n_u).reshape(n * n_u, n, n_u)
+    controls = np.concatenate([control + shifts, control - shifts, control[None], control[None]])
+    factors = np.ones(len(controls))
+    factors[-2:] = 1.0 + PERTURBATION, 1.0 - PERTURBATION
+    ends = _last_states(model, start, controls, factors * inputs.interval)
+    plus, minus = ends[: n * n_u], ends[n * n_u : -2]
+    gradient = (plus - minus) / (2.0 * by.reshape(-1, 1))
+    by_factor = (ends[-2] - ends[-1]) / (2.0 * PERTURBATION)
+    return gradient.T.reshape(start.size, n, n_u), by_factor
+
+
+def _last_states(model: Model, start: Array, controls: Array, intervals: Array) -> Array:
+    """Reduced states (m, n_z) after inputs (m, n, n_u) in intervals (m,) [s], by Runge-Kutta."""
+    state = np.broadcast_to(start, (len(controls), start.size))
+    step = (intervals / RUNGE_KUTTA_STEPS)[:, None]
+    for k in range(controls.shape[1]):
+        for _ in range(RUNGE_KUTTA_STEPS):
+            rate_1 = model.reduced_dynamics(state, controls[:, k])
+            rate_2 = model.reduced_dynamics(state + step / 2.0 * rate_1, controls[:, k])
+            rate_3 = model.reduced_dynamics(state + step / 2.0 * rate_2, controls[:, k])
+            rate_4 = model.reduced_dynamics(state + step * rate_3, controls[:, k])
+            state = state + step / 6.0 * (rate_1 + 2.0 * rate_2 + 2.0 * rate_3 + rate_4)
+    return state
+
+
+def _outside(model: Model, trim: Trim) -> str:
+    """Which limit a trim breaks, empty if none."""
+    for what, names, values, limits in (
+        ("reduced state", model.reduced_names, trim.reduced_state, model.reduced_limits),
+        ("control", model.control_names, trim.control, model.control_limits),
+    ):
+        if values.shape != (len(names),):
+            raise ValueError(
+                f"trim {trim.name!r}: {what} has {values.size} components, need {len(names)} "
+                f"({', '.join(names)}) for the {model.name}"
+            )
+        excess = _excess(limits, values[None])
+        if excess.size and excess.max() > WITHIN:
+            k = int(excess.argmax())
+            return (
+                f"trim {trim.name!r}: {names[k]} = {values[k]:.6g} is outside "
+                f"[{limits[k, 0]:.6g}, {limits[k, 1]:.6g}]"
+            )
+    return ""
+
+
+def _excess(limits: Array, rows: Array) -> Array:
+    """How far rows (n, k) leave limits (k, 2) at worst, as a share of their range, (k,)."""
+    inner = drawn_in(limits, 0.0)
+    width = np.where(np.isfinite(limits[:, 1] - limits[:, 0]), limits[:, 1] - limits[:, 0], 1.0)
+    out = np.maximum(inner[:, 0] - rows, rows - inner[:, 1]).max(axis=0)
+    share: Array = np.maximum(0.0, out) / np.where(width > 0.0, width, 1.0)
+    return share

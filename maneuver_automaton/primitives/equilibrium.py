@@ -1,0 +1,291 @@
+"""Trims of a model: where its reduced dynamics stand still, point by point of a grid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton.models import Model
+from maneuver_automaton.primitives.trim import Trim
+
+TWIST_NAMES = ("speed", "lateral_speed", "turn_rate", "climb")
+BALANCED = 1e-11  # rates of an equilibrium and misses of what is asked for, over the scale
+SAME = 1e-12  # numbers closer than this are taken for the simpler one
+MOST_STEPS = 60
+SHORTEST = 1e-6  # share of a step of Newton
+DIFFERENCE = 1e-6  # of central differences, over the size of the value, at least 1
+SLACK = 1e-12  # what a limit may be exceeded by, over its size, before the value is moved onto it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MissingTrim:
+    """A point of a grid at which the vehicle has no trim, and why."""
+
+    name: str
+    reason: str  # which limit, and by how much; or what stays out of balance
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FoundTrims:
+    """Trims at the points of a grid, and the points without one, both in the order of the grid."""
+
+    trims: tuple[Trim, ...]
+    missing: tuple[MissingTrim, ...]
+
+
+def trims_of(
+    model: Model,
+    grid: Mapping[str, ArrayLike],
+    *,
+    max_lateral_acceleration: float | None = None,
+) -> FoundTrims:
+    """Trims of a model at every combination of the values in `grid`, within its limits.
+
+    What the grid does not say is solved for: reduced state z and control u with ``f(z, u) = 0``,
+    nearest to zero where that leaves a freedom. If the equations leave one, the vehicle is asked
+    not to slide sideways. Trims are named after their point: ``"speed 10, turn_rate 0.2"``.
+
+    Source: Frazzoli, Dahleh, Feron (2005), Sec. III-A: trims are the equilibria of the reduced
+    dynamics. Solved by Newton with halved steps; from a start inside the limits by the trust
+    region of Branch, Coleman, Li (1999), in SciPy, where Newton leaves them.
+
+    Parameters
+    ----------
+    model : Model
+        The vehicle.
+    grid : mapping of str to (n,) arrays
+        Values of components of the reduced state or the control, by name; or of the body
+        velocity: speed [m/s], lateral_speed [m/s], turn_rate [rad/s], climb [m/s].
+    max_lateral_acceleration : float, optional
+        Greatest speed times turn rate [m/s^2]: a tyre's grip, which is no limit of a state; no
+        limit if None.
+
+    Returns
+    -------
+    FoundTrims
+        Rates of the reduced state are below 1e-11, relative to their terms.
+
+    Raises
+    ------
+    ValueError
+        If the grid names what the model does not have, or holds no number.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import SecondOrderCar
+    >>> car = SecondOrderCar(wheelbase=2.0, max_steering=0.7, max_speed=2.0, max_acceleration=1.0,
+    ...                      max_steering_rate=0.5)
+    >>> found = trims_of(car, {"speed": [1.0, 2.0], "turn_rate": [0.5]})
+    >>> [trim.name for trim in found.trims]
+    ['speed 2, turn_rate 0.5']
+    >>> found.missing[0].reason
+    'steering would be 0.7854, 0.0854 beyond its limit 0.7000'
+    """
+    axes = {name: as_array(f"grid: {name}", values).ravel() + 0.0 for name, values in grid.items()}
+    for name, values in axes.items():
+        if not values.size:
+            raise ValueError(f"grid: got no value of {name}, need at least one")
+    _check_names(model, axes)
+    trims, missing = [], []
+    for point in product(*(values.tolist() for values in axes.values())):
+        asked = dict(zip(axes, point, strict=True))
+        name = ", ".join(f"{what} {value:.10g}" for what, value in asked.items())
+        found = _trim_at(_balance(model, asked), name, max_lateral_acceleration)
+        if isinstance(found, Trim):
+            trims.append(found)
+        else:
+            missing.append(found)
+    return FoundTrims(trims=tuple(trims), missing=tuple(missing))
+
+
+def _check_names(model: Model, axes: Mapping[str, Array]) -> None:
+    twist = TWIST_NAMES[: model.group.dof]
+    known = dict.fromkeys((*model.reduced_names, *model.control_names, *twist))
+    if not axes:
+        raise ValueError(f"grid: got no axis, need some of {', '.join(known)}")
+    for name in axes:
+        if name not in known:
+            raise ValueError(f"grid: the {model.name} has no {name!r}, need {', '.join(known)}")
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Balance:
+    """The equations of one trim; the unknowns are reduced state and control, less what is given."""
+
+    model: Model
+    given: Array  # (n_z + n_u,) nan where it is unknown
+    twist: Mapping[int, float]  # components of the body velocity that are asked for
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (*self.model.reduced_names, *self.model.control_names)
+
+    @property
+    def limits(self) -> Array:
+        return np.concatenate([self.model.reduced_limits, self.model.control_limits])
+
+    @property
+    def equations(self) -> tuple[str, ...]:
+        rates = (f"the rate of {name}" for name in self.model.reduced_names)
+        return (*rates, *(TWIST_NAMES[k] for k in self.twist))
+
+    def completed(self, unknown: Array) -> Array:
+        """Reduced state and control (n_z + n_u,)."""
+        everything = self.given.copy()
+        everything[np.isnan(everything)] = unknown
+        return everything
+
+    def missed(self, unknown: Array) -> Array:
+        """What is out of balance (n_equations,); not finite outside of what the model can bear."""
+        everything = self.completed(unknown)
+        z, u = np.split(everything, [len(self.model.reduced_names)])
+        with np.errstate(all="ignore"):
+            rates = np.array(self.model.dynamics(z, u), dtype=np.float64).ravel()
+            twist = np.array(self.model.velocity(z, u), dtype=np.float64)
+        return np.concatenate([rates, [twist[k] - value for k, value in self.twist.items()]])
+
+
+def _balance(model: Model, asked: Mapping[str, float]) -> _Balance:
+    names = (*model.reduced_names, *model.control_names)
+    twist = {TWIST_NAMES.index(k): value for k, value in asked.items() if k not in names}
+    free = len(names) - (len(asked) - len(twist))
+    if free > len(model.reduced_names) + len(twist) and "lateral_speed" not in asked:
+        twist[1] = 0.0
+    given = np.array([asked.get(name, np.nan) for name in names], dtype=np.float64)
+    return _Balance(model=model, given=given, twist=twist)
+
+
+def _trim_at(
+    balance: _Balance, name: str, max_lateral_acceleration: float | None
+) -> Trim | MissingTrim:
+    """The trim that a balance asks for, or why there is none."""
+    model = balance.model
+    found, solved = _solved(balance)
+    everything, excess = balance.completed(found), _excess(balance, found)
+    if not solved:  # only what the grid asks for is sure to be beyond its limits
+        excess = np.where(np.isnan(balance.given), 0.0, excess)
+    if excess.any():
+        return MissingTrim(name=name, reason=_beyond(balance, everything, excess))
+    if not solved:
+        return MissingTrim(name=name, reason=_unbalanced(balance, found))
+    inside = np.clip(everything, *balance.limits.T) + 0.0
+    state, control = np.split(inside, [len(model.reduced_names)])
+    twist = _as_asked(model.body_velocity(state, control), balance)
+    lateral = float(np.hypot(twist[0], twist[1]) * abs(twist[2]))
+    if max_lateral_acceleration is not None and lateral > max_lateral_acceleration * (1.0 + SLACK):
+        more = lateral - max_lateral_acceleration
+        reason = (
+            f"the lateral acceleration would be {lateral:.4g} m/s^2, {more:.4g} m/s^2 beyond "
+            f"max_lateral_acceleration {max_lateral_acceleration:.4g} m/s^2"
+        )
+        return MissingTrim(name=name, reason=reason)
+    return Trim(name=name, body_velocity=twist, control=control, reduced_state=state)
+
+
+def _solved(balance: _Balance) -> tuple[Array, bool]:
+    """Unknowns in balance, within the limits if there are such; and whether they are."""
+    low, high = balance.limits[np.isnan(balance.given)].T
+    found, solved = _newton(balance.missed, np.clip(0.0, low, high))
+    if low.size and (not solved or _excess(balance, found).any()):
+        other, also = _newton(balance.missed, _inside(balance, low, high))
+        if also and not (solved and _excess(balance, other).any()):
+            found, solved = other, True
+    return (_simplest(balance.missed, found) if solved else found), solved
+
+
+def _newton(missed: Callable[[Array], Array], start: Array) -> tuple[Array, bool]:
+    """Root of `missed` from `start`, by shortest steps that are halved until they help."""
+    x, now = start, missed(start)
+    for _ in range(MOST_STEPS):
+        if not np.isfinite(now).all() or not now.any():
+            break
+        slopes = _slopes(missed, x)
+        if not np.isfinite(slopes).all():
+            break
+        step = np.linalg.lstsq(slopes, -now, rcond=1e-12)[0]
+        share = 1.0
+        while share > SHORTEST:
+            there = missed(x + share * step)
+            if np.isfinite(there).all() and np.abs(there).max() < np.abs(now).max():
+                break
+            share /= 2.0
+        else:
+            break
+        x, now = x + share * step, there
+    if not np.isfinite(now).all():
+        return x, False
+    scale = max(1.0, float((np.abs(_slopes(missed, x)) @ np.abs(x)).max(initial=0.0)))
+    return x, bool(np.abs(now).max(initial=0.0) <= BALANCED * scale)
+
+
+def _slopes(missed: Callable[[Array], Array], x: Array) -> Array:
+    """Derivatives (n_equations, n) by central differences."""
+    widths = DIFFERENCE * np.maximum(1.0, np.abs(x))
+    steps = np.diag(widths)
+    columns = [
+        (missed(x + step) - missed(x - step)) / (2.0 * width)
+        for step, width in zip(steps, widths, strict=True)
+    ]
+    slopes: Array = np.stack(columns, axis=-1) if columns else np.zeros((missed(x).size, 0))
+    return slopes
+
+
+def _inside(balance: _Balance, low: Array, high: Array) -> Array:
+    """What is nearest to balance within the limits."""
+    from scipy.optimize import least_squares
+
+    high = np.maximum(high, low + 1e-9)
+    start: Array = np.clip(0.0, low, high)
+    if not np.isfinite(balance.missed(start)).all():
+        return start
+    fit = least_squares(
+        balance.missed, start, bounds=(low, high), xtol=1e-15, ftol=1e-15, gtol=1e-15
+    )
+    return np.asarray(fit.x, dtype=np.float64)
+
+
+def _excess(balance: _Balance, unknown: Array) -> Array:
+    """How far each component is beyond its limits (n_z + n_u,), 0 inside."""
+    everything, (low, high) = balance.completed(unknown), balance.limits.T
+    beyond = np.maximum(low - everything, everything - high)
+    return np.where(beyond > SLACK * np.maximum(1.0, np.abs(everything)), beyond, 0.0)
+
+
+def _simplest(missed: Callable[[Array], Array], x: Array) -> Array:
+    """The root without the digits that are rounding: zeros are zero, a half is a half."""
+    for k, value in enumerate(np.round(x, 12)):
+        simple = x.copy()
+        simple[k] = value
+        if np.abs(missed(simple)).max() <= max(np.abs(missed(x)).max(), 1e-15):
+            x = simple
+    return x
+
+
+def _as_asked(twist: Array, balance: _Balance) -> Array:
+    """The body velocity, with the numbers asked for where it has them but for rounding."""
+    exact: Array = np.array(twist)
+    for k, value in balance.twist.items():
+        if abs(exact[k] - value) <= SAME * max(1.0, abs(value)):
+            exact[k] = value
+    exact += 0.0  # -0.0 is 0.0
+    return exact
+
+
+def _beyond(balance: _Balance, everything: Array, excess: Array) -> str:
+    parts = [
+        f"{balance.names[k]} would be {everything[k]:.4f}, {excess[k]:.4g} beyond its limit "
+        f"{balance.limits[k, int(everything[k] > balance.limits[k, 1])]:.4f}"
+        for k in np.flatnonzero(excess)
+    ]
+    return "; ".join(parts)
+
+
+def _unbalanced(balance: _Balance, unknown: Array) -> str:
+    missed = np.abs(balance.missed(unknown))
+    worst = int(np.argmax(missed))
+    return f"no steady motion: {balance.equations[worst]} stays off by {missed[worst]:.4g}"

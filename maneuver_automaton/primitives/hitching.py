@@ -1,0 +1,159 @@
+"""Maneuvers of a car with a trailer: the wheels at their limit until the hitch is where it goes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.models import CarWithTrailer
+from maneuver_automaton.primitives.driving import drive_all
+from maneuver_automaton.primitives.maneuver import Maneuver
+from maneuver_automaton.primitives.trajectory import Trajectory
+from maneuver_automaton.primitives.trim import Trim
+
+POINTS = 64  # of the quadrature of the time
+PARTS = 16  # intervals of the hitch that it is applied to
+
+
+def hitch_trims(model: CarWithTrailer, hitches: Sequence[float]) -> tuple[Trim, ...]:
+    """Rest, and steady motion at the greatest speeds ahead and back, at each angle of the hitch.
+
+    Where the wheels cannot hold an angle there is rest alone.
+
+    Source: ``hitch' = 0``: tan(steering) = wheelbase sin(hitch) / hitch_length.
+
+    Examples
+    --------
+    >>> truck = CarWithTrailer(wheelbase=0.25, hitch_length=0.5, max_steering=1.0, max_speed=0.5)
+    >>> [trim.name for trim in hitch_trims(truck, [0.0])]
+    ['rest, hitch 0', 'ahead, hitch 0', 'back, hitch 0']
+    """
+    trims = []
+    for hitch in hitches:
+        steering = math.atan(model.wheelbase * math.sin(hitch) / model.hitch_length)
+        speeds = [("rest", 0.0)]
+        if abs(steering) <= model.max_steering:
+            low, high = model.control_limits[0].tolist()
+            speeds += [(name, v) for name, v in (("ahead", high), ("back", low)) if v]
+        for name, speed in speeds:
+            state = np.array([hitch])
+            control = np.array([speed, steering if speed else 0.0])
+            trims.append(
+                Trim(
+                    name=f"{name}, hitch {hitch:.6g}",
+                    body_velocity=model.body_velocity(state, control),
+                    control=control,
+                    reduced_state=state,
+                )
+            )
+    return tuple(trims)
+
+
+def hitch_maneuver(model: CarWithTrailer, source: Trim, target: Trim, *, speed: float) -> Maneuver:
+    """The quickest change of the hitch at a constant `speed` [m/s].
+
+    The wheels are at their limit all the time: with them there the hitch moves one way at every
+    angle that the motion passes, and any other steering is slower. The time is the integral of
+    ``1 / hitch'`` over the hitch.
+
+    Source: the dynamics of `CarWithTrailer`; the comparison of rates for one state.
+
+    Raises
+    ------
+    ValueError
+        If the hitch is the same at both trims, or the wheels cannot bring it there.
+
+    Examples
+    --------
+    >>> truck = CarWithTrailer(wheelbase=0.25, hitch_length=0.5, max_steering=1.0, max_speed=0.5)
+    >>> rest, *_, bent = hitch_trims(truck, [0.0, 0.5])
+    >>> turned = hitch_maneuver(truck, rest, bent, speed=0.5)
+    >>> turned.course.reduced_state[-1].tolist(), round(turned.duration, 3)
+    ([0.5], 0.175)
+    """
+    if source.reduced_state[0] == target.reduced_state[0] or not speed:
+        raise ValueError(
+            f"hitch maneuver from {source.name!r} to {target.name!r}: got equal angles or no "
+            "speed, need a change"
+        )
+    made = _driven(model, [(source, target, speed)])
+    if not made:
+        raise ValueError(
+            f"hitch maneuver from {source.name!r} to {target.name!r}: the wheels cannot bring the "
+            f"hitch there at {speed:g} m/s"
+        )
+    return made[0]
+
+
+def connect_hitches(model: CarWithTrailer, trims: Sequence[Trim]) -> tuple[Maneuver, ...]:
+    """Maneuvers between all angles of the hitch, ahead and back, from rest to rest of each.
+
+    Speed and steering are inputs, so at one angle the vehicle changes between rest and motion at
+    will.
+    """
+    rests = [trim for trim in trims if trim.is_rest]
+    low, high = model.control_limits[0].tolist()
+    return _driven(
+        model,
+        [
+            (source, target, speed)
+            for source in rests
+            for target in rests
+            if source.reduced_state[0] != target.reduced_state[0]
+            for speed in (high, low)
+            if speed
+        ],
+    )
+
+
+def _driven(
+    model: CarWithTrailer, wanted: Sequence[tuple[Trim, Trim, float]]
+) -> tuple[Maneuver, ...]:
+    """The maneuvers from trim to trim at a speed, those that exist, driven all at once."""
+    begins = np.array([float(source.reduced_state[0]) for source, _, _ in wanted])
+    ends = np.array([float(target.reduced_state[0]) for _, target, _ in wanted])
+    speeds = np.array([speed for _, _, speed in wanted])
+    steering = np.copysign(model.max_steering, (ends - begins) * speeds)
+    control = np.stack([speeds, steering], axis=-1)
+    rows = zip(control, begins.tolist(), ends.tolist(), strict=True)
+    durations = np.array([_time(model, row, begin, end) for row, begin, end in rows])
+    can = np.flatnonzero(np.isfinite(durations))
+    if not can.size:
+        return ()
+    courses = drive_all(
+        model, begins[can, None], control=control[can, None], durations=durations[can, None]
+    )
+    return tuple(
+        _maneuver(*wanted[k], course) for k, course in zip(can.tolist(), courses, strict=True)
+    )
+
+
+def _maneuver(source: Trim, target: Trim, speed: float, course: Trajectory) -> Maneuver:
+    begin, end = float(source.reduced_state[0]), float(target.reduced_state[0])
+    states = course.reduced_state.copy()
+    states[-1] = end
+    return Maneuver(
+        name=f"{'ahead' if speed > 0.0 else 'back'} from hitch {begin:.6g} to {end:.6g}",
+        source=source.name,
+        target=target.name,
+        displacement=course.pose[-1],
+        duration=float(course.time[-1]),
+        course=replace(course, reduced_state=states),
+    )
+
+
+def _time(model: CarWithTrailer, control: Array, begin: float, end: float) -> float:
+    """How long the hitch takes at a constant control [s]; inf if it stops on the way."""
+    nodes, weights = np.polynomial.legendre.leggauss(POINTS)
+    edges = np.linspace(begin, end, PARTS + 1)
+    half = 0.5 * np.diff(edges)
+    hitch = (edges[:-1] + half)[:, None] + half[:, None] * nodes
+    (rates,) = model.dynamics([hitch], control)
+    ends = np.append(rates.ravel(), model.dynamics([np.array([begin, end])], control)[0])
+    if not (ends * (end - begin) > 0.0).all():
+        return math.inf
+    return float((half[:, None] * weights / rates).sum())

@@ -1,0 +1,251 @@
+"""From rest to rest over any length: speed up, cruise, brake; and turning the wheels at rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from maneuver_automaton.errors import NotATrim
+from maneuver_automaton.models import Model
+from maneuver_automaton.primitives.bang_bang import bang_bang, check_limited_rates
+from maneuver_automaton.primitives.driving import drive_all
+from maneuver_automaton.primitives.maneuver import Maneuver
+from maneuver_automaton.primitives.trim import Trim
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ramp:
+    """The quickest way over a length from rest to rest: times of its three parts."""
+
+    peak: float  # greatest speed, signed as the length [m/s, or rad/s]
+    speed_up: float  # [s]
+    cruise: float  # [s]
+    brake: float  # [s]
+
+    @property
+    def duration(self) -> float:
+        """Time it takes [s]."""
+        return self.speed_up + self.cruise + self.brake
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Stroke:
+    """A motion from rest to rest in three primitives; the trim between may last no time."""
+
+    speed_up: Maneuver  # from the rest to the cruise
+    cruise: Trim
+    cruise_duration: float  # [s]
+    brake: Maneuver  # back to the rest
+
+    @property
+    def duration(self) -> float:
+        """Time it takes [s]."""
+        return self.speed_up.duration + self.cruise_duration + self.brake.duration
+
+
+def ramp_of(
+    length: float, *, max_speed: float, acceleration: float, deceleration: float | None = None
+) -> Ramp:
+    """Quickest speeds over a signed length, from rest to rest: a triangle, or a trapezoid.
+
+    Source: the area under the speed; LaValle (2006), *Planning Algorithms*, Sec. 14.6.3.
+
+    Parameters
+    ----------
+    length : float
+        Way to go, negative in reverse [m, or rad].
+    max_speed, acceleration : float
+        Greatest speed and rate of the speed, positive [m/s, m/s^2; or rad].
+    deceleration : float, optional
+        Greatest rate of braking; the acceleration if None.
+
+    Examples
+    --------
+    >>> ramp_of(4.0, max_speed=10.0, acceleration=1.0)
+    Ramp(peak=2.0, speed_up=2.0, cruise=0.0, brake=2.0)
+    >>> ramp_of(-4.0, max_speed=1.0, acceleration=1.0)
+    Ramp(peak=-1.0, speed_up=1.0, cruise=3.0, brake=1.0)
+    """
+    brake = acceleration if deceleration is None else deceleration
+    given = {"max_speed": max_speed, "acceleration": acceleration, "deceleration": brake}
+    for name, value in given.items():
+        if not 0.0 < value < math.inf:
+            raise ValueError(f"ramp: {name} must be positive, got {value}")
+    if not math.isfinite(length):
+        raise ValueError(f"ramp: length must be finite, got {length}")
+    ramps = 0.5 / acceleration + 0.5 / brake  # length of both ramps over the squared peak
+    peak = min(max_speed, math.sqrt(abs(length) / ramps))
+    cruise = (abs(length) - ramps * peak * peak) / peak if peak == max_speed else 0.0
+    return Ramp(
+        peak=math.copysign(peak, length),
+        speed_up=peak / acceleration,
+        cruise=max(0.0, cruise),
+        brake=peak / brake,
+    )
+
+
+def stroke(model: Model, rest: Trim, length: float, *, max_speed: float | None = None) -> Stroke:
+    """Quickest way of `length` [m] ahead, or back if negative, from a rest to the same rest.
+
+    What else the reduced state holds, such as the steering angle, stays: an arc of a circle.
+
+    Parameters
+    ----------
+    model : Model
+        A vehicle with a component `speed` whose rate is a limited control.
+    rest : Trim
+        Where it begins and ends.
+    length : float
+        Length of the path of the pose, not zero [m].
+    max_speed : float, optional
+        Greatest speed [m/s], at most that of the model, which stands for None.
+
+    Raises
+    ------
+    ValueError
+        If the vehicle cannot go that way, or is none whose rates are limited.
+    NotATrim
+        If it does not rest there.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import SecondOrderCar
+    >>> from maneuver_automaton.primitives.equilibrium import trims_of
+    >>> car = SecondOrderCar(wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0,
+    ...                      max_steering_rate=0.5)
+    >>> (rest,) = trims_of(car, {"speed": [0.0], "steering": [0.0]}).trims
+    >>> back = stroke(car, rest, -10.0)
+    >>> back.speed_up.displacement.round(12).tolist(), back.cruise_duration, back.duration
+    ([-3.125, 0.0, 0.0], 1.5, 6.5)
+    """
+    return _in_parts(model, _swing(model, rest, length, "speed", max_speed))
+
+
+def strokes(
+    model: Model, rests: Sequence[Trim], lengths: Sequence[float], *, max_speed: float | None = None
+) -> tuple[Maneuver, ...]:
+    """Strokes of every length from every rest, each as one maneuver from the rest to itself."""
+    return _whole(
+        model, [_swing(model, r, way, "speed", max_speed) for r in rests for way in lengths]
+    )
+
+
+def turn(model: Model, rest: Trim, angle: float, *, max_turn_rate: float | None = None) -> Stroke:
+    """Quickest turn on the spot by `angle` [rad], left if positive, from a rest to the same rest.
+
+    See `stroke`; here the vehicle has a component `turn_rate` whose rate is a limited control.
+    """
+    return _in_parts(model, _swing(model, rest, angle, "turn_rate", max_turn_rate))
+
+
+def turns(
+    model: Model,
+    rests: Sequence[Trim],
+    angles: Sequence[float],
+    *,
+    max_turn_rate: float | None = None,
+) -> tuple[Maneuver, ...]:
+    """Turns on the spot by every angle at every rest, each as one maneuver to the same rest."""
+    return _whole(
+        model, [_swing(model, r, way, "turn_rate", max_turn_rate) for r in rests for way in angles]
+    )
+
+
+def steer_at_rest(model: Model, source: Trim, target: Trim) -> Maneuver:
+    """Quickest change of what can change at rest, such as the steering angle; see `bang_bang`.
+
+    Raises
+    ------
+    NotATrim
+        If the vehicle does not rest at both trims.
+    """
+    for trim in (source, target):
+        _check_rest(trim)
+    return bang_bang(model, source, target)
+
+
+class _Swing(NamedTuple):
+    """A rest, and how one component of its reduced state goes up and back to zero."""
+
+    name: str
+    rest: Trim
+    component: int
+    ramp: Ramp
+
+
+def _swing(model: Model, rest: Trim, way: float, component: str, limit: float | None) -> _Swing:
+    """The one whose integral is `way`."""
+    check_limited_rates(model)
+    _check_rest(rest)
+    if component not in model.reduced_names:
+        raise ValueError(f"stroke: the {model.name} has no {component}, need one of limited rate")
+    k = model.reduced_names.index(component)
+    (slow, fast), (least, greatest) = model.control_limits[k], model.reduced_limits[k]
+    up, down, most = (fast, -slow, greatest) if way > 0.0 else (-slow, fast, -least)
+    if way == 0.0 or not most > 0.0:
+        raise ValueError(
+            f"stroke: got {way}, but the {component} of the {model.name} is within "
+            f"[{least:.6g}, {greatest:.6g}]; need a way that is not 0 and leads there"
+        )
+    ramp = ramp_of(
+        way,
+        max_speed=float(most) if limit is None else min(float(most), limit),
+        acceleration=float(up),
+        deceleration=float(down),
+    )
+    return _Swing(f"{rest.name}, {component} over {way:.6g}", rest, k, ramp)
+
+
+def _in_parts(model: Model, swing: _Swing) -> Stroke:
+    state = np.array(swing.rest.reduced_state)
+    state[swing.component] = swing.ramp.peak
+    component = model.reduced_names[swing.component]
+    cruise = replace(
+        swing.rest,
+        name=f"{component} {swing.ramp.peak:.6g} from {swing.rest.name}",
+        reduced_state=state,
+        body_velocity=model.body_velocity(state, swing.rest.control),
+    )
+    return Stroke(
+        speed_up=bang_bang(model, swing.rest, cruise),
+        cruise=cruise,
+        cruise_duration=swing.ramp.cruise,
+        brake=bang_bang(model, cruise, swing.rest),
+    )
+
+
+def _whole(model: Model, swings: Sequence[_Swing]) -> tuple[Maneuver, ...]:
+    if not swings:
+        return ()
+    ramps = [swing.ramp for swing in swings]
+    durations = np.array([[ramp.speed_up, ramp.cruise, ramp.brake] for ramp in ramps])
+    control = np.zeros((len(swings), 3, len(model.control_names)))
+    for row, swing in zip(control, swings, strict=True):
+        up, down = swing.ramp.speed_up, swing.ramp.brake
+        row[:, swing.component] = [swing.ramp.peak / up, 0.0, -swing.ramp.peak / down]
+    courses = drive_all(
+        model,
+        [swing.rest.reduced_state for swing in swings],
+        control=control,
+        durations=durations,
+    )
+    return tuple(
+        Maneuver(
+            name=swing.name,
+            source=swing.rest.name,
+            target=swing.rest.name,
+            displacement=course.pose[-1],
+            duration=float(course.time[-1]),
+            course=course,
+        )
+        for swing, course in zip(swings, courses, strict=True)
+    )
+
+
+def _check_rest(trim: Trim) -> None:
+    if not trim.is_rest:
+        raise NotATrim(f"trim {trim.name!r}: moves with {trim.body_velocity.tolist()}, need a rest")

@@ -1,0 +1,69 @@
+"""How a loop is closed: the numbers, and whether they fit a problem."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.primitives import Trim
+from maneuver_automaton.problem import Problem
+
+EXACT = 1e-9  # [m, rad] a pose this close to a goal is the goal; to a plan, on it
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Settings:
+    """How a loop is closed."""
+
+    step: float  # delta [s]
+    margin: float = 0.0
+    time_limit: float = 5.0  # [s] per step
+    first: Plan | None = None
+    hold: bool = False
+    retimed: bool = False
+    pad: Trim | None = None  # the rest that prolongs a plan
+    look_ahead: float = 60.0  # [s] that a way out must be free
+    stand: float = 2.0  # [s] that the goal must stay free after arrival
+
+    def __post_init__(self) -> None:
+        for name in ("step", "time_limit", "look_ahead"):
+            value = getattr(self, name)
+            if not value > 0.0:
+                raise ValueError(f"receding horizon: {name} must be positive, got {value} s")
+        if not self.margin >= 0.0:
+            raise ValueError(f"receding horizon: margin must be at least 0, got {self.margin}")
+        if not self.stand >= 0.0:
+            raise ValueError(f"receding horizon: stand must be at least 0, got {self.stand} s")
+
+    def pad_of(self, problem: Problem) -> Trim | None:
+        """The rest that fills a fixed time; None where time is free."""
+        return None if problem.horizon.time is None else self.pad
+
+    def check_horizon(self, problem: Problem) -> None:
+        """Raise ValueError if a loop with these settings cannot keep the horizon of a problem."""
+        horizon = problem.horizon.time
+        if horizon is not None:
+            if self.pad is None:
+                raise ValueError(
+                    "receding horizon: a fixed time needs a rest trim, which prolongs the last "
+                    "plan; the library has none"
+                )
+            if self.step > horizon * (1.0 + EXACT):
+                raise ValueError(
+                    f"receding horizon: step is {self.step:g} s, need at most the horizon, "
+                    f"{horizon:g} s"
+                )
+        if self.retimed and (horizon is None or not getattr(problem.cost, "effort", 0.0) > 0.0):
+            raise ValueError(
+                "receding horizon: retimed plans need a fixed horizon and a cost with effort"
+            )
+
+
+def cheapest_rest(problem: Problem) -> Trim | None:
+    """The cheapest rest of the library."""
+    still = np.flatnonzero(~problem.automaton.body_velocities.any(axis=1))
+    if not still.size:
+        return None
+    return problem.automaton.trims[int(still[np.argmin(problem.rates[still])])]

@@ -1,0 +1,164 @@
+"""Different ways to drive there: kinematic plans that differ in their gears, most promising first.
+
+What polishing comes to is decided by the sequence of gears and the side on which obstacles are
+passed. So several are made, by pricing changes of direction differently and by turning less
+tightly than the vehicle could, and ranked by the time they would take from stop to stop.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.models import Car, Unicycle
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.refinement.improve import Patience, improve
+from maneuver_automaton.search.cost_to_go import cost_to_go_table
+from maneuver_automaton.search.lattice import first_plan
+from maneuver_automaton.search.lattice_query import lattice_query
+from maneuver_automaton.search.word_plan import plan_of_word
+
+PRICES = (  # of a change of direction, and of a switch of trims, in the time of a turning radius
+    (0.8, 0.0),
+    (0.3, 0.8),
+    (0.3, 0.3),
+    (2.0, 0.0),
+)
+BRIEF = Patience(attempts=2000, passes=4)
+SAME = 0.15  # share of a stroke in which it differs at most from that of a like sequence
+SMALL = 0.02  # share of the whole way by which a stroke counts as longer
+OTHERS = 8  # further words of each search that are looked at
+
+
+Estimate = Callable[[Plan], float]
+"""Time [s] a vehicle with inertia takes along a kinematic plan, roughly."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Drive:
+    """A kinematic plan and what it comes to from stop to stop."""
+
+    plan: Plan
+    estimate: float  # [s]
+    strokes: Array  # (m,) signed lengths of its strokes [m]; turns on the spot are no stroke
+
+    def resembles(self, other: Drive) -> bool:
+        """Whether it has the same gears, for about as long each."""
+        if self.strokes.shape != other.strokes.shape:
+            return False
+        mine, theirs = np.abs(self.strokes), np.abs(other.strokes)
+        longer = np.maximum(mine, theirs) + SMALL * (mine.sum() + theirs.sum())
+        signs = (np.sign(self.strokes) == np.sign(other.strokes)).all()
+        return bool(signs and (np.abs(mine - theirs) <= SAME * longer).all())
+
+
+def car_library(
+    *, wheelbase: float, max_steering: float, share: float = 1.0, reverses: bool = True
+) -> Automaton:
+    """Straight on and as tightly as a share of the greatest curvature allows, both ways."""
+    return _car_library(wheelbase, max_steering, share, reverses)
+
+
+def unicycle_library(
+    *, max_speed: float, max_turn_rate: float, share: float = 1.0, reverses: bool = True
+) -> Automaton:
+    """Straight on, arcs at a share of the greatest turn rate, and turns on the spot."""
+    return _unicycle_library(max_speed, max_turn_rate, share, reverses)
+
+
+@functools.lru_cache(maxsize=16)
+def _car_library(wheelbase: float, steering: float, share: float, reverses: bool) -> Automaton:
+    angle = math.atan(share * math.tan(steering))
+    turns = {"left": angle, "straight": 0.0, "right": -angle}
+    gears = {"ahead": 1.0, "back": -1.0} if reverses else {"ahead": 1.0}
+    car = Car(wheelbase=wheelbase, max_steering=steering)
+    return Automaton.of_controls(
+        car, {f"{g} {t}": (gears[g], turns[t]) for g in gears for t in turns}
+    )
+
+
+@functools.lru_cache(maxsize=16)
+def _unicycle_library(speed: float, rate: float, share: float, reverses: bool) -> Automaton:
+    gears = {"ahead": speed, "back": -speed} if reverses else {"ahead": speed}
+    turns = {"left": share * rate, "straight": 0.0, "right": -share * rate}
+    controls = {f"{g} {t}": (gears[g], turns[t]) for g in gears for t in turns}
+    spins = {"spin left": (0.0, rate), "spin right": (0.0, -rate)}
+    return Automaton.of_controls(Unicycle(), controls | spins)
+
+
+def gear_sequences(
+    problem: Problem,
+    libraries: Sequence[Automaton],
+    estimate: Estimate,
+    *,
+    time_limit: float = 2.0,
+    keep: int = 6,
+) -> tuple[Drive, ...]:
+    """Kinematic plans that differ, those first that are estimated to take the least time.
+
+    Parameters
+    ----------
+    problem : Problem
+        Start, goal and obstacles; its automaton and cost are replaced.
+    libraries : sequence of Automaton
+        Kinematic ones, from `car_library` or `unicycle_library`.
+    estimate : callable
+        What a plan would take; see `timed`.
+    time_limit : float
+        For all searches together [s]; the first of them ends when it has a plan.
+    keep : int
+        How many plans to return at most.
+    """
+    deadline = time.monotonic() + time_limit
+    found: list[Drive] = []
+    order = sorted(np.ndindex(len(PRICES), len(libraries)), key=sum)
+    variants = [(PRICES[i], libraries[j]) for i, j in order]
+    for k, ((turning, switching), library) in enumerate(variants):
+        now = time.monotonic()
+        if now >= deadline:
+            break
+        until = deadline if not found else now + (deadline - now) / (len(variants) - k)
+        unit = _unit(library)
+        cost = Cost(time=1.0, direction_change=turning * unit, switch=switching * unit)
+        variant = replace(problem, automaton=library, cost=cost)
+        for plan in _plans(variant, until, deadline):
+            drive = Drive(plan=plan, estimate=estimate(plan), strokes=_strokes(plan))
+            if any(drive.resembles(other) and drive.estimate >= other.estimate for other in found):
+                continue
+            found = [other for other in found if not drive.resembles(other)] + [drive]
+    return tuple(sorted(found, key=lambda one: one.estimate)[:keep])
+
+
+def _plans(problem: Problem, until: float, deadline: float) -> Iterator[Plan]:
+    """Plans of one search: what improving its first one comes to, and what it met on the way."""
+    query = lattice_query(problem, tuple(range(len(problem.goals))))
+    table = cost_to_go_table(problem)
+    first = first_plan(query, deadline=max(until, deadline), table=table)
+    if first.word is None:
+        return
+    improved = improve(query, first.word, deadline=until, patience=BRIEF, table=table)
+    for word in (improved.word, *improved.others[:OTHERS]):
+        yield plan_of_word(query, word)
+
+
+def _unit(library: Automaton) -> float:
+    """Time [s] in which the tightest arc turns by one radian."""
+    return 1.0 / float(np.abs(library.body_velocities[:, 2]).max())
+
+
+def _strokes(plan: Plan) -> Array:
+    """Signed lengths of the stretches without a change of direction [m]."""
+    lengths = np.array([trim.body_velocity[0] for trim in plan.trims]) * plan.durations
+    lengths = lengths[np.abs(lengths) > 1e-6]
+    if not lengths.size:
+        return lengths
+    begins = np.flatnonzero(np.diff(np.sign(lengths), prepend=0.0))
+    return np.add.reduceat(lengths, begins)

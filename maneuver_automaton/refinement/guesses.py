@@ -1,0 +1,271 @@
+"""Guesses for polishing: the geometry of a kinematic plan, driven at a pace that inertia allows.
+
+A guess may jump where the plan jumps from arc to arc: defects do no harm. What it must get right
+is the sequence of gears and, roughly, the time each stroke takes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.models import CarWithTrailer, SecondOrderCar, SecondOrderUnicycle
+from maneuver_automaton.optimal_control import Guess
+from maneuver_automaton.primitives import Trajectory
+
+SHARE = 0.9  # of the limits that a guess uses
+SAMPLES = 24  # at least, of every trim that is driven
+FINE = 0.02  # [rad, share of the plan] between samples
+
+Step = Callable[[float], int]
+"""How many intervals a duration [s] gets."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pace:
+    """Limits of a motion along a path; infinite where there is no limit."""
+
+    speed: float  # [m/s]
+    reverse_speed: float  # [m/s]
+    acceleration: float  # [m/s^2]
+    turn_rate: float = math.inf  # [rad/s]
+    angular_acceleration: float = math.inf  # [rad/s^2]
+    wheelbase: float = 0.0  # [m] 0: nothing is steered
+    steering_rate: float = math.inf  # [rad/s]
+
+
+class Timed(NamedTuple):
+    """A kinematic plan driven from stop to stop: samples in time, and what each belongs to."""
+
+    time: Array  # (m,) [s]
+    pose: Array  # (m, 3)
+    twist: Array  # (m, 3) along the path
+    steering: Array  # (m,) [rad] as the path asks for it, with jumps
+    stroke: IntArray  # (m,) number of the stroke from stop to stop
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return float(self.time[-1])
+
+
+def timed(plan: Plan, pace: Pace) -> Timed:
+    """A plan of steady motions in the plane, driven within limits of speed and acceleration.
+
+    It stops where the sign of the speed changes, and between driving and turning on the spot. Where
+    a wheel has to be turned further than the strokes around a stop give time for, it waits.
+
+    Raises
+    ------
+    ValueError
+        If the plan does not move.
+    """
+    twists = np.array([trim.body_velocity[:3] for trim in plan.trims]).reshape(-1, 3)
+    moves = twists.any(axis=1) & (plan.durations > 0.0)
+    if not moves.any():
+        raise ValueError("guess: the plan does not move, so there is nothing to time")
+    twists, durations = twists[moves], plan.durations[moves]
+    begins = (np.cumsum(plan.durations) - plan.durations)[moves]
+    gears = np.sign(twists[:, 0])
+    stroke_of = np.concatenate([[0], np.cumsum(np.diff(gears) != 0)])
+    counts = np.maximum(SAMPLES, np.ceil(durations / durations.sum() / FINE)).astype(np.int64)
+    owner = np.repeat(np.arange(len(counts)), counts)
+    first = np.cumsum(counts) - counts
+    share = (np.arange(len(owner)) - first[owner]) / counts[owner]
+    width = durations[owner] / counts[owner]
+    ratio, growth = _limits(twists, pace)
+    squared = _squared_ratio(ratio[owner], growth[owner], width, stroke_of[owner])
+    mean = 0.5 * (np.sqrt(squared[:-1]) + np.sqrt(squared[1:]))
+    passed = width / mean
+    steering = _steering(twists, pace.wheelbase)
+    waits = _waits(steering, stroke_of, _sums(stroke_of[owner], passed), pace.steering_rate)
+    return _assembled(
+        plan, begins[owner] + share * durations[owner], passed, squared, twists[owner],
+        steering[owner], stroke_of[owner], waits,
+    )  # fmt: skip
+
+
+def _sums(owner: IntArray, values: Array) -> Array:
+    return np.asarray(np.bincount(owner, values), dtype=np.float64)
+
+
+def _limits(twists: Array, pace: Pace) -> tuple[Array, Array]:
+    """How much faster than planned each trim may be driven, and how fast this may grow [1/s]."""
+    speed, turn = np.abs(twists[:, 0]), np.abs(twists[:, 2])
+    most = np.where(twists[:, 0] < 0.0, pace.reverse_speed, pace.speed)
+    with np.errstate(divide="ignore"):
+        ratio = np.minimum(most / speed, pace.turn_rate / turn)
+        growth = np.minimum(pace.acceleration / speed, pace.angular_acceleration / turn)
+    return SHARE * ratio, SHARE * growth
+
+
+def _squared_ratio(ratio: Array, growth: Array, width: Array, stroke: IntArray) -> Array:
+    """Squares (m + 1,) of the fastest pace along the path, zero at its stops."""
+    stops = np.concatenate([[True], np.diff(stroke) != 0, [True]])
+    bound = np.minimum(np.append(ratio, np.inf), np.append(np.inf, ratio)) ** 2
+    squared = np.where(stops, 0.0, bound)
+    gain = 2.0 * growth * width
+    for k in range(len(width)):
+        squared[k + 1] = min(squared[k + 1], squared[k] + gain[k])
+    for k in range(len(width) - 1, -1, -1):
+        squared[k] = min(squared[k], squared[k + 1] + gain[k])
+    return squared
+
+
+def _steering(twists: Array, wheelbase: float) -> Array:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        angle = np.arctan(wheelbase * twists[:, 2] / twists[:, 0])
+    return np.where(twists[:, 0] != 0.0, angle, 0.0)
+
+
+def _waits(steering: Array, stroke_of: IntArray, strokes: Array, rate: float) -> Array:
+    """Time (n + 1,) [s] at the begin, at each stop and at the end for the wheel to come round."""
+    last = np.concatenate([[0.0], steering[np.flatnonzero(np.diff(np.append(stroke_of, -1)))]])
+    first = steering[np.flatnonzero(np.diff(np.concatenate([[-1], stroke_of])))]
+    turned = np.abs(np.append(first, 0.0) - last)
+    before = np.concatenate([[0.0], 0.5 * strokes])
+    spare = before + np.append(0.5 * strokes, 0.0)
+    return np.asarray(np.maximum(0.0, turned / rate - spare))
+
+
+def _assembled(
+    plan: Plan,
+    places: Array,
+    passed: Array,
+    squared: Array,
+    twists: Array,
+    steering: Array,
+    stroke: IntArray,
+    waits: Array,
+) -> Timed:
+    """Samples at the begin of every cell, doubled at stops, and at the end."""
+    new = np.concatenate([[True], np.diff(stroke) != 0])
+    time = np.concatenate([[0.0], np.cumsum(passed)])
+    time[:-1] += np.cumsum(waits[:-1])[stroke]
+    time[-1] += waits[:-1].sum()
+    pace = np.sqrt(squared)[:-1]
+    number = stroke.astype(np.float64)
+    table = np.column_stack([time[:-1], places, pace, number, steering, pace[:, None] * twists])
+    at = np.flatnonzero(new)
+    stops = table[at].copy()  # where each stroke begins, before it has waited
+    stops[:, 0] -= waits[:-1][stroke[at]]
+    stops[1:, 4] = steering[at[1:] - 1]
+    stops[0, 4] = 0.0
+    table = np.insert(table, at, stops, axis=0)
+    end = table[-1].copy()
+    end[[0, 1, 2, 5, 6, 7]] = [time[-1], plan.durations.sum(), 0.0, 0.0, 0.0, 0.0]
+    last = end.copy()
+    last[0] += waits[-1] + 1e-6
+    last[4] = 0.0
+    table = np.vstack([table, end, last])
+    clock = table[:, 0] + 1e-9 * np.arange(len(table))
+    return Timed(
+        time=clock - clock[0],
+        pose=plan.pose_at(plan.start_time + table[:, 1]),
+        twist=table[:, 5:8],
+        steering=table[:, 4],
+        stroke=table[:, 3].astype(np.int64),
+    )
+
+
+def car_guess(model: SecondOrderCar, plan: Plan, *, intervals: Step) -> Guess:
+    """Guess for a car whose speed and steering angle take time to change."""
+    run = timed(plan, pace_of_car(model))
+    at = np.linspace(0.0, run.duration, intervals(run.duration) + 1)
+    steering = _followed(np.interp(at, run.time, run.steering), model.max_steering_rate, at[1])
+    steering[[0, -1]] = 0.0
+    return _second_order(run, at, steering, model.control_limits)
+
+
+def unicycle_guess(model: SecondOrderUnicycle, plan: Plan, *, intervals: Step) -> Guess:
+    """Guess for a unicycle whose speed and turn rate take time to change."""
+    run = timed(plan, pace_of_unicycle(model))
+    at = np.linspace(0.0, run.duration, intervals(run.duration) + 1)
+    wanted = np.interp(at, run.time, run.twist[:, 2])
+    turn = _followed(wanted, model.max_angular_acceleration, at[1])
+    turn[[0, -1]] = 0.0
+    return _second_order(run, at, turn, model.control_limits)
+
+
+def trailer_guess(
+    model: CarWithTrailer, plan: Plan, *, intervals: Step, hitch: float = 0.0
+) -> Guess:
+    """Guess for a car with a trailer, which follows as it is pulled, from a hitch angle [rad]."""
+    low, high = model.control_limits[0]
+    pace = Pace(speed=high, reverse_speed=-low, acceleration=math.inf, wheelbase=model.wheelbase)
+    run = timed(plan, pace)
+    at = np.linspace(0.0, run.duration, intervals(run.duration) + 1)
+    middle = 0.5 * (at[1:] + at[:-1])
+    control = np.stack([np.interp(middle, run.time, run.twist[:, 0]),
+                        np.interp(middle, run.time, run.steering)], axis=1)  # fmt: skip
+    control = np.clip(control, *model.control_limits.T)
+    angles = np.empty(len(at))
+    angles[0] = hitch
+    least, most = model.reduced_limits[0]
+    for k, (speed, steering) in enumerate(control):
+        bend = math.tan(steering) / model.wheelbase - math.sin(angles[k]) / model.hitch_length
+        angles[k + 1] = min(max(angles[k] + at[1] * speed * bend, least), most)
+    state = np.column_stack([_at(run, at), angles])
+    return Guess(state=state, control=control, duration=run.duration)
+
+
+def course_guess(course: Trajectory, *, intervals: Step) -> Guess:
+    """Guess from a motion that any model can make: an automaton's plan."""
+    time = course.time - course.time[0]
+    at = np.linspace(0.0, float(time[-1]), intervals(float(time[-1])) + 1)
+    rows = np.hstack([course.pose, course.reduced_state])
+    state = np.stack([np.interp(at, time, column) for column in rows.T], axis=1)
+    which = np.clip(np.searchsorted(time, at[:-1], side="right") - 1, 0, len(time) - 2)
+    return Guess(state=state, control=course.control[which], duration=float(time[-1]))
+
+
+def pace_of_car(model: SecondOrderCar) -> Pace:
+    """Limits of a second-order car along a path."""
+    low, high = model.reduced_limits[0]
+    return Pace(
+        speed=high,
+        reverse_speed=-low,
+        acceleration=model.max_acceleration,
+        wheelbase=model.wheelbase,
+        steering_rate=model.max_steering_rate,
+    )
+
+
+def pace_of_unicycle(model: SecondOrderUnicycle) -> Pace:
+    """Limits of a second-order unicycle along a path."""
+    low, high = model.reduced_limits[0]
+    return Pace(
+        speed=high,
+        reverse_speed=-low,
+        acceleration=model.max_acceleration,
+        turn_rate=model.max_turn_rate,
+        angular_acceleration=model.max_angular_acceleration,
+    )
+
+
+def _second_order(run: Timed, at: Array, second: Array, limits: Array) -> Guess:
+    """Poses, speed and a second reduced state at equal steps; controls are their differences."""
+    reduced = np.column_stack([np.interp(at, run.time, run.twist[:, 0]), second])
+    control = np.clip(np.diff(reduced, axis=0) / at[1], *limits.T)
+    return Guess(state=np.hstack([_at(run, at), reduced]), control=control, duration=run.duration)
+
+
+def _at(run: Timed, at: Array) -> Array:
+    return np.stack([np.interp(at, run.time, column) for column in run.pose.T], axis=1)
+
+
+def _followed(wanted: Array, rate: float, step: float) -> Array:
+    """What follows a signal at a limited rate, half of it ahead of its jumps."""
+    after, before = wanted.copy(), wanted.copy()
+    most = rate * step
+    for k in range(1, len(wanted)):
+        after[k] = after[k - 1] + min(max(wanted[k] - after[k - 1], -most), most)
+    for k in range(len(wanted) - 2, -1, -1):
+        before[k] = before[k + 1] + min(max(wanted[k] - before[k + 1], -most), most)
+    return 0.5 * (after + before)

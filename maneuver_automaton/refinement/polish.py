@@ -1,0 +1,396 @@
+"""Polish plans of a vehicle with inertia: several guesses, the best exact motion that is accepted.
+
+For each guess: with the lines between body and obstacles kept as the guess has them, which is quick
+and seldom fails; from there with lines that are free. The first guess goes all the way at once, of
+the others only those that come close to the best. Whatever is found is closed: it ends at the goal.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton.collision import Shape
+from maneuver_automaton.collision.convex import pieces_seen_from
+from maneuver_automaton.groups import group_of
+from maneuver_automaton.models import Model
+from maneuver_automaton.optimal_control import Guess, SolveStatus
+from maneuver_automaton.optimal_control.polish_values import (
+    Ends,
+    Polished,
+    PolishSettings,
+    Scene,
+)
+from maneuver_automaton.optimal_control.polishing import intervals_for, polish
+from maneuver_automaton.optimal_control.problem import RunningCost, resampled
+from maneuver_automaton.optimal_control.separation import BodyPart
+from maneuver_automaton.primitives import Maneuver, Trajectory
+from maneuver_automaton.problem import Bounds
+from maneuver_automaton.refinement.closure import closed
+
+NEAR = 1.12  # share of the best cost so far up to which free lines are tried
+DEEP_ITERATIONS = 150  # from a guess inside obstacles, before it is led out of them
+SHUFFLE = 6  # changes of gear from which on gears are fixed first
+FINER = 0.6  # share of the step with which the best is solved once more
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PolishTask:
+    """A vehicle, its two ends and what is in its way.
+
+    Parameters
+    ----------
+    model : Model
+        The vehicle.
+    start, start_state : (dof,), (n_z,) arrays
+        First pose and reduced state.
+    goal, goal_state : sequences of dof, n_z numbers
+        Last pose and reduced state; None for a heading, a height or a reduced state that is free.
+    parts : tuple of BodyPart
+        The body; without one, nothing is in its way.
+    obstacles : tuple of Shape
+        What stands still around it.
+    bounds : Bounds
+        Where the reference point may be.
+    margin : float
+        Distance to keep from obstacles [m].
+    """
+
+    model: Model
+    start: Array
+    start_state: Array
+    goal: tuple[float | None, ...]
+    goal_state: tuple[float | None, ...]
+    parts: tuple[BodyPart, ...] = ()
+    obstacles: tuple[Shape, ...] = ()
+    bounds: Bounds = field(default_factory=Bounds)
+    margin: float = 0.0  # [m]
+
+    def __post_init__(self) -> None:
+        freeze(self, "start", last=self.model.group.dof)
+        freeze(self, "start_state", last=len(self.model.reduced_names))
+        for name, count in (
+            ("goal", self.model.group.dof),
+            ("goal_state", len(self.model.reduced_names)),
+        ):
+            values = tuple(None if v is None else float(v) for v in getattr(self, name))
+            object.__setattr__(self, name, values)
+            if len(values) != count:
+                raise ValueError(f"polish: {name} has {len(values)} components, need {count}")
+        if self.goal[0] is None or self.goal[1] is None:
+            raise ValueError("polish: the goal's place must be given, only its heading may be None")
+        low, high = self.model.reduced_limits.T
+        if ((self.start_state < low) | (self.start_state > high)).any():
+            raise ValueError(
+                f"polish: start_state {self.start_state.tolist()} is outside the model's limits "
+                f"{self.model.reduced_limits.tolist()}"
+            )
+
+    @property
+    def scene(self) -> Scene:
+        """Body, obstacles and bounds seen from the start."""
+        pieces = pieces_seen_from(list(self.obstacles), self.start[:3])
+        return Scene(
+            parts=self.parts,
+            pieces=tuple((corners, by + self.margin) for corners, by in pieces),
+            walls=tuple(self._walls()),
+        )
+
+    def _walls(self) -> list[tuple[float, float, float]]:
+        cosine, sine = math.cos(self.start[2]), math.sin(self.start[2])
+        axes = ((self.bounds.x, 0, (cosine, -sine)), (self.bounds.y, 1, (sine, cosine)))
+        walls = []
+        for pair, axis, (a, b) in axes:
+            if pair is not None:
+                low, high = (limit - float(self.start[axis]) for limit in pair)
+                walls += [(a, b, high), (-a, -b, -low)]
+        return walls
+
+    def ends(self, heading: float) -> Ends:
+        """First and last state seen from the start; the heading nearest to one that is near [rad].
+
+        Places are counted from the start before they are turned, so that no digit is lost.
+        """
+        group = group_of(self.start.size)
+        filled = np.array([0.0 if v is None else v for v in self.goal])
+        origin = np.array([*self.start[:2], 0.0, *self.start[3:]])
+        turned = np.where(np.arange(self.start.size) == 2, self.start, 0.0)
+        end: list[float | None] = [
+            float(v) for v in (group(turned).inverse() @ group(filled - origin)).pose
+        ]
+        if self.goal[2] is None:
+            end[2] = None
+        else:
+            turn = self.goal[2] - float(self.start[2])
+            end[2] = heading + math.remainder(turn - heading, 2.0 * math.pi)
+        if len(self.goal) > 3 and self.goal[3] is None:
+            end[3] = None
+        still = (0.0,) * self.start.size
+        return Ends((*still, *self.start_state.tolist()), (*end, *self.goal_state))
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Attempt:
+    """One call of the solver."""
+
+    guess: int  # number of the guess
+    kind: str  # fixed planes | lines | elastic | gears | finer
+    duration: float  # [s] of what came out
+    status: str
+    iterations: int
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PolishedMotion:
+    """An exact motion from the start to the goal, seen from the start."""
+
+    course: Trajectory  # from the identity pose and time 0
+    control: Array  # (n, n_u)
+    durations: Array  # (n,) [s]
+    objective: float  # what the solver minimised
+    error: float  # [m, rad, units of z] of its end
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return float(self.course.time[-1])
+
+    def maneuver(self, name: str, *, source: str, target: str) -> Maneuver:
+        """The motion as a maneuver from trim to trim."""
+        return Maneuver(
+            name=name,
+            source=source,
+            target=target,
+            displacement=self.course.pose[-1],
+            duration=self.duration,
+            course=self.course,
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PolishResult:
+    """The best motion, and what was tried for it."""
+
+    motion: PolishedMotion | None
+    reason: str  # why there is none
+    attempts: tuple[Attempt, ...]
+
+
+Accepts = Callable[[PolishedMotion], bool]
+
+
+def polish_guesses(
+    task: PolishTask,
+    guesses: Sequence[Guess],
+    *,
+    stage_cost: RunningCost | None = None,
+    settings: PolishSettings | None = None,
+    time_limit: float = 8.0,
+    accepts: Accepts = lambda motion: True,
+) -> PolishResult:
+    """The best exact motion that some guesses lead to.
+
+    Parameters
+    ----------
+    task : PolishTask
+    guesses : sequence of Guess
+        Seen from the start, the most promising first; see `guesses`.
+    stage_cost : callable, optional
+        Cost per second ``l(z, u)`` on top of 1 for the time.
+    settings : PolishSettings, optional
+    time_limit : float
+        [s].
+    accepts : callable
+        Whether a motion is sound, say by an audit: solver success proves nothing.
+
+    Raises
+    ------
+    MissingExtra
+        If CasADi is not installed.
+    """
+    settings = settings or PolishSettings()
+    return _Polishing(
+        task, task.scene, guesses, stage_cost, settings, time.monotonic() + time_limit, accepts
+    ).run()
+
+
+@dataclass(slots=True, eq=False)
+class _Polishing:
+    """The state of one run."""
+
+    task: PolishTask
+    scene: Scene
+    guesses: Sequence[Guess]
+    stage_cost: RunningCost | None
+    settings: PolishSettings
+    deadline: float
+    accepts: Accepts
+    best: PolishedMotion | None = None
+    best_raw: Polished | None = None
+    reason: str = "no guess was given"
+    attempts: list[Attempt] = field(default_factory=list)
+
+    def run(self) -> PolishResult:
+        quick: list[tuple[float, int, Polished]] = []
+        for number in range(len(self.guesses)):
+            if self._left() <= 0.0:
+                break
+            rough = self._rough(number)
+            if rough is None:
+                continue
+            if self.best is None:
+                self._lines(number, rough)
+            else:
+                quick.append((rough.objective, number, rough))
+        for objective, number, rough in sorted(quick, key=lambda one: one[0]):
+            if self.best is None or objective < NEAR * self.best.objective:
+                self._lines(number, rough)
+        self._finer()
+        return PolishResult(motion=self.best, reason="" if self.best else self.reason,
+                            attempts=tuple(self.attempts))  # fmt: skip
+
+    def _left(self) -> float:
+        return self.deadline - time.monotonic()
+
+    def _rough(self, number: int) -> Polished | None:
+        """Where a guess leads with fixed planes, or with fixed gears."""
+        guess = self.guesses[number]
+        gears = _gears(self.task.model, guess)
+        shuffles = np.count_nonzero(np.diff(gears)) >= SHUFFLE
+        if not shuffles:
+            found = self._solve("fixed planes", number, guess, fixed_planes=True)
+            if found.status is SolveStatus.SOLVED:
+                return found
+            found = self._solve("lines", number, guess, most=DEEP_ITERATIONS)
+            if found.status is not SolveStatus.SOLVED:
+                out = self._solve("elastic", number, guess, elastic=True)
+                if out.status is SolveStatus.SOLVED:
+                    found = self._solve("lines", number, out.as_guess)
+            if found.status is SolveStatus.SOLVED:
+                self._consider(found)
+                return None
+        found = self._solve("gears", number, guess, gears=gears)
+        if found.status is SolveStatus.SOLVED:
+            self._consider(found)
+        return None
+
+    def _lines(self, number: int, rough: Polished) -> None:
+        """Free lines from what fixed planes came to, which counts itself if they fail."""
+        if self._left() > 0.0:
+            found = self._solve("lines", number, rough.as_guess)
+            if found.status is SolveStatus.SOLVED and self._consider(found):
+                return
+        if self.best is None:
+            self._consider(rough)
+
+    def _finer(self) -> None:
+        """The best once more with smaller steps, while there is time for it."""
+        last = max((a.seconds for a in self.attempts if a.kind != "fixed planes"), default=0.0)
+        raw = self.best_raw
+        if raw is None or self._left() < 3.0 * last or np.ptp(raw.durations) > 1e-9:
+            return
+        count = math.ceil(len(raw.durations) / FINER)
+        if count > self.settings.nodes[1]:
+            return
+        guess = Guess(
+            state=resampled(raw.state, count + 1),
+            control=raw.control[(np.arange(count) * len(raw.control)) // count],
+            duration=raw.duration,
+        )
+        found = self._solve("finer", -1, guess)
+        if found.status is SolveStatus.SOLVED:
+            self._consider(found)
+
+    def _solve(
+        self,
+        kind: str,
+        number: int,
+        guess: Guess,
+        *,
+        fixed_planes: bool = False,
+        elastic: bool = False,
+        gears: Array | None = None,
+        most: int | None = None,
+    ) -> Polished:
+        began = time.monotonic()
+        settings = self.settings
+        if most is not None:
+            settings = replace(settings, max_iterations=min(most, settings.max_iterations))
+        found = polish(
+            self.task.model,
+            self.task.ends(float(guess.state[-1, 2])),
+            self.scene,
+            guess,
+            stage_cost=self.stage_cost,
+            settings=settings,
+            fixed_planes=fixed_planes,
+            elastic=elastic,
+            gears=gears,
+            max_seconds=max(self._left(), 0.05),
+        )
+        self.attempts.append(
+            Attempt(
+                guess=number,
+                kind=kind,
+                duration=found.duration,
+                status=found.status.value,
+                iterations=found.iterations,
+                seconds=time.monotonic() - began,
+            )
+        )
+        if found.status is not SolveStatus.SOLVED and self.best is None:
+            self.reason = f"{kind}: {found.reason}"
+        return found
+
+    def _consider(self, found: Polished) -> bool:
+        """Close what was found, and keep it if it is accepted and better."""
+        ends = self.task.ends(float(found.state[-1, 2]))
+        ending = closed(
+            self.task.model,
+            self.task.start_state,
+            ends.end,
+            control=found.control,
+            durations=found.durations,
+        )
+        if isinstance(ending, str):
+            self.reason = ending
+            return False
+        motion = PolishedMotion(
+            course=ending.course,
+            control=ending.control,
+            durations=ending.durations,
+            objective=found.objective,
+            error=ending.error,
+        )
+        if self.best is not None and motion.objective >= self.best.objective:
+            return True
+        if not self.accepts(motion):
+            self.reason = "what was found is not accepted"
+            return False
+        self.best, self.best_raw = motion, found
+        return True
+
+
+def _gears(model: Model, guess: Guess) -> Array:
+    """Sign (n - 1,) of the speed ahead in every interval; where it is zero, that of the next."""
+    reduced = guess.state[:, model.group.dof :]
+    control = guess.control
+    begin = model.body_velocity(reduced[:-1], control)[:, 0]
+    end = model.body_velocity(reduced[1:], control)[:, 0]
+    signs = np.sign(begin + end)
+    for k in range(len(signs) - 2, -1, -1):
+        signs[k] = signs[k] or signs[k + 1]
+    for k in range(1, len(signs)):
+        signs[k] = signs[k] or signs[k - 1]
+    return np.where(signs == 0.0, 1.0, signs)
+
+
+def guess_intervals(settings: PolishSettings) -> Callable[[float], int]:
+    """How many intervals a guess of a duration [s] gets, for the functions in `guesses`."""
+    return lambda duration: intervals_for(duration, settings)

@@ -1,0 +1,177 @@
+"""Driving a scene in closed loop: plan, drive a step of 0.1 s, plan again."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.primitives import Trajectory
+from maneuver_automaton.primitives.driving import drive
+from maneuver_automaton.roads.horizon import RoadPlan, RoadPlanner
+from maneuver_automaton.roads.judge import RoadVerdict, judged
+from maneuver_automaton.roads.library import TICK
+
+FINE = 5  # samples of a tick at least
+MOST_STEPS = 600
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RoadStep:
+    """One step: the state before it, the plan from there, and the control applied."""
+
+    number: int
+    time: float  # [s]
+    state: Array  # (5,) x, y, heading of the rear axle, speed, steering, in the planner's frame
+    plan: RoadPlan
+    value: float  # cost of the plan
+    applied_cost: float  # of its first step
+    replanned: bool  # the plan is not the rest of the last one
+    solve_s: float  # [s] to decide
+    cpu_s: float  # [s] of it that the processor spent on this thread
+
+    def __post_init__(self) -> None:
+        freeze(self, "state", last=5)
+
+    @property
+    def control(self) -> Array:
+        """Acceleration [m/s^2] and steering rate [rad/s] (2,) until the next step."""
+        return np.asarray(self.plan.controls[0])
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RoadDrive:
+    """A drive from its start to where it ended, and what another library says of it."""
+
+    planner: RoadPlanner
+    steps: tuple[RoadStep, ...]
+    driven: Trajectory  # all that was driven; times are those of the scene
+    reached: bool
+    status: str  # reached | missed | steps_spent
+    reason: str  # one line; empty if reached
+    verdict: RoadVerdict
+
+    @property
+    def solve_s(self) -> Array:
+        """Time (n,) that every step took to decide [s]."""
+        return np.array([step.solve_s for step in self.steps])
+
+
+def drive_scene(
+    planner: RoadPlanner,
+    *,
+    steps: int | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> RoadDrive:
+    """Close the loop until a goal is reached, or its time is over.
+
+    What the planner knows of the others is their recorded motion, before it happens.
+
+    Parameters
+    ----------
+    planner : RoadPlanner
+    steps : int, optional
+        Steps at most.
+    progress : callable, optional
+        Called with the number of each step that is done.
+    """
+    planner.warm()
+    last = planner.last_tick
+    limit = min(MOST_STEPS if steps is None else steps, last)
+    state, plan = planner.start_state, None
+    done: list[RoadStep] = []
+    pieces: list[Trajectory] = []
+    tick = 0
+    while not planner.at_goal(state, tick=tick) and tick < limit:
+        wall, cpu = time.perf_counter(), time.thread_time()
+        plan, replanned = planner.plan(state, tick=tick, last=plan)
+        wall, cpu = time.perf_counter() - wall, time.thread_time() - cpu
+        done.append(
+            RoadStep(
+                number=tick,
+                time=planner.time_of(tick),
+                state=state,
+                plan=plan,
+                value=planner.price(plan),
+                applied_cost=planner.price(plan, ticks=1),
+                replanned=replanned,
+                solve_s=wall,
+                cpu_s=cpu,
+            )
+        )
+        pieces.append(driven_from(planner, state, plan.controls[:1], tick=tick))
+        state = np.concatenate([pieces[-1].pose[-1], pieces[-1].reduced_state[-1]])
+        state[3] = max(state[3], 0.0)  # rounding at rest
+        tick += 1
+        if progress is not None:
+            progress(tick)
+    reached = planner.at_goal(state, tick=tick)
+    status, reason = _ending(planner, reached=reached, over=tick >= last, tick=tick)
+    local = joined(pieces) if pieces else standing(planner, state, tick=tick)
+    driven = replace(local, pose=planner.world(local.pose))
+    return RoadDrive(
+        planner=planner,
+        steps=tuple(done),
+        driven=driven,
+        reached=reached,
+        status=status,
+        reason=reason,
+        verdict=judged(planner.scene, planner.vehicle, driven),
+    )
+
+
+def driven_from(planner: RoadPlanner, state: Array, controls: Array, *, tick: int) -> Trajectory:
+    """What controls (n, 2), a tick each, make of a state (5,): exact, and finely sampled.
+
+    The trajectory is in the coordinates of the planner's frame.
+    """
+    course = drive(
+        planner.vehicle.model,
+        state[3:],
+        control=np.repeat(controls, FINE, axis=0),
+        durations=np.full(FINE * len(controls), TICK / FINE),
+    )
+    return Trajectory(
+        time=planner.time_of(tick) + course.time,
+        pose=(SE2(state[:3]) @ SE2(course.pose)).pose,
+        reduced_state=course.reduced_state,
+        control=course.control,
+    )
+
+
+def joined(pieces: Sequence[Trajectory]) -> Trajectory:
+    """One trajectory of several that follow another; where they meet, the later one counts."""
+    return Trajectory(
+        **{
+            name: np.concatenate(
+                [
+                    *(getattr(piece, name)[:-1] for piece in pieces[:-1]),
+                    getattr(pieces[-1], name),
+                ]
+            )
+            for name in ("time", "pose", "reduced_state", "control")
+        }
+    )
+
+
+def standing(planner: RoadPlanner, state: Array, *, tick: int) -> Trajectory:
+    """A trajectory of one sample."""
+    return Trajectory(
+        time=np.array([planner.time_of(tick)]),
+        pose=state[None, :3],
+        reduced_state=state[None, 3:],
+        control=np.zeros((1, 2)),
+    )
+
+
+def _ending(planner: RoadPlanner, *, reached: bool, over: bool, tick: int) -> tuple[str, str]:
+    if reached:
+        return "reached", ""
+    now = planner.time_of(tick)
+    if over:
+        return "missed", f"no goal was reached until {now:.6g} s, when the last one is over"
+    return "steps_spent", f"no goal was reached in {tick} steps, until {now:.6g} s"

@@ -1,0 +1,392 @@
+"""One step of driving: the last plan's rest, a search for a better one, the choice."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.roads import _kernels_free, _kernels_horizon, _kernels_library
+from maneuver_automaton.roads._kernels_horizon import (
+    GoalArrays,
+    Horizon,
+    HorizonArrays,
+    HorizonTask,
+    RouteArrays,
+    Weights,
+)
+from maneuver_automaton.roads.clearing import clearing_of
+from maneuver_automaton.roads.goal_region import GoalRegion, outlines_of
+from maneuver_automaton.roads.library import TICK, TICKS, RoadLibrary, road_library
+from maneuver_automaton.roads.route import SPACING, Route, route_of
+from maneuver_automaton.roads.scene import RoadScene
+from maneuver_automaton.roads.vehicle import RoadVehicle
+
+CHILDREN = 64  # rows for the children of a node
+CELL, TURN_CELL, SPEED_CELL = 0.5, 0.06, 2.0  # [m], [rad], [m/s] of equal nodes
+SHARES = (math.nan, 0.0, 0.2, -0.2, 0.5, -0.5, 1.0, -1.0)  # of steering while it stops; nan: held
+SHARE = 0.25  # of the nodes of a level that one strip along the route may hold
+STRIPS = 17
+LONGEST_STOP = 120  # ticks
+FAR_TICK = 1 << 40
+AT_REST = 1e-9  # [m/s]
+DIGITS = 9  # of the numbers of a scene [m, rad]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RoadSettings:
+    """How a drive is planned.
+
+    Examples
+    --------
+    >>> RoadSettings(horizon_s=4.0).step_s
+    0.1
+    """
+
+    horizon_s: float = 6.0  # how far a plan looks ahead at most, its stop apart
+    width: int = 80  # nodes of a level that the search goes on from
+    narrow: int = 40  # the same where the last plan leads to a goal and is only to be improved
+    off_edge_m: float = 0.04  # distances kept from the edge of the area
+    off_traffic_m: float = 0.15  # and from everybody
+    top_speed: float = 36.0  # [m/s] of the trims, if the start is not faster still
+    greed: float = 1.0  # weight of the cost-to-go
+    gain: float = 0.02  # share of the cost by which a new plan has to be better than the old one
+
+    @property
+    def step_s(self) -> float:
+        """Time between two plans [s]."""
+        return TICK
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RoadPlan:
+    """Controls tick by tick, and how the vehicle would stop after them."""
+
+    tick: int  # at which it begins
+    states: Array  # (n + 1, 5) x, y, heading of the rear axle, speed, steering, the stop included
+    controls: Array  # (n, 2) acceleration [m/s^2], steering rate [rad/s], the stop included
+    lasting: int  # ticks before the stop begins
+    reaches: bool  # whether it reaches a goal there
+
+    def __post_init__(self) -> None:
+        freeze(self, "states", last=5)
+        freeze(self, "controls", last=2)
+
+    @property
+    def stops(self) -> bool:
+        """Whether it ends at rest."""
+        return bool(self.states[-1, 3] <= AT_REST)
+
+    @property
+    def duration(self) -> float:
+        """Time until it stops, or the goal is reached [s]."""
+        return TICK * self.lasting
+
+    def rest(self) -> RoadPlan:
+        """What remains of it a tick later."""
+        return RoadPlan(
+            tick=self.tick + 1,
+            states=self.states[1:],
+            controls=self.controls[1:],
+            lasting=max(self.lasting - 1, 0),
+            reaches=self.reaches,
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RoadPlanner:
+    """All that planning needs on one scene, made once.
+
+    States and plans are seen from `frame`, the start of the rear axle, so that a moved scene has
+    the moved plans.
+    """
+
+    scene: RoadScene  # as it was given
+    frame: Array  # (3,) [m, m, rad]
+    local: RoadScene  # the scene seen from the frame
+    vehicle: RoadVehicle
+    settings: RoadSettings
+    route: Route
+    library: RoadLibrary
+    horizon: Horizon
+    memory: HorizonArrays = field(repr=False)
+
+    @property
+    def last_tick(self) -> int:
+        """Tick at which the last goal is over."""
+        return int(self.horizon.goals.tick[:, 1].max())
+
+    @property
+    def start_state(self) -> Array:
+        """State (5,) at the beginning: x, y, heading of the rear axle, speed, steering."""
+        start = self.local.start
+        steering = self.vehicle.steering_of(start.speed, start.turn_rate)
+        return np.array([*self.vehicle.rear_of(start.middle), start.speed, steering])
+
+    def world(self, poses: ArrayLike) -> Array:
+        """Poses (..., 3) in the coordinates of the scene as it was given."""
+        return (SE2(self.frame) @ SE2(np.asarray(poses))).pose
+
+    def time_of(self, tick: int) -> float:
+        """Time of a tick [s]."""
+        return self.scene.start.time + TICK * tick
+
+    def at_goal(self, state: Array, *, tick: int) -> bool:
+        """Whether a state (5,) at a tick is within a goal, by the goal's own words."""
+        middle = self.vehicle.middle_of(state[:3])
+        return any(
+            goal.contains(middle, speed=float(state[3]), time=self.time_of(tick))
+            for goal in self.local.goals
+        )
+
+    def wider(self, width: int) -> RoadPlanner:
+        """The same planner with another width of its search."""
+        settings = replace(self.settings, width=width)
+        return replace(self, settings=settings, memory=_memory(settings))
+
+    def warm(self) -> None:
+        """Compile, and touch the memory, before time counts."""
+        plan, _ = self.plan(self.start_state, tick=0, last=None)
+        self.plan(plan.states[1], tick=1, last=plan)
+
+    def plan(self, state: Array, *, tick: int, last: RoadPlan | None) -> tuple[RoadPlan, bool]:
+        """The plan from a state (5,) at a tick, and whether it is not the rest of the last one.
+
+        The rest of the last plan is proven again from where the vehicle is, and kept unless a new
+        one is better. A plan that is not free is driven only where none is: then braking.
+        """
+        old = None if last is None else self._again(state, last.rest())
+        settled = old is not None and old.reaches
+        new = self.search(state, tick=tick, narrow=settled)
+        if old is None:
+            return (self._emergency(state, tick) if new is None else new), True
+        if new is None or not self._better(new, old):
+            return old, False
+        return new, True
+
+    def search(self, state: Array, *, tick: int, narrow: bool = False) -> RoadPlan | None:
+        """A new plan from a state (5,); None if none with a way to stop was found."""
+        library, settings = self.library, self.settings
+        until = min(tick + round(settings.horizon_s / TICK), self.last_tick)
+        if until <= tick:
+            return None
+        x, y, heading, speed, steering = state.tolist()
+        width = min(settings.narrow, settings.width) if narrow else settings.width
+        task = HorizonTask(
+            x=x,
+            y=y,
+            heading=heading,
+            speed=speed,
+            steering=steering,
+            tick=tick,
+            until=until,
+            cell=CELL,
+            turn_cell=TURN_CELL,
+            speed_cell=SPEED_CELL,
+            width=width,
+            abreast=max(math.ceil(SHARE * width), 1),
+            greed=settings.greed,
+        )
+        first = _kernels_library.maneuvers_from(library.limits, library.trims, speed, steering)
+        controls = np.zeros((until - tick + library.limits.ticks + LONGEST_STOP, 2))
+        reaches, n, whole = _kernels_horizon.search_horizon(
+            task,
+            self.horizon,
+            first,
+            self.memory,
+            np.array(SHARES),
+            controls,
+        )
+        if whole < 0:
+            return None
+        return self._of_controls(state, tick, controls[:whole], n, reaches=reaches)
+
+    def _of_controls(
+        self, state: Array, tick: int, controls: Array, lasting: int, *, reaches: bool
+    ) -> RoadPlan:
+        model = self.vehicle.model
+        states = _kernels_free.driven(model.wheelbase, TICK, np.array(state), np.array(controls))
+        return RoadPlan(
+            tick=tick, states=states, controls=controls, lasting=lasting, reaches=reaches
+        )
+
+    def _again(self, state: Array, rest: RoadPlan) -> RoadPlan | None:
+        """The rest of a plan from where the vehicle is; None if it is not free any more."""
+        if not len(rest.controls):
+            return None
+        plan = self._of_controls(
+            state, rest.tick, rest.controls, rest.lasting, reaches=rest.reaches
+        )
+        free = _kernels_free.free_ticks(self.horizon.clearing, np.array(plan.states), plan.tick)
+        if free < len(plan.controls):
+            return None
+        if plan.reaches:
+            until = np.array(plan.states[: plan.lasting + 1])
+            if _kernels_horizon.first_goal(self.horizon, until, plan.tick) < 0:
+                return None
+        return plan
+
+    def _better(self, new: RoadPlan, old: RoadPlan) -> bool:
+        """Whether a new plan is worth leaving the old one for."""
+        if new.reaches != old.reaches:
+            return new.reaches
+        if new.stops != old.stops:
+            return new.stops
+        if not new.reaches:
+            return True  # it looks a tick further
+        return self.price(new) < (1.0 - self.settings.gain) * self.price(old)
+
+    def price(self, plan: RoadPlan, *, ticks: int | None = None) -> float:
+        """Cost of a plan, or of its first ticks, its stop left out."""
+        n = plan.lasting if ticks is None else ticks
+        return float(
+            _kernels_horizon.price(
+                self.horizon, np.array(plan.states[: n + 1]), np.array(plan.controls[:n]), plan.tick
+            )
+        )
+
+    def _emergency(self, state: Array, tick: int) -> RoadPlan:
+        """Full braking straight on, free or not."""
+        braking, speeds = self.vehicle.model.max_acceleration, [float(state[3])]
+        while speeds[-1] > 0.0:
+            speeds.append(max(speeds[-1] - braking * TICK, 0.0))
+        rates = np.diff(speeds) / TICK
+        controls = np.stack([rates, np.zeros_like(rates)], axis=-1).reshape(-1, 2)
+        if not len(controls):
+            controls = np.zeros((1, 2))
+        return self._of_controls(state, tick, controls, 0, reaches=False)
+
+
+def road_planner(
+    scene: RoadScene, vehicle: RoadVehicle | None = None, settings: RoadSettings | None = None
+) -> RoadPlanner:
+    """Everything for driving on a scene, made once.
+
+    Raises
+    ------
+    ValueError
+        If the area is too large.
+    """
+    vehicle, settings = vehicle or RoadVehicle(), settings or RoadSettings()
+    top = min(max(settings.top_speed, math.ceil(scene.start.speed)), vehicle.model.max_speed)
+    library = road_library(vehicle, top_speed=top)
+    frame = vehicle.rear_of(scene.start.middle)
+    local = scene.moved(SE2(frame).inverse(), digits=DIGITS)
+    route = route_of(local)
+    horizon_ticks = round(settings.horizon_s / TICK)
+    last = scene.last_time if math.isfinite(scene.last_time) else scene.start.time + 60.0
+    last_tick = math.ceil((last - scene.start.time) / TICK) + horizon_ticks + LONGEST_STOP
+    clearing = clearing_of(
+        local,
+        vehicle,
+        tick=TICK,
+        last_tick=last_tick,
+        off_edge=settings.off_edge_m,
+        off_traffic=settings.off_traffic_m,
+        braking=vehicle.model.max_acceleration,
+    )
+    horizon = Horizon(
+        clearing=clearing,
+        limits=library.limits,
+        trims=library.trims,
+        maneuvers=library.maneuvers,
+        route=RouteArrays(
+            np.array(route.points),
+            np.array(route.heading),
+            np.stack([np.cos(route.heading), np.sin(route.heading)], axis=-1),
+            np.array(route.limit),
+            SPACING,
+        ),
+        goals=goal_arrays(local, route),
+        weights=_weights(scene, vehicle),
+    )
+    return RoadPlanner(
+        scene=scene,
+        frame=frame,
+        local=local,
+        vehicle=vehicle,
+        settings=settings,
+        route=route,
+        library=library,
+        horizon=horizon,
+        memory=_memory(settings),
+    )
+
+
+def goal_arrays(scene: RoadScene, route: Route) -> GoalArrays:
+    """Goals for the kernels; times as ticks from the start of the scene."""
+    rings = [outlines_of(goal.places or ()) for goal in scene.goals]
+    flat = [ring for group in rings for ring in group]
+    start = scene.start.time
+    ticks, headings, speeds = [], [], []
+    for goal in scene.goals:
+        end = (goal.time[1] - start) / TICK
+        ticks.append(
+            (
+                max(math.ceil((goal.time[0] - start) / TICK - 1e-6), 0),
+                math.floor(end + 1e-6) if math.isfinite(end) else FAR_TICK,
+            )
+        )
+        low, high = goal.heading or (0.0, 2.0 * math.pi)
+        headings.append((low, min(high - low, 2.0 * math.pi)))
+        speeds.append(goal.speed or (-math.inf, math.inf))
+    return GoalArrays(
+        corner=np.concatenate(flat) if flat else np.zeros((0, 2)),
+        ring=np.cumsum([0, *(len(ring) for ring in flat)]).astype(np.int64),
+        place=np.cumsum([0, *(len(group) for group in rings)]).astype(np.int64),
+        anywhere=np.array([goal.places is None for goal in scene.goals]),
+        heading=np.array(headings),
+        speed=np.array(speeds),
+        tick=np.array(ticks, dtype=np.int64),
+        way=np.array(route.ways),
+        turned=np.array(
+            [_turned(goal, way, route) for goal, way in zip(scene.goals, route.ways, strict=True)]
+        ),
+    )
+
+
+def _turned(goal: GoalRegion, way: Array, route: Route) -> tuple[float, float]:
+    """Headings of a goal, seen from the route's direction in the middle of the goal."""
+    if goal.heading is None or not np.isfinite(way).all():
+        return -math.inf, math.inf
+    low, high = goal.heading
+    middle = round(0.5 * (way[0] + way[1]) / SPACING)
+    ahead = float(route.heading[min(max(middle, 0), len(route.heading) - 1)])
+    center = math.remainder(0.5 * (low + high) - ahead, 2.0 * math.pi)
+    return center - 0.5 * (high - low), center + 0.5 * (high - low)
+
+
+def _weights(scene: RoadScene, vehicle: RoadVehicle) -> Weights:
+    placed = any(goal.places is not None for goal in scene.goals)
+    return Weights(
+        offset=0.05,
+        turned=1.0,
+        hurry=0.2,
+        pace=0.02,
+        progress=math.nan if placed else scene.start.speed,
+        ahead=0.05,
+        aside=0.05,
+        lateral=vehicle.lateral,
+        braking=vehicle.model.max_acceleration,
+        gain=vehicle.engine,
+    )
+
+
+def _memory(settings: RoadSettings) -> HorizonArrays:
+    levels = round(settings.horizon_s / TICK) // TICKS + 1
+    nodes = CHILDREN * settings.width * levels + 1024
+    return HorizonArrays(
+        pose=np.empty((nodes, 4)),
+        links=np.empty((nodes, 4), dtype=np.int64),
+        kept=np.empty((levels, settings.width), dtype=np.int64),
+        counts=np.zeros(levels, dtype=np.int64),
+        strips=np.zeros(STRIPS, dtype=np.int64),
+        cells=np.empty(1 << (64 * settings.width).bit_length(), dtype=np.int64),
+        heap_key=np.empty(nodes),
+        heap_node=np.empty(nodes, dtype=np.int64),
+        state=np.zeros(4, dtype=np.int64),
+    )

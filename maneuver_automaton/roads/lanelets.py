@@ -1,0 +1,160 @@
+"""Lanelets: pieces of lane between two bounds, where one may drive, and how they follow another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton.collision import Obstacle, Polygon
+from maneuver_automaton.groups import LieGroup
+
+CLOSED_GAP = 0.1  # [m] slivers between lanelets that ought to touch are closed up to twice this
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lanelet:
+    """A piece of lane; its bounds run in the direction of travel.
+
+    Examples
+    --------
+    >>> lane = Lanelet(1, [[0, 2], [10, 2]], [[0, -2], [10, -2]])
+    >>> lane.center.tolist(), lane.length
+    ([[0.0, 0.0], [10.0, 0.0]], 10.0)
+    """
+
+    number: int
+    left: Array  # (n, 2) [m]
+    right: Array  # (n, 2) [m]
+    successors: tuple[int, ...] = ()
+    beside: tuple[int, ...] = ()  # neighbours in the same direction
+    speed_limit: float | None = None  # [m/s]
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            number: int,
+            left: ArrayLike,
+            right: ArrayLike,
+            successors: Sequence[int] = ...,
+            beside: Sequence[int] = ...,
+            speed_limit: float | None = ...,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        freeze(self, "left", last=2)
+        freeze(self, "right", last=2)
+        for name, bound in (("left", self.left), ("right", self.right)):
+            if bound.ndim != 2 or len(bound) < 2:
+                raise ValueError(
+                    f"lanelet {self.number}: the {name} bound has shape {bound.shape}, need "
+                    "(n, 2) with n >= 2"
+                )
+        object.__setattr__(self, "successors", tuple(self.successors))
+        object.__setattr__(self, "beside", tuple(self.beside))
+        if self.speed_limit is not None and not self.speed_limit > 0.0:
+            raise ValueError(
+                f"lanelet {self.number}: the speed limit must be positive, got "
+                f"{self.speed_limit} m/s"
+            )
+
+    def moved(self, by: LieGroup, *, digits: int | None = None) -> Lanelet:
+        """The lanelet moved by a planar pose, its places rounded to `digits` if given."""
+        left, right = (_rounded(np.asarray(by.act(one)), digits) for one in (self.left, self.right))
+        return replace(self, left=left, right=right)
+
+    @property
+    def center(self) -> Array:
+        """Middle between the bounds (n, 2), corner by corner if they have as many [m]."""
+        if len(self.left) == len(self.right):
+            return np.asarray(0.5 * (self.left + self.right))
+        n = max(len(self.left), len(self.right))
+        return 0.5 * (resampled(self.left, n) + resampled(self.right, n))
+
+    @property
+    def length(self) -> float:
+        """Length of the middle [m]."""
+        return float(np.hypot(*np.diff(self.center, axis=0).T).sum())
+
+    @property
+    def ring(self) -> Array:
+        """Outline (n, 2), counter-clockwise if the left bound is on the left [m]."""
+        return np.concatenate([self.right, self.left[::-1]])
+
+
+def _rounded(values: Array, digits: int | None) -> Array:
+    return values if digits is None else np.asarray(np.round(values, digits) + 0.0)
+
+
+def resampled(line: Array, n: int) -> Array:
+    """`n` points (n, 2) equally spaced along a line (m, 2).
+
+    Examples
+    --------
+    >>> resampled(np.array([[0.0, 0.0], [1.0, 0.0], [4.0, 0.0]]), 3).tolist()
+    [[0.0, 0.0], [2.0, 0.0], [4.0, 0.0]]
+    """
+    way = along(line)
+    at = np.linspace(0.0, way[-1], n)
+    return np.stack([np.interp(at, way, line[:, k]) for k in range(2)], axis=-1)
+
+
+def along(line: Array) -> Array:
+    """Distance (n,) from the first point of a line (n, 2) [m]."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+
+
+def drivable_area(lanelets: Sequence[Lanelet], *, closed_gap: float = CLOSED_GAP) -> Any:
+    """The union of all lanelets, a valid shapely polygon or multipolygon.
+
+    Bounds of neighbours are drawn by hand and miss each other by centimetres: gaps of less than
+    twice `closed_gap` [m] are closed.
+
+    Examples
+    --------
+    >>> lanes = [Lanelet(k, [[0, k + 1], [9, k + 1]], [[0, k], [9, k]]) for k in range(2)]
+    >>> round(drivable_area(lanes).area, 9)
+    18.0
+    """
+    import shapely
+
+    parts = [shapely.make_valid(shapely.Polygon(lanelet.ring)) for lanelet in lanelets]
+    area = shapely.union_all(parts)
+    if closed_gap > 0.0:
+        grown = shapely.buffer(area, closed_gap, join_style="mitre")
+        area = shapely.union_all([area, shapely.buffer(grown, -closed_gap, join_style="mitre")])
+    flat = [part for part in shapely.get_parts(area) if part.geom_type == "Polygon"]
+    return shapely.union_all(flat)
+
+
+def off_road(area: Any, *, frame: float = 20.0) -> tuple[Obstacle, ...]:
+    """What is not drivable within `frame` [m] around the area, as obstacles that stand still.
+
+    Examples
+    --------
+    >>> import shapely
+    >>> (verge,) = off_road(shapely.box(0, 0, 9, 3), frame=1.0)
+    >>> len(verge.shape.holes), verge.shape.corners.max(axis=0).tolist()
+    (1, [10.0, 4.0])
+    """
+    import shapely
+
+    low_x, low_y, high_x, high_y = area.bounds
+    around = shapely.box(low_x - frame, low_y - frame, high_x + frame, high_y + frame)
+    outside = shapely.get_parts(shapely.difference(around, area))
+    return tuple(
+        Obstacle(
+            Polygon(
+                np.asarray(part.exterior.coords)[:-1],
+                tuple(np.asarray(ring.coords)[:-1] for ring in part.interiors),
+            ),
+            name="off the road" if k == 0 else f"off the road {k + 1}",
+        )
+        for k, part in enumerate(outside)
+        if part.geom_type == "Polygon"
+    )

@@ -1,0 +1,211 @@
+"""The way through the lanelets to a goal: the line to follow, and where the goal lies on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.roads.goal_region import GoalRegion, outlines_of
+from maneuver_automaton.roads.lanelets import Lanelet, along
+from maneuver_automaton.roads.scene import RoadScene
+
+if TYPE_CHECKING:
+    import networkx
+
+SPACING = 1.0  # [m] of the points of the line
+BEFORE, BEYOND = 60.0, 300.0  # [m] the line goes on straight before its first point, after its last
+LANE_CHANGE = 10.0  # [m] that a lane change is worth when ways are compared
+SHARE = 0.3  # of the smaller of two areas, common to a lanelet and a goal in it
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Route:
+    """A line to follow; stations count along it."""
+
+    lanelets: tuple[int, ...]  # numbers, in order
+    points: Array  # (n, 2) equally spaced [m]
+    heading: Array  # (n,) direction of travel, not wrapped [rad]
+    limit: Array  # (n,) speed limit [m/s], inf where there is none
+    ways: Array  # (goals, 4) least and greatest station of each goal, and least and greatest offset
+
+    @property
+    def stations(self) -> Array:
+        """Distance (n,) along the line [m]."""
+        return np.asarray(SPACING * np.arange(len(self.points)), dtype=np.float64)
+
+
+def route_of(scene: RoadScene) -> Route:
+    """The cheapest way through the lanelets from the start to a goal.
+
+    Where lanes are changed, the line is that of the lane that is changed to, so that the offset
+    from the line falls to zero. Without a goal that is a place, the way goes straight on.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.roads import RoadStart
+    >>> lane = Lanelet(1, [[0, 2], [90, 2]], [[0, -2], [90, -2]])
+    >>> scene = RoadScene(name="lane", lanelets=(lane,), goals=(GoalRegion(time=(1.0, 2.0)),),
+    ...                   start=RoadStart(middle=[5.0, 0.0, 0.0], speed=10.0))
+    >>> route_of(scene).lanelets
+    (1,)
+    """
+    lanelets = {lanelet.number: lanelet for lanelet in scene.lanelets}
+    sources = lanelets_at(scene.lanelets, scene.start.middle)
+    targets = [k for goal in scene.goals for k in lanelets_of_goal(scene.lanelets, goal)]
+    path = _path(lanelets, sources, targets)
+    line, limits = _line([lanelets[k] for k in path], lanelets)
+    points, heading, limit = _spaced(line, limits)
+    ways = np.array([_way(goal, points, heading) for goal in scene.goals])
+    return Route(lanelets=tuple(path), points=points, heading=heading, limit=limit, ways=ways)
+
+
+def lanelets_at(lanelets: Sequence[Lanelet], middle: Array) -> list[int]:
+    """Numbers of the lanelets around a pose (3,) that lead its way; else of the nearest."""
+    import shapely
+
+    place = shapely.Point(middle[:2])
+    forward = np.array([np.cos(middle[2]), np.sin(middle[2])])
+    off = {}
+    for lanelet in lanelets:
+        center = lanelet.center
+        steps = np.diff(center, axis=0)
+        nearest = int(np.argmin(np.hypot(*(center[:-1] + 0.5 * steps - middle[:2]).T)))
+        turned = float(steps[nearest] @ forward) < 0.0
+        away = shapely.distance(shapely.make_valid(shapely.Polygon(lanelet.ring)), place)
+        off[lanelet.number] = (turned, float(away))
+    best = min(off.values())
+    return [number for number, value in off.items() if value == best]
+
+
+def lanelets_of_goal(lanelets: Sequence[Lanelet], goal: GoalRegion) -> list[int]:
+    """Numbers of the lanelets that a goal covers, or that cover it, by a good part."""
+    import shapely
+
+    if goal.lanelets:
+        return list(goal.lanelets)
+    found = []
+    for place in outlines_of(goal.places or ()):
+        region = shapely.make_valid(shapely.Polygon(place))
+        for lanelet in lanelets:
+            piece = shapely.make_valid(shapely.Polygon(lanelet.ring))
+            common = shapely.intersection(piece, region).area
+            if common > SHARE * min(piece.area, region.area):
+                found.append(lanelet.number)
+    return found
+
+
+def lanelet_graph(lanelets: Sequence[Lanelet]) -> networkx.DiGraph[int]:
+    """Lanelets as nodes; edges to successors cost the length driven, lane changes a constant."""
+    import networkx
+
+    known = {lanelet.number for lanelet in lanelets}
+    graph: networkx.DiGraph[int] = networkx.DiGraph()
+    graph.add_nodes_from(known)
+    for lanelet in lanelets:
+        for number in known.intersection(lanelet.successors):
+            graph.add_edge(lanelet.number, number, cost=lanelet.length, beside=False)
+        for number in known.intersection(lanelet.beside):
+            graph.add_edge(lanelet.number, number, cost=LANE_CHANGE, beside=True)
+    return graph
+
+
+def _path(lanelets: dict[int, Lanelet], sources: list[int], targets: list[int]) -> list[int]:
+    """Numbers of the lanelets of the line: those that are left by a lane change are left out."""
+    import networkx
+
+    graph = lanelet_graph(list(lanelets.values()))
+    best: tuple[float, list[int]] | None = None
+    for source in sources:
+        costs, paths = networkx.single_source_dijkstra(graph, source, weight="cost")
+        assert isinstance(costs, dict)  # without a target
+        assert isinstance(paths, dict)
+        for target in targets:
+            if target in costs and (best is None or costs[target] < best[0]):
+                best = (float(costs[target]), list(paths[target]))
+    path = [sources[0]] if best is None else best[1]
+    kept = [
+        number
+        for number, after in zip(path, [*path[1:], None], strict=True)
+        if after is None or not graph.edges[number, after]["beside"]
+    ]
+    return [*kept, *_straight_on(lanelets, kept[-1], known=set(kept))]
+
+
+def _straight_on(lanelets: dict[int, Lanelet], number: int, *, known: set[int]) -> list[int]:
+    """Successors that turn least, as far as the line may be needed."""
+    more: list[int] = []
+    left = BEYOND
+    while left > 0.0:
+        steps = np.diff(lanelets[number].center, axis=0)
+        ahead = np.arctan2(*steps[-1][::-1])
+        after = [k for k in lanelets[number].successors if k in lanelets and k not in known]
+        if not after:
+            break
+
+        def turn(k: int, ahead: Any = ahead) -> float:
+            step = lanelets[k].center[-1] - lanelets[k].center[-2]
+            return abs(
+                float(np.remainder(np.arctan2(*step[::-1]) - ahead + np.pi, 2 * np.pi) - np.pi)
+            )
+
+        number = min(after, key=turn)
+        known.add(number)
+        more.append(number)
+        left -= lanelets[number].length
+    return more
+
+
+def _line(path: list[Lanelet], lanelets: dict[int, Lanelet]) -> tuple[Array, Array]:
+    """Middle of the lanelets of a path (n, 2), and the speed limit (n,) there."""
+    points, limits = [], []
+    for lanelet in path:
+        center = lanelet.center
+        limit = np.inf if lanelet.speed_limit is None else lanelet.speed_limit
+        points.append(center)
+        limits.append(np.full(len(center), limit))
+    line, limit_at = np.concatenate(points), np.concatenate(limits)
+    new = np.append(True, np.hypot(*np.diff(line, axis=0).T) > 1e-6)
+    return line[new], limit_at[new]
+
+
+def _spaced(line: Array, limits: Array) -> tuple[Array, Array, Array]:
+    """The line with equal spacing, longer at both ends, its headings and limits."""
+    first, last = line[0] - line[1], line[-1] - line[-2]
+    longer = np.concatenate(
+        [
+            [line[0] + BEFORE * first / np.hypot(*first)],
+            line,
+            [line[-1] + BEYOND * last / np.hypot(*last)],
+        ]
+    )
+    way = along(longer)
+    at = SPACING * np.arange(int(way[-1] / SPACING) + 1)
+    points = np.stack([np.interp(at, way, longer[:, k]) for k in range(2)], axis=-1)
+    steps = np.gradient(points, axis=0)
+    heading = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    after = np.searchsorted(way[1:-1], at).clip(0, len(limits) - 1)
+    return points, heading, limits[after]
+
+
+def _way(goal: GoalRegion, points: Array, heading: Array) -> Array:
+    """Stations and offsets between which a goal lies; all of them if it is no place."""
+    if goal.places is None:
+        return np.array([-np.inf, np.inf, -np.inf, np.inf])
+    import shapely
+
+    corners = np.concatenate(
+        [
+            np.asarray(shapely.segmentize(shapely.LinearRing(ring), 2.0 * SPACING).coords)
+            for ring in outlines_of(goal.places)
+        ]
+    )
+    nearest = np.argmin(np.hypot(*np.moveaxis(corners[:, None] - points[None], -1, 0)), axis=1)
+    apart = corners - points[nearest]
+    c, s = np.cos(heading[nearest]), np.sin(heading[nearest])
+    stations = SPACING * nearest + c * apart[:, 0] + s * apart[:, 1]
+    offsets = c * apart[:, 1] - s * apart[:, 0]
+    return np.array([stations.min(), stations.max(), offsets.min(), offsets.max()])

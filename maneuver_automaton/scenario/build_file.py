@@ -1,0 +1,279 @@
+"""The build file: a vehicle, a grid of trims and how to join them; a library comes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+from annotated_types import Ge
+from pydantic import AllowInfNan, BeforeValidator, Field, Strict
+
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.automaton._library_models import model_of as model_of_entry
+from maneuver_automaton.automaton.building import (
+    Failure,
+    LibraryBuild,
+    Pair,
+    all_pairs,
+    build_library,
+    nearest_pairs,
+    neighbour_pairs,
+)
+from maneuver_automaton.automaton.library import save_library
+from maneuver_automaton.formats.text_source import read_text
+from maneuver_automaton.formats.yaml_source import Document, parse
+from maneuver_automaton.models import Model
+from maneuver_automaton.optimal_control.maneuvers import ManeuverObjective, TransferSettings
+from maneuver_automaton.primitives.bang_bang import has_limited_rates
+from maneuver_automaton.primitives.equilibrium import MissingTrim, trims_of
+from maneuver_automaton.primitives.trim import Trim
+from maneuver_automaton.scenario.checks import Need, Number, Part, Several, Text, need
+from maneuver_automaton.scenario.reading import checked
+from maneuver_automaton.scenario.scenario import at
+from maneuver_automaton.scenario.schema import Count, Name, NotNegative, Positive, VehiclePart
+from maneuver_automaton.scenario.vehicles import model_of
+
+BUILD_KEY = "library"  # what only a build file has
+PAIRS = "all, neighbours, or a whole number of the nearest trims"
+
+
+def _grid(value: Any) -> Any:
+    good = isinstance(value, dict) and value and all(isinstance(v, list) for v in value.values())
+    if not good:
+        raise need("a mapping of names to lists of values, such as {speed: [0, 1], ...}")
+    return value
+
+
+def _mapping(value: Any) -> Any:
+    if not isinstance(value, dict):
+        raise need("a mapping with the key kind, and the parameters of this kind")
+    return value
+
+
+Mapped = Annotated[dict[str, Any], BeforeValidator(_mapping)]
+Grid = Annotated[
+    dict[str, Annotated[tuple[Number, ...], Several("a list of numbers", at_least=1)]],
+    BeforeValidator(_grid),
+]
+Numbers = Annotated[tuple[Number, ...], Several("a list of numbers", at_least=0)]
+
+
+class ManeuversPart(Part):
+    """How trims are joined: at once where rates are limited, else by optimal control."""
+
+    pairs: Annotated[
+        Literal["all", "neighbours"] | Annotated[int, Strict(), Ge(1)], Need(PAIRS)
+    ] = Field("all", description=PAIRS)
+    late: bool = Field(False, description="limited rates: also maneuvers that wait first")
+    strokes_m: Numbers = Field((), description="limited rates: lengths from rest to rest")
+    turns_rad: Numbers = Field((), description="limited rates: turns on the spot")
+    time: NotNegative = Field(1.0, description="optimal control: price of a second")
+    effort: NotNegative = Field(
+        0.0, description="optimal control: price of a second of full control, squared"
+    )
+    smoothness: NotNegative = Field(1e-3, description="optimal control: price of changing it")
+    intervals: Count = Field(20, description="optimal control: intervals of constant control")
+    steps: Count = Field(2, description="optimal control: steps of integration in each")
+    max_duration_s: Annotated[float, Strict(), AllowInfNan(False), Ge(0.1)] = Field(
+        60.0, description="optimal control: longest maneuver"
+    )
+    keep_sign: Annotated[tuple[Name, ...], Several("a list of controls", at_least=0)] = Field(
+        (), description="optimal control: controls that stay on one side of zero"
+    )
+
+
+class LibraryFile(Part):
+    """A library to be built: vehicle, trims, maneuvers."""
+
+    one_of: ClassVar = ("vehicle", "model")
+
+    schema_version: Literal[1] = Field(alias="schema", description="1")
+    library: Text = Field(description="what the library is called")
+    vehicle: VehiclePart | None = Field(None, description="as in a scenario: {model, ...}")
+    model: Mapped | None = Field(None, description="as in a library file: {kind, ...}, SI units")
+    trims: Grid = Field(description="a grid of trims, a mapping of names to lists of values")
+    max_lateral_acceleration_m_s2: Positive | None = Field(
+        None, description="what the tyres hold; left out: no limit"
+    )
+    maneuvers: ManeuversPart = Field(
+        default_factory=lambda: ManeuversPart(), description="how trims are joined"
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class BuildFile:
+    """What a build file asks for; trims that the vehicle does not have are left out, and named."""
+
+    name: str
+    model: Model
+    grid: Mapping[str, tuple[float, ...]]
+    max_lateral_acceleration: float | None  # [m/s^2]
+    trims: tuple[Trim, ...]
+    missing: tuple[MissingTrim, ...]
+    maneuvers: ManeuversPart
+
+    @property
+    def at_once(self) -> bool:
+        """Whether the maneuvers come in closed form, without a solver and in no time."""
+        closed = has_limited_rates(self.model) and self.maneuvers.effort == 0.0
+        return closed and not isinstance(self.maneuvers.pairs, int)
+
+    def pairs(self) -> list[Pair]:
+        """Trims to join by optimal control; none where maneuvers come at once."""
+        if self.at_once or not self.model.reduced_names:
+            return []
+        nodes, part = Automaton(self.model, self.trims), self.maneuvers
+        if isinstance(part.pairs, int):
+            return nearest_pairs(nodes, part.pairs, keep_sign=part.keep_sign)
+        chosen = neighbour_pairs if part.pairs == "neighbours" else all_pairs
+        return chosen(nodes, keep_sign=part.keep_sign)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Built:
+    """A library that was built and written."""
+
+    automaton: Automaton
+    failures: tuple[Failure, ...]
+    build: LibraryBuild | None  # of optimal control
+
+
+def is_build_file(path: Path) -> bool:
+    """Whether a YAML file is a build file and no scenario."""
+    if path.suffix not in (".yaml", ".yml"):
+        return False
+    value = parse(read_text(path), name=str(path)).value
+    return isinstance(value, dict) and BUILD_KEY in value
+
+
+def load_build_file(path: Path | str) -> BuildFile:
+    """Vehicle and trims of a build file.
+
+    Raises
+    ------
+    InvalidScenario
+        If the file cannot be read or used: one line with file, line, field, the value met, and
+        what would be right.
+    """
+    return build_file_of_text(read_text(Path(path)), name=str(path))
+
+
+def build_file_of_text(text: str, *, name: str) -> BuildFile:
+    """What the text of a build file asks for; see `load_build_file`.
+
+    Examples
+    --------
+    >>> asked = build_file_of_text(
+    ...     "{schema: 1, library: robots, vehicle: {model: unicycle}, trims: {speed: [0, 1]}}",
+    ...     name="robots.yaml")
+    >>> [trim.name for trim in asked.trims]
+    ['speed 0', 'speed 1']
+    """
+    document = parse(text, name=name, what="a build file")
+    file = checked(document, LibraryFile)
+    model = _model(document, file)
+    with at(document, ("trims",)):
+        found = trims_of(
+            model, file.trims, max_lateral_acceleration=file.max_lateral_acceleration_m_s2
+        )
+    if not found.trims:
+        reason = found.missing[0].reason
+        raise document.error(("trims",), f"the {model.name} has none of these trims: {reason}")
+    asked = BuildFile(
+        name=file.library,
+        model=model,
+        grid=file.trims,
+        max_lateral_acceleration=file.max_lateral_acceleration_m_s2,
+        trims=found.trims,
+        missing=found.missing,
+        maneuvers=file.maneuvers,
+    )
+    _check_maneuvers(document, asked)
+    return asked
+
+
+def _model(document: Document, file: LibraryFile) -> Model:
+    if file.vehicle is not None:
+        with at(document, ("vehicle",)):
+            return model_of(file.vehicle)
+    with at(document, ("model",)):
+        return model_of_entry(file.model, own=None)
+
+
+def build(
+    asked: BuildFile,
+    path: Path,
+    *,
+    jobs: int = 1,
+    scheduler: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Built:
+    """Build the library of a build file and write it to `path`; see `build_library`.
+
+    Raises
+    ------
+    MissingExtra
+        If optimal control is needed and CasADi not installed.
+    OSError
+        If the file cannot be written.
+    """
+    part = asked.maneuvers
+    if asked.at_once or not asked.model.reduced_names:
+        automaton = _made_at_once(asked)
+        save_library(automaton, path)
+        return Built(automaton=automaton, failures=(), build=None)
+    done = build_library(
+        asked.model,
+        asked.trims,
+        pairs=asked.pairs(),
+        objective=ManeuverObjective(time=part.time, effort=part.effort, smoothness=part.smoothness),
+        settings=TransferSettings(
+            intervals=part.intervals, steps=part.steps, duration=(0.02, part.max_duration_s)
+        ),
+        keep_sign=part.keep_sign,
+        jobs=jobs,
+        scheduler=scheduler,
+        path=path,
+        name=asked.name,
+        progress=progress,
+    )
+    return Built(automaton=done.automaton, failures=done.failures, build=done)
+
+
+def _made_at_once(asked: BuildFile) -> Automaton:
+    part = asked.maneuvers
+    made = Automaton.of_model(
+        asked.model,
+        asked.grid,
+        pairs="neighbours" if part.pairs == "neighbours" else "all",
+        late=part.late,
+        strokes=part.strokes_m,
+        turns=part.turns_rad,
+        max_lateral_acceleration=asked.max_lateral_acceleration,
+        leave_out=True,
+    )
+    return replace(made, name=asked.name)
+
+
+def _check_maneuvers(document: Document, asked: BuildFile) -> None:
+    """What is only for one way of joining trims is refused in the other."""
+    part, given = asked.maneuvers, asked.maneuvers.model_fields_set
+    if not asked.at_once:
+        for key in ("late", "strokes_m", "turns_rad"):
+            if key in given:
+                raise document.error(
+                    ("maneuvers", key),
+                    f"is for vehicles whose control is the rate of the reduced state, at no price "
+                    f"of effort, not for this {asked.model.name}",
+                )
+        with at(document, ("maneuvers",)):
+            ManeuverObjective(time=part.time, effort=part.effort, smoothness=part.smoothness)
+    for control in part.keep_sign:
+        if control not in asked.model.control_names:
+            raise document.error(
+                ("maneuvers", "keep_sign"),
+                f"the {asked.model.name} has no control {control!r}, need some of "
+                f"{', '.join(asked.model.control_names)}",
+            )

@@ -1,0 +1,345 @@
+"""Lattice A* over trims and maneuvers: a first plan soon, then cheaper ones while there is time."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.search import _kernels_maneuver_lattice as kernels
+from maneuver_automaton.search.distance_grid import DistanceGrid, distance_grid
+from maneuver_automaton.search.lattice_memory import widened
+from maneuver_automaton.search.maneuver_query import ManeuverQuery
+from maneuver_automaton.search.maneuver_shortcuts import LEAST, shortened
+from maneuver_automaton.search.maneuver_task import Rung, Task, task_of, transfer_steps
+from maneuver_automaton.search.maneuver_word import (
+    EDGE,
+    TRIM,
+    ManeuverWord,
+    plan_of_word,
+    word_of,
+)
+from maneuver_automaton.search.result import SearchStatus
+from maneuver_automaton.search.transfer import TransferScratch
+
+FIRST_CHUNK = 128  # expansions
+MOST_CHUNK = 16384
+TIMELY = 256  # expansions between two looks at the clock
+SMALLEST = 4096  # nodes
+
+
+FIRST: tuple[tuple[int, tuple[Rung, ...]], ...] = (
+    # after so many expansions of all passes together, or when all are exhausted
+    (0, (Rung(stop=True),)),
+    (300, (Rung(scale=0.5, quanta=0.5, stop=True), Rung(quanta=0.7, stop=True))),
+    (2000, (Rung(scale=0.25, quanta=0.25, stop=True), Rung(scale=0.5, quanta=0.7, stop=True))),
+    (40000, (Rung(scale=0.25, quanta=0.25, stop=True, margin=0.1),)),
+)
+LATER: tuple[Rung, ...] = (
+    Rung(weight=1.5),
+    Rung(weight=1.2),
+    Rung(weight=1.0),
+    Rung(scale=0.5, quanta=0.5, weight=1.2),
+    Rung(scale=0.5, quanta=0.5, weight=1.0),
+)
+
+
+class ManeuverSearchArrays(NamedTuple):
+    """Nodes, their hash table, the heap, and a few numbers."""
+
+    nodes: Array  # (n, 9)
+    links: NDArray[np.int32]  # (n, 4)
+    table: IntArray  # (4 n, 2) key, generation and node
+    heap_key: Array
+    heap_node: IntArray
+    state: IntArray  # (11,)
+    found: Array  # (5,) cost, four durations
+    scratch: TransferScratch
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ManeuverResult:
+    """Plans of one query, each cheaper than the one before."""
+
+    status: SearchStatus
+    words: tuple[ManeuverWord, ...]  # the last is the best
+    found_after: tuple[int, ...] = ()  # expansions until each was found
+    found_s: tuple[float, ...] = ()  # [s]
+    expansions: int = 0
+    counts: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def best(self) -> ManeuverWord | None:
+        """The cheapest word, None if there is none."""
+        return self.words[-1] if self.words else None
+
+
+class Heard(NamedTuple):
+    """What a search has to say: a better word, or how it ended."""
+
+    word: ManeuverWord | None
+    expansions: int
+    status: SearchStatus
+
+
+@dataclass(slots=True, eq=False)
+class ManeuverPass:
+    """A search at one resolution and weight; it can be stopped and resumed."""
+
+    query: ManeuverQuery
+    rung: Rung
+    task: Task
+    grid: DistanceGrid
+    arrays: ManeuverSearchArrays
+    quanta: Array
+    moves: Array
+    chunk: int = FIRST_CHUNK
+    alive: bool = True
+
+    @property
+    def expansions(self) -> int:
+        """Nodes expanded so far."""
+        return int(self.arrays.state[kernels.EXPANSIONS])
+
+    def run(self, n: int, ceiling: float, *, deadline: float = math.inf) -> ManeuverWord | None:
+        """Expand up to `n` more nodes; a word that costs less than `ceiling` if one was found."""
+        library = self.query.library.arrays._replace(quanta=self.quanta, moves=self.moves)
+        left = self.expansions + n
+        while self.alive and self.expansions < left and time.monotonic() < deadline:
+            step = min(left - self.expansions, TIMELY)
+            used = int(self.arrays.state[kernels.N_NODES])
+            self.arrays = with_room(self.arrays, used + library.most_children * (step + 1) + 2)
+            self.alive = bool(
+                kernels.expand(
+                    self.arrays,
+                    self.task,
+                    library,
+                    self.query.world.arrays,
+                    self.grid,
+                    step,
+                    ceiling,
+                )
+            )
+            if self.arrays.found[0] < ceiling * (1.0 - LEAST):
+                break
+        return self._word() if self.arrays.state[kernels.FOUND] else None
+
+    def _word(self) -> ManeuverWord:
+        """The word that was found, from start to goal."""
+        arrays, query = self.arrays, self.query
+        state, library = arrays.state, query.library
+        node = int(state[kernels.NODE])
+        last = int(arrays.links[node, 1])
+        steps: list[tuple[int, int, float]] = []
+        targets: list[int] = []
+        while arrays.links[node, 0] >= 0:
+            edge = int(arrays.links[node, 2])
+            if edge == kernels.COAST:
+                steps.append((TRIM, int(arrays.links[node, 1]), float(arrays.nodes[node, 6])))
+            else:
+                steps.append((EDGE, int(library.edge_maneuver[edge]), 0.0))
+                targets.append(int(arrays.links[node, 1]))
+            node = int(arrays.links[node, 0])
+        goal = int(state[kernels.GOAL])
+        tail = [int(trim) for trim in query.transfer.arrays.words[state[kernels.ROW]]]
+        times = arrays.found[1:5].tolist()
+        tail += [int(state[kernels.CLIMB]), int(query.goal_trims[goal])]
+        ahead, beyond = transfer_steps(query.transfer, last, tail, [*times, 0.0])
+        return word_of(
+            query.transfer,
+            start_trim=query.start_trim,
+            steps=steps[::-1] + ahead,
+            targets=targets[::-1] + beyond,
+            goal=goal,
+        )
+
+
+def search_maneuvers(
+    query: ManeuverQuery,
+    *,
+    deadline: float = math.inf,
+    max_expansions: int | None = None,
+    first_only: bool = False,
+) -> ManeuverResult:
+    """Words from the start to a goal, each cheaper than the one before: see `maneuver_words`.
+
+    Returns
+    -------
+    ManeuverResult
+        EXHAUSTED without a word: none at these resolutions, which proves nothing.
+    """
+    begun = time.monotonic()
+    found: list[tuple[ManeuverWord, int, float]] = []
+    total, status = 0, SearchStatus.EXHAUSTED
+    for heard in maneuver_words(query, deadline=deadline, max_expansions=max_expansions):
+        total, status = heard.expansions, heard.status
+        if heard.word is not None:
+            found.append((heard.word, total, time.monotonic() - begun))
+            if first_only:
+                break
+    return ManeuverResult(
+        status=SearchStatus.FOUND if found else status,
+        words=tuple(word for word, _, _ in found),
+        found_after=tuple(n for _, n, _ in found),
+        found_s=tuple(s for _, _, s in found),
+        expansions=total,
+    )
+
+
+def maneuver_words(
+    query: ManeuverQuery,
+    *,
+    deadline: float = math.inf,
+    max_expansions: int | None = None,
+) -> Iterator[Heard]:
+    """Words from the start to a goal as they are found, each cheaper than the one before.
+
+    Passes of greater weight come first; every word is shortened, and later passes are pruned by the
+    best. What is found in a number of expansions is the same at every call; shortcuts are rounds
+    that are not counted. The last thing heard has no word.
+
+    Parameters
+    ----------
+    query : ManeuverQuery
+    deadline : float
+        Of `time.monotonic()` [s].
+    max_expansions : int, optional
+        Nodes of all passes together.
+    """
+    room = 2**62 if max_expansions is None else max_expansions
+
+    def ended(total: int) -> SearchStatus:
+        over = time.monotonic() >= deadline or total >= room
+        return SearchStatus.OUT_OF_BUDGET if over else SearchStatus.EXHAUSTED
+
+    own = query.around(query.parts[0])
+    grid = distance_grid(own, query.window[0], query.seen_goals, query.seen_start)
+    word, first = _first(query, grid, room=room, deadline=deadline)
+    total = first
+    if word is not None:
+        yield Heard(word, first, SearchStatus.FOUND)
+        for better, more in _better(query, grid, word, room=room - first, deadline=deadline):
+            total = first + more
+            if better is not None:
+                yield Heard(better, total, SearchStatus.FOUND)
+    yield Heard(None, total, ended(total))
+
+
+def plan_of(query: ManeuverQuery, word: ManeuverWord) -> Plan:
+    """A word as a plan that ends exactly at its goal, in the frame of the query."""
+    return plan_of_word(
+        query.transfer,
+        word,
+        start=query.start,
+        goal=query.goals[word.goal],
+        start_time=query.start_time,
+    )
+
+
+def _first(
+    query: ManeuverQuery, grid: DistanceGrid, *, room: int, deadline: float
+) -> tuple[ManeuverWord | None, int]:
+    """Passes of rising resolution in turn until one connects: the word, and expansions."""
+    ladder = list(FIRST)
+    passes: list[ManeuverPass] = []
+    total = 0
+    while total < room and time.monotonic() < deadline:
+        alive = [one for one in passes if one.alive]
+        if ladder and (not alive or total >= ladder[0][0]):
+            passes += [pass_of(query, rung, grid) for rung in ladder.pop(0)[1]]
+            alive = [one for one in passes if one.alive]
+        if not alive:
+            break
+        for one in alive:
+            before = one.expansions
+            n = min(one.chunk, room - total)
+            word = one.run(n, math.inf, deadline=deadline) if n > 0 else None
+            total += one.expansions - before
+            one.chunk = min(2 * one.chunk, MOST_CHUNK)
+            if word is not None:
+                return word, total
+    return None, total
+
+
+def _better(
+    query: ManeuverQuery, grid: DistanceGrid, best: ManeuverWord, *, room: int, deadline: float
+) -> Iterator[tuple[ManeuverWord | None, int]]:
+    """Shortcuts, then passes of falling weight below the cost of the best word, one by one."""
+    total = 0
+    for shorter in shortened(query, best, deadline=deadline):
+        best = shorter
+        yield best, total
+    arrays: ManeuverSearchArrays | None = None
+    for rung in LATER:
+        one = pass_of(query, rung, grid, arrays=arrays)
+        while one.alive and total < room and time.monotonic() < deadline:
+            before = one.expansions
+            word = one.run(min(one.chunk, room - total), best.cost, deadline=deadline)
+            total += one.expansions - before
+            one.chunk = min(2 * one.chunk, MOST_CHUNK)
+            if word is None or not word.cost < best.cost * (1.0 - LEAST):
+                continue
+            best = word
+            yield best, total
+            for shorter in shortened(query, best, deadline=deadline):
+                best = shorter
+                yield best, total
+        arrays = one.arrays
+        yield None, total
+
+
+def pass_of(
+    query: ManeuverQuery,
+    rung: Rung,
+    grid: DistanceGrid,
+    *,
+    arrays: ManeuverSearchArrays | None = None,
+) -> ManeuverPass:
+    """A pass that is ready to run."""
+    library = query.library.arrays
+    quanta = library.quanta * rung.quanta
+    steps = quanta[..., None] * library.transfer.twists[:, None]
+    task = task_of(query, rung)
+    room = _search_arrays(query) if arrays is None else arrays
+    kernels.begin(room, task, query.world.arrays, grid)
+    return ManeuverPass(
+        query=query,
+        rung=rung,
+        task=task,
+        grid=grid,
+        arrays=room,
+        quanta=quanta,
+        moves=_moves(steps),
+    )
+
+
+def with_room(search: ManeuverSearchArrays, nodes: int) -> ManeuverSearchArrays:
+    """The same search in arrays that hold at least so many nodes."""
+    return cast(ManeuverSearchArrays, widened(search, nodes))
+
+
+def _moves(steps: Array) -> Array:
+    from maneuver_automaton.groups import SE2
+
+    return np.concatenate([SE2.exp(steps[..., :3]).pose, steps[..., 3:]], axis=-1)
+
+
+def _search_arrays(query: ManeuverQuery) -> ManeuverSearchArrays:
+    n = SMALLEST
+    return ManeuverSearchArrays(
+        nodes=np.empty((n, 9)),
+        links=np.empty((n, 4), dtype=np.int32),
+        table=np.zeros((4 * n, 2), dtype=np.int64),
+        heap_key=np.empty(n),
+        heap_node=np.empty(n, dtype=np.int64),
+        state=np.zeros(11, dtype=np.int64),
+        found=np.zeros(5),
+        scratch=query.transfer.scratch(),
+    )

@@ -1,0 +1,190 @@
+"""What a search over trims and maneuvers is asked, as a value."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from maneuver_automaton._arrays import Array, IntArray, as_array
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.collision import AnyObstacle
+from maneuver_automaton.collision.advancement import clearances
+from maneuver_automaton.collision.body import body_of
+from maneuver_automaton.collision.world import World, own_frame, world_of
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.problem import Bounds
+from maneuver_automaton.search.lattice_query import window_of
+from maneuver_automaton.search.maneuver_library import ManeuverLibrary, maneuver_library
+from maneuver_automaton.search.maneuver_motion import Part
+from maneuver_automaton.search.transfer import TransferLibrary
+
+MARGIN = 0.005  # proven clearance of every pose looked at, in half widths of the body
+LEAST_MARGIN = 1e-7  # [m]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ManeuverQuery:
+    """One start and its goals, each a pose and a trim, among obstacles.
+
+    Parameters
+    ----------
+    transfer : TransferLibrary
+        The automaton with its prices.
+    parts : tuple of Part
+        Rigid parts of the vehicle; the pose of the first is that of the vehicle.
+    start : (dof,) array
+        Pose [m, m, rad(, m)].
+    goals : (n, dof) array
+    start_trim : int
+        Trim at the start, with no need to coast in it.
+    goal_trims : (n,) array of int
+    obstacles : tuple of obstacles
+    bounds : Bounds
+        Of the pose.
+    keep : float
+        Distance kept from everything [m].
+    start_time : float
+        [s] of the clock by which obstacles move.
+    most_time : float
+        [s] that a plan may last.
+    """
+
+    transfer: TransferLibrary
+    parts: tuple[Part, ...]
+    start: Array
+    goals: Array
+    start_trim: int
+    goal_trims: IntArray
+    obstacles: tuple[AnyObstacle, ...] = ()
+    bounds: Bounds = field(default_factory=Bounds)
+    keep: float = 0.0
+    start_time: float = 0.0
+    most_time: float = math.inf
+
+    def __post_init__(self) -> None:
+        dof = self.automaton.model.group.dof
+        start = np.array(as_array("start", self.start, last=dof))
+        goals = np.atleast_2d(np.array(as_array("goals", self.goals, last=dof)))
+        trims = np.atleast_1d(np.array(self.goal_trims, dtype=np.int64))
+        if start.shape != (dof,):
+            raise ValueError(f"start: got shape {start.shape}, need ({dof},)")
+        if not len(goals) or trims.shape != goals.shape[:1]:
+            raise ValueError(f"goals: got {len(goals)} poses and {trims.size} trims")
+        numbers = [self.start_trim, *trims.tolist()]
+        if min(numbers) < 0 or max(numbers) >= len(self.automaton):
+            raise ValueError(f"trims: got {numbers}, need 0 to {len(self.automaton) - 1}")
+        for name, value in (("start", start), ("goals", goals), ("goal_trims", trims)):
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+    @property
+    def automaton(self) -> Automaton:
+        """The automaton."""
+        return self.transfer.automaton
+
+    @cached_property
+    def world(self) -> World:
+        """The obstacles, prepared for the largest part of the vehicle."""
+        largest = max(self.parts, key=lambda part: body_of(part.shapes).reach)
+        frame = own_frame(self.obstacles, self.goals[0])
+        return world_of(self.obstacles, largest.shapes, frame, keep=self.keep)
+
+    def around(self, part: Part) -> World:
+        """The same obstacles around one part."""
+        return replace(self.world, body=body_of(part.shapes))
+
+    @property
+    def moves(self) -> bool:
+        """Whether an obstacle moves."""
+        return bool(self.world.arrays.movers.speed.size)
+
+    @cached_property
+    def library(self) -> ManeuverLibrary:
+        """Edges and pieces of motion of the automaton."""
+        return maneuver_library(self.transfer, self.parts, timed=self.moves, waits=self.moves)
+
+    @cached_property
+    def seen_start(self) -> Array:
+        """Start (4,) seen from the world's frame."""
+        return np.asarray(self._seen(self.start[None])[0])
+
+    @cached_property
+    def seen_goals(self) -> Array:
+        """Goals (n, 4) seen from the world's frame."""
+        return self._seen(self.goals)
+
+    @cached_property
+    def half_width(self) -> float:
+        """Half the width of the narrowest part [m]."""
+        return min(body_of(part.shapes).half_width for part in self.parts)
+
+    @cached_property
+    def margin(self) -> float:
+        """Proven clearance [m]: a share of the body, at most half of what the ends have."""
+        usual = MARGIN * (self.half_width or 0.1 * self.library.radius)
+        known = [0.5 * gap for gap in self.end_clearances().tolist() if gap > 0.0]
+        return float(max(LEAST_MARGIN, min([usual, *known])))
+
+    def end_clearances(self) -> Array:
+        """Clearance (1 + n,) beyond `keep` at the start and every goal, over all parts [m].
+
+        Where something moves, at the start time, and after everything has come to rest.
+        """
+        settled = max(self.start_time, self.world.last_event)
+        rows = []
+        ends = [(self.seen_start, self.start_trim, self.start_time)]
+        ends += [
+            (goal, int(trim), settled)
+            for goal, trim in zip(self.seen_goals, self.goal_trims, strict=True)
+        ]
+        for pose, trim, time in ends:
+            gaps = []
+            for part in self.parts:
+                there = (SE2(pose[:3]) @ SE2(part.trim_poses[trim])).pose
+                gaps.append(float(clearances(self.around(part), there, times=time)[0]))
+            rows.append(min(gaps) - self.keep)
+        return np.array(rows)
+
+    @cached_property
+    def window(self) -> tuple[Array, Array, bool]:
+        """Box in the world's frame, window as in `_kernels_connect.inside_window`, if bounded."""
+        ends = np.vstack([self.seen_start[None], self.seen_goals])
+        return window_of(self.bounds, self.world, ends, radius=self.library.radius)
+
+    def _seen(self, poses: Array) -> Array:
+        planar = self.world.into(poses[:, :3])
+        heights = poses[:, 3:] if poses.shape[1] == 4 else np.zeros((len(poses), 1))
+        return np.hstack([planar, heights])
+
+
+def maneuver_query(
+    transfer: TransferLibrary,
+    parts: tuple[Part, ...],
+    start: ArrayLike,
+    goals: ArrayLike | Sequence[ArrayLike],
+    *,
+    start_trim: str,
+    goal_trim: str,
+    obstacles: tuple[AnyObstacle, ...] = (),
+    bounds: Bounds | None = None,
+    keep: float = 0.0,
+) -> ManeuverQuery:
+    """A query by the names of trims, one for all goals; raises UnknownTrim."""
+    rows = np.atleast_2d(as_array("goals", goals))  # type: ignore[arg-type]
+    automaton = transfer.automaton
+    return ManeuverQuery(
+        transfer=transfer,
+        parts=parts,
+        start=as_array("start", start),
+        goals=rows,
+        start_trim=automaton.index_of(start_trim),
+        goal_trims=np.full(len(rows), automaton.index_of(goal_trim), dtype=np.int64),
+        obstacles=obstacles,
+        bounds=Bounds() if bounds is None else bounds,
+        keep=keep,
+    )

@@ -1,0 +1,217 @@
+"""Shorten a word of trims and maneuvers by transfers between its own points."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.groups import SE2xR
+from maneuver_automaton.search import _kernels_maneuver_motion as motion
+from maneuver_automaton.search import _kernels_maneuver_shortcuts as kernels
+from maneuver_automaton.search.maneuver_query import ManeuverQuery
+from maneuver_automaton.search.maneuver_task import Rung, task_of, transfer_steps
+from maneuver_automaton.search.maneuver_word import EDGE, TRIM, ManeuverWord, word_of
+
+MOST_POINTS = 32
+LEAST = 1e-5  # share of the cost that a shortcut has to save
+WORTH = 1e-3  # share that a round has to save for another one of its kind
+ROUNDS = 8
+GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+
+
+class ShortcutPlan(NamedTuple):
+    """What the kernel fills; see there."""
+
+    costs: Array
+    spent: Array
+    before: IntArray
+    rows: IntArray
+    climbs: IntArray
+    times: Array
+
+
+class _Steps(NamedTuple):
+    """A word cut at its points: step k leads from point k to point k + 1."""
+
+    kinds: IntArray
+    numbers: IntArray  # trim, or maneuver
+    times: Array  # [s] of trims
+    targets: IntArray  # trim after the step
+    points: Array  # (n + 1, 4) in the world's frame
+    costs: Array  # (n + 1,)
+    spent: Array  # (n + 1,) [s]
+
+
+def shortened(
+    query: ManeuverQuery,
+    word: ManeuverWord,
+    *,
+    rounds: int = ROUNDS,
+    deadline: float = math.inf,
+) -> Iterator[ManeuverWord]:
+    """Words that rounds of shortcuts make of `word`, each cheaper than the one before.
+
+    Every round cuts the trims at other places, so that points lie elsewhere; first with words of
+    few trims, then with all.
+    """
+    arrays = query.transfer.arrays
+    best = word
+    for n_words in sorted({arrays.n_few, len(arrays.words)}):
+        for n in range(rounds):
+            if time.monotonic() >= deadline:
+                return
+            before, cut = best.cost, (GOLDEN * n) % 1.0
+            better = _once(query, best, cut=cut, n_words=n_words, deadline=deadline)
+            if better is not None:
+                best = better
+                yield best
+            if n >= 1 and before - best.cost < WORTH * before:
+                break
+
+
+def word_is_free(query: ManeuverQuery, word: ManeuverWord) -> bool:
+    """Whether a word is proven free all the way, at the times when it is where."""
+    steps = _steps(query, word, cut=0.0, most=0)
+    library = query.library
+    sources = np.repeat(np.arange(len(library.lag)), np.diff(library.arrays.first_edge))
+    keys = zip(
+        sources.tolist(),
+        library.edge_maneuver.tolist(),
+        library.arrays.edge_target.tolist(),
+        strict=True,
+    )
+    edges = {key: e for e, key in enumerate(keys)}
+    at = word.trims[0]
+    numbers = steps.numbers.copy()
+    for k, kind in enumerate(steps.kinds):
+        if kind == EDGE:
+            numbers[k] = edges[at, int(steps.numbers[k]), int(steps.targets[k])]
+        at = int(steps.targets[k])
+    free = motion.word_free(
+        task_of(query, Rung()),
+        library.arrays,
+        query.world.arrays,
+        np.array(query.seen_start[:3]),
+        steps.kinds,
+        numbers,
+        steps.times,
+        float(query.start_time),
+    )
+    return bool(free)
+
+
+def _once(
+    query: ManeuverQuery, word: ManeuverWord, *, cut: float, n_words: int, deadline: float
+) -> ManeuverWord | None:
+    """One round; None if nothing is gained."""
+    steps = _steps(query, word, cut=cut, most=MOST_POINTS)
+    n = len(steps.points)
+    plan = ShortcutPlan(
+        costs=np.zeros(n),
+        spent=np.zeros(n),
+        before=np.zeros(n, dtype=np.int64),
+        rows=np.full(n, kernels.AS_BEFORE),
+        climbs=np.full(n, -1),
+        times=np.zeros((n, 4)),
+    )
+    least = LEAST * max(word.cost, 1e-12)
+    trims = np.concatenate([[word.trims[0]], steps.targets]).astype(np.int64)
+    task, scratch = task_of(query, Rung()), query.transfer.scratch()
+    for j in range(1, n):
+        if time.monotonic() >= deadline:
+            return None
+        kernels.shorten_to(
+            task,
+            query.library.arrays,
+            n_words,
+            query.world.arrays,
+            j,
+            steps.points,
+            trims,
+            steps.costs,
+            steps.spent,
+            least,
+            plan,
+            scratch,
+        )
+    if not plan.costs[-1] < word.cost - 0.5 * least:
+        return None
+    found: list[tuple[int, int, float]] = []
+    targets: list[int] = []
+    j = n - 1
+    links = []
+    while j > 0:
+        links.append(j)
+        j = int(plan.before[j])
+    for j in reversed(links):
+        i = int(plan.before[j])
+        if plan.rows[j] == kernels.AS_BEFORE:
+            found.append((int(steps.kinds[i]), int(steps.numbers[i]), float(steps.times[i])))
+            if steps.kinds[i] == EDGE:
+                targets.append(int(steps.targets[i]))
+            continue
+        tail = [int(k) for k in query.transfer.arrays.words[plan.rows[j]]]
+        tail += [int(plan.climbs[j]), int(trims[j])]
+        ahead, beyond = transfer_steps(
+            query.transfer, int(trims[i]), tail, [*plan.times[j].tolist(), 0.0]
+        )
+        found += ahead
+        targets += beyond
+    better = word_of(
+        query.transfer, start_trim=word.trims[0], steps=found, targets=targets, goal=word.goal
+    )
+    late = better.duration > query.most_time
+    if late or (query.moves and not word_is_free(query, better)):
+        return None
+    return better
+
+
+def _steps(query: ManeuverQuery, word: ManeuverWord, *, cut: float, most: int) -> _Steps:
+    """The word as steps, its longest trims cut in parts until there are `most` points."""
+    transfer, automaton = query.transfer, query.automaton
+    durations = np.asarray(word.durations)
+    room = max(0, most - 2 * len(word.trims))
+    total = float(durations.sum())
+    rows: list[tuple[int, int, float, int]] = []
+    for k, trim in enumerate(word.trims):
+        if durations[k] > 0.0:
+            parts = 1 + int(room * durations[k] / total)
+            inner = (np.arange(1, parts) - cut) / parts if parts > 1 else np.zeros(0)
+            ends = np.concatenate([[0.0], inner[inner > 0.0], [1.0]]) * durations[k]
+            rows += [(TRIM, trim, t, trim) for t in np.diff(ends).tolist()]
+        if k < len(word.maneuvers):
+            rows.append((EDGE, word.maneuvers[k], 0.0, word.trims[k + 1]))
+    pose = SE2xR(query.seen_start)
+    points, costs, spent = [pose.pose], [0.0], [0.0]
+    for kind, number, t, _ in rows:
+        if kind == TRIM:
+            move, cost = SE2xR.exp(t * transfer.arrays.twists[number]), t
+            cost *= float(transfer.arrays.rates[number])
+        elif number < 0:
+            move, cost = SE2xR.identity(), 0.0
+        else:
+            maneuver = automaton.maneuvers[number]
+            shift = np.zeros(4)
+            shift[: maneuver.displacement.size] = maneuver.displacement
+            move, t = SE2xR(shift), maneuver.duration
+            cost = float(transfer.maneuver_costs[number])
+        pose = pose @ move
+        points.append(pose.pose)
+        costs.append(costs[-1] + cost)
+        spent.append(spent[-1] + t)
+    if rows:
+        points[-1] = query.seen_goals[word.goal]
+    return _Steps(
+        kinds=np.array([row[0] for row in rows], dtype=np.int64),
+        numbers=np.array([row[1] for row in rows], dtype=np.int64),
+        times=np.array([row[2] for row in rows], dtype=np.float64),
+        targets=np.array([row[3] for row in rows], dtype=np.int64),
+        points=np.array(points),
+        costs=np.array(costs),
+        spent=np.array(spent),
+    )

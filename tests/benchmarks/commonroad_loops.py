@@ -1,0 +1,135 @@
+"""CommonRoad scenarios in closed loop at 10 Hz, judged by shapely against the recorded traffic.
+
+``python tests/benchmarks/commonroad_loops.py [--scenarios FOLDER] [--width N] [--wide N]``: whether a goal
+can be reached at all is asked of one open-loop plan with the same automaton, `--wide` nodes of a
+level at a time; a second line asks it again without traffic and with tyres of 11.5 m/s^2. Clearance
+is the least distance to anybody, edge that to the edge of the lanelets, at poses every 0.02 s;
+defect is the difference from an ODE solver; cpu is the processor's time of a step, which a busy
+machine does not stretch.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.commonroad import read_commonroad
+from maneuver_automaton.roads import (
+    RoadDrive,
+    RoadScene,
+    RoadSettings,
+    RoadVehicle,
+    drive_scene,
+    road_planner,
+)
+from tests.benchmarks.tables import show
+
+SCENARIOS = Path(__file__).parents[2] / "../shared/data/commonroad/scenarios"
+HEAD = (
+    "scenario",
+    "reachable",
+    "reached",
+    "at [s]",
+    "steps",
+    "collisions",
+    "off road",
+    "clearance [m]",
+    "edge [m]",
+    "defect",
+    "median [ms]",
+    "p99 [ms]",
+    "cpu p99 [ms]",
+)
+TYRES = 11.5  # [m/s^2]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--scenarios", type=Path, default=SCENARIOS)
+    parser.add_argument("--width", type=int, default=RoadSettings().width)
+    parser.add_argument("--wide", type=int, default=2000)
+    arguments = parser.parse_args()
+    rows, wall, cpu, said = [], [], [], []
+    for file in sorted(arguments.scenarios.glob("*.xml")):
+        try:
+            statements = read_commonroad(file)
+        except InvalidScenario as error:
+            said.append(str(error))
+            continue
+        for statement in statements:
+            assert statement.road is not None
+            row, drive = _row(statement.road, arguments.width, arguments.wide)
+            rows.append(row)
+            wall += [step.solve_s for step in drive.steps]
+            cpu += [step.cpu_s for step in drive.steps]
+            if not row[1]:
+                said.append(_why(statement.road, arguments.wide))
+    show(HEAD, rows)
+    for name, times in (("wall", wall), ("cpu", cpu)):
+        spread = np.percentile(1e3 * np.array(times), [50, 99, 100])
+        print(f"{name}: {len(times)} steps, median {spread[0]:.1f} ms, ", end="")
+        print(f"p99 {spread[1]:.1f} ms, most {spread[2]:.1f} ms")
+    for line in said:
+        print(line)
+
+
+def _row(scene: RoadScene, width: int, wide: int) -> tuple[list[object], RoadDrive]:
+    drive = drive_scene(road_planner(scene, settings=RoadSettings(width=width)))
+    verdict = drive.verdict
+    wall, cpu = (
+        1e3 * np.array(times) for times in (drive.solve_s, [step.cpu_s for step in drive.steps])
+    )
+    return [
+        scene.name,
+        _reaches(scene, RoadVehicle(), wide),
+        drive.reached,
+        float(drive.driven.time[-1]),
+        len(drive.steps),
+        verdict.collisions,
+        verdict.off_road,
+        verdict.clearance_m,
+        verdict.edge_m,
+        f"{verdict.defect:.0e}",
+        float(np.median(wall)),
+        float(np.percentile(wall, 99)),
+        float(np.percentile(cpu, 99)),
+    ], drive
+
+
+def _reaches(scene: RoadScene, vehicle: RoadVehicle, wide: int) -> bool:
+    planner = road_planner(
+        scene, vehicle, RoadSettings(width=wide, horizon_s=scene.last_time - scene.start.time)
+    )
+    plan = planner.search(planner.start_state, tick=0)
+    return plan is not None and plan.reaches
+
+
+def _why(scene: RoadScene, wide: int) -> str:
+    """Which of the conditions keep the goal out of reach, even alone on the road."""
+    plain = RoadVehicle()
+    model = replace(plain.model, max_acceleration=TYRES)
+    wild = replace(plain, model=model, engine=TYRES, lateral=TYRES, friction=TYRES)
+    alone = replace(scene, traffic=())
+    free = replace(alone, goals=tuple(replace(goal, heading=None) for goal in scene.goals))
+    later = tuple(replace(goal, time=(goal.time[0], goal.time[1] + 4.0)) for goal in scene.goals)
+    asked = {
+        "alone": (alone, plain),
+        f"alone with {TYRES} m/s^2 along and across": (alone, wild),
+        "alone, any heading": (free, plain),
+        "with traffic, any heading": (replace(free, traffic=scene.traffic), plain),
+        "alone, 4 s later": (replace(alone, goals=later), plain),
+    }
+    found = {what: _reaches(one, vehicle, wide) for what, (one, vehicle) in asked.items()}
+    words = ", ".join(f"{what}: {'yes' if yes else 'no'}" for what, yes in found.items())
+    return f"{scene.name} is not reachable; {words}"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,105 @@
+"""The search over trims and maneuvers on dynobench's vehicles with inertia, and with a trailer.
+
+``python tests/benchmarks/maneuver_search.py [--time-limit S]``: exact goal, exact body, rest to
+rest; the first word, the best one at the limit, and the times of transfers in free space.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from maneuver_automaton.collision import Box, Obstacle
+from maneuver_automaton.problem import Bounds
+from maneuver_automaton.search import _kernels_transfer as kernels
+from maneuver_automaton.search.maneuver_lattice import plan_of, search_maneuvers
+from maneuver_automaton.search.maneuver_motion import parts_of
+from maneuver_automaton.search.maneuver_query import ManeuverQuery, maneuver_query
+from maneuver_automaton.search.transfer import TransferLibrary, transfer_library
+from tests.benchmarks import cases
+from tests.benchmarks.tables import show
+from tests.search.automata import inertial_unicycle, truck_with_trailer
+
+PROBLEMS = (
+    "unicycle2_v0/parallelpark_0",
+    "unicycle2_v0/kink_0",
+    "unicycle2_v0/narrow_passage",
+    "car1_v0/kink_0",
+    "car1_v0/bugtrap_double",
+)
+FREE = 200  # transfers that are timed
+
+
+def libraries() -> dict[str, tuple[TransferLibrary, tuple, str]]:
+    """Transfers, parts and the trim at rest of each vehicle."""
+    unicycle, truck = inertial_unicycle(levels=5), truck_with_trailer()
+    body, trailer = (Box([0.5, 0.25]),), (Box([0.3, 0.25]),)
+    return {
+        "unicycle2_v0": (transfer_library(unicycle), parts_of(unicycle, body), "0 0"),
+        "car1_v0": (transfer_library(truck), parts_of(truck, body, (trailer,)), "0 at 0.00"),
+    }
+
+
+def query_of(name: str, known: dict[str, tuple[TransferLibrary, tuple, str]]) -> ManeuverQuery:
+    given = yaml.safe_load((cases.DATA / "dynobench" / "envs" / f"{name}.yaml").read_text())
+    robot, world = given["robots"][0], given["environment"]
+    library, parts, rest = known[robot["type"]]
+    low, high = world["min"], world["max"]
+    return maneuver_query(
+        library,
+        parts,
+        robot["start"][:3],
+        robot["goal"][:3],
+        start_trim=rest,
+        goal_trim=rest,
+        obstacles=tuple(Obstacle(Box(one["size"], one["center"])) for one in world["obstacles"]),
+        bounds=Bounds(x=(low[0], high[0]), y=(low[1], high[1])),
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--time-limit", type=float, default=5.0)
+    options = parser.parse_args()
+    if not cases.present("dynobench"):
+        return
+    known = libraries()
+    for name in PROBLEMS:  # compile
+        search_maneuvers(query_of(name, known), max_expansions=3000)
+    rows = []
+    for name in PROBLEMS:
+        query = query_of(name, known)
+        result = search_maneuvers(query, deadline=time.monotonic() + options.time_limit)
+        first, best = result.words[0], result.words[-1]
+        off = plan_of(query, best).end - query.goals[best.goal]
+        off[2] = np.remainder(off[2] + np.pi, 2.0 * np.pi) - np.pi
+        rows.append([
+            name, result.found_after[0], 1e3 * result.found_s[0], first.duration,
+            best.duration, result.found_s[-1], result.expansions, float(np.abs(off).max()),
+        ])  # fmt: skip
+    show(["problem", "expansions", "first [ms]", "first [s]", "best [s]", "found at [s]",
+          "expansions", "off goal"], rows)  # fmt: skip
+    rng = np.random.default_rng(0)
+    for name, (library, _, rest) in known.items():
+        goals = np.zeros((FREE, 4))
+        goals[:, :3] = rng.uniform([-4, -4, -3], [4, 4, 3], (FREE, 3))
+        number = library.automaton.index_of(rest)
+        arrays, scratch = library.arrays, library.scratch()
+        for n_words in (arrays.n_few, len(arrays.words)):
+            begun = time.perf_counter()
+            kernels.transfer_batch(
+                arrays, n_words, np.zeros((FREE, 4)), number, goals, number, 1e9, scratch
+            )
+            spent = 1e3 * (time.perf_counter() - begun) / FREE
+            print(f"{name}: {n_words} words of transfers in {spent:.3f} ms")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,160 @@
+"""Maneuvers as optimal control problems: known times, limits, prices, and one program for all."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from maneuver_automaton.errors import MissingExtra
+from maneuver_automaton.models import Car, Hovercraft, SecondOrderCar
+from maneuver_automaton.optimal_control.maneuvers import (
+    ManeuverObjective,
+    TransferSettings,
+    control_scale,
+    drawn_in,
+    duration_guess,
+    solve_transfer,
+    transfer_program,
+)
+from maneuver_automaton.optimal_control.solution import SolveStatus
+
+pytest.importorskip("casadi")
+
+CAR = SecondOrderCar(
+    wheelbase=2.5, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
+)
+NO_INPUT = np.zeros((2, 2))
+
+
+@pytest.fixture(scope="module")
+def program():
+    return transfer_program(CAR)
+
+
+@pytest.mark.parametrize(
+    ("start", "end"),
+    [((0.0, 0.0), (2.0, 0.3)), ((2.5, -0.75), (1.0, 0.75)), ((-1.0, 0.2), (2.5, 0.0))],
+)
+def test_least_time_is_that_of_the_slowest_component(program, start, end):
+    start, end = np.array(start), np.array(end)
+    found = solve_transfer(program, start=start, end=end, controls=NO_INPUT)
+    exact = float((np.abs(end - start) / [1.0, 0.5]).max())
+    assert found.status is SolveStatus.SOLVED
+    assert exact - 1e-6 <= found.duration <= exact * (1.0 + 1e-4)
+    assert np.abs(found.control).max(axis=0) == pytest.approx(np.abs(end - start) / exact, rel=0.5)
+
+
+def test_a_program_keeps_nothing_of_the_pair_before(program):
+    ends = [np.array([2.0, 0.3]), np.array([-2.0, 0.7]), np.array([0.5, -0.5])]
+
+    def controls(order):
+        return {
+            k: solve_transfer(program, start=np.zeros(2), end=ends[k], controls=NO_INPUT).control
+            for k in order
+        }
+
+    forward, backward = controls((0, 1, 2)), controls((2, 1, 0))
+    assert all(np.array_equal(forward[k], backward[k]) for k in range(3))
+
+
+def test_effort_alone_takes_the_time_it_is_given():
+    settings = TransferSettings(duration=(0.1, 4.0))
+    objective = ManeuverObjective(time=0.0, effort=1.0, smoothness=0.0)
+    program = transfer_program(CAR, objective=objective, settings=settings)
+    found = solve_transfer(program, start=np.zeros(2), end=np.array([2.0, 0.0]), controls=NO_INPUT)
+    assert found.duration == pytest.approx(4.0, abs=1e-4)
+    assert found.control == pytest.approx(np.tile([0.5, 0.0], (20, 1)), abs=1e-4)
+    assert found.cost == pytest.approx(1.0, abs=1e-4)  # 0.5^2 for 4 s
+
+
+def test_a_mix_weighs_time_against_effort():
+    objective = ManeuverObjective(time=1.0, effort=4.0, smoothness=0.0)
+    program = transfer_program(CAR, objective=objective)
+    found = solve_transfer(program, start=np.zeros(2), end=np.array([1.0, 0.0]), controls=NO_INPUT)
+    assert found.duration == pytest.approx(2.0, abs=1e-4)  # T + 4 / T is least
+
+
+def test_limits_hold_and_are_drawn_in(program):
+    found = solve_transfer(
+        program,
+        start=np.zeros(2),
+        end=np.array([2.0, 0.7]),
+        controls=NO_INPUT,
+        control_limits=np.array([[0.0, 0.5], [-0.5, 0.5]]),
+        tightening=0.1,
+    )
+    assert found.status is SolveStatus.SOLVED
+    assert found.control[:, 0].max() <= 0.45 + 1e-9
+    assert found.duration == pytest.approx(2.0 / 0.45, rel=1e-3)
+
+
+def test_what_cannot_be_reached_is_said(program):
+    found = solve_transfer(
+        program,
+        start=np.zeros(2),
+        end=np.array([2.0, 0.0]),
+        controls=NO_INPUT,
+        control_limits=np.array([[-1.0, 0.0], [-0.5, 0.5]]),
+    )
+    assert found.status is SolveStatus.INFEASIBLE
+
+
+def test_a_coupled_model_slows_down_in_its_own_way():
+    craft = Hovercraft(
+        mass=2.0, inertia=0.1, drag=1.0, lateral_drag=3.0, turn_drag=0.1, max_force=4.0,
+        max_torque=0.2,
+    )  # fmt: skip
+    found = solve_transfer(
+        transfer_program(craft),
+        start=np.zeros(3),
+        end=np.array([2.0, 0.0, 0.0]),
+        controls=np.array([[0.0, 0.0], [2.0, 0.0]]),
+    )
+    exact = 2.0 * np.log(2.0)  # v' = 2 - v / 2
+    assert found.duration == pytest.approx(exact, rel=1e-4)
+
+
+def test_sizes_and_guesses():
+    assert control_scale(Car(wheelbase=2.0, max_speed=3.0, max_steering=0.5)).tolist() == [3.0, 0.5]
+    assert drawn_in(np.array([[-2.0, 2.0]]), 0.25).tolist() == [[-1.0, 1.0]]
+    assert duration_guess(CAR, np.zeros(2), np.array([2.0, 0.1])) == pytest.approx(3.0)
+    assert duration_guess(CAR, np.zeros(2), np.zeros(2)) == 0.1
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: ManeuverObjective(time=-1.0), "objective: time must not be negative, got -1.0"),
+        (
+            lambda: ManeuverObjective(time=0.0),
+            "objective: got no price of time nor of effort, need one of them",
+        ),
+        (lambda: TransferSettings(intervals=0), "maneuver: intervals must be at least 1, got 0"),
+        (
+            lambda: TransferSettings(duration=(2.0, 1.0)),
+            "maneuver: duration must be 0 < least < greatest, got (2.0, 1.0) s",
+        ),
+        (
+            lambda: transfer_program(Car(wheelbase=2.0)),
+            "car: has no reduced state, so its trims need no maneuvers",
+        ),
+    ],
+)
+def test_what_is_wrong_is_said(make, message):
+    with pytest.raises(ValueError) as error:
+        make()
+    assert str(error.value) == message
+
+
+def test_without_casadi(monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "casadi", None)
+    with pytest.raises(MissingExtra):
+        transfer_program(CAR)
+
+
+def test_the_objective_in_words():
+    assert dataclasses.replace(ManeuverObjective(), effort=2.0).text == (
+        "time 1, effort 2, smoothness 0.001"
+    )

@@ -1,0 +1,230 @@
+"""Lines between a body and what is in its way, and a small problem with one box."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+
+from maneuver_automaton.models import CarWithTrailer, SecondOrderUnicycle
+from maneuver_automaton.optimal_control import Guess, SolveStatus
+from maneuver_automaton.optimal_control.polish_values import Ends, PolishSettings, Scene
+from maneuver_automaton.optimal_control.polishing import intervals_for, polish
+from maneuver_automaton.optimal_control.separation import (
+    BodyPart,
+    Lines,
+    Pairs,
+    first_lines,
+    near_pairs,
+    reaches,
+    trailer_pose,
+)
+
+casadi = pytest.importorskip("casadi")
+SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+ROBOT = SecondOrderUnicycle(
+    max_speed=1.0, max_turn_rate=1.0, max_acceleration=1.0, max_angular_acceleration=1.0
+)
+BODY = BodyPart(solids=((0.4 * SQUARE, 0.0),))
+
+
+def moved(x: float, y: float) -> np.ndarray:
+    """The unit square somewhere."""
+    return SQUARE + np.array([x, y])
+
+
+def standing(x: float, y: float = 0.0) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Control points of the unit square that stands at a place for one interval."""
+    ring = moved(x, y)
+    return [(np.tile(ring[:, :1], (4, 1)), np.tile(ring[:, 1:], (4, 1)))]
+
+
+def guess(n: int = 40, *, aside: float = 0.0, length: float = 4.0, duration: float = 6.0) -> Guess:
+    """Straight ahead, bulging to the left."""
+    share = np.linspace(0.0, 1.0, n + 1)
+    state = np.zeros((n + 1, 5))
+    state[:, 0] = length * share
+    state[:, 1] = aside * np.sin(np.pi * share)
+    state[1:-1, 3] = length / duration
+    return Guess(state=state, control=np.zeros((n, 2)), duration=duration)
+
+
+def at_rest(x: float, y: float = 0.0, heading: float | None = 0.0) -> Ends:
+    return Ends((0.0,) * 5, (x, y, heading, 0.0, 0.0))
+
+
+def test_a_line_lies_midway_between_nearest_points() -> None:
+    body, pieces = [(SQUARE, 0.0)], [(moved(3.0, 0.0), 0.0)]
+    pairs = near_pairs(standing(0.0), body, pieces, within=2.5)
+    lines = first_lines(standing(0.0), body, pieces, pairs)
+    assert [column.tolist() for column in pairs] == [[0], [0], [0]]
+    assert lines.angle == pytest.approx([0.0])
+    assert lines.anchor[:, 0] == pytest.approx([1.5])
+
+
+def test_where_solids_overlap_the_line_shows_the_shortest_way_out() -> None:
+    body, pieces = [(SQUARE, 0.0)], [(moved(0.1, 0.8), 0.0)]
+    pairs = near_pairs(standing(0.0), body, pieces, within=0.1)
+    lines = first_lines(standing(0.0), body, pieces, pairs)
+    assert lines.angle == pytest.approx([np.pi / 2])
+    assert reaches(standing(0.0), (body, pieces), pairs, lines).nodes == pytest.approx([0.1])
+
+
+def test_rounding_counts_on_both_sides() -> None:
+    disc = [(np.array([[2.0, 0.0]]), 0.5)]
+    body = [(SQUARE, 0.25)]
+    assert len(near_pairs(standing(0.0), body, disc, within=0.74).interval) == 0
+    assert len(near_pairs(standing(0.0), body, disc, within=0.76).interval) == 1
+    pairs = Pairs(*(np.zeros(1, dtype=np.int64) for _ in range(3)))
+    reach = reaches(standing(0.0), (body, disc), pairs, Lines(np.zeros(1), np.zeros((1, 2))))
+    assert (reach.nodes, reach.piece) == (pytest.approx([0.75]), pytest.approx([1.5]))
+
+
+def test_pairs_are_joined_once() -> None:
+    one = Pairs(*(np.array(column) for column in ([0, 1], [0, 0], [2, 2])))
+    other = Pairs(*(np.array(column) for column in ([1, 2], [0, 0], [2, 2])))
+    assert one.joined(other).interval.tolist() == [0, 1, 2]
+
+
+def test_the_number_of_intervals_follows_the_duration_between_its_limits() -> None:
+    settings = PolishSettings()
+    assert [intervals_for(s, settings) for s in (0.1, 12.0, 900.0)] == [40, 100, 300]
+
+
+def test_without_obstacles_full_ahead_and_full_back() -> None:
+    free = polish(ROBOT, at_rest(0.5), Scene(), guess(length=0.5, duration=2.0))
+    assert free.status is SolveStatus.SOLVED
+    assert free.duration == pytest.approx(2.0 * np.sqrt(0.5), abs=2e-3)  # the effort costs a bit
+
+
+@pytest.mark.parametrize("fixed", [False, True])
+def test_a_box_is_passed_without_touching_it_between_nodes(fixed: bool) -> None:
+    box = SQUARE * [1.0, 0.6] + [2.0, 0.0]
+    scene = Scene(parts=(BODY,), pieces=((box, 0.0),))
+    found = polish(ROBOT, at_rest(4.0), scene, guess(aside=0.8), fixed_planes=fixed)
+    assert found.status is SolveStatus.SOLVED
+    assert touched(found.state, found.control, found.durations, box) > 0.0
+    assert np.abs(found.control).max() <= 1.0
+    assert np.abs(found.state[:, 3:]).max() <= 1.0
+
+
+def test_a_disc_is_passed_as_it_is() -> None:
+    scene = Scene(parts=(BODY,), pieces=((np.array([[2.0, 0.0]]), 0.3),))
+    found = polish(ROBOT, at_rest(4.0), scene, guess(aside=0.8))
+    assert found.status is SolveStatus.SOLVED
+    around = shapely.Point(2.0, 0.0).buffer(0.3, quad_segs=64)
+    gap = touched(found.state, found.control, found.durations, shapely.get_coordinates(around))
+    assert 0.0 < gap < 0.01
+
+
+def test_a_guess_inside_is_led_out() -> None:
+    scene = Scene(parts=(BODY,), pieces=((SQUARE * [1.0, 0.6] + [2.0, 0.1], 0.0),))
+    refused = polish(ROBOT, at_rest(4.0), scene, guess(), fixed_planes=True)
+    assert refused.reason == "the guess is too deep inside obstacles for fixed planes"
+    out = polish(ROBOT, at_rest(4.0), scene, guess(), elastic=True)
+    found = polish(ROBOT, at_rest(4.0), scene, out.as_guess)
+    assert (out.status, found.status) == (SolveStatus.SOLVED, SolveStatus.SOLVED)
+    assert found.state[20, 1] < -0.3  # on the nearer side
+
+
+def test_a_point_is_a_body_too() -> None:
+    point = BodyPart(solids=((np.zeros((1, 2)), 0.0),))
+    scene = Scene(parts=(point,), pieces=((moved(2.0, 0.1), 0.0),))
+    out = polish(ROBOT, at_rest(4.0), scene, guess(), elastic=True)
+    found = polish(ROBOT, at_rest(4.0), scene, out.as_guess)
+    assert found.status is SolveStatus.SOLVED
+    poses = simulated(found.state, found.control, found.durations)
+    box = shapely.Polygon(moved(2.0, 0.1))
+    assert min(shapely.Point(x, y).distance(box) for x, y, _ in poses) > 0.0
+
+
+def test_walls_hold_between_nodes_too() -> None:
+    walls = ((0.0, 1.0, 0.3), (0.0, -1.0, 0.05))  # -0.05 <= y <= 0.3
+    found = polish(ROBOT, at_rest(1.0, 0.2), Scene(walls=walls), guess(length=1.0, duration=4.0))
+    assert found.status is SolveStatus.SOLVED
+    poses = simulated(found.state, found.control, found.durations)
+    assert poses[:, 1].min() >= -0.05
+    assert poses[:, 1].max() <= 0.3
+
+
+def test_a_free_heading_is_free() -> None:
+    found = polish(ROBOT, at_rest(2.0, 1.0, None), Scene(), guess(length=2.0, aside=0.3))
+    assert found.status is SolveStatus.SOLVED
+    assert found.state[-1, :2] == pytest.approx([2.0, 1.0])
+    assert abs(found.state[-1, 2]) > 0.1
+
+
+def test_with_fixed_gears_each_stretch_takes_its_own_time() -> None:
+    there_and_back = guess(length=1.0, duration=6.0)
+    gears = np.where(np.arange(40) < 10, 1.0, -1.0)
+    found = polish(ROBOT, at_rest(-1.0), Scene(), there_and_back, gears=gears)
+    assert found.status is SolveStatus.SOLVED
+    assert (found.state[:11, 3] >= -1e-6).all()
+    assert (found.state[10:, 3] <= 1e-6).all()
+    assert np.ptp(found.durations[:10]) < 1e-6 < abs(found.durations[0] - found.durations[-1])
+
+
+def test_a_trailer_is_part_of_the_body() -> None:
+    truck = CarWithTrailer(
+        wheelbase=0.25, hitch_length=0.5, max_steering=1.0, max_speed=0.5, max_hitch=0.7
+    )
+    trailer = BodyPart(
+        solids=((SQUARE * [0.3, 0.25], 0.0),),
+        pose=trailer_pose(0.5),
+    )
+    car = BodyPart(solids=((SQUARE * [0.5, 0.25], 0.0),))
+    box = SQUARE * [0.5, 0.5] + [1.5, -0.45]
+    share = np.linspace(0.0, 1.0, 61)
+    state = np.stack([3 * share, 0.1 * np.sin(np.pi * share), 0 * share, 0 * share], axis=1)
+    first = Guess(state=state, control=np.tile([0.5, 0.0], (60, 1)), duration=6.0)
+    ends = Ends((0.0,) * 4, (3.0, 0.0, 0.0, 0.0))
+    found = polish(truck, ends, Scene(parts=(car, trailer), pieces=((box, 0.0),)), first)
+    alone = polish(truck, ends, Scene(parts=(car,), pieces=((box, 0.0),)), first)
+    assert (found.status, alone.status) == (SolveStatus.SOLVED, SolveStatus.SOLVED)
+    gap = min(part_gap(row, box) for row in found.state)
+    assert gap >= 0.0
+    assert found.duration >= alone.duration - 1e-3
+
+
+def part_gap(state: np.ndarray, box: np.ndarray) -> float:
+    """Distance of the trailer from a box."""
+    x, y, heading, hitch = state
+    back = heading - hitch
+    place = np.array([x - 0.5 * np.cos(back), y - 0.5 * np.sin(back)])
+    turn = np.array([[np.cos(back), -np.sin(back)], [np.sin(back), np.cos(back)]])
+    ring = SQUARE * [0.3, 0.25] @ turn.T + place
+    return float(shapely.Polygon(ring).distance(shapely.Polygon(box)))
+
+
+def simulated(state: np.ndarray, control: np.ndarray, durations: np.ndarray) -> np.ndarray:
+    """Poses of the unicycle, 20 in every interval, by small Runge-Kutta steps."""
+    now, poses = state[0].copy(), [state[0, :3].copy()]
+    for u, h in zip(control, durations, strict=True):
+        for _ in range(20):
+            now = runge_kutta(now, u, h / 20)
+            poses.append(now[:3].copy())
+    return np.array(poses)
+
+
+def runge_kutta(x: np.ndarray, u: np.ndarray, h: float) -> np.ndarray:
+    def rates(s: np.ndarray) -> np.ndarray:
+        return np.array([s[3] * np.cos(s[2]), s[3] * np.sin(s[2]), s[4], *u])
+
+    k_1 = rates(x)
+    k_2 = rates(x + h / 2 * k_1)
+    k_3 = rates(x + h / 2 * k_2)
+    k_4 = rates(x + h * k_3)
+    return np.asarray(x + h / 6 * (k_1 + 2 * k_2 + 2 * k_3 + k_4))
+
+
+def touched(
+    state: np.ndarray, control: np.ndarray, durations: np.ndarray, ring: np.ndarray
+) -> float:
+    """Least distance of the body from an obstacle, over the whole motion."""
+    obstacle = shapely.Polygon(ring)
+    least = np.inf
+    for x, y, heading in simulated(state, control, durations):
+        turn = np.array([[np.cos(heading), -np.sin(heading)], [np.sin(heading), np.cos(heading)]])
+        body = shapely.Polygon(0.4 * SQUARE @ turn.T + [x, y])
+        least = min(least, body.distance(obstacle))
+    return float(least)

@@ -1,0 +1,101 @@
+"""Left and right: found where they are alike, denied where they are not."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.models import (
+    Car,
+    Helicopter,
+    Hovercraft,
+    SingleTrack,
+    Unicycle,
+    UserModel,
+)
+from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.primitives.driving import drive
+from maneuver_automaton.primitives.mirror import mirror_of
+
+CRAFT = Hovercraft(
+    mass=2.0, inertia=0.1, drag=1.0, lateral_drag=3.0, turn_drag=0.1, max_force=4.0, max_torque=0.2
+)
+HELICOPTER = Helicopter(
+    max_speed=10.0, max_lateral_speed=3.0, max_climb=3.0, max_turn_rate=1.0, max_tilt=0.6,
+    max_tilt_rate=1.5, max_climb_acceleration=3.0, max_angular_acceleration=2.0, drag=0.1,
+)  # fmt: skip
+SIGNS = [
+    (Unicycle(), [], [1, -1]),
+    (Car(wheelbase=2.0), [], [1, -1]),
+    (CRAFT, [1, -1, -1], [1, -1]),
+    (SingleTrack(), [1, -1, -1, -1], [1, -1]),
+    (HELICOPTER, [1, -1, 1, -1, 1, -1], [1, -1, 1, -1]),
+]
+
+
+@pytest.mark.parametrize(
+    ("model", "reduced", "control"), SIGNS, ids=lambda x: getattr(x, "name", "")
+)
+def test_stock_vehicles(model, reduced, control):
+    mirror = mirror_of(model)
+    assert mirror.reduced.tolist() == reduced
+    assert mirror.control.tolist() == np.diag(control).tolist()
+
+
+def two_tracks(**changes):
+    """Two chains, left and right: the mirror exchanges them."""
+    return UserModel(
+        name="tracks", group=SE2, control_names=("left", "right"), reduced_names=("speed",),
+        velocity=lambda z, u: [z[0], 0.0, u[1] - u[0]], dynamics=lambda z, u: [u[0] + u[1] - z[0]],
+        **{"control_limits": [[-1.0, 1.0], [-1.0, 1.0]], **changes},
+    )  # fmt: skip
+
+
+def test_two_controls_may_change_places():
+    mirror = mirror_of(two_tracks())
+    assert mirror.control.tolist() == [[0, 1], [1, 0]]
+    assert mirror.reduced.tolist() == [1]
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        two_tracks(control_limits=[[-1.0, 1.0], [-1.0, 2.0]]),
+        dataclasses.replace(two_tracks(), velocity=lambda z, u: [z[0], 0.01 * z[0], u[1] - u[0]]),
+        dataclasses.replace(two_tracks(), dynamics=lambda z, u: [u[0] + 1.1 * u[1] - z[0]]),
+    ],
+    ids=["limits", "velocity", "dynamics"],
+)
+def test_a_lopsided_vehicle_has_none(model):
+    assert mirror_of(model) is None
+
+
+def test_the_image_of_a_drive_is_the_drive_of_the_image():
+    mirror = mirror_of(CRAFT)
+    control = np.array([[3.0, 0.1], [-1.0, 0.2], [2.0, -0.1]])
+    start = np.array([1.0, 0.3, -0.2])
+    course = drive(CRAFT, start, control=control, durations=[0.3, 0.4, 0.5])
+    there = drive(
+        CRAFT, start * mirror.reduced, control=control @ mirror.control.T, durations=[0.3, 0.4, 0.5]
+    )
+    maneuver = Maneuver(
+        name="a", source="s", target="t", displacement=course.pose[-1],
+        duration=float(course.time[-1]), course=course,
+    )  # fmt: skip
+    image = mirror.maneuver(maneuver, source="s'", target="t'")
+    assert (image.source, image.target) == ("s'", "t'")
+    assert image.displacement == pytest.approx(there.pose[-1], abs=1e-13)
+    assert image.course.pose == pytest.approx(there.pose, abs=1e-13)
+    assert image.course.reduced_state == pytest.approx(there.reduced_state, abs=1e-13)
+    assert image.course.control == pytest.approx(there.control)
+
+
+def test_which_trims_are_images():
+    mirror = mirror_of(Unicycle())
+    left = Trim(name="left", body_velocity=[1, 0, 1], control=[1, 1])
+    right = Trim(name="right", body_velocity=[1, 0, -1], control=[1, -1])
+    assert mirror.takes(left, right)
+    assert not mirror.takes(left, left)

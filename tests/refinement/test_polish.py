@@ -1,0 +1,229 @@
+"""Guesses from kinematic plans, polished and closed: exact, inside limits, equivariant."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.collision import Box
+from maneuver_automaton.collision.convex import convex_pieces
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.models import CarWithTrailer, SecondOrderCar, SecondOrderUnicycle
+from maneuver_automaton.optimal_control.polish_values import PolishSettings
+from maneuver_automaton.optimal_control.separation import BodyPart
+from maneuver_automaton.primitives import Trim
+from maneuver_automaton.primitives.driving import drive
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.refinement.closure import closed
+from maneuver_automaton.refinement.gear_sequences import car_library, gear_sequences
+from maneuver_automaton.refinement.guesses import (
+    car_guess,
+    course_guess,
+    pace_of_car,
+    timed,
+    trailer_guess,
+    unicycle_guess,
+)
+from maneuver_automaton.refinement.polish import PolishTask, guess_intervals, polish_guesses
+
+CAR = SecondOrderCar(
+    wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
+)
+BODY = Box([4.689, 1.942], [1.4155, 0.0])
+SETTINGS = PolishSettings()
+HERE = SE2([0.0, 0.0, 0.0])
+STEPS = guess_intervals(SETTINGS)
+
+
+def trim(speed: float, curvature: float, name: str) -> Trim:
+    return Trim(
+        name=name,
+        body_velocity=[speed, 0.0, speed * curvature],
+        control=[speed, math.atan(2.8 * curvature)],
+    )
+
+
+def plan(*pieces: tuple[float, float, float]) -> Plan:
+    """Speed, curvature and duration of each trim, from the identity."""
+    trims = tuple(trim(v, kappa, f"trim {k}") for k, (v, kappa, _) in enumerate(pieces))
+    return Plan([0.0, 0.0, 0.0], trims, durations=[one[2] for one in pieces])
+
+
+def swerve(place: SE2 = HERE) -> PolishTask:
+    """Past a box, from rest to rest, wherever that is."""
+    end = (place @ SE2([14.0, 0.0, 0.0])).pose
+    return PolishTask(
+        model=CAR,
+        start=place.pose,
+        start_state=[0.0, 0.0],
+        goal=tuple(end.tolist()),
+        goal_state=(0.0, 0.0),
+        parts=(BodyPart(solids=tuple(convex_pieces(BODY))),),
+        obstacles=(Box([3.0, 2.0], [8.4, -0.4]).moved(place),),
+    )
+
+
+def around():
+    """A guess for `swerve`: to the left and back."""
+    kappa, angle = 0.3, 0.62
+    arc = angle / kappa
+    pieces = plan((1.0, kappa, arc), (1.0, -kappa, 2 * arc), (1.0, kappa, arc))
+    reach = float(pieces.end[0])
+    rest = (14.0 - reach) / 2.0
+    whole = plan((1.0, 0.0, rest), (1.0, kappa, arc), (1.0, -kappa, 2 * arc), (1.0, kappa, arc),
+                 (1.0, 0.0, rest))  # fmt: skip
+    return car_guess(CAR, whole, intervals=STEPS)
+
+
+def test_a_straight_stroke_is_timed_like_on_paper() -> None:
+    run = timed(plan((1.0, 0.0, 10.0)), pace_of_car(CAR))
+    v, a = 0.9 * 2.5, 0.9  # 90 % of the limits
+    assert run.duration == pytest.approx(10.0 / v + v / a, rel=2e-2)
+    assert run.twist[:, 0].max() <= v + 1e-12
+
+
+def test_it_stops_and_turns_the_wheel_where_the_gear_changes() -> None:
+    run = timed(plan((1.0, 0.35, 0.2), (-1.0, -0.35, 0.2)), pace_of_car(CAR))
+    turned = 2.0 * math.atan(2.8 * 0.35)
+    strokes = 2.0 * math.sqrt(0.2 / 0.9)  # each; the wheel turns at the ends too
+    assert run.duration == pytest.approx(4.0 * turned / 2.0 / 0.5, abs=strokes)
+    assert run.pose[-1] == pytest.approx(plan((1.0, 0.35, 0.2), (-1.0, -0.35, 0.2)).end)
+
+
+def test_a_plan_that_stays_has_no_timing() -> None:
+    with pytest.raises(ValueError, match="does not move"):
+        timed(plan((0.0, 0.0, 1.0)), pace_of_car(CAR))
+
+
+def test_guesses_keep_their_limits_and_their_ends() -> None:
+    whole = plan((1.0, 0.3, 3.0), (-1.0, -0.3, 2.0), (1.0, 0.0, 4.0))
+    guess = car_guess(CAR, whole, intervals=STEPS)
+    assert guess.state[[0, -1], 3:].tolist() == [[0.0, 0.0], [0.0, 0.0]]
+    assert guess.state[-1, :3] == pytest.approx(whole.end, abs=1e-6)
+    assert (np.abs(guess.control) <= [1.0, 0.5]).all()
+    assert np.abs(guess.state[:, 4]).max() <= 0.75
+
+
+def test_the_unicycle_turns_on_the_spot_between_strokes() -> None:
+    robot = SecondOrderUnicycle(
+        max_speed=0.5, max_turn_rate=0.5, max_acceleration=0.25, max_angular_acceleration=0.25
+    )
+    spin = Trim(name="spin", body_velocity=[0.0, 0.0, 0.5], control=[0.0, 0.5])
+    whole = Plan([0.0, 0.0, 0.0], (trim(0.5, 0.0, "ahead"), spin), durations=[2.0, 2.0])
+    guess = unicycle_guess(robot, whole, intervals=STEPS)
+    assert guess.state[-1, :3] == pytest.approx([1.0, 0.0, 1.0], abs=1e-6)
+    assert np.abs(guess.state[:, 3:]).max() <= 0.5
+
+
+def test_a_trailer_follows() -> None:
+    truck = CarWithTrailer(wheelbase=0.25, hitch_length=0.5, max_steering=1.0, max_speed=0.5)
+    whole = plan((0.5, 1.0, 30.0))
+    guess = trailer_guess(truck, whole, intervals=STEPS)
+    assert guess.state[-1, 3] == pytest.approx(math.asin(0.5), abs=1e-2)  # hitch of a steady turn
+
+
+def test_a_course_is_a_guess() -> None:
+    course = drive(CAR, [0.0, 0.0], control=[[1.0, 0.0], [-1.0, 0.0]], durations=[2.0, 2.0])
+    guess = course_guess(course, intervals=lambda duration: 8)
+    assert guess.state[:, 0] == pytest.approx(np.interp(np.linspace(0, 4, 9), course.time,
+                                                        course.pose[:, 0]))  # fmt: skip
+    assert guess.control[:, 0].tolist() == [1.0] * 4 + [-1.0] * 4
+
+
+def test_closure_brings_a_motion_to_its_end_within_the_limits() -> None:
+    rng = np.random.default_rng(3)
+    control = np.clip(rng.normal(size=(60, 2)) * [0.4, 0.2], [-1.0, -0.5], [1.0, 0.5])
+    control[10:14] = [1.0, 0.5]  # at their limits
+    durations = np.full(60, 0.1)
+    course = drive(CAR, [0.0, 0.0], control=control, durations=durations)
+    end = np.concatenate([course.pose[-1], course.reduced_state[-1]]) + 1e-5
+    found = closed(CAR, np.zeros(2), end.tolist(), control=control, durations=durations)
+    assert not isinstance(found, str)
+    assert found.error < 1e-12
+    assert np.abs(found.control - control).max() < 1e-3
+    assert (np.abs(found.control) <= [1.0, 0.5]).all()
+    free = closed(CAR, np.zeros(2), [end[0], end[1], None, None, None], control=control,
+                  durations=durations)  # fmt: skip
+    assert not isinstance(free, str)
+    assert np.abs(free.course.pose[-1, :2] - end[:2]).max() < 1e-12
+
+
+def test_closure_says_which_limit_is_exceeded() -> None:
+    slow = SecondOrderCar(
+        wheelbase=2.8, max_steering=0.75, max_speed=0.5, max_acceleration=1.0, max_steering_rate=0.5
+    )
+    control, durations = np.array([[0.9, 0.0], [-0.9, 0.1]]), np.ones(2)
+    end = drive(slow, [0.0, 0.0], control=control, durations=durations)
+    goal = [*end.pose[-1].tolist(), *end.reduced_state[-1].tolist()]
+    found = closed(slow, np.zeros(2), goal, control=control, durations=durations)
+    assert isinstance(found, str)
+    assert "speed exceeds its limit by 0.4" in found
+
+
+def test_the_goal_needs_a_place_and_the_start_its_limits() -> None:
+    with pytest.raises(ValueError, match="place must be given"):
+        PolishTask(model=CAR, start=[0, 0, 0], start_state=[0, 0], goal=(None, 0.0, 0.0),
+                   goal_state=(0, 0))  # fmt: skip
+    with pytest.raises(ValueError, match="outside the model's limits"):
+        PolishTask(model=CAR, start=[0, 0, 0], start_state=[9, 0], goal=(1.0, 0.0, 0.0),
+                   goal_state=(0, 0))  # fmt: skip
+
+
+def test_a_polished_motion_is_exact_clean_and_inside_its_limits() -> None:
+    pytest.importorskip("casadi")
+    task = swerve()
+    motion = polish_guesses(task, [around()], time_limit=60.0).motion
+    assert motion is not None
+    assert np.abs(motion.course.pose[-1] - [14.0, 0.0, 0.0]).max() < 1e-12
+    assert np.abs(motion.course.reduced_state[-1]).max() < 1e-12
+    assert (np.abs(motion.control) <= [1.0, 0.5]).all()
+    assert (np.abs(motion.course.reduced_state) <= [2.5, 0.75]).all()
+    assert least_gap(motion.course.pose, Box([3.0, 2.0], [8.4, -0.4])) > 0.0
+    assert motion.duration < around().duration * 1.2
+    stroke = motion.maneuver("polished", source="rest", target="rest")
+    assert stroke.duration == motion.duration
+
+
+def test_a_moved_problem_has_the_moved_solution() -> None:
+    pytest.importorskip("casadi")
+    here = polish_guesses(swerve(), [around()], time_limit=60.0).motion
+    there = polish_guesses(swerve(SE2([700.0, -300.0, 2.0])), [around()], time_limit=60.0).motion
+    assert here is not None
+    assert there is not None
+    assert there.duration == pytest.approx(here.duration, abs=1e-6)
+    assert there.course.pose[-1] == pytest.approx(here.course.pose[-1], abs=1e-9)
+
+
+def test_what_is_not_accepted_is_not_returned() -> None:
+    pytest.importorskip("casadi")
+    result = polish_guesses(swerve(), [around()], time_limit=60.0, accepts=lambda motion: False)
+    assert result.motion is None
+    assert result.reason == "what was found is not accepted"
+
+
+def test_gear_sequences_differ_and_come_in_order() -> None:
+    car = car_library(wheelbase=2.8, max_steering=0.75)
+    slot = [Box([4.689, 1.942], [x, 0.0]) for x in (-5.0, 8.0)]
+    problem = Problem(car, [-1.0, 3.0, 0.0], [0.0, 0.0, 0.0], obstacles=slot, footprint=BODY)
+    drives = gear_sequences(
+        problem,
+        [car, car_library(wheelbase=2.8, max_steering=0.75, share=0.8)],
+        lambda plan: timed(plan, pace_of_car(CAR)).duration,
+        time_limit=20.0,
+        keep=3,
+    )
+    assert drives
+    estimates = [one.estimate for one in drives]
+    assert estimates == sorted(estimates)
+    assert not any(a.resembles(b) for k, a in enumerate(drives) for b in drives[:k])
+    assert all(SE2(one.plan.end).pose == pytest.approx([0.0, 0.0, 0.0], abs=1e-9) for one in drives)
+
+
+def least_gap(poses: np.ndarray, obstacle: Box) -> float:
+    """Least distance of the body from an obstacle."""
+    ring = shapely.Polygon(obstacle.corners)
+    return min(shapely.Polygon(SE2(p).act(BODY.corners)).distance(ring) for p in poses)

@@ -1,0 +1,130 @@
+"""Driving small scenes in closed loop: goals, traffic, and the law of moved problems."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.roads import RoadSettings, drive_scene, judged, plan_road, road_planner
+from tests.formats.outside import DATA, needs_data
+from tests.roads.files import GOAL, LANES, car, interval, parked, problem, scene_of
+
+QUICK = RoadSettings(width=40, narrow=20)
+ANY = "<goalState>" + interval("time", 30, 32) + "</goalState>"
+
+
+def driven(scene, **options):
+    return drive_scene(road_planner(scene, settings=QUICK), **options)
+
+
+def test_a_lane_is_changed_to_reach_the_goal(tmp_path):
+    drive = driven(scene_of(tmp_path))
+    assert drive.reached
+    assert drive.status == "reached"
+    assert drive.verdict.clean
+    assert drive.verdict.clearance_m > 0.0
+    assert drive.verdict.defect < 1e-8
+    assert drive.driven.time[-1] == pytest.approx(0.1 * len(drive.steps))
+
+
+def test_it_stops_behind_what_blocks_the_road(tmp_path):
+    wall = parked(3, x=40.0, y=4.0, size=(2.0, 8.0))
+    drive = driven(scene_of(tmp_path, *LANES, wall, problem(goal=ANY, speed=10.0)))
+    assert drive.reached
+    assert drive.verdict.clean
+    assert drive.driven.pose[-1, 0] < 39.0
+
+
+def test_a_goal_out_of_reach_is_missed_without_harm(tmp_path):
+    goal = GOAL.replace(interval("time", 20, 40), interval("time", 0, 5))
+    drive = driven(scene_of(tmp_path, *LANES, problem(goal=goal)))
+    assert (drive.reached, drive.status) == (False, "missed")
+    assert drive.reason == "no goal was reached until 0.5 s, when the last one is over"
+    assert drive.verdict.clean
+
+
+def test_steps_are_counted(tmp_path):
+    drive = driven(scene_of(tmp_path), steps=3)
+    assert (len(drive.steps), drive.status) == (3, "steps_spent")
+
+
+def test_a_goal_at_the_start_needs_no_step(tmp_path):
+    goal = GOAL.replace('ref="2"', 'ref="1"').replace(
+        interval("time", 20, 40), interval("time", 0, 40)
+    )
+    drive = driven(scene_of(tmp_path, *LANES, problem(goal=goal)))
+    assert (drive.reached, len(drive.steps)) == (True, 0)
+
+
+def test_every_plan_is_free_and_ends_at_rest_or_a_goal(tmp_path):
+    drive = driven(scene_of(tmp_path))
+    planner = drive.planner
+    for step in drive.steps:
+        assert step.plan.stops
+        assert step.state.tolist() == step.plan.states[0].tolist()
+        limits = planner.vehicle.model.control_limits
+        assert (step.plan.controls >= limits[:, 0] - 1e-9).all()
+        assert (step.plan.controls <= limits[:, 1] + 1e-9).all()
+
+
+def test_a_moved_scene_has_the_moved_drive(tmp_path):
+    scene = scene_of(tmp_path)
+    by = SE2(np.array([320.0, -75.0, 2.4]))
+    here, there = driven(scene), driven(scene.moved(by))
+    assert [step.control.tolist() for step in here.steps] == [
+        step.control.tolist() for step in there.steps
+    ]
+    moved = (by @ SE2(here.driven.pose)).pose
+    difference = moved - there.driven.pose
+    difference[:, 2] = np.remainder(difference[:, 2] + np.pi, 2 * np.pi) - np.pi
+    assert np.abs(difference).max() < 1e-7
+
+
+def test_one_plan(tmp_path):
+    result = plan_road(scene_of(tmp_path))
+    assert result.plan is not None
+    assert result.plan.reaches
+    assert result.verdict.clean
+    end = result.planner.vehicle.middle_of(result.driven.pose[-1])
+    (goal,) = result.planner.scene.goals
+    speed, time = result.driven.reduced_state[-1, 0], result.driven.time[-1]
+    assert goal.contains(end, speed=speed, time=time)
+
+
+def test_no_plan_says_why(tmp_path):
+    goal = GOAL.replace(interval("time", 20, 40), interval("time", 0, 5))
+    result = plan_road(scene_of(tmp_path, *LANES, problem(goal=goal)), time_limit=1e-6)
+    assert result.plan is None
+    assert result.reason == (
+        "no goal is reached until 0.5 s by any of the words searched, 100 at a time"
+    )
+
+
+def test_the_judge_sees_contacts_and_the_edge(tmp_path):
+    blind = scene_of(tmp_path, *LANES, problem(goal=ANY, speed=10.0))
+    drive = driven(blind)
+    there = scene_of(tmp_path, *LANES, parked(3, x=30.0, y=2.0), problem(goal=ANY))
+    verdict = judged(there, drive.planner.vehicle, drive.driven)
+    assert not verdict.clean
+    assert verdict.hit == ("parkedVehicle 3",)
+    assert verdict.clearance_m == 0.0
+    narrow = scene_of(
+        tmp_path, LANES[1], car(7, x=90.0, y=6.0, speed=6.0, steps=40), problem(goal=ANY)
+    )
+    off = judged(narrow, drive.planner.vehicle, drive.driven)
+    assert (off.off_road, off.edge_m) == (off.poses, 0.0)
+
+
+@needs_data
+@pytest.mark.parametrize(
+    "name", ["DEU_A9-2_1_T-1", "DEU_Ffb-1_6_T-1", "RUS_Bicycle-11_1_T-1", "USA_Peach-1_1_T-1"]
+)
+def test_given_scenarios_are_driven_without_contact(name):
+    from maneuver_automaton.formats.commonroad import read_commonroad
+
+    file = DATA / "commonroad" / "scenarios" / f"{name}.xml"
+    drive = drive_scene(road_planner(read_commonroad(file)[0].road))
+    assert drive.reached
+    assert drive.verdict.collisions == 0
+    assert drive.verdict.off_road == 0

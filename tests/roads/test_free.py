@@ -1,0 +1,140 @@
+"""The proof that a tick is free, against shapely at many poses; the motion, against an ODE."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Polygon
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.models import rollout
+from maneuver_automaton.roads import (
+    GoalRegion,
+    Lanelet,
+    RoadScene,
+    RoadStart,
+    RoadVehicle,
+    drivable_area,
+)
+from maneuver_automaton.roads import _kernels_free as kernels
+from maneuver_automaton.roads.clearing import clearing_of
+
+TICK = 0.1
+OFF_EDGE, OFF_TRAFFIC = 0.03, 0.05
+VEHICLE = RoadVehicle()
+BEND = [[0, 0], [20, 0], [40, 6], [55, 20], [60, 40]]
+LEFT, RIGHT = (np.array(shapely.LineString(BEND).offset_curve(side).coords) for side in (3.0, -3.0))
+LANE = Lanelet(1, LEFT, RIGHT)
+OTHER = Obstacle(
+    Box([4.0, 1.8]),
+    motion=Motion([0.0, 1.0, 2.0], [[25.0, 1.0, 0.1], [33.0, 3.0, 0.4], [40.0, 7.0, 0.8]]),
+    name="car",
+)
+SCENE = RoadScene(
+    name="bend",
+    lanelets=(LANE,),
+    start=RoadStart(middle=np.array([5.0, 0.0, 0.0]), speed=10.0),
+    goals=(GoalRegion(time=(1.0, 2.0)),),
+    traffic=(OTHER, Obstacle(Disc(0.4, [12.0, 2.0]), name="post")),
+)
+AREA = drivable_area(SCENE.lanelets)
+
+
+def clearing():
+    return clearing_of(
+        SCENE,
+        VEHICLE,
+        tick=TICK,
+        last_tick=60,
+        off_edge=OFF_EDGE,
+        off_traffic=OFF_TRAFFIC,
+        braking=8.0,
+    )
+
+
+def states_of(x, y, heading, speed, steering, controls):
+    state = np.array([x, y, heading, speed, steering])
+    return kernels.driven(VEHICLE.model.wheelbase, TICK, state, np.array(controls))
+
+
+def slow_gap(states, control, tick):
+    """Least distance to anybody, and to the edge (negative outside), within one tick."""
+    gaps, edges = [], []
+    for share in np.linspace(0.0, 1.0, 11):
+        state = states
+        if share > 0.0:
+            state = rollout(VEHICLE.model, states, control=control, times=[0.0, share * TICK])[-1]
+        body = shapely.Polygon(SE2(state[:3]).act(VEHICLE.footprint.corners))
+        for one in SCENE.present((tick + share) * TICK):
+            shape = one.at((tick + share) * TICK)
+            other = (
+                shapely.Point(shape.center).buffer(shape.radius)
+                if isinstance(shape, Disc)
+                else shapely.Polygon(shape.corners)
+            )
+            gaps.append(body.distance(other))
+        inside = AREA.covers(body)
+        edges.append(AREA.boundary.distance(body) if inside else -1.0)
+    return min(gaps, default=np.inf), min(edges)
+
+
+drives = st.tuples(
+    st.floats(2.0, 45.0),
+    st.floats(-3.0, 12.0),
+    st.floats(-0.5, 1.2),
+    st.floats(0.0, 20.0),
+    st.floats(-0.2, 0.2),
+    st.floats(-8.0, 4.0),
+    st.floats(-0.4, 0.4),
+    st.integers(0, 22),
+)
+
+
+@settings(max_examples=150)
+@given(drive=drives)
+def test_what_is_proven_free_is_free_and_what_is_not_is_near_something(drive):
+    x, y, heading, speed, steering, acceleration, rate, tick = drive
+    acceleration = max(acceleration, -speed / TICK)
+    control = np.array([acceleration, rate])
+    states = states_of(x, y, heading, speed, steering, [control])
+    gap, edge = slow_gap(states[0], control, tick)
+    if edge < 0.0 and slow_gap(states[0], np.zeros(2), tick)[1] < 0.0:
+        return  # begins outside, which is never asked
+    if kernels.free_ticks(clearing(), states, tick):
+        assert gap > 0.0
+        assert edge > 0.0
+    else:
+        assert gap < 0.8 or edge < 0.25
+
+
+def test_who_is_gone_is_not_hit():
+    states = states_of(36.0, 4.0, 0.4, 0.0, 0.0, [[0.0, 0.0]])
+    assert slow_gap(states[0], np.zeros(2), 20)[0] < 0.05
+    assert kernels.free_ticks(clearing(), states, 18) == 0
+    assert kernels.free_ticks(clearing(), states, 22) == 1
+
+
+@pytest.mark.parametrize("control", [(-8.0, 0.4), (2.0, -0.4), (0.0, 0.0)])
+def test_motion_of_a_tick_is_that_of_the_model(control):
+    begin = np.array([1.0, 2.0, 0.3, 12.0, 0.1])
+    states = kernels.driven(VEHICLE.model.wheelbase, TICK, begin, np.array([control] * 5))
+    exact = rollout(VEHICLE.model, begin, control=control, times=[0.0, 0.5], rtol=1e-12)[-1]
+    np.testing.assert_allclose(states[-1], exact, atol=1e-6)
+
+
+def test_polygons_count_by_a_rectangle_around_them():
+    corners = [[0.0, 0.0], [2.0, 0.0], [0.0, 1.0]]
+    scene = RoadScene(
+        name="one",
+        lanelets=SCENE.lanelets,
+        start=SCENE.start,
+        goals=SCENE.goals,
+        traffic=(Obstacle(Polygon(corners), name="wedge"),),
+    )
+    found = clearing_of(
+        scene, VEHICLE, tick=TICK, last_tick=5, off_edge=0.03, off_traffic=0.05, braking=8.0
+    ).traffic
+    assert sorted(np.round(2.0 * found.half[0], 9)) in ([1.0, 2.0], [0.894427191, 2.236067977])

@@ -1,0 +1,238 @@
+"""Plans of trims and maneuvers among obstacles: exact, free by another library, moved with all."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+import shapely
+
+from maneuver_automaton._arrays import wrapped
+from maneuver_automaton.collision import Box, Motion, Obstacle
+from maneuver_automaton.errors import UnknownTrim
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.problem import Bounds
+from maneuver_automaton.search.maneuver_lattice import plan_of, search_maneuvers
+from maneuver_automaton.search.maneuver_motion import parts_of
+from maneuver_automaton.search.maneuver_query import maneuver_query
+from maneuver_automaton.search.maneuver_shortcuts import word_is_free
+from maneuver_automaton.search.result import SearchStatus
+from maneuver_automaton.search.transfer import transfer_library
+from tests.search.automata import inertial_unicycle, linked, truck_with_trailer
+
+BODY = Box([0.5, 0.25])
+WALLS = (Obstacle(Box([0.2, 3.0], [1.5, -0.6])), Obstacle(Box([0.2, 3.0], [3.0, 1.4])))
+ROOM = Bounds(x=(-0.5, 5.0), y=(-1.5, 2.5))
+START, GOAL = np.array([0.5, 0.0, 0.0]), np.array([4.0, 1.0, 2.0])
+
+
+@cache
+def library():
+    automaton = inertial_unicycle(levels=3)
+    return transfer_library(automaton), parts_of(automaton, (BODY,))
+
+
+def query(start=START, goal=GOAL, **changes):
+    settings = {"obstacles": WALLS, "bounds": ROOM} | changes
+    return maneuver_query(*library(), start, goal, start_trim="0 0", goal_trim="0 0", **settings)
+
+
+def least_gap(plan, obstacles, *, model=None, carried=()):
+    """Least distance of dense poses from the obstacles, by shapely, at the times of the plan."""
+    times = np.linspace(0.0, plan.duration, 4000)
+    poses = plan.pose_at(times)
+    vehicles = [outlines(poses, BODY)]
+    if carried:
+        samples = plan.sample(max_step_m=0.01, max_step_rad=0.01)
+        state = np.interp(times, samples.time, samples.reduced_state[:, 0])[:, None]
+        there = (SE2(poses) @ SE2(model.part_poses(state)[:, 0])).pose
+        vehicles.append(outlines(there, carried[0]))
+    gap = np.inf
+    for obstacle in obstacles:
+        box = obstacle.shape
+        place = SE2([*box.center, box.heading]).pose[None]
+        if obstacle.motion is not None:
+            knots, now = obstacle.motion, times + plan.start_time
+            columns = [np.interp(now, knots.time, knots.pose[:, k]) for k in range(3)]
+            place = (SE2(np.stack(columns, axis=1)) @ SE2(place)).pose
+        solid = outlines(place, Box(box.size))
+        gap = min(gap, *(float(shapely.distance(one, solid).min()) for one in vehicles))
+    return gap
+
+
+def outlines(poses, box):
+    half = 0.5 * box.size
+    ring = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * half + box.center
+    return shapely.polygons(np.stack([np.asarray(SE2(poses).act(c)) for c in ring], axis=1))
+
+
+def off_goal(plan, goal):
+    off = plan.end - goal
+    off[2] = wrapped(off[2])
+    return float(np.abs(off).max())
+
+
+def test_plans_are_exact_free_inside_and_cheaper_one_by_one():
+    here = query()
+    result = search_maneuvers(here, max_expansions=600)
+    assert result.status is SearchStatus.FOUND
+    costs = [word.cost for word in result.words]
+    assert costs == sorted(costs, reverse=True)
+    assert len(costs) >= 2
+    for word in result.words:
+        plan = plan_of(here, word)
+        assert off_goal(plan, GOAL) < 1e-12
+        assert plan.duration == pytest.approx(word.cost, abs=1e-6)
+        assert plan.trims[0].name == plan.trims[-1].name == "0 0"
+        assert least_gap(plan, WALLS) > 0.0
+        poses = plan.sample(max_step_m=0.005).pose
+        assert poses[:, 0].min() >= -0.5
+        assert poses[:, 1].max() <= 2.5
+        assert word_is_free(here, word)
+
+
+def test_the_same_expansions_find_the_same_plan():
+    first, second = (search_maneuvers(query(), max_expansions=400) for _ in range(2))
+    assert first.best.trims == second.best.trims
+    assert first.best.durations.tolist() == second.best.durations.tolist()
+    assert first.found_after == second.found_after
+
+
+def test_a_moved_problem_has_the_moved_plan():
+    by = SE2([3.0, -2.0, 0.7])
+    still = query(bounds=None)
+    moved = maneuver_query(
+        *library(),
+        (by @ SE2(START)).pose,
+        (by @ SE2(GOAL)).pose,
+        start_trim="0 0",
+        goal_trim="0 0",
+        obstacles=tuple(obstacle.moved(by) for obstacle in WALLS),
+    )
+    here, there = (search_maneuvers(one, max_expansions=400) for one in (still, moved))
+    assert here.best.trims == there.best.trims
+    a, b = plan_of(still, here.best), plan_of(moved, there.best)
+    assert np.abs(a.durations - b.durations).max() < 1e-7
+    assert np.abs((by @ SE2(a.end)).pose - b.end).max() < 1e-9
+
+
+def test_the_goal_may_be_a_moving_trim():
+    here = maneuver_query(*library(), START, [2.0, 1.5, 1.0], start_trim="0 0", goal_trim="0.5 0")
+    plan = plan_of(here, search_maneuvers(here, first_only=True).best)
+    assert off_goal(plan, [2.0, 1.5, 1.0]) < 1e-12
+    assert plan.trims[-1].name == "0.5 0"
+    state = plan.sample().reduced_state[-1]
+    assert np.abs(state - [0.5, 0.0]).max() < 1e-9
+
+
+def test_a_straight_way_is_one_trim():
+    here = maneuver_query(
+        *library(), [0.0, 0.0, 0.3], [2 * math.cos(0.3), 2 * math.sin(0.3), 0.3],
+        start_trim="0 0", goal_trim="0 0",
+    )  # fmt: skip
+    result = search_maneuvers(here, first_only=True)
+    assert result.expansions == 1
+    assert plan_of(here, result.best).word == ("0 0 to 0.5 0", "0.5 0", "0.5 0 to 0 0")
+    assert result.best.cost == pytest.approx(2 / 0.5 + 2.0, abs=1e-9)
+
+
+def test_walls_all_around_exhaust_the_search():
+    ring = [Box([3.0, 0.1], [4.0, 2.5]), Box([3.0, 0.1], [4.0, -0.5]),
+            Box([0.1, 3.1], [2.5, 1.0]), Box([0.1, 3.1], [5.5, 1.0])]  # fmt: skip
+    closed = query(obstacles=tuple(Obstacle(box) for box in ring))
+    result = search_maneuvers(closed)
+    assert result.status is SearchStatus.EXHAUSTED
+    assert result.best is None
+
+
+def test_budgets_end_the_search():
+    assert search_maneuvers(query(), max_expansions=5).status is SearchStatus.OUT_OF_BUDGET
+    over = search_maneuvers(query(), deadline=time.monotonic() - 1.0)
+    assert over.status is SearchStatus.OUT_OF_BUDGET
+    assert over.expansions == 0
+
+
+def test_what_moves_is_let_pass():
+    crossing = Obstacle(
+        Box([0.4, 3.0]), motion=Motion([0.0, 20.0], [[2.0, -3.0, 0.0], [2.0, 7.0, 0.0]])
+    )
+    here = maneuver_query(
+        *library(), START, [4.0, 0.0, 0.0], start_trim="0 0", goal_trim="0 0",
+        obstacles=(crossing,),
+    )  # fmt: skip
+    result = search_maneuvers(here, max_expansions=2500)
+    assert result.status is SearchStatus.FOUND
+    for word in result.words:
+        plan = plan_of(here, word)
+        assert off_goal(plan, [4.0, 0.0, 0.0]) < 1e-12
+        assert word_is_free(here, word)
+        assert least_gap(plan, (crossing,)) > 0.0
+
+
+def test_a_trailer_stays_free_too():
+    automaton, trailer = truck_with_trailer(levels=3), Box([0.3, 0.25])
+    parts = parts_of(automaton, (BODY,), ((trailer,),))
+    goal = np.array([3.0, 1.5, 1.0])
+    here = maneuver_query(
+        transfer_library(automaton), parts, START, goal,
+        start_trim="0 at 0.00", goal_trim="0 at 0.00",
+        obstacles=(Obstacle(Box([0.2, 3.0], [1.5, -1.0])), Obstacle(Box([0.2, 3.0], [3.5, 2.6]))),
+    )  # fmt: skip
+    result = search_maneuvers(here, max_expansions=600)
+    assert result.status is SearchStatus.FOUND
+    for word in result.words:
+        plan = plan_of(here, word)
+        assert off_goal(plan, goal) < 1e-12
+        assert abs(plan.sample().reduced_state[-1, 0]) < 1e-9
+        assert least_gap(plan, here.obstacles, model=automaton.model, carried=(trailer,)) > 0.0
+
+
+def test_a_trailer_wider_than_its_truck_does_not_close_the_way_of_the_truck():
+    automaton = truck_with_trailer(levels=3)
+    parts = parts_of(automaton, (Box([0.1, 0.1]),), ((Box([0.3, 0.6]),),))
+    beside = Obstacle(Box([0.1, 1.0], [0.1, 0.6]))  # nearer to the truck than half the trailer
+    here = maneuver_query(
+        transfer_library(automaton), parts, np.zeros(3), [0.2, 0.0, 0.0],
+        start_trim="0 at 0.00", goal_trim="0 at 0.00", obstacles=(beside,),
+    )  # fmt: skip
+    assert search_maneuvers(here, max_expansions=20, first_only=True).best is not None
+
+
+@pytest.mark.parametrize("height", [1.5, -0.5])
+def test_altitude_is_gained_on_the_way(height):
+    flying = [[0.0] * 4, [1.0, 0, 0, 0], [0.7, 0, 0.8, 0], [0.7, 0, -0.8, 0],
+              [0.8, 0, 0, 0.2], [0.0, 0, 0, 0.5], [0.0, 0, 0, -0.5]]  # fmt: skip
+    automaton = linked(flying, size=0.1)
+    towers = (Obstacle(Box([0.3, 3.0], [2.0, -0.8])), Obstacle(Box([0.3, 3.0], [4.0, 2.0])))
+    goal = np.array([6.0, 1.0, 1.0, height])
+    here = maneuver_query(
+        transfer_library(automaton), parts_of(automaton, (BODY,)), np.zeros(4), goal,
+        start_trim="t0", goal_trim="t0", obstacles=towers,
+    )  # fmt: skip
+    result = search_maneuvers(here, max_expansions=8000, first_only=True)
+    assert result.status is SearchStatus.FOUND
+    for word in result.words:
+        plan = plan_of(here, word)
+        assert off_goal(plan, goal) < 1e-12
+        assert word_is_free(here, word)
+
+
+def test_a_limit_of_time_is_kept():
+    free = search_maneuvers(query(), max_expansions=400).best
+    short = replace(query(), most_time=free.duration * 1.1)
+    result = search_maneuvers(short, max_expansions=1500)
+    assert all(word.duration <= free.duration * 1.1 for word in result.words)
+    none = search_maneuvers(replace(query(), most_time=3.0), max_expansions=1500)
+    assert none.best is None
+
+
+def test_wrong_queries_are_refused():
+    with pytest.raises(UnknownTrim):
+        maneuver_query(*library(), START, GOAL, start_trim="rest", goal_trim="0 0")
+    with pytest.raises(ValueError) as error:
+        maneuver_query(*library(), [0.0, 0.0], GOAL, start_trim="0 0", goal_trim="0 0")
+    assert str(error.value) == "start: got shape (2,), need 3 components last"

@@ -1,0 +1,25 @@
+"""What is compiled before the clock runs is what searches use."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from maneuver_automaton.search import _kernels_maneuver_lattice as lattice
+from maneuver_automaton.search import _kernels_maneuver_motion as motion
+from maneuver_automaton.search import _kernels_maneuver_shortcuts as shortcuts
+from maneuver_automaton.search.maneuver_lattice import search_maneuvers
+from maneuver_automaton.search.maneuver_ready import load_maneuver_kernels
+from tests.search.test_maneuver_lattice import query
+
+KERNELS = (lattice.begin, lattice.expand, shortcuts.shorten_to, motion.word_free)
+
+
+@pytest.mark.skipif(bool(os.environ.get("NUMBA_DISABLE_JIT")), reason="nothing is compiled")
+def test_every_kernel_is_ready():
+    load_maneuver_kernels()
+    before = [len(kernel.signatures) for kernel in KERNELS]
+    assert min(before) >= 1
+    search_maneuvers(query(), max_expansions=300)
+    assert [len(kernel.signatures) for kernel in KERNELS] == before

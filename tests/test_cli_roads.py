@@ -1,0 +1,99 @@
+"""`plan` and `mpc` of CommonRoad scenarios: files, exit codes, one line for what is wrong."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from maneuver_automaton.cli import run
+from tests.roads.files import GOAL, LANES, commonroad, interval, problem
+
+QUICK = ["--no-plot", "--quiet"]
+LATE = GOAL.replace(interval("time", 20, 40), interval("time", 0, 5))
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("road.xml").write_text(commonroad())
+    return tmp_path
+
+
+def test_a_scenario_is_driven(folder, capsys):
+    assert run(["mpc", "road.xml", "--no-plot"]) == 0
+    document = json.loads(Path("out/closed_loop.json").read_text())
+    assert document["reached"] is True
+    assert (document["status"], document["collisions"]) == ("reached", 0)
+    assert document["broken_guarantees"] == []
+    first, *_, last = document["steps"]
+    assert {"time_s", "pose", "value", "accumulated_cost", "control", "word", "plan"} <= set(first)
+    assert sum(one["duration_s"] for one in first["plan"]) >= first["lasting_s"] - 1e-9
+    assert last["control"] is None
+    assert last["accumulated_cost"] == pytest.approx(document["cost"])
+    assert "reached" in capsys.readouterr().out
+
+
+def test_pictures_are_drawn(folder):
+    assert run(["mpc", "road.xml", "--steps", "5", "--animate", "--quiet"]) == 1
+    for name in ("closed_loop.png", "closed_loop.gif", "closed_loop.html"):
+        assert Path("out", name).stat().st_size > 1000
+
+
+def test_a_goal_that_is_missed_ends_with_one(folder, capsys):
+    Path("late.xml").write_text(commonroad(*LANES, problem(goal=LATE)))
+    assert run(["mpc", "late.xml", *QUICK]) == 1
+    assert capsys.readouterr().err.endswith(
+        "late.xml: missed: no goal was reached until 0.5 s, when the last one is over\n"
+    )
+    assert run(["plan", "late.xml", "--time-limit", "0.001", *QUICK]) == 1
+    document = json.loads(Path("out/plan.json").read_text())
+    assert (document["status"], document["cost"], document["primitives"]) == ("no_plan", None, [])
+
+
+def test_one_plan(folder):
+    assert run(["plan", "road.xml", "--animate", "--quiet"]) == 0
+    document = json.loads(Path("out/plan.json").read_text())
+    assert document["status"] == "found"
+    assert document["audit"]["passed"] is True
+    lasting = sum(one["duration_s"] for one in document["primitives"])
+    assert lasting == pytest.approx(document["duration_s"])
+    assert document["trajectory"]["time_s"][-1] == pytest.approx(lasting)
+    assert Path("out/plan.png").is_file()
+    assert Path("out/plan.gif").is_file()
+
+
+def test_one_of_several_problems(folder, capsys):
+    Path("two.xml").write_text(commonroad(*LANES, problem(1, goal=LATE), problem(2)))
+    assert run(["plan", "two.xml", *QUICK]) == 2
+    assert "two.xml: holds 2 problems, need --case and a number, 0 to 1" in capsys.readouterr().err
+    assert run(["plan", "two.xml", "--case", "1", *QUICK]) == 0
+
+
+def test_folders_hold_scenarios_and_other_xml(folder):
+    Path("many").mkdir()
+    Path("many/road.xml").write_text(commonroad())
+    Path("many/primitives.xml").write_text("<Trajectories></Trajectories>")
+    assert run(["plan", "many", *QUICK]) == 0
+    assert Path("out/road/plan.json").is_file()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["mpc", "road.xml", "--seeds", "2"], "--seeds: drives on roads have no such option"),
+        (["plan", "nowhere.xml"], "nowhere.xml: no such file"),
+        (["check", "road.xml"], "road.xml: is a drive on roads, which only plan and mpc know"),
+        (["mpc", "road.xml", "--case", "3"], "--case: got 3, but road.xml holds one problem"),
+        (["plan", "road.xml", "--with", "unicycle.yaml"],
+         "--with: unicycle.yaml: vehicle: got the model unicycle, need second_order_car on roads"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_told_in_one_line(folder, capsys, arguments, said):
+    Path("unicycle.yaml").write_text(
+        "schema: 1\nvehicle: {model: unicycle}\nautomaton: {preset: table2}\n"
+        "start: {pose: [0, 1, 0]}\ngoal: {pose: [0, 0, 0]}\n"
+    )
+    assert run(arguments) == 2
+    assert capsys.readouterr().err.startswith(said)
