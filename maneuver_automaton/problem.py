@@ -218,15 +218,15 @@ class Problem:
         object.__setattr__(self, "obstacles", as_obstacles(self.obstacles))
         object.__setattr__(self, "footprint", as_footprint(self.footprint))
         object.__setattr__(self, "parts", _as_parts(self.automaton.model, self.parts))
-        object.__setattr__(self, "zones", tuple(self.zones))
-        for zone in self.zones:
-            for trim in zone.trims or ():
-                self.automaton.index_of(trim)
         low, high = self.body_height
         if not (math.isfinite(low) and math.isfinite(high) and low <= high):
             raise ValueError(
                 f"body_height must be [low, high] with low <= high, got {self.body_height} m"
             )
+        object.__setattr__(self, "zones", tuple(self.zones))
+        for zone in self.zones:
+            for trim in zone.trims or ():
+                self.automaton.index_of(trim)
         if not (math.isfinite(self.margin) and self.margin >= 0.0):
             raise ValueError(f"margin must be a number of at least 0, got {self.margin} m")
         if not self.automaton.is_kinematic:

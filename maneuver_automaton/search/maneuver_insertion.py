@@ -19,7 +19,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.groups import LieGroup
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.maneuver_setup import (
+from maneuver_automaton.search.maneuver_solution import (
     ManeuverSearch,
     TimedWord,
     WordSetup,

@@ -7,7 +7,7 @@ import time
 
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.maneuver_insertion import improve_maneuver_words
-from maneuver_automaton.search.maneuver_setup import ManeuverSearch, ManeuverSolution
+from maneuver_automaton.search.maneuver_solution import ManeuverSearch, ManeuverSolution
 from maneuver_automaton.search.maneuver_words import CLOSED_FORM, search_maneuver_words
 from maneuver_automaton.search.result import SearchStatus
 

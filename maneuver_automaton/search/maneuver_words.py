@@ -19,7 +19,7 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search import _kernels_transfer as kernels
-from maneuver_automaton.search.maneuver_setup import (
+from maneuver_automaton.search.maneuver_solution import (
     SAME,
     ManeuverSearch,
     TimedWord,

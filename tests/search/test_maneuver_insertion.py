@@ -12,7 +12,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search.maneuver_insertion import improve_maneuver_words
 from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
-from maneuver_automaton.search.maneuver_setup import word_setup
+from maneuver_automaton.search.maneuver_solution import word_setup
 from maneuver_automaton.search.maneuver_words import search_maneuver_words
 from tests.ramps import car_automaton, unicycle_automaton
 from tests.search.cases import compiled_only

@@ -15,7 +15,7 @@ from maneuver_automaton.audit import audit_plan
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.search.maneuver_setup import word_setup
+from maneuver_automaton.search.maneuver_solution import word_setup
 from maneuver_automaton.search.maneuver_words import search_maneuver_words
 from maneuver_automaton.search.result import SearchStatus
 from tests.ramps import car_automaton, unicycle_automaton

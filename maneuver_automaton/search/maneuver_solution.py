@@ -1,0 +1,346 @@
+"""One word of trims and maneuvers from a pose and trim to a goal and its trim."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.costs import Cost, StageCost
+from maneuver_automaton.groups import LieGroup, group_of
+from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.search.result import SearchStatus
+from maneuver_automaton.search.transfer import (
+    TransferLibrary,
+    _most_different,
+    _words,
+    transfer_library,
+)
+from maneuver_automaton.switching_times import TimesStatus
+from maneuver_automaton.switching_times.with_maneuvers import (
+    close_times_with_maneuvers,
+    solve_times_with_maneuvers,
+)
+
+LATE = 1e-9  # relative, by which a plan may take longer than it is allowed
+SAME = 1e-6  # [s] times that differ by less are the same
+VANISHING = 1e-9  # [s] what lasts no longer lasts no time
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ManeuverSolution:
+    """A word and its coasting times; the maneuvers between its trims follow from the library."""
+
+    trims: tuple[int, ...]  # between the first trim and the last, by their indices
+    durations: Array  # (n,) [s] of these
+    cost: float  # of trims, maneuvers, switches, and the rest that fills a fixed time
+    plan: Plan
+
+    def __post_init__(self) -> None:
+        freeze(self, "durations")
+
+
+class TimedWord(NamedTuple):
+    """A word with coasting times that lead to the goal, not yet a plan."""
+
+    trims: tuple[int, ...]
+    durations: Array  # (n,) [s]
+    cost: float
+
+    def same_as(self, other: TimedWord) -> bool:
+        """Whether both are the same motion."""
+        return self.trims == other.trims and bool(
+            np.abs(self.durations - other.durations).max(initial=0.0) <= SAME
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ManeuverSearch:
+    """Words that were found, cheapest first."""
+
+    status: SearchStatus
+    solutions: tuple[ManeuverSolution, ...]
+    complete: bool = False  # every locally optimal word within the limits is listed
+    counts: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def plans(self) -> tuple[Plan, ...]:
+        """The plans, cheapest first."""
+        return tuple(one.plan for one in self.solutions)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class WordSetup:
+    """A problem, one of its goals, and the transitions of its automaton with their prices."""
+
+    problem: Problem
+    goal: Goal
+    library: TransferLibrary
+    letters: tuple[int, ...]  # trims that words are made of
+    start_trim: int
+    goal_trim: int
+
+    @property
+    def group(self) -> type[LieGroup]:
+        """The group that moves the vehicle."""
+        return self.problem.automaton.model.group
+
+    @property
+    def pad(self) -> int | None:
+        """Where the word may wait for what is left of a fixed time: at its first or last trim."""
+        for index in (self.goal_trim, self.start_trim):
+            if self.problem.automaton.trims[index].is_rest:
+                return index
+        return None
+
+    @property
+    def limit(self) -> float | None:
+        """The longest time a plan may take [s]; exactly so long with a fixed time."""
+        horizon = self.problem.horizon
+        return horizon.time if horizon.time is not None else horizon.max_time
+
+    def links(self, trims: Sequence[int]) -> list[tuple[int, int]]:
+        """Neighbours in the word, the first and last trim included."""
+        return list(pairwise((self.start_trim, *trims, self.goal_trim)))
+
+    def fixed(self, trims: Sequence[int]) -> tuple[float, float]:
+        """Cost and time [s] of the transitions of a word; inf where there is none."""
+        rows, columns = np.array(self.links(trims)).T
+        arrays = self.library.arrays
+        return float(arrays.cost[rows, columns].sum()), float(arrays.time[rows, columns].sum())
+
+    def solved(
+        self, trims: Sequence[int], guesses: Sequence[Array] = (), *, restarts: int = 0
+    ) -> TimedWord | None:
+        """The word with locally best times; None if none lead to the goal, or in time."""
+        price, lasting = self.fixed(trims)
+        if not math.isfinite(price):
+            return None
+        if not len(trims):
+            return self._without_trims()
+        exactly = self.problem.horizon.time is not None and self.pad is None
+        total = None if not exactly or self.limit is None else self.limit - lasting
+        times = self._times(trims, guesses, total, restarts)
+        if times is None:
+            return None
+        too_late = self.limit is not None and self._is_late(float(times.sum()) + lasting)
+        if too_late and not exactly and self.limit is not None:
+            times = self._times(trims, [times], self.limit - lasting, restarts)
+            if times is None:
+                return None
+        return self.priced(trims, times)
+
+    def closed(self, trims: Sequence[int], times: Array) -> TimedWord | None:
+        """The word with times next to these, which lead to the goal; None if not in time."""
+        if not len(trims):
+            return self._without_trims()
+        twists, steps = self._rows(trims)
+        begin = self._begin(trims)
+        closed = close_times_with_maneuvers(
+            begin,
+            twists,
+            times,
+            self.goal.pose,
+            displacements=steps,
+            free_heading=self.goal.free_heading,
+        )
+        if self._is_late(float(closed.sum()) + self.fixed(trims)[1]):
+            return None
+        exactly = self.problem.horizon.time is not None and self.pad is None
+        return None if exactly else self.priced(trims, closed)
+
+    def priced(self, trims: Sequence[int], durations: Array) -> TimedWord | None:
+        """The word with these times and its cost; None if it has too many trims."""
+        times = np.where(durations <= VANISHING, 0.0, durations)
+        price, lasting = self.fixed(trims)
+        total, most = self.problem.horizon.time, self.problem.horizon.max_trims
+        waits = total is not None and float(times.sum()) + lasting < total * (1.0 - LATE)
+        if most is not None and np.count_nonzero(times) + waits > most:
+            return None
+        cost = price + float(self.library.arrays.rates[list(trims)] @ times)
+        if total is not None or self.prices_switches:
+            cost = self.problem.cost_of(self.plan(trims, times))
+        return TimedWord(tuple(trims), times, cost)
+
+    @property
+    def prices_switches(self) -> bool:
+        """Whether the cost of a word is more than that of its parts."""
+        cost = self.problem.cost
+        return not isinstance(cost, Cost) or cost.switch > 0.0 or cost.direction_change > 0.0
+
+    def solution(self, word: TimedWord) -> ManeuverSolution:
+        """A word as a plan."""
+        plan = self.plan(word.trims, word.durations)
+        cost = self.problem.cost_of(plan)
+        return ManeuverSolution(trims=word.trims, durations=word.durations, cost=cost, plan=plan)
+
+    def plan(self, trims: Sequence[int], durations: Array) -> Plan:
+        """The plan of a word from the problem's start, padded by rest where the time is fixed."""
+        automaton = self.problem.automaton
+        word, times, between = [self.start_trim], [0.0], list[Maneuver | None]()
+        for trim, time in zip((*trims, self.goal_trim), (*durations.tolist(), 0.0), strict=True):
+            for maneuver, following in self.library.chain(word[-1], trim):
+                between.append(automaton.maneuvers[maneuver] if maneuver >= 0 else None)
+                word.append(following)
+                times.append(0.0)
+            times[-1] += time
+        total, pad = self.problem.horizon.time, self.pad
+        if total is not None and pad is not None:
+            taken = sum(times) + sum(one.duration for one in between if one)
+            times[-1 if pad == self.goal_trim else 0] += max(0.0, total - taken)
+        return _plan_without_idle(self.problem, [automaton.trims[k] for k in word], times, between)
+
+    def _times(
+        self, trims: Sequence[int], guesses: Sequence[Array], total: float | None, restarts: int
+    ) -> Array | None:
+        if total is not None and total < 0.0:
+            return None
+        twists, steps = self._rows(trims)
+        begin, group = group_of(self.goal.pose.size)(self._begin(trims)), self.group
+        rows = list(trims)
+        arrays = self.library.arrays
+        solved = solve_times_with_maneuvers(
+            twists,
+            arrays.rates[rows],
+            (begin.inverse() @ group(self.goal.pose)).pose,
+            displacements=steps,
+            total=total,
+            free_heading=self.goal.free_heading,
+            least=np.full(len(rows), self.problem.horizon.min_coast),
+            longest=arrays.longest[rows],
+            guesses=guesses,
+            restarts=restarts,
+        )
+        return None if solved.status is TimesStatus.FAILED else np.array(solved.durations)
+
+    def _begin(self, trims: Sequence[int]) -> Array:
+        """Pose (dof,) after the transition out of the first trim."""
+        group, dof = self.group, self.problem.start.size
+        shift = self.library.arrays.shift[self.start_trim, trims[0], :dof]
+        return (group(self.problem.start) @ group(shift)).pose
+
+    def _rows(self, trims: Sequence[int]) -> tuple[Array, Array]:
+        """Twists (n, dof), and displacements (n, dof) of the transitions after each trim."""
+        dof = self.problem.start.size
+        before, after = np.array(self.links(trims)[1:]).T
+        arrays = self.library.arrays
+        return arrays.twists[list(trims), :dof], arrays.shift[before, after, :dof]
+
+    def _without_trims(self) -> TimedWord | None:
+        """The transition from the first trim to the last, if it leads to the goal."""
+        group, dof = self.group, self.problem.start.size
+        shift = self.library.arrays.shift[self.start_trim, self.goal_trim, :dof]
+        end = np.array((group(self.problem.start) @ group(shift)).pose)
+        if max(self.goal.off(end)) > self.library.arrays.met or self._is_late(self.fixed(())[1]):
+            return None
+        exactly = self.problem.horizon.time is not None and self.pad is None
+        return None if exactly else self.priced((), np.zeros(0))
+
+    def _is_late(self, duration: float) -> bool:
+        return self.limit is not None and duration > self.limit * (1.0 + LATE)
+
+
+def word_setup(
+    problem: Problem,
+    goal: Goal,
+    *,
+    most_trims: int,
+    also: Sequence[int] = (),
+    steers: bool = True,
+) -> WordSetup:
+    """What every search over words with maneuvers starts from.
+
+    Words are made of the trims that differ most where the library has more than `most_trims`; the
+    first trim, the last, and those of the indices `also` are among them. Unless it `steers`, the
+    library lists no words to be steered along.
+    """
+    automaton = problem.automaton
+    start_trim = automaton.index_of(problem.first_trim.name)
+    goal_trim = automaton.index_of(problem.last_trim(goal).name)
+    pads = problem.horizon.time is not None and automaton.rest is not None
+    wanted = tuple(sorted({start_trim, goal_trim, *also}))
+    letters, library = _library(automaton, problem.cost, pads, most_trims, wanted, steers)
+    return WordSetup(
+        problem=problem,
+        goal=goal,
+        library=library,
+        letters=letters,
+        start_trim=start_trim,
+        goal_trim=goal_trim,
+    )
+
+
+@functools.lru_cache(maxsize=16)
+def maneuver_prices(automaton: Automaton, cost: StageCost) -> Array:
+    """What every maneuver costs (M,) without the prices of switches."""
+    name, still = automaton.trim_names[0], np.zeros(automaton.model.group.dof)
+    any_problem = Problem(automaton, still, Goal(pose=still, trim=name), cost=cost, start_trim=name)
+    return np.array([any_problem.maneuver_cost(one) for one in automaton.maneuvers])
+
+
+@functools.lru_cache(maxsize=32)
+def _library(
+    automaton: Automaton,
+    cost: StageCost,
+    pads: bool,
+    most_trims: int,
+    wanted: tuple[int, ...],
+    steers: bool,
+) -> tuple[tuple[int, ...], TransferLibrary]:
+    """Trims that words are made of, and the transitions; words to be steered along on demand."""
+    library = _transitions(automaton, cost, pads)
+    twists = library.arrays.twists
+    moving = np.flatnonzero(twists[:, :3].any(axis=1))
+    chosen = set(moving[_most_different(twists[moving], most_trims)].tolist())
+    chosen |= set(wanted) & set(moving.tolist())
+    letters = tuple(sorted(chosen))
+    if not steers:
+        return (*letters, *library.arrays.climbs.tolist()), library
+    words, n_few = _words(list(letters), library.arrays.cost)
+    return letters, replace(library, arrays=library.arrays._replace(words=words, n_few=n_few))
+
+
+@functools.lru_cache(maxsize=8)
+def _transitions(automaton: Automaton, cost: StageCost, pads: bool) -> TransferLibrary:
+    rates = cost.rates(automaton.controls, automaton.body_velocities)
+    prices = maneuver_prices(automaton, cost)
+    if pads and automaton.rest is not None:  # what rest would cost meanwhile is taken off
+        waiting = rates[automaton.rest]
+        lasting = np.array([maneuver.duration for maneuver in automaton.maneuvers])
+        rates = np.maximum(rates - waiting, 0.0)
+        prices = np.maximum(prices - waiting * lasting, 0.0)
+    return transfer_library(automaton, rates=rates, maneuver_costs=prices, trims=())
+
+
+def _plan_without_idle(
+    problem: Problem, word: list[Trim], times: list[float], between: list[Maneuver | None]
+) -> Plan:
+    """The plan without trims that last no time and stand between no maneuvers."""
+    kept = [
+        k
+        for k in range(len(word))
+        if times[k] > 0.0
+        or (k > 0 and between[k - 1] is not None)
+        or (k < len(between) and between[k] is not None)
+    ]
+    if not kept:
+        kept = [0]
+    links = tuple(
+        between[a] if b == a + 1 else None  # what was left out had no maneuver on either side
+        for a, b in pairwise(kept)
+    )
+    return Plan(
+        problem.start,
+        [word[k] for k in kept],
+        durations=[times[k] for k in kept],
+        maneuvers=links if any(links) else (),
+        start_time=problem.start_time,
+    )
