@@ -20,7 +20,7 @@ from maneuver_automaton.automaton.cutting import (
     with_samples_at,
 )
 from maneuver_automaton.problem import Goal
-from tests.ramps import car_automaton
+from tests.inertia import car_automaton
 
 
 @functools.cache

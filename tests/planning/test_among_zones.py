@@ -17,7 +17,7 @@ from maneuver_automaton.planning.result import PlanStatus
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.receding_horizon import RecedingHorizon, simulate
 from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
-from tests.ramps import unicycle_automaton
+from tests.inertia import unicycle_automaton
 from tests.search.cases import compiled_only
 
 pytestmark = compiled_only

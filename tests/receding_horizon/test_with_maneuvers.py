@@ -27,7 +27,7 @@ from maneuver_automaton.receding_horizon import (
     Origin,
     simulate,
 )
-from tests.ramps import car_automaton, unicycle_automaton
+from tests.inertia import car_automaton, unicycle_automaton
 from tests.search.cases import compiled_only
 
 pytestmark = compiled_only

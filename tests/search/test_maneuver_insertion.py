@@ -14,7 +14,7 @@ from maneuver_automaton.search.maneuver_insertion import improve_maneuver_words
 from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
 from maneuver_automaton.search.maneuver_solution import word_setup
 from maneuver_automaton.search.maneuver_words import search_maneuver_words
-from tests.ramps import car_automaton, unicycle_automaton
+from tests.inertia import car_automaton, unicycle_automaton
 from tests.search.cases import compiled_only
 
 GOALS = ([0.0, 3.0, 0.0], [5.0, 1.0, 1.0], [0.5, 0.0, 0.0], [-3.0, 2.0, 3.14])

@@ -18,7 +18,7 @@ from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.search.maneuver_solution import word_setup
 from maneuver_automaton.search.maneuver_words import search_maneuver_words
 from maneuver_automaton.search.result import SearchStatus
-from tests.ramps import car_automaton, unicycle_automaton
+from tests.inertia import car_automaton, unicycle_automaton
 from tests.search.cases import compiled_only
 
 SMALL = ((0.0, 0.0), (1.0, 0.0), (0.8, 0.8), (0.8, -0.8))
