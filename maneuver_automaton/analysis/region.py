@@ -12,6 +12,7 @@ from maneuver_automaton.groups import LieGroup
 from maneuver_automaton.models import Model
 
 REACH = 10.0  # poses are drawn this far from the origin [m]
+RATES = 200  # random states and controls at which rates are looked at
 USUAL = 2.0  # what has no limit is drawn from -USUAL to USUAL
 
 
@@ -79,6 +80,33 @@ class Region:
             controls=_finite(model.control_limits),
             reduced_names=model.reduced_names,
         )
+
+    @classmethod
+    def inside_of_model(cls, model: Model) -> tuple[Region, float]:
+        """Middle half of what limits leave to the reduced state, and for how long it stays inside.
+
+        The time [s] is that of the fastest of many random rates; infinite without such limits.
+        """
+        whole = cls.of_model(model)
+        limits, dof = model.reduced_limits, model.group.dof
+        limited = np.isfinite(limits).all(axis=1)
+        if not limited.any():
+            return whole, np.inf
+        room = (limits[limited, 1] - limits[limited, 0]) / 4.0
+        states = np.array(whole.states)
+        states[dof:][limited] += np.stack([room, -room], axis=-1)
+        region = cls(
+            group=model.group,
+            states=states,
+            controls=whole.controls,
+            reduced_names=model.reduced_names,
+        )
+        rng = np.random.default_rng(0)
+        drawn = np.array([region.state(rng)[dof:] for _ in range(RATES)])
+        controls = np.array([region.control(rng) for _ in range(RATES)])
+        rates = np.abs(model.reduced_dynamics(drawn, controls))[:, limited].max(axis=0)
+        with np.errstate(divide="ignore"):
+            return region, float((room / rates).min())
 
     @property
     def state_names(self) -> tuple[str, ...]:

@@ -106,7 +106,8 @@ def check_flow(
     dynamics, region, rng, samples
         As for `check_vector_field`.
     piece_durations : tuple of float
-        How long each of the random constant controls lasts [s].
+        How long each of the random constant controls lasts [s]. Of a model without a region they
+        are shortened so that its reduced state stays within its limits.
     tolerance : float
         Greatest difference of the ends admitted, relative to the greatest coordinate
         (at least 1) [-]. The solver is run with a thousandth of it.
@@ -122,9 +123,13 @@ def check_flow(
     >>> check_flow(Car(wheelbase=2.0, max_steering=0.6), samples=2).holds
     True
     """
-    f, region = _field_and_region(dynamics, region)
     if not piece_durations or not min(piece_durations) > 0.0:
         raise ValueError(f"piece_durations: got {piece_durations}, need positive times [s]")
+    if region is None and not callable(dynamics):
+        region, seconds = Region.inside_of_model(dynamics)
+        share = min(1.0, seconds / sum(piece_durations))
+        piece_durations = tuple(share * duration for duration in piece_durations)
+    f, region = _field_and_region(dynamics, region)
 
     def flow(state: Array, controls: Array) -> Array:
         for control, duration in zip(controls, piece_durations, strict=True):

@@ -29,10 +29,21 @@ from maneuver_automaton.optimal_control.maneuvers import ManeuverObjective, Tran
 from maneuver_automaton.primitives.bang_bang import has_limited_rates
 from maneuver_automaton.primitives.equilibrium import MissingTrim, trims_of
 from maneuver_automaton.primitives.trim import Trim
-from maneuver_automaton.scenario.checks import Need, Number, Part, Several, Text, need
+from maneuver_automaton.scenario.checks import (
+    Count,
+    Name,
+    Need,
+    NotNegative,
+    Number,
+    Part,
+    Positive,
+    Several,
+    Text,
+    need,
+)
+from maneuver_automaton.scenario.places import at
 from maneuver_automaton.scenario.reading import checked
-from maneuver_automaton.scenario.scenario import at
-from maneuver_automaton.scenario.schema import Count, Name, NotNegative, Positive, VehiclePart
+from maneuver_automaton.scenario.vehicle_parts import VehiclePart
 from maneuver_automaton.scenario.vehicles import model_of
 
 BUILD_KEY = "library"  # what only a build file has

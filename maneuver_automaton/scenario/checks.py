@@ -6,10 +6,12 @@ import difflib
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar
 
+from annotated_types import Ge, Gt
 from pydantic import (
     AllowInfNan,
     BaseModel,
     ConfigDict,
+    Field,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     Strict,
@@ -68,7 +70,17 @@ class Several:
 
 
 Number = Annotated[float, Strict(), AllowInfNan(False), Need("a finite number")]
+Positive = Annotated[float, Strict(), AllowInfNan(False), Gt(0), Need("a positive number")]
+NotNegative = Annotated[
+    float, Strict(), AllowInfNan(False), Ge(0), Need("a finite number of at least 0")
+]
+Count = Annotated[int, Strict(), Ge(1), Need("a whole number of at least 1")]
 Text = Annotated[str, Strict(), Need("a text")]
+Name = Annotated[str, Strict(), Field(pattern=r"\S"), Need("a name, a text that is not empty")]
+Point = Annotated[
+    tuple[Number, Number], Several("a point [x, y], two numbers", at_least=2, at_most=2)
+]
+Polygon = Annotated[tuple[Point, ...], Several("a list of at least 3 points [x, y]", at_least=3)]
 
 
 class Part(BaseModel):
@@ -117,6 +129,11 @@ class Part(BaseModel):
                     {"key": key, "partners": " or ".join(partners)},
                 )
         return value
+
+
+def one_or_many(value: Any) -> str:
+    """Tag of a value that is one, or a list of them."""
+    return "<many>" if isinstance(value, list) else "<one>"
 
 
 def nearest(word: str, known: list[str]) -> str:

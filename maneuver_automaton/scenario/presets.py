@@ -1,14 +1,23 @@
-"""Libraries of trims that have a name."""
+"""Libraries that have a name."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from itertools import product
 
-from maneuver_automaton.models import Car, Unicycle
+import numpy as np
+
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.models import Car, Model, SecondOrderCar, SecondOrderUnicycle, Unicycle
+from maneuver_automaton.primitives import Trim
+from maneuver_automaton.primitives.quickest import quickest_maneuvers
 
 Controls = Mapping[str, tuple[float, float]]
 
-PRESETS = ("table2", "reeds_shepp", "dubins")
+KINEMATIC = ("table2", "reeds_shepp", "dubins")
+INERTIAL = ("parking", "road")
+PRESETS = (*KINEMATIC, *INERTIAL)
 TABLE_2: Controls = {
     "rest": (0.0, 0.0),
     "straight": (1.5, 0.0),
@@ -16,15 +25,25 @@ TABLE_2: Controls = {
     "anticlockwise": (-0.25, 1.0),
     "spin": (0.0, 1.0),
 }
+SLOW_TO_FAST = (0.0, 0.2, 0.5, 1.0)  # speeds for parking, over the greatest one
+PACES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)  # speeds for the road, over the greatest one
+SHARPNESS = (-1.0, -0.5, 0.0, 0.5, 1.0)  # turns, over the sharpest one
+STROKES_S = (0.5, 1.0, 1.5)  # lengths of strokes, as time to speed up and as long to brake
+COMFORTABLE = 4.0  # [m/s^2] greatest lateral acceleration on the road
 
 
-def preset_controls(name: str, vehicle: Unicycle | Car) -> Controls:
-    """Controls of the trims of a preset, by name of the trim.
+def preset_automaton(name: str, model: Model) -> Automaton:
+    """The library of a preset.
 
     `table2` is the paper's Table 2, for the unicycle. `dubins` (3 trims) and `reeds_shepp` (6)
     drive at 1 m/s, or at the greatest speed where that is less, on the tightest circles; those
     of a unicycle turn at 1 rad/s, or at the greatest turn rate. Left and right are as the wheels
     point, in reverse too.
+
+    `parking` and `road` are for the second-order unicycle and car. For parking, 0, 20, 50 and
+    100 % of the speed both ways, straight, half and full turns, maneuvers between neighbours, and
+    short strokes from every rest. For the road, rest and five speeds ahead, turns as sharp as a
+    lateral acceleration of 4 m/s^2 allows, maneuvers between neighbours, early and late.
 
     Source: the paper, Table 2; LaValle (2006), *Planning Algorithms*, Sec. 15.3.1 and 15.3.2.
 
@@ -35,13 +54,29 @@ def preset_controls(name: str, vehicle: Unicycle | Car) -> Controls:
 
     Examples
     --------
-    >>> preset_controls("dubins", Unicycle())
-    {'left': (1.0, 1.0), 'straight': (1.0, 0.0), 'right': (1.0, -1.0)}
-    >>> preset_controls("reeds_shepp", Unicycle())["reverse left"]
-    (-1.0, -1.0)
+    >>> preset_automaton("dubins", Unicycle()).controls.tolist()
+    [[1.0, 1.0], [1.0, 0.0], [1.0, -1.0]]
+    >>> car = SecondOrderCar(wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0,
+    ...                      max_steering_rate=0.5)
+    >>> parking = preset_automaton("parking", car)
+    >>> len(parking), len(parking.maneuvers)
+    (35, 242)
     """
     if name not in PRESETS:
         raise ValueError(f"got {name!r}, need one of {', '.join(PRESETS)}")
+    if name in KINEMATIC:
+        if not isinstance(model, Unicycle | Car):
+            raise ValueError(
+                f"got {name!r}, which is for vehicles without inertia, not the {model.name}"
+            )
+        return Automaton.of_controls(model, _controls(name, model))
+    if not isinstance(model, SecondOrderUnicycle | SecondOrderCar):
+        need = "second_order_unicycle and second_order_car"
+        raise ValueError(f"got {name!r}, which is for {need}, not the {model.name}")
+    return _parking(model) if name == "parking" else _road(model)
+
+
+def _controls(name: str, vehicle: Unicycle | Car) -> Controls:
     if name == "table2":
         if not isinstance(vehicle, Unicycle):
             raise ValueError(f"got 'table2', which is for the unicycle, not the {vehicle.name}")
@@ -63,3 +98,52 @@ def _turns(vehicle: Unicycle | Car, speed: float) -> dict[str, tuple[float, floa
     else:
         left = vehicle.max_steering
     return {"left": (speed, left), "straight": (speed, 0.0), "right": (speed, -left)}
+
+
+def _parking(model: SecondOrderUnicycle | SecondOrderCar) -> Automaton:
+    (least, greatest), (_, sharpest) = model.reduced_limits
+    low, high = model.control_limits[0]
+    reverse = [share * least for share in reversed(SLOW_TO_FAST[1:]) if least < 0.0]
+    speeds = [*reverse, *(share * greatest for share in SLOW_TO_FAST)]
+    ways = [float(high * t * t) for t in STROKES_S]
+    back = [float(low * t * t) for t in STROKES_S if least < 0.0]
+    turn = model.reduced_names[1]
+    return Automaton.of_model(
+        model,
+        {"speed": speeds, turn: [share * sharpest for share in SHARPNESS]},
+        strokes=[*ways, *back],
+        turns=(-math.pi / 4, math.pi / 4) if turn == "turn_rate" else (),
+    )
+
+
+def _road(model: SecondOrderUnicycle | SecondOrderCar) -> Automaton:
+    """Turns differ from speed to speed, so neighbours are those on the grid of shares."""
+    greatest, sharpest = model.reduced_limits[:, 1]
+    states = []
+    for pace in PACES:
+        speed = pace * greatest
+        if isinstance(model, SecondOrderCar):
+            most = math.atan2(COMFORTABLE * model.wheelbase, speed * speed)
+        else:
+            most = COMFORTABLE / speed if speed > 0.0 else math.inf
+        states.append([(speed, share * min(most, sharpest)) for share in SHARPNESS])
+    trims = tuple(_trim(model, state) for row in states for state in row)
+    places = list(product(range(len(PACES)), range(len(SHARPNESS))))
+    near = [
+        (i, j)
+        for i, a in enumerate(places)
+        for j, b in enumerate(places)
+        if i != j and max(abs(a[0] - b[0]), abs(a[1] - b[1])) == 1
+    ]
+    return Automaton(model, trims, quickest_maneuvers(model, trims, pairs=near, late=True))
+
+
+def _trim(model: SecondOrderUnicycle | SecondOrderCar, state: tuple[float, float]) -> Trim:
+    control, reduced = np.zeros(2), np.array(state)
+    names = zip(model.reduced_names, state, strict=True)
+    return Trim(
+        name=", ".join(f"{what} {value:.4g}" for what, value in names),
+        body_velocity=model.body_velocity(reduced, control),
+        control=control,
+        reduced_state=reduced,
+    )

@@ -8,13 +8,9 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from maneuver_automaton.formats.yaml_source import Document, Where, shown
-from maneuver_automaton.models import Car, Unicycle
 from maneuver_automaton.scenario.schema import ScenarioFile
+from maneuver_automaton.scenario.vehicles import KINDS
 
-CONTROL_NAMES: Mapping[str, tuple[str, ...]] = {
-    "unicycle": Unicycle.control_names,
-    "car": Car.control_names,
-}
 File = TypeVar("File", bound=BaseModel)
 OTHER_KINDS: Mapping[str, set[str]] = {  # and what only they have
     "a library of trims": {"format", "trims"},
@@ -69,7 +65,10 @@ def _check_schema(document: Document) -> None:
 def _context(value: Any) -> dict[str, Any]:
     vehicle = value.get("vehicle") if isinstance(value, dict) else None
     model = vehicle.get("model") if isinstance(vehicle, dict) else None
-    return {"control_names": CONTROL_NAMES.get(model, ()) if isinstance(model, str) else ()}
+    kind = KINDS.get(model) if isinstance(model, str) else None
+    if kind is None:
+        return {}
+    return {"control_names": kind.control_names, "reduced_names": kind.reduced_names}
 
 
 def _message(document: Document, item: Any) -> tuple[Where, str]:

@@ -2,33 +2,27 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from decimal import Decimal
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.automaton.library import load_library
 from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.statement import MapFile
-from maneuver_automaton.formats.yaml_source import Document, Where, parse, shown
-from maneuver_automaton.models import Car, Model, Unicycle
+from maneuver_automaton.formats.yaml_source import Document, Where, parse
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.scenario.presets import preset_controls
+from maneuver_automaton.scenario.automata import automaton_of
+from maneuver_automaton.scenario.places import at
 from maneuver_automaton.scenario.reading import values_of
 from maneuver_automaton.scenario.schema import (
-    Axis,
+    AutomatonPart,
     CostPart,
     GoalPart,
-    Grid,
     HorizonPart,
-    NamedControl,
     RecedingHorizonPart,
     ScenarioFile,
     SearchPart,
@@ -39,9 +33,7 @@ from maneuver_automaton.scenario.shapes import (
     stated_footprint,
     zones_of,
 )
-from maneuver_automaton.scenario.vehicles import described, model_of
-
-MAX_GRID_TRIMS = 100_000
+from maneuver_automaton.scenario.vehicles import carried_of, model_of
 
 Footprint = tuple[Mapping[str, Any], ...]  # shapes, each {rectangle_m, reference_m} and so on
 
@@ -55,6 +47,7 @@ class Scenario:
     time_limit_s: float = 5.0  # ceiling for search and refinement [s]
     receding_horizon: RecedingHorizonPart | None = None
     maps: tuple[MapFile, ...] = ()  # files of the maps among the obstacles
+    stated: AutomatonPart | None = None  # the automaton, as the file states it
     path: Path | None = None
     timing_s: Mapping[str, float] = field(default_factory=dict)  # load, automaton [s]
 
@@ -103,20 +96,34 @@ def scenario_of_document(document: Document, *, path: Path | None, begin: float)
     folder = path.parent if path else Path()
     with at(document, ("vehicle",)):
         model = model_of(file.vehicle)
-    footprint = footprint_of(document, file.vehicle.footprint)
+    bodies = _Bodies(
+        vehicle=footprint_of(document, file.vehicle.footprint, key="footprint"),
+        parts={
+            name: footprint_of(document, body, key=name)
+            for name, body in carried_of(file.vehicle).items()
+        },
+    )
     obstacles, maps = obstacles_of(document, file.obstacles, folder)
     read = time.perf_counter()
-    automaton = _automaton(document, file, model, folder)
+    automaton = automaton_of(document, file.automaton, model, folder=folder)
     made = time.perf_counter()
     return Scenario(
         name=(path.stem if path else document.name) if file.name is None else file.name,
-        problem=_problem(document, file, automaton, footprint=footprint, obstacles=obstacles),
+        problem=_problem(document, file, automaton, bodies=bodies, obstacles=obstacles),
         time_limit_s=file.search.time_limit_s,
         receding_horizon=file.receding_horizon,
         maps=maps,
+        stated=file.automaton,
         path=path,
         timing_s={"load": read - begin, "automaton": made - read},
     )
+
+
+class _Bodies(NamedTuple):
+    """What must not touch anything."""
+
+    vehicle: tuple[Shape, ...]
+    parts: Mapping[str, tuple[Shape, ...]]  # what it carries, by name
 
 
 def _refuse_long_words(document: Document, file: ScenarioFile) -> None:
@@ -134,115 +141,12 @@ def _refuse_long_words(document: Document, file: ScenarioFile) -> None:
         )
 
 
-@contextlib.contextmanager
-def at(document: Document, where: Where) -> Iterator[None]:
-    """Give what a constructor refuses the file, line and field it comes from."""
-    try:
-        yield
-    except InvalidScenario:
-        raise
-    except (ValueError, LookupError) as error:
-        said = str(error)
-        for step in where:
-            said = said.removeprefix(f"{step}: ").removeprefix(f"{step} ")
-        raise document.error(where, said) from error
-
-
-def _automaton(
-    document: Document, file: ScenarioFile, model: Unicycle | Car, folder: Path
-) -> Automaton:
-    part = file.automaton
-    if part.trims is not None:
-        return _listed(document, part.trims, model)
-    if part.grid is not None:
-        return _grid(document, part.grid, model)
-    if part.file is not None:
-        return _from_library(document, folder / part.file, model)
-    where = ("automaton", "preset")
-    assert part.preset is not None
-    with at(document, where):
-        return Automaton.of_controls(model, preset_controls(part.preset, model))
-
-
-def _listed(document: Document, trims: tuple[NamedControl, ...], model: Model) -> Automaton:
-    controls: dict[str, Any] = {}
-    for k, trim in enumerate(trims):
-        where = ("automaton", "trims", k)
-        if trim.name in controls:
-            first = document.line_of(("automaton", "trims", list(controls).index(trim.name)))
-            raise document.error(
-                (*where, "name"),
-                f"got {trim.name!r}, the name of another trim in line {first}; need a new name",
-            )
-        controls[trim.name] = trim.control
-        with at(document, (*where, "control")):
-            Automaton.of_controls(model, {trim.name: trim.control})
-    return Automaton.of_controls(model, controls)
-
-
-def _grid(document: Document, grid: Grid, model: Model) -> Automaton:
-    where: Where = ("automaton", "grid", "control")
-    names = model.control_names
-    if len(grid.control) != len(names):
-        raise document.error(
-            where, f"got {len(grid.control)} axes, need {len(names)} ({', '.join(names)})"
-        )
-    counts = []
-    for k, axis in enumerate(grid.control):
-        if axis.min > axis.max:
-            raise document.error(
-                (*where, k), f"got min {axis.min:g} above max {axis.max:g}, need min <= max"
-            )
-        if axis.count == 1 and axis.min < axis.max:
-            raise document.error(
-                (*where, k, "count"), "got 1 for two different ends, need at least 2"
-            )
-        counts.append(_n_values(axis))
-    if math.prod(counts) > MAX_GRID_TRIMS:
-        raise document.error(
-            where, f"got {math.prod(counts):g} trims, need at most {MAX_GRID_TRIMS}"
-        )
-    with at(document, where):
-        return Automaton.of_grid(model, [_values(axis) for axis in grid.control])
-
-
-def _n_values(axis: Axis) -> int:
-    if axis.count is not None:
-        return axis.count
-    assert axis.step is not None
-    return int(min((axis.max - axis.min) / axis.step * (1.0 + 1e-12) + 1e-9, 1e12)) + 1
-
-
-def _values(axis: Axis) -> list[float]:
-    """The values of an axis, computed in decimals: 0.3 is 0.3 and the middle is 0."""
-    n, low = _n_values(axis), Decimal(repr(axis.min))
-    if axis.step is not None:
-        step = Decimal(repr(axis.step))
-    else:
-        step = (Decimal(repr(axis.max)) - low) / max(n - 1, 1)
-    return [float(low + k * step) for k in range(n)]
-
-
-def _from_library(document: Document, path: Path, model: Model) -> Automaton:
-    with at(document, ("automaton", "file")):
-        automaton = load_library(path)
-        if described(automaton.model) != described(model):
-            raise ValueError(
-                f"got a library for {_words(automaton.model)}, but the vehicle is {_words(model)}"
-            )
-    return automaton
-
-
-def _words(model: Model) -> str:
-    return shown(described(model))
-
-
 def _problem(
     document: Document,
     file: ScenarioFile,
     automaton: Automaton,
     *,
-    footprint: tuple[Shape, ...],
+    bodies: _Bodies,
     obstacles: tuple[AnyObstacle, ...],
 ) -> Problem:
     goals = file.goal if isinstance(file.goal, tuple) else (file.goal,)
@@ -272,7 +176,8 @@ def _problem(
             bounds=Bounds(x=file.bounds_m.x, y=file.bounds_m.y, z=file.bounds_m.z),
             search=_search(file.search),
             obstacles=obstacles,
-            footprint=footprint,
+            footprint=bodies.vehicle,
+            parts=bodies.parts,
             margin=file.margin_m,
             zones=zones_of(document, file.zones),
         )

@@ -10,7 +10,7 @@ import itertools
 import math
 from typing import Annotated, Any, ClassVar, Literal
 
-from annotated_types import Ge, Gt, Lt
+from annotated_types import Ge
 from pydantic import (
     AfterValidator,
     AllowInfNan,
@@ -22,29 +22,23 @@ from pydantic import (
     ValidationInfo,
     field_validator,
 )
-from pydantic_core import PydanticCustomError
 
-from maneuver_automaton.scenario.checks import Need, Number, Part, Several, Text, need
-
-MODELS = ("unicycle", "car")
-LATER_MODELS = (
-    "second_order_unicycle",
-    "second_order_car",
-    "car_with_trailer",
-    "single_track",
-    "hovercraft",
-    "helicopter",
+from maneuver_automaton.scenario.checks import (
+    Count,
+    Name,
+    Need,
+    NotNegative,
+    Number,
+    Part,
+    Point,
+    Polygon,
+    Positive,
+    Several,
+    Text,
+    need,
+    one_or_many,
 )
-
-Positive = Annotated[float, Strict(), AllowInfNan(False), Gt(0), Need("a positive number")]
-NotNegative = Annotated[
-    float, Strict(), AllowInfNan(False), Ge(0), Need("a finite number of at least 0")
-]
-Count = Annotated[int, Strict(), Ge(1), Need("a whole number of at least 1")]
-Name = Annotated[str, Strict(), Field(pattern=r"\S"), Need("a name, a text that is not empty")]
-Point = Annotated[
-    tuple[Number, Number], Several("a point [x, y], two numbers", at_least=2, at_most=2)
-]
+from maneuver_automaton.scenario.vehicle_parts import VehiclePart
 
 
 def _rising(value: tuple[float, float]) -> tuple[float, float]:
@@ -62,108 +56,44 @@ Pose = Annotated[
     tuple[Number, ...],
     Several("a pose [x, y, heading], a list of 3 numbers", at_least=3, at_most=4),
 ]
-Polygon = Annotated[tuple[Point, ...], Several("a list of at least 3 points [x, y]", at_least=3)]
-SHARP = "an angle between 0 and pi / 2, 1.5708"
 Seconds = Annotated[Positive | Literal["free"], Need("a positive number of seconds, or free")]
 
 
-def _list_of_numbers(value: Any, info: ValidationInfo) -> Any:
-    names = (info.context or {}).get("control_names", ())
+def _names(info: ValidationInfo, kind: str) -> tuple[str, ...]:
+    names: tuple[str, ...] = (info.context or {}).get(kind, ())
+    return names
+
+
+def _listed(value: Any, names: tuple[str, ...]) -> Any:
     if not isinstance(value, list) or (names and len(value) != len(names)):
         count = f"{len(names)} numbers ({', '.join(names)})" if names else "numbers"
         raise need(f"a list of {count}")
     return value
 
 
-Control = Annotated[tuple[Number, ...], BeforeValidator(_list_of_numbers)]
+def _controls(value: Any, info: ValidationInfo) -> Any:
+    return _listed(value, _names(info, "control_names"))
 
 
-def _one_or_many(value: Any) -> str:
-    return "<many>" if isinstance(value, list) else "<one>"
+def _states(value: Any, info: ValidationInfo) -> Any:
+    return _listed(value, _names(info, "reduced_names"))
 
 
-class Shape(Part):
-    """A rigid shape in the frame of the vehicle: rectangle, polygon or disc."""
-
-    one_of: ClassVar = ("rectangle_m", "polygon_m", "disc_m")
-    goes_with: ClassVar = {"reference_m": ("rectangle_m",)}
-
-    rectangle_m: (
-        Annotated[
-            tuple[Positive, Positive],
-            Several("[length, width], two positive numbers", at_least=2, at_most=2),
-        ]
-        | None
-    ) = Field(None, description="[length, width], ahead and aside")
-    reference_m: Point | None = Field(
-        None, description="where the pose sits in the rectangle, from its centre: [ahead, left]"
-    )
-    polygon_m: Polygon | None = Field(None, description="corners [x, y]")
-    disc_m: Positive | None = Field(None, description="radius of a disc around the pose")
+Control = Annotated[tuple[Number, ...], BeforeValidator(_controls)]
+State = Annotated[tuple[Number, ...], BeforeValidator(_states)]
+Numbers = Annotated[tuple[Number, ...], Several("a list of numbers", at_least=0)]
 
 
-Footprint = Annotated[
-    Annotated[Shape, Tag("<one>")]
-    | Annotated[
-        tuple[Shape, ...],
-        Several("a shape or a list of at least one shape", at_least=1),
-        Tag("<many>"),
-    ],
-    Discriminator(_one_or_many),
-]
-
-
-class UnicyclePart(Part):
-    """A robot that drives ahead and turns on the spot; control [v, omega]."""
-
-    model: Literal["unicycle"] = Field(description="unicycle")
-    max_speed_m_s: Positive | None = Field(None, description="left out: no limit")
-    max_turn_rate_rad_s: Positive | None = Field(None, description="left out: no limit")
-    footprint: Footprint | None = Field(None, description="shape of the body")
-
-
-class CarPart(Part):
-    """A car that rolls without slip, its pose on the rear axle; control [v, steering]."""
-
-    model: Literal["car"] = Field(description="car")
-    wheelbase_m: Positive = Field(description="distance of the axles, a positive number")
-    max_steering_rad: (
-        Annotated[float, Strict(), AllowInfNan(False), Gt(0), Lt(math.pi / 2), Need(SHARP)] | None
-    ) = Field(None, description="left out: no limit")
-    max_speed_m_s: Positive | None = Field(None, description="left out: no limit")
-    footprint: Footprint | None = Field(None, description="shape of the body")
-
-
-def _check_model(value: Any) -> Any:
-    if not isinstance(value, dict):
-        raise need("a mapping with the key model")
-    if "model" not in value:
-        what = f"one of {', '.join(MODELS)}"
-        raise PydanticCustomError("missing_key", "", {"key": "model", "what": what})
-    if value["model"] not in MODELS:
-        later = " (it is not in this version)" if value["model"] in LATER_MODELS else ""
-        what = f"one of {', '.join(MODELS)}{later}"
-        raise PydanticCustomError("at_key", "", {"key": "model", "need": what})
-    return value
-
-
-def _model_of(value: Any) -> str:
-    model = value["model"] if isinstance(value, dict) else value.model
-    return f"<{model}>"
-
-
-VehiclePart = Annotated[
-    Annotated[UnicyclePart, Tag("<unicycle>")] | Annotated[CarPart, Tag("<car>")],
-    Discriminator(_model_of),
-    BeforeValidator(_check_model),
-]
-
-
-class NamedControl(Part):
-    """One trim of a kinematic vehicle: a name and a constant control."""
+class NamedTrim(Part):
+    """One trim: a name, and what holds it; what is left out follows from the rest being steady."""
 
     name: Name = Field(description="a name that no other trim has")
-    control: Control = Field(description="unicycle: [v, omega]; car: [v, steering]")
+    control: Control | None = Field(
+        None, description="constant control; unicycle: [v, omega]; car: [v, steering]"
+    )
+    state: State | None = Field(
+        None, description="reduced state of a vehicle that has one; second_order_car: [v, steering]"
+    )
 
 
 class Axis(Part):
@@ -178,25 +108,52 @@ class Axis(Part):
 
 
 class Grid(Part):
-    """One trim for every combination of control values."""
+    """One trim for every combination of values: of controls, or of speeds and what else is steady.
 
-    control: Annotated[
-        tuple[Axis, ...], Several("a list with one axis per control", at_least=1)
-    ] = Field(description="one axis {min, max, step or count} per control")
+    The axes of a kinematic vehicle are those of its control. Any other vehicle has axes by name:
+    of its body velocity, its reduced state or its control; the rest is solved for.
+    """
+
+    control: (
+        Annotated[tuple[Axis, ...], Several("a list with one axis per control", at_least=1)] | None
+    ) = Field(None, description="one axis {min, max, step or count} per control")
+    speed_m_s: Axis | None = Field(None, description="axis of the speed ahead")
+    lateral_speed_m_s: Axis | None = Field(None, description="axis of the speed to the left")
+    turn_rate_rad_s: Axis | None = Field(None, description="axis of the turn rate")
+    climb_m_s: Axis | None = Field(None, description="axis of the speed upwards")
+    steering_rad: Axis | None = Field(None, description="axis of the steering angle")
+    max_lateral_acceleration_m_s2: Positive | None = Field(
+        None, description="greatest speed times turn rate of a trim; left out: no limit"
+    )
+    leave_out: bool = Field(
+        False, description="true: points without a trim are left out, not refused"
+    )
+
+
+class ManeuversPart(Part):
+    """How trims of a grid are joined, where that needs no solver."""
+
+    pairs: Annotated[Literal["all", "neighbours"], Need("all or neighbours")] = Field(
+        "neighbours", description="all, or neighbours: at most one level apart in every axis"
+    )
+    late: bool = Field(False, description="also what is as quick but changes late")
+    strokes_m: Numbers = Field((), description="lengths from rest to rest, negative in reverse")
+    turns_rad: Numbers = Field((), description="turns on the spot, from rest to rest")
 
 
 class AutomatonPart(Part):
     """The library of trims: listed, a grid, a file, or a named one."""
 
     one_of: ClassVar = ("trims", "grid", "file", "preset")
+    goes_with: ClassVar = {"maneuvers": ("trims", "grid")}
 
     trims: (
-        Annotated[tuple[NamedControl, ...], Several("a list of at least one trim", at_least=1)]
-        | None
-    ) = Field(None, description="trims, each {name, control}")
-    grid: Grid | None = Field(None, description="all combinations of control values")
+        Annotated[tuple[NamedTrim, ...], Several("a list of at least one trim", at_least=1)] | None
+    ) = Field(None, description="trims, each {name, control or state}")
+    grid: Grid | None = Field(None, description="all combinations of values")
     file: Name | None = Field(None, description="library file, relative to this file")
     preset: Name | None = Field(None, description="name of a built-in library")
+    maneuvers: ManeuversPart | None = Field(None, description="how trims are joined")
 
 
 class Start(Part):
@@ -226,7 +183,7 @@ Goals = Annotated[
         Several("a goal or a list of at least one goal", at_least=1),
         Tag("<many>"),
     ],
-    Discriminator(_one_or_many),
+    Discriminator(one_or_many),
 ]
 
 

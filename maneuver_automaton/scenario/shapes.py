@@ -25,13 +25,12 @@ from maneuver_automaton.formats.nav2_map import load_nav2_map
 from maneuver_automaton.formats.polygons import simple_polygon
 from maneuver_automaton.formats.statement import MapFile
 from maneuver_automaton.formats.yaml_source import Document, Where
-from maneuver_automaton.scenario import schema
+from maneuver_automaton.scenario import schema, vehicle_parts
+from maneuver_automaton.scenario.vehicle_parts import Footprint
 
 
-def footprint_of(
-    document: Document, part: schema.Shape | tuple[schema.Shape, ...] | None
-) -> tuple[Shape, ...]:
-    """The body of a vehicle.
+def footprint_of(document: Document, part: Footprint | None, *, key: str) -> tuple[Shape, ...]:
+    """The body of a vehicle, or of what it carries, that stands at this key.
 
     Raises
     ------
@@ -40,8 +39,8 @@ def footprint_of(
     """
     if part is None:
         return ()
-    where: Where = ("vehicle", "footprint")
-    if isinstance(part, schema.Shape):
+    where: Where = ("vehicle", key)
+    if isinstance(part, vehicle_parts.Shape):
         return (_body_part(document, part, where),)
     return tuple(_body_part(document, one, (*where, k)) for k, one in enumerate(part))
 
@@ -149,7 +148,7 @@ def stated_obstacle(obstacle: AnyObstacle, maps: Sequence[MapFile], folder: Path
     if isinstance(obstacle, OccupancyMap):
         for file in maps:
             if file.map is obstacle:
-                path = _relative(file.path, folder)
+                path = relative(file.path, folder)
                 return {"map": path} | ({"unknown": "free"} if file.unknown == "free" else {})
         raise ValueError(
             f"obstacles: a scenario file states a map by its file, and {obstacle.name!r} has none; "
@@ -164,7 +163,7 @@ def stated_obstacle(obstacle: AnyObstacle, maps: Sequence[MapFile], folder: Path
     return entry
 
 
-def _body_part(document: Document, part: schema.Shape, where: Where) -> Shape:
+def _body_part(document: Document, part: vehicle_parts.Shape, where: Where) -> Shape:
     if part.rectangle_m is not None:
         reference = np.array(part.reference_m or (0.0, 0.0))
         return Box(part.rectangle_m, 0.0 - reference)
@@ -232,13 +231,14 @@ def _stated_shape(shape: Shape) -> dict[str, Any]:
     if isinstance(shape, Disc):
         return {"disc_m": {"center": shape.center.tolist(), "radius": float(shape.radius)}}
     if isinstance(shape, Box):
-        heading = {"heading_rad": float(shape.heading)} if shape.heading else {}
+        plain = str(shape.heading) == "0.0"  # -0.0 is not
+        heading = {} if plain else {"heading_rad": float(shape.heading)}
         return {"box_m": {"center": shape.center.tolist(), "size": shape.size.tolist(), **heading}}
     holes = {"holes_m": [ring.tolist() for ring in shape.holes]} if shape.holes else {}
     return {"polygon_m": shape.corners.tolist(), **holes}
 
 
-def _relative(path: Path, folder: Path) -> str:
+def relative(path: Path, folder: Path) -> str:
     """The path as seen from a folder, with the slashes of every system."""
     try:
         return Path(os.path.relpath(path, folder)).as_posix()

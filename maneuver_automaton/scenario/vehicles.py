@@ -2,29 +2,79 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Mapping
 from typing import Any
 
-from maneuver_automaton.models import Car, Model, Unicycle
-from maneuver_automaton.scenario.schema import MODELS, CarPart, UnicyclePart
+from maneuver_automaton.models import (
+    Car,
+    CarWithTrailer,
+    Helicopter,
+    Hovercraft,
+    Model,
+    SecondOrderCar,
+    SecondOrderUnicycle,
+    SingleTrack,
+    Unicycle,
+)
+from maneuver_automaton.scenario.checks import Part
+from maneuver_automaton.scenario.vehicle_parts import MODELS, PARTS, CarWithTrailerPart, Footprint
 
-
-def unicycle_of(part: UnicyclePart) -> Unicycle:
-    """The model that a file describes."""
-    return Unicycle(max_speed=part.max_speed_m_s, max_turn_rate=part.max_turn_rate_rad_s)
-
-
-def car_of(part: CarPart) -> Car:
-    """The model that a file describes."""
-    return Car(
-        wheelbase=part.wheelbase_m,
-        max_steering=part.max_steering_rad,
-        max_speed=part.max_speed_m_s,
+UNITS = (
+    "m",
+    "rad",
+    "m_s",
+    "rad_s",
+    "m_s2",
+    "rad_s2",
+    "per_s",
+    "per_rad",
+    "kg",
+    "kg_m2",
+    "n",
+    "n_m",
+    "n_s_m",
+    "n_m_s",
+)
+KINDS: Mapping[str, Any] = {
+    kind.name: kind
+    for kind in (
+        Unicycle,
+        Car,
+        SecondOrderUnicycle,
+        SecondOrderCar,
+        CarWithTrailer,
+        SingleTrack,
+        Hovercraft,
+        Helicopter,
     )
+}
 
 
-def model_of(part: UnicyclePart | CarPart) -> Unicycle | Car:
-    """The model that a file describes."""
-    return unicycle_of(part) if isinstance(part, UnicyclePart) else car_of(part)
+def _keys(part: type[Part], kind: Any) -> dict[str, str]:
+    """Key of the file by parameter of the model: the same, with its unit."""
+    keys = {}
+    for field in dataclasses.fields(kind):
+        names = (field.name, *(f"{field.name}_{unit}" for unit in UNITS))
+        (keys[field.name],) = (name for name in names if name in part.model_fields)
+    return keys
+
+
+KEYS = {name: _keys(part, KINDS[name]) for name, part in zip(MODELS, PARTS, strict=True)}
+
+
+def model_of(part: Any) -> Model:
+    """The model that a file describes, by its `VehiclePart`."""
+    given = {name: getattr(part, key) for name, key in KEYS[part.model].items()}
+    model: Model = KINDS[part.model](**{k: v for k, v in given.items() if v is not None})
+    return model
+
+
+def carried_of(part: Any) -> Mapping[str, Footprint]:
+    """Bodies of what a vehicle carries, as the file states them."""
+    if isinstance(part, CarWithTrailerPart) and part.trailer is not None:
+        return {"trailer": part.trailer}
+    return {}
 
 
 def described(model: Model) -> dict[str, Any]:
@@ -40,17 +90,7 @@ def described(model: Model) -> dict[str, Any]:
     >>> described(Car(wheelbase=2.5))
     {'model': 'car', 'wheelbase_m': 2.5}
     """
-    if isinstance(model, Unicycle):
-        keys = {
-            "max_speed_m_s": model.max_speed,
-            "max_turn_rate_rad_s": model.max_turn_rate,
-        }
-    elif isinstance(model, Car):
-        keys = {
-            "wheelbase_m": model.wheelbase,
-            "max_steering_rad": model.max_steering,
-            "max_speed_m_s": model.max_speed,
-        }
-    else:
+    if model.name not in KINDS or not isinstance(model, KINDS[model.name]):
         raise ValueError(f"vehicle: a file cannot state {model.name!r}, only {', '.join(MODELS)}")
-    return {"model": model.name} | {k: float(v) for k, v in keys.items() if v is not None}
+    values = {key: getattr(model, name) for name, key in KEYS[model.name].items()}
+    return {"model": model.name} | {k: float(v) for k, v in values.items() if v is not None}

@@ -15,7 +15,12 @@ from maneuver_automaton.formats.yaml_source import scalar
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.scenario.scenario import Scenario
 from maneuver_automaton.scenario.schema import ScenarioFile
-from maneuver_automaton.scenario.shapes import stated_obstacle, stated_zone
+from maneuver_automaton.scenario.shapes import (
+    relative,
+    stated_footprint,
+    stated_obstacle,
+    stated_zone,
+)
 from maneuver_automaton.scenario.vehicles import described
 
 _PLAIN = re.compile(r"[A-Za-z][A-Za-z0-9_ ()-]*[A-Za-z0-9_)]|[A-Za-z]")
@@ -25,15 +30,16 @@ _HARD = re.compile(r"[^\x20-\x7e\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-
 def to_yaml(scenario: Scenario, *, folder: Path | None = None) -> str:
     """The scenario as a file that reads back to the same problem, to the last bit.
 
-    The trims are listed, whatever named them before. A map stays a reference to its file, as seen
-    from `folder`, where the file will be; None: that of the scenario's own file. The names of
+    The trims of a kinematic vehicle are listed, whatever named them before; the automaton of any
+    other is written as its file states it. Maps and libraries stay references to their files, as
+    seen from `folder`, where the file will be; None: that of the scenario's own file. The names of
     obstacles are not written.
 
     Raises
     ------
     ValueError
-        If a scenario file cannot state it: another model or cost, maneuvers, a reduced state, a
-        map without a file, a body that is a disc beside the pose.
+        If a scenario file cannot state it: another model or cost, maneuvers that are from no file,
+        a map without a file, a body that is a disc beside the pose.
 
     Examples
     --------
@@ -59,6 +65,9 @@ def to_yaml(scenario: Scenario, *, folder: Path | None = None) -> str:
     if scenario.footprint:
         shapes = list(scenario.footprint)
         vehicle["footprint"] = shapes if len(shapes) > 1 else shapes[0]
+    for name, body in problem.parts.items():
+        stated = list(stated_footprint(body))
+        vehicle[name] = stated if len(stated) > 1 else stated[0]
     bounds = {name: getattr(problem.bounds, name) for name in ("x", "y", "z")}
     goals = [_goal(goal) for goal in problem.goals]
     if folder is None:
@@ -67,7 +76,7 @@ def to_yaml(scenario: Scenario, *, folder: Path | None = None) -> str:
         "schema": 1,
         "name": scenario.name,
         "vehicle": vehicle,
-        "automaton": {"trims": _trims(problem.automaton)},
+        "automaton": _automaton(scenario, folder),
         "start": _start(problem),
         "goal": goals if len(goals) > 1 else goals[0],
         "cost": _cost(problem.cost),
@@ -109,9 +118,20 @@ def _without_null(schema: Any) -> Any:
     return kept
 
 
-def _trims(automaton: Automaton) -> list[dict[str, Any]]:
-    if automaton.maneuvers or automaton.model.reduced_names:
+def _automaton(scenario: Scenario, folder: Path) -> dict[str, Any]:
+    """Trims of a kinematic vehicle one by one; else what the scenario's own file states."""
+    automaton = scenario.problem.automaton
+    if not automaton.maneuvers and not automaton.model.reduced_names:
+        return {"trims": _trims(automaton)}
+    if scenario.stated is None:
         raise ValueError("automaton: a scenario file cannot list maneuvers, save a library instead")
+    entry = scenario.stated.model_dump(exclude_none=True, exclude_defaults=True)
+    if scenario.stated.file is not None and scenario.path is not None:
+        entry["file"] = relative(scenario.path.parent / scenario.stated.file, folder)
+    return entry
+
+
+def _trims(automaton: Automaton) -> list[dict[str, Any]]:
     for trim in automaton.trims:
         if math.isfinite(trim.max_duration):
             raise ValueError(f"trim {trim.name!r}: a scenario file cannot state its max_duration")
@@ -167,9 +187,10 @@ def _given(**entries: Any) -> dict[str, Any]:
 
 def _block(key: str, value: Any) -> str:
     """One key of the file, lists of mappings over several lines."""
-    if key == "automaton":
+    if key == "automaton" and "trims" in value:
         rows = "".join(f"    - {_flow(row)}\n" for row in value["trims"])
-        return f"automaton:\n  trims:\n{rows}"
+        rest = "".join(f"  {k}: {_flow(v)}\n" for k, v in value.items() if k != "trims")
+        return f"automaton:\n  trims:\n{rows}{rest}"
     if isinstance(value, list):
         return f"{key}:\n" + "".join(f"  - {_flow(row)}\n" for row in value)
     return f"{key}: {_flow(value)}\n"

@@ -15,6 +15,15 @@ TOP = (
     "schema, name, vehicle, automaton, start, goal, cost, horizon, bounds_m, margin_m, obstacles, "
     "zones, search, receding_horizon"
 )
+MODELS = (
+    "unicycle, car, second_order_unicycle, second_order_car, car_with_trailer, single_track, "
+    "hovercraft, helicopter"
+)
+SECOND_ORDER = (
+    "{model: second_order_car, wheelbase_m: 2.8, max_steering_rad: 0.75, max_speed_m_s: 2.5, "
+    "max_acceleration_m_s2: 1.0, max_steering_rate_rad_s: 0.5}"
+)
+AXES = "speed_m_s, lateral_speed_m_s, turn_rate_rad_s, climb_m_s, steering_rad"
 LAUGHS = "".join(
     f"l{i}: &l{i} [{', '.join([f'*l{i - 1}'] * 9) if i else 'lol'}]\n" for i in range(9)
 )
@@ -48,6 +57,11 @@ def two_axes(text: str) -> str:
 def car(scenario: str) -> str:
     """A scenario with a car in place of the unicycle."""
     return scenario.replace("{model: unicycle}", "{model: car, wheelbase_m: 2.5}")
+
+
+def inertia(scenario: str) -> str:
+    """A scenario with a second-order car in place of the unicycle."""
+    return scenario.replace("{model: unicycle}", SECOND_ORDER)
 
 
 def vehicle(text: str) -> str:
@@ -84,7 +98,7 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
     "unknown key of a trim": (
         but("{name: spin, control: [0.0, 1.0]}", "{name: spin, contrl: [0.0, 1.0]}"),
         ":8: automaton.trims[2].contrl: unknown key; did you mean 'control'? Known "
-        "keys: name, control",
+        "keys: name, control, state",
     ),
     "missing schema": (
         but("schema: 1\nname: A case", "name: A case"),
@@ -203,7 +217,8 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
     ),
     "unknown preset": (
         automaton("preset: dubbins"),
-        ":5: automaton.preset: got 'dubbins', need one of table2, reeds_shepp, dubins",
+        ":5: automaton.preset: got 'dubbins', need one of table2, reeds_shepp, dubins, parking, "
+        "road",
     ),
     "preset of another vehicle": (
         car(automaton("preset: table2")),
@@ -220,24 +235,19 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
     ),
     "unknown model": (
         vehicle("{model: tank}"),
-        ":3: vehicle.model: got 'tank', need one of unicycle, car",
-    ),
-    "later model": (
-        vehicle("{model: hovercraft}"),
-        ":3: vehicle.model: got 'hovercraft', need one of unicycle, car (it is not "
-        "in this version)",
+        ":3: vehicle.model: got 'tank', need one of " + MODELS,
     ),
     "no model": (
         vehicle("{}"),
-        ":3: vehicle: the key 'model' is missing, need model: one of unicycle, car",
+        ":3: vehicle: the key 'model' is missing, need model: one of " + MODELS,
     ),
     "model nothing": (
         vehicle("{model: }"),
-        ":3: vehicle.model: got nothing, need one of unicycle, car",
+        ":3: vehicle.model: got nothing, need one of " + MODELS,
     ),
     "model list": (
         vehicle("{model: [unicycle]}"),
-        ":3: vehicle.model: got ['unicycle'], need one of unicycle, car",
+        ":3: vehicle.model: got ['unicycle'], need one of " + MODELS,
     ),
     "car without wheelbase": (
         vehicle("{model: car}"),
@@ -580,6 +590,144 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
     "grid missing max": (
         two_axes("{min: 0, step: 1}"),
         ":5: automaton.grid.control[0]: the key 'max' is missing, need max: largest value",
+    ),
+    "state of a kinematic vehicle": (
+        but("{name: spin, control: [0.0, 1.0]}", "{name: spin, state: [0.0, 1.0]}"),
+        ":8: automaton.trims[2].state: the unicycle has no reduced state, need no such key",
+    ),
+    "trim of no control": (
+        but("{name: spin, control: [0.0, 1.0]}", "{name: spin}"),
+        ":8: automaton.trims[2]: the key 'control' is missing, need control: [speed, turn_rate]",
+    ),
+    "trim of no state": (
+        inertia(automaton("trims: [{name: rest}]")),
+        ":5: automaton.trims[0]: needs state: [speed, steering] or "
+        "control: [acceleration, steering_rate]",
+    ),
+    "state too short": (
+        inertia(automaton("trims: [{name: rest, state: [0]}]")),
+        ":5: automaton.trims[0].state: got [0], need a list of 2 numbers (speed, steering)",
+    ),
+    "state beyond its limit": (
+        inertia(automaton("trims: [{name: fast, state: [3.0, 0.0]}]")),
+        ":5: automaton.trims[0].state: is no trim of the second_order_car: speed would be 3.0000, "
+        "0.5 beyond its limit 2.5000",
+    ),
+    "control that is no trim": (
+        inertia(automaton("trims: [{name: up, control: [1.0, 0.0]}]")),
+        ":5: automaton.trims[0].control: is no trim of the second_order_car: no steady motion: the "
+        "rate of speed stays off by 1",
+    ),
+    "state twice": (
+        inertia(automaton("trims: [{name: a, state: [0, 0]}, {name: a, state: [1, 0]}]")),
+        ":5: automaton.trims[1].name: got 'a', the name of another trim in line 5; need a new name",
+    ),
+    "grid of controls with inertia": (
+        inertia(grid(f"[{UNIT}, {UNIT}]")),
+        ":5: automaton.grid.control: is for vehicles without a reduced state; the "
+        f"second_order_car needs axes such as {AXES}",
+    ),
+    "grid of speeds without inertia": (
+        automaton(f"grid: {{control: [{UNIT}, {UNIT}], speed_m_s: {UNIT}}}"),
+        ":5: automaton.grid.speed_m_s: is for vehicles with a reduced state; the unicycle needs "
+        "control, a list with one axis per control",
+    ),
+    "grid of no control": (
+        automaton("grid: {}"),
+        ":5: automaton.grid: the key 'control' is missing, need one axis per control",
+    ),
+    "grid of no axis": (
+        inertia(automaton("grid: {leave_out: true}")),
+        f":5: automaton.grid: got no axis, need some of {AXES}",
+    ),
+    "grid of what the vehicle has not": (
+        inertia(automaton(f"grid: {{climb_m_s: {UNIT}}}")),
+        ":5: automaton.grid: the second_order_car has no 'climb', need speed, steering, "
+        "acceleration, steering_rate, lateral_speed, turn_rate",
+    ),
+    "grid with a point out of reach": (
+        inertia(
+            automaton(
+                "grid: {speed_m_s: {min: 0, max: 3, count: 2}, "
+                "steering_rad: {min: 0, max: 0, count: 1}}"
+            )
+        ),
+        ":5: automaton.grid: 1 of 2 points have no trim, such as 'speed 3, steering 0': speed "
+        "would be 3.0000, 0.5 beyond its limit 2.5000",
+    ),
+    "grid of states too large": (
+        inertia(
+            automaton(
+                "grid: {speed_m_s: {min: 0, max: 1, step: 0.001}, "
+                "steering_rad: {min: 0, max: 0.5, step: 0.1}}"
+            )
+        ),
+        ":5: automaton.grid: got 6006 trims, need at most 2000",
+    ),
+    "grid with an axis upside down": (
+        inertia(automaton("grid: {speed_m_s: {min: 1, max: 0, count: 2}}")),
+        ":5: automaton.grid.speed_m_s: got min 1 above max 0, need min <= max",
+    ),
+    "maneuvers without inertia": (
+        automaton("preset: table2").replace(
+            "  preset", f"  grid: {{control: [{UNIT}, {UNIT}]}}\n  maneuvers: {{}}\n#"
+        ),
+        ":6: automaton.maneuvers: is for vehicles whose control is the rate of the reduced state, "
+        "not for the unicycle; maneuvers of others come from a library file, or there are none",
+    ),
+    "maneuvers of a preset": (
+        inertia(automaton("preset: parking\n  maneuvers: {late: true}")),
+        ":6: automaton.maneuvers: goes with trims or grid only",
+    ),
+    "unknown pairs": (
+        inertia(automaton("trims: [{name: rest, state: [0, 0]}]\n  maneuvers: {pairs: some}")),
+        ":6: automaton.maneuvers.pairs: got 'some', need all or neighbours",
+    ),
+    "strokes of a length that is none": (
+        inertia(automaton("trims: [{name: rest, state: [0, 0]}]\n  maneuvers: {strokes_m: [0]}")),
+        ":6: automaton.maneuvers: stroke: got 0.0, but the speed of the second_order_car is within "
+        "[-2.5, 2.5]; need a way that is not 0 and leads there",
+    ),
+    "preset for inertia": (
+        automaton("preset: parking"),
+        ":5: automaton.preset: got 'parking', which is for second_order_unicycle and "
+        "second_order_car, not the unicycle",
+    ),
+    "preset against inertia": (
+        inertia(automaton("preset: dubins")),
+        ":5: automaton.preset: got 'dubins', which is for vehicles without inertia, not the "
+        "second_order_car",
+    ),
+    "speeds upside down": (
+        inertia(SCENARIO).replace("max_speed_m_s: 2.5", "max_speed_m_s: 2.5, min_speed_m_s: 3"),
+        ":3: vehicle: second_order_car: min_speed must be less than max_speed 2.5 m/s, got 3.0 m/s",
+    ),
+    "no acceleration": (
+        inertia(SCENARIO).replace("max_acceleration_m_s2: 1.0, ", ""),
+        ":3: vehicle: the key 'max_acceleration_m_s2' is missing, need max_acceleration_m_s2: a "
+        "positive number",
+    ),
+    "trailer of a car without one": (
+        vehicle("{model: car, wheelbase_m: 2.5, trailer: {rectangle_m: [1, 1]}}"),
+        ":3: vehicle.trailer: unknown key; did you mean 'footprint'? Known keys: model, "
+        "wheelbase_m, max_steering_rad, max_speed_m_s, footprint",
+    ),
+    "trailer that is no shape": (
+        vehicle(
+            "{model: car_with_trailer, wheelbase_m: 0.25, hitch_length_m: 0.5, "
+            "max_steering_rad: 1.0, max_speed_m_s: 0.5, trailer: {disc_m: -1}}"
+        ),
+        ":3: vehicle.trailer.disc_m: got -1, need a positive number",
+    ),
+    "unknown start trim with inertia": (
+        inertia(automaton("preset: parking")).replace(
+            "start: {pose: [0.0, 0.0, 0.0]}", "start: {pose: [0.0, 0.0, 0.0], trim: rest}"
+        ),
+        ":6: start.trim: no trim 'rest' among speed -2.5, steering -0.75, "
+        "speed -2.5, steering -0.375, speed -2.5, steering 0, speed -2.5, steering 0.375, "
+        "speed -2.5, steering 0.75, speed -1.25, steering -0.75, speed -1.25, steering -0.375, "
+        "speed -1.25, steering 0, speed -1.25, steering 0.375, speed -1.25, steering 0.75, "
+        "speed -0.5, steering -0.75, speed -0.5, steering -0.375, ...",
     ),
     "empty trims": (
         automaton("trims: []"),

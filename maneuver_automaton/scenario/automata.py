@@ -1,0 +1,243 @@
+"""The automaton of a scenario file: listed, gridded, from a file or by name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.automaton.library import load_library
+from maneuver_automaton.formats.yaml_source import Document, Where, shown
+from maneuver_automaton.models import Model
+from maneuver_automaton.primitives import Trim, trims_of
+from maneuver_automaton.primitives.bang_bang import has_limited_rates
+from maneuver_automaton.primitives.quickest import quickest_maneuvers
+from maneuver_automaton.scenario.places import at
+from maneuver_automaton.scenario.presets import preset_automaton
+from maneuver_automaton.scenario.schema import AutomatonPart, Axis, Grid, ManeuversPart, NamedTrim
+from maneuver_automaton.scenario.vehicles import described
+
+MAX_GRID_TRIMS = 100_000
+MAX_STEADY_TRIMS = 2_000  # of a grid that has to be solved for
+AXES = {  # of the grid of a vehicle with a reduced state
+    "speed_m_s": "speed",
+    "lateral_speed_m_s": "lateral_speed",
+    "turn_rate_rad_s": "turn_rate",
+    "climb_m_s": "climb",
+    "steering_rad": "steering",
+}
+WHERE: Where = ("automaton",)
+
+
+def automaton_of(
+    document: Document, part: AutomatonPart, model: Model, *, folder: Path
+) -> Automaton:
+    """The automaton that a file asks for; the paths in it are relative to `folder`.
+
+    Raises
+    ------
+    InvalidScenario
+        If what it asks for is none of this vehicle.
+    """
+    if part.maneuvers is not None and not has_limited_rates(model):
+        raise document.error(
+            (*WHERE, "maneuvers"),
+            f"is for vehicles whose control is the rate of the reduced state, not for the "
+            f"{model.name}; maneuvers of others come from a library file, or there are none",
+        )
+    if part.file is not None:
+        return _from_library(document, folder / part.file, model)
+    if part.preset is not None:
+        with at(document, (*WHERE, "preset")):
+            return preset_automaton(part.preset, model)
+    if not model.reduced_names:
+        if part.trims is not None:
+            return _listed(document, part.trims, model)
+        assert part.grid is not None
+        return _grid_of_controls(document, part.grid, model)
+    if part.trims is not None:
+        trims = tuple(_steady(document, k, one, model) for k, one in enumerate(part.trims))
+        _check_names(document, part.trims)
+        return _joined(document, model, trims, part.maneuvers)
+    assert part.grid is not None
+    return _grid(document, part.grid, model, part.maneuvers or ManeuversPart())
+
+
+def _listed(document: Document, trims: tuple[NamedTrim, ...], model: Model) -> Automaton:
+    """Trims of a kinematic vehicle, by their controls."""
+    _check_names(document, trims)
+    controls: dict[str, Any] = {}
+    for k, trim in enumerate(trims):
+        where = (*WHERE, "trims", k)
+        if trim.state is not None:
+            raise document.error(
+                (*where, "state"), f"the {model.name} has no reduced state, need no such key"
+            )
+        if trim.control is None:
+            raise document.error(where, f"the key 'control' is missing, need {_need(model)}")
+        controls[trim.name] = trim.control
+        with at(document, (*where, "control")):
+            Automaton.of_controls(model, {trim.name: trim.control})
+    return Automaton.of_controls(model, controls)
+
+
+def _check_names(document: Document, trims: tuple[NamedTrim, ...]) -> None:
+    names = [trim.name for trim in trims]
+    for k, name in enumerate(names):
+        if name in names[:k]:
+            first = document.line_of((*WHERE, "trims", names.index(name)))
+            raise document.error(
+                (*WHERE, "trims", k, "name"),
+                f"got {name!r}, the name of another trim in line {first}; need a new name",
+            )
+
+
+def _need(model: Model) -> str:
+    names = f"control: [{', '.join(model.control_names)}]"
+    state = f"state: [{', '.join(model.reduced_names)}] or " if model.reduced_names else ""
+    return state + names
+
+
+def _steady(document: Document, k: int, part: NamedTrim, model: Model) -> Trim:
+    """The trim with a reduced state, a control, or both; what is not given is solved for."""
+    where = (*WHERE, "trims", k)
+    if part.state is None and part.control is None:
+        raise document.error(where, f"needs {_need(model)}")
+    given = dict(zip(model.reduced_names, part.state or (), strict=False))
+    given |= dict(zip(model.control_names, part.control or (), strict=False))
+    found = trims_of(model, {name: [value] for name, value in given.items()})
+    if found.missing:
+        key = "state" if part.state is not None else "control"
+        reason = found.missing[0].reason
+        raise document.error((*where, key), f"is no trim of the {model.name}: {reason}")
+    (trim,) = found.trims
+    return Trim(
+        name=part.name,
+        body_velocity=trim.body_velocity,
+        control=trim.control,
+        reduced_state=trim.reduced_state,
+    )
+
+
+def _joined(
+    document: Document, model: Model, trims: tuple[Trim, ...], part: ManeuversPart | None
+) -> Automaton:
+    """The trims, with the maneuvers that need no solver."""
+    if not has_limited_rates(model):
+        return Automaton(model, trims)
+    part = ManeuversPart() if part is None else part
+    with at(document, (*WHERE, "maneuvers")):
+        maneuvers = quickest_maneuvers(
+            model,
+            trims,
+            pairs=part.pairs,
+            late=part.late,
+            strokes=part.strokes_m,
+            turns=part.turns_rad,
+        )
+    return Automaton(model, trims, maneuvers)
+
+
+def _grid(document: Document, grid: Grid, model: Model, part: ManeuversPart) -> Automaton:
+    """Steady trims of a vehicle with a reduced state."""
+    where: Where = (*WHERE, "grid")
+    if grid.control is not None:
+        raise document.error(
+            (*where, "control"),
+            f"is for vehicles without a reduced state; the {model.name} needs axes such as "
+            f"{', '.join(AXES)}",
+        )
+    axes = {key: axis for key in AXES if (axis := getattr(grid, key)) is not None}
+    values = _axes(document, {(*where, key): axis for key, axis in axes.items()})
+    if not axes:
+        raise document.error(where, f"got no axis, need some of {', '.join(AXES)}")
+    count = math.prod(len(one) for one in values)
+    if count > MAX_STEADY_TRIMS:
+        raise document.error(where, f"got {count:g} trims, need at most {MAX_STEADY_TRIMS}")
+    points = {AXES[key]: one for key, one in zip(axes, values, strict=True)}
+    with at(document, where):
+        return Automaton.of_model(
+            model,
+            points,
+            pairs=part.pairs,
+            late=part.late,
+            strokes=part.strokes_m,
+            turns=part.turns_rad,
+            max_lateral_acceleration=grid.max_lateral_acceleration_m_s2,
+            leave_out=grid.leave_out,
+        )
+
+
+def _grid_of_controls(document: Document, grid: Grid, model: Model) -> Automaton:
+    where: Where = (*WHERE, "grid", "control")
+    for key in grid.model_fields_set - {"control"}:
+        raise document.error(
+            (*where[:2], key),
+            f"is for vehicles with a reduced state; the {model.name} needs control, a list with "
+            "one axis per control",
+        )
+    names = model.control_names
+    if grid.control is None:
+        raise document.error(where[:2], "the key 'control' is missing, need one axis per control")
+    if len(grid.control) != len(names):
+        raise document.error(
+            where, f"got {len(grid.control)} axes, need {len(names)} ({', '.join(names)})"
+        )
+    axes = {(*where, k): axis for k, axis in enumerate(grid.control)}
+    for place, axis in axes.items():
+        _check_axis(document, place, axis)
+    count = math.prod(_n_values(axis) for axis in axes.values())
+    if count > MAX_GRID_TRIMS:
+        raise document.error(where, f"got {count:g} trims, need at most {MAX_GRID_TRIMS}")
+    with at(document, where):
+        return Automaton.of_grid(model, _axes(document, axes))
+
+
+def _axes(document: Document, axes: Mapping[Where, Axis]) -> list[list[float]]:
+    for place, axis in axes.items():
+        _check_axis(document, place, axis)
+        if _n_values(axis) > MAX_GRID_TRIMS:
+            raise document.error(
+                place, f"got {_n_values(axis):g} values, need at most {MAX_GRID_TRIMS}"
+            )
+    return [_values(axis) for axis in axes.values()]
+
+
+def _check_axis(document: Document, where: Where, axis: Axis) -> None:
+    if axis.min > axis.max:
+        raise document.error(where, f"got min {axis.min:g} above max {axis.max:g}, need min <= max")
+    if axis.count == 1 and axis.min < axis.max:
+        raise document.error((*where, "count"), "got 1 for two different ends, need at least 2")
+
+
+def _n_values(axis: Axis) -> int:
+    if axis.count is not None:
+        return axis.count
+    assert axis.step is not None
+    return int(min((axis.max - axis.min) / axis.step * (1.0 + 1e-12) + 1e-9, 1e12)) + 1
+
+
+def _values(axis: Axis) -> list[float]:
+    """The values of an axis, computed in decimals: 0.3 is 0.3 and the middle is 0."""
+    n, low = _n_values(axis), Decimal(repr(axis.min))
+    if axis.step is not None:
+        step = Decimal(repr(axis.step))
+    else:
+        step = (Decimal(repr(axis.max)) - low) / max(n - 1, 1)
+    return [float(low + k * step) for k in range(n)]
+
+
+def _from_library(document: Document, path: Path, model: Model) -> Automaton:
+    with at(document, (*WHERE, "file")):
+        automaton = load_library(path)
+        has, needs = described(automaton.model), described(model)
+        if has["model"] != needs["model"]:
+            raise ValueError(f"got a library for {shown(has)}, but the vehicle is {shown(needs)}")
+        keys = [key for key in (*has, *needs) if has.get(key) != needs.get(key)]
+        if keys:
+            (one, other) = ({key: what.get(key) for key in keys} for what in (has, needs))
+            raise ValueError(f"got a library for {shown(one)}, but the vehicle has {shown(other)}")
+    return automaton

@@ -1,0 +1,217 @@
+"""The vehicle of a scenario file as values: model, parameters with their units, body."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, ClassVar, Literal
+
+from annotated_types import Gt, Lt
+from pydantic import AllowInfNan, BeforeValidator, Discriminator, Field, Strict, Tag
+from pydantic_core import PydanticCustomError
+
+from maneuver_automaton.scenario.checks import (
+    Need,
+    NotNegative,
+    Number,
+    Part,
+    Point,
+    Polygon,
+    Positive,
+    Several,
+    need,
+    one_or_many,
+)
+
+SHARP = "an angle between 0 and pi / 2, 1.5708"
+Sharp = Annotated[float, Strict(), AllowInfNan(False), Gt(0), Lt(math.pi / 2), Need(SHARP)]
+
+
+class Shape(Part):
+    """A rigid shape in the frame of the vehicle: rectangle, polygon or disc."""
+
+    one_of: ClassVar = ("rectangle_m", "polygon_m", "disc_m")
+    goes_with: ClassVar = {"reference_m": ("rectangle_m",)}
+
+    rectangle_m: (
+        Annotated[
+            tuple[Positive, Positive],
+            Several("[length, width], two positive numbers", at_least=2, at_most=2),
+        ]
+        | None
+    ) = Field(None, description="[length, width], ahead and aside")
+    reference_m: Point | None = Field(
+        None, description="where the pose sits in the rectangle, from its centre: [ahead, left]"
+    )
+    polygon_m: Polygon | None = Field(None, description="corners [x, y]")
+    disc_m: Positive | None = Field(None, description="radius of a disc around the pose")
+
+
+Footprint = Annotated[
+    Annotated[Shape, Tag("<one>")]
+    | Annotated[
+        tuple[Shape, ...],
+        Several("a shape or a list of at least one shape", at_least=1),
+        Tag("<many>"),
+    ],
+    Discriminator(one_or_many),
+]
+
+
+class UnicyclePart(Part):
+    """A robot that drives ahead and turns on the spot; control [v, omega]."""
+
+    model: Literal["unicycle"] = Field(description="unicycle")
+    max_speed_m_s: Positive | None = Field(None, description="left out: no limit")
+    max_turn_rate_rad_s: Positive | None = Field(None, description="left out: no limit")
+    footprint: Footprint | None = Field(None, description="shape of the body")
+
+
+class CarPart(Part):
+    """A car that rolls without slip, its pose on the rear axle; control [v, steering]."""
+
+    model: Literal["car"] = Field(description="car")
+    wheelbase_m: Positive = Field(description="distance of the axles, a positive number")
+    max_steering_rad: Sharp | None = Field(None, description="left out: no limit")
+    max_speed_m_s: Positive | None = Field(None, description="left out: no limit")
+    footprint: Footprint | None = Field(None, description="shape of the body")
+
+
+class SecondOrderUnicyclePart(Part):
+    """A robot with inertia; state [v, omega], control their rates."""
+
+    model: Literal["second_order_unicycle"] = Field(description="second_order_unicycle")
+    max_speed_m_s: Positive = Field(description="a positive number")
+    max_turn_rate_rad_s: Positive = Field(description="a positive number")
+    max_acceleration_m_s2: Positive = Field(description="a positive number")
+    max_angular_acceleration_rad_s2: Positive = Field(description="a positive number")
+    min_speed_m_s: Number | None = Field(None, description="left out: as fast in reverse")
+    footprint: Footprint | None = Field(None, description="shape of the body")
+
+
+class SecondOrderCarPart(Part):
+    """A car with inertia, its pose on the rear axle; state [v, steering], control their rates."""
+
+    model: Literal["second_order_car"] = Field(description="second_order_car")
+    wheelbase_m: Positive = Field(description="distance of the axles, a positive number")
+    max_steering_rad: Sharp = Field(description=SHARP)
+    max_speed_m_s: Positive = Field(description="a positive number")
+    max_acceleration_m_s2: Positive = Field(description="a positive number")
+    max_steering_rate_rad_s: Positive = Field(description="a positive number")
+    min_speed_m_s: Number | None = Field(None, description="left out: as fast in reverse")
+    footprint: Footprint | None = Field(None, description="shape of the body")
+
+
+class CarWithTrailerPart(Part):
+    """A car that pulls a trailer; state [hitch], control [v, steering]."""
+
+    model: Literal["car_with_trailer"] = Field(description="car_with_trailer")
+    wheelbase_m: Positive = Field(description="distance of the axles, a positive number")
+    hitch_length_m: Positive = Field(description="from the hitch to the trailer's axle")
+    max_steering_rad: Sharp = Field(description=SHARP)
+    max_speed_m_s: Positive = Field(description="a positive number")
+    min_speed_m_s: Number | None = Field(None, description="left out: as fast in reverse")
+    max_hitch_rad: Positive | None = Field(None, description="left out: no limit")
+    footprint: Footprint | None = Field(None, description="shape of the car")
+    trailer: Footprint | None = Field(
+        None, description="shape of the trailer, seen from the middle of its axle"
+    )
+
+
+class SingleTrackPart(Part):
+    """A car on linear tyres; state [v, v aside, turn rate, steering]; left out: a BMW 320i."""
+
+    model: Literal["single_track"] = Field(description="single_track")
+    mass_kg: Positive | None = Field(None, description="a positive number")
+    inertia_kg_m2: Positive | None = Field(None, description="about the vertical")
+    front_m: Positive | None = Field(None, description="from the front axle to the pose")
+    rear_m: Positive | None = Field(None, description="from the rear axle to the pose")
+    height_m: Positive | None = Field(None, description="of the centre of gravity")
+    cornering_per_rad: Positive | None = Field(None, description="stiffness over load and friction")
+    friction: Positive | None = Field(None, description="of the tyres")
+    max_steering_rad: Sharp | None = Field(None, description=SHARP)
+    max_steering_rate_rad_s: Positive | None = Field(None, description="a positive number")
+    max_acceleration_m_s2: Positive | None = Field(None, description="a positive number")
+    min_speed_m_s: Positive | None = Field(None, description="from which the model holds")
+    max_speed_m_s: Positive | None = Field(None, description="a positive number")
+    max_lateral_speed_m_s: Positive | None = Field(None, description="left out: no limit")
+    max_turn_rate_rad_s: Positive | None = Field(None, description="left out: no limit")
+    footprint: Footprint | None = Field(None, description="shape of the body")
+
+
+class HovercraftPart(Part):
+    """A body on an air cushion; state [v, v aside, turn rate], control [force ahead, torque]."""
+
+    model: Literal["hovercraft"] = Field(description="hovercraft")
+    mass_kg: Positive = Field(description="a positive number")
+    inertia_kg_m2: Positive = Field(description="about the vertical, a positive number")
+    drag_n_s_m: Positive = Field(description="force per speed ahead, a positive number")
+    lateral_drag_n_s_m: Positive = Field(description="force per speed aside, a positive number")
+    turn_drag_n_m_s: Positive = Field(description="torque per turn rate, a positive number")
+    max_force_n: Positive = Field(description="ahead, a positive number")
+    max_torque_n_m: Positive = Field(description="a positive number")
+    min_force_n: Number | None = Field(None, description="left out: as strong in reverse")
+    max_speed_m_s: Positive | None = Field(None, description="left out: no limit")
+    max_lateral_speed_m_s: Positive | None = Field(None, description="left out: no limit")
+    max_turn_rate_rad_s: Positive | None = Field(None, description="left out: no limit")
+    footprint: Footprint | None = Field(None, description="shape of the body")
+
+
+class HelicopterPart(Part):
+    """A small helicopter; state [v, v aside, climb, turn rate, tilt, tilt aside]."""
+
+    model: Literal["helicopter"] = Field(description="helicopter")
+    max_speed_m_s: Positive = Field(description="a positive number")
+    max_lateral_speed_m_s: Positive = Field(description="a positive number")
+    max_climb_m_s: Positive = Field(description="up and down, a positive number")
+    max_turn_rate_rad_s: Positive = Field(description="a positive number")
+    max_tilt_rad: Sharp = Field(description=SHARP)
+    max_tilt_rate_rad_s: Positive = Field(description="a positive number")
+    max_climb_acceleration_m_s2: Positive = Field(description="less than gravity")
+    max_angular_acceleration_rad_s2: Positive = Field(description="a positive number")
+    drag_per_s: NotNegative | None = Field(None, description="over speed and mass; left out: 0")
+    min_speed_m_s: Number | None = Field(None, description="left out: as fast backwards")
+    gravity_m_s2: Positive | None = Field(None, description="left out: 9.81")
+    footprint: Footprint | None = Field(None, description="shape of the body, seen from above")
+
+
+PARTS: tuple[type[Part], ...] = (
+    UnicyclePart,
+    CarPart,
+    SecondOrderUnicyclePart,
+    SecondOrderCarPart,
+    CarWithTrailerPart,
+    SingleTrackPart,
+    HovercraftPart,
+    HelicopterPart,
+)
+MODELS = tuple(str(part.model_fields["model"].description) for part in PARTS)
+
+
+def _check_model(value: Any) -> Any:
+    if not isinstance(value, dict):
+        raise need("a mapping with the key model")
+    what = f"one of {', '.join(MODELS)}"
+    if "model" not in value:
+        raise PydanticCustomError("missing_key", "", {"key": "model", "what": what})
+    if value["model"] not in MODELS:
+        raise PydanticCustomError("at_key", "", {"key": "model", "need": what})
+    return value
+
+
+def _model_of(value: Any) -> str:
+    model = value["model"] if isinstance(value, dict) else value.model
+    return f"<{model}>"
+
+
+VehiclePart = Annotated[
+    Annotated[UnicyclePart, Tag("<unicycle>")]
+    | Annotated[CarPart, Tag("<car>")]
+    | Annotated[SecondOrderUnicyclePart, Tag("<second_order_unicycle>")]
+    | Annotated[SecondOrderCarPart, Tag("<second_order_car>")]
+    | Annotated[CarWithTrailerPart, Tag("<car_with_trailer>")]
+    | Annotated[SingleTrackPart, Tag("<single_track>")]
+    | Annotated[HovercraftPart, Tag("<hovercraft>")]
+    | Annotated[HelicopterPart, Tag("<helicopter>")],
+    Discriminator(_model_of),
+    BeforeValidator(_check_model),
+]
