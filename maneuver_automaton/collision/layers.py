@@ -85,9 +85,7 @@ def always(bands: Sequence[Layer], *, low: float, high: float) -> tuple[AnyObsta
     )
 
 
-def layer_arrays(
-    worlds: Sequence[World], *, low: Array, high: Array, plane: World
-) -> LayerArrays:
+def layer_arrays(worlds: Sequence[World], *, low: Array, high: Array, plane: World) -> LayerArrays:
     """Worlds as the kernels see them, each for poses between the altitudes `low` and `high`."""
     arrays = [world.arrays for world in worlds]
     solids, still, moving = _joined([(one.solids, one.movers.solids) for one in arrays])

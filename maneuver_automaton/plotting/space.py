@@ -164,9 +164,7 @@ def _draw_flat(
         top = min(heights[1], high[2])
         if across == 2:
             left, right = ring[:, 0].min(), ring[:, 0].max()
-            ring = np.array(
-                [[left, heights[0]], [right, heights[0]], [right, top], [left, top]]
-            )
+            ring = np.array([[left, heights[0]], [right, heights[0]], [right, top], [left, top]])
         tint = shaded(BUILDING, 0.45 - 0.75 * (top - low[2]) / (high[2] - low[2]))
         face = tint if across == 1 else (*BUILDING, 0.55)
         ax.add_collection(

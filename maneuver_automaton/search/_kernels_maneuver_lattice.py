@@ -214,9 +214,7 @@ def expand(search, task, lib, layers, grid, n, ceiling):
             climbs = lib.transfer.twists[trim, 3] != 0.0 and not layers.flat
             if gap <= task.margin or moving or climbs:
                 state[QUERIES] += 1
-                gap = trim_proven(
-                    task, lib, layers, trim, x, y, heading, z, t, task.clock + spent
-                )
+                gap = trim_proven(task, lib, layers, trim, x, y, heading, z, t, task.clock + spent)
                 if not gap >= 0.0:
                     break
             if old >= 0:

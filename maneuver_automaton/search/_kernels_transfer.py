@@ -101,9 +101,7 @@ def before_climb(lib, end, last, climb, t):
     """Pose from which the transition to a climb, and the climb for `t`, lead to `end`."""
     x, y, heading = end
     if t > 0.0:
-        d_x, d_y, turn = coast(
-            lib.twists[climb, 0], lib.twists[climb, 1], lib.twists[climb, 2], t
-        )
+        d_x, d_y, turn = coast(lib.twists[climb, 0], lib.twists[climb, 1], lib.twists[climb, 2], t)
         x, y, heading = back_from(x, y, heading, d_x, d_y, turn)
     return back_from(
         x,
@@ -232,9 +230,7 @@ def transfer_candidates(lib, n_words, start, start_trim, goal, goal_trim, ceilin
                 )
                 h_x, h_y, h_heading = e_x, e_y, e_heading
                 if climb >= 0:
-                    e_x, e_y, e_heading = before_climb(
-                        lib, (h_x, h_y, h_heading), last, climb, 0.0
-                    )
+                    e_x, e_y, e_heading = before_climb(lib, (h_x, h_y, h_heading), last, climb, 0.0)
                 rel = seen(s_x, s_y, s_heading, e_x, e_y, e_heading)
             fixed = way_in + way_out
             slope = 0.0
