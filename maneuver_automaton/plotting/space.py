@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from maneuver_automaton._arrays import Array
@@ -37,14 +37,18 @@ from maneuver_automaton.problem import Problem
 
 WIDTH, SPACE, FLAT = 9.6, 5.3, 1.75  # [in] of the page; heights of the axes
 LEFT, GAP = 0.7, 0.62  # [in]
-ELEVATION, AZIMUTH = 34.0, -62.0  # [deg] from where space is seen
+ELEVATION, AZIMUTH = 42.0, -68.0  # [deg] from where space is seen
 LIGHT = np.array([0.42, -0.76, 0.5])  # direction from which walls are lit
 BUILDING: Color = (0.72, 0.74, 0.78)
 START: Color = (0.10, 0.55, 0.25)
 GOAL: Color = (0.78, 0.16, 0.10)
 STORY = 4.0  # [m] of walls drawn in one piece: what is behind what is told piece by piece
-LONGEST = 24  # samples of one stroke of the path
+STROKE = 1.0  # [m] of the path in one piece
+BROAD, SHADOW, POST = 0.0055, 0.0022, 0.0012  # of the scene's size: widths of what is drawn
+RIM = 0.3  # [pt] one for all: nearer faces are drawn later, line widths would not follow
 POSTS = 14  # lines from the path down to the ground
+NAMES = 40  # characters of a trim's name
+HIDDEN = 0.3  # opacity of the path where a building is before it
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -79,23 +83,28 @@ def draw_space(ax: Axes3D, result: PlanResult) -> SpaceArtists:
     faces: list[Array] = []
     inner: list[Color] = []
     rims: list[tuple[float, ...]] = []
-    widths: list[float] = []
+    size = float((high - low).max())
     for obstacle in _standing(problem):
         bottom, top = _height(obstacle) or (low[2], high[2])
         for face, shade in _prism(obstacle, max(bottom, low[2]), min(top, high[2])):
             faces.append(face)
             inner.append(shaded(BUILDING, shade))
-            rims.append((*shaded(BUILDING, -0.25), 0.55))
-            widths.append(0.35)
+            rims.append((*shaded(BUILDING, -0.25), 0.5))
     for places, color, width in _strokes(result, track, ground=float(low[2])):
-        faces.append(np.concatenate([places, places[-2:0:-1]]) if len(places) > 2 else places)
+        faces.append(_ribbon(places, width * size))
         inner.append(color)
         rims.append((*color, 1.0))
-        widths.append(width)
     collection = Poly3DCollection(
-        faces, facecolors=inner, edgecolors=rims, linewidths=widths, zsort="average"
+        faces, facecolors=inner, edgecolors=rims, linewidths=RIM, zsort="average", clip_on=False
     )
     ax.add_collection3d(collection)
+    path = [(places, color) for places, color, _ in _strokes(result, track, ground=None)]
+    ax.add_collection3d(
+        Line3DCollection(
+            [places for places, _ in path], colors=[color for _, color in path],
+            linewidths=1.6, alpha=HIDDEN, zorder=5, clip_on=False,
+        )
+    )  # fmt: skip
     ends = [_mark(ax, track.start, START, "o")]
     ends += [_mark(ax, goal.pose, GOAL, "*") for goal in problem.goals]
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
@@ -127,7 +136,7 @@ def _figure(result: PlanResult) -> Figure:
 
     track, problem = _track(result), result.problem
     handles, names = _legend(result, track)
-    bottom = 0.62 + 0.2 * legend_rows(names, WIDTH - 2 * LEFT)
+    bottom = 0.6 + 0.2 * legend_rows(names, WIDTH - 2 * LEFT, length=NAMES)
     low, high = _box(problem, track)
     span = high - low
     room = WIDTH - LEFT - 0.2 - GAP
@@ -147,7 +156,7 @@ def _figure(result: PlanResult) -> Figure:
     _draw_flat(from_above, result, track, across=1, low=low, high=high)
     _draw_flat(aside, result, track, across=2, low=low, high=high)
     heading_text(figure, [(_headline(result), 10.0, "bold")], left=0.35)
-    bottom_legend(figure, handles, names, left=LEFT, width=WIDTH - 2 * LEFT)
+    bottom_legend(figure, handles, names, left=LEFT, width=WIDTH - 2 * LEFT, length=NAMES)
     return figure
 
 
@@ -198,13 +207,13 @@ def _strokes(
         for piece in track.pieces:
             shadow = piece.pose[:, [0, 1, 3]].copy()
             shadow[:, 2] = ground
-            strokes += [(part, shaded(INK, 0.45), 0.9) for part in _parts(shadow)]
+            strokes += [(part, shaded(INK, 0.5), SHADOW) for part in _parts(shadow)]
         for pose in track.spread(POSTS, reach=0.0):
             post = np.array([[pose[0], pose[1], ground], [pose[0], pose[1], pose[3]]])
-            strokes.append((post, GREY, 0.5))
+            strokes += [(part, shaded(GREY, 0.2), POST) for part in _parts(post)]
     for piece in track.pieces:
         color = colors.get(piece.name, INK)
-        strokes += [(part, color, 2.4) for part in _parts(piece.pose[:, [0, 1, 3]])]
+        strokes += [(part, color, BROAD) for part in _parts(piece.pose[:, [0, 1, 3]])]
     return strokes
 
 
@@ -214,10 +223,21 @@ def _parts(places: Array) -> list[Array]:
     if not steps.sum() > 0.0:
         return []
     way = np.concatenate([[0.0], np.cumsum(steps)])
-    count = max(2, math.ceil(way[-1] / 0.5) + 1)
+    count = max(2, math.ceil(way[-1] / STROKE) + 1)
     at = np.linspace(0.0, way[-1], count)
     even = np.stack([np.interp(at, way, column) for column in places.T], axis=1)
     return [even[k : k + 2] for k in range(count - 1)]
+
+
+def _ribbon(places: Array, width: float) -> Array:
+    """A stroke (2, 3) as a face (4, 3) that is seen from the front."""
+    azimuth, elevation = math.radians(AZIMUTH), math.radians(ELEVATION)
+    level = math.cos(elevation)
+    seen = [level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation)]
+    aside = np.cross(places[1] - places[0], seen)
+    length = float(np.linalg.norm(aside))
+    aside = 0.5 * width * aside / length if length > 0.0 else np.zeros(3)
+    return np.array([places[0] - aside, places[1] - aside, places[1] + aside, places[0] + aside])
 
 
 def _prism(obstacle: Obstacle, bottom: float, top: float) -> list[tuple[Array, float]]:
@@ -308,7 +328,7 @@ def _mark(ax: Axes3D, pose: Array, color: Color, marker: str) -> Line2D:
     (mark,) = ax.plot(
         pose[[0]], pose[[1]], pose[[3]], marker=marker, color=color, linestyle="none",
         markersize=7 if marker == "o" else 12, markeredgecolor="white", markeredgewidth=0.6,
-        zorder=10,
+        zorder=10, clip_on=False,
     )  # fmt: skip
     return mark
 
