@@ -34,6 +34,7 @@ from maneuver_automaton.collision.swept import (
     Windows,
     along,
     body_of,
+    box_around,
     chunks,
     course_hulls,
     fastest,
@@ -93,6 +94,7 @@ class FclChecker:
     proven: float = field(default=1e-3, kw_only=True)  # [m]
     _body: Body = field(init=False, repr=False)
     _bare: Body = field(init=False, repr=False)
+    _covers: tuple[Body, ...] = field(init=False, repr=False)  # from few corners to all
     _ground: _Ground = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -107,6 +109,9 @@ class FclChecker:
         object.__setattr__(self, "origin", (x, y))
         object.__setattr__(self, "_body", body_of(self.footprint, self.margin, excess))
         object.__setattr__(self, "_bare", body_of(self.footprint, 0.0, excess))
+        around = box_around(self._body)
+        few = sum(map(len, self._body.pieces)) <= len(around.pieces[0])
+        object.__setattr__(self, "_covers", (self._body,) if few else (around, self._body))
         object.__setattr__(self, "_ground", _ground_of(self.obstacles, (x, y), excess))
 
     def pose_hit(self, pose: ArrayLike, *, time: float = 0.0) -> int | None:
@@ -179,10 +184,10 @@ class FclChecker:
                     if hit is not None:
                         return hit
                     continue
-                skin = body_skin(
-                    course_hulls(self._body, seen[first : last + 1], steps[first:last])
-                )
-                if _touching(_object(skin), np.zeros((1, 3)), self._ground.still, most=1):
+                if all(
+                    self._sweep_hits(body, seen[first : last + 1], steps[first:last])
+                    for body in self._covers
+                ):
                     middle = (first + last) // 2
                     todo += [(middle, last), (first, middle)]
         if self._ground.movers:
@@ -219,6 +224,11 @@ class FclChecker:
         near = np.array(as_array(name, poses, last=3))
         near[..., :2] -= self.origin
         return near
+
+    def _sweep_hits(self, body: Body, poses: Array, steps: Array) -> bool:
+        """Whether one solid around a body along a course touches what stands still."""
+        skin = body_skin(course_hulls(body, poses, steps))
+        return bool(_touching(_object(skin), np.zeros((1, 3)), self._ground.still, most=1))
 
     def _still_hit(self, poses: Array) -> int | None:
         """An obstacle that stands still and is touched at one of the poses (n, 3)."""

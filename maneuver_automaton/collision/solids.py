@@ -98,7 +98,7 @@ def convex_hull(points: Array) -> Array:
     import shapely
 
     normal = np.where(np.abs(points) < 1e-150, 0.0, points)  # products must not underflow
-    hull = shapely.convex_hull(shapely.multipoints(normal))
+    hull = shapely.convex_hull(shapely.linestrings(normal))  # quicker than points one by one
     return np.asarray(shapely.get_coordinates(hull)[:-1])
 
 

@@ -64,6 +64,20 @@ def body_of(footprint: tuple[Shape, ...], margin: float, excess: float) -> Body:
     return Body(body_pieces(footprint, margin=margin, excess=excess))
 
 
+def box_around(body: Body) -> Body:
+    """The rectangle, along the axes of its frame, that holds a body.
+
+    Examples
+    --------
+    >>> triangle = Body((np.array([[0.0, 0.0], [2.0, 0.0], [1.0, 1.0]]),))
+    >>> box_around(triangle).pieces[0].tolist()
+    [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]]
+    """
+    corners = np.concatenate(body.pieces)
+    (left, low), (right, high) = corners.min(axis=0), corners.max(axis=0)
+    return Body((np.array([[left, low], [right, low], [right, high], [left, high]]),))
+
+
 def slice_hulls(body: Body, twist: Twist, duration: float) -> list[Array]:
     """Convex polygons (m, 2) that hold every point of the body at every time of a short coast.
 

@@ -108,7 +108,7 @@ class World:
         return seen
 
 
-@functools.lru_cache(maxsize=8)
+@functools.lru_cache(maxsize=64)
 def world_of(
     obstacles: tuple[AnyObstacle, ...],
     footprint: tuple[Shape, ...],

@@ -6,11 +6,12 @@ import math
 from dataclasses import replace
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.collision import Disc
+from maneuver_automaton.collision import AnyObstacle, Disc
 from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.collision.blocked import touched
 from maneuver_automaton.collision.body import body_of
 from maneuver_automaton.collision.checker import origin_near
+from maneuver_automaton.collision.heights import layers_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.problem import Goal, Problem, moves
@@ -83,21 +84,35 @@ def where_touched(problem: Problem, pose: Array, time: float) -> str:
 
     The kernels prove most poses free; where they do not, shapely decides.
     """
-    still = tuple(obstacle for obstacle in problem.obstacles if not moves(obstacle))
-    obstacles = problem.obstacles if math.isfinite(time) else still
+    beside = _beside(problem, pose)
+    still = tuple(obstacle for obstacle in beside if not moves(obstacle))
+    obstacles = beside if math.isfinite(time) else still
     if not obstacles:
         return ""
     at = time if math.isfinite(time) else 0.0
     if obstacles == problem.obstacles:
         world = world_around(problem)
-        (gap,) = clearances(world, world.into(pose), times=at)
+        (gap,) = clearances(world, world.into(pose[:3]), times=at)
         if gap > problem.margin + CLEARLY:
             return ""
     return touched(
         problem.footprint,
         obstacles,
-        pose,
+        pose[:3],
         time=at,
         margin=problem.margin,
         origin=origin_near(pose[:2]),
     )
+
+
+def _beside(problem: Problem, pose: Array) -> tuple[AnyObstacle, ...]:
+    """Obstacles that stand at the altitude of a pose, within the margin; all of them in a plane."""
+    if pose.size == 3:
+        return problem.obstacles
+    near = [
+        number
+        for layer in layers_of(problem.obstacles, in_space=True)
+        if layer.gap(pose[3:], problem.body_height)[0] <= problem.margin
+        for number in layer.numbers
+    ]
+    return tuple(problem.obstacles[number] for number in sorted(near))

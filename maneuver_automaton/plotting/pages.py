@@ -57,23 +57,24 @@ def heading_text(figure: Figure, lines: Sequence[tuple[str, float, str]], *, lef
         top += 1.42 * size / 72.0 * (1 + text.count("\n"))
 
 
-def legend_rows(labels: Sequence[str], width: float) -> int:
-    """Rows that a legend of `labels` takes in `width` [in]."""
-    return math.ceil(len(labels) / _columns(labels, width))
+def legend_rows(labels: Sequence[str], width: float, *, length: int = NAME_LENGTH) -> int:
+    """Rows that a legend of `labels`, cut to a `length`, takes in `width` [in]."""
+    return math.ceil(len(labels) / _columns(labels, width, length))
 
 
 def bottom_legend(
-    figure: Figure, handles: Sequence[Artist], labels: Sequence[str], *, left: float, width: float
-) -> None:
+    figure: Figure, handles: Sequence[Artist], labels: Sequence[str], *, left: float, width: float,
+    length: int = NAME_LENGTH,
+) -> None:  # fmt: skip
     """A legend in rows along the lower edge of `figure`, in a strip given in inches."""
     wide, high = figure.get_size_inches()
     legend = figure.legend(
         handles, [str(k) for k in range(len(labels))], loc="lower left", frameon=False,
-        bbox_to_anchor=(left / wide, 0.06 / high), ncols=_columns(labels, width),
+        bbox_to_anchor=(left / wide, 0.06 / high), ncols=_columns(labels, width, length),
         fontsize=SMALL_PT, borderaxespad=0.0, borderpad=0.0, handlelength=1.8,
         columnspacing=1.6, labelspacing=0.45,
     )  # fmt: skip
-    plain(legend, labels)
+    plain(legend, labels, length=length)
 
 
 def write_figure(figure: Figure, path: str | Path) -> None:
@@ -100,7 +101,7 @@ def write_figure(figure: Figure, path: str | Path) -> None:
     write_bytes_atomically(target, stream.getvalue())
 
 
-def _columns(labels: Sequence[str], width: float) -> int:
-    longest = max((min(len(label), NAME_LENGTH) for label in labels), default=1)
+def _columns(labels: Sequence[str], width: float, length: int) -> int:
+    longest = max((min(len(label), length) for label in labels), default=1)
     most = max(1, min(len(labels), int(width / (0.062 * longest + 0.48))))
     return math.ceil(len(labels) / math.ceil(len(labels) / most))

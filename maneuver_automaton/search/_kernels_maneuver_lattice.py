@@ -28,20 +28,22 @@ N_NODES, HEAP, GENERATION, EXPANSIONS, PATIENCE, FOUND, NODE, GOAL, ROW, CLIMB, 
 
 
 @inlined_kernel
-def cell_key(task, x, y, heading, trim, time):
+def cell_key(task, x, y, heading, z, trim, time):
     """Number of the lattice cell of a pose, trim and time, seen from the task's own frame."""
     d_x, d_y = x - task.frame_x, y - task.frame_y
     c, s = task.frame_cos, task.frame_sin
-    i = math.floor((c * d_x + s * d_y) / task.cell + 0.5) & 0x7FFF
-    j = math.floor((c * d_y - s * d_x) / task.cell + 0.5) & 0x7FFF
+    i = math.floor((c * d_x + s * d_y) / task.cell + 0.5) & 0x3FFF
+    j = math.floor((c * d_y - s * d_x) / task.cell + 0.5) & 0x3FFF
+    level = math.floor(z / task.rise + 0.5) & 0xFF
     turn = (heading - task.frame_heading) / FULL_TURN
     k = math.floor((turn - math.floor(turn)) * task.headings + 0.5) % task.headings
     tick = math.floor(time / task.tick) & 0x7FF if task.tick > 0.0 else 0
-    return (((int(trim) * 2048 + tick) * 512 + k) * 32768 + j) * 32768 + i
+    key = ((int(trim) * 2048 + tick) * 256 + level) * 128 + k
+    return (key * 16384 + j) * 16384 + i
 
 
 @inlined_kernel
-def cost_to_go(task, grid, world, x, y, z, trim):
+def cost_to_go(task, grid, layers, x, y, z, trim):
     """Estimate of the cost from here to a goal; inf if the plane alone forbids it."""
     way, rise = math.inf, math.inf
     for g in range(task.aims.shape[0]):
@@ -49,7 +51,7 @@ def cost_to_go(task, grid, world, x, y, z, trim):
         way = min(way, math.sqrt(e_x * e_x + e_y * e_y))
         rise = min(rise, abs(task.aims[g, 3] - z))
     if grid.columns > 0:
-        way = distance_at(grid, world.field, x, y)
+        way = distance_at(grid, layers.plane, x, y)
     estimate = way * task.per_metre
     if rise > 0.0:
         estimate = max(estimate, rise * task.per_climb)
@@ -57,7 +59,7 @@ def cost_to_go(task, grid, world, x, y, z, trim):
 
 
 @bare_inner_kernel
-def connect(search, task, lib, world, node, ceiling, estimate):
+def connect(search, task, lib, layers, node, ceiling, estimate):
     """Try to reach a goal from a node by a transfer; keeps the cheapest plan found."""
     nodes, links, state, found = search.nodes, search.links, search.state, search.found
     scratch = search.scratch
@@ -86,8 +88,8 @@ def connect(search, task, lib, world, node, ceiling, estimate):
             if fits and transfer_free(
                 task,
                 lib,
-                world,
-                (start[0], start[1], start[2]),
+                layers,
+                start,
                 trim,
                 goal_trim,
                 word,
@@ -120,7 +122,7 @@ def add_node(search, task, slot, key, row, link, estimate):
 
 
 @bare_kernel
-def begin(search, task, world, grid):
+def begin(search, task, layers, grid):
     """Queue the start of a search; what was searched before is forgotten."""
     state = search.state
     generation = state[GENERATION] + 1
@@ -129,8 +131,8 @@ def begin(search, task, world, grid):
     state[GENERATION] = generation
     search.found[0] = math.inf
     x, y, heading, z = task.start[0], task.start[1], task.start[2], task.start[3]
-    estimate = cost_to_go(task, grid, world, x, y, z, task.start_trim)
-    key = cell_key(task, x, y, heading, task.start_trim, 0.0)
+    estimate = cost_to_go(task, grid, layers, x, y, z, task.start_trim)
+    key = cell_key(task, x, y, heading, z, task.start_trim, 0.0)
     slot = slot_of(search.table, generation, key)
     if estimate < math.inf:
         row = (x, y, heading, z, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -138,21 +140,21 @@ def begin(search, task, world, grid):
 
 
 @bare_inner_kernel
-def worth(search, task, grid, world, x, y, heading, z, trim, cost, time, limit):
+def worth(search, task, grid, layers, x, y, heading, z, trim, cost, time, limit):
     """Slot and key of a child, and its estimate; the estimate is inf if it is not worth a node."""
-    key = cell_key(task, x, y, heading, trim, time)
+    key = cell_key(task, x, y, heading, z, trim, time)
     slot = slot_of(search.table, search.state[GENERATION], key)
     old = node_in(search.table, search.state[GENERATION], slot)
     if old >= 0 and search.nodes[old, 4] <= cost:
         return slot, key, old, math.inf
-    ahead = cost_to_go(task, grid, world, x, y, z, trim)
+    ahead = cost_to_go(task, grid, layers, x, y, z, trim)
     if not cost + ahead < limit:
         ahead = math.inf
     return slot, key, old, ahead
 
 
 @bare_kernel
-def expand(search, task, lib, world, grid, n, ceiling):
+def expand(search, task, lib, layers, grid, n, ceiling):
     """Expand up to `n` nodes; stops at the first connection if the task says so.
 
     Children that cannot lead to less than `ceiling` are left out. Returns whether it may go on:
@@ -160,7 +162,7 @@ def expand(search, task, lib, world, grid, n, ceiling):
     """
     nodes, links, state = search.nodes, search.links, search.state
     room = nodes.shape[0] - lib.most_children - 1
-    moving = world.movers.speed.shape[0] > 0
+    moving = layers.movers.speed.shape[0] > 0
     for _ in range(n):
         node = -1
         while state[HEAP] > 0:
@@ -185,10 +187,10 @@ def expand(search, task, lib, world, grid, n, ceiling):
         trim = links[node, 1]
         state[PATIENCE] -= 1
         if state[PATIENCE] < 0:
-            here = cost_to_go(task, grid, world, x, y, z, trim)
+            here = cost_to_go(task, grid, layers, x, y, z, trim)
             wait = min(here / task.per_shot, task.most_patience)
             state[PATIENCE] = int(max(wait, task.least_patience))
-            connect(search, task, lib, world, node, ceiling, here)
+            connect(search, task, lib, layers, node, ceiling, here)
             if state[FOUND] == 1 and task.stop_at_first:
                 return 1
         limit = min(ceiling, search.found[0])
@@ -204,17 +206,16 @@ def expand(search, task, lib, world, grid, n, ceiling):
             n_x, n_y = x + cos * d_x - sin * d_y, y + sin * d_x + cos * d_y
             n_heading, n_z = heading + lib.moves[trim, q, 2], z + lib.moves[trim, q, 3]
             slot, key, old, ahead = worth(
-                search, task, grid, world, n_x, n_y, n_heading, n_z, trim, cost, time, limit
+                search, task, grid, layers, n_x, n_y, n_heading, n_z, trim, cost, time, limit
             )
-            if ahead == math.inf or not trim_inside(task, lib, trim, x, y, heading, t):
+            if ahead == math.inf or not trim_inside(task, lib, trim, x, y, heading, z, t):
                 continue
             gap = clearance - lib.fastest[trim] * t
-            if gap <= task.margin or moving:
+            climbs = lib.transfer.twists[trim, 3] != 0.0 and not layers.flat
+            if gap <= task.margin or moving or climbs:
                 state[QUERIES] += 1
-                proven, gap = trim_proven(
-                    task, lib, world, trim, x, y, heading, t, task.clock + spent
-                )
-                if proven < t:
+                gap = trim_proven(task, lib, layers, trim, x, y, heading, z, t, task.clock + spent)
+                if not gap >= 0.0:
                     break
             if old >= 0:
                 links[old, 3] = 1
@@ -235,14 +236,15 @@ def expand(search, task, lib, world, grid, n, ceiling):
             )
             n_z = z + lib.edge_shift[edge, 3]
             slot, key, old, ahead = worth(
-                search, task, grid, world, n_x, n_y, n_heading, n_z, target, cost, time, limit
+                search, task, grid, layers, n_x, n_y, n_heading, n_z, target, cost, time, limit
             )
-            if ahead == math.inf or not edge_inside(task, lib, edge, x, y, heading):
+            if ahead == math.inf or not edge_inside(task, lib, edge, x, y, heading, z):
                 continue
             gap = clearance - lib.edge_reach[edge]
-            if gap <= task.margin or moving:
+            climbs = lib.edge_high[edge] > lib.edge_low[edge] and not layers.flat
+            if gap <= task.margin or moving or climbs:
                 state[QUERIES] += 1
-                gap = edge_proven(task, lib, world, edge, x, y, heading, task.clock + spent)
+                gap = edge_proven(task, lib, layers, edge, x, y, heading, z, task.clock + spent)
                 if not gap >= 0.0:
                     continue
             if old >= 0:

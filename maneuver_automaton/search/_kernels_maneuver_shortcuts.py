@@ -12,7 +12,7 @@ AS_BEFORE = -1
 
 
 @bare_kernel
-def shorten_to(task, lib, n_words, world, j, points, trims, costs, spent, least, plan, scratch):
+def shorten_to(task, lib, n_words, layers, j, points, trims, costs, spent, least, plan, scratch):
     """Cheapest way to point `j` of a word, through points (n, 4) before it or past them.
 
     `costs` (n,) and `spent` (n,) [s] are those of the word up to each point. Fills `plan`: the cost
@@ -40,8 +40,8 @@ def shorten_to(task, lib, n_words, world, j, points, trims, costs, spent, least,
             if transfer_free(
                 task,
                 lib,
-                world,
-                (start[0], start[1], start[2]),
+                layers,
+                start,
                 trims[i],
                 trims[j],
                 lib.transfer.words[row],

@@ -97,6 +97,32 @@ def climb_time(lib, word, last, goal_trim, climb, start_trim, altitude, times):
 
 
 @bare_inner_kernel
+def before_climb(lib, end, last, climb, t):
+    """Pose from which the transition to a climb, and the climb for `t`, lead to `end`."""
+    x, y, heading = end
+    if t > 0.0:
+        d_x, d_y, turn = coast(lib.twists[climb, 0], lib.twists[climb, 1], lib.twists[climb, 2], t)
+        x, y, heading = back_from(x, y, heading, d_x, d_y, turn)
+    return back_from(
+        x,
+        y,
+        heading,
+        lib.shift[last, climb, 0],
+        lib.shift[last, climb, 1],
+        lib.shift[last, climb, 2],
+    )
+
+
+@inner_kernel
+def is_level(lib, word):
+    """Whether no trim of a word climbs."""
+    for n in range(3):
+        if word[n] >= 0 and lib.twists[word[n], 3] != 0.0:
+            return False
+    return True
+
+
+@bare_inner_kernel
 def word_misses(lib, word, start, goal, times):
     """How far a word of fewer than three trims ends from the goal [m, rad], both poses folded."""
     x, y, heading = start
@@ -168,6 +194,7 @@ def transfer_candidates(lib, n_words, start, start_trim, goal, goal_trim, ceilin
         way_in, way_out = 0.0, 0.0
         s_x, s_y, s_heading = x, y, heading
         e_x, e_y, e_heading = g_x, g_y, g_heading
+        h_x, h_y, h_heading = g_x, g_y, g_heading
         rel = (0j, 0.0)
         for row in range(n_words):
             word = lib.words[row]
@@ -201,17 +228,23 @@ def transfer_candidates(lib, n_words, start, start_trim, goal, goal_trim, ceilin
                     lib.shift[end, goal_trim, 1],
                     lib.shift[end, goal_trim, 2],
                 )
+                h_x, h_y, h_heading = e_x, e_y, e_heading
                 if climb >= 0:
-                    e_x, e_y, e_heading = back_from(
-                        e_x,
-                        e_y,
-                        e_heading,
-                        lib.shift[last, climb, 0],
-                        lib.shift[last, climb, 1],
-                        lib.shift[last, climb, 2],
-                    )
+                    e_x, e_y, e_heading = before_climb(lib, (h_x, h_y, h_heading), last, climb, 0.0)
                 rel = seen(s_x, s_y, s_heading, e_x, e_y, e_heading)
             fixed = way_in + way_out
+            slope = 0.0
+            if climbing >= lib.n_upright:  # it drives as it climbs: its time is known before
+                if not fixed < ceiling or not is_level(lib, word):
+                    continue
+                level = scratch.branches[0]
+                level[0], level[1], level[2] = 0.0, 0.0, 0.0
+                slope = climb_time(lib, word, last, goal_trim, climb, start_trim, g_z - z, level)
+                if not lib.shortest <= slope <= lib.longest[climb]:
+                    continue
+                e_x, e_y, e_heading = before_climb(lib, (h_x, h_y, h_heading), last, climb, slope)
+                rel = seen(s_x, s_y, s_heading, e_x, e_y, e_heading)
+                fixed += slope * lib.rates[climb]
             if n_trims >= 2:
                 fixed += lib.cost[a, b]
             if n_trims == 3:
@@ -263,8 +296,10 @@ def transfer_candidates(lib, n_words, start, start_trim, goal, goal_trim, ceilin
                 if not (usable and cost < ceiling):
                     continue
                 times = branches[branch]
-                t = 0.0
-                if lib.climbs.shape[0] > 0:
+                t = slope
+                if slope > 0.0:
+                    duration += slope
+                elif lib.climbs.shape[0] > 0:
                     t = climb_time(lib, word, last, goal_trim, climb, start_trim, g_z - z, times)
                     if not t >= 0.0 or (climb >= 0 and t < lib.shortest):
                         continue

@@ -121,7 +121,7 @@ class ManeuverPass:
                     self.arrays,
                     self.task,
                     library,
-                    self.query.world.arrays,
+                    self.query.layers,
                     self.grid,
                     step,
                     ceiling,
@@ -219,7 +219,7 @@ def maneuver_words(
         over = time.monotonic() >= deadline or total >= room
         return SearchStatus.OUT_OF_BUDGET if over else SearchStatus.EXHAUSTED
 
-    own = query.around(query.parts[0])
+    own = query.around(query.parts[0], query.plane)
     grid = distance_grid(own, query.window[0], query.seen_goals, query.seen_start)
     word, first = _first(query, grid, room=room, deadline=deadline)
     total = first
@@ -308,7 +308,7 @@ def pass_of(
     steps = quanta[..., None] * library.transfer.twists[:, None]
     task = task_of(query, rung)
     room = _search_arrays(query) if arrays is None else arrays
-    kernels.begin(room, task, query.world.arrays, grid)
+    kernels.begin(room, task, query.layers, grid)
     return ManeuverPass(
         query=query,
         rung=rung,

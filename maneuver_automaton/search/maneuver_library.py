@@ -12,6 +12,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.groups import SE2
+from maneuver_automaton.search.maneuver_heights import altitude_ranges
 from maneuver_automaton.search.maneuver_motion import (
     CLOSE,
     BodyArrays,
@@ -54,6 +55,10 @@ class ManeuverArrays(NamedTuple):
     piece_time: Array  # (N,) [s]
     piece_error: Array  # (N,) [m]
     piece_speed: Array  # (N,) [m/s]
+    piece_low: Array  # (N,) [m] altitudes above where the edge begins
+    piece_high: Array  # (N,)
+    edge_low: Array  # (E,) of all pieces of an edge
+    edge_high: Array  # (E,)
     via_edge: IntArray  # (m, m) first edge of a transition, -1 if there is none
     most_children: int
 
@@ -147,6 +152,10 @@ class _Motion(NamedTuple):
     piece_time: Array
     piece_error: Array
     piece_speed: Array
+    piece_low: Array
+    piece_high: Array
+    edge_low: Array
+    edge_high: Array
 
 
 def _edges(automaton: Automaton, transfer: TransferLibrary) -> _Edges:
@@ -186,13 +195,15 @@ def _motion(
     close = CLOSE * min(b.half_width or 0.05 * max(b.reach, 1.0) for b in bodies)
     driven = np.flatnonzero(edges.maneuver >= 0)
     sources, targets = edges.source[driven], edges.target[driven]
-    found, counts, speeds = [], [np.zeros(1, dtype=np.int64)], []
+    chosen = [automaton.maneuvers[k] for k in edges.maneuver[driven]]
+    climbs = automaton.body_velocities[:, 3:].sum(axis=1)
+    ends = np.stack([climbs[sources], climbs[targets]], axis=1)
+    found, counts, speeds, heights = [], [np.zeros(1, dtype=np.int64)], [], []
     for p in range(len(parts) + 1):
         body = bodies[p] if p < len(parts) else None
         table = own if body is None else twists[p]
         courses = []
-        for k in edges.maneuver[driven]:
-            maneuver = automaton.maneuvers[k]
+        for k, maneuver in zip(edges.maneuver[driven], chosen, strict=True):
             n = 2 if maneuver.course is None else len(maneuver.course.time)
             poses = np.zeros((n, 3)) if body is None else parts[p].course_poses[k]
             courses.append(course_of(maneuver, poses))
@@ -209,6 +220,11 @@ def _motion(
         found.append(pieces)
         flat = np.hypot(pieces.twist[:, 0], pieces.twist[:, 1])
         speeds.append(flat if body is None else fastest_of(body, pieces.twist))
+        heights.append(altitude_ranges(chosen, ends, pieces.begin, pieces.end))
+    low, high = np.zeros(len(edges.source)), np.zeros(len(edges.source))
+    if driven.size:
+        low[driven] = np.minimum.reduceat(heights[-1][0], pieces.first[:-1])
+        high[driven] = np.maximum.reduceat(heights[-1][1], pieces.first[:-1])
     return _Motion(
         first_piece=np.cumsum(np.concatenate(counts)),
         piece_pose=np.concatenate([row.pose for row in found]),
@@ -216,6 +232,10 @@ def _motion(
         piece_time=np.concatenate([row.time for row in found]),
         piece_error=np.concatenate([row.error for row in found]),
         piece_speed=np.concatenate(speeds),
+        piece_low=np.concatenate([row for row, _ in heights]),
+        piece_high=np.concatenate([row for _, row in heights]),
+        edge_low=low,
+        edge_high=high,
     )
 
 

@@ -52,6 +52,8 @@ class Pieces(NamedTuple):
     time: Array  # (n,) [s]
     error: Array  # (n,) [m] by which a point of the body may be off
     first: IntArray  # (k + 1,) piece with which each of k courses begins
+    begin: IntArray  # (n,) sample where each begins, of all courses one after the other
+    end: IntArray  # (n,) and where it ends
 
 
 def parts_of(
@@ -171,9 +173,9 @@ def pieces_of(
         Whether it matters when the part is where, not only where it comes along.
     """
     if not courses:
-        return Pieces(
-            np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(1, int)
-        )
+        none, nowhere = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+        first = np.zeros(1, dtype=np.int64)
+        return Pieces(nowhere, nowhere, np.zeros(0), np.zeros(0), first, none, none)
     poses = np.concatenate([poses for poses, _ in courses])
     times = np.concatenate([times for _, times in courses])
     sizes = np.array([len(times) for _, times in courses])
@@ -206,6 +208,8 @@ def pieces_of(
         time=spent,
         error=error[order],
         first=np.searchsorted(start, np.append(first, len(poses))),
+        begin=start,
+        end=stop,
     )
 
 

@@ -42,6 +42,7 @@ def maneuver_problem_query(problem: Problem, goals: tuple[int, ...]) -> Maneuver
         obstacles=problem.obstacles,
         bounds=problem.bounds,
         keep=problem.margin,
+        body_height=problem.body_height,
         start_time=problem.start_time,
         most_time=np.inf if most is None else most,
     )

@@ -15,6 +15,15 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import AnyObstacle
 from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.collision.body import body_of
+from maneuver_automaton.collision.convex import DIGITS
+from maneuver_automaton.collision.heights import Layer
+from maneuver_automaton.collision.layers import (
+    ROUNDED,
+    LayerArrays,
+    always,
+    bands_of,
+    layer_arrays,
+)
 from maneuver_automaton.collision.world import World, own_frame, world_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds
@@ -52,6 +61,8 @@ class ManeuverQuery:
         [s] of the clock by which obstacles move.
     most_time : float
         [s] that a plan may last.
+    body_height : (float, float)
+        Lowest and highest point of the vehicle about its altitude [m].
     """
 
     transfer: TransferLibrary
@@ -65,6 +76,7 @@ class ManeuverQuery:
     keep: float = 0.0
     start_time: float = 0.0
     most_time: float = math.inf
+    body_height: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         dof = self.automaton.model.group.dof
@@ -89,14 +101,52 @@ class ManeuverQuery:
 
     @cached_property
     def world(self) -> World:
-        """The obstacles, prepared for the largest part of the vehicle."""
-        largest = max(self.parts, key=lambda part: body_of(part.shapes).reach)
-        frame = own_frame(self.obstacles, self.goals[0])
-        return world_of(self.obstacles, largest.shapes, frame, keep=self.keep)
+        """All obstacles, whatever their heights, prepared for the vehicle's largest part."""
+        return self._world_of(self.obstacles)
 
-    def around(self, part: Part) -> World:
-        """The same obstacles around one part."""
-        return replace(self.world, body=body_of(part.shapes))
+    @cached_property
+    def bands(self) -> tuple[Layer, ...]:
+        """Obstacles between neighbouring heights, in the problem's altitudes."""
+        return bands_of(self.obstacles, in_space=self.start.size > 3)
+
+    @cached_property
+    def plane(self) -> World:
+        """Those obstacles that are in the way at every altitude within the bounds."""
+        if self.start.size == 3:
+            return self.world
+        low, high = self.bounds.z or (-math.inf, math.inf)
+        below, above = self.body_height
+        return self._world_of(always(self.bands, low=low + below, high=high + above))
+
+    @cached_property
+    def layers(self) -> LayerArrays:
+        """The obstacles between neighbouring heights, as the kernels see them."""
+        (below, above), pad = self.body_height, self.keep + self.margin + ROUNDED
+        low = np.array([band.low - above - pad - self.level for band in self.bands])
+        high = np.array([band.high - below + pad - self.level for band in self.bands])
+        return layer_arrays(
+            [self._world_of(band.obstacles) for band in self.bands],
+            low=np.round(low, DIGITS),
+            high=np.round(high, DIGITS),
+            plane=self.plane,
+        )
+
+    @property
+    def level(self) -> float:
+        """Altitude from which the kernels count [m]."""
+        return float(self.goals[0, 3]) if self.start.size > 3 else 0.0
+
+    @property
+    def altitudes(self) -> tuple[float, float]:
+        """Lowest and highest altitude within the bounds, as the kernels count it."""
+        if self.bounds.z is None or self.start.size == 3:
+            return -math.inf, math.inf
+        low, high = self.bounds.z
+        return low - self.level - ROUNDED, high - self.level + ROUNDED
+
+    def around(self, part: Part, world: World) -> World:
+        """A world around one part."""
+        return replace(world, body=body_of(part.shapes))
 
     @property
     def moves(self) -> bool:
@@ -146,7 +196,11 @@ class ManeuverQuery:
             gaps = []
             for part in self.parts:
                 there = (SE2(pose[:3]) @ SE2(part.trim_poses[trim])).pose
-                gaps.append(float(clearances(self.around(part), there, times=time)[0]))
+                for band in self.bands:
+                    own = self.around(part, self._world_of(band.obstacles))
+                    aside = float(clearances(own, there, times=time)[0])
+                    beside = band.gap(pose[3:] + self.level, self.body_height)[0]
+                    gaps.append(max(aside, float(beside)))
             rows.append(min(gaps) - self.keep)
         return np.array(rows)
 
@@ -158,8 +212,14 @@ class ManeuverQuery:
 
     def _seen(self, poses: Array) -> Array:
         planar = self.world.into(poses[:, :3])
-        heights = poses[:, 3:] if poses.shape[1] == 4 else np.zeros((len(poses), 1))
-        return np.hstack([planar, heights])
+        if poses.shape[1] == 3:
+            return np.hstack([planar, np.zeros((len(poses), 1))])
+        return np.hstack([planar, np.round(poses[:, 3:] - self.level, DIGITS)])
+
+    def _world_of(self, obstacles: tuple[AnyObstacle, ...]) -> World:
+        largest = max(self.parts, key=lambda part: body_of(part.shapes).reach)
+        frame = own_frame(self.obstacles, self.goals[0])
+        return world_of(obstacles, largest.shapes, frame, keep=self.keep)
 
 
 def maneuver_query(
@@ -173,6 +233,7 @@ def maneuver_query(
     obstacles: tuple[AnyObstacle, ...] = (),
     bounds: Bounds | None = None,
     keep: float = 0.0,
+    body_height: tuple[float, float] = (0.0, 0.0),
 ) -> ManeuverQuery:
     """A query by the names of trims, one for all goals; raises UnknownTrim."""
     rows = np.atleast_2d(as_array("goals", goals))  # type: ignore[arg-type]
@@ -187,4 +248,5 @@ def maneuver_query(
         obstacles=obstacles,
         bounds=Bounds() if bounds is None else bounds,
         keep=keep,
+        body_height=body_height,
     )

@@ -14,6 +14,7 @@ from maneuver_automaton.search.maneuver_word import EDGE, TRIM
 from maneuver_automaton.search.transfer import TransferLibrary
 
 CELL = 0.122  # of the first pass, in length scales
+RISE = 0.25  # of altitude
 HEADINGS = 72
 TRIES = 6  # candidates of one transfer that are tried
 PATIENCE = 1.5  # a connection may cost so much more than the estimate ...
@@ -48,6 +49,7 @@ class Task(NamedTuple):
     frame_cos: float
     frame_sin: float
     cell: float
+    rise: float  # [m] of altitude that makes another cell
     headings: int
     tick: float
     weight: float
@@ -67,6 +69,8 @@ class Task(NamedTuple):
     most_time: float
     window: Array
     edge_window: Array  # narrower by what courses may be off
+    lowest: float  # [m] altitudes
+    highest: float
 
 
 def task_of(query: ManeuverQuery, rung: Rung) -> Task:
@@ -94,6 +98,7 @@ def task_of(query: ManeuverQuery, rung: Rung) -> Task:
         frame_cos=math.cos(float(frame[2])),
         frame_sin=math.sin(float(frame[2])),
         cell=float(rung.scale * CELL * library.radius),
+        rise=float(rung.scale * RISE * library.radius),
         headings=HEADINGS,
         tick=float(tick),
         weight=float(rung.weight),
@@ -113,6 +118,8 @@ def task_of(query: ManeuverQuery, rung: Rung) -> Task:
         most_time=float(query.most_time),
         window=window,
         edge_window=edge_window,
+        lowest=query.altitudes[0],
+        highest=query.altitudes[1],
     )
 
 

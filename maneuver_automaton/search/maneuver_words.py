@@ -225,6 +225,7 @@ class _Job:
         scratch = self.scratch
         n = kernels.transfer_batch(
             self.setup.library.arrays,
+            len(self.setup.library.arrays.words),
             begin[None],
             trim,
             end[None],

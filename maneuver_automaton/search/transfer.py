@@ -41,7 +41,8 @@ class TransferArrays(NamedTuple):
     per_metre: Array  # (m,) least cost per metre in the plane, inf for none
     words: IntArray  # (K, 3) trims in order, -1 for none; those of few trims first
     n_few: int  # how many these are
-    climbs: IntArray  # (C,) trims that only climb, or only sink
+    climbs: IntArray  # (C,) trims that only climb or sink, then such that drive straight with it
+    n_upright: int  # how many only climb or sink
     tolerance: float
     shortest: float  # [s]
     met: float  # [m, rad]
@@ -150,7 +151,9 @@ def transfer_library(
     twists[np.abs(twists[:, 2]) < STRAIGHT, 2] = 0.0
     via, following = _cheapest_chains(automaton, prices)
     shift, cost, time = _transitions(automaton, prices, via, following)
-    climbs = np.flatnonzero(~twists[:, :3].any(axis=1) & (twists[:, 3] != 0.0))
+    rising = twists[:, 3] != 0.0
+    upright = np.flatnonzero(~twists[:, :3].any(axis=1) & rising)
+    sloping = np.flatnonzero(twists[:, :2].any(axis=1) & (twists[:, 2] == 0.0) & rising)
     moving = np.flatnonzero(twists[:, :3].any(axis=1))
     chosen = (
         moving[_most_different(twists[moving], most_trims)].tolist() if trims is None else trims
@@ -172,7 +175,8 @@ def transfer_library(
         per_metre=per_metre,
         words=words,
         n_few=n_few,
-        climbs=np.asarray(climbs, dtype=np.int64),
+        climbs=np.concatenate([upright, sloping]).astype(np.int64),
+        n_upright=len(upright),
         tolerance=TOLERANCE,
         shortest=SHORTEST,
         met=MET,
@@ -197,8 +201,9 @@ def transfers(
 ) -> list[Transfer]:
     """Words of up to three trims that lead exactly from start to goal, cheapest first.
 
-    Words of fewer trims are listed where they fit exactly. In SE(2) x R a vertical trim makes up
-    for the altitude, before the goal's trim.
+    Words of fewer trims are listed where they fit exactly. In SE(2) x R one more trim makes up for
+    the altitude, before the goal's trim: a vertical one, or after words of level trims a straight
+    one that climbs.
 
     Parameters
     ----------

@@ -1,0 +1,52 @@
+"""One of several planar worlds that lie between heights."""
+
+from __future__ import annotations
+
+from maneuver_automaton._compile import bare_inner_kernel
+from maneuver_automaton.collision.convex import Solids
+from maneuver_automaton.collision.world import Buckets, Field, Movers, WorldArrays
+
+
+@bare_inner_kernel
+def layer_world(layers, k):
+    """The planar world of layer `k`; the first is at hand, the others are cut out."""
+    if k == 0:
+        return layers.first
+    m_0, m_1 = layers.first_mover[k], layers.first_mover[k + 1]
+    sizes, counts = layers.sizes, layers.counts
+    movers = layers.movers
+    return WorldArrays(
+        Solids(layers.solids.edges, layers.solids.first, layers.solids.plates),
+        Buckets(
+            layers.start[k],
+            layers.items,
+            sizes[k, 0],
+            sizes[k, 1],
+            sizes[k, 2],
+            counts[k, 0],
+            counts[k, 1],
+            sizes[k, 3],
+        ),
+        Field(layers.distance[k], sizes[k, 4], sizes[k, 5], sizes[k, 6], sizes[k, 7]),
+        Movers(
+            layers.solids,
+            movers.first_piece[m_0 : m_1 + 1],
+            movers.first_knot[m_0 : m_1 + 1],
+            movers.time,
+            movers.pose,
+            movers.speed[m_0:m_1],
+            movers.middle[m_0:m_1],
+            movers.reach[m_0:m_1],
+        ),
+    )
+
+
+@bare_inner_kernel
+def times_between(altitude, climb, low, high, duration):
+    """First and last time of a steady climb between two heights; the last is less for never."""
+    if climb == 0.0:
+        return 0.0, duration if low <= altitude <= high else -1.0
+    first, last = (low - altitude) / climb, (high - altitude) / climb
+    if climb < 0.0:
+        first, last = last, first
+    return max(first, 0.0), min(last, duration)

@@ -1,0 +1,178 @@
+"""Worlds one above the other: what stands between two heights, as a world in the plane each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.collision.convex import Solids
+from maneuver_automaton.collision.heights import Layer, layers_of
+from maneuver_automaton.collision.shapes import AnyObstacle
+from maneuver_automaton.collision.world import Field, Movers, World, WorldArrays
+
+MOST_LAYERS = 24  # more are joined, the thinnest first
+ROUNDED = 1e-8  # [m] by which heights may be off
+
+
+class LayerArrays(NamedTuple):
+    """What the kernels see; a body is concerned by those layers in which its altitude is."""
+
+    low: Array  # (L,) [m] altitudes of a pose
+    high: Array  # (L,)
+    first: WorldArrays  # the first layer, all there is in the plane
+    solids: Solids  # of all layers
+    start: IntArray  # (L, cells + 1) buckets
+    items: IntArray
+    sizes: Array  # (L, 8) numbers of buckets and field, as `layer_world` puts them together
+    counts: IntArray  # (L, 2)
+    distance: Array  # (L, rows, columns)
+    movers: Movers
+    first_mover: IntArray  # (L + 1,)
+    plane: Field  # of what blocks every altitude
+    flat: bool  # whether heights do not matter
+
+
+def bands_of(obstacles: tuple[AnyObstacle, ...], *, in_space: bool) -> tuple[Layer, ...]:
+    """All obstacles that stand anywhere between neighbouring heights; bands without any left out.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.collision import Disc, Obstacle
+    >>> low, high = (Obstacle(Disc(1.0), height=(0.0, h)) for h in (5.0, 20.0))
+    >>> [(band.low, band.high, band.numbers) for band in bands_of((low, high), in_space=True)]
+    [(0.0, 5.0, (0, 1)), (5.0, 20.0, (1,))]
+    """
+    layers = layers_of(obstacles, in_space=in_space)
+    heights = {height for layer in layers for height in (layer.low, layer.high)}
+    bands = []
+    for low, high in _thick(sorted(heights)):
+        numbers = sorted(
+            number
+            for layer in layers
+            if layer.low < high and layer.high > low
+            for number in layer.numbers
+        )
+        if numbers:
+            standing = tuple(obstacles[k] for k in numbers)
+            bands.append(Layer(low, high, standing, tuple(numbers)))
+    return tuple(bands) or (Layer(-math.inf, math.inf, (), ()),)
+
+
+def always(bands: Sequence[Layer], *, low: float, high: float) -> tuple[AnyObstacle, ...]:
+    """Obstacles that stand at every height between two, so that no way leads over or under them.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.collision import Disc, Obstacle
+    >>> tower = Obstacle(Disc(1.0), height=(0.0, 20.0))
+    >>> [len(always(bands_of((tower,), in_space=True), low=1.0, high=h)) for h in (9.0, 30.0)]
+    [1, 0]
+    """
+    inside = sorted((band for band in bands if band.low < high and band.high > low))
+    if not inside or inside[0].low > low or inside[-1].high < high:
+        return ()
+    if any(a.high < b.low for a, b in zip(inside, inside[1:], strict=False)):
+        return ()
+    numbers = set(inside[0].numbers).intersection(*(band.numbers for band in inside))
+    return tuple(
+        one
+        for one, number in zip(inside[0].obstacles, inside[0].numbers, strict=True)
+        if number in numbers
+    )
+
+
+def layer_arrays(worlds: Sequence[World], *, low: Array, high: Array, plane: World) -> LayerArrays:
+    """Worlds as the kernels see them, each for poses between the altitudes `low` and `high`."""
+    arrays = [world.arrays for world in worlds]
+    solids, still, moving = _joined([(one.solids, one.movers.solids) for one in arrays])
+    shapes = np.array([one.field.distance.shape for one in arrays])
+    distance = np.zeros((len(arrays), *shapes.max(axis=0)))
+    most = max(len(one.buckets.start) for one in arrays)
+    start = np.zeros((len(arrays), most), dtype=np.int64)
+    items: list[IntArray] = []
+    for k, one in enumerate(arrays):
+        rows, columns = shapes[k]
+        distance[k] = one.field.outside
+        distance[k, :rows, :columns] = one.field.distance
+        known = len(one.buckets.start)
+        offset = sum(len(part) for part in items)
+        start[k, :known] = one.buckets.start + offset
+        start[k, known:] = start[k, known - 1]
+        items.append(one.buckets.items + still[k])
+    sizes = [
+        (
+            *(one.buckets.origin_x, one.buckets.origin_y, one.buckets.cell, one.buckets.reach),
+            *(one.field.origin_x, one.field.origin_y, one.field.cell, one.field.outside),
+        )
+        for one in arrays
+    ]
+    counts = [(one.buckets.columns, one.buckets.rows) for one in arrays]
+    return LayerArrays(
+        low=np.array(low, dtype=np.float64),
+        high=np.array(high, dtype=np.float64),
+        first=arrays[0],
+        solids=solids,
+        start=start,
+        items=np.concatenate(items),
+        sizes=np.array(sizes, dtype=np.float64),
+        counts=np.array(counts, dtype=np.int64),
+        distance=distance,
+        movers=_all_movers([one.movers for one in arrays], solids, moving),
+        first_mover=np.cumsum([0, *(len(one.movers.speed) for one in arrays)]),
+        plane=plane.arrays.field,
+        flat=bool(np.isinf(low).all() and np.isinf(high).all()),
+    )
+
+
+def _thick(heights: Sequence[float]) -> list[tuple[float, float]]:
+    """Bands between sorted heights, at most so many: the thinnest join their lower neighbour."""
+    kept = list(heights)
+    while len(kept) > MOST_LAYERS + 1:
+        widths = np.diff(kept)
+        k = int(np.argmin(widths))
+        del kept[k if 0 < k else 1]
+    return list(zip(kept, kept[1:], strict=False))
+
+
+def _joined(pairs: Sequence[tuple[Solids, Solids]]) -> tuple[Solids, list[int], list[int]]:
+    """All solids as one, and with which piece those of each pair begin."""
+    edges, plates, firsts = [], [], [np.zeros(1, dtype=np.int64)]
+    begins: tuple[list[int], list[int]] = ([], [])
+    n_edges = n_pieces = 0
+    for pair in pairs:
+        for solids, begin in zip(pair, begins, strict=True):
+            begin.append(n_pieces)
+            edges.append(solids.edges)
+            plates.append(solids.plates)
+            firsts.append(solids.first[1:] + n_edges)
+            n_edges += len(solids.edges)
+            n_pieces += len(solids.plates)
+    return (
+        Solids(np.concatenate(edges), np.concatenate(firsts), np.concatenate(plates)),
+        *begins,
+    )
+
+
+def _all_movers(movers: Sequence[Movers], solids: Solids, begins: Sequence[int]) -> Movers:
+    """What moves, layer by layer, its pieces and knots among those of all layers."""
+    knots = np.cumsum([0, *(len(one.time) for one in movers)]).tolist()
+    return Movers(
+        solids=solids,
+        first_piece=_offset([one.first_piece for one in movers], begins),
+        first_knot=_offset([one.first_knot for one in movers], knots[:-1]),
+        time=np.concatenate([one.time for one in movers]),
+        pose=np.concatenate([one.pose for one in movers]),
+        speed=np.concatenate([one.speed for one in movers]),
+        middle=np.concatenate([one.middle for one in movers]),
+        reach=np.concatenate([one.reach for one in movers]),
+    )
+
+
+def _offset(firsts: Sequence[IntArray], offsets: Sequence[int]) -> IntArray:
+    """Ranges of all layers in one list, for a slice of it to end where its layer does."""
+    rows = [first + offset for first, offset in zip(firsts, offsets, strict=True)]
+    return np.concatenate([*(row[:-1] for row in rows), rows[-1][-1:]])
