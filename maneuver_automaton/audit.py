@@ -314,7 +314,8 @@ def _closest(plan: Plan, scene: _Scene) -> Approach:
     def distances(times: Array) -> Array:
         poses, clock = scene.seen(plan, times), scene.clock + times
         apart = [one.nearest(body, poses, clock).distance for one in around]
-        over = [layer.gap(scene.altitudes(plan, times), scene.height) for layer in layers]
+        altitudes = scene.altitudes(plan, times)
+        over = [layer.gap(altitudes, scene.height) for layer in layers]
         return np.asarray(np.min(np.hypot(apart, over), axis=0))
 
     if not plan.primitives:

@@ -218,10 +218,10 @@ class Plan:
         index = self._index_at(times)
         begin = group_of(self.start.size)(self.switching_poses[index])
         since = np.clip(times - self.switching_times[index], 0.0, self.primitive_durations[index])
-        steps = begin.exp(since[..., None] * self._twists[index]).pose
+        steps = np.array(begin.exp(since[..., None] * self._twists[index]).pose)
         for k, primitive in enumerate(self.primitives):
             if isinstance(primitive, Maneuver) and (here := index == k).any():
-                steps = np.where(here[..., None], _within(primitive, since), steps)
+                steps[here] = _within(primitive, since[here])
         return (begin @ type(begin)(steps)).pose
 
     def control_at(self, time: ArrayLike) -> Array:

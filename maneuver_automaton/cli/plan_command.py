@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.planning import PlanResult
     from maneuver_automaton.scenario import Scenario
 
-PICTURES = ("plan.png", "alternatives.png", "plan.gif")
+PICTURES = ("plan.png", "plan_3d.png", "alternatives.png", "plan.gif")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,6 +133,8 @@ def _write(result: PlanResult, out: Path, settings: Settings) -> None:
 
     if settings.plot:
         plotting.save_plan_figure(result, out / "plan.png", nodes=result.nodes)
+        if plotting.flies_among_heights(result.problem):
+            plotting.save_space_figure(result, out / "plan_3d.png")
         if result.alternatives:
             plotting.save_alternatives_figure(result, out / "alternatives.png")
     if settings.animate and result.plan is not None:

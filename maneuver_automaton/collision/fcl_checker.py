@@ -174,7 +174,7 @@ class FclChecker:
         spans = np.diff(clock)
         steps = (SE2(seen[:-1]).inverse() @ SE2(seen[1:])).log()
         twists = steps / np.maximum(spans, 1e-300)[:, None]
-        if self._ground.still is not None:
+        if self._may_come_near(seen, steps):
             todo = chunks(steps)[::-1]
             while todo:
                 first, last = todo.pop()
@@ -224,6 +224,14 @@ class FclChecker:
         near = np.array(as_array(name, poses, last=3))
         near[..., :2] -= self.origin
         return near
+
+    def _may_come_near(self, poses: Array, steps: Array) -> bool:
+        """Whether the rectangles around a course and around what stands still meet."""
+        far = float(np.hypot(*self._body.middle)) + self._body.reach
+        swings = np.linalg.norm(steps[:, :2], axis=1) + far * np.abs(steps[:, 2])
+        pad = far + float(swings.max(initial=0.0))
+        low, high = poses[:, :2].min(axis=0) - pad, poses[:, :2].max(axis=0) + pad
+        return bool((low <= self._ground.high).all() and (high >= self._ground.low).all())
 
     def _sweep_hits(self, body: Body, poses: Array, steps: Array) -> bool:
         """Whether one solid around a body along a course touches what stands still."""
@@ -286,6 +294,8 @@ class _Ground(NamedTuple):
     """Obstacles as FCL sees them."""
 
     still: Any  # one object for all that stands still, None without
+    low: Array  # (2,) corners of the rectangle around it
+    high: Array
     owners: IntArray  # which obstacle each of its triangles belongs to
     movers: tuple[_Moving, ...]
 
@@ -323,9 +333,17 @@ def _ground_of(
             regions.append(region)
             owners.append(index)
     if not regions:
-        return _Ground(None, np.zeros(0, dtype=np.int64), tuple(movers))
+        nowhere = np.full(2, np.inf)
+        return _Ground(None, nowhere, -nowhere, np.zeros(0, dtype=np.int64), tuple(movers))
     skin, which = obstacle_skin(regions)
-    return _Ground(_object(skin), np.array(owners)[which], tuple(movers))
+    corners = skin.vertices[:, :2]
+    return _Ground(
+        _object(skin),
+        corners.min(axis=0),
+        corners.max(axis=0),
+        np.array(owners)[which],
+        tuple(movers),
+    )
 
 
 @functools.lru_cache(maxsize=32)

@@ -47,6 +47,10 @@ from maneuver_automaton.plotting.plan_figures import save_plan_file_figure as sa
 from maneuver_automaton.plotting.roads import draw_road as draw_road
 from maneuver_automaton.plotting.roads import save_road_animation as save_road_animation
 from maneuver_automaton.plotting.roads import save_road_figure as save_road_figure
+from maneuver_automaton.plotting.space import SpaceArtists as SpaceArtists
+from maneuver_automaton.plotting.space import draw_space as draw_space
+from maneuver_automaton.plotting.space import flies_among_heights as flies_among_heights
+from maneuver_automaton.plotting.space import save_space_figure as save_space_figure
 from maneuver_automaton.plotting.stability import CertificateCurve as CertificateCurve
 from maneuver_automaton.plotting.stability import DrivenLoop as DrivenLoop
 from maneuver_automaton.plotting.stability import draw_distances as draw_distances

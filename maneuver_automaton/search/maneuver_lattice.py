@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, cast
 
@@ -48,6 +48,14 @@ LATER: tuple[Rung, ...] = (
     Rung(weight=1.0),
     Rung(scale=0.5, quanta=0.5, weight=1.2),
     Rung(scale=0.5, quanta=0.5, weight=1.0),
+)
+IN_SPACE: tuple[Rung, ...] = (
+    # one more dimension: coarse cells and little greed find the way, fine ones do not end
+    Rung(scale=12.0, quanta=4.0, weight=1.0, most=40000),
+    Rung(scale=8.0, quanta=3.0, weight=1.0, most=60000),
+    Rung(scale=4.0, quanta=2.0, weight=1.2, most=60000),
+    Rung(scale=4.0, quanta=2.0, weight=1.1, most=100000),
+    Rung(scale=6.0, quanta=2.0, weight=1.0, most=100000),
 )
 
 
@@ -102,6 +110,11 @@ class ManeuverPass:
     moves: Array
     chunk: int = FIRST_CHUNK
     alive: bool = True
+
+    @property
+    def may_go_on(self) -> bool:
+        """Whether there is something left to expand, and leave to do so."""
+        return self.alive and self.expansions < self.rung.most
 
     @property
     def expansions(self) -> int:
@@ -273,26 +286,41 @@ def _better(
 ) -> Iterator[tuple[ManeuverWord | None, int]]:
     """Shortcuts, then passes of falling weight below the cost of the best word, one by one."""
     total = 0
-    for shorter in shortened(query, best, deadline=deadline):
-        best = shorter
-        yield best, total
     arrays: ManeuverSearchArrays | None = None
-    for rung in LATER:
-        one = pass_of(query, rung, grid, arrays=arrays)
-        while one.alive and total < room and time.monotonic() < deadline:
-            before = one.expansions
-            word = one.run(min(one.chunk, room - total), best.cost, deadline=deadline)
-            total += one.expansions - before
-            one.chunk = min(2 * one.chunk, MOST_CHUNK)
-            if word is None or not word.cost < best.cost * (1.0 - LEAST):
-                continue
-            best = word
+    coarse = IN_SPACE if query.start.size > 3 else ()
+    for rungs, all_words in ((coarse, False), (LATER, True)):
+        for shorter in _shorter(query, best, rungs, all_words=all_words, deadline=deadline):
+            best = shorter
             yield best, total
-            for shorter in shortened(query, best, deadline=deadline):
-                best = shorter
+        for rung in rungs:
+            one = pass_of(query, rung, grid, arrays=arrays)
+            while one.may_go_on and total < room and time.monotonic() < deadline:
+                before = one.expansions
+                word = one.run(min(one.chunk, room - total), best.cost, deadline=deadline)
+                total += one.expansions - before
+                one.chunk = min(2 * one.chunk, MOST_CHUNK)
+                if word is None or not word.cost < best.cost * (1.0 - LEAST):
+                    continue
+                best = word
                 yield best, total
-        arrays = one.arrays
-        yield None, total
+                for shorter in _shorter(query, best, rungs, all_words=all_words, deadline=deadline):
+                    best = shorter
+                    yield best, total
+            arrays = one.arrays
+            yield None, total
+
+
+def _shorter(
+    query: ManeuverQuery,
+    best: ManeuverWord,
+    rungs: Sequence[Rung],
+    *,
+    all_words: bool,
+    deadline: float,
+) -> Iterator[ManeuverWord]:
+    """Shortcuts of the best word, where passes are to come."""
+    if rungs:
+        yield from shortened(query, best, all_words=all_words, deadline=deadline)
 
 
 def pass_of(

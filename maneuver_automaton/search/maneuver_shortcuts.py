@@ -52,16 +52,17 @@ def shortened(
     word: ManeuverWord,
     *,
     rounds: int = ROUNDS,
+    all_words: bool = True,
     deadline: float = math.inf,
 ) -> Iterator[ManeuverWord]:
     """Words that rounds of shortcuts make of `word`, each cheaper than the one before.
 
     Every round cuts the trims at other places, so that points lie elsewhere; first with words of
-    few trims, then with all.
+    few trims, then, unless `all_words` says otherwise, with all.
     """
     arrays = query.transfer.arrays
     best = word
-    for n_words in sorted({arrays.n_few, len(arrays.words)}):
+    for n_words in sorted({arrays.n_few, len(arrays.words) if all_words else arrays.n_few}):
         for n in range(rounds):
             if time.monotonic() >= deadline:
                 return

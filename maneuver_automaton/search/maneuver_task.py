@@ -33,6 +33,7 @@ class Rung:
     weight: float = 2.0
     stop: bool = False  # at the first connection
     margin: float = 1.0  # of the proven clearance
+    most: int = 2**62  # expansions
 
 
 class Task(NamedTuple):
