@@ -17,7 +17,6 @@ from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.checking import check_plan, load_checking, load_checks
 from maneuver_automaton.planning.polishing import (
-    SEQUENCES_SHARE,
     Aimed,
     guess_along,
     guess_of_plan,
@@ -197,8 +196,7 @@ def _polish(heard: _Heard) -> None:
         return
     aimed = [Aimed(guess_of_plan(heard.accepted[0].plan), heard.accepted[0].goal_index)]
     if _rests(problem):
-        share = SEQUENCES_SHARE * heard.left
-        along = list(guesses_along_paths(problem, time_limit=share))
+        along = list(guesses_along_paths(problem, time_limit=heard.left))
         aimed = along or [*heard.paths, *aimed]
     for goal_index in dict.fromkeys(one.goal_index for one in aimed):
         if heard.left <= 0.0:
