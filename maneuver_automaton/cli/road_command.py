@@ -65,9 +65,13 @@ def plan_file(
 
 
 def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: Parts) -> int:
-    """Close the loop of one drive into the folder `out`, print it, return the exit code."""
+    """Close the loop of one drive into the folder `out`, print it, return the exit code.
+
+    Where the search of one step finds no plan to a goal from the start, a wider one is made before
+    the vehicle sets off, and told apart from the steps.
+    """
     from maneuver_automaton.formats.road_json import road_drive_to_dict, save_road_document
-    from maneuver_automaton.roads import drive_scene, road_planner
+    from maneuver_automaton.roads import drive_scene, plan_road, road_planner
 
     for name, value in (("--seeds", settings.seeds), ("--resume", settings.resume)):
         if value is not None:
@@ -79,10 +83,21 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
             planner = road_planner(scene, vehicle)
         except ValueError as error:
             raise _in_file(path, error) from error
+        before = None
+        first = planner.search(planner.start_state, tick=0)
+        if first is None or not first.reaches:
+            limit = settings.time_limit or TIME_LIMIT
+            with waiting(f"planning before the start, at most {limit:g} s", quiet=settings.quiet):
+                before = plan_road(scene, vehicle, time_limit=limit)
         most = min(settings.steps or planner.last_tick, planner.last_tick)
         with progress_bar("steps", most, quiet=settings.quiet) as advance:
-            drive = drive_scene(planner, steps=settings.steps, progress=lambda _: advance())
-    document = road_drive_to_dict(drive)
+            drive = drive_scene(
+                planner,
+                steps=settings.steps,
+                first=None if before is None else before.plan,
+                progress=lambda _: advance(),
+            )
+    document = road_drive_to_dict(drive, before=before)
 
     def write() -> None:
         save_road_document(document, out / "closed_loop.json")
@@ -94,7 +109,7 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
 
     _written(write, out)
     if not settings.quiet:
-        _print(scene.name, _drive_facts(drive, out))
+        _print(scene.name, _drive_facts(drive, before, out))
     for name in drive.verdict.hit:
         complain(f"{path}: collision with {name}")
     if drive.verdict.off_road:
@@ -153,7 +168,7 @@ def _plan_facts(result: RoadPlanResult, out: Path) -> dict[str, str]:
     }
 
 
-def _drive_facts(drive: RoadDrive, out: Path) -> dict[str, str]:
+def _drive_facts(drive: RoadDrive, before: RoadPlanResult | None, out: Path) -> dict[str, str]:
     verdict = drive.verdict
     milliseconds = 1e3 * drive.solve_s
     facts = {
@@ -163,6 +178,8 @@ def _drive_facts(drive: RoadDrive, out: Path) -> dict[str, str]:
         "clearance": f"{verdict.clearance_m:.3g} m, to the edge of the road {verdict.edge_m:.3g} m",
         "written to": str(out),
     }
+    if before is not None and before.plan is not None:
+        facts["first plan"] = f"made in {before.search_s:.3g} s before the start"
     if len(milliseconds):
         facts["time per step"] = (
             f"{np.median(milliseconds):.2f} ms median, {milliseconds.max():.2f} ms at most"

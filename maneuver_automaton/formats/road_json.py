@@ -55,8 +55,8 @@ def road_plan_to_dict(result: RoadPlanResult) -> dict[str, Any]:
     }
 
 
-def road_drive_to_dict(drive: RoadDrive) -> dict[str, Any]:
-    """The content of closed_loop.json."""
+def road_drive_to_dict(drive: RoadDrive, *, before: RoadPlanResult | None = None) -> dict[str, Any]:
+    """The content of closed_loop.json; `before` is the search that was made before the start."""
     spent = np.concatenate([[0.0], np.cumsum([step.applied_cost for step in drive.steps])])
     verdict, end = drive.verdict, drive.driven
     broken = [("no collision", name) for name in verdict.hit]
@@ -73,6 +73,7 @@ def road_drive_to_dict(drive: RoadDrive) -> dict[str, Any]:
         "duration_s": float(end.time[-1] - end.time[0]),
         "step_s": TICK,
         "steps_bound": None,
+        "planned_before_s": None if before is None else before.search_s,
         "audit": {**_audit(verdict), "pieces": len(drive.steps), "failed": len(broken)},
         "min_clearance_m": _number(verdict.clearance_m),
         "collisions": verdict.collisions,

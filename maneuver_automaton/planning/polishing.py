@@ -43,7 +43,6 @@ from maneuver_automaton.refinement.polish import (
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
 
 POINT = ((np.zeros((1, 2)), 0.0),)  # the body of a vehicle without a footprint
-SEQUENCES_SHARE = 0.2  # of the time, for kinematic plans that differ
 TURNS = (1.0, 0.8)  # of the greatest curvature, with which they turn
 
 

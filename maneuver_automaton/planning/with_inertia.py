@@ -6,7 +6,7 @@ import functools
 import math
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.checking import check_plan, load_checking, load_checks
 from maneuver_automaton.planning.polishing import (
-    SEQUENCES_SHARE,
     Aimed,
     guess_along,
     guess_of_plan,
@@ -38,7 +37,10 @@ from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.maneuver_lattice import maneuver_words, plan_of
 from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
 from maneuver_automaton.search.maneuver_ready import load_maneuver_kernels
+from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
+from maneuver_automaton.search.maneuver_words import load_maneuver_words
 
+LATE = 1e-12  # relative, by which a plan may exceed a limit of time
 FIRST_SHARE = 0.8  # of the time limit, for a first path
 IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
 MANEUVER_SHARE = 0.2  # of what is left, for words of maneuvers where there is a plan already
@@ -115,6 +117,10 @@ class _Heard:
     def hear(self, plan: Plan, goal_index: int) -> bool:
         """Keep a plan if it passes the checks, and say so."""
         begin = time.monotonic()
+        plan, against = _fitted(self.problem, plan)
+        if against:
+            self.refused = self.refused or against
+            return False
         checked = check_plan(self.problem, plan, self.problem.goals[goal_index])
         now = time.monotonic()
         self.checking += now - begin
@@ -142,6 +148,31 @@ class _Heard:
         return PlanStatus.OUT_OF_BUDGET, f"no plan within {time_limit:g} s{self.reason}"
 
 
+def _fitted(problem: Problem, plan: Plan) -> tuple[Plan, str]:
+    """The plan with a rest that fills a fixed time, and which limit of the horizon it breaks."""
+    horizon = problem.horizon
+    limit = horizon.max_time if horizon.time is None else horizon.time
+    if limit is not None and plan.duration > limit * (1.0 + LATE):
+        return plan, f"it takes {plan.duration:.6g} s, {limit:g} s are left"
+    if horizon.time is not None and plan.duration < horizon.time:
+        if not plan.trims[-1].is_rest:
+            return (
+                plan,
+                f"it takes {plan.duration:.6g} s and ends in motion, {horizon.time:g} s are asked",
+            )
+        padded = plan.durations.copy()
+        padded[-1] += horizon.time - plan.duration
+        plan = replace(plan, durations=padded)
+    lasting = [
+        (trim, time) for trim, time in zip(plan.trims, plan.durations, strict=True) if time > 0.0
+    ]
+    if horizon.max_trims is not None and len(lasting) > horizon.max_trims:
+        return plan, f"it has {len(lasting)} trims, {horizon.max_trims} are admitted"
+    if any(time < horizon.min_coast for trim, time in lasting if not trim.is_rest):
+        return plan, f"a trim lasts less than {horizon.min_coast:g} s"
+    return plan, ""
+
+
 def _candidates(heard: _Heard) -> Iterator[tuple[Plan, int]]:
     """Plans as they are found, and the goals they reach."""
     problem = heard.problem
@@ -154,6 +185,8 @@ def _candidates(heard: _Heard) -> Iterator[tuple[Plan, int]]:
         yield from _over_maneuvers(heard, 1.0 if why_not_polished(problem) else share)
         if not heard.accepted:
             yield from _over_maneuvers(heard, 1.0)
+        if not problem.obstacles:
+            yield from _by_words(heard)
 
 
 def _polish(heard: _Heard) -> None:
@@ -163,8 +196,7 @@ def _polish(heard: _Heard) -> None:
         return
     aimed = [Aimed(guess_of_plan(heard.accepted[0].plan), heard.accepted[0].goal_index)]
     if _rests(problem):
-        share = SEQUENCES_SHARE * heard.left
-        along = list(guesses_along_paths(problem, time_limit=share))
+        along = list(guesses_along_paths(problem, time_limit=heard.left))
         aimed = along or [*heard.paths, *aimed]
     for goal_index in dict.fromkeys(one.goal_index for one in aimed):
         if heard.left <= 0.0:
@@ -193,6 +225,17 @@ def _over_maneuvers(heard: _Heard, share: float) -> Iterator[tuple[Plan, int]]:
             yield plan_of(query, found.word), goals[found.word.goal]
         elif found.status is SearchStatus.EXHAUSTED and not heard.accepted:
             heard.reason = "; none over trims and maneuvers at any resolution tried"
+
+
+def _by_words(heard: _Heard) -> Iterator[tuple[Plan, int]]:
+    """Words of trims and maneuvers where nothing is in the way: short ones, then insertion."""
+    problem = heard.problem
+    for index, goal in enumerate(problem.goals):
+        best = heard.accepted[0].cost if heard.accepted else math.inf
+        left = MANEUVER_SHARE * heard.left
+        found = search_words_with_maneuvers(problem, goal, time_limit=left, ceiling=best)
+        for plan in found.plans:
+            yield plan, index
 
 
 def _along_paths(heard: _Heard) -> Iterator[tuple[Plan, int]]:
@@ -231,6 +274,8 @@ def load_inertia(problem: Problem) -> None:
             load_polishing(problem)
     if problem.automaton.maneuvers:
         load_maneuver_kernels()
+        if not problem.obstacles:
+            load_maneuver_words()
 
 
 def _rests(problem: Problem) -> bool:

@@ -24,9 +24,12 @@ SAME = 1e-9  # [m, rad, s] between the end of a piece and the start of what goes
 
 
 def loop_colors(loop: ClosedLoop) -> dict[str, Color]:
-    """A colour for every trim that a `loop` planned or drove."""
+    """A colour for every trim, and the parts of every maneuver, that a `loop` planned or drove."""
     twists: dict[str, Array] = {}
     for plan in [step.plan for step in loop.steps] + list(loop.driven):
+        if any(plan.maneuvers):
+            twists = track_of_plan(plan).twists | twists
+            continue
         for trim in plan.trims:
             twists.setdefault(trim.name, trim.body_velocity)
     return trim_colors(twists)

@@ -2,30 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, IntArray, as_array
 from maneuver_automaton.models import Model
-from maneuver_automaton.primitives._legendre import (
-    INTEGRALS,
-    NODES,
-    SERIES,
-    WEIGHTS,
-    integrals_to,
-)
+from maneuver_automaton.primitives._collocation import Elements, Ride, resolved
+from maneuver_automaton.primitives._legendre import SERIES, WEIGHTS, integrals_to
 from maneuver_automaton.primitives.trajectory import Trajectory
-
-RESOLVED = 1e-13  # last terms of a series, over the greatest value or 1 [m, rad, units of z]
-SETTLED = 1e-14  # change of the reduced state in an iteration, over the greatest value or 1
-NOISE = 1e-12  # the same, where it goes on for ever because rates are differences of great numbers
-FINEST = 2**16  # parts of an interval of constant control, at most
-ITERATIONS = 40  # before a stretch counts as too long to be solved at once
-HOPEFUL = 9  # iterations after which every one has to halve the change, or the stretch is too long
-
-BoolArray = NDArray[np.bool_]
 
 
 def drive(
@@ -39,8 +23,9 @@ def drive(
 ) -> Trajectory:
     """Motion from the identity pose under controls (n, n_u), each for its duration (n,) [s].
 
-    There is a sample at every change of control, and samples are closer than both steps. Controls
-    of no duration are left out. What is computed, and how exactly, see `drive_all`.
+    There is a sample at the begin of every control, and samples are closer than both steps, equal
+    times apart while one control holds. Controls of no duration are left out. What is computed,
+    and how exactly, see `drive_all`.
 
     Raises
     ------
@@ -125,188 +110,60 @@ def drive_all(
     for name, step in (("max_step_m", max_step_m), ("max_step_rad", max_step_rad)):
         if not step > 0.0:
             raise ValueError(f"drive: {name} must be positive, got {step}")
-    return _sampled(_resolved(model, z, u, h), max_step_m, max_step_rad)
+    ride, elements = resolved(model, z, u, h)
+    return _sampled(ride, elements, max_step_m, max_step_rad)
 
 
-class _Elements(NamedTuple):
-    """Stretches of constant control on which all rates are short series, m rides of k each."""
-
-    step: Array  # (m, k) [s]
-    control: Array  # (m, k, n_u)
-    begin: Array  # (m, k + 1, n_z) reduced states
-    rates: Array  # (m, k, n, n_z) of the reduced state at the points
-    twists: Array  # (m, k, n, dof) at the points
-    flow: Array  # (m, k, n, dof) rates of the pose, in the frame where the element begins
-    ends: Array  # (m, k, 2, dof) twists at begin and end
-
-
-def _resolved(model: Model, z: Array, control: Array, durations: Array) -> _Elements:
-    """Elements that are fine enough for their series to be exact, for each ride by itself."""
-    parts = np.ones(durations.shape, dtype=np.int64)
-    while True:
-        most = parts.max(axis=0)
-        owner = np.repeat(np.arange(most.size), most)
-        number = np.arange(owner.size) - (np.cumsum(most) - most)[owner]
-        mine = number < parts[:, owner]
-        step = np.where(mine, durations[:, owner] / parts[:, owner], 0.0)
-        elements, rough = _integrated(model, z, control[:, owner], step)
-        if elements is not None:
-            rough = _is_rough(elements)
-            if not rough.any():
-                return elements
-        ride, place = np.nonzero(rough)
-        finer = np.zeros(parts.shape, dtype=bool)
-        finer[ride, owner[place]] = True
-        parts[finer] *= 2
-        if parts.max() > FINEST:
-            r, k = np.unravel_index(np.argmax(parts), parts.shape)
-            raise ValueError(
-                f"{model.name}: the motion under control {control[r, k].tolist()} cannot be "
-                f"followed for {durations[r, k]:.6g} s: it explodes, or a reduced state leaves "
-                "what the model can bear"
-            )
-
-
-def _integrated(
-    model: Model, z: Array, control: Array, step: Array
-) -> tuple[_Elements | None, BoolArray]:
-    """The elements; or none, and which (m, k) cannot be solved for."""
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        begin, at_nodes, rates, lost = _reduced_states(model, z, control, step)
-    if lost.any():
-        return None, lost
-    at_ends = np.stack([begin[:, :-1], begin[:, 1:]], axis=2)
-    twists = model.body_velocity(at_nodes, control[:, :, None])
-    heading = step[..., None] * (twists[..., 2] @ INTEGRALS.T)
-    flow = twists.copy()
-    cosine, sine = np.cos(heading), np.sin(heading)
-    flow[..., 0] = cosine * twists[..., 0] - sine * twists[..., 1]
-    flow[..., 1] = sine * twists[..., 0] + cosine * twists[..., 1]
-    ends = model.body_velocity(at_ends, control[:, :, None])
-    return _Elements(step, control, begin, rates, twists, flow, ends), lost
-
-
-def _reduced_states(
-    model: Model, z: Array, control: Array, step: Array
-) -> tuple[Array, Array, Array, BoolArray]:
-    """Reduced states at the begins (m, k + 1, n_z) and points (m, k, n, n_z), rates there.
-
-    The last value tells the elements (m, k) that no iteration solves.
-    """
-    m, k = step.shape
-    begin = np.empty((m, k + 1, z.shape[1]))
-    at_nodes = np.empty((m, k, NODES.size, z.shape[1]))
-    rates = np.empty_like(at_nodes)
-    lost = np.zeros((m, k), dtype=bool)
-    begin[:, 0] = z
-    done, window = 0, k
-    while done < k and not lost.any():
-        stretch = slice(done, min(done + window, k))
-        solved = _picard(model, begin[:, done], control[:, stretch, None], step[:, stretch])
-        if solved.lost.any():
-            if stretch.stop == done + 1:
-                lost[:, done] = solved.lost
-            window = (stretch.stop - done) // 2
-            continue
-        at_nodes[:, stretch], rates[:, stretch] = solved.nodes, solved.rates
-        begin[:, done + 1 : stretch.stop + 1] = solved.ends
-        done = stretch.stop
-        window *= 2 if solved.iterations < ITERATIONS // 3 else 1
-    return begin, at_nodes, rates, lost
-
-
-class _Stretch(NamedTuple):
-    """Reduced states of m rides on k elements."""
-
-    nodes: Array  # (m, k, n, n_z) at the points
-    rates: Array  # (m, k, n, n_z) there
-    ends: Array  # (m, k, n_z) at the ends of the elements
-    iterations: int
-    lost: BoolArray  # (m,) rides for which the iteration came to nothing
-
-
-def _picard(model: Model, z: Array, control: Array, step: Array) -> _Stretch:
-    """Reduced states from those at the begin (m, n_z), by iteration over all elements at once."""
-    m, k = step.shape
-    h = step[..., None]
-    nodes = np.broadcast_to(z[:, None, None], (m, k, NODES.size, z.shape[1])).copy()
-    before = np.inf
-    for iteration in range(ITERATIONS):
-        rates = np.broadcast_to(model.reduced_dynamics(nodes, control), nodes.shape)
-        ends = z[:, None] + np.cumsum(h * (WEIGHTS @ rates), axis=1)
-        begins = np.concatenate([z[:, None], ends[:, :-1]], axis=1)[:, :, None]
-        new = begins + h[..., None] * (INTEGRALS @ rates)
-        changes = np.abs(new - nodes) / np.maximum(1.0, np.abs(new))
-        nodes = new
-        if not np.isfinite(new).all():
-            break
-        change = float(changes.max(initial=0.0))
-        hopeless = k > 1 and iteration >= HOPEFUL and change > before / 2.0
-        if change <= SETTLED or hopeless or (change <= NOISE and change > before / 2.0):
-            break
-        before = change
-    off = changes.reshape(m, -1).max(axis=1, initial=0.0)
-    return _Stretch(nodes, rates, ends, iteration, np.asarray(~(off <= NOISE)))
-
-
-def _is_rough(elements: _Elements) -> BoolArray:
-    """Elements (m, k) whose series have last terms that are more than rounding."""
-    rough = np.zeros(elements.step.shape, dtype=bool)
-    h = elements.step[..., None]
-    for values in (elements.rates, elements.twists, elements.flow):
-        last = np.abs(SERIES[-2:] @ values)
-        size = np.maximum(np.abs(values[..., 0, :]), np.abs(values[..., -1, :]))
-        worst = np.maximum(last[..., 0, :], last[..., 1, :])
-        rough |= (h * worst > RESOLVED * np.maximum(1.0, h * size)).any(axis=-1)
-    return rough
-
-
-def _sampled(elements: _Elements, max_step_m: float, max_step_rad: float) -> tuple[Trajectory, ...]:
-    """Samples of every ride, in one go over all elements that last."""
-    poses, start = _chained(elements), np.zeros((elements.step.shape[0], 1))
-    times = np.concatenate([start, np.cumsum(elements.step, axis=1)], axis=1)
-    ride, place = np.nonzero(elements.step)
-    count = _n_samples(elements, max_step_m, max_step_rad)[ride, place]
+def _sampled(
+    ride: Ride, elements: Elements, max_step_m: float, max_step_rad: float
+) -> tuple[Trajectory, ...]:
+    """Samples of every ride, equal times apart while one control holds, all in one go."""
+    poses = _chained(elements)
+    spans = np.cumsum(ride.durations, axis=1)
+    counts = _n_samples(ride, elements, max_step_m, max_step_rad)
+    rows, place = np.nonzero(ride.durations)
+    count = counts[rows, place]
     of = np.repeat(np.arange(count.size), count)
-    share, steps, gained = _between(elements, ride, place, count)
-    at = (ride[of], place[of])
+    number = np.arange(of.size) - (np.cumsum(count) - count)[of]
+    parts = ride.parts[rows, place][of]
+    part = number * parts // count[of]  # in whole numbers: ends of parts are begins
+    share = number * parts / count[of] - part
+    at = (rows[of], ride.first[place][of] + part)
+    gained = _gained(elements, at, share)
+    dof = poses.shape[-1]
+    begin = spans[rows, place] - ride.durations[rows, place]
     samples = Trajectory(
-        time=times[at] + share * elements.step[at],
-        pose=_moved(poses[at], steps),
-        reduced_state=elements.begin[at] + gained,
+        time=begin[of] + number * (ride.durations[rows, place] / count)[of],
+        pose=_moved(poses[at], gained[:, :dof]),
+        reduced_state=elements.begin[at] + gained[:, dof:],
         control=elements.control[at],
     )
-    last = elements.control[np.arange(times.shape[0]), _last_place(elements.step)]
-    stops = np.searchsorted(ride[of], np.arange(times.shape[0]), side="right")
+    last = elements.control[np.arange(len(spans)), _last_place(elements.step)]
+    stops = np.searchsorted(rows[of], np.arange(len(spans)), side="right")
     return tuple(
         Trajectory(
-            time=np.append(samples.time[begin:stop], times[r, -1]),
-            pose=np.concatenate([samples.pose[begin:stop], poses[r, -1:]]),
+            time=np.append(samples.time[start:stop], spans[r, -1]),
+            pose=np.concatenate([samples.pose[start:stop], poses[r, -1:]]),
             reduced_state=np.concatenate(
-                [samples.reduced_state[begin:stop], elements.begin[r, -1:]]
+                [samples.reduced_state[start:stop], elements.begin[r, -1:]]
             ),
-            control=np.concatenate([samples.control[begin:stop], last[r][None]]),
+            control=np.concatenate([samples.control[start:stop], last[r][None]]),
         )
-        for r, (begin, stop) in enumerate(zip([0, *stops[:-1]], stops, strict=True))
+        for r, (start, stop) in enumerate(zip([0, *stops[:-1]], stops, strict=True))
     )
 
 
-def _between(
-    elements: _Elements, ride: IntArray, place: IntArray, count: IntArray
-) -> tuple[Array, Array, Array]:
-    """Share of the element, pose from its begin, and reduced state gained, at every sample."""
-    first = np.cumsum(count) - count
-    dof = elements.flow.shape[-1]
-    rates = np.concatenate([elements.flow, elements.rates], axis=-1)[ride, place]
-    series = SERIES @ rates * elements.step[ride, place][:, None, None]
-    share, gained = np.empty(count.sum()), np.empty((count.sum(), rates.shape[-1]))
-    for n in np.unique(count):
-        alike = np.flatnonzero(count == n)
-        shares = np.arange(n) / n
-        rows = first[alike][:, None] + np.arange(n)
-        share[rows] = shares
-        gained[rows] = integrals_to(shares) @ series[alike]
-    return share, gained[:, :dof], gained[:, dof:]
+def _gained(elements: Elements, at: tuple[IntArray, IntArray], share: Array) -> Array:
+    """Pose from the begin of the element, then reduced state gained, at shares of elements."""
+    rates = np.concatenate([elements.flow, elements.rates], axis=-1)
+    series = SERIES @ rates * elements.step[..., None, None]
+    shares, which, counts = np.unique(share, return_inverse=True, return_counts=True)
+    gained = np.empty((share.size, rates.shape[-1]))
+    order, ends = np.argsort(which, kind="stable"), np.cumsum(counts)
+    for row, begin, end in zip(integrals_to(shares), ends - counts, ends, strict=True):
+        same = order[begin:end]
+        gained[same] = row @ series[at[0][same], at[1][same]]
+    return gained
 
 
 def _last_place(step: Array) -> IntArray:
@@ -314,18 +171,19 @@ def _last_place(step: Array) -> IntArray:
     return np.asarray(step.shape[1] - 1 - np.argmax(step[:, ::-1] > 0.0, axis=1))
 
 
-def _n_samples(elements: _Elements, max_step_m: float, max_step_rad: float) -> IntArray:
-    """How many equal parts (m, k) keep the samples of an element close enough."""
+def _n_samples(ride: Ride, elements: Elements, max_step_m: float, max_step_rad: float) -> IntArray:
+    """How many equal intervals (m, n) keep the samples under a control close enough."""
     twists = np.concatenate([elements.twists, elements.ends], axis=2)
     places = [0, 1, *range(3, twists.shape[-1])]
     speed = np.linalg.norm(twists[..., places], axis=-1).max(axis=2)
     turn = np.abs(twists[..., 2]).max(axis=2)
-    need = elements.step * np.maximum(speed / max_step_m, turn / max_step_rad)
+    rate = np.where(elements.step > 0.0, np.maximum(speed / max_step_m, turn / max_step_rad), 0.0)
+    need = ride.durations * np.maximum.reduceat(rate, ride.first, axis=1)
     count: IntArray = np.maximum(np.ceil(1.001 * need), 1.0).astype(np.int64)
     return count
 
 
-def _chained(elements: _Elements) -> Array:
+def _chained(elements: Elements) -> Array:
     """Poses (m, k + 1, dof) at the ends of the elements, from the identity."""
     h = elements.step[..., None]
     steps = h * (WEIGHTS @ elements.flow)

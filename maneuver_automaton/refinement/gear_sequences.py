@@ -8,6 +8,7 @@ tightly than the vehicle could, and ranked by the time they would take from stop
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -32,7 +33,8 @@ PRICES = (  # of a change of direction, and of a switch of trims, in the time of
     (0.3, 0.3),
     (2.0, 0.0),
 )
-BRIEF = Patience(attempts=2000, passes=4)
+BRIEF = Patience(attempts=300, passes=1)
+MOST = 20_000  # expansions of one search: what it finds does not depend on the clock
 SAME = 0.15  # share of a stroke in which it differs at most from that of a like sequence
 SMALL = 0.02  # share of the whole way by which a stroke counts as longer
 OTHERS = 8  # further words of each search that are looked at
@@ -113,23 +115,20 @@ def gear_sequences(
     estimate : callable
         What a plan would take; see `timed`.
     time_limit : float
-        For all searches together [s]; the first of them ends when it has a plan.
+        For all searches together [s]; they are counted in expansions and attempts, so it only cuts
+        them short.
     keep : int
         How many plans to return at most.
     """
     deadline = time.monotonic() + time_limit
     found: list[Drive] = []
-    order = sorted(np.ndindex(len(PRICES), len(libraries)), key=sum)
-    variants = [(PRICES[i], libraries[j]) for i, j in order]
-    for k, ((turning, switching), library) in enumerate(variants):
-        now = time.monotonic()
-        if now >= deadline:
+    for (turning, switching), library in itertools.product(PRICES, libraries):
+        if time.monotonic() >= deadline:
             break
-        until = deadline if not found else now + (deadline - now) / (len(variants) - k)
         unit = _unit(library)
         cost = Cost(time=1.0, direction_change=turning * unit, switch=switching * unit)
         variant = replace(problem, automaton=library, cost=cost)
-        for plan in _plans(variant, until, deadline):
+        for plan in _plans(variant, deadline):
             drive = Drive(plan=plan, estimate=estimate(plan), strokes=_strokes(plan))
             if any(drive.resembles(other) and drive.estimate >= other.estimate for other in found):
                 continue
@@ -137,14 +136,14 @@ def gear_sequences(
     return tuple(sorted(found, key=lambda one: one.estimate)[:keep])
 
 
-def _plans(problem: Problem, until: float, deadline: float) -> Iterator[Plan]:
+def _plans(problem: Problem, deadline: float) -> Iterator[Plan]:
     """Plans of one search: what improving its first one comes to, and what it met on the way."""
     query = lattice_query(problem, tuple(range(len(problem.goals))))
     table = cost_to_go_table(problem)
-    first = first_plan(query, deadline=max(until, deadline), table=table)
+    first = first_plan(query, deadline=deadline, max_expansions=MOST, table=table)
     if first.word is None:
         return
-    improved = improve(query, first.word, deadline=until, patience=BRIEF, table=table)
+    improved = improve(query, first.word, deadline=deadline, patience=BRIEF, table=table)
     for word in (improved.word, *improved.others[:OTHERS]):
         yield plan_of_word(query, word)
 

@@ -36,6 +36,7 @@ from maneuver_automaton.refinement.closure import closed
 NEAR = 1.12  # share of the best cost so far up to which free lines are tried
 DEEP_ITERATIONS = 150  # from a guess inside obstacles, before it is led out of them
 SHUFFLE = 6  # changes of gear from which on gears are fixed first
+FIRST_BUILD = 0.3  # [s] that writing a problem down is expected to take
 FINER = 0.6  # share of the step with which the best is solved once more
 
 
@@ -235,6 +236,7 @@ class _Polishing:
     best_raw: Polished | None = None
     reason: str = "no guess was given"
     attempts: list[Attempt] = field(default_factory=list)
+    building: float = FIRST_BUILD  # [s] the longest so far
 
     def run(self) -> PolishResult:
         quick: list[tuple[float, int, Polished]] = []
@@ -256,7 +258,8 @@ class _Polishing:
                             attempts=tuple(self.attempts))  # fmt: skip
 
     def _left(self) -> float:
-        return self.deadline - time.monotonic()
+        """Time for a solver [s]: what is left less what it takes to write a problem down."""
+        return self.deadline - time.monotonic() - self.building
 
     def _rough(self, number: int) -> Polished | None:
         """Where a guess leads with fixed planes, or with fixed gears."""
@@ -334,6 +337,7 @@ class _Polishing:
             gears=gears,
             max_seconds=max(self._left(), 0.05),
         )
+        self.building = max(self.building, found.build_s)
         self.attempts.append(
             Attempt(
                 guess=number,

@@ -52,6 +52,13 @@ class GoalArrays(NamedTuple):
     turned: np.ndarray  # (G, 2) least and greatest heading, seen from the route's direction there
 
 
+class Blocks(NamedTuple):
+    """What stands on the road, seen along the route, as the vehicle's middle may not be there."""
+
+    way: np.ndarray  # (B, 4) stations and offsets
+    passable: np.ndarray  # (B, 2) whether there is road to its right and to its left
+
+
 class Weights(NamedTuple):
     """What a drive minds, per second."""
 
@@ -108,6 +115,7 @@ class Horizon(NamedTuple):
     maneuvers: Maneuvers
     route: RouteArrays
     goals: GoalArrays
+    blocks: Blocks
     weights: Weights
 
 
@@ -205,6 +213,45 @@ def rest_of_the_way(weights, goals, g, station, offset, turned, speed, least, mo
 
 
 @inner_kernel
+def around_blocks(weights, blocks, station, offset, turned, speed, goal, most):
+    """Estimate of what it costs to get around what stands on the way to a station.
+
+    Each is taken alone: the vehicle is beside it when it gets there, on the nearer side with road,
+    and has to be back at the goal's offsets in what time is left then.
+    """
+    cost = 0.0
+    for b in range(blocks.way.shape[0]):
+        begin, after = blocks.way[b, 0], blocks.way[b, 1]
+        end = goal[0] if goal[0] > -math.inf else station + speed * most
+        if station >= after or begin >= end or speed <= 0.0:
+            continue
+        if goal[0] > -math.inf:
+            right, left = goal[2] - blocks.way[b, 2], blocks.way[b, 3] - goal[3]
+            back = max(min(right, left), 0.0)
+            left_over = max(most - (after - station) / speed, 0.1)
+            needed = back / (left_over * left_over)  # half of what it is from straight ahead
+            cost += weights.aside * needed * needed * left_over
+        time = max(begin - station, 0.0) / speed
+        reach = offset + speed * math.sin(turned) * time
+        right, left = reach - blocks.way[b, 2], blocks.way[b, 3] - reach
+        if right <= 0.0 or left <= 0.0:
+            continue  # it will be beside it
+        aside = math.inf
+        if blocks.passable[b, 0]:
+            aside = right
+        if blocks.passable[b, 1]:
+            aside = min(aside, left)
+        if aside == math.inf:
+            continue
+        time = max(time, 0.1)
+        needed = 2.0 * aside / (time * time)
+        cost += weights.aside * needed * needed * time
+        if needed > weights.lateral:
+            cost += IMPOSSIBLE * (needed / weights.lateral - 1.0)
+    return cost
+
+
+@inner_kernel
 def cost_to_go(horizon, station, offset, turned, speed, tick):
     """Estimate of what the rest costs to the goal that is nearest."""
     goals = horizon.goals
@@ -217,6 +264,16 @@ def cost_to_go(horizon, station, offset, turned, speed, tick):
         most = (goals.tick[g, 1] - tick) * horizon.limits.tick
         cost = rest_of_the_way(
             horizon.weights, goals, g, station, offset, turned, speed, least, most
+        )
+        cost += around_blocks(
+            horizon.weights,
+            horizon.blocks,
+            station,
+            offset,
+            turned,
+            speed,
+            goals.way[g],
+            most,
         )
         best = min(best, cost)
     return best

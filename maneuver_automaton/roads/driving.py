@@ -65,6 +65,7 @@ def drive_scene(
     planner: RoadPlanner,
     *,
     steps: int | None = None,
+    first: RoadPlan | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> RoadDrive:
     """Close the loop until a goal is reached, or its time is over.
@@ -76,19 +77,21 @@ def drive_scene(
     planner : RoadPlanner
     steps : int, optional
         Steps at most.
+    first : RoadPlan, optional
+        A plan from the start that was made before, such as that of `plan_road`.
     progress : callable, optional
         Called with the number of each step that is done.
     """
     planner.warm()
     last = planner.last_tick
     limit = min(MOST_STEPS if steps is None else steps, last)
-    state, plan = planner.start_state, None
+    state, rest = planner.start_state, first
     done: list[RoadStep] = []
     pieces: list[Trajectory] = []
     tick = 0
     while not planner.at_goal(state, tick=tick) and tick < limit:
         wall, cpu = time.perf_counter(), time.thread_time()
-        plan, replanned = planner.plan(state, tick=tick, last=plan)
+        plan, replanned = planner.plan(state, tick=tick, rest=rest)
         wall, cpu = time.perf_counter() - wall, time.thread_time() - cpu
         done.append(
             RoadStep(
@@ -106,7 +109,7 @@ def drive_scene(
         pieces.append(driven_from(planner, state, plan.controls[:1], tick=tick))
         state = np.concatenate([pieces[-1].pose[-1], pieces[-1].reduced_state[-1]])
         state[3] = max(state[3], 0.0)  # rounding at rest
-        tick += 1
+        tick, rest = tick + 1, plan.rest()
         if progress is not None:
             progress(tick)
     reached = planner.at_goal(state, tick=tick)

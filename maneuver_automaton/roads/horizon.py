@@ -12,6 +12,7 @@ from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads import _kernels_free, _kernels_horizon, _kernels_library
 from maneuver_automaton.roads._kernels_horizon import (
+    Blocks,
     GoalArrays,
     Horizon,
     HorizonArrays,
@@ -21,8 +22,9 @@ from maneuver_automaton.roads._kernels_horizon import (
 )
 from maneuver_automaton.roads.clearing import clearing_of
 from maneuver_automaton.roads.goal_region import GoalRegion, outlines_of
+from maneuver_automaton.roads.lanelets import drivable_area
 from maneuver_automaton.roads.library import TICK, TICKS, RoadLibrary, road_library
-from maneuver_automaton.roads.route import SPACING, Route, route_of
+from maneuver_automaton.roads.route import SPACING, Route, extent_on, route_of
 from maneuver_automaton.roads.scene import RoadScene
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
@@ -150,16 +152,16 @@ class RoadPlanner:
 
     def warm(self) -> None:
         """Compile, and touch the memory, before time counts."""
-        plan, _ = self.plan(self.start_state, tick=0, last=None)
-        self.plan(plan.states[1], tick=1, last=plan)
+        plan, _ = self.plan(self.start_state, tick=0, rest=None)
+        self.plan(plan.states[1], tick=1, rest=plan.rest())
 
-    def plan(self, state: Array, *, tick: int, last: RoadPlan | None) -> tuple[RoadPlan, bool]:
+    def plan(self, state: Array, *, tick: int, rest: RoadPlan | None) -> tuple[RoadPlan, bool]:
         """The plan from a state (5,) at a tick, and whether it is not the rest of the last one.
 
-        The rest of the last plan is proven again from where the vehicle is, and kept unless a new
-        one is better. A plan that is not free is driven only where none is: then braking.
+        The `rest` of the last plan is proven again from where the vehicle is, and kept unless a
+        new one is better. A plan that is not free is driven only where none is: then braking.
         """
-        old = None if last is None else self._again(state, last.rest())
+        old = None if rest is None else self._again(state, rest)
         settled = old is not None and old.reaches
         new = self.search(state, tick=tick, narrow=settled)
         if old is None:
@@ -302,6 +304,7 @@ def road_planner(
             SPACING,
         ),
         goals=goal_arrays(local, route),
+        blocks=block_arrays(local, route, vehicle),
         weights=_weights(scene, vehicle),
     )
     return RoadPlanner(
@@ -346,6 +349,32 @@ def goal_arrays(scene: RoadScene, route: Route) -> GoalArrays:
         turned=np.array(
             [_turned(goal, way, route) for goal, way in zip(scene.goals, route.ways, strict=True)]
         ),
+    )
+
+
+def block_arrays(scene: RoadScene, route: Route, vehicle: RoadVehicle) -> Blocks:
+    """What stands on the route, grown by the vehicle's half length and half width."""
+    import shapely
+
+    area = drivable_area(scene.lanelets)
+    ways, passable = [], []
+    for one in scene.traffic:
+        if one.motion is not None:
+            continue
+        low_s, high_s, low_d, high_d = extent_on(outlines_of((one.shape,)), route)
+        way = np.array([low_s, high_s, low_d, high_d]) + np.array(
+            [-0.5 * vehicle.length, 0.5 * vehicle.length, -0.5 * vehicle.width, 0.5 * vehicle.width]
+        )
+        middle = min(max(round(0.5 * (low_s + high_s) / SPACING), 0), len(route.points) - 1)
+        aside = np.array([-np.sin(route.heading[middle]), np.cos(route.heading[middle])])
+        ways.append(way)
+        beside = [
+            shapely.Point(route.points[middle] + offset * aside).buffer(0.5 * vehicle.width)
+            for offset in way[2:]
+        ]
+        passable.append([bool(area.covers(place)) for place in beside])
+    return Blocks(
+        way=np.array(ways).reshape(-1, 4), passable=np.array(passable, dtype=bool).reshape(-1, 2)
     )
 
 

@@ -195,12 +195,21 @@ def _way(goal: GoalRegion, points: Array, heading: Array) -> Array:
     """Stations and offsets between which a goal lies; all of them if it is no place."""
     if goal.places is None:
         return np.array([-np.inf, np.inf, -np.inf, np.inf])
+    return _extent(outlines_of(goal.places), points, heading)
+
+
+def extent_on(rings: Sequence[Array], route: Route) -> Array:
+    """Least and greatest station of rings (n, 2), and least and greatest offset [m]."""
+    return _extent(rings, route.points, route.heading)
+
+
+def _extent(rings: Sequence[Array], points: Array, heading: Array) -> Array:
     import shapely
 
     corners = np.concatenate(
         [
             np.asarray(shapely.segmentize(shapely.LinearRing(ring), 2.0 * SPACING).coords)
-            for ring in outlines_of(goal.places)
+            for ring in rings
         ]
     )
     nearest = np.argmin(np.hypot(*np.moveaxis(corners[:, None] - points[None], -1, 0)), axis=1)

@@ -14,8 +14,11 @@ from maneuver_automaton.plotting import (
     save_closed_loop_figure,
 )
 from maneuver_automaton.plotting.closed_loop import _figure, loop_text
-from maneuver_automaton.plotting.closed_loop_track import driven_track
+from maneuver_automaton.plotting.closed_loop_track import driven_track, loop_colors
 from maneuver_automaton.primitives import Trim
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.receding_horizon import simulate
+from tests.inertia import unicycle_automaton
 from tests.plotting.cases import assert_picture
 from tests.plotting.loops import (
     LOOPS,
@@ -27,6 +30,7 @@ from tests.plotting.loops import (
     straight_loop,
     unfinished_loop,
 )
+from tests.search.cases import compiled_only
 
 CAR = {"rectangle_m": [0.5, 0.3]}
 
@@ -169,3 +173,13 @@ def test_a_flight_shows_its_altitude():
     assert driven_track(loop).climbs
     labels = [ax.get_ylabel() for ax in _figure(loop, footprint=None).axes]
     assert labels == ["y [m]", "cost", "speed [m/s]", "turn", "climb", "z [m]", "to decide [s]"]
+
+
+@compiled_only
+def test_a_loop_with_maneuvers_is_drawn_with_all_it_drove(tmp_path):
+    problem = Problem(unicycle_automaton(), [0.0, 0.0, 0.0], [3.0, 0.5, 0.2])
+    loop = simulate(problem, step=0.5, time_limit=1.0)
+    names = set(driven_track(loop).twists)
+    assert names <= set(loop_colors(loop))
+    save_closed_loop_figure(loop, tmp_path / "loop.png")
+    assert (tmp_path / "loop.png").stat().st_size > 0

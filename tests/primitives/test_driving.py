@@ -112,9 +112,28 @@ def test_rides_together_are_rides_alone():
         alone = drive(CAR, z[k], control=controls[k], durations=durations[k])
         np.testing.assert_allclose(course.pose[-1], alone.pose[-1], atol=1e-14)
         np.testing.assert_allclose(course.time, alone.time, atol=1e-14)
+        np.testing.assert_allclose(course.pose, alone.pose, atol=1e-13)
     still = drive(CAR, z[3], control=controls[3], durations=durations[3])
     assert still.time.tolist() == [0.0]
     assert still.control.shape == (1, 2)
+
+
+def test_samples_are_equal_times_apart_while_a_control_holds():
+    stiff = SingleTrack(min_speed=0.5)  # needs many elements where it is slow
+    for z in ([1.0, 0.0, 0.0, 0.1], [30.0, 0.0, 0.0, 0.01]):
+        course = drive(
+            stiff,
+            z,
+            control=[[1.0, 0.1], [0.0, 0.0]],
+            durations=[0.5, 0.7],
+            max_step_m=9e9,
+            max_step_rad=9e9,
+        )
+        assert course.time.tolist() == [0.0, 0.5, 1.2]
+    course = drive(CAR, [0.0, 0.0], control=[[1.0, 0.0], [0.0, 0.5]], durations=[2.0, 1.0])
+    slow, fast = course.time[course.time <= 2.0], course.time[course.time >= 2.0]
+    np.testing.assert_allclose(np.diff(slow), 2.0 / (slow.size - 1), atol=1e-14)
+    np.testing.assert_allclose(np.diff(fast), 1.0 / (fast.size - 1), atol=1e-14)
 
 
 def test_headings_count_full_turns():

@@ -92,6 +92,15 @@ def test_one_plan(tmp_path):
     assert goal.contains(end, speed=speed, time=time)
 
 
+def test_a_plan_made_before_is_driven(tmp_path):
+    result = plan_road(scene_of(tmp_path))
+    drive = drive_scene(road_planner(result.planner.scene, settings=QUICK), first=result.plan)
+    assert drive.reached
+    assert drive.verdict.clean
+    kept = [step for step in drive.steps if not step.replanned]
+    assert kept[0].plan.controls[0].tolist() == result.plan.controls[0].tolist()
+
+
 def test_no_plan_says_why(tmp_path):
     goal = GOAL.replace(interval("time", 20, 40), interval("time", 0, 5))
     result = plan_road(scene_of(tmp_path, *LANES, problem(goal=goal)), time_limit=1e-6)
