@@ -282,7 +282,7 @@ class TestFolder:
         (["plan", "x.yaml", "--out", "x.yaml"], "x.yaml: cannot be written: File exists"),
         (["convert", "x.yaml", "x.csv"],
          "x.csv: is in no format that this version writes, need a scenario or a Nav2 map (.yaml, "
-         ".yml) or a MovingAI map (.map)"),
+         ".yml), a MovingAI map (.map), or primitives (.json, .nav2.json, .mprim, .xml)"),
         (["convert", "x.yaml", "x.map"],
          "x.yaml: states no occupancy map, or several; need one"),
         (["plot", "plan.json"], "plan.json: no such file"),
