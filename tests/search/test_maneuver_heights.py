@@ -25,6 +25,9 @@ from maneuver_automaton.search.maneuver_lattice import plan_of, search_maneuvers
 from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.search.transfer import transfer_library, transfers
+from tests.search.cases import compiled_only
+
+pytestmark = compiled_only  # whole searches; their kernels have tests of their own
 
 HOVER = "speed 0, turn_rate 0, climb 0"
 BODY, TALL = Disc(2.0), (-1.0, 1.0)
