@@ -170,6 +170,14 @@ def test_shipped_scenarios_plan(folder, name):
     assert document["terminal_error"]["heading_rad"] <= 1e-9
 
 
+def test_a_flight_among_heights_is_drawn_in_space_too(folder):
+    assert run(["plan", str(SCENARIOS / "helicopter_city.yaml"), "--time-limit", "12"]) == 0
+    assert result_file()["audit"]["passed"] is True
+    assert result_file()["clearance_m"] >= 1.5 - 1e-3
+    names = [path.name for path in Path("out").iterdir()]
+    assert sorted(names) == ["plan.json", "plan.png", "plan_3d.png"]
+
+
 def test_obstacles_are_told_of(folder, capsys):
     Path("x.yaml").write_text(AMONG)
     assert run(["plan", "x.yaml", "--time-limit", "1", "--animate"]) == 0
