@@ -171,7 +171,7 @@ def test_shipped_scenarios_plan(folder, name):
 
 
 def test_a_flight_among_heights_is_drawn_in_space_too(folder):
-    assert run(["plan", str(SCENARIOS / "helicopter_city.yaml"), "--time-limit", "5"]) == 0
+    assert run(["plan", str(SCENARIOS / "helicopter_city.yaml"), "--time-limit", "12"]) == 0
     assert result_file()["audit"]["passed"] is True
     assert result_file()["clearance_m"] >= 1.5 - 1e-3
     names = [path.name for path in Path("out").iterdir()]
@@ -290,7 +290,7 @@ class TestFolder:
         (["plan", "x.yaml", "--out", "x.yaml"], "x.yaml: cannot be written: File exists"),
         (["convert", "x.yaml", "x.csv"],
          "x.csv: is in no format that this version writes, need a scenario or a Nav2 map (.yaml, "
-         ".yml) or a MovingAI map (.map)"),
+         ".yml), a MovingAI map (.map), or primitives (.json, .nav2.json, .mprim, .xml)"),
         (["convert", "x.yaml", "x.map"],
          "x.yaml: states no occupancy map, or several; need one"),
         (["plot", "plan.json"], "plan.json: no such file"),

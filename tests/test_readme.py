@@ -31,8 +31,9 @@ def first_words(text: str) -> str:
 
 @pytest.fixture
 def clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with the scenarios in it, as in a clone; the current one."""
-    shutil.copytree(ROOT / "scenarios", tmp_path / "scenarios")
+    """A folder with the scenarios and libraries in it, as in a clone; the current one."""
+    for folder in ("scenarios", "maneuver_automaton/libraries"):
+        shutil.copytree(ROOT / folder, tmp_path / folder)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

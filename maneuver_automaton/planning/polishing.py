@@ -93,7 +93,8 @@ def guesses_along_paths(problem: Problem, *, time_limit: float) -> Iterator[Aime
         lambda plan: timed(plan, pace).duration,
         time_limit=time_limit,
     ):
-        yield guess_along(problem, drive.plan)
+        if drive.plan.duration > 0.0:
+            yield guess_along(problem, drive.plan)
 
 
 def guess_along(problem: Problem, path: Plan) -> Aimed:

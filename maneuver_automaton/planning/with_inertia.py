@@ -163,6 +163,8 @@ def _fitted(problem: Problem, plan: Plan) -> tuple[Plan, str]:
         padded = plan.durations.copy()
         padded[-1] += horizon.time - plan.duration
         plan = replace(plan, durations=padded)
+    if plan.duration == 0.0:
+        return Plan(plan.start, (), durations=[], start_time=plan.start_time), ""
     lasting = [
         (trim, time) for trim, time in zip(plan.trims, plan.durations, strict=True) if time > 0.0
     ]
@@ -194,6 +196,8 @@ def _polish(heard: _Heard) -> None:
     problem = heard.problem
     if not heard.accepted or heard.left <= 0.0 or why_not_polished(problem):
         return
+    if not heard.accepted[0].plan.duration > 0.0:
+        return  # it is there already
     aimed = [Aimed(guess_of_plan(heard.accepted[0].plan), heard.accepted[0].goal_index)]
     if _rests(problem):
         along = list(guesses_along_paths(problem, time_limit=heard.left))
@@ -201,13 +205,17 @@ def _polish(heard: _Heard) -> None:
     for goal_index in dict.fromkeys(one.goal_index for one in aimed):
         if heard.left <= 0.0:
             return
-        found = polish_plans(
-            problem,
-            [one.guess for one in aimed if one.goal_index == goal_index],
-            goal_index,
-            time_limit=heard.left,
-            accepts=functools.partial(heard.hear, goal_index=goal_index),
-        )
+        try:
+            found = polish_plans(
+                problem,
+                [one.guess for one in aimed if one.goal_index == goal_index],
+                goal_index,
+                time_limit=heard.left,
+                accepts=functools.partial(heard.hear, goal_index=goal_index),
+            )
+        except RuntimeError:  # the solver gave up on a number; the plan in hand stays
+            heard.counts["solver_errors"] = heard.counts.get("solver_errors", 0) + 1
+            continue
         heard.counts["polished"] = heard.counts.get("polished", 0) + len(found.attempts)
 
 
@@ -248,7 +256,8 @@ def _along_paths(heard: _Heard) -> Iterator[tuple[Plan, int]]:
         heard.reason = f" ({first.reason})" if first.reason else ""
         return
     yield _stopping(problem, first.plan, first.goal_index), first.goal_index
-    heard.paths.append(guess_along(problem, first.plan))
+    if first.plan.duration > 0.0:
+        heard.paths.append(guess_along(problem, first.plan))
     left = IMPROVED_SHARE * heard.left
     better = heard.count(track(kinematic_problem(problem), time_limit=left, known=first.plan))
     if better.plan is not None and better.goal_index is not None:

@@ -143,3 +143,11 @@ def test_maneuvers_without_a_course_are_refused():
     library = Automaton(robot.model, robot.trims, (bare,))
     with pytest.raises(ValueError, match=r"^maneuver 'hop': has no course, so its cost is not"):
         plan(Problem(library, [0, 0, 0], [5, 0, 0]))
+
+
+@pytest.mark.parametrize("automaton", [resting(CAR), unicycle_automaton()])
+def test_a_start_that_is_the_goal_is_an_empty_word(automaton):
+    for goal in ([1.0, 2.0, 0.5], [1.0, 2.0, 0.5 + 2.0 * np.pi]):
+        result = plan(Problem(automaton, [1.0, 2.0, 0.5], goal), time_limit=2.0)
+        assert result.status is PlanStatus.FOUND
+        assert (result.plan.word, result.cost, result.plan.duration) == ((), 0.0, 0.0)

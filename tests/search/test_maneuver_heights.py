@@ -26,6 +26,9 @@ from maneuver_automaton.search.maneuver_lattice import plan_of, search_maneuvers
 from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.search.transfer import transfer_library, transfers
+from tests.search.cases import compiled_only
+
+pytestmark = compiled_only  # whole searches; their kernels have tests of their own
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 compiled = pytest.mark.skipif(INTERPRETED, reason="tens of thousands of nodes")

@@ -23,6 +23,9 @@ from maneuver_automaton.search.maneuver_shortcuts import word_is_free
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.search.transfer import transfer_library
 from tests.search.automata import inertial_unicycle, linked, truck_with_trailer
+from tests.search.cases import compiled_only
+
+pytestmark = compiled_only  # whole searches; their kernels have tests of their own
 
 BODY = Box([0.5, 0.25])
 WALLS = (Obstacle(Box([0.2, 3.0], [1.5, -0.6])), Obstacle(Box([0.2, 3.0], [3.0, 1.4])))

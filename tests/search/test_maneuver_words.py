@@ -21,6 +21,8 @@ from maneuver_automaton.search.result import SearchStatus
 from tests.inertia import car_automaton, unicycle_automaton
 from tests.search.cases import compiled_only
 
+pytestmark = compiled_only  # whole searches; their kernels have tests of their own
+
 SMALL = ((0.0, 0.0), (1.0, 0.0), (0.8, 0.8), (0.8, -0.8))
 
 
