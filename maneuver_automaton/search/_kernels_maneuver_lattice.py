@@ -242,7 +242,8 @@ def expand(search, task, lib, layers, grid, n, ceiling):
                 continue
             gap = clearance - lib.edge_reach[edge]
             climbs = lib.edge_high[edge] > lib.edge_low[edge] and not layers.flat
-            if gap <= task.margin or moving or climbs:
+            stays = lib.edge_time[edge] == 0.0  # a switch: what was proven here is all there is
+            if not stays and (gap <= task.margin or moving or climbs):
                 state[QUERIES] += 1
                 gap = edge_proven(task, lib, layers, edge, x, y, heading, z, task.clock + spent)
                 if not gap >= 0.0:

@@ -239,3 +239,27 @@ def test_wrong_queries_are_refused():
     with pytest.raises(ValueError) as error:
         maneuver_query(*library(), [0.0, 0.0], GOAL, start_trim="0 0", goal_trim="0 0")
     assert str(error.value) == "start: got shape (2,), need 3 components last"
+
+
+def test_a_switch_at_rest_proves_nothing():
+    """Beside a wall, behind a switch of trims that takes no time, motions are looked at too."""
+    automaton, trailer = truck_with_trailer(levels=3), Box([0.3, 0.25])
+    library = transfer_library(automaton)
+    parts = parts_of(automaton, (BODY,), ((trailer,),))
+    heard = 0
+    for side in (-0.4, 0.4):
+        for gap in (0.02, 0.1, 0.25):
+            wall = Obstacle(Box([0.3, 0.6], [0.25 + 0.15 + gap, 0.5 * side]))
+            query = maneuver_query(
+                library,
+                parts,
+                [0.0, 0.0, 0.0],
+                [3.0, 0.5 * side, 0.0],
+                start_trim="0 at 0.00",
+                goal_trim="0 at 0.00",
+                obstacles=(wall,),
+            )
+            for word in search_maneuvers(query, max_expansions=3000).words:
+                heard += 1
+                assert word_is_free(query, word)
+    assert heard > 0
