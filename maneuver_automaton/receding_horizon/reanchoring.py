@@ -18,7 +18,7 @@ from maneuver_automaton.search.insertion import sub_library
 from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.setup import search_setup
 from maneuver_automaton.search.words import search_setup_words
-from maneuver_automaton.switching_times import TimesStatus, solve_switching_times
+from maneuver_automaton.words import TimesStatus, solve_switching_times
 
 LOOK_AHEAD = 3  # joints of a plan that steering tries to rejoin
 NEAR = 1e-9  # [m, rad] a plan that ends so close to the goal leads there

@@ -39,8 +39,8 @@ from maneuver_automaton.search.inside import outside, stays_inside
 from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
 from maneuver_automaton.search.maneuver_words import load_maneuver_words
 from maneuver_automaton.search.words import TIE
-from maneuver_automaton.switching_times import TimesStatus
-from maneuver_automaton.switching_times.with_maneuvers import solve_times_with_maneuvers
+from maneuver_automaton.words import TimesStatus
+from maneuver_automaton.words.switching_times import solve_times_with_maneuvers
 
 FIRST_SHARE = 0.5  # of a step's time limit, for the words of the first step
 EASED = 0.5  # share of a goal's tolerance that may be given up before the end

@@ -4,6 +4,4 @@ from maneuver_automaton.search.insertion import search_insertion as search_inser
 from maneuver_automaton.search.result import SearchResult as SearchResult
 from maneuver_automaton.search.result import SearchStatus as SearchStatus
 from maneuver_automaton.search.result import Solution as Solution
-from maneuver_automaton.search.steering import steer as steer
-from maneuver_automaton.search.steering import steer_climbing as steer_climbing
 from maneuver_automaton.search.words import search_words as search_words

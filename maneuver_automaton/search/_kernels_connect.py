@@ -7,7 +7,7 @@ import math
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 from maneuver_automaton.collision._kernels_advancement import free_time
 from maneuver_automaton.groups._kernels import coast, compose
-from maneuver_automaton.search._kernels_steering import steer
+from maneuver_automaton.words._kernels_steering import steer
 
 NO_TRIM = -1
 SAME = 1e-9  # share of a full turn that counts as none

@@ -15,7 +15,8 @@ import numpy as np
 
 from maneuver_automaton._compile import inner_kernel, kernel
 from maneuver_automaton.groups._kernels import coast, compose
-from maneuver_automaton.switching_times._kernels import (
+from maneuver_automaton.words._kernels_solve import solve_from
+from maneuver_automaton.words._kernels_times import (
     assign,
     end_and_columns,
     jacobian,
@@ -23,7 +24,6 @@ from maneuver_automaton.switching_times._kernels import (
     multipliers,
     newton_feasible,
 )
-from maneuver_automaton.switching_times._kernels_solve import solve_from
 
 
 @inner_kernel

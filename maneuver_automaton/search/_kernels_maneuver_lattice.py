@@ -20,7 +20,7 @@ from maneuver_automaton.search._kernels_maneuver_motion import (
     trim_inside,
     trim_proven,
 )
-from maneuver_automaton.search._kernels_transfer import transfer_candidates
+from maneuver_automaton.words._kernels_candidates import transfer_candidates
 
 FULL_TURN = 2.0 * math.pi
 COAST, ROOT = -1, -2

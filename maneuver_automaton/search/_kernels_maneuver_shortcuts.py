@@ -6,7 +6,7 @@ import math
 
 from maneuver_automaton._compile import bare_kernel
 from maneuver_automaton.search._kernels_maneuver_motion import transfer_free
-from maneuver_automaton.search._kernels_transfer import transfer_candidates
+from maneuver_automaton.words._kernels_candidates import transfer_candidates
 
 AS_BEFORE = -1
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from maneuver_automaton._compile import inner_kernel, kernel
 from maneuver_automaton.search._kernels_problem import word_extra
-from maneuver_automaton.switching_times._kernels import (
+from maneuver_automaton.words._kernels_times import (
     assign,
     curvature,
     newton_feasible,

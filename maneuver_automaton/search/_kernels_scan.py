@@ -13,8 +13,8 @@ import numpy as np
 
 from maneuver_automaton._compile import inner_kernel
 from maneuver_automaton.search._kernels_problem import condition, is_straight, propose, word_extra
-from maneuver_automaton.search._kernels_steering import steer, unit
-from maneuver_automaton.switching_times._kernels import assign, end_and_columns
+from maneuver_automaton.words._kernels_steering import steer, unit
+from maneuver_automaton.words._kernels_times import assign, end_and_columns
 
 
 @inner_kernel

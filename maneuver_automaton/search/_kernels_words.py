@@ -19,8 +19,8 @@ from maneuver_automaton.search._kernels_scan import (
     scan_two,
     solve_triple,
 )
-from maneuver_automaton.search._kernels_steering import phase, unit
-from maneuver_automaton.switching_times._kernels import least_squares
+from maneuver_automaton.words._kernels_steering import phase, unit
+from maneuver_automaton.words._kernels_times import least_squares
 
 
 @inner_kernel

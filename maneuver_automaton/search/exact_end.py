@@ -15,7 +15,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.search.library_arrays import LibraryArrays
 from maneuver_automaton.search.setup import SearchSetup
-from maneuver_automaton.switching_times.closing import MET, EndConditions, closest_times
+from maneuver_automaton.words.closing import MET, EndConditions, closest_times
 
 DIGITS = 9  # of the goal that is searched for, after the point [m, rad]
 UNUSUAL = 1.7  # keeps steps in the number of digits away from the sizes people choose

@@ -19,15 +19,15 @@ from maneuver_automaton.search.lattice_memory import widened
 from maneuver_automaton.search.maneuver_query import ManeuverQuery
 from maneuver_automaton.search.maneuver_shortcuts import LEAST, shortened
 from maneuver_automaton.search.maneuver_task import Rung, Task, task_of, transfer_steps
-from maneuver_automaton.search.maneuver_word import (
+from maneuver_automaton.search.result import SearchStatus
+from maneuver_automaton.words.library import TransferScratch
+from maneuver_automaton.words.word import (
     EDGE,
     TRIM,
     ManeuverWord,
     plan_of_word,
     word_of,
 )
-from maneuver_automaton.search.result import SearchStatus
-from maneuver_automaton.search.transfer import TransferScratch
 
 FIRST_CHUNK = 128  # expansions
 MOST_CHUNK = 16384

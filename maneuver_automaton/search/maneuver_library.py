@@ -25,7 +25,7 @@ from maneuver_automaton.search.maneuver_motion import (
     fastest_of,
     pieces_of,
 )
-from maneuver_automaton.search.transfer import TransferArrays, TransferLibrary
+from maneuver_automaton.words.library import TransferArrays, TransferLibrary
 
 QUANTA = (0.17, 0.5)  # lengths of coasts, in length scales
 SPIN_QUANTA = (math.pi / 12.0, math.pi / 4.0)  # [rad] of turns on the spot

@@ -12,7 +12,7 @@ from maneuver_automaton.costs import StageCost
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.maneuver_motion import Part, parts_of
 from maneuver_automaton.search.maneuver_query import ManeuverQuery
-from maneuver_automaton.search.transfer import TransferLibrary, transfer_library
+from maneuver_automaton.words.library import TransferLibrary, transfer_library
 
 
 def maneuver_problem_query(problem: Problem, goals: tuple[int, ...]) -> ManeuverQuery:

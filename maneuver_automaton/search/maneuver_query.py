@@ -30,7 +30,7 @@ from maneuver_automaton.problem import Bounds
 from maneuver_automaton.search.lattice_query import window_of
 from maneuver_automaton.search.maneuver_library import ManeuverLibrary, maneuver_library
 from maneuver_automaton.search.maneuver_motion import Part
-from maneuver_automaton.search.transfer import TransferLibrary
+from maneuver_automaton.words.library import TransferLibrary
 
 MARGIN = 0.005  # proven clearance of every pose looked at, in half widths of the body
 LEAST_MARGIN = 1e-7  # [m]

@@ -15,7 +15,7 @@ from maneuver_automaton.search.maneuver_lattice import maneuver_words
 from maneuver_automaton.search.maneuver_motion import parts_of
 from maneuver_automaton.search.maneuver_query import maneuver_query
 from maneuver_automaton.search.maneuver_shortcuts import word_is_free
-from maneuver_automaton.search.transfer import transfer_library
+from maneuver_automaton.words.library import transfer_library
 
 EXPANSIONS = 20
 

@@ -15,7 +15,7 @@ from maneuver_automaton.search import _kernels_maneuver_motion as motion
 from maneuver_automaton.search import _kernels_maneuver_shortcuts as kernels
 from maneuver_automaton.search.maneuver_query import ManeuverQuery
 from maneuver_automaton.search.maneuver_task import Rung, task_of, transfer_steps
-from maneuver_automaton.search.maneuver_word import EDGE, TRIM, ManeuverWord, word_of
+from maneuver_automaton.words.word import EDGE, TRIM, ManeuverWord, word_of
 
 MOST_POINTS = 32
 LEAST = 1e-5  # share of the cost that a shortcut has to save

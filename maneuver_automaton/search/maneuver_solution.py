@@ -18,14 +18,14 @@ from maneuver_automaton.groups import LieGroup, group_of
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.result import SearchStatus
-from maneuver_automaton.search.transfer import (
+from maneuver_automaton.words import TimesStatus
+from maneuver_automaton.words.library import (
     TransferLibrary,
     _most_different,
     _words,
     transfer_library,
 )
-from maneuver_automaton.switching_times import TimesStatus
-from maneuver_automaton.switching_times.with_maneuvers import (
+from maneuver_automaton.words.switching_times import (
     close_times_with_maneuvers,
     solve_times_with_maneuvers,
 )

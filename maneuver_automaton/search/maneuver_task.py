@@ -10,8 +10,8 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.search.maneuver_query import ManeuverQuery
-from maneuver_automaton.search.maneuver_word import EDGE, TRIM
-from maneuver_automaton.search.transfer import TransferLibrary
+from maneuver_automaton.words.library import TransferLibrary
+from maneuver_automaton.words.word import EDGE, TRIM
 
 CELL = 0.122  # of the first pass, in length scales
 RISE = 0.25  # of altitude

@@ -18,7 +18,6 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search import _kernels_transfer as kernels
 from maneuver_automaton.search.maneuver_solution import (
     SAME,
     ManeuverSearch,
@@ -28,6 +27,7 @@ from maneuver_automaton.search.maneuver_solution import (
 )
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.search.words import TIE
+from maneuver_automaton.words import _kernels_candidates as kernels
 
 MOST_TRIMS = 24  # of a larger library those that differ most
 MOST_LETTERS = 4  # trims of one word, unless more are asked for

@@ -16,7 +16,7 @@ from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.result import SearchResult, SearchStatus, Solution
 from maneuver_automaton.search.setup import SearchSetup, search_setup
 from maneuver_automaton.search.words import in_order, resting
-from maneuver_automaton.switching_times import TimesStatus, solve_switching_times
+from maneuver_automaton.words import TimesStatus, solve_switching_times
 
 MOST_TRIMS = 4  # moving trims of a word
 RESTARTS = 3  # starts of each word beside the first

@@ -24,7 +24,7 @@ from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.insertion import compile_calming, search_insertion
 from maneuver_automaton.search.result import Solution
 from maneuver_automaton.search.words import compile_polishing, compile_scanning, search_words
-from maneuver_automaton.switching_times import solve_switching_times
+from maneuver_automaton.words import solve_switching_times
 
 if TYPE_CHECKING:
     from maneuver_automaton.search.lattice_query import LatticeQuery

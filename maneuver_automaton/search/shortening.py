@@ -14,7 +14,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.search.library_arrays import LibraryArrays
-from maneuver_automaton.switching_times import TimesStatus, solve_switching_times
+from maneuver_automaton.words import TimesStatus, solve_switching_times
 
 AT_ONCE = 4  # of the shortest trims, how many are tried to be left out
 LAST = 2  # trims too many, from when on everything is tried

@@ -7,7 +7,7 @@ import numpy as np
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.search.lattice_pass import Word
 from maneuver_automaton.search.lattice_query import LatticeQuery
-from maneuver_automaton.switching_times.closing import closed_at
+from maneuver_automaton.words.closing import closed_at
 
 
 def plan_of_word(query: LatticeQuery, word: Word) -> Plan:

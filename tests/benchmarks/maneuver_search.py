@@ -18,11 +18,11 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from maneuver_automaton.collision import Box, Obstacle
 from maneuver_automaton.problem import Bounds
-from maneuver_automaton.search import _kernels_transfer as kernels
 from maneuver_automaton.search.maneuver_lattice import plan_of, search_maneuvers
 from maneuver_automaton.search.maneuver_motion import parts_of
 from maneuver_automaton.search.maneuver_query import ManeuverQuery, maneuver_query
-from maneuver_automaton.search.transfer import TransferLibrary, transfer_library
+from maneuver_automaton.words import _kernels_candidates as kernels
+from maneuver_automaton.words.library import TransferLibrary, transfer_library
 from tests.benchmarks import cases
 from tests.benchmarks.tables import show
 from tests.search.automata import inertial_unicycle, truck_with_trailer

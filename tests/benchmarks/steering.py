@@ -19,8 +19,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.search import search_words, steer, steer_climbing
-from maneuver_automaton.search._kernels_steering import steer_batch
+from maneuver_automaton.search import search_words
+from maneuver_automaton.words import steer, steer_climbing
+from maneuver_automaton.words._kernels_steering import steer_batch
 from tests import reference
 from tests.search.cases import TABLE_2, end_off_goal, names, parking
 

@@ -17,8 +17,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search import search_insertion, steer
+from maneuver_automaton.search import search_insertion
 from maneuver_automaton.search.certificate import certificate
+from maneuver_automaton.words import steer
 from tests.search.cases import DUBINS, REEDS_SHEPP, VECTORS, end_off_goal, names, robot, vectors
 
 MISSED = 1e-6  # turning radii

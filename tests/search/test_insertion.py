@@ -22,7 +22,7 @@ from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.library_arrays import library_arrays
 from maneuver_automaton.search.setup import search_setup
 from maneuver_automaton.search.shortening import shortened
-from maneuver_automaton.switching_times.end_pose import end_pose
+from maneuver_automaton.words.end_pose import end_pose
 from tests import reference
 from tests.search.cases import (
     DUBINS,
@@ -345,8 +345,8 @@ def test_results_are_the_same_in_every_run():
 CASES = """
 import json, sys
 import numpy as np
-from maneuver_automaton.search import search_insertion, search_words, steer, steer_climbing
-from maneuver_automaton.switching_times import solve_switching_times
+from maneuver_automaton.search import search_insertion, search_words
+from maneuver_automaton.words import solve_switching_times, steer, steer_climbing
 from tests.search.cases import *
 answers = []
 for problem in (parking(), parking(REVERSED_SPIN), parking(cost=Cost(time=1.0), time=None)):

@@ -19,12 +19,12 @@ from maneuver_automaton.collision.layers import MOST_LAYERS, always, bands_of
 from maneuver_automaton.groups import SE2xR
 from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.problem import Bounds, Goal, Problem
-from maneuver_automaton.search._kernels_transfer import NONE
 from maneuver_automaton.search.maneuver_heights import altitude_ranges
 from maneuver_automaton.search.maneuver_lattice import plan_of, search_maneuvers
 from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
 from maneuver_automaton.search.result import SearchStatus
-from maneuver_automaton.search.transfer import transfer_library, transfers
+from maneuver_automaton.words._kernels_candidates import NONE
+from maneuver_automaton.words.library import transfer_library, transfers
 from tests.search.cases import compiled_only
 
 pytestmark = compiled_only  # whole searches; their kernels have tests of their own

@@ -21,7 +21,7 @@ from maneuver_automaton.search.maneuver_motion import parts_of
 from maneuver_automaton.search.maneuver_query import maneuver_query
 from maneuver_automaton.search.maneuver_shortcuts import word_is_free
 from maneuver_automaton.search.result import SearchStatus
-from maneuver_automaton.search.transfer import transfer_library
+from maneuver_automaton.words.library import transfer_library
 from tests.search.automata import inertial_unicycle, linked, truck_with_trailer
 from tests.search.cases import compiled_only
 

@@ -15,8 +15,8 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.primitives import Maneuver, Trim
-from maneuver_automaton.search import steer
-from maneuver_automaton.search.transfer import transfer_library, transfers
+from maneuver_automaton.words import steer
+from maneuver_automaton.words.library import transfer_library, transfers
 from tests.search.automata import joined_end, linked, model_of_kinds
 
 REST, AHEAD, LEFT, RIGHT = [0.0, 0, 0], [1.0, 0, 0], [1.0, 0, 1.0], [0.8, 0, -1.0]

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from maneuver_automaton.groups import SE2, SE2xR
-from maneuver_automaton.switching_times.closing import EndConditions, closed_at, closest_times
+from maneuver_automaton.words.closing import EndConditions, closed_at, closest_times
 from tests.reference import plain_end
 
 TWISTS = np.array([[1, 0, 0.5], [1, 0, 0], [-1, 0, 0.25], [0, 0, 1], [0.5, 0.3, -0.8]], dtype=float)

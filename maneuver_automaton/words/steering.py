@@ -295,7 +295,7 @@ class _Climb:
 
 def _branches(rows: Array, gaps: Array, goals: Array, tolerance: float) -> Array:
     """Both branches (n, 2, 3) for goals (n, 3)."""
-    from maneuver_automaton.search import _kernels_steering as kernels
+    from maneuver_automaton.words import _kernels_steering as kernels
 
     n = len(goals)
     triples = np.tile(np.arange(3), (n, 1))

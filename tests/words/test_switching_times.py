@@ -11,8 +11,8 @@ from scipy.optimize import minimize
 from maneuver_automaton._arrays import wrapped
 from maneuver_automaton.groups import SE2, SE2xR, group_of
 from maneuver_automaton.groups.chain import chained
-from maneuver_automaton.switching_times import TimesStatus, solve_times_with_maneuvers
-from maneuver_automaton.switching_times.with_maneuvers import (
+from maneuver_automaton.words import TimesStatus, solve_times_with_maneuvers
+from maneuver_automaton.words.switching_times import (
     close_times_with_maneuvers,
     conjugated,
 )

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from maneuver_automaton._compile import inner_kernel, kernel
-from maneuver_automaton.switching_times._kernels import (
+from maneuver_automaton.words._kernels_times import (
     assign,
     jacobian,
     lagrangian_hessian,

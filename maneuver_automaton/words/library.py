@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, IntArray, as_array
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.search import _kernels_transfer as kernels
+from maneuver_automaton.words import _kernels_candidates as kernels
 
 MOST_TRIMS = 24  # of a larger library those that differ most
 FEW_TRIMS = 14  # of these, for transfers that are tried often

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from maneuver_automaton.switching_times import (
+from maneuver_automaton.words import (
     SwitchingTimes,
     TimesStatus,
     end_pose,

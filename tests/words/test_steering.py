@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from maneuver_automaton.groups import SE2, SE2xR
-from maneuver_automaton.search import steer, steer_climbing
-from maneuver_automaton.search._kernels_steering import steer_batch
+from maneuver_automaton.words import steer, steer_climbing
+from maneuver_automaton.words._kernels_steering import steer_batch
 from tests import reference
 
 LEFT, RIGHT, AHEAD, BACK = [1.0, 0, 1.0], [1.0, 0, -1.0], [1.0, 0, 0], [-1.0, 0, 0]

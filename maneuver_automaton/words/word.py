@@ -11,7 +11,7 @@ from maneuver_automaton._arrays import Array, wrapped
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.groups import SE2xR
 from maneuver_automaton.primitives import Maneuver
-from maneuver_automaton.search.transfer import TransferLibrary
+from maneuver_automaton.words.library import TransferLibrary
 
 CLOSED = 1e-14  # [m, rad] relative to the size of the motion: nothing is left to correct
 STEPS = 8
@@ -47,7 +47,7 @@ def word_of(
     Examples
     --------
     >>> from maneuver_automaton.models import Unicycle
-    >>> from maneuver_automaton.search.transfer import transfer_library
+    >>> from maneuver_automaton.words.library import transfer_library
     >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
     >>> steps = [(TRIM, 0, 1.0), (TRIM, 0, 0.5), (EDGE, -1, 0.0), (TRIM, 1, 2.0)]
     >>> word = word_of(transfer_library(robot), start_trim=0, steps=steps, targets=[1], goal=0)

@@ -10,7 +10,7 @@ import math
 
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
 from maneuver_automaton.groups._kernels import coast, compose, nearest_turn
-from maneuver_automaton.search._kernels_steering import phase, steer, turn_time, two_lines, unit
+from maneuver_automaton.words._kernels_steering import phase, steer, turn_time, two_lines, unit
 
 NONE = -1
 WHOLE = 1e-9  # share of a full turn that counts as none

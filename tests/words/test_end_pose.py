@@ -11,8 +11,8 @@ from hypothesis.extra.numpy import arrays
 from maneuver_automaton._arrays import wrapped
 from maneuver_automaton._compile import kernel
 from maneuver_automaton.groups import group_of
-from maneuver_automaton.switching_times import end_pose, end_twists
-from maneuver_automaton.switching_times._kernels import (
+from maneuver_automaton.words import end_pose, end_twists
+from maneuver_automaton.words._kernels_times import (
     end_and_columns,
     lagrangian_hessian,
     least_squares,

@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.groups.chain import chained
-from maneuver_automaton.switching_times.closing import MET, EndConditions, closest_times
-from maneuver_automaton.switching_times.solve import (
+from maneuver_automaton.words.closing import MET, EndConditions, closest_times
+from maneuver_automaton.words.solve import (
     RESTARTS,
     SwitchingTimes,
     TimesStatus,

@@ -88,7 +88,7 @@ def solve_switching_times(
     >>> best.durations.round(6).tolist(), round(best.cost, 6)
     ([0.8, 0.2], 2.626)
     """
-    from maneuver_automaton.switching_times import _kernels_solve as kernels
+    from maneuver_automaton.words import _kernels_solve as kernels
 
     words = _four_columns("twists", twists)
     n = len(words)
