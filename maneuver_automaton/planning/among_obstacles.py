@@ -16,11 +16,12 @@ from maneuver_automaton.problem import Problem, moves
 from maneuver_automaton.refinement.improve import Improved, Patience, improve
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable, cost_to_go_table
 from maneuver_automaton.search.lattice import FirstPlan, first_plan
-from maneuver_automaton.search.lattice_pass import Word, with_cost
+from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.limits import why_impossible
 from maneuver_automaton.search.waiting import with_waits
 from maneuver_automaton.search.word_plan import plan_of_word
+from maneuver_automaton.words.word import Word
 
 BRIEF = Patience(attempts=1000, passes=3)  # of the way among what stands still
 MOST_WAYS = 4  # that are tried with rests

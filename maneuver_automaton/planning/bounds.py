@@ -5,7 +5,7 @@ from __future__ import annotations
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.limits import closed_bound
 from maneuver_automaton.search.plane_bound import plane_bound
-from maneuver_automaton.search.setup import moving_library
+from maneuver_automaton.words.library import moving_trims
 
 
 def lattice_bound(query: LatticeQuery) -> float:
@@ -15,7 +15,7 @@ def lattice_bound(query: LatticeQuery) -> float:
     """
     problem = query.problem
     closed = min(closed_bound(problem, problem.goals[k]) for k in query.goal_index)
-    library = moving_library(problem.automaton, problem.cost)
+    library = moving_trims(problem.automaton, problem.cost)
     pads = problem.horizon.time is not None and library.rest is not None
     rates = library.rates - (library.rest_rate if pads else 0.0)
     drives = library.speeds > 0.0

@@ -21,9 +21,9 @@ from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.improve import Patience, improve
 from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.search.lattice import first_plan
-from maneuver_automaton.search.lattice_pass import Word
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.word_plan import plan_of_word
+from maneuver_automaton.words.word import Word
 
 LITTLE = Patience(attempts=800, passes=2)  # where a step's budget is short
 PROVEN = 1e-6  # [m] what a search has proven with its margin passes with this one, once more
@@ -198,7 +198,7 @@ def word_of_plan(query: LatticeQuery, plan: Plan) -> Word | None:
     problem = query.problem
     if free_until(problem, plan) < plan.duration:
         return None
-    numbers = {problem.automaton.trims[k].name: n for n, k in enumerate(query.library.trims)}
+    numbers = {problem.automaton.trims[k].name: k for k in query.library.trims}
     trims, durations = list(plan.trims), plan.durations.tolist()
     while trims and trims[-1].is_rest:
         trims.pop()

@@ -133,7 +133,7 @@ def expand(task, lib, world, body, search, n):
     on: 0 when nothing is left, or no room.
     """
     nodes, state = search.nodes, search.state
-    room = nodes.shape[0] - 32 * lib.n_trims
+    room = nodes.shape[0] - 32 * lib.library.n_trims
     for _ in range(n):
         if state[FOUND] == 1 or state[HEAP] == 0 or state[N_NODES] > room:
             return 0
@@ -142,8 +142,12 @@ def expand(task, lib, world, body, search, n):
         state[EXPANSIONS] += 1
         x, y, heading, clock = nodes[node, 0], nodes[node, 1], nodes[node, 2], nodes[node, 3]
         left = task.until - clock
-        for trim in range(lib.n_trims):
-            v_x, v_y, turn = lib.twists[trim, 0], lib.twists[trim, 1], lib.twists[trim, 2]
+        for trim in range(lib.library.n_trims):
+            v_x, v_y, turn = (
+                lib.library.twists[trim, 0],
+                lib.library.twists[trim, 1],
+                lib.library.twists[trim, 2],
+            )
             if trim == task.rest:
                 proven = nodes[node, 5] - clock
             else:

@@ -70,7 +70,8 @@ def escape(
     """
     query = lattice_query(problem, (0,))
     library = query.library.arrays
-    still = np.flatnonzero(~library.twists[: library.n_trims].any(axis=1))
+    twists = library.library.twists
+    still = np.flatnonzero(~twists[: library.library.n_trims].any(axis=1))
     rest = int(still[0]) if still.size else -1
     task = _task(query, rest, until)
     search = _arrays(MOST_NODES)
@@ -94,7 +95,7 @@ def escape(
 
 def _task(query: LatticeQuery, rest: int, until: float) -> kernels.EscapeTask:
     library = query.library
-    quantum = float(library.arrays.quanta[: library.arrays.n_trims, 0].min())
+    quantum = float(library.arrays.quanta[:, 0].min())
     open_ = query.problem.bounds.x is None and query.problem.bounds.y is None
     window = np.array(query.window)
     if open_:

@@ -39,8 +39,7 @@ from maneuver_automaton.search.inside import outside, stays_inside
 from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
 from maneuver_automaton.search.maneuver_words import load_maneuver_words
 from maneuver_automaton.search.words import TIE
-from maneuver_automaton.words import TimesStatus
-from maneuver_automaton.words.switching_times import solve_times_with_maneuvers
+from maneuver_automaton.words import TimesStatus, solve_switching_times
 
 FIRST_SHARE = 0.5  # of a step's time limit, for the words of the first step
 EASED = 0.5  # share of a goal's tolerance that may be given up before the end
@@ -441,7 +440,7 @@ def same_maneuvers(here: Problem, plan: Plan, goal: Goal, *, under_way: bool) ->
     total = None if horizon.time is None else horizon.time - lasting
     if total is not None and total < 0.0:
         return None
-    solved = solve_times_with_maneuvers(
+    solved = solve_switching_times(
         np.array([trim.body_velocity for trim in plan.trims]),
         here.rates_of(plan),
         (group(plan.start).inverse() @ group(goal.pose)).pose,

@@ -20,13 +20,12 @@ from maneuver_automaton.refinement._kernels_word import (
     word_cost,
 )
 from maneuver_automaton.search._kernels_connect import (
-    NO_TRIM,
-    candidates,
     driven,
     free_candidate,
     may_stay,
     trim_free,
 )
+from maneuver_automaton.words._kernels_candidates import NO_TRIM, candidates
 
 
 @bare_inner_kernel
@@ -65,12 +64,12 @@ def still_free(lib, task, world, body, work, size, begin):
 
 
 @inlined_kernel
-def put_middle(lib, work, triples, scratch, which, m):
+def put_middle(lib, work, words, scratch, which, m):
     """Append a candidate to the new middle; returns its length."""
     row = scratch.rows[which]
     for n_th in range(3):
-        trim, t = triples[row, n_th], scratch.times[which, n_th]
-        if t > 0.0 and trim < lib.n_trims:
+        trim, t = words[row, n_th], scratch.times[which, n_th]
+        if t > 0.0 and trim < lib.library.n_trims:
             work.middle_trims[m], work.middle_durations[m] = trim, t
             m += 1
     return m
@@ -99,12 +98,12 @@ def section_price(lib, work, begin, end, first, last):
     price = 0.0
     for k in range(first, last + 1):
         low, high = max(work.times[k], begin), min(work.times[k + 1], end)
-        price += lib.rates[work.trims[k]] * max(high - low, 0.0)
-    if lib.switch > 0.0:
-        price += lib.switch * (last - first)
+        price += lib.library.rates[work.trims[k]] * max(high - low, 0.0)
+    if lib.library.switch > 0.0:
+        price += lib.library.switch * (last - first)
     for k in range(first, last):
-        if lib.gears[work.trims[k]] * lib.gears[work.trims[k + 1]] < 0:
-            price += lib.direction_change
+        if lib.library.gears[work.trims[k]] * lib.library.gears[work.trims[k + 1]] < 0:
+            price += lib.library.direction_change
     return price
 
 
@@ -152,19 +151,17 @@ def cheapest_of(scratch, n):
 
 
 @bare_inner_kernel
-def put_free(
-    lib, task, world, body, work, triples, pose, n, most_cost, most_time, clock, scratch, m
-):
+def put_free(lib, task, world, body, work, words, pose, n, most_cost, most_time, clock, scratch, m):
     """Append to the new middle, of `m` trims, the cheapest free one of `n` candidates.
 
     Returns its number and the middle's new length; -1 and -1 if there is none.
     """
     which = free_candidate(
-        lib, task, world, body, triples, pose, n, most_cost, most_time, clock, scratch
+        lib, task, world, body, words, pose, n, most_cost, most_time, clock, scratch
     )
     if which < 0:
         return -1, -1
-    return which, put_middle(lib, work, triples, scratch, which, m)
+    return which, put_middle(lib, work, words, scratch, which, m)
 
 
 @bare_inner_kernel
@@ -177,16 +174,25 @@ def direct_middle(lib, task, world, body, work, section):
     e_x, e_y, e_heading = section.goal
     if math.hypot(e_x - x, e_y - y) * task.per_metre >= section.budget:
         return -1
-    triples = lib.free_triples if section.free_heading else lib.triples
-    entry, leave = section.entry, section.leave
-    n = candidates(lib, triples, x, y, heading, e_x, e_y, e_heading, entry, leave, work.one)
+    words = lib.library.free_words if section.free_heading else lib.library.words
+    n = candidates(
+        lib.library,
+        words,
+        words.shape[0],
+        (x, y, heading, 0.0),
+        section.entry,
+        (e_x, e_y, e_heading, 0.0),
+        section.leave,
+        section.budget,
+        work.one,
+    )
     _, m = put_free(
         lib,
         task,
         world,
         body,
         work,
-        triples,
+        words,
         section.start,
         n,
         section.budget,
@@ -222,14 +228,30 @@ def via_middle(lib, task, world, body, work, section, via):
         return -1
     nowhere = (NO_TRIM, 0)
     n_1 = candidates(
-        lib, lib.triples, x, y, heading, v_x, v_y, v_heading, section.entry, nowhere, one
+        lib.library,
+        lib.library.words,
+        lib.library.words.shape[0],
+        (x, y, heading, 0.0),
+        section.entry,
+        (v_x, v_y, v_heading, 0.0),
+        nowhere,
+        budget,
+        one,
     )
     cheapest = cheapest_of(one, n_1)
     if cheapest >= budget:
         return -1
-    triples = lib.free_triples if section.free_heading else lib.triples
+    words = lib.library.free_words if section.free_heading else lib.library.words
     n_2 = candidates(
-        lib, triples, v_x, v_y, v_heading, e_x, e_y, e_heading, nowhere, section.leave, two
+        lib.library,
+        words,
+        words.shape[0],
+        (v_x, v_y, v_heading, 0.0),
+        nowhere,
+        (e_x, e_y, e_heading, 0.0),
+        section.leave,
+        budget - cheapest,
+        two,
     )
     rest = cheapest_of(two, n_2)
     if cheapest + rest >= budget:
@@ -240,7 +262,7 @@ def via_middle(lib, task, world, body, work, section, via):
         world,
         body,
         work,
-        lib.triples,
+        lib.library.words,
         section.start,
         n_1,
         budget - rest,
@@ -258,7 +280,7 @@ def via_middle(lib, task, world, body, work, section, via):
         world,
         body,
         work,
-        triples,
+        words,
         via,
         n_2,
         budget - one.costs[which],

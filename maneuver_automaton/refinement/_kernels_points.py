@@ -16,7 +16,8 @@ from maneuver_automaton.refinement._kernels_word import (
     unroll,
     word_cost,
 )
-from maneuver_automaton.search._kernels_connect import NO_TRIM, candidates, free_candidate
+from maneuver_automaton.search._kernels_connect import free_candidate
+from maneuver_automaton.words._kernels_candidates import NO_TRIM, candidates
 
 
 @bare_inner_kernel
@@ -41,16 +42,16 @@ def price_along(lib, work, n, j):
     price = 0.0
     for k in range(first, last + 1):
         low, high = max(work.times[k], begin), min(work.times[k + 1], end)
-        price += lib.rates[work.trims[k]] * max(high - low, 0.0)
+        price += lib.library.rates[work.trims[k]] * max(high - low, 0.0)
         if k > first:
-            price += lib.switch
-            if lib.gears[work.trims[k]] * lib.gears[work.trims[k - 1]] < 0:
-                price += lib.direction_change
+            price += lib.library.switch
+            if lib.library.gears[work.trims[k]] * lib.library.gears[work.trims[k - 1]] < 0:
+                price += lib.library.direction_change
     return price
 
 
 @bare_inner_kernel
-def join(lib, task, world, body, work, triples, i, j, gain):
+def join(lib, task, world, body, work, words, i, j, gain):
     """Reach point `j` from point `i` by three trims, if that is cheaper by `gain`, and free."""
     x, y, heading = work.at[i, 0], work.at[i, 1], work.at[i, 2]
     e_x, e_y, e_heading = work.at[j, 0], work.at[j, 1], work.at[j, 2]
@@ -58,13 +59,23 @@ def join(lib, task, world, body, work, triples, i, j, gain):
     if math.hypot(e_x - x, e_y - y) * task.per_metre >= budget:
         return
     nowhere = (NO_TRIM, 0)
-    count = candidates(lib, triples, x, y, heading, e_x, e_y, e_heading, nowhere, nowhere, work.one)
+    count = candidates(
+        lib.library,
+        words,
+        words.shape[0],
+        (x, y, heading, 0.0),
+        nowhere,
+        (e_x, e_y, e_heading, 0.0),
+        nowhere,
+        budget - gain,
+        work.one,
+    )
     which = free_candidate(
         lib,
         task,
         world,
         body,
-        triples,
+        words,
         (x, y, heading),
         count,
         budget - gain,
@@ -78,7 +89,7 @@ def join(lib, task, world, body, work, triples, i, j, gain):
     work.back[j] = i
     row = work.one.rows[which]
     for n_th in range(3):
-        work.by_trims[j, n_th] = triples[row, n_th]
+        work.by_trims[j, n_th] = words[row, n_th]
         work.by_durations[j, n_th] = work.one.times[which, n_th]
 
 
@@ -96,7 +107,7 @@ def unwound(lib, work, n, points):
         if work.back[j] >= 0:
             for n_th in range(3):
                 trim, t = work.by_trims[j, n_th], work.by_durations[j, n_th]
-                if t > 0.0 and trim < lib.n_trims:
+                if t > 0.0 and trim < lib.library.n_trims:
                     size = append(lib, work.new_trims, work.new_durations, size, trim, t)
             continue
         begin, end = work.at[j - 1, 3], work.at[j, 3]
@@ -108,7 +119,7 @@ def unwound(lib, work, n, points):
 
 @bare_kernel
 def dynamic_programming(lib, task, world, body, work, state, points):
-    """Best way over `points` poses of the word, joined by triples where that is cheaper.
+    """Best way over `points` poses of the word, joined by words where that is cheaper.
 
     Returns the cost. The word changes only if it gains; nothing may move.
     """
@@ -121,9 +132,9 @@ def dynamic_programming(lib, task, world, body, work, state, points):
     for j in range(1, points):
         work.best[j] = work.best[j - 1] + price_along(lib, work, n, j)
         free_heading = task.free_heading and j == points - 1
-        triples = lib.free_triples if free_heading else lib.triples
+        words = lib.library.free_words if free_heading else lib.library.words
         for i in range(j - 1):
-            join(lib, task, world, body, work, triples, i, j, GAIN * cost)
+            join(lib, task, world, body, work, words, i, j, GAIN * cost)
     size = unwound(lib, work, n, points)
     if not admitted(lib, task, work, size):
         return cost

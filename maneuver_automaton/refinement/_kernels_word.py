@@ -15,13 +15,13 @@ def word_cost(lib, trims, durations, n):
     cost, gear = 0.0, 0
     for k in range(n):
         trim = trims[k]
-        cost += lib.rates[trim] * durations[k]
+        cost += lib.library.rates[trim] * durations[k]
         if k > 0:
-            cost += lib.switch
-        if lib.gears[trim] != 0:
-            if gear * lib.gears[trim] < 0:
-                cost += lib.direction_change
-            gear = lib.gears[trim]
+            cost += lib.library.switch
+        if lib.library.gears[trim] != 0:
+            if gear * lib.library.gears[trim] < 0:
+                cost += lib.library.direction_change
+            gear = lib.library.gears[trim]
     return cost
 
 
@@ -65,7 +65,7 @@ def gear_before(lib, work, k):
     """Sign of the last forward speed up to trim `k`, that included."""
     gear = 0
     while k >= 0 and gear == 0:
-        gear = lib.gears[work.trims[k]]
+        gear = lib.library.gears[work.trims[k]]
         k -= 1
     return gear
 
@@ -75,7 +75,7 @@ def gear_after(lib, work, n, k):
     """Sign of the first forward speed from trim `k` on."""
     gear = 0
     while k < n and gear == 0:
-        gear = lib.gears[work.trims[k]]
+        gear = lib.library.gears[work.trims[k]]
         k += 1
     return gear
 
@@ -83,7 +83,7 @@ def gear_after(lib, work, n, k):
 @bare_inner_kernel
 def append(lib, trims, durations, n, trim, t):
     """Put a trim at the end of a word, joined with the last one if that is the same."""
-    if t < lib.shortest:
+    if t < lib.library.shortest:
         return n
     if n > 0 and trims[n - 1] == trim:
         durations[n - 1] += t
@@ -101,7 +101,7 @@ def admitted(lib, task, work, size):
         return False
     duration = 0.0
     for k in range(size):
-        if work.new_durations[k] < lib.min_coast:
+        if work.new_durations[k] < lib.library.min_coast:
             return False
         duration += work.new_durations[k]
     return duration <= task.most_time

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -22,14 +22,11 @@ from maneuver_automaton.refinement._kernels_word import LENGTH
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.distance_grid import DistanceGrid
 from maneuver_automaton.search.lattice import distance_grids
-from maneuver_automaton.search.lattice_memory import (
-    Scratch,
-    SearchArrays,
-    scratch_of,
-    search_arrays,
-)
-from maneuver_automaton.search.lattice_pass import Rung, Word, both_ends, with_cost
+from maneuver_automaton.search.lattice_memory import SearchArrays, search_arrays
+from maneuver_automaton.search.lattice_pass import Rung, both_ends, with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
+from maneuver_automaton.words.library import Scratch, scratch_of
+from maneuver_automaton.words.word import Word
 
 POINTS = 40  # of the dynamic program
 FIRST_GAINS = 4  # new searches after which the first gains are made
@@ -159,11 +156,7 @@ class _Improvement:
         self.best = with_cost(self.best, query)
         self._consider(self._shortened(self.best, rng, SLICE))
         grids = distance_grids(query)
-        memory = [
-            search_arrays(
-                max(len(query.library.arrays.triples), len(query.library.arrays.free_triples))
-            )
-        ]
+        memory = [search_arrays(query.library.arrays.library)]
         idle_attempts = idle_passes = 0
         step = 0
         slice_ = SLICE
@@ -292,7 +285,6 @@ class _Improvement:
 def work_of(query: LatticeQuery, word: Word) -> tuple[Work, IntArray]:
     """Arrays that hold a word, and its state."""
     n = max(256, 4 * len(word.trims) + 64)
-    triples = max(len(query.library.arrays.triples), len(query.library.arrays.free_triples))
     work = Work(
         start=np.array(query.start),
         trims=np.zeros(n, dtype=np.int64),
@@ -303,8 +295,8 @@ def work_of(query: LatticeQuery, word: Word) -> tuple[Work, IntArray]:
         new_durations=np.zeros(n),
         middle_trims=np.zeros(6, dtype=np.int64),
         middle_durations=np.zeros(6),
-        one=scratch_of(triples),
-        two=scratch_of(triples),
+        one=scratch_of(query.library.arrays.library),
+        two=scratch_of(query.library.arrays.library),
         at=np.zeros((POINTS, 4)),
         best=np.zeros(POINTS),
         back=np.zeros(POINTS, dtype=np.int64),
@@ -312,7 +304,7 @@ def work_of(query: LatticeQuery, word: Word) -> tuple[Work, IntArray]:
         by_durations=np.zeros((POINTS, 3)),
         legs=np.zeros(POINTS, dtype=np.int64),
     )
-    work.trims[: len(word.trims)] = word.trims
+    work.trims[: len(word.trims)] = query.library.number_of[word.trims]
     work.durations[: len(word.trims)] = word.durations
     return work, np.array([len(word.trims)], dtype=np.int64)
 
@@ -320,14 +312,19 @@ def work_of(query: LatticeQuery, word: Word) -> tuple[Work, IntArray]:
 def word_of(work: Work, state: IntArray, word: Word, query: LatticeQuery) -> Word:
     """The word that arrays hold."""
     n = int(state[LENGTH])
-    held = replace(word, trims=work.trims[:n].copy(), durations=work.durations[:n].copy())
+    held = Word(
+        trims=query.library.trims[work.trims[:n]],
+        durations=work.durations[:n].copy(),
+        goal=word.goal,
+    )
     return with_cost(held, query)
 
 
 def improve_task(query: LatticeQuery, word: Word) -> ImproveTask:
     """Limits and sizes of improving a word."""
     library = query.library
-    speed = np.hypot(library.arrays.twists[:, 0], library.arrays.twists[:, 1]).max()
+    twists = library.arrays.library.twists
+    speed = np.hypot(twists[:, 0], twists[:, 1]).max()
     return ImproveTask(
         keep=float(query.keep),
         margin=float(query.margin),

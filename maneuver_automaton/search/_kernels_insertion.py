@@ -46,7 +46,7 @@ def price_positions(twists, rates, rows, n_priced, word, times, n, p, values, tr
     for i in range(n):
         assign(some[i], twists[word[i]])
     columns = np.empty((n, 3))
-    end_x, end_y, _ = end_and_columns(some, np.zeros((n, 4)), times[:n], columns)
+    end_x, end_y, _ = end_and_columns(some, times[:n], columns)
     least_position = 0
     base = np.empty(n_priced)
     for j in range(n_priced):
@@ -169,9 +169,7 @@ def solve_word(twists, rates, goal, rows, targets, word, times, n, barrier):
         some_times[i] = times[i]
         for r in range(m):
             some_rows[r, i] = rows[r, word[i]]
-    status, p, _slope = solve_from(
-        some_rates, some, np.zeros((n, 4)), goal, some_rows, targets, some_times, barrier
-    )
+    status, p, _slope = solve_from(some_rates, some, goal, some_rows, targets, some_times, barrier)
     cost = 0.0
     for i in range(n):
         times[i] = some_times[i]
@@ -191,7 +189,7 @@ def refine(twists, rates, goal, rows, targets, word, times, n, cost):
         refined[i] = times[i]
         for r in range(m):
             some_rows[r, i] = rows[r, word[i]]
-    worst = newton_feasible(some, np.zeros((n, 4)), goal, some_rows, targets, refined, 10)
+    worst = newton_feasible(some, goal, some_rows, targets, refined, 10)
     after = 0.0
     for i in range(n):
         if refined[i] < 0.0:
@@ -216,7 +214,7 @@ def word_multipliers(twists, rates, rows, word, times, n):
         for r in range(rows.shape[0]):
             some_rows[r, i] = rows[r, word[i]]
     columns = np.empty((n, 3))
-    end_and_columns(some, np.zeros((n, 4)), times[:n], columns)
+    end_and_columns(some, times[:n], columns)
     return multipliers(jacobian(columns, some_rows), some_rates)
 
 
@@ -235,7 +233,7 @@ def lengthen(twists, goal, rows, targets, word, times, n, grown, share):
         for r in range(m):
             some_rows[r, i] = rows[r, word[i]]
     columns = np.empty((n, 3))
-    end_and_columns(some, np.zeros((n, 4)), times[:n], columns)
+    end_and_columns(some, times[:n], columns)
     matrix = jacobian(columns, some_rows)
     others = np.empty((3 + m, n))
     rhs = np.empty(3 + m)
@@ -256,7 +254,7 @@ def lengthen(twists, goal, rows, targets, word, times, n, grown, share):
     moved = np.empty(n)
     for i in range(n):
         moved[i] = times[i] + share * longest * direction[i]
-    worst = newton_feasible(some, np.zeros((n, 4)), goal, some_rows, targets, moved, 10)
+    worst = newton_feasible(some, goal, some_rows, targets, moved, 10)
     for i in range(n):
         if moved[i] < 0.0:
             worst = np.inf
@@ -313,7 +311,7 @@ def replace_runs(
         for i in range(n):
             assign(some[i], twists[word[i]])
         columns = np.empty((n, 3))
-        end_x, end_y, _ = end_and_columns(some, np.zeros((n, 4)), times[:n], columns)
+        end_x, end_y, _ = end_and_columns(some, times[:n], columns)
         x, y, heading, total = 0.0, 0.0, 0.0, 0.0
         for i in range(end):
             share = 1.0

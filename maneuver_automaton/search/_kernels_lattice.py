@@ -13,14 +13,12 @@ from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_
 from maneuver_automaton.collision._kernels_advancement import free_time
 from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search._kernels_connect import (
-    NO_TRIM,
-    candidates,
     free_candidate,
     inside_window,
     may_stay,
-    price_of_switch,
 )
 from maneuver_automaton.search._kernels_distance import distance_at, pop, push
+from maneuver_automaton.words._kernels_candidates import NO_TRIM, candidates, price_of_switch
 
 FULL_TURN = 2.0 * math.pi
 N_NODES, HEAP, GENERATION, EXPANSIONS, PATIENCE, FOUND, NODE, GOAL, ROW, FREE, QUERIES = range(11)
@@ -108,7 +106,7 @@ def layer_of(task, lib, trim, gear, n_trims):
     if task.by_gear:
         layer = gear + 1
     if task.by_trim:
-        layer = layer * (lib.n_trims + 1) + trim + 1
+        layer = layer * (lib.library.n_trims + 1) + trim + 1
     if task.by_count:
         layer = layer * 16 + min(n_trims, 15)
     return layer
@@ -125,27 +123,32 @@ def connect_ends(search, task, lib, world, body, node, ceiling, estimate):
     nowhere = (NO_TRIM, 0)
     for g in range(task.aims.shape[0]):
         free_heading = task.sign > 0.0 and task.aim_free[g]
-        triples = lib.free_triples if free_heading else lib.triples
-        a_x, a_y, a_heading = task.aims[g, 0], task.aims[g, 1], task.aims[g, 2]
-        if task.sign > 0.0:
-            pose, clock = (x, y, heading), task.clock + spent
-            n = candidates(lib, triples, x, y, heading, a_x, a_y, a_heading, here, nowhere, scratch)
-        else:
-            pose, clock = (a_x, a_y, a_heading), task.clock
-            n = candidates(lib, triples, a_x, a_y, a_heading, x, y, heading, nowhere, here, scratch)
-        if task.most_trims > 0 or lib.min_coast > 0.0:
-            for k in range(n):
-                if not word_admitted(search, task, lib, triples, node, k):
-                    scratch.costs[k] = math.inf
+        words = lib.library.free_words if free_heading else lib.library.words
+        aim = (task.aims[g, 0], task.aims[g, 1], task.aims[g, 2], 0.0)
         most = min(ceiling, found[0]) - done
         if estimate < math.inf:
             most = min(most, task.patience * estimate + task.slack)
+        begin, end, first, last, clock = (
+            (x, y, heading, 0.0),
+            aim,
+            here,
+            nowhere,
+            task.clock + spent,
+        )
+        if task.sign < 0.0:  # the node is nearer to the goal: the word leads from the start to it
+            begin, end, first, last, clock = aim, begin, nowhere, here, task.clock
+        n = candidates(lib.library, words, words.shape[0], begin, first, end, last, most, scratch)
+        if task.most_trims > 0 or lib.library.min_coast > 0.0:
+            for k in range(n):
+                if not word_admitted(search, task, lib, words, node, k):
+                    scratch.costs[k] = math.inf
         left = task.most_time - spent
-        which = free_candidate(lib, task, world, body, triples, pose, n, most, left, clock, scratch)
+        pose = (begin[0], begin[1], begin[2])
+        which = free_candidate(lib, task, world, body, words, pose, n, most, left, clock, scratch)
         state[QUERIES] += 1
         if which >= 0 and task.sign > 0.0:
             arrival = clock + scratch.durations[which]
-            if not may_stay(task, world, body, a_x, a_y, a_heading, arrival):
+            if not may_stay(task, world, body, aim[0], aim[1], aim[2], arrival):
                 which = -1
         if which >= 0:
             found[0] = done + scratch.costs[which]
@@ -157,7 +160,7 @@ def connect_ends(search, task, lib, world, body, node, ceiling, estimate):
 
 
 @bare_inner_kernel
-def word_admitted(search, task, lib, triples, node, k):
+def word_admitted(search, task, lib, words, node, k):
     """Whether the word through a node and one candidate keeps the limits of single words."""
     scratch, links, nodes = search.scratch, search.links, search.nodes
     row = scratch.rows[k]
@@ -166,17 +169,17 @@ def word_admitted(search, task, lib, triples, node, k):
     forward = task.sign > 0.0
     for step in range(3):
         n_th = step if forward else 2 - step  # away from the node
-        this, t = triples[row, n_th], scratch.times[k, n_th]
-        if t == 0.0 or this >= lib.n_trims:
+        this, t = words[row, n_th], scratch.times[k, n_th]
+        if t == 0.0 or this >= lib.library.n_trims:
             continue
         if this == trim:
             run += t
             continue
-        if trim != NO_TRIM and run < lib.min_coast:
+        if trim != NO_TRIM and run < lib.library.min_coast:
             return False
         count += 1
         trim, run = this, t
-    if trim != NO_TRIM and run < lib.min_coast:
+    if trim != NO_TRIM and run < lib.library.min_coast:
         return False
     return task.most_trims == 0 or count <= task.most_trims
 
@@ -225,7 +228,7 @@ def expand(search, task, lib, world, body, grid, table, n, ceiling):
     1, or 0 when nothing is left to expand, or no room for more nodes.
     """
     nodes, links, state = search.nodes, search.links, search.state
-    room = nodes.shape[0] - lib.n_trims * lib.quanta.shape[1] - 1
+    room = nodes.shape[0] - lib.library.n_trims * lib.quanta.shape[1] - 1
     generation = state[GENERATION]
     for _ in range(n):
         node = -1
@@ -258,21 +261,25 @@ def expand(search, task, lib, world, body, grid, table, n, ceiling):
         limit = min(ceiling, search.found[0])
         cos, sin = math.cos(heading), math.sin(heading)
         before, gear = int(links[node, 1]), int(links[node, 2])  # of 32 bits: keys need more
-        for trim in range(lib.n_trims):
-            if before != NO_TRIM and before != trim and run < lib.min_coast:
+        for trim in range(lib.library.n_trims):
+            if before != NO_TRIM and before != trim and run < lib.library.min_coast:
                 continue
             count = int(links[node, 3]) + (0 if trim == before else 1)
             if task.most_trims > 0 and count > task.most_trims:
                 continue
-            v_x, v_y, turn = lib.twists[trim, 0], lib.twists[trim, 1], lib.twists[trim, 2]
-            price = price_of_switch(lib, before, gear, trim)
-            new_gear = lib.gears[trim] if lib.gears[trim] != 0 else gear
+            v_x, v_y, turn = (
+                lib.library.twists[trim, 0],
+                lib.library.twists[trim, 1],
+                lib.library.twists[trim, 2],
+            )
+            price = price_of_switch(lib.library, before, gear, trim)
+            new_gear = lib.library.gears[trim] if lib.library.gears[trim] != 0 else gear
             layer = layer_of(task, lib, trim, new_gear, count)
             for q in range(lib.quanta.shape[1]):
                 t = lib.quanta[trim, q]
                 if not t > 0.0:
                     continue
-                cost = done + price + t * lib.rates[trim]
+                cost = done + price + t * lib.library.rates[trim]
                 time = spent + t
                 if cost >= limit or time > task.most_time:
                     break
@@ -315,7 +322,7 @@ def expand(search, task, lib, world, body, grid, table, n, ceiling):
                     if t * lib.speeds[trim] < task.shortest_contact:
                         break
                     fine = 1
-                    cost, time = done + price + t * lib.rates[trim], spent + t
+                    cost, time = done + price + t * lib.library.rates[trim], spent + t
                     d_x, d_y, angle = coast(v_x, v_y, turn, task.sign * t)
                     n_x, n_y, n_heading = compose(x, y, heading, d_x, d_y, angle)
                     key = cell_key(task, n_x, n_y, n_heading, layer, time, 1)

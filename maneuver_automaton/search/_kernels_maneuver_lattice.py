@@ -20,7 +20,7 @@ from maneuver_automaton.search._kernels_maneuver_motion import (
     trim_inside,
     trim_proven,
 )
-from maneuver_automaton.words._kernels_candidates import transfer_candidates
+from maneuver_automaton.words._kernels_candidates import candidates
 
 FULL_TURN = 2.0 * math.pi
 COAST, ROOT = -1, -2
@@ -72,7 +72,9 @@ def connect(search, task, lib, layers, node, ceiling, estimate):
         goal_trim = task.aim_trims[g]
         most = min(ceiling, found[0]) - done
         most = min(most, task.patience * estimate + task.slack)
-        n = transfer_candidates(lib.transfer, n_words, start, trim, goal, goal_trim, most, scratch)
+        words = lib.transfer.words
+        here, there = (trim, 0), (goal_trim, 0)
+        n = candidates(lib.transfer, words, n_words, start, here, goal, there, most, scratch)
         state[QUERIES] += 1
         left = task.most_time - spent
         for _ in range(task.tries):

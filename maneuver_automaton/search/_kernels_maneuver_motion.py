@@ -165,8 +165,9 @@ def chain_free(task, lib, layers, source, target, pose, clock):
     """Whether the transition between two trims is free; then the pose and time at its end."""
     x, y, heading, z = pose
     trim = source
-    while trim != target:
-        edge = lib.via_edge[trim, target]
+    classes = lib.transfer.class_of
+    while classes[trim] != classes[target]:  # within a class the transition is the identity
+        edge = lib.via_edge[classes[trim], classes[target]]
         if not edge_inside(task, lib, edge, x, y, heading, z) or not (
             edge_proven(task, lib, layers, edge, x, y, heading, z, clock) >= 0.0
         ):

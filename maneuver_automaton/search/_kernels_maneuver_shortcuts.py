@@ -6,7 +6,7 @@ import math
 
 from maneuver_automaton._compile import bare_kernel
 from maneuver_automaton.search._kernels_maneuver_motion import transfer_free
-from maneuver_automaton.words._kernels_candidates import transfer_candidates
+from maneuver_automaton.words._kernels_candidates import candidates
 
 AS_BEFORE = -1
 
@@ -26,9 +26,8 @@ def shorten_to(task, lib, n_words, layers, j, points, trims, costs, spent, least
     for i in range(j - 1):
         start = (points[i, 0], points[i, 1], points[i, 2], points[i, 3])
         most = plan.costs[j] - plan.costs[i] - least
-        n = transfer_candidates(
-            lib.transfer, n_words, start, trims[i], goal, trims[j], most, scratch
-        )
+        words, here, there = lib.transfer.words, (trims[i], 0), (trims[j], 0)
+        n = candidates(lib.transfer, words, n_words, start, here, goal, there, most, scratch)
         for _ in range(task.tries):
             best, which = most, -1
             for k in range(n):

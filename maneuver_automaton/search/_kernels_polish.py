@@ -124,22 +124,18 @@ def polish(problem, found, word, n, times, isolated, max_trims):
         rates[i] = problem.rates[word[i]]
         for r in range(m):
             rows[r, i] = problem.rows[r, word[i]]
-    gaps = np.zeros((n, 4))
     if isolated == 0:
         p, worst, slope = newton_stationary(
-            rates, twists, gaps, problem.goal, rows, problem.targets, times, 30
+            rates, twists, problem.goal, rows, problem.targets, times, 30
         )
         if not (worst < 1e-10 and slope < 1e-8):
             return
         for i in range(n):
             if times[i] <= 1e-9:
                 return
-        if (
-            not curvature(rates, twists, gaps, problem.goal, rows, problem.targets, times, p)
-            > 1e-10
-        ):
+        if not curvature(rates, twists, problem.goal, rows, problem.targets, times, p) > 1e-10:
             return
-    worst = newton_feasible(twists, gaps, problem.goal, rows, problem.targets, times, 8)
+    worst = newton_feasible(twists, problem.goal, rows, problem.targets, times, 8)
     if worst < 1e-10 and not is_neighbour(problem, twists, rows, n, times):
         accept_with_turns(problem, found, word, n, times, max_trims)
 
@@ -169,8 +165,7 @@ def is_neighbour(problem, twists, rows, n, times):
         left[i] = times[source]
         for r in range(m):
             fewer_rows[r, i] = rows[r, source]
-    gaps = np.zeros((n - 1, 4))
-    worst = newton_feasible(fewer, gaps, problem.goal, fewer_rows, problem.targets, left, 8)
+    worst = newton_feasible(fewer, problem.goal, fewer_rows, problem.targets, left, 8)
     return worst < 1e-13 * (1.0 + abs(problem.goal[0]) + abs(problem.goal[1]))
 
 

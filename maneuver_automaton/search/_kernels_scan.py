@@ -106,7 +106,7 @@ def reduced_gradient(problem, word, n, triple, times, columns, free, out):
     twists = np.empty((n, 4))
     for i in range(n):
         assign(twists[i], problem.twists[word[i]])
-    end_and_columns(twists, np.zeros((n, 4)), times, columns)
+    end_and_columns(twists, times, columns)
     a, b, c = triple[0], triple[1], triple[2]
     u0 = columns[b, 1] * columns[c, 2] - columns[b, 2] * columns[c, 1]
     u1 = columns[b, 2] * columns[c, 0] - columns[b, 0] * columns[c, 2]

@@ -82,11 +82,11 @@ def cost_to_go_table(
 
 
 def _table(library: LatticeLibrary, reach: float, folder: Path | None) -> CostTable:
-    arrays = library.arrays
+    arrays = library.arrays.library
     m = arrays.n_trims
     moving = arrays.twists[:m].any(axis=1)
-    twists, rates = arrays.twists[:m][moving].copy(), arrays.rates[:m][moving].copy()
-    longest = arrays.quanta[moving].max(axis=1)
+    twists, rates = arrays.twists[:m][moving, :3].copy(), arrays.rates[:m][moving].copy()
+    longest = library.arrays.quanta[moving].max(axis=1)
     quanta = np.multiply.outer(longest, SCALES)
     cell = reach / HALF
     smallest = np.where(arrays.twists[:m][moving, :2].any(axis=1), cell, 0.0)

@@ -22,9 +22,10 @@ from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.exact_end import corrected, with_fewer_digits
 from maneuver_automaton.search.library_arrays import LibraryArrays, library_arrays
 from maneuver_automaton.search.result import SearchResult, SearchStatus, Solution
-from maneuver_automaton.search.setup import MovingLibrary, SearchSetup, search_setup
+from maneuver_automaton.search.setup import SearchSetup, search_setup
 from maneuver_automaton.search.shortening import shortened
 from maneuver_automaton.search.words import in_order, resting, search_setup_words
+from maneuver_automaton.words.library import MovingTrims
 
 SEEDS = 10  # cheapest words that are improved, where the library is its own sub-library
 SEEDS_OF_MANY = 4  # the same for larger libraries: insertion makes more of them
@@ -372,7 +373,7 @@ def sub_library(setup: SearchSetup) -> SearchSetup:
 
 
 @functools.lru_cache(maxsize=8)
-def _far_reaching(library: MovingLibrary) -> IntArray:
+def _far_reaching(library: MovingTrims) -> IntArray:
     """The trims of a sub-library: the same for every start and goal."""
     twists, rates = library.twists, library.rates
     scaled = twists / np.abs(twists).max(axis=0).clip(min=1e-300)

@@ -13,8 +13,9 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.search import _kernels_lattice as kernels
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.distance_grid import DistanceGrid, distance_grid
-from maneuver_automaton.search.lattice_pass import WEIGHT, Pass, Rung, Word, both_ends
+from maneuver_automaton.search.lattice_pass import WEIGHT, Pass, Rung, both_ends
 from maneuver_automaton.search.lattice_query import LatticeQuery
+from maneuver_automaton.words.word import Word
 
 MOST_CHUNK = 8192  # expansions of one pass before it is the next one's turn
 LADDER: tuple[tuple[int, tuple[Rung, ...]], ...] = (

@@ -16,34 +16,28 @@ from maneuver_automaton.collision.body import body_of, fastest_points
 from maneuver_automaton.costs import StageCost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.setup import moving_library
+from maneuver_automaton.words.library import (
+    NO_TRIM,
+    STRAIGHT,
+    LibraryArrays,
+    four_columns,
+    library_arrays,
+    moving_trims,
+)
+from maneuver_automaton.words.transitions import transitions_of
 
 MOST_TRIMS = 10  # of a larger library the most useful ones
 QUANTA = (0.17, 0.5)  # lengths of the edges, in turning radii
 SPIN_QUANTA = (math.pi / 12.0, math.pi / 4.0)  # [rad] of turns on the spot
-STRAIGHT = 1e-12  # [rad/s] turn rates below it are none
-SHORTEST = 1e-9  # [s] coasting times below it are none
-TOLERANCE = 1e-10  # of the steering function
 
 
 class LatticeArrays(NamedTuple):
-    """What the kernels see; the row after the last trim is the turn of a free heading."""
+    """What the kernels see of the m trims that a lattice is made of."""
 
-    twists: Array  # (m + 1, 3)
-    rates: Array  # (m + 1,) cost per second, that of rest taken off where it pads
+    library: LibraryArrays  # numbered as `LatticeLibrary.trims` lists them
     speeds: Array  # (m + 1,) [m/s] of the fastest point of the body
-    periods: Array  # (m + 1,) [s] of a full turn
-    gears: IntArray  # (m + 1,) sign of the forward speed
     quanta: Array  # (m, 2) [s] lengths of the edges, 0 for none
     moves: Array  # (m, 2, 3) poses they lead to, forwards or backwards
-    triples: IntArray  # (K, 3)
-    free_triples: IntArray  # (F, 3) that end with the turn of a free heading
-    n_trims: int
-    switch: float
-    direction_change: float
-    min_coast: float  # [s]
-    shortest: float  # [s]
-    tolerance: float
 
 
 class LatticeLibrary(NamedTuple):
@@ -51,6 +45,7 @@ class LatticeLibrary(NamedTuple):
 
     arrays: LatticeArrays
     trims: IntArray  # (m,) their indices in the automaton
+    number_of: IntArray  # from the indices in the automaton to these, -1 for none
     radius: float  # [m] length scale: the tightest turn, or the size of the body
     per_metre: float  # least cost per metre
     per_turn: float  # cost of the cheapest full turn
@@ -82,20 +77,19 @@ def _library(
     waits: bool,
     min_coast: float,
 ) -> LatticeLibrary:
-    library = moving_library(automaton, cost)
+    library = moving_trims(automaton, cost)
     body = body_of(footprint)
     pads = fixed_time and library.rest is not None
     rates = library.rates - (library.rest_rate if pads else 0.0)
     chosen = _most_useful(library.twists, rates)
     trims = library.trims[chosen]
-    twists, rates, periods = library.twists[chosen, :3], rates[chosen], library.periods[chosen]
+    twists, rates = library.twists[chosen, :3], rates[chosen]
     twists[np.abs(twists[:, 2]) < STRAIGHT, 2] = 0.0
     radius = _length_scale(twists, body.half_width, body.reach)
     if waits and library.rest is not None:
         trims = np.append(trims, library.rest)
         twists = np.vstack([twists, np.zeros(3)])
         rates = np.append(rates, 0.0 if pads else library.rest_rate)
-        periods = np.append(periods, np.inf)
     still = ~twists.any(axis=1)
     speed = np.hypot(twists[:, 0], twists[:, 1])
     moving = np.flatnonzero(~still)
@@ -114,30 +108,30 @@ def _library(
     m = len(trims)
     prices = (getattr(cost, "switch", 0.0), getattr(cost, "direction_change", 0.0))
     arrays = LatticeArrays(
-        twists=np.vstack([twists, [0.0, 0.0, 1.0]]),
-        rates=np.append(rates, 0.0),
+        library=library_arrays(
+            four_columns(twists), rates, transitions_of(automaton, np.zeros(0)), trims=trims
+        )._replace(
+            words=_triples(moving),
+            free_words=np.array(
+                [(i, j, m) for i, j in itertools.permutations(moving.tolist(), 2)]
+                or [(int(i), int(i), m) for i in moving],
+                dtype=np.int64,
+            ).reshape(-1, 3),
+            switch=float(prices[0]),
+            direction_change=float(prices[1]),
+            min_coast=float(min_coast),
+        ),
         speeds=np.append(fastest_points(body, twists), 0.0),
-        periods=np.append(periods, 2.0 * np.pi),
-        gears=np.append(np.sign(twists[:, 0]), 0).astype(np.int64),
         quanta=quanta,
         moves=moves_of(twists, quanta),
-        triples=_triples(moving),
-        free_triples=np.array(
-            [(i, j, m) for i, j in itertools.permutations(moving.tolist(), 2)]
-            or [(int(i), int(i), m) for i in moving],
-            dtype=np.int64,
-        ).reshape(-1, 3),
-        n_trims=m,
-        switch=float(prices[0]),
-        direction_change=float(prices[1]),
-        min_coast=float(min_coast),
-        shortest=SHORTEST,
-        tolerance=TOLERANCE,
     )
     best = float(per_radian.min())
+    number_of = np.full(len(automaton), NO_TRIM)
+    number_of[trims] = np.arange(m)
     return LatticeLibrary(
         arrays=arrays,
         trims=np.asarray(trims, dtype=np.int64),
+        number_of=np.asarray(number_of, dtype=np.int64),
         radius=radius,
         per_metre=float(per_metre.min()) if np.isfinite(per_metre.min()) else 0.0,
         per_turn=2.0 * math.pi * best if math.isfinite(best) else 0.0,

@@ -9,18 +9,9 @@ from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.search import _kernels_lattice as kernels
+from maneuver_automaton.words.library import LibraryArrays, Scratch, scratch_of
 
 SMALLEST = 2048  # nodes
-
-
-class Scratch(NamedTuple):
-    """Candidates of one steering: at most two for each triple."""
-
-    costs: Array
-    durations: Array
-    rows: IntArray
-    times: Array  # (n, 3)
-    branches: Array  # (2, 3)
 
 
 class SearchArrays(NamedTuple):
@@ -36,19 +27,7 @@ class SearchArrays(NamedTuple):
     scratch: Scratch
 
 
-def scratch_of(n_triples: int) -> Scratch:
-    """Room for the candidates of one steering."""
-    n = 2 * max(1, n_triples)
-    return Scratch(
-        costs=np.empty(n),
-        durations=np.empty(n),
-        rows=np.empty(n, dtype=np.int64),
-        times=np.empty((n, 3)),
-        branches=np.empty((2, 3)),
-    )
-
-
-def search_arrays(n_triples: int) -> SearchArrays:
+def search_arrays(library: LibraryArrays) -> SearchArrays:
     """Room for a small search."""
     n = SMALLEST
     return SearchArrays(
@@ -59,7 +38,7 @@ def search_arrays(n_triples: int) -> SearchArrays:
         heap_node=np.empty(n, dtype=np.int64),
         state=np.zeros(11, dtype=np.int64),
         found=np.zeros(5),
-        scratch=scratch_of(n_triples),
+        scratch=scratch_of(library),
     )
 
 

@@ -10,13 +10,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.search import _kernels_lattice as kernels
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.distance_grid import DistanceGrid
 from maneuver_automaton.search.lattice_library import LatticeArrays, moves_of
 from maneuver_automaton.search.lattice_memory import SearchArrays, search_arrays, with_room
 from maneuver_automaton.search.lattice_query import LatticeQuery
+from maneuver_automaton.words.word import Word
 
 CELL = 0.122  # of the first pass, in turning radii
 HEADINGS = 72
@@ -88,16 +89,6 @@ class Task(NamedTuple):
     window: Array
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Word:
-    """Trims of the lattice library with their coasting times, joined where they repeat."""
-
-    trims: IntArray  # (n,)
-    durations: Array  # (n,) [s]
-    goal: int  # among the goals of the query
-    cost: float = math.nan
-
-
 @dataclass(slots=True, eq=False)
 class Pass:
     """A search from one end at one resolution; it can be stopped and resumed."""
@@ -128,7 +119,7 @@ class Pass:
         left = self.expansions + n
         while self.alive and self.expansions < left and time.monotonic() < deadline:
             state = self.arrays.state
-            per_node = self.library.n_trims * 2
+            per_node = len(query.library.trims) * 2
             step = min(left - self.expansions, TIMELY)
             self.arrays = with_room(
                 self.arrays, int(state[kernels.N_NODES]) + per_node * (step + 1) + 2
@@ -178,13 +169,12 @@ def _pass(
     arrays: SearchArrays | None,
 ) -> Pass:
     library = query.library.arrays
-    quanta = np.maximum(library.quanta * rung.quanta, library.min_coast)
+    quanta = np.maximum(library.quanta * rung.quanta, library.library.min_coast)
     quanta = np.where(library.quanta > 0.0, quanta, 0.0)
-    moves = moves_of(library.twists[: library.n_trims], sign * quanta)
+    moves = moves_of(library.library.twists[: library.library.n_trims, :3], sign * quanta)
     scaled = library._replace(quanta=quanta, moves=moves)
     task = task_of(query, rung, sign)
-    n_triples = max(len(library.triples), len(library.free_triples))
-    room = search_arrays(n_triples) if arrays is None else arrays
+    room = search_arrays(library.library) if arrays is None else arrays
     room = with_room(room, len(task.roots) + 4)
     kernels.begin(room, task, scaled, query.world.arrays, grid, table)
     return Pass(query, rung, task, grid, table, room, scaled)
@@ -199,7 +189,7 @@ def task_of(query: LatticeQuery, rung: Rung, sign: float) -> Task:
     frame = goals[0]
     cell = rung.scale * (settings.cell or CELL * radius)
     size = body.half_width or radius * 0.1
-    cost = library.arrays
+    cost = library.arrays.library
     price = library.per_metre
     sharp = 0.25 * radius * price
     aim = goals[0] if sign > 0.0 else query.start
@@ -263,12 +253,12 @@ def _goal_roots(query: LatticeQuery) -> Array:
 
 def _word(one: Pass) -> Word:
     """The plan that a pass has found, from start to goal."""
-    arrays, library = one.arrays, one.query.library.arrays
+    arrays, library = one.arrays, one.query.library.arrays.library
     state = arrays.state
-    triples = library.free_triples if state[kernels.FREE] else library.triples
+    words = library.free_words if state[kernels.FREE] else library.words
     middle = [
         (int(trim), float(t))
-        for trim, t in zip(triples[state[kernels.ROW]], arrays.found[1:4], strict=True)
+        for trim, t in zip(words[state[kernels.ROW]], arrays.found[1:4], strict=True)
         if t > 0.0 and trim < library.n_trims
     ]
     edges: list[tuple[int, float]] = []
@@ -281,7 +271,7 @@ def _word(one: Pass) -> Word:
         parts, goal = edges[::-1] + middle, int(state[kernels.GOAL])
     else:
         parts, goal = middle + edges, _goal_of_root(one.query, root)
-    return joined(parts, goal=goal)
+    return joined(parts, one.query, goal=goal)
 
 
 def _goal_of_root(query: LatticeQuery, root: int) -> int:
@@ -289,8 +279,8 @@ def _goal_of_root(query: LatticeQuery, root: int) -> int:
     return int(np.searchsorted(np.cumsum(counts), root, side="right"))
 
 
-def joined(parts: list[tuple[int, float]], *, goal: int) -> Word:
-    """A word without neighbours that repeat."""
+def joined(parts: list[tuple[int, float]], query: LatticeQuery, *, goal: int) -> Word:
+    """A word of trims, as the lattice numbers them, and times, without neighbours that repeat."""
     trims: list[int] = []
     durations: list[float] = []
     for trim, t in parts:
@@ -300,7 +290,7 @@ def joined(parts: list[tuple[int, float]], *, goal: int) -> Word:
             trims.append(trim)
             durations.append(t)
     return Word(
-        trims=np.array(trims, dtype=np.int64),
+        trims=query.library.trims[trims] if trims else np.zeros(0, dtype=np.int64),
         durations=np.array(durations, dtype=np.float64),
         goal=goal,
     )
@@ -308,10 +298,10 @@ def joined(parts: list[tuple[int, float]], *, goal: int) -> Word:
 
 def with_cost(word: Word, query: LatticeQuery) -> Word:
     """The word with what it costs in the lattice library, prices of switches included."""
-    library = query.library.arrays
-    cost = float(library.rates[word.trims] @ word.durations)
-    cost += library.switch * max(0, len(word.trims) - 1)
-    gears = library.gears[word.trims]
+    library, numbers = query.library.arrays.library, query.library.number_of[word.trims]
+    cost = float(library.rates[numbers] @ word.durations)
+    cost += library.switch * max(0, len(numbers) - 1)
+    gears = library.gears[numbers]
     gears = gears[gears != 0]
     cost += library.direction_change * int(np.count_nonzero(gears[1:] != gears[:-1]))
     return replace(word, cost=cost)

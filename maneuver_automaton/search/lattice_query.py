@@ -42,7 +42,7 @@ class LatticeQuery:
         library, fixed = self.library, self.problem.horizon.time
         if fixed is None or library.rest is None:
             return 0.0
-        return library.rest_rate * fixed + library.arrays.switch
+        return library.rest_rate * fixed + library.arrays.library.switch
 
     @property
     def most_trims(self) -> int:

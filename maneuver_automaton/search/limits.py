@@ -13,7 +13,8 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import StageCost
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.setup import SearchSetup, moving_library, search_setup
+from maneuver_automaton.search.setup import SearchSetup, search_setup
+from maneuver_automaton.words.library import moving_trims
 
 MISSED = 1e-6  # [m, rad] for a goal a metre away: what is nearer may be met
 HARDLY_TURNING = 1e-6  # turn rate, as a share of a twist, that is too small to measure a way by
@@ -136,7 +137,7 @@ class _Prices:
 @functools.lru_cache(maxsize=8)
 def _prices(automaton: Automaton, cost: StageCost, pads: bool) -> _Prices | None:
     """None where a trim is cheaper than the rest that pads."""
-    library = moving_library(automaton, cost)
+    library = moving_trims(automaton, cost)
     rates = library.rates - (library.rest_rate if pads else 0.0)
     if (rates < 0.0).any():
         return None

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.groups import LieGroup
@@ -180,7 +181,6 @@ class _Prices:
         self.letters = np.array(setup.letters, dtype=np.int64)
         dof = setup.problem.start.size
         self.twists = self.arrays.twists[:, :dof]
-        self.shift = self.arrays.shift[..., :dof]
         chain = (setup.start_trim, *word.trims, setup.goal_trim)
         self.chain = chain
         group = self.group
@@ -190,12 +190,22 @@ class _Prices:
         for before, trim, lasting in zip(
             chain, chain[1:], (*word.durations.tolist(), 0.0), strict=False
         ):
-            pose = pose @ group(self.shift[before, trim])
+            pose = pose @ group(self._step(before, trim))
             self.begins.append(pose)
             pose = pose @ group.exp(lasting * self.twists[trim])
             self.ends.append(pose)
         self.end = self.ends[-1]
         self.momentum = self._momentum()
+
+    def _step(self, before: ArrayLike, after: ArrayLike) -> Array:
+        """Displacement (..., dof) of the transition between trims."""
+        known, pair = self.setup.library.transitions, self.setup.library.class_pair(before, after)
+        return np.asarray(known.displacement[pair][..., : self.twists.shape[1]])
+
+    def _cost(self, before: ArrayLike, after: ArrayLike) -> Array:
+        """Cost (...,) of the transition between trims; inf where there is none."""
+        library = self.setup.library
+        return np.asarray(library.transitions.cost[library.class_pair(before, after)])
 
     def _momentum(self) -> Array:
         """Prices (dof,) of a displacement of the end, seen from the start."""
@@ -217,7 +227,7 @@ class _Prices:
         removed = float(
             self.arrays.rates[list(word.trims[first:after])] @ word.durations[first:after]
         )
-        removed += sum(self.arrays.cost[chain[k], chain[k + 1]] for k in range(first, after + 1))
+        removed += float(self._cost(chain[first : after + 1], chain[first + 1 : after + 2]).sum())
         prices = self._priced(self.ends[first], before, chosen, lasting, following, rest) - removed
         head, tail = word.trims[:first], word.trims[after:]
         times = np.concatenate([word.durations[:first], [lasting], word.durations[after:]])
@@ -253,14 +263,19 @@ class _Prices:
         n, dof = chosen.size, self.twists.shape[1]
         if not n:
             return np.zeros(0)
-        end = group(np.tile(here.pose, (n, 1))) @ group(self.shift[before, chosen])
+        end = group(np.tile(here.pose, (n, 1))) @ group(self._step(np.full(n, before), chosen))
         end = end @ group.exp(lasting * self.twists[chosen])
-        end = end @ group(self.shift[chosen, following]) @ group(np.tile(rest.pose, (n, 1)))
+        end = (
+            end
+            @ group(self._step(chosen, np.full(n, following)))
+            @ group(np.tile(rest.pose, (n, 1)))
+        )
         back = self.end.inverse()
         moved = np.array((end @ group(np.tile(back.pose, (n, 1)))).pose)
         moved[:, 2] = np.remainder(moved[:, 2] + np.pi, 2.0 * np.pi) - np.pi
         jump = group(moved).log().reshape(n, dof)
-        added = arrays.cost[before, chosen] + arrays.cost[chosen, following]
+        added = self._cost(np.full(n, before), chosen)
+        added = added + self._cost(chosen, np.full(n, following))
         return np.asarray(
             self.word.cost + added + lasting * arrays.rates[chosen] + jump @ self.momentum
         )

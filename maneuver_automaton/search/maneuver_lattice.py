@@ -20,14 +20,9 @@ from maneuver_automaton.search.maneuver_query import ManeuverQuery
 from maneuver_automaton.search.maneuver_shortcuts import LEAST, shortened
 from maneuver_automaton.search.maneuver_task import Rung, Task, task_of, transfer_steps
 from maneuver_automaton.search.result import SearchStatus
-from maneuver_automaton.words.library import TransferScratch
-from maneuver_automaton.words.word import (
-    EDGE,
-    TRIM,
-    ManeuverWord,
-    plan_of_word,
-    word_of,
-)
+from maneuver_automaton.words.library import Scratch
+from maneuver_automaton.words.word import MANEUVER, TRIM, Word, word_of_steps
+from maneuver_automaton.words.word import plan_of as plan_of_word
 
 FIRST_CHUNK = 128  # expansions
 MOST_CHUNK = 16384
@@ -69,7 +64,7 @@ class ManeuverSearchArrays(NamedTuple):
     heap_node: IntArray
     state: IntArray  # (11,)
     found: Array  # (5,) cost, four durations
-    scratch: TransferScratch
+    scratch: Scratch
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -77,14 +72,14 @@ class ManeuverResult:
     """Plans of one query, each cheaper than the one before."""
 
     status: SearchStatus
-    words: tuple[ManeuverWord, ...]  # the last is the best
+    words: tuple[Word, ...]  # the last is the best
     found_after: tuple[int, ...] = ()  # expansions until each was found
     found_s: tuple[float, ...] = ()  # [s]
     expansions: int = 0
     counts: dict[str, int] = field(default_factory=dict)
 
     @property
-    def best(self) -> ManeuverWord | None:
+    def best(self) -> Word | None:
         """The cheapest word, None if there is none."""
         return self.words[-1] if self.words else None
 
@@ -92,7 +87,7 @@ class ManeuverResult:
 class Heard(NamedTuple):
     """What a search has to say: a better word, or how it ended."""
 
-    word: ManeuverWord | None
+    word: Word | None
     expansions: int
     status: SearchStatus
 
@@ -121,7 +116,7 @@ class ManeuverPass:
         """Nodes expanded so far."""
         return int(self.arrays.state[kernels.EXPANSIONS])
 
-    def run(self, n: int, ceiling: float, *, deadline: float = math.inf) -> ManeuverWord | None:
+    def run(self, n: int, ceiling: float, *, deadline: float = math.inf) -> Word | None:
         """Expand up to `n` more nodes; a word that costs less than `ceiling` if one was found."""
         library = self.query.library.arrays._replace(quanta=self.quanta, moves=self.moves)
         left = self.expansions + n
@@ -144,7 +139,7 @@ class ManeuverPass:
                 break
         return self._word() if self.arrays.state[kernels.FOUND] else None
 
-    def _word(self) -> ManeuverWord:
+    def _word(self) -> Word:
         """The word that was found, from start to goal."""
         arrays, query = self.arrays, self.query
         state, library = arrays.state, query.library
@@ -157,7 +152,7 @@ class ManeuverPass:
             if edge == kernels.COAST:
                 steps.append((TRIM, int(arrays.links[node, 1]), float(arrays.nodes[node, 6])))
             else:
-                steps.append((EDGE, int(library.edge_maneuver[edge]), 0.0))
+                steps.append((MANEUVER, int(library.edge_maneuver[edge]), 0.0))
                 targets.append(int(arrays.links[node, 1]))
             node = int(arrays.links[node, 0])
         goal = int(state[kernels.GOAL])
@@ -165,7 +160,7 @@ class ManeuverPass:
         times = arrays.found[1:5].tolist()
         tail += [int(state[kernels.CLIMB]), int(query.goal_trims[goal])]
         ahead, beyond = transfer_steps(query.transfer, last, tail, [*times, 0.0])
-        return word_of(
+        return word_of_steps(
             query.transfer,
             start_trim=query.start_trim,
             steps=steps[::-1] + ahead,
@@ -189,7 +184,7 @@ def search_maneuvers(
         EXHAUSTED without a word: none at these resolutions, which proves nothing.
     """
     begun = time.monotonic()
-    found: list[tuple[ManeuverWord, int, float]] = []
+    found: list[tuple[Word, int, float]] = []
     total, status = 0, SearchStatus.EXHAUSTED
     for heard in maneuver_words(query, deadline=deadline, max_expansions=max_expansions):
         total, status = heard.expansions, heard.status
@@ -245,12 +240,12 @@ def maneuver_words(
     yield Heard(None, total, ended(total))
 
 
-def plan_of(query: ManeuverQuery, word: ManeuverWord) -> Plan:
+def plan_of(query: ManeuverQuery, word: Word) -> Plan:
     """A word as a plan that ends exactly at its goal, in the frame of the query."""
     return plan_of_word(
-        query.transfer,
+        query.automaton,
         word,
-        start=query.start,
+        query.start,
         goal=query.goals[word.goal],
         start_time=query.start_time,
     )
@@ -258,7 +253,7 @@ def plan_of(query: ManeuverQuery, word: ManeuverWord) -> Plan:
 
 def _first(
     query: ManeuverQuery, grid: DistanceGrid, *, room: int, deadline: float
-) -> tuple[ManeuverWord | None, int]:
+) -> tuple[Word | None, int]:
     """Passes of rising resolution in turn until one connects: the word, and expansions."""
     ladder = list(FIRST)
     passes: list[ManeuverPass] = []
@@ -282,8 +277,8 @@ def _first(
 
 
 def _better(
-    query: ManeuverQuery, grid: DistanceGrid, best: ManeuverWord, *, room: int, deadline: float
-) -> Iterator[tuple[ManeuverWord | None, int]]:
+    query: ManeuverQuery, grid: DistanceGrid, best: Word, *, room: int, deadline: float
+) -> Iterator[tuple[Word | None, int]]:
     """Shortcuts, then passes of falling weight below the cost of the best word, one by one."""
     total = 0
     arrays: ManeuverSearchArrays | None = None
@@ -312,12 +307,12 @@ def _better(
 
 def _shorter(
     query: ManeuverQuery,
-    best: ManeuverWord,
+    best: Word,
     rungs: Sequence[Rung],
     *,
     all_words: bool,
     deadline: float,
-) -> Iterator[ManeuverWord]:
+) -> Iterator[Word]:
     """Shortcuts of the best word, where passes are to come."""
     if rungs:
         yield from shortened(query, best, all_words=all_words, deadline=deadline)
@@ -333,7 +328,7 @@ def pass_of(
     """A pass that is ready to run."""
     library = query.library.arrays
     quanta = library.quanta * rung.quanta
-    steps = quanta[..., None] * library.transfer.twists[:, None]
+    steps = quanta[..., None] * library.transfer.twists[: library.transfer.n_trims, None]
     task = task_of(query, rung)
     room = _search_arrays(query) if arrays is None else arrays
     kernels.begin(room, task, query.layers, grid)

@@ -25,7 +25,8 @@ from maneuver_automaton.search.maneuver_motion import (
     fastest_of,
     pieces_of,
 )
-from maneuver_automaton.words.library import TransferArrays, TransferLibrary
+from maneuver_automaton.words.library import Library, LibraryArrays
+from maneuver_automaton.words.transitions import SWITCH, transitions_of
 
 QUANTA = (0.17, 0.5)  # lengths of coasts, in length scales
 SPIN_QUANTA = (math.pi / 12.0, math.pi / 4.0)  # [rad] of turns on the spot
@@ -34,7 +35,7 @@ SPIN_QUANTA = (math.pi / 12.0, math.pi / 4.0)  # [rad] of turns on the spot
 class ManeuverArrays(NamedTuple):
     """What the kernels see; edges are maneuvers and switches at will, sorted by source."""
 
-    transfer: TransferArrays
+    transfer: LibraryArrays
     n_parts: int
     bodies: BodyArrays
     offsets: Array  # (P, m, 3) of the parts in the trims
@@ -59,7 +60,7 @@ class ManeuverArrays(NamedTuple):
     piece_high: Array  # (N,)
     edge_low: Array  # (E,) of all pieces of an edge
     edge_high: Array  # (E,)
-    via_edge: IntArray  # (m, m) first edge of a transition, -1 if there is none
+    via_edge: IntArray  # (C, C) first edge of a transition between classes, -1 for none
     most_children: int
 
 
@@ -67,18 +68,18 @@ class ManeuverLibrary(NamedTuple):
     """The arrays with what the wrapper needs beside them."""
 
     arrays: ManeuverArrays
-    transfer: TransferLibrary
+    transfer: Library
     edge_maneuver: IntArray  # (E,) index in the automaton, -1 for a switch at will
     radius: float  # [m] length scale: the tightest turn, or the size of the body
     per_metre: float  # least cost per metre
     per_climb: float  # least cost per metre of altitude
-    lag: Array  # (m, m) least cost of maneuvers between trims beyond that of their way
+    lag: Array  # (C, C) least cost of maneuvers between classes beyond that of their way
     worst_error: float  # [m] of the pose along any piece
 
 
 @functools.lru_cache(maxsize=16)
 def maneuver_library(
-    transfer: TransferLibrary, parts: tuple[Part, ...], *, timed: bool, waits: bool
+    transfer: Library, parts: tuple[Part, ...], *, timed: bool, waits: bool
 ) -> ManeuverLibrary:
     """Everything about an automaton that is the same for every start, goal and map.
 
@@ -86,20 +87,21 @@ def maneuver_library(
     like any other.
     """
     automaton, arrays = transfer.automaton, transfer.arrays
+    trim_twists, trim_rates = arrays.twists[: arrays.n_trims], arrays.rates[: arrays.n_trims]
     m = len(automaton)
     edges = _edges(automaton, transfer)
     bodies = bodies_of(parts)
     offsets = np.array([part.trim_poses for part in parts])
-    twists = [carried_twists(arrays.twists, poses) for poses in offsets]
+    twists = [carried_twists(trim_twists, poses) for poses in offsets]
     speeds = np.array([fastest_of(b, t) for b, t in zip(bodies, twists, strict=True)])
     motion = _motion(automaton, parts, edges, np.array(twists), timed=timed)
-    radius = _length_scale(arrays.twists, bodies[0].half_width, bodies[0].reach)
-    quanta = _quanta(arrays.twists, radius, waits=waits)
+    radius = _length_scale(trim_twists, bodies[0].half_width, bodies[0].reach)
+    quanta = _quanta(trim_twists, radius, waits=waits)
     counts = np.bincount(edges.source, minlength=m)
-    steps = quanta[..., None] * arrays.twists[:, None]
+    steps = quanta[..., None] * trim_twists[:, None]
     moves = np.concatenate([SE2.exp(steps[..., :3]).pose, steps[..., 3:]], axis=-1)
-    speed = np.hypot(arrays.twists[:, 0], arrays.twists[:, 1])
-    per_metre = _least(arrays.rates, speed)
+    speed = np.hypot(trim_twists[:, 0], trim_twists[:, 1])
+    per_metre = _least(trim_rates, speed)
     lengths = np.array([0.0 if k < 0 else _way(automaton, k) for k in edges.maneuver])
     reach = motion.piece_speed * motion.piece_time + 2.0 * motion.piece_error
     per_group = np.add.reduceat(np.append(reach, 0.0), motion.first_piece[:-1])
@@ -130,8 +132,8 @@ def maneuver_library(
         edge_maneuver=edges.maneuver,
         radius=radius,
         per_metre=per_metre,
-        per_climb=_least(arrays.rates, np.abs(arrays.twists[:, 3])),
-        lag=_lags(m, edges, np.maximum(edges.cost - per_metre * lengths, 0.0)),
+        per_climb=_least(trim_rates, np.abs(trim_twists[:, 3])),
+        lag=_lags(transfer, np.maximum(edges.cost - per_metre * lengths, 0.0), edges),
         worst_error=float(motion.piece_error[pose_rows:].max(initial=0.0)),
     )
 
@@ -158,7 +160,7 @@ class _Motion(NamedTuple):
     edge_high: Array
 
 
-def _edges(automaton: Automaton, transfer: TransferLibrary) -> _Edges:
+def _edges(automaton: Automaton, transfer: Library) -> _Edges:
     """Maneuvers and switches at will, sorted by source, then as the automaton lists them."""
     classes, dof = automaton.trim_classes, automaton.model.group.dof
     rows: list[tuple[int, int, int]] = []
@@ -239,20 +241,12 @@ def _motion(
     )
 
 
-def _via_edges(transfer: TransferLibrary, edges: _Edges) -> IntArray:
-    """First edge (m, m) of the transition between two trims."""
-    number = {
-        (int(i), int(j), int(k)): e
-        for e, (i, j, k) in enumerate(zip(edges.source, edges.target, edges.maneuver, strict=True))
-    }
-    m = len(transfer.via)
-    via = np.full((m, m), -1, dtype=np.int64)
-    for i in range(m):
-        for j in range(m):
-            following = int(transfer.next_trim[i, j])
-            if i != j and following >= 0:
-                via[i, j] = number[i, following, int(transfer.via[i, j])]
-    return via
+def _via_edges(transfer: Library, edges: _Edges) -> IntArray:
+    """Edge (C, C) of the first maneuver of the transition between two classes."""
+    edge_of = np.full(len(transfer.maneuver_costs) + 1, -1)
+    edge_of[edges.maneuver] = np.arange(len(edges.maneuver))
+    edge_of[SWITCH] = -1
+    return np.asarray(edge_of[transfer.transitions.first], dtype=np.int64)
 
 
 def _quanta(twists: Array, radius: float, *, waits: bool) -> Array:
@@ -273,14 +267,12 @@ def _quanta(twists: Array, radius: float, *, waits: bool) -> Array:
     return np.stack(columns, axis=1)
 
 
-def _lags(m: int, edges: _Edges, surplus: Array) -> Array:
-    """Least surplus (m, m) of chains of maneuvers over the price of the way they make."""
-    value = np.full((m, m), np.inf)
-    np.minimum.at(value, (edges.source, edges.target), surplus)
-    np.fill_diagonal(value, 0.0)
-    for k in range(m):
-        value = np.minimum(value, value[:, k, None] + value[None, k, :])
-    return value
+def _lags(transfer: Library, surplus: Array, edges: _Edges) -> Array:
+    """Least surplus (C, C) of chains of maneuvers over the price of the way they make."""
+    by_maneuver = np.zeros(len(transfer.maneuver_costs))
+    driven = edges.maneuver != SWITCH
+    by_maneuver[edges.maneuver[driven]] = surplus[driven]
+    return transitions_of(transfer.automaton, by_maneuver).cost
 
 
 def _way(automaton: Automaton, k: int) -> float:

@@ -12,7 +12,7 @@ from maneuver_automaton.costs import StageCost
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.maneuver_motion import Part, parts_of
 from maneuver_automaton.search.maneuver_query import ManeuverQuery
-from maneuver_automaton.words.library import TransferLibrary, transfer_library
+from maneuver_automaton.words.library import Library, library_of
 
 
 def maneuver_problem_query(problem: Problem, goals: tuple[int, ...]) -> ManeuverQuery:
@@ -49,12 +49,12 @@ def maneuver_problem_query(problem: Problem, goals: tuple[int, ...]) -> Maneuver
 
 
 @functools.lru_cache(maxsize=8)
-def priced_transfers(automaton: Automaton, cost: StageCost) -> TransferLibrary:
+def priced_transfers(automaton: Automaton, cost: StageCost) -> Library:
     """The transfers of an automaton under a cost, made once."""
     origin = np.zeros(automaton.model.group.dof)
     rest = automaton.trims[0].name
     known = Problem(automaton, origin, Goal(pose=origin, trim=rest), start_trim=rest, cost=cost)
-    return transfer_library(
+    return library_of(
         automaton,
         rates=known.rates,
         maneuver_costs=[known.maneuver_cost(maneuver) for maneuver in automaton.maneuvers],

@@ -30,7 +30,7 @@ from maneuver_automaton.problem import Bounds
 from maneuver_automaton.search.lattice_query import window_of
 from maneuver_automaton.search.maneuver_library import ManeuverLibrary, maneuver_library
 from maneuver_automaton.search.maneuver_motion import Part
-from maneuver_automaton.words.library import TransferLibrary
+from maneuver_automaton.words.library import Library
 
 MARGIN = 0.005  # proven clearance of every pose looked at, in half widths of the body
 LEAST_MARGIN = 1e-7  # [m]
@@ -42,7 +42,7 @@ class ManeuverQuery:
 
     Parameters
     ----------
-    transfer : TransferLibrary
+    transfer : Library
         The automaton with its prices.
     parts : tuple of Part
         Rigid parts of the vehicle; the pose of the first is that of the vehicle.
@@ -65,7 +65,7 @@ class ManeuverQuery:
         Lowest and highest point of the vehicle about its altitude [m].
     """
 
-    transfer: TransferLibrary
+    transfer: Library
     parts: tuple[Part, ...]
     start: Array
     goals: Array
@@ -223,7 +223,7 @@ class ManeuverQuery:
 
 
 def maneuver_query(
-    transfer: TransferLibrary,
+    transfer: Library,
     parts: tuple[Part, ...],
     start: ArrayLike,
     goals: ArrayLike | Sequence[ArrayLike],

@@ -15,7 +15,7 @@ from maneuver_automaton.search.maneuver_lattice import maneuver_words
 from maneuver_automaton.search.maneuver_motion import parts_of
 from maneuver_automaton.search.maneuver_query import maneuver_query
 from maneuver_automaton.search.maneuver_shortcuts import word_is_free
-from maneuver_automaton.words.library import transfer_library
+from maneuver_automaton.words.library import library_of
 
 EXPANSIONS = 20
 
@@ -47,7 +47,7 @@ def load_maneuver_kernels() -> None:
     )
     automaton = Automaton(cart, (rest, ahead), maneuvers)
     query = maneuver_query(
-        transfer_library(automaton),
+        library_of(automaton),
         parts_of(automaton, (Box([0.4, 0.2]),)),
         [0.0, 0.0, 0.0],
         SE2.exp([3.0, 0.0, 0.3]).pose,

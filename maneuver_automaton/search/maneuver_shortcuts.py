@@ -15,7 +15,7 @@ from maneuver_automaton.search import _kernels_maneuver_motion as motion
 from maneuver_automaton.search import _kernels_maneuver_shortcuts as kernels
 from maneuver_automaton.search.maneuver_query import ManeuverQuery
 from maneuver_automaton.search.maneuver_task import Rung, task_of, transfer_steps
-from maneuver_automaton.words.word import EDGE, TRIM, ManeuverWord, word_of
+from maneuver_automaton.words.word import MANEUVER, TRIM, Word, word_of_steps
 
 MOST_POINTS = 32
 LEAST = 1e-5  # share of the cost that a shortcut has to save
@@ -49,12 +49,12 @@ class _Steps(NamedTuple):
 
 def shortened(
     query: ManeuverQuery,
-    word: ManeuverWord,
+    word: Word,
     *,
     rounds: int = ROUNDS,
     all_words: bool = True,
     deadline: float = math.inf,
-) -> Iterator[ManeuverWord]:
+) -> Iterator[Word]:
     """Words that rounds of shortcuts make of `word`, each cheaper than the one before.
 
     Every round cuts the trims at other places, so that points lie elsewhere; first with words of
@@ -75,11 +75,13 @@ def shortened(
                 break
 
 
-def word_is_free(query: ManeuverQuery, word: ManeuverWord) -> bool:
+def word_is_free(query: ManeuverQuery, word: Word) -> bool:
     """Whether a word is proven free all the way, at the times when it is where."""
     steps = _steps(query, word, cut=0.0, most=0)
     library = query.library
-    sources = np.repeat(np.arange(len(library.lag)), np.diff(library.arrays.first_edge))
+    sources = np.repeat(
+        np.arange(library.transfer.arrays.n_trims), np.diff(library.arrays.first_edge)
+    )
     keys = zip(
         sources.tolist(),
         library.edge_maneuver.tolist(),
@@ -87,10 +89,10 @@ def word_is_free(query: ManeuverQuery, word: ManeuverWord) -> bool:
         strict=True,
     )
     edges = {key: e for e, key in enumerate(keys)}
-    at = word.trims[0]
+    at = int(word.trims[0])
     numbers = steps.numbers.copy()
     for k, kind in enumerate(steps.kinds):
-        if kind == EDGE:
+        if kind == MANEUVER:
             numbers[k] = edges[at, int(steps.numbers[k]), int(steps.targets[k])]
         at = int(steps.targets[k])
     free = motion.word_free(
@@ -107,8 +109,8 @@ def word_is_free(query: ManeuverQuery, word: ManeuverWord) -> bool:
 
 
 def _once(
-    query: ManeuverQuery, word: ManeuverWord, *, cut: float, n_words: int, deadline: float
-) -> ManeuverWord | None:
+    query: ManeuverQuery, word: Word, *, cut: float, n_words: int, deadline: float
+) -> Word | None:
     """One round; None if nothing is gained."""
     steps = _steps(query, word, cut=cut, most=MOST_POINTS)
     n = len(steps.points)
@@ -153,7 +155,7 @@ def _once(
         i = int(plan.before[j])
         if plan.rows[j] == kernels.AS_BEFORE:
             found.append((int(steps.kinds[i]), int(steps.numbers[i]), float(steps.times[i])))
-            if steps.kinds[i] == EDGE:
+            if steps.kinds[i] == MANEUVER:
                 targets.append(int(steps.targets[i]))
             continue
         tail = [int(k) for k in query.transfer.arrays.words[plan.rows[j]]]
@@ -163,8 +165,8 @@ def _once(
         )
         found += ahead
         targets += beyond
-    better = word_of(
-        query.transfer, start_trim=word.trims[0], steps=found, targets=targets, goal=word.goal
+    better = word_of_steps(
+        query.transfer, start_trim=int(word.trims[0]), steps=found, targets=targets, goal=word.goal
     )
     late = better.duration > query.most_time
     if late or (query.moves and not word_is_free(query, better)):
@@ -172,21 +174,21 @@ def _once(
     return better
 
 
-def _steps(query: ManeuverQuery, word: ManeuverWord, *, cut: float, most: int) -> _Steps:
+def _steps(query: ManeuverQuery, word: Word, *, cut: float, most: int) -> _Steps:
     """The word as steps, its longest trims cut in parts until there are `most` points."""
     transfer, automaton = query.transfer, query.automaton
     durations = np.asarray(word.durations)
     room = max(0, most - 2 * len(word.trims))
     total = float(durations.sum())
     rows: list[tuple[int, int, float, int]] = []
-    for k, trim in enumerate(word.trims):
+    for k, trim in enumerate(word.trims.tolist()):
         if durations[k] > 0.0:
             parts = 1 + int(room * durations[k] / total)
             inner = (np.arange(1, parts) - cut) / parts if parts > 1 else np.zeros(0)
             ends = np.concatenate([[0.0], inner[inner > 0.0], [1.0]]) * durations[k]
             rows += [(TRIM, trim, t, trim) for t in np.diff(ends).tolist()]
-        if k < len(word.maneuvers):
-            rows.append((EDGE, word.maneuvers[k], 0.0, word.trims[k + 1]))
+        if k < len(word.transitions):
+            rows.append((MANEUVER, int(word.transitions[k]), 0.0, int(word.trims[k + 1])))
     pose = SE2xR(query.seen_start)
     points, costs, spent = [pose.pose], [0.0], [0.0]
     for kind, number, t, _ in rows:

@@ -18,17 +18,9 @@ from maneuver_automaton.groups import LieGroup, group_of
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.result import SearchStatus
-from maneuver_automaton.words import TimesStatus
-from maneuver_automaton.words.library import (
-    TransferLibrary,
-    _most_different,
-    _words,
-    transfer_library,
-)
-from maneuver_automaton.words.switching_times import (
-    close_times_with_maneuvers,
-    solve_times_with_maneuvers,
-)
+from maneuver_automaton.words import TimesStatus, solve_switching_times
+from maneuver_automaton.words.closing import closed_at
+from maneuver_automaton.words.library import Library, library_of, most_different, words_of
 
 LATE = 1e-9  # relative, by which a plan may take longer than it is allowed
 SAME = 1e-6  # [s] times that differ by less are the same
@@ -83,7 +75,7 @@ class WordSetup:
 
     problem: Problem
     goal: Goal
-    library: TransferLibrary
+    library: Library
     letters: tuple[int, ...]  # trims that words are made of
     start_trim: int
     goal_trim: int
@@ -113,9 +105,9 @@ class WordSetup:
 
     def fixed(self, trims: Sequence[int]) -> tuple[float, float]:
         """Cost and time [s] of the transitions of a word; inf where there is none."""
-        rows, columns = np.array(self.links(trims)).T
-        arrays = self.library.arrays
-        return float(arrays.cost[rows, columns].sum()), float(arrays.time[rows, columns].sum())
+        pair = self.library.class_pair(*np.array(self.links(trims)).T)
+        known = self.library.transitions
+        return float(known.cost[pair].sum()), float(known.time[pair].sum())
 
     def solved(
         self, trims: Sequence[int], guesses: Sequence[Array] = (), *, restarts: int = 0
@@ -144,7 +136,7 @@ class WordSetup:
             return self._without_trims()
         twists, steps = self._rows(trims)
         begin = self._begin(trims)
-        closed = close_times_with_maneuvers(
+        closed = closed_at(
             begin,
             twists,
             times,
@@ -207,7 +199,7 @@ class WordSetup:
         begin, group = group_of(self.goal.pose.size)(self._begin(trims)), self.group
         rows = list(trims)
         arrays = self.library.arrays
-        solved = solve_times_with_maneuvers(
+        solved = solve_switching_times(
             twists,
             arrays.rates[rows],
             (begin.inverse() @ group(self.goal.pose)).pose,
@@ -224,21 +216,20 @@ class WordSetup:
     def _begin(self, trims: Sequence[int]) -> Array:
         """Pose (dof,) after the transition out of the first trim."""
         group, dof = self.group, self.problem.start.size
-        shift = self.library.arrays.shift[self.start_trim, trims[0], :dof]
-        return (group(self.problem.start) @ group(shift)).pose
+        (out,) = self.library.displacements([self.start_trim, trims[0]])
+        return (group(self.problem.start) @ group(out[:dof])).pose
 
     def _rows(self, trims: Sequence[int]) -> tuple[Array, Array]:
         """Twists (n, dof), and displacements (n, dof) of the transitions after each trim."""
         dof = self.problem.start.size
-        before, after = np.array(self.links(trims)[1:]).T
-        arrays = self.library.arrays
-        return arrays.twists[list(trims), :dof], arrays.shift[before, after, :dof]
+        steps = self.library.displacements([*trims, self.goal_trim])
+        return self.library.arrays.twists[list(trims), :dof], steps[:, :dof]
 
     def _without_trims(self) -> TimedWord | None:
         """The transition from the first trim to the last, if it leads to the goal."""
         group, dof = self.group, self.problem.start.size
-        shift = self.library.arrays.shift[self.start_trim, self.goal_trim, :dof]
-        end = np.array((group(self.problem.start) @ group(shift)).pose)
+        (over,) = self.library.displacements([self.start_trim, self.goal_trim])
+        end = np.array((group(self.problem.start) @ group(over[:dof])).pose)
         if max(self.goal.off(end)) > self.library.arrays.met or self._is_late(self.fixed(())[1]):
             return None
         exactly = self.problem.horizon.time is not None and self.pad is None
@@ -294,22 +285,22 @@ def _library(
     most_trims: int,
     wanted: tuple[int, ...],
     steers: bool,
-) -> tuple[tuple[int, ...], TransferLibrary]:
+) -> tuple[tuple[int, ...], Library]:
     """Trims that words are made of, and the transitions; words to be steered along on demand."""
     library = _transitions(automaton, cost, pads)
-    twists = library.arrays.twists
+    twists = library.arrays.twists[: library.arrays.n_trims]
     moving = np.flatnonzero(twists[:, :3].any(axis=1))
-    chosen = set(moving[_most_different(twists[moving], most_trims)].tolist())
+    chosen = set(moving[most_different(twists[moving], most_trims)].tolist())
     chosen |= set(wanted) & set(moving.tolist())
     letters = tuple(sorted(chosen))
     if not steers:
         return (*letters, *library.arrays.climbs.tolist()), library
-    words, n_few = _words(list(letters), library.arrays.cost)
+    words, n_few = words_of(letters, library.transitions)
     return letters, replace(library, arrays=library.arrays._replace(words=words, n_few=n_few))
 
 
 @functools.lru_cache(maxsize=8)
-def _transitions(automaton: Automaton, cost: StageCost, pads: bool) -> TransferLibrary:
+def _transitions(automaton: Automaton, cost: StageCost, pads: bool) -> Library:
     rates = cost.rates(automaton.controls, automaton.body_velocities)
     prices = maneuver_prices(automaton, cost)
     if pads and automaton.rest is not None:  # what rest would cost meanwhile is taken off
@@ -317,7 +308,7 @@ def _transitions(automaton: Automaton, cost: StageCost, pads: bool) -> TransferL
         lasting = np.array([maneuver.duration for maneuver in automaton.maneuvers])
         rates = np.maximum(rates - waiting, 0.0)
         prices = np.maximum(prices - waiting * lasting, 0.0)
-    return transfer_library(automaton, rates=rates, maneuver_costs=prices, trims=())
+    return library_of(automaton, rates=rates, maneuver_costs=prices, trims=())
 
 
 def _plan_without_idle(

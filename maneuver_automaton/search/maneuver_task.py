@@ -10,8 +10,8 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.search.maneuver_query import ManeuverQuery
-from maneuver_automaton.words.library import TransferLibrary
-from maneuver_automaton.words.word import EDGE, TRIM
+from maneuver_automaton.words.library import Library
+from maneuver_automaton.words.word import MANEUVER, TRIM
 
 CELL = 0.122  # of the first pass, in length scales
 RISE = 0.25  # of altitude
@@ -82,7 +82,7 @@ def task_of(query: ManeuverQuery, rung: Rung) -> Task:
     window = query.window[1]
     edge_window = window.copy()
     edge_window[8] -= library.worst_error
-    goal_trims = query.goal_trims
+    goal_trims, classes = query.goal_trims, query.transfer.transitions.class_of
     tick = 0.0
     if query.moves or math.isfinite(query.most_time):
         lengths = library.arrays.quanta[library.arrays.quanta > 0.0]
@@ -92,7 +92,7 @@ def task_of(query: ManeuverQuery, rung: Rung) -> Task:
         start_trim=int(query.start_trim),
         aims=np.array(query.seen_goals),
         aim_trims=np.array(goal_trims),
-        lag=library.lag[:, goal_trims].min(axis=1),
+        lag=library.lag[:, classes[goal_trims]].min(axis=1)[classes],
         frame_x=float(frame[0]),
         frame_y=float(frame[1]),
         frame_heading=float(frame[2]),
@@ -125,7 +125,7 @@ def task_of(query: ManeuverQuery, rung: Rung) -> Task:
 
 
 def transfer_steps(
-    library: TransferLibrary, start_trim: int, trims: list[int], times: list[float]
+    library: Library, start_trim: int, trims: list[int], times: list[float]
 ) -> tuple[list[tuple[int, int, float]], list[int]]:
     """Steps of a transfer through trims (-1 for none) and the trims its maneuvers lead to."""
     steps: list[tuple[int, int, float]] = []
@@ -135,7 +135,7 @@ def transfer_steps(
         if trim < 0:
             continue
         for maneuver, following in library.chain(at, trim):
-            steps.append((EDGE, maneuver, 0.0))
+            steps.append((MANEUVER, maneuver, 0.0))
             targets.append(following)
         steps.append((TRIM, trim, t))
         at = trim

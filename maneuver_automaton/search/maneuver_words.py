@@ -223,7 +223,7 @@ class _Job:
     def _steered(self, start: Array, goal: Array, trim: int, ceiling: float) -> _Candidates:
         begin, end = _four(start), _four(goal)
         scratch = self.scratch
-        n = kernels.transfer_batch(
+        n = kernels.candidate_batch(
             self.setup.library.arrays,
             len(self.setup.library.arrays.words),
             begin[None],
@@ -312,17 +312,18 @@ class _Job:
 
     def _prefixes(self, trims: tuple[int, ...]) -> Iterator[_Prefix]:
         """Grid nodes of the times of the first trims, as far as they may be cheap enough."""
-        arrays, dof = self.setup.library.arrays, self.problem.start.size
-        group = group_of(dof)
+        library, dof = self.setup.library, self.problem.start.size
+        arrays, group = library.arrays, group_of(dof)
         steps = self._steps(trims)
         nodes = NODES[min(len(trims), len(NODES) - 1)]
         for node in itertools.product(range(nodes + 1), repeat=len(trims)):
             pose, cost, before = group(self.problem.start), 0.0, self.setup.start_trim
             times = tuple(n * step for n, step in zip(node, steps, strict=True))
             for trim, lasting in zip(trims, times, strict=True):
-                pose = pose @ group(arrays.shift[before, trim, :dof])
+                pair = library.class_pair(before, trim)
+                pose = pose @ group(library.transitions.displacement[pair][:dof])
                 pose = pose @ group.exp(lasting * arrays.twists[trim, :dof])
-                cost += float(arrays.cost[before, trim] + lasting * arrays.rates[trim])
+                cost += float(library.transitions.cost[pair] + lasting * arrays.rates[trim])
                 before = trim
             way = float(np.linalg.norm(self.setup.goal.pose[:2] - pose.pose[:2]))
             if cost + self.per_metre * way < self._bar() * (1.0 + TIE):
@@ -361,7 +362,7 @@ def _least_price(setup: WordSetup) -> float:
     """Cost per metre of way that no word falls below."""
     arrays = setup.library.arrays
     speeds = np.linalg.norm(arrays.twists[:, :2], axis=1)
-    ways = np.linalg.norm(arrays.shift[..., :2], axis=-1)
+    ways = arrays.length
     fast = speeds > 0.0
     prices = arrays.rates[fast] / speeds[fast]
     joined = np.isfinite(arrays.cost) & (ways > SAME)

@@ -11,7 +11,6 @@ from dataclasses import replace
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.groups import SE2xR
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.result import SearchResult, SearchStatus, Solution
 from maneuver_automaton.search.setup import SearchSetup, search_setup
@@ -92,29 +91,24 @@ def _solved(
         rates = np.append(rates, setup.rest_rate)
         floors = np.append(floors, 0.0)
         trims = np.append(trims, setup.rest)
-    counted = len(rates)
-    if setup.free_heading:
-        twists = np.vstack([twists, [0.0, 0.0, 1.0, 0.0]])
-        rates, floors = np.append(rates, 0.0), np.append(floors, 0.0)
-    if setup.free_heading and problem.horizon.time is not None:
-        return []  # the turn of a free heading takes no time, which this formulation cannot say
-    total = problem.horizon.time
-    beyond = None if total is None else total - float(floors.sum())
-    if beyond is not None and beyond < 0.0:
-        return []
-    gaps = SE2xR.exp(floors[:, None] * twists).pose
     solved = solve_switching_times(
-        twists, rates, setup.goal, total=beyond, gaps=gaps, restarts=RESTARTS
+        twists,
+        rates,
+        setup.goal,
+        total=problem.horizon.time,
+        free_heading=setup.free_heading,
+        least=floors,
+        restarts=RESTARTS,
     )
     if solved.status is TimesStatus.FAILED:
         return []
-    times = (np.maximum(solved.durations, 0.0) + floors)[:counted]
+    times = solved.durations
     longest = problem.horizon.max_time
     if longest is not None and times.sum() > longest + 1e-9:
         return []
     if rest and times[-1] <= 1e-9:
         return []  # the same word without rest is tried too
-    return [_priced(problem, Solution(word=trims, durations=times, cost=0.0), rates[:counted])]
+    return [_priced(problem, Solution(word=trims, durations=times, cost=0.0), rates)]
 
 
 def _priced(problem: Problem, solution: Solution, rates: Array) -> Solution:

@@ -9,12 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.costs import StageCost
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.problem import Goal, Problem
-
-FULL_TURN = 2.0 * np.pi
+from maneuver_automaton.words.library import FULL_TURN, MovingTrims, moving_trims
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -30,7 +27,7 @@ class SearchSetup:
     rest: int | None  # index of the cheapest rest
     rest_rate: float
     climbs: bool  # whether altitude is a condition
-    library: MovingLibrary  # where the trims come from
+    library: MovingTrims  # where the trims come from
 
     @property
     def start_is_goal(self) -> bool:
@@ -43,7 +40,7 @@ class SearchSetup:
 @functools.lru_cache(maxsize=8)
 def search_setup(problem: Problem, goal: Goal) -> SearchSetup:
     """What every search for one goal starts from."""
-    library = moving_library(problem.automaton, problem.cost)
+    library = moving_trims(problem.automaton, problem.cost)
     relative = np.zeros(4)
     relative[: problem.start.size] = _seen_from(problem.start, goal.pose)
     relative.setflags(write=False)
@@ -58,62 +55,6 @@ def search_setup(problem: Problem, goal: Goal) -> SearchSetup:
         rest_rate=library.rest_rate,
         climbs=bool(library.climbs or relative[3] != 0.0),
         library=library,
-    )
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class MovingLibrary:
-    """The part of a search that symmetry makes the same for every start and goal."""
-
-    trims: IntArray  # (M,)
-    twists: Array  # (M, 4)
-    rates: Array  # (M,)
-    periods: Array  # (M,) [s]
-    rest: int | None
-    rest_rate: float
-    climbs: bool
-    speeds: Array  # (M,) [m/s] climb included
-    turn_rates: Array  # (M,) [rad/s] without sign
-
-
-@functools.lru_cache(maxsize=8)
-def moving_library(automaton: Automaton, cost: StageCost) -> MovingLibrary:
-    """Moving trims of an automaton with what they cost, of equal twists only the cheapest."""
-    dof = automaton.model.group.dof
-    twists = np.zeros((len(automaton), 4))
-    twists[:, :dof] = automaton.body_velocities
-    rates = cost.rates(automaton.controls, automaton.body_velocities)
-    still = ~twists.any(axis=1)
-    groups = automaton.twist_groups
-    cheapest = np.ones(len(automaton), dtype=bool)
-    if (groups != np.arange(len(automaton))).any():
-        order = np.lexsort((rates, groups))
-        cheapest[:] = False
-        cheapest[order[np.append(True, np.diff(groups[order]) != 0)]] = True
-    moving = np.flatnonzero(cheapest & ~still)
-    resting = np.flatnonzero(cheapest & still)
-    with np.errstate(divide="ignore"):
-        periods = np.where(twists[:, 2] != 0.0, FULL_TURN / np.abs(twists[:, 2]), np.inf)
-    arrays = (
-        moving.astype(np.int64),
-        twists[moving],
-        rates[moving],
-        periods[moving],
-        np.linalg.norm(twists[moving][:, [0, 1, 3]], axis=1),
-        np.abs(twists[moving][:, 2]),
-    )
-    for array in arrays:
-        array.setflags(write=False)
-    return MovingLibrary(
-        trims=arrays[0],
-        twists=arrays[1],
-        rates=arrays[2],
-        periods=arrays[3],
-        rest=int(resting[0]) if resting.size else None,
-        rest_rate=float(rates[resting[0]]) if resting.size else 0.0,
-        climbs=bool(twists[:, 3].any()),
-        speeds=arrays[4],
-        turn_rates=arrays[5],
     )
 
 

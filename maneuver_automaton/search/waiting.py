@@ -12,8 +12,9 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.groups.chain import chained
 from maneuver_automaton.search import _kernels_waiting as kernels
-from maneuver_automaton.search.lattice_pass import Rung, Word, joined, task_of, with_cost
+from maneuver_automaton.search.lattice_pass import Rung, joined, task_of, with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
+from maneuver_automaton.words.word import Word
 
 MOST_PIECES = 60  # joints at which it may wait
 MOST_TICKS = 300  # of the clock, until nothing moves any more
@@ -38,14 +39,15 @@ def with_waits(query: LatticeQuery, word: Word) -> Word | None:
     library = query.library.arrays
     if not len(word.trims):
         return with_cost(word, query)
-    still = np.flatnonzero(~library.twists[: library.n_trims].any(axis=1))
+    twists = library.library.twists
+    still = np.flatnonzero(~twists[: library.library.n_trims].any(axis=1))
     rest = int(still[0]) if still.size else -1
-    trims, durations = _pieces(word)
+    trims, durations = _pieces(word, query)
     until = query.world.last_event - query.problem.start_time
     lasting = max(until, 0.0) + 1.0 if math.isfinite(until) else 1.0
     tick = max(SHORTEST_TICK, lasting / MOST_TICKS)
     ticks = math.ceil(lasting / tick) + 2
-    steps = SE2.exp(durations[:, None] * library.twists[trims]).pose
+    steps = SE2.exp(durations[:, None] * twists[trims, :3]).pose
     way = Way(
         trims=trims,
         durations=durations,
@@ -63,14 +65,15 @@ def with_waits(query: LatticeQuery, word: Word) -> Word | None:
     )
     if joint < 0:
         return None
-    return with_cost(joined(_driven(way, joint, at, rest, tick), goal=word.goal), query)
+    return with_cost(joined(_driven(way, joint, at, rest, tick), query, goal=word.goal), query)
 
 
-def _pieces(word: Word) -> tuple[IntArray, Array]:
-    """Trims cut into pieces of about equal length."""
+def _pieces(word: Word, query: LatticeQuery) -> tuple[IntArray, Array]:
+    """Trims, as the lattice numbers them, cut into pieces of about equal length."""
     longest = float(word.durations.sum()) / MOST_PIECES
     counts = np.maximum(1, np.ceil(word.durations / longest).astype(int))
-    return np.repeat(word.trims, counts), np.repeat(word.durations / counts, counts)
+    numbers = query.library.number_of[word.trims]
+    return np.repeat(numbers, counts), np.repeat(word.durations / counts, counts)
 
 
 def _driven(way: Way, joint: int, at: int, rest: int, tick: float) -> list[tuple[int, float]]:

@@ -2,26 +2,32 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.search.lattice_pass import Word
 from maneuver_automaton.search.lattice_query import LatticeQuery
-from maneuver_automaton.words.closing import closed_at
+from maneuver_automaton.words.word import Word, plan_of
 
 
 def plan_of_word(query: LatticeQuery, word: Word) -> Plan:
     """The word from the problem's own start, its times corrected until it ends at the goal."""
     problem = query.problem
     goal = problem.goals[query.goal_index[word.goal]]
-    trims = [problem.automaton.trims[k] for k in query.library.trims[word.trims]]
-    twists = np.array([trim.body_velocity for trim in trims]).reshape(-1, 3)
-    durations = closed_at(
-        problem.start, twists, word.durations, goal.pose, free_heading=goal.free_heading
+    plan = plan_of(
+        problem.automaton,
+        word,
+        problem.start,
+        goal=goal.pose,
+        free_heading=goal.free_heading,
+        start_time=problem.start_time,
     )
-    total = float(durations.sum())
     fixed, rest = problem.horizon.time, query.library.rest
-    if fixed is not None and rest is not None and total < fixed:
-        trims.append(problem.automaton.trims[rest])
-        durations = np.append(durations, fixed - total)
-    return Plan(problem.start, tuple(trims), durations=durations, start_time=problem.start_time)
+    if fixed is None or rest is None or not plan.duration < fixed:
+        return plan
+    return replace(
+        plan,
+        trims=(*plan.trims, problem.automaton.trims[rest]),
+        durations=np.append(plan.durations, fixed - plan.duration),
+    )

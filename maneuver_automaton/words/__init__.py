@@ -1,12 +1,9 @@
-"""Words: trims, how long each lasts, and the transitions between them."""
+"""Words: trims, how long each lasts, and the transitions between them, for every vehicle."""
 
 from maneuver_automaton.words.end_pose import end_pose as end_pose
 from maneuver_automaton.words.end_pose import end_twists as end_twists
-from maneuver_automaton.words.solve import SwitchingTimes as SwitchingTimes
-from maneuver_automaton.words.solve import TimesStatus as TimesStatus
-from maneuver_automaton.words.solve import solve_switching_times as solve_switching_times
 from maneuver_automaton.words.steering import steer as steer
-from maneuver_automaton.words.steering import steer_climbing as steer_climbing
-from maneuver_automaton.words.switching_times import (
-    solve_times_with_maneuvers as solve_times_with_maneuvers,
-)
+from maneuver_automaton.words.switching_times import SwitchingTimes as SwitchingTimes
+from maneuver_automaton.words.switching_times import TimesStatus as TimesStatus
+from maneuver_automaton.words.switching_times import solve_switching_times as solve_switching_times
+from maneuver_automaton.words.word import Word as Word

@@ -1,19 +1,63 @@
-"""Transfers: words of at most three trims, joined by maneuvers, that carry a pose to another.
+"""Words of at most three trims that carry a pose and trim exactly to another, with what they cost.
 
-A word begins and ends in given trims: the maneuvers out of the first and into the last are folded
-into the two poses, what is left is the steering function with displacements between its trims.
+A word begins and ends in given trims: the transitions out of the first and into the last are folded
+into the two poses, what is left is the steering function with displacements between its trims. A
+vehicle whose trims are all of one class has the identity for every transition: nothing is folded,
+and every word is steered from the same pose to the same pose.
 """
 
 from __future__ import annotations
 
 import math
 
-from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
+from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel, inner_kernel, kernel
 from maneuver_automaton.groups._kernels import coast, compose, nearest_turn
 from maneuver_automaton.words._kernels_steering import phase, steer, turn_time, two_lines, unit
 
-NONE = -1
+NO_TRIM = -1
 WHOLE = 1e-9  # share of a full turn that counts as none
+
+
+@inlined_kernel
+def price_of_switch(lib, before, gear, trim):
+    """Price of going on with `trim` after `before`, in `gear` the last that drove."""
+    price = 0.0
+    if before != NO_TRIM and before != trim:
+        price += lib.switch
+    if gear * lib.gears[trim] < 0:
+        price += lib.direction_change
+    return price
+
+
+@inlined_kernel
+def class_of(lib, trim):
+    """Class of a trim; of none the first, to which a kinematic vehicle's trims belong."""
+    return lib.class_of[trim] if trim >= 0 else 0
+
+
+@inlined_kernel
+def displacement_of(lib, before, after):
+    """Displacement (x, y, heading) of the transition between two trims."""
+    a, b = class_of(lib, before), class_of(lib, after)
+    return lib.displacement[a, b, 0], lib.displacement[a, b, 1], lib.displacement[a, b, 2]
+
+
+@inlined_kernel
+def rise_of(lib, before, after):
+    """Altitude that the transition between two trims gains."""
+    return lib.displacement[class_of(lib, before), class_of(lib, after), 3]
+
+
+@inlined_kernel
+def cost_between(lib, before, after):
+    """Cost of the transition between two trims; inf where there is none."""
+    return lib.cost[class_of(lib, before), class_of(lib, after)]
+
+
+@inlined_kernel
+def time_between(lib, before, after):
+    """Duration of the transition between two trims."""
+    return lib.time[class_of(lib, before), class_of(lib, after)]
 
 
 @inner_kernel
@@ -50,10 +94,10 @@ def steer_one(trim, goal, out):
 
 
 @bare_inner_kernel
-def steer_two(a, gap, b, goal, tolerance, out):
+def steer_two(a, step, b, goal, tolerance, out):
     """Fill `out` (3,) with times of two trims that may meet `goal`; NaN if none can."""
     v_a, w_a = a
-    d, e = gap
+    d, e = step
     v_b, w_b = b
     z, heading = goal
     out[0], out[1], out[2] = math.nan, math.nan, 0.0
@@ -87,12 +131,12 @@ def climb_time(lib, word, last, goal_trim, climb, start_trim, altitude, times):
     for n in range(3):
         trim = word[n]
         if trim >= 0:
-            left -= lib.shift[before, trim, 3] + times[n] * lib.twists[trim, 3]
+            left -= rise_of(lib, before, trim) + times[n] * lib.twists[trim, 3]
             before = trim
     if climb < 0:
-        left -= lib.shift[before, goal_trim, 3]
+        left -= rise_of(lib, before, goal_trim)
         return 0.0 if abs(left) <= lib.met * (1.0 + abs(altitude)) else math.nan
-    left -= lib.shift[before, climb, 3] + lib.shift[climb, goal_trim, 3]
+    left -= rise_of(lib, before, climb) + rise_of(lib, climb, goal_trim)
     return left / lib.twists[climb, 3]
 
 
@@ -103,14 +147,8 @@ def before_climb(lib, end, last, climb, t):
     if t > 0.0:
         d_x, d_y, turn = coast(lib.twists[climb, 0], lib.twists[climb, 1], lib.twists[climb, 2], t)
         x, y, heading = back_from(x, y, heading, d_x, d_y, turn)
-    return back_from(
-        x,
-        y,
-        heading,
-        lib.shift[last, climb, 0],
-        lib.shift[last, climb, 1],
-        lib.shift[last, climb, 2],
-    )
+    d_x, d_y, turn = displacement_of(lib, last, climb)
+    return back_from(x, y, heading, d_x, d_y, turn)
 
 
 @inner_kernel
@@ -126,17 +164,13 @@ def is_level(lib, word):
 def word_misses(lib, word, start, goal, times):
     """How far a word of fewer than three trims ends from the goal [m, rad], both poses folded."""
     x, y, heading = start
-    before = NONE
+    before = NO_TRIM
     for n in range(3):
         trim = word[n]
         if trim < 0:
             break
-        if before != NONE:
-            d_x, d_y, turn = (
-                lib.shift[before, trim, 0],
-                lib.shift[before, trim, 1],
-                lib.shift[before, trim, 2],
-            )
+        if before != NO_TRIM:
+            d_x, d_y, turn = displacement_of(lib, before, trim)
             x, y, heading = compose(x, y, heading, d_x, d_y, turn)
         d_x, d_y, turn = coast(
             lib.twists[trim, 0], lib.twists[trim, 1], lib.twists[trim, 2], times[n]
@@ -154,12 +188,10 @@ def motion_of(lib, trim):
 
 
 @inner_kernel
-def gap_of(lib, before, trim):
+def step_of(lib, before, trim):
     """The transition between two trims as a planar displacement."""
-    return (
-        complex(lib.shift[before, trim, 0], lib.shift[before, trim, 1]),
-        lib.shift[before, trim, 2],
-    )
+    d_x, d_y, turn = displacement_of(lib, before, trim)
+    return complex(d_x, d_y), turn
 
 
 @inner_kernel
@@ -169,65 +201,57 @@ def way_cost(lib, way, a, b, c):
     if a >= 0:
         price = lib.per_metre[a]
     if b >= 0:
-        left -= lib.length[a, b]
+        left -= lib.length[class_of(lib, a), class_of(lib, b)]
         price = min(price, lib.per_metre[b])
     if c >= 0:
-        left -= lib.length[b, c]
+        left -= lib.length[class_of(lib, b), class_of(lib, c)]
         price = min(price, lib.per_metre[c])
     return left * price if left > lib.met else 0.0
 
 
 @bare_inner_kernel
-def transfer_candidates(lib, n_words, start, start_trim, goal, goal_trim, ceiling, scratch):
+def candidates(lib, words, n_words, start, before, goal, after, upper_bound, scratch):
     """Fill `scratch` with the words that lead from one pose and trim to another; how many.
 
-    The first `n_words` of the library are tried. `start` and `goal` are (x, y, heading, z). What
-    costs `ceiling` or more is left out.
+    The first `n_words` rows of `words` are tried. `start` and `goal` are (x, y, heading, z);
+    `before` and `after` are the (trim, gear) there, NO_TRIM and 0 where any will do. What costs
+    `upper_bound` or more is left out: first by what the transitions cost, then by the least cost of
+    the way, and only then is a word steered.
     """
     x, y, heading, z = start
     g_x, g_y, g_heading, g_z = goal
+    start_trim, start_gear = before
+    goal_trim, goal_gear = after
     size = 1.0 + abs(g_x - x) + abs(g_y - y)
+    one_class = lib.cost.shape[0] == 1
     count = 0
     for climbing in range(-1, lib.climbs.shape[0]):
-        climb = lib.climbs[climbing] if climbing >= 0 else NONE
+        climb = lib.climbs[climbing] if climbing >= 0 else NO_TRIM
         first_before, last_before = -2, -2
         way_in, way_out = 0.0, 0.0
         s_x, s_y, s_heading = x, y, heading
         e_x, e_y, e_heading = g_x, g_y, g_heading
         h_x, h_y, h_heading = g_x, g_y, g_heading
-        rel = (0j, 0.0)
+        rel = seen(s_x, s_y, s_heading, e_x, e_y, e_heading)
         for row in range(n_words):
-            word = lib.words[row]
-            a, b, c = word[0], word[1], word[2]
+            a, b, c = words[row, 0], words[row, 1], words[row, 2]
             n_trims = 3 if c >= 0 else 2 if b >= 0 else 1 if a >= 0 else 0
-            last = word[n_trims - 1] if n_trims else start_trim
-            if a != first_before or last != last_before:
+            last = words[row, n_trims - 1] if n_trims else start_trim
+            # Rows are sorted by first and last trim, so the ends are folded once for many words.
+            if not one_class and (a != first_before or last != last_before):
                 first_before, last_before = a, last
-                way_in = lib.cost[start_trim, a] if n_trims else 0.0
-                way_out = lib.cost[last, goal_trim]
+                way_in = cost_between(lib, start_trim, a) if n_trims else 0.0
+                way_out = cost_between(lib, last, goal_trim)
                 if climb >= 0:
-                    way_out = lib.cost[last, climb] + lib.cost[climb, goal_trim]
-                if not way_in + way_out < ceiling:
+                    way_out = cost_between(lib, last, climb) + cost_between(lib, climb, goal_trim)
+                if not way_in + way_out < upper_bound:
                     continue
                 s_x, s_y, s_heading = x, y, heading
                 if n_trims:
-                    s_x, s_y, s_heading = compose(
-                        x,
-                        y,
-                        heading,
-                        lib.shift[start_trim, a, 0],
-                        lib.shift[start_trim, a, 1],
-                        lib.shift[start_trim, a, 2],
-                    )
-                end = climb if climb >= 0 else last
-                e_x, e_y, e_heading = back_from(
-                    g_x,
-                    g_y,
-                    g_heading,
-                    lib.shift[end, goal_trim, 0],
-                    lib.shift[end, goal_trim, 1],
-                    lib.shift[end, goal_trim, 2],
-                )
+                    d_x, d_y, turn = displacement_of(lib, start_trim, a)
+                    s_x, s_y, s_heading = compose(x, y, heading, d_x, d_y, turn)
+                d_x, d_y, turn = displacement_of(lib, climb if climb >= 0 else last, goal_trim)
+                e_x, e_y, e_heading = back_from(g_x, g_y, g_heading, d_x, d_y, turn)
                 h_x, h_y, h_heading = e_x, e_y, e_heading
                 if climb >= 0:
                     e_x, e_y, e_heading = before_climb(lib, (h_x, h_y, h_heading), last, climb, 0.0)
@@ -235,30 +259,32 @@ def transfer_candidates(lib, n_words, start, start_trim, goal, goal_trim, ceilin
             fixed = way_in + way_out
             slope = 0.0
             if climbing >= lib.n_upright:  # it drives as it climbs: its time is known before
-                if not fixed < ceiling or not is_level(lib, word):
+                if not fixed < upper_bound or not is_level(lib, words[row]):
                     continue
                 level = scratch.branches[0]
                 level[0], level[1], level[2] = 0.0, 0.0, 0.0
-                slope = climb_time(lib, word, last, goal_trim, climb, start_trim, g_z - z, level)
+                slope = climb_time(
+                    lib, words[row], last, goal_trim, climb, start_trim, g_z - z, level
+                )
                 if not lib.shortest <= slope <= lib.longest[climb]:
                     continue
                 e_x, e_y, e_heading = before_climb(lib, (h_x, h_y, h_heading), last, climb, slope)
                 rel = seen(s_x, s_y, s_heading, e_x, e_y, e_heading)
                 fixed += slope * lib.rates[climb]
             if n_trims >= 2:
-                fixed += lib.cost[a, b]
+                fixed += cost_between(lib, a, b)
             if n_trims == 3:
-                fixed += lib.cost[b, c]
-            if not fixed + way_cost(lib, rel[0], a, b, c) < ceiling:
+                fixed += cost_between(lib, b, c)
+            if not fixed + way_cost(lib, rel[0], a, b, c) < upper_bound:
                 continue
             branches = scratch.branches
             n_branches = 1
             if n_trims == 3:
                 steer(
                     motion_of(lib, a),
-                    gap_of(lib, a, b),
+                    step_of(lib, a, b),
                     motion_of(lib, b),
-                    gap_of(lib, b, c),
+                    step_of(lib, b, c),
                     motion_of(lib, c),
                     rel,
                     lib.tolerance,
@@ -268,7 +294,7 @@ def transfer_candidates(lib, n_words, start, start_trim, goal, goal_trim, ceilin
             elif n_trims == 2:
                 steer_two(
                     motion_of(lib, a),
-                    gap_of(lib, a, b),
+                    step_of(lib, a, b),
                     motion_of(lib, b),
                     rel,
                     lib.tolerance,
@@ -280,46 +306,62 @@ def transfer_candidates(lib, n_words, start, start_trim, goal, goal_trim, ceilin
                 branches[0, 0], branches[0, 1], branches[0, 2] = 0.0, 0.0, 0.0
             for branch in range(n_branches):
                 cost, duration, usable = fixed, 0.0, True
+                trim, gear = start_trim, start_gear
                 for n in range(n_trims):
-                    t, trim = branches[branch, n], word[n]
+                    t, this = branches[branch, n], words[row, n]
                     if not t >= -lib.tolerance:
                         usable = False
                         break
-                    if t >= lib.periods[trim] * (1.0 - WHOLE) or t < lib.shortest:
+                    if t >= lib.periods[this] * (1.0 - WHOLE) or t < lib.shortest:
                         t = 0.0
                     branches[branch, n] = t
-                    cost += t * lib.rates[trim]
-                    duration += t
-                    if t > lib.longest[trim]:
-                        usable = False
-                        break
-                if not (usable and cost < ceiling):
+                    if t > 0.0 and this < lib.n_trims:  # the turn of a free heading is no trim
+                        cost += t * lib.rates[this] + price_of_switch(lib, trim, gear, this)
+                        if t > lib.longest[this] or (t < lib.min_coast and trim != this):
+                            usable = False
+                            break
+                        trim = this
+                        if lib.gears[this] != 0:
+                            gear = lib.gears[this]
+                        duration += t
+                if not usable:
+                    continue
+                if goal_trim != NO_TRIM:
+                    if trim != NO_TRIM and trim != goal_trim:
+                        cost += lib.switch
+                    if gear * goal_gear < 0:
+                        cost += lib.direction_change
+                if not cost < upper_bound:
                     continue
                 times = branches[branch]
                 t = slope
                 if slope > 0.0:
                     duration += slope
                 elif lib.climbs.shape[0] > 0:
-                    t = climb_time(lib, word, last, goal_trim, climb, start_trim, g_z - z, times)
+                    t = climb_time(
+                        lib, words[row], last, goal_trim, climb, start_trim, g_z - z, times
+                    )
                     if not t >= 0.0 or (climb >= 0 and t < lib.shortest):
                         continue
                     if climb >= 0:
                         cost += t * lib.rates[climb]
                         duration += t
-                if n_trims < 3:
+                if n_trims < 3:  # fewer times than the goal has coordinates: does it meet the goal?
                     folded, target = (s_x, s_y, s_heading), (e_x, e_y, e_heading)
-                    if not word_misses(lib, word, folded, target, times) <= lib.met * size:
+                    if not word_misses(lib, words[row], folded, target, times) <= lib.met * size:
                         continue
-                if n_trims:
-                    duration += lib.time[start_trim, a]
-                if n_trims >= 2:
-                    duration += lib.time[a, b]
-                if n_trims == 3:
-                    duration += lib.time[b, c]
-                if climb >= 0:
-                    duration += lib.time[last, climb] + lib.time[climb, goal_trim]
-                else:
-                    duration += lib.time[last, goal_trim]
+                if not one_class:
+                    if n_trims:
+                        duration += time_between(lib, start_trim, a)
+                    if n_trims >= 2:
+                        duration += time_between(lib, a, b)
+                    if n_trims == 3:
+                        duration += time_between(lib, b, c)
+                    if climb >= 0:
+                        duration += time_between(lib, last, climb)
+                        duration += time_between(lib, climb, goal_trim)
+                    else:
+                        duration += time_between(lib, last, goal_trim)
                 scratch.costs[count] = cost
                 scratch.durations[count] = duration
                 scratch.rows[count] = row
@@ -332,13 +374,21 @@ def transfer_candidates(lib, n_words, start, start_trim, goal, goal_trim, ceilin
 
 
 @kernel
-def transfer_batch(lib, n_words, starts, start_trim, goals, goal_trim, ceiling, scratch):
-    """Candidates of each of many transfers (n, 4) to (n, 4); how many of the last, for timing."""
+def candidate_batch(lib, n_words, starts, start_trim, goals, goal_trim, upper_bound, scratch):
+    """Candidates of each of many pairs of poses (n, 4); how many the last pair has, for timing."""
     count = 0
     for k in range(starts.shape[0]):
         start = (starts[k, 0], starts[k, 1], starts[k, 2], starts[k, 3])
         goal = (goals[k, 0], goals[k, 1], goals[k, 2], goals[k, 3])
-        count = transfer_candidates(
-            lib, n_words, start, start_trim, goal, goal_trim, ceiling, scratch
+        count = candidates(
+            lib,
+            lib.words,
+            n_words,
+            start,
+            (start_trim, 0),
+            goal,
+            (goal_trim, 0),
+            upper_bound,
+            scratch,
         )
     return count

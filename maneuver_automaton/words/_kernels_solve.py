@@ -37,7 +37,7 @@ def merit(rates, times, barrier, gap, weight):
 
 
 @inner_kernel
-def interior_point(rates, twists, gaps, goal, rows, targets, times, barrier, iterations):
+def interior_point(rates, twists, goal, rows, targets, times, barrier, iterations):
     """Primal-dual Newton from `times` > 0, in place; returns (converged, slack of each bound)."""
     n = times.size
     n_rows = 3 + targets.size
@@ -50,7 +50,7 @@ def interior_point(rates, twists, gaps, goal, rows, targets, times, barrier, ite
     for i in range(n):
         slack[i] = barrier / times[i]
         trial[i] = rates[i] - slack[i]
-    worst = residual(twists, gaps, times, goal, rows, targets, columns, gap)
+    worst = residual(twists, times, goal, rows, targets, columns, gap)
     p = multipliers(jacobian(columns, rows), trial)
     system = np.empty((n + n_rows, n + n_rows))
     rhs = np.empty(n + n_rows)
@@ -123,7 +123,7 @@ def interior_point(rates, twists, gaps, goal, rows, targets, times, barrier, ite
         for _attempt in range(10):
             for i in range(n):
                 trial[i] = times[i] + share * step[i]
-            worst = residual(twists, gaps, trial, goal, rows, targets, columns, trial_gap)
+            worst = residual(twists, trial, goal, rows, targets, columns, trial_gap)
             if merit(rates, trial, barrier, trial_gap, weight) <= before + 1e-12 * abs(before):
                 break
             share *= 0.5
@@ -140,14 +140,14 @@ def interior_point(rates, twists, gaps, goal, rows, targets, times, barrier, ite
 
 
 @inner_kernel
-def levenberg_marquardt(twists, gaps, goal, rows, targets, times, iterations):
+def levenberg_marquardt(twists, goal, rows, targets, times, iterations):
     """Feasible times near `times`, in place, by projected Levenberg-Marquardt; what is violated."""
     n = times.size
     n_rows = 3 + targets.size
     columns = np.empty((n, 3))
     gap = np.empty(n_rows)
     trial = np.empty(n)
-    worst = residual(twists, gaps, times, goal, rows, targets, columns, gap)
+    worst = residual(twists, times, goal, rows, targets, columns, gap)
     square = 0.0
     for e in range(n_rows):
         square += gap[e] * gap[e]
@@ -155,7 +155,7 @@ def levenberg_marquardt(twists, gaps, goal, rows, targets, times, iterations):
     for _ in range(iterations):
         if worst < 1e-13:
             break
-        residual(twists, gaps, times, goal, rows, targets, columns, gap)
+        residual(twists, times, goal, rows, targets, columns, gap)
         matrix = jacobian(columns, rows)
         system = np.zeros((n_rows + n, n))
         rhs = np.zeros(n_rows + n)
@@ -175,7 +175,7 @@ def levenberg_marquardt(twists, gaps, goal, rows, targets, times, iterations):
         step = least_squares(system, rhs, 1e-14)[0]
         for i in range(n):
             trial[i] = max(0.0, times[i] + step[i])
-        after = residual(twists, gaps, trial, goal, rows, targets, columns, gap)
+        after = residual(twists, trial, goal, rows, targets, columns, gap)
         square_after = 0.0
         for e in range(n_rows):
             square_after += gap[e] * gap[e]
@@ -191,45 +191,7 @@ def levenberg_marquardt(twists, gaps, goal, rows, targets, times, iterations):
 
 
 @inner_kernel
-def finish_with_gaps(rates, twists, gaps, goal, rows, targets, times, keep):
-    """Refine the times at the positions `keep`, the others stay zero; returned as by `finish`."""
-    n, count, n_rows = times.size, keep.size, 3 + targets.size
-    columns = np.empty((n, 3))
-    gap = np.empty(n_rows)
-    some = np.empty((n_rows, count))
-    worst = np.inf
-    for step_number in range(11):
-        worst = residual(twists, gaps, times, goal, rows, targets, columns, gap)
-        matrix = jacobian(columns, rows)
-        for e in range(n_rows):
-            gap[e] = -gap[e]
-            for k in range(count):
-                some[e, k] = matrix[e, keep[k]]
-        if worst < 1e-15 or step_number == 10:
-            break
-        work = np.empty((n_rows, count))
-        for e in range(n_rows):
-            assign(work[e], some[e])
-        step = least_squares(work, gap, 1e-11)[0]
-        for k in range(count):
-            times[keep[k]] += step[k]
-    some_rates = np.empty(count)
-    for k in range(count):
-        some_rates[k] = rates[keep[k]]
-    p = multipliers(some, some_rates)
-    slope = 0.0
-    for k in range(count):
-        value = some_rates[k]
-        for e in range(n_rows):
-            value += some[e, k] * p[e]
-        slope = max(slope, abs(value))
-        if times[keep[k]] < 0.0:
-            worst = np.inf
-    return worst, slope, p
-
-
-@inner_kernel
-def finish(rates, twists, gaps, goal, rows, targets, times, slack, keep):
+def finish(rates, twists, goal, rows, targets, times, slack, keep):
     """Set vanishing times to zero and refine the others, in place.
 
     Returns (largest violation, largest stationarity violated, multipliers).
@@ -244,16 +206,9 @@ def finish(rates, twists, gaps, goal, rows, targets, times, slack, keep):
             keep[count] = i
             count += 1
     some_twists = np.empty((count, 4))
-    some_gaps = np.zeros((count, 4))
     some_rates = np.empty(count)
     some_rows = np.empty((m, count))
     some_times = np.empty(count)
-    fixed_gaps = False
-    for i in range(n):
-        for k in range(4):
-            fixed_gaps = fixed_gaps or gaps[i, k] != 0.0
-    if fixed_gaps:  # maneuvers stay where they are, whether their trims last or not
-        return finish_with_gaps(rates, twists, gaps, goal, rows, targets, times, keep[:count])
     for k in range(count):
         assign(some_twists[k], twists[keep[k]])
         some_rates[k] = rates[keep[k]]
@@ -264,14 +219,12 @@ def finish(rates, twists, gaps, goal, rows, targets, times, slack, keep):
     slope = 0.0
     if count > 3 + m:
         p, worst, slope = newton_stationary(
-            some_rates, some_twists, some_gaps, goal, some_rows, targets, some_times, 20
+            some_rates, some_twists, goal, some_rows, targets, some_times, 20
         )
-    worst = newton_feasible(some_twists, some_gaps, goal, some_rows, targets, some_times, 10)
+    worst = newton_feasible(some_twists, goal, some_rows, targets, some_times, 10)
     if count <= 3 + m:
         columns = np.empty((count, 3))
-        residual(
-            some_twists, some_gaps, some_times, goal, some_rows, targets, columns, np.empty(3 + m)
-        )
+        residual(some_twists, some_times, goal, some_rows, targets, columns, np.empty(3 + m))
         matrix = jacobian(columns, some_rows)
         p = multipliers(matrix, some_rates)
         for k in range(count):
@@ -287,7 +240,7 @@ def finish(rates, twists, gaps, goal, rows, targets, times, slack, keep):
 
 
 @inner_kernel
-def solve_from(rates, twists, gaps, goal, rows, targets, times, barrier):
+def solve_from(rates, twists, goal, rows, targets, times, barrier):
     """Interior point, then refinement; `times` in place. Returns (status, multipliers, slope)."""
     n = times.size
     start = np.empty(n)
@@ -295,26 +248,26 @@ def solve_from(rates, twists, gaps, goal, rows, targets, times, barrier):
         times[i] = max(times[i], 30.0 * barrier)
         start[i] = times[i]
     keep = np.empty(n, dtype=np.int64)
-    _, slack = interior_point(rates, twists, gaps, goal, rows, targets, times, barrier, 60)
+    _, slack = interior_point(rates, twists, goal, rows, targets, times, barrier, 60)
     inner = np.empty(n)
     assign(inner, times)
-    worst, slope, p = finish(rates, twists, gaps, goal, rows, targets, times, slack, keep)
+    worst, slope, p = finish(rates, twists, goal, rows, targets, times, slack, keep)
     if worst < 1e-10 and slope < 1e-7:
         return 0, p, slope
     for i in range(n):  # the refinement went astray: feasibility alone, from where it began
         times[i] = inner[i] if math.isfinite(inner[i]) else start[i]
-    worst = levenberg_marquardt(twists, gaps, goal, rows, targets, times, 60)
+    worst = levenberg_marquardt(twists, goal, rows, targets, times, 60)
     if worst > 1e-10:
         assign(times, start)
-        worst = levenberg_marquardt(twists, gaps, goal, rows, targets, times, 100)
+        worst = levenberg_marquardt(twists, goal, rows, targets, times, 100)
     columns = np.empty((n, 3))
-    residual(twists, gaps, times, goal, rows, targets, columns, np.empty(3 + targets.size))
+    residual(twists, times, goal, rows, targets, columns, np.empty(3 + targets.size))
     p = multipliers(jacobian(columns, rows), rates)
     return (1 if worst < 1e-10 else 2), p, np.inf
 
 
 @kernel
-def solve_times(rates, twists, gaps, goal, rows, targets, starts, best_times):
+def solve_times(rates, twists, goal, rows, targets, starts, best_times):
     """Best of several starts (k, n), into `best_times`; returns (status, cost, multipliers, slope).
 
     Stops at the first start that is solved; later ones are restarts.
@@ -331,7 +284,7 @@ def solve_times(rates, twists, gaps, goal, rows, targets, starts, best_times):
         for i in range(n):
             scale = max(scale, abs(rates[i]))
         status, p, slope = solve_from(
-            rates, twists, gaps, goal, rows, targets, times, 1e-2 * max(scale, 1e-3)
+            rates, twists, goal, rows, targets, times, 1e-2 * max(scale, 1e-3)
         )
         if status == 2:
             continue

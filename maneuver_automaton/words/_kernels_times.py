@@ -1,9 +1,9 @@
 """End of a word, its derivatives, and the Newton iterations on its coasting times.
 
-A word is given by rows: `twists` (n, 4) of (v_x, v_y, turn rate, v_z), `gaps` (n, 4) the
-displacement (x, y, heading, z) after each trim, `goal` (4,) relative to the start. Linear
-conditions ``rows @ times = targets`` carry altitude and fixed time. Times are relative to nothing:
-seconds.
+A word is given by rows: `twists` (n, 4) of (v_x, v_y, turn rate, v_z), and `goal` (4,) relative to
+the start. No kernel knows a displacement: trims after a maneuver come in as conjugated twists, and
+the goal as seen from before all maneuvers (see `switching_times.conjugated`). Linear conditions
+``rows @ times = targets`` carry altitude and fixed time. Times are in seconds.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def assign(target, source):
 
 
 @inner_kernel
-def end_and_columns(twists, gaps, times, columns):
+def end_and_columns(twists, times, columns):
     """End pose (x, y, heading) of a word; fills `columns` (n, 3) with its derivatives by the times.
 
     A trim that lasts longer turns all that follows about its own instantaneous centre:
@@ -39,7 +39,6 @@ def end_and_columns(twists, gaps, times, columns):
         columns[i, 0] = c * twists[i, 0] - s * twists[i, 1] + twists[i, 2] * y
         columns[i, 1] = s * twists[i, 0] + c * twists[i, 1] - twists[i, 2] * x
         columns[i, 2] = twists[i, 2]
-        x, y, heading = compose(x, y, heading, gaps[i, 0], gaps[i, 1], gaps[i, 2])
     for i in range(n):
         columns[i, 0] -= twists[i, 2] * y
         columns[i, 1] += twists[i, 2] * x
@@ -120,12 +119,12 @@ def least_squares(matrix, rhs, relative_tolerance):
 
 
 @inner_kernel
-def residual(twists, gaps, times, goal, rows, targets, columns, out):
+def residual(twists, times, goal, rows, targets, columns, out):
     """Fill `out` (3 + m,) with end minus goal and the linear conditions; returns its largest entry.
 
     The heading is compared modulo a full turn.
     """
-    x, y, heading = end_and_columns(twists, gaps, times, columns)
+    x, y, heading = end_and_columns(twists, times, columns)
     out[0] = x - goal[0]
     out[1] = y - goal[1]
     out[2] = nearest_turn(heading - goal[2])
@@ -168,7 +167,7 @@ def multipliers(matrix, rates):
 
 
 @inner_kernel
-def newton_stationary(rates, twists, gaps, goal, rows, targets, times, iterations):
+def newton_stationary(rates, twists, goal, rows, targets, times, iterations):
     """Newton on ``rates + J^T p = 0, conditions = 0`` without bounds, from `times`, in place.
 
     Returns the multipliers (3 + m,), the largest condition violated and the largest
@@ -179,7 +178,7 @@ def newton_stationary(rates, twists, gaps, goal, rows, targets, times, iteration
     columns = np.empty((n, 3))
     gap = np.empty(n_rows)
     hessian = np.empty((n, n))
-    worst = residual(twists, gaps, times, goal, rows, targets, columns, gap)
+    worst = residual(twists, times, goal, rows, targets, columns, gap)
     p = multipliers(jacobian(columns, rows), rates)
     slope = np.inf
     for _ in range(iterations):
@@ -211,21 +210,21 @@ def newton_stationary(rates, twists, gaps, goal, rows, targets, times, iteration
             times[i] += shrink * step[i]
         for e in range(n_rows):
             p[e] += shrink * step[n + e]
-        worst = residual(twists, gaps, times, goal, rows, targets, columns, gap)
+        worst = residual(twists, times, goal, rows, targets, columns, gap)
         if length < 1e-15:
             break
     return p, worst, slope
 
 
 @inner_kernel
-def newton_feasible(twists, gaps, goal, rows, targets, times, iterations):
+def newton_feasible(twists, goal, rows, targets, times, iterations):
     """Gauss-Newton on the conditions alone, from `times`, in place; the largest one violated."""
     n = times.size
     columns = np.empty((n, 3))
     gap = np.empty(3 + targets.size)
     best = np.empty(n)
     assign(best, times)
-    worst = residual(twists, gaps, times, goal, rows, targets, columns, gap)
+    worst = residual(twists, times, goal, rows, targets, columns, gap)
     least = worst
     for _ in range(iterations):
         if worst < 1e-15:
@@ -235,7 +234,7 @@ def newton_feasible(twists, gaps, goal, rows, targets, times, iterations):
         step, _rank = least_squares(jacobian(columns, rows), gap, 1e-11)
         for i in range(n):
             times[i] += step[i]
-        worst = residual(twists, gaps, times, goal, rows, targets, columns, gap)
+        worst = residual(twists, times, goal, rows, targets, columns, gap)
         if worst < least:
             least = worst
             assign(best, times)
@@ -246,7 +245,7 @@ def newton_feasible(twists, gaps, goal, rows, targets, times, iterations):
 
 
 @inner_kernel
-def curvature(rates, twists, gaps, goal, rows, targets, times, p):
+def curvature(rates, twists, goal, rows, targets, times, p):
     """Smallest pivot of the Lagrangian's Hessian on the null space of the conditions.
 
     Positive: no small feasible change of the times is cheaper. `inf` where nothing can change.
@@ -254,7 +253,7 @@ def curvature(rates, twists, gaps, goal, rows, targets, times, p):
     n = times.size
     columns = np.empty((n, 3))
     gap = np.empty(3 + targets.size)
-    residual(twists, gaps, times, goal, rows, targets, columns, gap)
+    residual(twists, times, goal, rows, targets, columns, gap)
     hessian = np.empty((n, n))
     lagrangian_hessian(columns, p[0], p[1], hessian)
     basis = null_space(jacobian(columns, rows))

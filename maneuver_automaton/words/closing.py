@@ -10,8 +10,9 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.groups.chain import chained
+from maneuver_automaton.words.conjugation import conjugated, goal_before
 
-STEPS = 6
+STEPS = 8
 RANK = 1e-9  # singular values below this, relative, count as none
 MET = 1e-9  # [m, rad, s] below this a condition is met, and no step that misses more is followed
 EXACT = 1e-15  # nothing is left to be closed
@@ -19,12 +20,16 @@ EXACT = 1e-15  # nothing is left to be closed
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class EndConditions:
-    """What the times of a word of n trims must meet: its end, and `rows` @ times = `targets`."""
+    """What the times of a word of n trims must meet: its end, and `rows` @ times = `targets`.
+
+    The twists are seen from before all displacements of the word, whose product is `product`.
+    """
 
     start: Array  # (dof,)
     twists: Array  # (n, dof)
     goal: Array  # (dof,)
     free_heading: bool = False
+    product: Array | None = None  # (dof,) of all displacements; None if there are none
     rows: Array | None = None  # (m, n)
     targets: Array = field(default_factory=lambda: np.zeros(0))  # (m,)
 
@@ -40,10 +45,10 @@ class EndConditions:
         columns = np.array(twists.T)
         columns[0] = c * twists[:, 0] - s * twists[:, 1] - twists[:, 2] * arm[:, 1]
         columns[1] = s * twists[:, 0] + c * twists[:, 1] + twists[:, 2] * arm[:, 0]
-        gap = -end
-        gap[2] = math.remainder(float(self.goal[2] - end[2]), 2.0 * math.pi)
+        gap = self._aim(end) - end
+        gap[2] = math.remainder(float(gap[2]), 2.0 * math.pi)
         if self.free_heading:
-            columns[2], gap[2] = 0.0, 0.0
+            self._follow_the_heading(end, gap, columns)
         if self.rows is None:
             return gap, columns
         return (
@@ -51,16 +56,39 @@ class EndConditions:
             np.vstack([columns, self.rows]),
         )
 
+    def _aim(self, end: Array) -> Array:
+        """Where the conjugated word ends (dof,), seen from the place of the goal."""
+        aim = np.zeros(end.size)
+        aim[2] = self.goal[2]
+        if self.free_heading:  # the heading that the word has anyway
+            aim[2] = end[2] if self.product is None else end[2] + self.product[2]
+        return aim if self.product is None else goal_before(aim, self.product)
+
+    def _follow_the_heading(self, end: Array, gap: Array, columns: Array) -> None:
+        """Let the aim turn with the end, so that no condition is left on the heading.
+
+        What the displacements carry along, d, turns with the heading e: the aim is at
+        ``-R(e) d``, and its derivative by the heading is subtracted from the columns.
+        """
+        if self.product is not None:
+            x, y = self.product[:2]
+            c, s = math.cos(end[2]), math.sin(end[2])
+            columns[0] -= (s * x + c * y) * columns[2]
+            columns[1] -= (s * y - c * x) * columns[2]
+        columns[2], gap[2] = 0.0, 0.0
+
 
 def closest_times(
     conditions: EndConditions, durations: Array, *, rank: float = RANK, at_least: float = 0.0
 ) -> tuple[Array, float]:
     """Times (n,) near `durations` that miss the least, and what the worst condition then misses.
 
-    Gauss-Newton with the smallest change; no time becomes less than `at_least` [s].
+    Gauss-Newton with the smallest change; no time becomes less than `at_least` [s], and what lasts
+    no time stays so: it stands between two maneuvers.
     """
     best, least = durations, math.inf
     now = np.array(durations)
+    lasting = (now != 0.0) | (at_least < 0.0)
     for _ in range(STEPS):
         gap, columns = conditions.missing(now)
         worst = float(np.abs(gap).max())
@@ -68,19 +96,31 @@ def closest_times(
             best, least = now, worst
         elif least < MET:
             break
-        if worst < EXACT:
+        if worst < EXACT or not lasting.any():
             break
-        now = np.maximum(now + np.linalg.lstsq(columns, gap, rcond=rank)[0], at_least)
+        change = np.zeros(now.size)
+        change[lasting] = np.linalg.lstsq(columns[:, lasting], gap, rcond=rank)[0]
+        now = np.maximum(now + change, at_least)
     return np.asarray(best), least
 
 
 def closed_at(
-    start: Array, twists: Array, durations: Array, goal: Array, *, free_heading: bool = False
+    start: Array,
+    twists: Array,
+    durations: Array,
+    goal: Array,
+    *,
+    displacements: Array | None = None,
+    free_heading: bool = False,
 ) -> Array:
     """Durations (n,) near `durations` with which the word from `start` (dof,) ends at `goal`.
 
     The smallest change; as good as it gets where the word cannot meet the goal. Times stay at
-    least zero.
+    least zero, and those that are zero stay zero. `displacements` (n - 1, dof) or (n, dof) are
+    those of the maneuvers after each trim.
+
+    Source: the derivative of the end by a time, as a twist in its frame, is ``Ad(after^-1) xi``;
+    maneuvers by conjugation, see `conjugated`.
 
     Examples
     --------
@@ -89,8 +129,17 @@ def closed_at(
     >>> goal = np.array([2.0, 2.0, np.pi / 2])
     >>> closed_at(np.zeros(3), twists, np.array([1.0, 1.57, 1.0]), goal).round(6).tolist()
     [1.0, 1.570796, 1.0]
+    >>> stroke, aim = np.array([[0.5, 0.5, np.pi / 2]]), np.array([1.5, 2.5, np.pi / 2])
+    >>> near = np.array([0.99, 2.02])
+    >>> closed_at(np.zeros(3), twists[[0, 2]], near, aim, displacements=stroke).round(9).tolist()
+    [1.0, 2.0]
     """
     if not len(durations):
         return np.array(durations)
-    conditions = EndConditions(start=start, twists=twists, goal=goal, free_heading=free_heading)
+    product = None
+    if displacements is not None and displacements.any():
+        twists, product = conjugated(twists, displacements)
+    conditions = EndConditions(
+        start=start, twists=twists, goal=goal, free_heading=free_heading, product=product
+    )
     return closest_times(conditions, durations)[0]

@@ -13,15 +13,16 @@ from itertools import chain, product
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from maneuver_automaton._arrays import Array, as_array, wrapped
-from maneuver_automaton.groups import SE2, SE2xR
+from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.words.closing import MET, EndConditions, closest_times
+from maneuver_automaton.words.conjugation import conjugated
 
 BoolArray = NDArray[np.bool_]
 
 FULL_TURN = 2.0 * np.pi
 SMALL = 1e-6  # [s] nearer to zero or a full turn, a time may be zero: rounding at tangent circles
 SAME = 1e-7  # [s] solutions closer than this are one
-MET = 1e-9  # [m, rad] between the end and the goal, at most
 HALVINGS = 60  # of a bracket, to the last bit
 BISECTIONS = 8  # of an interval between nodes that may hide two roots
 
@@ -30,92 +31,46 @@ def steer(
     twists: ArrayLike,
     goal: ArrayLike,
     *,
-    gaps: ArrayLike | None = None,
+    displacements: ArrayLike | None = None,
+    longest: float | None = None,
+    nodes: int = 256,
     tolerance: float = 1e-12,
 ) -> Array:
-    """Coasting times of three planar trims that carry the identity exactly to `goal`.
+    """Coasting times of three planar trims, or of four in SE(2) x R, that end exactly at `goal`.
 
-    All isolated solutions without a negative time and with less than one turn per trim: at most
-    two. Trims that share a centre, parallel neighbours and three straights meet a goal never or in
-    infinitely many ways; both give no row.
+    In the plane: all isolated solutions without a negative time and with less than one turn per
+    trim, at most two. Trims that share a centre, parallel neighbours and three straights meet a
+    goal never or in infinitely many ways; both give no row.
+
+    In SE(2) x R the fourth trim makes up for the altitude: directly where it is purely vertical.
+    Otherwise its time is scanned: the first three follow in closed form, and the excess of altitude
+    is bracketed between nodes, halved where it bends. What is missed: a solution at which the
+    excess touches zero without a change of sign, and one on a branch of the closed form that begins
+    and ends between two nodes.
 
     Source: intersection of two circles. Special cases: Dubins (1957), *On curves of minimal
     length*; Reeds, Shepp (1990), *Optimal paths for a car that goes both forwards and backwards*.
 
     Parameters
     ----------
-    twists : (3, 3) array_like
-        Body velocity of each trim [m/s, m/s, rad/s].
-    goal : (3,) array_like
-        Pose [m, m, rad] seen from the start; its heading counts modulo a full turn.
-    gaps : (2, 3) array_like, optional
-        Displacement (x, y, heading) [m, m, rad] of the maneuver after the first and the second
-        trim; none if omitted.
-    tolerance : float
-        Relative, without unit: below it circles count as tangent, lines as parallel.
-
-    Returns
-    -------
-    (k, 3) array
-        Times [s], a row per solution, by rising total time; k is 0, 1 or 2. Times that may as
-        well be zero are zero.
-
-    Raises
-    ------
-    ValueError
-        If a shape is wrong, a number is not finite, or the tolerance is not positive.
-
-    Examples
-    --------
-    >>> left, ahead, right = [1, 0, 1], [1, 0, 0], [1, 0, -1]
-    >>> steer([left, ahead, right], [4, 2, 0]).round(4).tolist()
-    [[0.5236, 3.4641, 0.5236]]
-    >>> steer([left, right, left], [4.5, 0, 0]).tolist()
-    []
-    """
-    rows = _rows("twists", twists, 3, 3)
-    end = _pose("goal", goal, 3)
-    between = np.zeros((2, 3)) if gaps is None else _rows("gaps", gaps, 2, 3)
-    branches = _branches(rows, between, end[None], _positive("tolerance", tolerance))[0]
-    return _distinct((_settled(rows, between, end, times) for times in branches), 3)
-
-
-def steer_climbing(
-    twists: ArrayLike,
-    goal: ArrayLike,
-    *,
-    gaps: ArrayLike | None = None,
-    longest: float | None = None,
-    nodes: int = 256,
-    tolerance: float = 1e-12,
-) -> Array:
-    """Coasting times of four trims in SE(2) x R that carry the identity exactly to `goal`.
-
-    Where the fourth trim is purely vertical, the first three steer in the plane and the fourth
-    makes up for the altitude. Otherwise its time is scanned: the first three follow in closed form,
-    and the excess of altitude is bracketed between nodes, halved where it bends. What is missed:
-    a solution at which the excess touches zero without a change of sign, and one on a branch of the
-    closed form that begins and ends between two nodes.
-
-    Parameters
-    ----------
-    twists : (4, 4) array_like
-        Body velocity of each trim [m/s, m/s, rad/s, m/s]; a purely vertical trim comes last.
-    goal : (4,) array_like
-        Pose [m, m, rad, m] seen from the start; its heading counts modulo a full turn.
-    gaps : (3, 4) array_like, optional
-        Displacement (x, y, heading, z) of the maneuvers between the trims; none if omitted.
+    twists : (3, 3) or (4, 4) array_like
+        Body velocity of each trim [m/s, m/s, rad/s(, m/s)]; a purely vertical trim comes last.
+    goal : (3,) or (4,) array_like
+        Pose [m, m, rad(, m)] seen from the start; its heading counts modulo a full turn.
+    displacements : (2, 3) or (3, 4) array_like, optional
+        Displacement (x, y, heading(, z)) of the maneuver between each two trims; none if omitted.
     longest : float, optional
         Longest time of the fourth trim [s]; if omitted, a full turn or a way well beyond the goal.
     nodes : int
-        Intervals of the scan.
+        Intervals of the scan of the fourth trim's time.
     tolerance : float
         Relative, without unit: below it circles count as tangent, lines as parallel.
 
     Returns
     -------
-    (k, 4) array
-        Times [s], a row per solution, by rising total time; at most one turn per trim.
+    (k, 3) or (k, 4) array
+        Times [s], a row per solution, by rising total time. Times that may as well be zero are
+        zero.
 
     Raises
     ------
@@ -124,26 +79,38 @@ def steer_climbing(
 
     Examples
     --------
+    >>> left, ahead, right = [1, 0, 1], [1, 0, 0], [1, 0, -1]
+    >>> steer([left, ahead, right], [4, 2, 0]).round(4).tolist()
+    [[0.5236, 3.4641, 0.5236]]
+    >>> steer([left, right, left], [4.5, 0, 0]).tolist()
+    []
     >>> left, ahead, right, lift = [1, 0, 1, 0], [1, 0, 0, 0.5], [1, 0, -1, 0], [0, 0, 0, 2]
-    >>> steer_climbing([left, ahead, right, lift], [4, 2, 0, 3]).round(4).tolist()
+    >>> steer([left, ahead, right, lift], [4, 2, 0, 3]).round(4).tolist()
     [[0.5236, 3.4641, 0.5236, 0.634]]
     """
-    rows = _rows("twists", twists, 4, 4)
-    end = _pose("goal", goal, 4)
-    between = np.zeros((3, 4)) if gaps is None else _rows("gaps", gaps, 3, 4)
+    rows = as_array("twists", twists, last=(3, 4))
+    n = rows.shape[-1]
+    if rows.shape != (n, n):
+        raise ValueError(f"twists: got shape {rows.shape}, need (3, 3) or (4, 4)")
+    end = _pose("goal", goal, n)
+    steps = np.zeros((n - 1, n))
+    if displacements is not None:
+        steps = _rows("displacements", displacements, n - 1, n)
     relative = _positive("tolerance", tolerance)
     if nodes < 1:
         raise ValueError(f"nodes: got {nodes}, need at least 1")
-    if not rows[3].any():
+    if n == 3:
+        found: Iterable[Array] = _branches(rows, steps, end[None], relative)[0]
+    elif not rows[3].any():
         return np.zeros((0, 4))
-    climb = _Climb(rows, between, end, relative)
-    found: Iterable[Array]
-    if not rows[3, :3].any():
-        found = climb.lifted()
     else:
-        reach = climb.reach() if longest is None else _positive("longest", longest)
-        found = chain.from_iterable(climb.roots(branch, reach, nodes) for branch in range(2))
-    return _distinct((_settled(rows, between, end, times) for times in found), 4)
+        climb = _Climb(rows, steps, end, relative)
+        if not rows[3, :3].any():
+            found = climb.lifted()
+        else:
+            reach = climb.reach() if longest is None else _positive("longest", longest)
+            found = chain.from_iterable(climb.roots(branch, reach, nodes) for branch in range(2))
+    return _distinct((_settled(rows, steps, end, times) for times in found), n)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,7 +118,7 @@ class _Climb:
     """Four trims, of which the first three are solved for in the plane."""
 
     rows: Array  # (4, 4)
-    gaps: Array  # (3, 4)
+    steps: Array  # (3, 4)
     goal: Array  # (4,)
     tolerance: float
 
@@ -162,9 +129,9 @@ class _Climb:
 
     def branches(self, last: Array) -> Array:
         """Times (n, 2, 3) of the first three trims, given those of the fourth (n,)."""
-        back = SE2.exp(-last[:, None] * self.rows[3, :3]) @ SE2(self.gaps[2, :3]).inverse()
+        back = SE2.exp(-last[:, None] * self.rows[3, :3]) @ SE2(self.steps[2, :3]).inverse()
         goals = (SE2(self.goal[:3]) @ back).pose
-        return _branches(self.rows[:3, :3], self.gaps[:2, :3], goals, self.tolerance)
+        return _branches(self.rows[:3, :3], self.steps[:2, :3], goals, self.tolerance)
 
     def along(self, branch: int, last: Array, near: Array | None = None) -> Array:
         """All times (n, 4) on one branch; turns shifted by whole ones to lie nearest to `near`."""
@@ -177,15 +144,15 @@ class _Climb:
 
     def excess(self, times: Array) -> Array:
         """Altitude (n,) [m] by which times (n, 4) end too high; zero where it is only rounding."""
-        value = times @ self.rows[:, 3] + self.gaps[:, 3].sum() - self.goal[3]
+        value = times @ self.rows[:, 3] + self.steps[:, 3].sum() - self.goal[3]
         size = np.abs(times) @ np.abs(self.rows[:, 3]) + abs(self.goal[3]) + 1e-3
         return np.where(np.abs(value) <= 1e-13 * size, 0.0, value)
 
     def lifted(self) -> Iterator[Array]:
         """Both branches in the plane; the fourth trim makes up for the altitude."""
-        before_lift = (SE2(self.goal[:3]) @ SE2(self.gaps[2, :3]).inverse()).pose
+        before_lift = (SE2(self.goal[:3]) @ SE2(self.steps[2, :3]).inverse()).pose
         for times in self.branches(np.zeros(1))[0]:
-            planar = _settled(self.rows[:3, :3], self.gaps[:2, :3], before_lift, times)
+            planar = _settled(self.rows[:3, :3], self.steps[:2, :3], before_lift, times)
             if planar is not None:
                 excess = self.excess(np.append(planar, 0.0)[None])[0]
                 yield np.append(planar, -excess / self.rows[3, 3])
@@ -197,9 +164,9 @@ class _Climb:
         speeds = np.linalg.norm(self.rows[:, :2], axis=1)
         turning = self.rows[:, 2] != 0.0
         radius = (speeds[turning] / np.abs(self.rows[turning, 2])).max(initial=0.0)
-        jumps = np.linalg.norm(self.gaps[:, :2], axis=1).sum()
+        jumps = np.linalg.norm(self.steps[:, :2], axis=1).sum()
         way = np.linalg.norm(self.goal[:2]) + jumps + 4.0 * radius
-        height = abs(self.goal[3]) + np.abs(self.gaps[:, 3]).sum()
+        height = abs(self.goal[3]) + np.abs(self.steps[:, 3]).sum()
         return float(max(2.0 * way + height, 1e-3) / max(speeds[3], abs(self.rows[3, 3])))
 
     def roots(self, branch: int, reach: float, nodes: int) -> Iterator[Array]:
@@ -293,83 +260,34 @@ class _Climb:
         return near + shift
 
 
-def _branches(rows: Array, gaps: Array, goals: Array, tolerance: float) -> Array:
+def _branches(rows: Array, steps: Array, goals: Array, tolerance: float) -> Array:
     """Both branches (n, 2, 3) for goals (n, 3)."""
     from maneuver_automaton.words import _kernels_steering as kernels
 
     n = len(goals)
     triples = np.tile(np.arange(3), (n, 1))
-    tiled = np.tile(gaps, (n, 1, 1))
+    tiled = np.tile(steps, (n, 1, 1))
     times = kernels.steer_batch(
         np.ascontiguousarray(rows), triples, tiled, np.ascontiguousarray(goals), tolerance
     )
     return np.asarray(times)
 
 
-def _settled(rows: Array, gaps: Array, goal: Array, times: Array) -> Array | None:
+def _settled(rows: Array, steps: Array, goal: Array, times: Array) -> Array | None:
     """A solution without negative times, refined if need be; None if there is none at `times`."""
     if not np.isfinite(times).all():
         return None
-    chain = _Chain(_with_height(rows), _with_height(gaps), _with_height(goal))
+    twists, product = conjugated(rows, steps)
+    conditions = EndConditions(start=np.zeros(goal.size), twists=twists, goal=goal, product=product)
     may_vanish = (times < SMALL) | (_periods(rows) - times < SMALL)
-    free = np.ones(len(times), dtype=np.bool_)
-    times, error = chain.refined(times, free)
+    times, error = closest_times(conditions, times)
     for k in np.flatnonzero(may_vanish):
-        free[k] = False
-        pinned, pinned_error = chain.refined(np.where(free, times, 0.0), free)
+        without = times.copy()
+        without[k] = 0.0  # what lasts no time stays so
+        pinned, pinned_error = closest_times(conditions, without)
         if pinned_error <= MET:
             times, error = pinned, pinned_error
-        else:
-            free[k] = True
     return times if error <= MET and (times >= 0.0).all() else None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Chain:
-    """Trims (n, 4) with displacements (n - 1, 4) between them, and the goal (4,) of their end."""
-
-    rows: Array
-    gaps: Array
-    goal: Array
-
-    def refined(self, times: Array, free: BoolArray) -> tuple[Array, float]:
-        """Gauss-Newton on the times marked `free`, until nothing is gained; the error left."""
-        motions = self.motions(times)
-        error = self.error(motions[0])
-        while error > 1e-13 * (1.0 + np.abs(self.goal).max()) and free.any():
-            after = SE2xR(motions[1:][free])
-            columns = (after.inverse().adjoint() @ self.rows[free, :, None])[:, :, 0]
-            missing = np.array((SE2xR(motions[0]).inverse() @ SE2xR(self.goal)).pose)
-            missing[2] = wrapped(missing[2])
-            trial = times.copy()
-            trial[free] += np.linalg.lstsq(columns.T, missing, rcond=1e-9)[0]
-            motions = self.motions(trial)
-            before, error = error, self.error(motions[0])
-            if not error < 0.5 * before:
-                return times, before
-            times = trial
-        return times, error
-
-    def motions(self, times: Array) -> Array:
-        """The whole motion, then what follows each trim (n + 1, 4)."""
-        coasts = SE2xR.exp(times[:, None] * self.rows).pose
-        after = [SE2xR.identity()]
-        for i in range(len(times) - 1, 0, -1):
-            after.append(SE2xR(self.gaps[i - 1]) @ SE2xR(coasts[i]) @ after[-1])
-        after.append(SE2xR(coasts[0]) @ after[-1])
-        return np.array([motion.pose for motion in reversed(after)])
-
-    def error(self, end: Array) -> float:
-        """Largest difference between `end` and the goal [m, rad]."""
-        off = end - self.goal
-        off[2] = wrapped(off[2])
-        return float(np.abs(off).max())
-
-
-def _with_height(planar: Array) -> Array:
-    """Planar components (..., 3) with a height of zero; (..., 4) as they are."""
-    missing = [(0, 0)] * (planar.ndim - 1) + [(0, 4 - planar.shape[-1])]
-    return np.pad(planar, missing)
 
 
 def _periods(rows: Array) -> Array:

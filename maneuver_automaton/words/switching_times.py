@@ -1,60 +1,58 @@
-"""The best coasting times of a fixed word of trims and maneuvers.
+"""The best coasting times of a fixed word, with or without maneuvers between its trims.
 
 A word with maneuvers is a word without them: with D_i the product of all displacements before trim
 i, ``prod exp(tau_i xi_i) d_i = prod exp(tau_i Ad(D_i) xi_i) D_n``. So the trims are seen from
-where their maneuvers have led, the goal from before all of them, and what solves words of kinematic
-vehicles solves this one.
+where their maneuvers have led, the goal from before all of them, and one solver serves every
+vehicle. What a trim must last at least is a displacement like any other.
 """
 
 from __future__ import annotations
 
+import enum
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._arrays import Array, as_array, freeze
 from maneuver_automaton.groups import group_of
-from maneuver_automaton.groups.chain import chained
-from maneuver_automaton.words.closing import MET, EndConditions, closest_times
-from maneuver_automaton.words.solve import (
-    RESTARTS,
-    SwitchingTimes,
-    TimesStatus,
-    solve_switching_times,
-)
+from maneuver_automaton.words.closing import MET
+from maneuver_automaton.words.conjugation import conjugated, conjugated_turn, goal_before
 
+RESTARTS = 12  # further starts where the first one fails
 TURNS = (0.5, 2.0 * math.pi - 0.5)  # [rad] of a free heading that iterations start with
 
 
-def conjugated(twists: Array, steps: Array) -> tuple[Array, Array]:
-    """Twists (n, dof) seen from before all displacements `steps`, and the product of these.
+class TimesStatus(enum.Enum):
+    """How good the times are."""
 
-    `steps` are (n - 1, dof), one between each two trims, or (n, dof), one after each.
-
-    Source: ``D exp(xi) = exp(Ad(D) xi) D``; Solà, Deray, Atchuthan (2018), Eq. (30).
-
-    Examples
-    --------
-    >>> quarter = np.array([[1.0, 0.0, np.pi / 2]])
-    >>> seen, product = conjugated(np.array([[1.0, 0, 0], [1.0, 0, 0]]), quarter)
-    >>> seen.round(9).tolist(), product.round(3).tolist()
-    ([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [1.0, 0.0, 1.571])
-    """
-    n, dof = twists.shape
-    before = chained(np.zeros(dof), steps)
-    adjoints = group_of(dof)(before[:n]).adjoint()
-    return np.asarray((adjoints @ twists[:, :, None])[:, :, 0]), before[-1]
+    OPTIMAL = "optimal"  # first-order conditions hold
+    FEASIBLE = "feasible"  # the goal is met, optimality was not reached
+    FAILED = "failed"  # no start led to the goal
 
 
-def solve_times_with_maneuvers(
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class SwitchingTimes:
+    """Coasting times of a word with their multipliers."""
+
+    status: TimesStatus
+    durations: Array  # (n,) [s]; zero where a trim had better not be used
+    cost: float
+    multipliers: Array  # (3 + m,) prices of x, y, heading and of each linear condition
+
+    def __post_init__(self) -> None:
+        freeze(self, "durations")
+        freeze(self, "multipliers")
+
+
+def solve_switching_times(
     twists: ArrayLike,
     rates: ArrayLike,
     goal: ArrayLike,
     *,
-    displacements: ArrayLike,
+    displacements: ArrayLike | None = None,
     total: float | None = None,
     free_heading: bool = False,
     least: ArrayLike | None = None,
@@ -62,34 +60,42 @@ def solve_times_with_maneuvers(
     guesses: Sequence[ArrayLike] = (),
     restarts: int = RESTARTS,
 ) -> SwitchingTimes:
-    """Minimise ``sum rates * times`` such that trims with maneuvers between them end at `goal`.
+    """Minimise ``sum rates * times`` such that the word ends at `goal`, all times at least zero.
+
+    Primal-dual Newton with exact derivatives, Levenberg-Marquardt as fall-back, restarts last.
+    Words whose twists do not span, and goals that one set of times alone reaches, are solved too.
+
+    Source: Nocedal, Wright, *Numerical Optimization*, 2nd ed., Sec. 19.3; for the conjugation
+    ``D exp(xi) = exp(Ad(D) xi) D``, Solà, Deray, Atchuthan (2018), Eq. (30).
 
     Parameters
     ----------
-    twists : (n, dof) array_like
+    twists : (n, 3) or (n, 4) array_like
         Body velocity of each trim [m/s, m/s, rad/s(, m/s)].
     rates : (n,) array_like
-        Cost per second of each trim; what maneuvers cost is added by the caller.
-    goal : (dof,) array_like
+        Cost per second of each trim; the caller adds what maneuvers cost.
+    goal : (3,) or (4,) array_like
         Pose relative to the start; its heading counts modulo a full turn.
-    displacements : (n - 1, dof) or (n, dof) array_like
-        Of the maneuver between each two trims, and after the last; zero where there is none.
+    displacements : (n - 1, dof) or (n, dof) array_like, optional
+        Of the maneuver between each two trims, and after the last; zero for a switch. None if the
+        word has no maneuvers.
     total : float, optional
         [s] the coasting times must add up to: what is given less what the maneuvers take.
     free_heading : bool
-        Whether any heading will do at the goal.
+        Whether the goal admits any heading.
     least, longest : (n,) array_like, optional
         [s] each trim lasts at least and at most. A longest time that the best times exceed is
-        taken as fixed, one after the other: they are then feasible, but there may be better ones.
+        taken as fixed, one after the other: the times are then feasible, but there may be better
+        ones.
     guesses : sequence of (n,) array_like
-        Times to start from, best first.
+        Times to start from, best first; a second per trim if empty.
     restarts : int
         Further starts, the same in every call, if all guesses fail.
 
     Returns
     -------
     SwitchingTimes
-        The multipliers are those of the conjugated word: momenta in the frame of the start.
+        The multipliers are momenta of the conjugated word, in the frame of the start.
 
     Raises
     ------
@@ -98,32 +104,42 @@ def solve_times_with_maneuvers(
 
     Examples
     --------
+    >>> slow_and_fast = [[1.6, 0, 0], [1.7, 0, 0]]
+    >>> best = solve_switching_times(slow_and_fast, [2.56, 2.89], [1.62, 0, 0], total=1.0)
+    >>> best.durations.round(6).tolist(), round(best.cost, 6)
+    ([0.8, 0.2], 2.626)
+
     A metre ahead, a stroke that turns by a quarter, and as far as it takes:
 
-    >>> ahead = [1.0, 0.0, 0.0]
-    >>> stroke = [[0.5, 0.5, np.pi / 2]]
+    >>> ahead, stroke = [1.0, 0.0, 0.0], [[0.5, 0.5, np.pi / 2]]
     >>> goal = [1.5, 2.5, np.pi / 2]
-    >>> best = solve_times_with_maneuvers([ahead, ahead], [1, 1], goal, displacements=stroke)
+    >>> best = solve_switching_times([ahead, ahead], [1, 1], goal, displacements=stroke)
     >>> best.durations.round(9).tolist()
     [1.0, 2.0]
     """
     rows = as_array("twists", twists, last=(3, 4))
-    n, dof = rows.shape
-    steps = as_array("displacements", displacements).reshape(-1, dof)
-    if len(steps) not in (n - 1, n):
-        raise ValueError(f"displacements: got {len(steps)}, need {n - 1}, one between each two")
+    if rows.ndim != 2:
+        raise ValueError(f"twists: got shape {rows.shape}, need (n, 3) or (n, 4)")
+    n = len(rows)
     prices = as_array("rates", rates)
     if prices.shape != (n,):
         raise ValueError(f"rates: got shape {prices.shape}, need ({n},), one per trim")
-    end = as_array("goal", goal, last=dof)
+    end = as_array("goal", goal, last=(3, 4))
+    starts = [as_array("guesses", guess) for guess in guesses]
+    for guess in starts:
+        if guess.shape != (n,):
+            raise ValueError(f"guesses: got shape {guess.shape}, need ({n},)")
+    if displacements is None and least is None and longest is None and not free_heading:
+        return _solved(rows, prices, end, total, np.ones(n), starts, restarts)
+    rows, end = _of_equal_size(rows, end)
     floors = np.zeros(n) if least is None else np.array(as_array("least", least))
     limits = np.full(n, math.inf) if longest is None else np.asarray(longest, dtype=np.float64)
+    steps = _steps(displacements, n, end.size)
     if (floors > limits).any():
         return _failed(n)
-    starts = [as_array("guesses", guess) for guess in guesses]
     free = np.ones(n, dtype=np.bool_)
     while True:
-        word = _Word(rows, steps, floors, end, free_heading)
+        word = _ConjugatedWord(rows, steps, floors, end, free_heading)
         solved = word.solved(prices, free, total, starts, restarts)
         late = free & (solved.durations > limits)
         if solved.status is TimesStatus.FAILED or not late.any():
@@ -133,56 +149,7 @@ def solve_times_with_maneuvers(
         floors[worst], free[worst] = limits[worst], False
 
 
-def close_times_with_maneuvers(
-    start: Array,
-    twists: Array,
-    durations: Array,
-    goal: Array,
-    *,
-    displacements: Array,
-    free_heading: bool = False,
-) -> Array:
-    """Durations (n,) near `durations` with which a word with maneuvers ends at `goal`.
-
-    The smallest change; as good as it gets where the word cannot meet the goal.
-
-    Examples
-    --------
-    >>> ahead, stroke = [1.0, 0.0, 0.0], [[0.5, 0.5, np.pi / 2]]
-    >>> goal = np.array([1.5, 2.5, np.pi / 2])
-    >>> close_times_with_maneuvers(np.zeros(3), np.array([ahead, ahead]), np.array([0.99, 2.02]),
-    ...                            goal, displacements=np.array(stroke)).round(9).tolist()
-    [1.0, 2.0]
-    """
-    n, dof = twists.shape
-    if not n:
-        return np.array(durations)
-    seen, product = conjugated(twists, displacements)
-    before, times = _goal_before(goal, product), np.array(durations)
-    if free_heading:  # any turn in place at the end
-        seen = np.vstack([seen, conjugated_turn(product)])
-        times = np.append(times, 0.0)
-        group = group_of(dof)
-        end = chained(start, group.exp(times[:, None] * seen).pose)[-1]
-        times[-1] = math.remainder(float(before[2] - end[2]), 2.0 * math.pi) % (2.0 * math.pi)
-    conditions = EndConditions(start=start, twists=seen, goal=before)
-    best, missed = closest_times(conditions, times)
-    return best[:n] if missed < MET else np.array(durations)
-
-
-def conjugated_turn(product: Array) -> Array:
-    """Twist (dof,) of a turn in place after all displacements, seen from before them."""
-    turn = np.zeros(product.size)
-    turn[2] = 1.0
-    return np.asarray(group_of(product.size)(product).adjoint() @ turn)
-
-
-def _goal_before(goal: Array, product: Array) -> Array:
-    group = group_of(goal.size)
-    return (group(goal) @ group(product).inverse()).pose
-
-
-class _Word:
+class _ConjugatedWord:
     """Trims and displacements with least times: what is coasted beyond them is solved for."""
 
     def __init__(
@@ -190,10 +157,9 @@ class _Word:
     ) -> None:
         group = group_of(goal.size)
         least = group.exp(floors[:, None] * twists)
-        after = steps if len(steps) == len(twists) else np.vstack([steps, np.zeros(goal.size)])
         self.floors = floors
-        self.twists, product = conjugated(twists, (least @ group(after)).pose)
-        self.goal = _goal_before(goal, product)
+        self.twists, product = conjugated(twists, (least @ group(steps)).pose)
+        self.goal = goal_before(goal, product)
         self.turn = conjugated_turn(product)[None] if free_heading else np.zeros((0, goal.size))
 
     def solved(
@@ -214,14 +180,14 @@ class _Word:
         ways = [_Ending(self.turn[:0], 0.0), *(_Ending(self.turn, turn) for turn in TURNS)]
         solved = min(
             (
-                solve_switching_times(
+                _solved(
                     np.vstack([self.twists[chosen], way.turn]),
                     np.append(rates[chosen], 0.0 * way.first),
                     self.goal,
-                    total=beyond,
-                    weights=np.append(np.ones(chosen.size), 0.0 * way.first),
-                    guesses=[np.append(self._beside(one)[chosen], way.first) for one in guesses],
-                    restarts=restarts,
+                    beyond,
+                    np.append(np.ones(chosen.size), 0.0 * way.first),
+                    [np.append(self._beyond(one)[chosen], way.first) for one in guesses],
+                    restarts,
                 )
                 for way in (ways[:1] if not len(self.turn) else ways[int(not chosen.size) :])
             ),
@@ -233,14 +199,15 @@ class _Word:
         times[chosen] += np.maximum(solved.durations[: chosen.size], 0.0)
         return replace(solved, durations=times, cost=float(rates @ times))
 
-    def _beside(self, times: Array) -> Array:
+    def _beyond(self, times: Array) -> Array:
         """What times (n,) are beyond the least ones."""
         return np.maximum(times - self.floors, 0.0)
 
     def _as_it_is(self, rates: Array, beyond: float | None) -> SwitchingTimes:
         """No time is free: the word meets the goal or it does not."""
-        met = float(np.abs(_wrapped(self.goal)).max()) < MET
-        if not met or (beyond is not None and beyond > MET):
+        near = np.array(self.goal)
+        near[2] = math.remainder(float(near[2]), 2.0 * math.pi)
+        if not float(np.abs(near).max()) < MET or (beyond is not None and beyond > MET):
             return _failed(len(rates))
         return SwitchingTimes(
             status=TimesStatus.OPTIMAL,
@@ -258,11 +225,78 @@ class _Ending:
         self.first = np.full(len(turn), first)
 
 
-def _wrapped(pose: Array) -> Array:
-    """The pose with a heading between minus half a turn and half a turn."""
-    near = np.array(pose)
-    near[2] = math.remainder(float(near[2]), 2.0 * math.pi)
-    return near
+def _solved(
+    twists: Array,
+    rates: Array,
+    goal: Array,
+    total: float | None,
+    weights: Array,
+    guesses: Sequence[Array],
+    restarts: int,
+) -> SwitchingTimes:
+    """The best times of a word without displacements; `weights` say what counts in `total`."""
+    from maneuver_automaton.words import _kernels_solve as kernels
+
+    n = len(twists)
+    words, end = np.zeros((n, 4)), np.zeros(4)
+    words[:, : twists.shape[1]] = twists
+    end[: goal.size] = goal
+    rows, targets = [], []
+    if words[:, 3].any() or end[3] != 0.0:
+        rows.append(words[:, 3])
+        targets.append(end[3])
+    if total is not None:
+        rows.append(weights)
+        targets.append(total)
+    times = np.zeros(n)
+    status, cost, multipliers, _slope = kernels.solve_times(
+        np.ascontiguousarray(rates),
+        words,
+        end,
+        np.array(rows).reshape(len(rows), n),
+        np.array(targets, dtype=np.float64),
+        _starts(n, total, guesses, restarts),
+        times,
+    )
+    return SwitchingTimes(
+        status=list(TimesStatus)[status],
+        durations=times,
+        cost=float(cost) if math.isfinite(cost) else math.inf,
+        multipliers=multipliers,
+    )
+
+
+def _starts(n: int, total: float | None, guesses: Sequence[Array], restarts: int) -> Array:
+    even = np.full(n, 1.0 if total is None else total / n)
+    first = list(guesses) or [even]
+    if restarts == 0:
+        return np.vstack([*first, even])
+    rng = np.random.default_rng(0)  # restarts: the same in every call
+    scales = rng.exponential(1.0, size=(restarts, n))
+    if total is not None:
+        scales *= total / scales.sum(axis=1, keepdims=True)
+    return np.vstack([*first, even, scales])
+
+
+def _of_equal_size(twists: Array, goal: Array) -> tuple[Array, Array]:
+    """Twists and goal of as many coordinates, a missing altitude being zero."""
+    dof = max(twists.shape[1], goal.size)
+    rows, end = np.zeros((len(twists), dof)), np.zeros(dof)
+    rows[:, : twists.shape[1]] = twists
+    end[: goal.size] = goal
+    return rows, end
+
+
+def _steps(displacements: ArrayLike | None, n: int, dof: int) -> Array:
+    """Displacements (n, dof), one after each trim."""
+    steps = np.zeros((n, dof))
+    if displacements is None:
+        return steps
+    given = as_array("displacements", displacements).reshape(-1, dof)
+    if len(given) not in (n - 1, n):
+        raise ValueError(f"displacements: got {len(given)}, need {n - 1}, one between each two")
+    steps[: len(given)] = given
+    return steps
 
 
 def _failed(n: int) -> SwitchingTimes:

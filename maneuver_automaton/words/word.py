@@ -1,179 +1,168 @@
-"""Words of trims and maneuvers: what a search found, until it becomes a plan."""
+"""A word: trims, how long each lasts, and the transition after each but the last."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, wrapped
+from maneuver_automaton._arrays import Array, IntArray, freeze
 from maneuver_automaton.automaton import Automaton, Plan
-from maneuver_automaton.groups import SE2xR
-from maneuver_automaton.primitives import Maneuver
-from maneuver_automaton.words.library import TransferLibrary
+from maneuver_automaton.words.closing import closed_at
+from maneuver_automaton.words.library import Library
+from maneuver_automaton.words.transitions import SWITCH
 
-CLOSED = 1e-14  # [m, rad] relative to the size of the motion: nothing is left to correct
-STEPS = 8
-RANK = 1e-9  # singular values below this, relative, count as none
-TRIM, EDGE = 0, 1  # kinds of steps
+TRIM, MANEUVER = 0, 1  # kinds of steps
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class ManeuverWord:
-    """Trims with their times, and the maneuver after each but the last.
+class Word:
+    """What every search finds, until it becomes a plan.
 
-    A maneuver of -1 is a switch at will. Trims between maneuvers may last no time.
+    A transition is a maneuver of the automaton, or SWITCH where the vehicle changes trims at will.
+    Trims between two maneuvers may last no time. A word of a kinematic vehicle has switches only.
+
+    Examples
+    --------
+    >>> Word(trims=[2, 0], durations=[1.0, 0.5]).transitions.tolist()
+    [-1]
     """
 
-    trims: tuple[int, ...]  # (n,) indices in the automaton
+    trims: IntArray  # (n,) indices in the automaton
     durations: Array  # (n,) [s]
-    maneuvers: tuple[int, ...]  # (n - 1,) indices in the automaton
-    goal: int  # among the goals of the query
-    cost: float = float("nan")
-    duration: float = float("nan")  # [s] maneuvers included
+    transitions: IntArray = None  # type: ignore[assignment]  # (n - 1,); all SWITCH if omitted
+    goal: int = 0  # among the goals of the search
+    cost: float = math.nan
+    maneuver_time: float = 0.0  # [s] that its maneuvers take together
+    certificate: float | None = None  # smallest reduced cost over the library, all times
+
+    def __post_init__(self) -> None:
+        freeze(self, "durations")
+        _freeze_numbers(self, "trims", self.trims)
+        held = self.transitions
+        n = max(0, self.trims.size - 1)
+        _freeze_numbers(self, "transitions", np.full(n, SWITCH) if held is None else held)
+
+    @property
+    def duration(self) -> float:
+        """Time the motion takes, maneuvers included [s]."""
+        return float(self.durations.sum()) + self.maneuver_time
+
+    @property
+    def has_maneuvers(self) -> bool:
+        """Whether a transition is more than a switch."""
+        return bool((self.transitions != SWITCH).any())
 
 
-def word_of(
-    library: TransferLibrary,
+def word_of_steps(
+    library: Library,
     *,
     start_trim: int,
     steps: Iterable[tuple[int, int, float]],
     targets: Iterable[int],
     goal: int,
-) -> ManeuverWord:
-    """A word from its steps: (TRIM, trim, time) or (EDGE, maneuver, 0), maneuvers with `targets`.
+) -> Word:
+    """A word from its steps: (TRIM, trim, time) or (MANEUVER, maneuver, 0), each with its target.
 
     Examples
     --------
     >>> from maneuver_automaton.models import Unicycle
-    >>> from maneuver_automaton.words.library import transfer_library
+    >>> from maneuver_automaton.words.library import library_of
     >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
-    >>> steps = [(TRIM, 0, 1.0), (TRIM, 0, 0.5), (EDGE, -1, 0.0), (TRIM, 1, 2.0)]
-    >>> word = word_of(transfer_library(robot), start_trim=0, steps=steps, targets=[1], goal=0)
-    >>> word.trims, word.durations.tolist(), word.cost
-    ((0, 1), [1.5, 2.0], 3.5)
+    >>> steps = [(TRIM, 0, 1.0), (TRIM, 0, 0.5), (MANEUVER, SWITCH, 0.0), (TRIM, 1, 2.0)]
+    >>> word = word_of_steps(library_of(robot), start_trim=0, steps=steps, targets=[1], goal=0)
+    >>> word.trims.tolist(), word.durations.tolist(), word.cost
+    ([0, 1], [1.5, 2.0], 3.5)
     """
-    trims, durations, maneuvers = [start_trim], [0.0], []
+    trims, durations, transitions = [start_trim], [0.0], list[int]()
     following = iter(targets)
     for kind, number, time in steps:
         if kind == TRIM:
             durations[-1] += time
         else:
-            maneuvers.append(number)
+            transitions.append(number)
             trims.append(next(following))
             durations.append(0.0)
-    word = ManeuverWord(
-        trims=tuple(trims),
+    _drop_idle_switches(trims, durations, transitions)
+    word = Word(
+        trims=np.array(trims),
         durations=np.array(durations),
-        maneuvers=tuple(maneuvers),
+        transitions=np.array(transitions, dtype=np.int64),
         goal=goal,
     )
-    return priced(library, _without_idle_switches(word))
+    return with_price(library, word)
 
 
-def priced(library: TransferLibrary, word: ManeuverWord) -> ManeuverWord:
-    """The word with its cost and duration."""
-    held = [k for k in word.maneuvers if k >= 0]
+def with_price(library: Library, word: Word) -> Word:
+    """The word with its cost, prices of switches left out, and the time of its maneuvers."""
+    held = word.transitions[word.transitions != SWITCH]
     lasting = sum(library.automaton.maneuvers[k].duration for k in held)
-    cost = float(library.arrays.rates[list(word.trims)] @ word.durations)
-    cost += float(library.maneuver_costs[held].sum()) if held else 0.0
-    return replace(word, cost=cost, duration=float(word.durations.sum()) + lasting)
+    cost = float(library.arrays.rates[word.trims] @ word.durations)
+    cost += float(library.maneuver_costs[held].sum())
+    return replace(word, cost=cost, maneuver_time=float(lasting))
 
 
-def closed_word(library: TransferLibrary, word: ManeuverWord, start: Array, goal: Array) -> Array:
-    """Durations (n,) with which the word from `start` (dof,) ends exactly at `goal` (dof,).
-
-    Gauss-Newton with the smallest change of the times that are not zero, as good as it gets.
-
-    Source: the derivative of the end by a time, as a twist in its frame, is Ad(after^-1) xi.
-    """
-    twists = library.arrays.twists[list(word.trims)]
-    gaps = gaps_of(library.automaton, word)
-    begin, aim = np.zeros(4), np.zeros(4)
-    begin[: start.size], aim[: goal.size] = start, goal
-    begin[[0, 1, 3]] -= aim[[0, 1, 3]]  # seen from the goal's place no digit is lost
-    aim[[0, 1, 3]] = 0.0
-    now, best, least = np.array(word.durations), np.array(word.durations), np.inf
-    for _ in range(STEPS):
-        missing, columns = _missing(begin, aim, twists, gaps, now)
-        size = float(np.abs(missing).max())
-        if size < least:
-            best, least = now, size
-        free = now > 0.0
-        if size <= CLOSED or not free.any():
-            break
-        change = np.zeros(len(now))
-        change[free] = np.linalg.lstsq(columns[:, free], missing, rcond=RANK)[0]
-        now = np.maximum(now + change, 0.0)
-    return best
-
-
-def gaps_of(automaton: Automaton, word: ManeuverWord) -> Array:
-    """Displacement (n - 1, 4) after every trim but the last."""
-    gaps = np.zeros((len(word.maneuvers), 4))
-    for n, k in enumerate(word.maneuvers):
-        if k >= 0:
-            displacement = automaton.maneuvers[k].displacement
-            gaps[n, : displacement.size] = displacement
-    return gaps
-
-
-def plan_of_word(
-    library: TransferLibrary,
-    word: ManeuverWord,
-    *,
+def plan_of(
+    automaton: Automaton,
+    word: Word,
     start: Array,
-    goal: Array,
+    *,
+    goal: Array | None = None,
+    free_heading: bool = False,
     start_time: float = 0.0,
 ) -> Plan:
-    """The word as a plan from `start` (dof,), its times corrected to end at `goal` (dof,)."""
-    automaton = library.automaton
-    maneuvers: list[Maneuver | None] = [
-        None if k < 0 else automaton.maneuvers[k] for k in word.maneuvers
-    ]
+    """The word as a plan from `start` (dof,), its times corrected to end at `goal` (dof,).
+
+    Without a goal the times are taken as they are.
+    """
+    trims = [automaton.trims[k] for k in word.trims]
+    durations = word.durations
+    if goal is not None:
+        twists = np.array([trim.body_velocity for trim in trims]).reshape(-1, start.size)
+        durations = closed_at(
+            start,
+            twists,
+            durations,
+            goal,
+            displacements=displacements_of(automaton, word.transitions),
+            free_heading=free_heading,
+        )
+    maneuvers = [None if k == SWITCH else automaton.maneuvers[k] for k in word.transitions]
     return Plan(
         start,
-        tuple(automaton.trims[k] for k in word.trims),
-        durations=closed_word(library, word, start, goal),
-        maneuvers=tuple(maneuvers),
+        tuple(trims),
+        durations=durations,
+        maneuvers=tuple(maneuvers) if any(maneuvers) else (),
         start_time=start_time,
     )
 
 
-def _missing(
-    begin: Array, aim: Array, twists: Array, gaps: Array, times: Array
-) -> tuple[Array, Array]:
-    """Twist (4,) of the end frame that is missing to the goal, and what each time adds (4, n)."""
-    coasts = SE2xR.exp(times[:, None] * twists)
-    after = [SE2xR.identity()]
-    for k in range(len(times) - 1, 0, -1):
-        motion = SE2xR(gaps[k - 1]) @ SE2xR(coasts.pose[k])
-        after.append(motion @ after[-1])
-    end = SE2xR(begin) @ SE2xR(coasts.pose[0]) @ after[-1]
-    missing = np.array((end.inverse() @ SE2xR(aim)).pose)
-    missing[2] = wrapped(missing[2])
-    back = SE2xR(np.array([motion.pose for motion in reversed(after)])).inverse()
-    columns = (back.adjoint() @ twists[:, :, None])[:, :, 0]
-    return missing, columns.T
+def displacements_of(automaton: Automaton, transitions: Sequence[int] | IntArray) -> Array:
+    """Displacement (n, dof) of each transition of a word."""
+    steps = np.zeros((len(transitions), automaton.model.group.dof))
+    for n, k in enumerate(transitions):
+        if k != SWITCH:
+            steps[n] = automaton.maneuvers[k].displacement
+    return steps
 
 
-def _without_idle_switches(word: ManeuverWord) -> ManeuverWord:
-    """The same motion without trims that last no time beside switches at will."""
-    trims, durations = list(word.trims), word.durations.tolist()
-    maneuvers = list(word.maneuvers)
-    k = 0
-    while k < len(trims):
-        idle = durations[k] == 0.0 and len(trims) > 1
-        before = maneuvers[k - 1] if k > 0 else None
-        after = maneuvers[k] if k < len(maneuvers) else None
-        if idle and before == -1 and (after == -1 or after is None) and 0 < k < len(trims) - 1:
-            del trims[k], durations[k], maneuvers[k]
-            if k < len(trims) and trims[k - 1] == trims[k]:
+def _drop_idle_switches(trims: list[int], durations: list[float], transitions: list[int]) -> None:
+    """Take out, in place, trims that last no time and stand beside switches alone."""
+    k = 1
+    while k < len(trims) - 1:
+        if durations[k] == 0.0 and transitions[k - 1] == transitions[k] == SWITCH:
+            del trims[k], durations[k], transitions[k]
+            if trims[k - 1] == trims[k]:
                 durations[k - 1] += durations.pop(k)
-                del trims[k], maneuvers[k - 1]
+                del trims[k], transitions[k - 1]
             continue
         k += 1
-    return replace(
-        word, trims=tuple(trims), durations=np.array(durations), maneuvers=tuple(maneuvers)
-    )
+
+
+def _freeze_numbers(word: Word, name: str, value: ArrayLike) -> None:
+    numbers = np.array(value, dtype=np.int64)
+    numbers.setflags(write=False)
+    object.__setattr__(word, name, numbers)

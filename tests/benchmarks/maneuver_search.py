@@ -22,7 +22,7 @@ from maneuver_automaton.search.maneuver_lattice import plan_of, search_maneuvers
 from maneuver_automaton.search.maneuver_motion import parts_of
 from maneuver_automaton.search.maneuver_query import ManeuverQuery, maneuver_query
 from maneuver_automaton.words import _kernels_candidates as kernels
-from maneuver_automaton.words.library import TransferLibrary, transfer_library
+from maneuver_automaton.words.library import Library, library_of
 from tests.benchmarks import cases
 from tests.benchmarks.tables import show
 from tests.search.automata import inertial_unicycle, truck_with_trailer
@@ -37,17 +37,17 @@ PROBLEMS = (
 FREE = 200  # transfers that are timed
 
 
-def libraries() -> dict[str, tuple[TransferLibrary, tuple, str]]:
+def libraries() -> dict[str, tuple[Library, tuple, str]]:
     """Transfers, parts and the trim at rest of each vehicle."""
     unicycle, truck = inertial_unicycle(levels=5), truck_with_trailer()
     body, trailer = (Box([0.5, 0.25]),), (Box([0.3, 0.25]),)
     return {
-        "unicycle2_v0": (transfer_library(unicycle), parts_of(unicycle, body), "0 0"),
-        "car1_v0": (transfer_library(truck), parts_of(truck, body, (trailer,)), "0 at 0.00"),
+        "unicycle2_v0": (library_of(unicycle), parts_of(unicycle, body), "0 0"),
+        "car1_v0": (library_of(truck), parts_of(truck, body, (trailer,)), "0 at 0.00"),
     }
 
 
-def query_of(name: str, known: dict[str, tuple[TransferLibrary, tuple, str]]) -> ManeuverQuery:
+def query_of(name: str, known: dict[str, tuple[Library, tuple, str]]) -> ManeuverQuery:
     given = yaml.safe_load((cases.DATA / "dynobench" / "envs" / f"{name}.yaml").read_text())
     robot, world = given["robots"][0], given["environment"]
     library, parts, rest = known[robot["type"]]

@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.search import search_words
-from maneuver_automaton.words import steer, steer_climbing
+from maneuver_automaton.words import steer
 from maneuver_automaton.words._kernels_steering import steer_batch
 from tests import reference
 from tests.search.cases import TABLE_2, end_off_goal, names, parking
@@ -101,11 +101,11 @@ def climbs(n: int) -> None:
     laps, met = [], 0
     for row, known, goal in zip(twists, times, goals, strict=True):
         began = time.perf_counter()
-        found = steer_climbing(row, goal)
+        found = steer(row, goal)
         laps.append(time.perf_counter() - began)
         met += bool(len(found)) and bool(np.abs(found - known).max(axis=1).min() < MATCH)
     print(f"{n} random words of four climbing trims")
-    print(f"  steer_climbing(): {1e3 * statistics.median(laps):.1f} ms, known times found: {met}")
+    print(f"  steer(): {1e3 * statistics.median(laps):.1f} ms, known times found: {met}")
 
 
 def pairs(n: int, moves: int) -> None:

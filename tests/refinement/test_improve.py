@@ -20,6 +20,7 @@ from maneuver_automaton.search import lattice_pass
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_pass import joined, with_cost
 from maneuver_automaton.search.lattice_query import lattice_query
+from maneuver_automaton.words.word import Word
 from tests import scenes
 from tests.reference import plain_end
 from tests.reference_collision import driven
@@ -70,9 +71,9 @@ def improved(name, *, expansions=EXPANSIONS):
 
 def assert_admitted(query, word, *, first=False):
     """Exactly at the goal, free, and within every limit."""
-    problem, library = query.problem, query.library.arrays
+    problem = query.problem
     horizon = problem.horizon
-    twists = library.twists[word.trims]
+    twists = problem.automaton.body_velocities[word.trims]
     end = (SE2(query.start) @ SE2(plain_end(twists, word.durations)[:3])).pose
     off = np.abs(end - query.goals[word.goal])
     assert off[:2].max() < 1e-6
@@ -82,7 +83,7 @@ def assert_admitted(query, word, *, first=False):
     limit = horizon.time or horizon.max_time or math.inf
     assert word.durations.sum() <= limit + 1e-9
     assert all(a != b for a, b in itertools.pairwise(word.trims.tolist()))
-    rates = problem.rates[query.library.trims[word.trims]] - query.library.rest_rate
+    rates = problem.rates[word.trims] - query.library.rest_rate
     cost = float(rates @ word.durations) + problem.cost.switching(twists)
     assert word.cost == pytest.approx(cost, rel=1e-12)
     world = World(problem)
@@ -135,12 +136,8 @@ def heard_until(deadline, monkeypatch, name="car"):
     monkeypatch.setattr(improvement, "time", clock)
     monkeypatch.setattr(lattice_pass, "time", clock)
     query = query_of(PROBLEMS[name])
-    word = joined(
-        list(
-            zip(improved(name)[1].trims.tolist(), improved(name)[1].durations.tolist(), strict=True)
-        ),
-        goal=0,
-    )
+    first = improved(name)[1]
+    word = Word(trims=first.trims, durations=first.durations)
     heard = []
     improve(query, word, deadline=deadline, patience=Patience(), max_expansions=2000,
             better=lambda better: heard.append(better.cost))  # fmt: skip
@@ -184,7 +181,9 @@ def test_no_time_at_all():
 
 def test_the_empty_word_stays_empty():
     query = query_of(replace(BASE, goals=(Goal(pose=BASE.start),)))
-    ended = improve(query, joined([], goal=0), deadline=math.inf, patience=Patience(), floor=0.0)
+    ended = improve(
+        query, joined([], query, goal=0), deadline=math.inf, patience=Patience(), floor=0.0
+    )
     assert (len(ended.word.trims), ended.word.cost) == (0, 0.0)
 
 
@@ -192,13 +191,15 @@ def test_a_detour_round_nothing_is_cut_short():
     problem = replace(BASE, obstacles=(Obstacle(Box([0.1, 0.1], [0.0, 9.0])),), goals=(
         Goal(pose=[6.0, 0.0, 0.0]),))  # fmt: skip
     query = query_of(problem)
-    index = {tuple(t): k for k, t in enumerate(query.library.arrays.twists[:6].tolist())}
+    index = {
+        tuple(t): k for k, t in enumerate(query.library.arrays.library.twists[:6, :3].tolist())
+    }
     left, ahead, right = index[1.0, 0.0, 1.0], index[1.0, 0.0, 0.0], index[1.0, 0.0, -1.0]
     quarter = 0.5 * math.pi
     there = [(left, quarter), (ahead, 1.0), (right, 2 * quarter), (ahead, 1.0), (left, quarter),
              (ahead, 2.0)]  # fmt: skip
-    word = joined(there, goal=0)
+    word = joined(there, query, goal=0)
     assert_admitted(query, with_cost(word, query))
     ended = improve(query, word, deadline=math.inf, patience=Patience(attempts=2000, passes=1))
-    assert ended.word.trims.tolist() == [ahead]
+    assert ended.word.trims.tolist() == query.library.trims[[ahead]].tolist()
     assert ended.word.cost == pytest.approx(6.0, abs=1e-9)

@@ -346,7 +346,7 @@ CASES = """
 import json, sys
 import numpy as np
 from maneuver_automaton.search import search_insertion, search_words
-from maneuver_automaton.words import solve_switching_times, steer, steer_climbing
+from maneuver_automaton.words import solve_switching_times, steer
 from tests.search.cases import *
 answers = []
 for problem in (parking(), parking(REVERSED_SPIN), parking(cost=Cost(time=1.0), time=None)):

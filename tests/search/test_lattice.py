@@ -94,7 +94,7 @@ def test_nodes_are_ends_of_free_ways(name, rung, sign):
     if sign < 0.0 and problem.moves:
         pytest.skip("no search from a goal where something moves")
     one, nodes, links = grown(problem, sign=sign, rung=rung)
-    library, query = one.query.library.arrays, one.query
+    library, query = one.query.library.arrays.library, one.query
     children = np.flatnonzero(links[:, PARENT] >= 0)
     if not (
         one.arrays.state[kernels.FOUND] or problem.horizon.max_trims
@@ -105,7 +105,9 @@ def test_nodes_are_ends_of_free_ways(name, rung, sign):
     parents = links[children, PARENT]
     trims, times = links[children, TRIM], nodes[children, EDGE]
     # exact poses: those of the edge done from the parent's
-    steps = [plain_end([library.twists[k]], [sign * t]) for k, t in zip(trims, times, strict=True)]
+    steps = [
+        plain_end([library.twists[k, :3]], [sign * t]) for k, t in zip(trims, times, strict=True)
+    ]
     expected = (SE2(nodes[parents, :3]) @ SE2(np.array(steps)[:, :3])).pose
     assert np.abs(expected - nodes[children, :3]).max() < 1e-11
     # costs, times and counts add up
@@ -138,7 +140,7 @@ def test_nodes_are_ends_of_free_ways(name, rung, sign):
     rng = np.random.default_rng(1)
     for k in rng.permutation(len(children))[: 150 if COMPILED else 10]:
         since = np.linspace(0.0, times[k], 12)
-        way = driven(poses[parents[k]], library.twists[trims[k]], sign * since)
+        way = driven(poses[parents[k]], library.twists[trims[k], :3], sign * since)
         at = clock + nodes[parents[k], TIME] + since
         assert (world.clearance(way, at) > problem.margin - 1e-8).all()
         assert outside(problem, way[:, :2] + problem.start[:2]).max() < 1e-6
@@ -153,7 +155,7 @@ def test_a_connection_ends_at_a_goal_and_costs_what_it_says(name):
         assert not COMPILED
         return
     word = with_cost(found.word, query)
-    twists = query.library.arrays.twists[word.trims]
+    twists = problem.automaton.body_velocities[word.trims]
     goal = problem.goals[query.goal_index[word.goal]]
     start = SE2(query.start)
     end = (start @ SE2(plain_end(twists, word.durations)[:3])).pose if len(twists) else start.pose
@@ -162,7 +164,7 @@ def test_a_connection_ends_at_a_goal_and_costs_what_it_says(name):
     assert goal.free_heading or abs(math.remainder(off[2], 2 * math.pi)) < 1e-7
     assert (word.durations > 0.0).all()
     assert all(a != b for a, b in itertools.pairwise(word.trims.tolist()))
-    rates = problem.rates[query.library.trims[word.trims]] - query.library.rest_rate
+    rates = problem.rates[word.trims] - query.library.rest_rate
     assert word.cost == pytest.approx(
         float(rates @ word.durations) + problem.cost.switching(twists), rel=1e-12
     )
@@ -222,7 +224,7 @@ def test_who_waits_until_contact_is_still_somewhere():
 def test_the_same_at_every_call_and_from_used_memory():
     query = query_of(PROBLEMS["car"])
     rung, grids = Rung(), distance_grids(query)
-    memory = search_arrays(len(query.library.arrays.triples))
+    memory = search_arrays(query.library.arrays.library)
     said = []
     for arrays in (None, memory, memory):
         (one,) = both_ends(query, rung, grids=grids, arrays=arrays, ends=(1.0,))
@@ -259,14 +261,14 @@ def test_arrays_grow_and_forget_nothing():
 
 def test_joined_and_priced_by_hand():
     query = query_of(PROBLEMS["prices"])
-    gears = query.library.arrays.gears
+    gears = query.library.arrays.library.gears
     ahead = int(np.flatnonzero(gears > 0)[0])
     back = int(np.flatnonzero(gears < 0)[0])
-    word = joined([(ahead, 1.0), (ahead, 0.5), (back, 2.0), (ahead, 1.0)], goal=0)
-    assert word.trims.tolist() == [ahead, back, ahead]
+    word = joined([(ahead, 1.0), (ahead, 0.5), (back, 2.0), (ahead, 1.0)], query, goal=0)
+    assert word.trims.tolist() == query.library.trims[[ahead, back, ahead]].tolist()
     assert word.durations.tolist() == [1.5, 2.0, 1.0]
     assert with_cost(word, query).cost == pytest.approx(4.5 + 2 * 0.2 + 2 * 0.7)
-    assert with_cost(joined([], goal=0), query).cost == 0.0
+    assert with_cost(joined([], query, goal=0), query).cost == 0.0
 
 
 def test_a_lattice_without_a_way_out_is_exhausted():

@@ -23,8 +23,9 @@ from maneuver_automaton.search.maneuver_heights import altitude_ranges
 from maneuver_automaton.search.maneuver_lattice import plan_of, search_maneuvers
 from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
 from maneuver_automaton.search.result import SearchStatus
-from maneuver_automaton.words._kernels_candidates import NONE
-from maneuver_automaton.words.library import transfer_library, transfers
+from maneuver_automaton.words._kernels_candidates import NO_TRIM
+from maneuver_automaton.words.library import library_of
+from tests.reference_words import candidates
 from tests.search.cases import compiled_only
 
 pytestmark = compiled_only  # whole searches; their kernels have tests of their own
@@ -151,9 +152,9 @@ def test_a_moved_problem_has_the_moved_plan():
 
 
 def test_a_slope_makes_up_for_the_altitude_in_flight():
-    library = transfer_library(craft())
+    library = library_of(craft())
     cruise = craft().index_of("speed 10, turn_rate 0, climb 0")
-    rows = transfers(library, [0, 0, 0, 0], [150.0, 10.0, 0.2, 12.0], start_trim=cruise,
+    rows = candidates(library, [0, 0, 0, 0], [150.0, 10.0, 0.2, 12.0], start_trim=cruise,
                      goal_trim=cruise)  # fmt: skip
     slopes = [row for row in rows if craft().trims[row.trims[-1]].body_velocity[0] > 0.0]
     assert slopes
@@ -163,7 +164,7 @@ def test_a_slope_makes_up_for_the_altitude_in_flight():
     at = cruise
     for trim, t in zip((*best.trims, cruise), (*best.durations, 0.0), strict=True):
         for maneuver, _ in library.chain(at, trim):
-            assert maneuver != NONE
+            assert maneuver != NO_TRIM
             pose = pose @ SE2xR(craft().maneuvers[maneuver].displacement)
         pose = pose @ SE2xR.exp(t * craft().trims[trim].body_velocity)
         at = trim

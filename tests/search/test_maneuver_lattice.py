@@ -21,7 +21,7 @@ from maneuver_automaton.search.maneuver_motion import parts_of
 from maneuver_automaton.search.maneuver_query import maneuver_query
 from maneuver_automaton.search.maneuver_shortcuts import word_is_free
 from maneuver_automaton.search.result import SearchStatus
-from maneuver_automaton.words.library import transfer_library
+from maneuver_automaton.words.library import library_of
 from tests.search.automata import inertial_unicycle, linked, truck_with_trailer
 from tests.search.cases import compiled_only
 
@@ -36,7 +36,7 @@ START, GOAL = np.array([0.5, 0.0, 0.0]), np.array([4.0, 1.0, 2.0])
 @cache
 def library():
     automaton = inertial_unicycle(levels=3)
-    return transfer_library(automaton), parts_of(automaton, (BODY,))
+    return library_of(automaton), parts_of(automaton, (BODY,))
 
 
 def query(start=START, goal=GOAL, **changes):
@@ -100,7 +100,7 @@ def test_plans_are_exact_free_inside_and_cheaper_one_by_one():
 
 def test_the_same_expansions_find_the_same_plan():
     first, second = (search_maneuvers(query(), max_expansions=400) for _ in range(2))
-    assert first.best.trims == second.best.trims
+    assert first.best.trims.tolist() == second.best.trims.tolist()
     assert first.best.durations.tolist() == second.best.durations.tolist()
     assert first.found_after == second.found_after
 
@@ -117,7 +117,7 @@ def test_a_moved_problem_has_the_moved_plan():
         obstacles=tuple(obstacle.moved(by) for obstacle in WALLS),
     )
     here, there = (search_maneuvers(one, max_expansions=400) for one in (still, moved))
-    assert here.best.trims == there.best.trims
+    assert here.best.trims.tolist() == there.best.trims.tolist()
     a, b = plan_of(still, here.best), plan_of(moved, there.best)
     assert np.abs(a.durations - b.durations).max() < 1e-7
     assert np.abs((by @ SE2(a.end)).pose - b.end).max() < 1e-9
@@ -181,7 +181,7 @@ def test_a_trailer_stays_free_too():
     parts = parts_of(automaton, (BODY,), ((trailer,),))
     goal = np.array([3.0, 1.5, 1.0])
     here = maneuver_query(
-        transfer_library(automaton), parts, START, goal,
+        library_of(automaton), parts, START, goal,
         start_trim="0 at 0.00", goal_trim="0 at 0.00",
         obstacles=(Obstacle(Box([0.2, 3.0], [1.5, -1.0])), Obstacle(Box([0.2, 3.0], [3.5, 2.6]))),
     )  # fmt: skip
@@ -199,7 +199,7 @@ def test_a_trailer_wider_than_its_truck_does_not_close_the_way_of_the_truck():
     parts = parts_of(automaton, (Box([0.1, 0.1]),), ((Box([0.3, 0.6]),),))
     beside = Obstacle(Box([0.1, 1.0], [0.1, 0.6]))  # nearer to the truck than half the trailer
     here = maneuver_query(
-        transfer_library(automaton), parts, np.zeros(3), [0.2, 0.0, 0.0],
+        library_of(automaton), parts, np.zeros(3), [0.2, 0.0, 0.0],
         start_trim="0 at 0.00", goal_trim="0 at 0.00", obstacles=(beside,),
     )  # fmt: skip
     assert search_maneuvers(here, max_expansions=20, first_only=True).best is not None
@@ -213,7 +213,7 @@ def test_altitude_is_gained_on_the_way(height):
     towers = (Obstacle(Box([0.3, 3.0], [2.0, -0.8])), Obstacle(Box([0.3, 3.0], [4.0, 2.0])))
     goal = np.array([6.0, 1.0, 1.0, height])
     here = maneuver_query(
-        transfer_library(automaton), parts_of(automaton, (BODY,)), np.zeros(4), goal,
+        library_of(automaton), parts_of(automaton, (BODY,)), np.zeros(4), goal,
         start_trim="t0", goal_trim="t0", obstacles=towers,
     )  # fmt: skip
     result = search_maneuvers(here, max_expansions=8000, first_only=True)
@@ -244,7 +244,7 @@ def test_wrong_queries_are_refused():
 def test_a_switch_at_rest_proves_nothing():
     """Beside a wall, behind a switch of trims that takes no time, motions are looked at too."""
     automaton, trailer = truck_with_trailer(levels=3), Box([0.3, 0.25])
-    library = transfer_library(automaton)
+    library = library_of(automaton)
     parts = parts_of(automaton, (BODY,), ((trailer,),))
     heard = 0
     for side in (-0.4, 0.4):

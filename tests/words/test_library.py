@@ -12,11 +12,12 @@ from scipy.optimize import least_squares
 
 from maneuver_automaton._arrays import wrapped
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.groups import SE2, SE2xR
+from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.words import steer
-from maneuver_automaton.words.library import transfer_library, transfers
+from maneuver_automaton.words.library import library_of
+from tests.reference_words import candidates
 from tests.search.automata import joined_end, linked, model_of_kinds
 
 REST, AHEAD, LEFT, RIGHT = [0.0, 0, 0], [1.0, 0, 0], [1.0, 0, 1.0], [0.8, 0, -1.0]
@@ -43,8 +44,8 @@ def poses():
 @settings(max_examples=30)
 def test_every_transfer_ends_at_the_goal_and_costs_its_time(goal, trims):
     automaton = linked(CAR)
-    library = transfer_library(automaton)
-    rows = transfers(library, [1.0, 2, 3], goal, start_trim=trims[0], goal_trim=trims[1])
+    library = library_of(automaton)
+    rows = candidates(library, [1.0, 2, 3], goal, start_trim=trims[0], goal_trim=trims[1])
     assert rows
     assert [row.cost for row in rows] == sorted(row.cost for row in rows)
     for row in rows:
@@ -52,14 +53,14 @@ def test_every_transfer_ends_at_the_goal_and_costs_its_time(goal, trims):
         end = joined_end(automaton, library, [1.0, 2, 3], row.trims, row.durations, *trims)
         assert off(end, goal) < 1e-7  # tangent circles lose half the digits
         links = [trims[0], *row.trims, trims[1]]
-        between = sum(library.arrays.time[a, b] for a, b in itertools.pairwise(links))
+        between = sum(float(library.transitions.time[a, b]) for a, b in itertools.pairwise(links))
         assert row.duration == pytest.approx(row.durations.sum() + between, abs=1e-9)
         assert row.cost == pytest.approx(row.duration, abs=1e-9)
 
 
 def test_numeric_roots_are_found():
     automaton = linked(CAR)
-    library = transfer_library(automaton)
+    library = library_of(automaton)
     rng = np.random.default_rng(3)
     for _ in range(40):
         word = rng.permutation(6)[:3] + 1
@@ -75,7 +76,7 @@ def test_numeric_roots_are_found():
             return [end[0], end[1], np.sin(0.5 * end[2])]
 
         root = least_squares(miss, times + 1e-3 * rng.normal(size=3), xtol=1e-15, ftol=1e-15)
-        rows = transfers(library, np.zeros(3), goal, start_trim=0, goal_trim=0)
+        rows = candidates(library, np.zeros(3), goal, start_trim=0, goal_trim=0)
         mine = [row.durations for row in rows if row.trims == tuple(word)]
         assert mine
         assert np.abs(np.array(mine) - root.x).max(axis=1).min() < 1e-6
@@ -85,9 +86,9 @@ def test_without_displacements_it_is_the_steering_of_a_kinematic_vehicle():
     car = Automaton.of_controls(
         Unicycle(), {"rest": (0, 0), "ahead": (1, 0), "left": (1, 1), "right": (0.7, -1)}
     )
-    library = transfer_library(car)
+    library = library_of(car)
     goal = np.array([3.0, -1.0, 2.0])
-    rows = transfers(library, np.zeros(3), goal, start_trim=0, goal_trim=0)
+    rows = candidates(library, np.zeros(3), goal, start_trim=0, goal_trim=0)
     for word in itertools.product((1, 2, 3), repeat=3):
         if word[0] == word[1] or word[1] == word[2]:
             continue
@@ -101,10 +102,10 @@ def test_without_displacements_it_is_the_steering_of_a_kinematic_vehicle():
 @given(goal=poses(), by=poses())
 @settings(max_examples=30)
 def test_a_moved_problem_has_the_moved_answer(goal, by):
-    library = transfer_library(linked(CAR))
+    library = library_of(linked(CAR))
     start = np.array([0.3, 0.2, 0.1])
-    here = transfers(library, start, goal, start_trim=0, goal_trim=0)
-    there = transfers(
+    here = candidates(library, start, goal, start_trim=0, goal_trim=0)
+    there = candidates(
         library, (SE2(by) @ SE2(start)).pose, (SE2(by) @ SE2(goal)).pose, start_trim=0, goal_trim=0
     )
     best, moved = here[0], there[0]
@@ -114,16 +115,16 @@ def test_a_moved_problem_has_the_moved_answer(goal, by):
 @pytest.mark.parametrize("word", [(), (1,), (2,), (1, 2), (2, 1), (2, 3), (1, 4), (5, 1)])
 def test_words_of_fewer_trims_are_found_where_they_fit(word):
     automaton = linked(CAR)
-    library = transfer_library(automaton)
+    library = library_of(automaton)
     times = np.array([0.7, 0.4])[: len(word)]
     start = np.array([5.0, -3.0, 1.0])
     goal = joined_end(automaton, library, start, word, times, 0, 6)
-    rows = transfers(library, start, goal, start_trim=0, goal_trim=6)
+    rows = candidates(library, start, goal, start_trim=0, goal_trim=6)
     mine = [row.durations for row in rows if row.trims == word]
     assert len(mine) == 1
     assert np.abs(mine[0] - times).max(initial=0.0) < 1e-9
     aside = goal + np.array([1e-3, 2e-3, 3e-3])
-    rows = transfers(library, start, aside, start_trim=0, goal_trim=6)
+    rows = candidates(library, start, aside, start_trim=0, goal_trim=6)
     assert word not in [row.trims for row in rows]
 
 
@@ -133,9 +134,9 @@ def test_a_vertical_trim_makes_up_for_the_altitude(height):
     rising = [0.8, 0, 0.6, 0.1]
     twists = [[*REST, 0.0], [*AHEAD, 0.0], [*LEFT, 0.0], rising, up, down]
     automaton = linked(twists)
-    library = transfer_library(automaton)
+    library = library_of(automaton)
     goal = np.array([2.0, 3.0, 1.0, height])
-    rows = transfers(library, np.zeros(4), goal, start_trim=0, goal_trim=0)
+    rows = candidates(library, np.zeros(4), goal, start_trim=0, goal_trim=0)
     assert rows
     assert all(row.trims[-1] in (4, 5) for row in rows)
     assert not any(trim in (4, 5) for row in rows for trim in row.trims[:-1])
@@ -146,9 +147,9 @@ def test_a_vertical_trim_makes_up_for_the_altitude(height):
 
 def test_altitude_that_fits_needs_no_climb():
     automaton = linked([[*REST, 0.0], [*AHEAD, 0.0], [0.0, 0, 0, 0.5]])
-    library = transfer_library(automaton)
+    library = library_of(automaton)
     goal = joined_end(automaton, library, np.zeros(4), (1,), [2.0], 0, 0)
-    rows = transfers(library, np.zeros(4), goal, start_trim=0, goal_trim=0)
+    rows = candidates(library, np.zeros(4), goal, start_trim=0, goal_trim=0)
     assert (1,) in [row.trims for row in rows]
 
 
@@ -163,13 +164,13 @@ def test_chains_of_maneuvers_are_transitions():
         for a, b, x, t in [("rest", "slow", 0.5, 1.0), ("slow", "fast", 1.5, 1.0),
                            ("rest", "fast", 9.0, 5.0), ("fast", "rest", 2.0, 2.0)]
     )  # fmt: skip
-    library = transfer_library(Automaton(model_of_kinds(), trims, maneuvers))
+    library = library_of(Automaton(model_of_kinds(), trims, maneuvers))
     assert library.chain(0, 2) == ((0, 1), (1, 2))
     assert library.arrays.cost[0, 2] == 2.0
     first, second = (SE2(maneuvers[k].displacement) for k in (0, 1))
-    assert np.allclose(library.arrays.shift[0, 2, :3], (first @ second).pose, atol=1e-15)
+    assert np.allclose(library.displacements([0, 2])[0, :3], (first @ second).pose, atol=1e-15)
     assert np.isfinite(library.arrays.cost).all()
-    dear = transfer_library(
+    dear = library_of(
         Automaton(model_of_kinds(), trims, maneuvers), maneuver_costs=[9.0, 9.0, 1.0, 1.0]
     )
     assert dear.chain(0, 2) == ((2, 2),)
@@ -180,8 +181,8 @@ def test_trims_without_a_way_between_them_are_named():
         Trim(name=name, body_velocity=[v, 0, 0], control=[0, 0], reduced_state=[v])
         for name, v in (("rest", 0.0), ("fast", 2.0))
     )
-    library = transfer_library(Automaton(model_of_kinds(), trims))
-    assert transfers(library, [0, 0, 0], [1, 0, 0], start_trim=0, goal_trim=1) == []
+    library = library_of(Automaton(model_of_kinds(), trims))
+    assert candidates(library, [0, 0, 0], [1, 0, 0], start_trim=0, goal_trim=1) == []
     with pytest.raises(ValueError) as error:
         library.chain(0, 1)
     assert str(error.value) == "no maneuvers lead from 'rest' to 'fast'"
@@ -190,26 +191,18 @@ def test_trims_without_a_way_between_them_are_named():
 def test_wrong_prices_are_refused():
     automaton = linked(CAR)
     with pytest.raises(ValueError) as error:
-        transfer_library(automaton, rates=[1.0])
+        library_of(automaton, rates=[1.0])
     assert str(error.value) == "rates: got shape (1,), need (7,)"
     with pytest.raises(ValueError) as error:
-        transfer_library(automaton, maneuver_costs=[-1.0] * 42)
+        library_of(automaton, maneuver_costs=[-1.0] * 42)
     assert str(error.value) == "maneuver_costs: must not be negative, got -1.0"
 
 
 def test_a_large_library_is_represented_by_trims_that_differ():
     grid = [[v, 0.0, w] for v in np.linspace(-1, 1, 7) for w in np.linspace(-1, 1, 7)]
-    library = transfer_library(linked(grid), most_trims=12)
+    library = library_of(linked(grid), most_trims=12)
     used = np.unique(library.arrays.words)
     assert used.size == 13  # and the one that stands for none
     chosen = library.arrays.twists[used[used >= 0]]
     for twist in ([1, 0, 1, 0], [1, 0, -1, 0], [1, 0, 0, 0], [-1, 0, 0, 0], [0, 0, 1, 0]):
         assert np.abs(chosen - twist).max(axis=1).min() < 1e-12
-
-
-def test_climbing_poses_need_four_numbers():
-    library = transfer_library(linked([[0.0] * 4, [1.0, 0, 0, 0]]))
-    assert library.automaton.model.group is SE2xR
-    with pytest.raises(ValueError) as error:
-        transfers(library, [0, 0, 0], [1, 0, 0, 0], start_trim=0, goal_trim=0)
-    assert str(error.value) == "start: got shape (3,), need 4 components last"

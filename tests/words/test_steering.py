@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from maneuver_automaton.groups import SE2, SE2xR
-from maneuver_automaton.words import steer, steer_climbing
+from maneuver_automaton.words import steer
 from maneuver_automaton.words._kernels_steering import steer_batch
 from tests import reference
 
@@ -70,7 +70,7 @@ def test_every_triple_of_times_ends_at_the_goal(kind):
     n = 12
     twists, between, times, goals = planted(rng, np.tile(kind, (n, 1)), sideways=1.0, gaps=1.0)
     for row, gap, known, goal in zip(twists, between, times, goals, strict=True):
-        found = steer(row, goal, gaps=gap)
+        found = steer(row, goal, displacements=gap)
         assert 1 <= len(found) <= 2
         assert np.abs(found - known).max(axis=1).min() < 1e-6
         for solution in found:
@@ -96,7 +96,7 @@ def test_root_finding_from_many_starts_finds_nothing_else(kind):
     rng = np.random.default_rng(4)
     twists, between, _, goals = planted(rng, np.tile(kind, (3, 1)), sideways=1.0, gaps=1.0)
     for row, gap, goal in zip(twists, between, goals, strict=True):
-        found = steer(row, goal, gaps=gap)
+        found = steer(row, goal, displacements=gap)
         for root in reference.steering_roots(row, goal, gap, starts=12, longest=8.0, rng=rng):
             assert np.abs(found - root).max(axis=1).min() < 1e-4
 
@@ -127,7 +127,7 @@ def test_moved_problems_have_the_same_times_to_nine_digits():
     for row, gap, goal in zip(twists, between, goals, strict=True):
         by, start = SE2(rng.uniform(-20, 20, 3)), SE2(rng.uniform(-5, 5, 3))
         moved = (by @ start).inverse() @ (by @ start @ SE2(goal))
-        here, there = steer(row, goal, gaps=gap), steer(row, moved.pose, gaps=gap)
+        here, there = steer(row, goal, displacements=gap), steer(row, moved.pose, displacements=gap)
         assert there == pytest.approx(here, abs=1e-9)
 
 
@@ -252,7 +252,7 @@ def test_planted_climbs_are_found(fourth):
     rng = np.random.default_rng(10)
     for _ in range(25):
         twists, gaps, times, goal = climbing(rng, fourth=fourth)
-        found = steer_climbing(twists, goal, gaps=gaps)
+        found = steer(twists, goal, displacements=gaps)
         assert np.abs(found - times).max(axis=1).min() < 1e-6
         for solution in found:
             assert solution.min() >= 0.0
@@ -266,35 +266,35 @@ def test_a_moved_climb_has_the_same_times():
     for _ in range(5):
         by = SE2xR(rng.uniform(-20, 20, 4))
         moved = (by.inverse() @ (by @ SE2xR(goal))).pose
-        here, there = (steer_climbing(twists, end, gaps=gaps) for end in (goal, moved))
+        here, there = (steer(twists, end, displacements=gaps) for end in (goal, moved))
         assert there == pytest.approx(here, abs=1e-9)
 
 
 def test_climbs_by_hand():
     spin, ahead = [*SPIN, 0.0], [*AHEAD, 0.0]
-    lift = steer_climbing([spin, ahead, spin, UP], [1.0, 1.0, np.pi / 2, 2.0])
+    lift = steer([spin, ahead, spin, UP], [1.0, 1.0, np.pi / 2, 2.0])
     assert lift == pytest.approx(np.array([[np.pi / 4, np.sqrt(2), np.pi / 4, 4.0]]))
     # two metres up take four seconds of the rising straight, at the end
-    rise = steer_climbing([spin, ahead, spin, RISE], [6.0, 0.0, 0.0, 2.0])
+    rise = steer([spin, ahead, spin, RISE], [6.0, 0.0, 0.0, 2.0])
     assert np.array([0.0, 2.0, 0.0, 4.0]) == pytest.approx(rise[0], abs=1e-9)
     # one turn of a helix
-    helix = steer_climbing([spin, ahead, spin, [1.0, 0, 1.0, 1.0]], [0, 0, 0, 3.0])
+    helix = steer([spin, ahead, spin, [1.0, 0, 1.0, 1.0]], [0, 0, 0, 3.0])
     assert helix[:, 3] == pytest.approx([3.0])
-    down = steer_climbing([spin, ahead, spin, UP], [1.0, 1.0, np.pi / 2, -2.0])
+    down = steer([spin, ahead, spin, UP], [1.0, 1.0, np.pi / 2, -2.0])
     assert down.shape == (0, 4)
 
 
 def test_longest_limits_the_fourth_time():
     trims = [[*SPIN, 0.0], [*AHEAD, 0.0], [*SPIN, 0.0], RISE]
-    assert steer_climbing(trims, [6.0, 0, 0, 2.0], longest=3.0).shape == (0, 4)
-    assert len(steer_climbing(trims, [6.0, 0, 0, 2.0], longest=5.0)) > 0
+    assert steer(trims, [6.0, 0, 0, 2.0], longest=3.0).shape == (0, 4)
+    assert len(steer(trims, [6.0, 0, 0, 2.0], longest=5.0)) > 0
 
 
 def test_what_leaves_the_altitude_open_gives_none():
     flat = [[*LEFT, 0.0], [*AHEAD, 0.0], [*RIGHT, 0.0], [1.0, 0, 0.5, 0.0]]
-    assert steer_climbing(flat, [4.0, 2.0, 0, 0]).shape == (0, 4)
-    assert steer_climbing(flat, [4.0, 2.0, 0, 1.0]).shape == (0, 4)
-    assert steer_climbing([*flat[:3], [0, 0, 0, 0]], [4.0, 2.0, 0, 0]).shape == (0, 4)
+    assert steer(flat, [4.0, 2.0, 0, 0]).shape == (0, 4)
+    assert steer(flat, [4.0, 2.0, 0, 1.0]).shape == (0, 4)
+    assert steer([*flat[:3], [0, 0, 0, 0]], [4.0, 2.0, 0, 0]).shape == (0, 4)
 
 
 @pytest.mark.parametrize(
@@ -333,4 +333,4 @@ def test_wrong_input(twists, goal, options, message):
 )
 def test_wrong_climbing_input(twists, goal, options, message):
     with pytest.raises(ValueError, match=message):
-        steer_climbing(twists, goal, **options)
+        steer(twists, goal, **options)

@@ -1,0 +1,129 @@
+"""Transitions: the cheapest chain of maneuvers from each class of trims to each other.
+
+Trims of one class switch at will, so what leads from trim to trim depends on their classes alone:
+a kinematic vehicle has one class, whose only transition is the identity, however many trims it has.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.automaton import Automaton
+
+SWITCH = -1  # the maneuver of a switch at will: the identity
+HOP = 1e-9  # of the dearest maneuver: of equally cheap chains the one with the fewest maneuvers
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Transitions:
+    """The cheapest chain of maneuvers between any two of C classes of trims."""
+
+    class_of: IntArray  # (m,) of the automaton's trims
+    displacement: Array  # (C, C, 4) a planar one has no height
+    cost: Array  # (C, C) of the maneuvers, inf where no chain leads
+    time: Array  # (C, C) [s]
+    first: IntArray  # (C, C) first maneuver of the chain, -1 where there is none
+    sources: IntArray  # (M,) trim before each maneuver
+    targets: IntArray  # (M,) and after it
+
+    def chain(self, source: int, target: int) -> tuple[tuple[int, int], ...]:
+        """What leads from trim to trim: each (maneuver, trim it leads to), SWITCH for a switch.
+
+        Raises
+        ------
+        ValueError
+            If no chain of maneuvers leads there.
+        """
+        links: list[tuple[int, int]] = []
+        while self.class_of[source] != self.class_of[target]:
+            maneuver = int(self.first[self.class_of[source], self.class_of[target]])
+            if maneuver < 0:
+                raise ValueError(f"no maneuvers lead from trim {source} to trim {target}")
+            if self.sources[maneuver] != source:
+                links.append((SWITCH, int(self.sources[maneuver])))
+            source = int(self.targets[maneuver])
+            links.append((maneuver, source))
+        if source != target:
+            links.append((SWITCH, target))
+        return tuple(links)
+
+
+def transitions_of(automaton: Automaton, prices: Array) -> Transitions:
+    """The transitions of an automaton whose maneuvers cost `prices` (M,).
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
+    >>> transitions_of(robot, np.zeros(0)).cost.tolist()
+    [[0.0]]
+    """
+    sources = np.array([automaton.index_of(one.source) for one in automaton.maneuvers], dtype=int)
+    targets = np.array([automaton.index_of(one.target) for one in automaton.maneuvers], dtype=int)
+    class_of = automaton.trim_classes
+    n = int(class_of.max()) + 1
+    before = _predecessors(n, class_of[sources], class_of[targets], prices)
+    gained, lasting = np.zeros((len(prices), 4)), np.zeros(len(prices))
+    for k, maneuver in enumerate(automaton.maneuvers):
+        gained[k, : maneuver.displacement.size] = maneuver.displacement
+        lasting[k] = maneuver.duration
+    first = np.full((n, n), SWITCH)
+    cost, time, displacement = np.full((n, n), np.inf), np.zeros((n, n)), np.zeros((n, n, 4))
+    np.fill_diagonal(cost, 0.0)
+    # A chain is known once the chain to its last but one class is: short chains come first.
+    rows, columns = np.nonzero(before >= 0)
+    while rows.size:
+        last = before[rows, columns]
+        middle = class_of[sources[last]]
+        known = np.isfinite(cost[rows, middle])
+        i, j, k, via = rows[known], columns[known], last[known], middle[known]
+        first[i, j] = np.where(i == via, k, first[i, via])
+        cost[i, j] = cost[i, via] + prices[k]
+        time[i, j] = time[i, via] + lasting[k]
+        displacement[i, j] = _composed(displacement[i, via], gained[k])
+        rows, columns = rows[~known], columns[~known]
+    return Transitions(
+        class_of=class_of,
+        displacement=displacement,
+        cost=cost,
+        time=time,
+        first=np.asarray(first, dtype=np.int64),
+        sources=np.asarray(sources, dtype=np.int64),
+        targets=np.asarray(targets, dtype=np.int64),
+    )
+
+
+def _predecessors(n: int, sources: IntArray, targets: IntArray, prices: Array) -> IntArray:
+    """Last maneuver (n, n) of the cheapest chain from class to class; -1 for none."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import dijkstra
+
+    best = np.full((n, n), -1)
+    if not prices.size:
+        return best
+    weights = prices + HOP * max(float(prices.max()), 1.0)
+    leads = np.flatnonzero(sources != targets)
+    # Between two classes the cheapest maneuver, the first of equals.
+    order = leads[np.lexsort((leads, weights[leads], targets[leads], sources[leads]))]
+    new = np.ones(order.size, dtype=bool)
+    new[1:] = (np.diff(sources[order]) != 0) | (np.diff(targets[order]) != 0)
+    direct = order[new]
+    graph = csr_array((weights[direct], (sources[direct], targets[direct])), shape=(n, n))
+    edge = np.full((n, n), -1)
+    edge[sources[direct], targets[direct]] = direct
+    _, before = dijkstra(graph, return_predecessors=True)
+    rows, columns = np.nonzero(before >= 0)
+    best[rows, columns] = edge[before[rows, columns], columns]
+    return best
+
+
+def _composed(before: Array, after: Array) -> Array:
+    """Displacements (n, 4), each of `after` done in the frame of `before`."""
+    c, s = np.cos(before[:, 2]), np.sin(before[:, 2])
+    done = before + after
+    done[:, 0] = before[:, 0] + c * after[:, 0] - s * after[:, 1]
+    done[:, 1] = before[:, 1] + s * after[:, 0] + c * after[:, 1]
+    return done
