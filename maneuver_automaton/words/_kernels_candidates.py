@@ -196,8 +196,8 @@ def step_of(lib, before, trim):
 
 @inner_kernel
 def way_cost(lib, way, a, b, c):
-    """Least cost of coasting `way` by these trims: the way that transitions do not make."""
-    left, price = abs(way), math.inf
+    """Least cost of coasting a distance by these trims: what transitions do not make of it."""
+    left, price = way, math.inf
     if a >= 0:
         price = lib.per_metre[a]
     if b >= 0:
@@ -233,6 +233,7 @@ def candidates(lib, words, n_words, start, before, goal, after, upper_bound, scr
         e_x, e_y, e_heading = g_x, g_y, g_heading
         h_x, h_y, h_heading = g_x, g_y, g_heading
         rel = seen(s_x, s_y, s_heading, e_x, e_y, e_heading)
+        way = abs(rel[0])
         for row in range(n_words):
             a, b, c = words[row, 0], words[row, 1], words[row, 2]
             n_trims = 3 if c >= 0 else 2 if b >= 0 else 1 if a >= 0 else 0
@@ -256,6 +257,7 @@ def candidates(lib, words, n_words, start, before, goal, after, upper_bound, scr
                 if climb >= 0:
                     e_x, e_y, e_heading = before_climb(lib, (h_x, h_y, h_heading), last, climb, 0.0)
                 rel = seen(s_x, s_y, s_heading, e_x, e_y, e_heading)
+                way = abs(rel[0])
             fixed = way_in + way_out
             slope = 0.0
             if climbing >= lib.n_upright:  # it drives as it climbs: its time is known before
@@ -270,16 +272,27 @@ def candidates(lib, words, n_words, start, before, goal, after, upper_bound, scr
                     continue
                 e_x, e_y, e_heading = before_climb(lib, (h_x, h_y, h_heading), last, climb, slope)
                 rel = seen(s_x, s_y, s_heading, e_x, e_y, e_heading)
+                way = abs(rel[0])
                 fixed += slope * lib.rates[climb]
-            if n_trims >= 2:
-                fixed += cost_between(lib, a, b)
-            if n_trims == 3:
-                fixed += cost_between(lib, b, c)
-            if not fixed + way_cost(lib, rel[0], a, b, c) < upper_bound:
-                continue
+            if one_class and n_trims == 3:
+                price = min(lib.per_metre[a], lib.per_metre[b], lib.per_metre[c])
+                if way > lib.met and not way * price < upper_bound:
+                    continue
+            else:
+                if n_trims >= 2:
+                    fixed += cost_between(lib, a, b)
+                if n_trims == 3:
+                    fixed += cost_between(lib, b, c)
+                if not fixed + way_cost(lib, way, a, b, c) < upper_bound:
+                    continue
             branches = scratch.branches
             n_branches = 1
-            if n_trims == 3:
+            if n_trims == 3 and one_class:  # displacements known to be none cost no time
+                nothing = (0j, 0.0)
+                first, second, third = motion_of(lib, a), motion_of(lib, b), motion_of(lib, c)
+                steer(first, nothing, second, nothing, third, rel, lib.tolerance, branches)
+                n_branches = 2
+            elif n_trims == 3:
                 steer(
                     motion_of(lib, a),
                     step_of(lib, a, b),
@@ -314,7 +327,7 @@ def candidates(lib, words, n_words, start, before, goal, after, upper_bound, scr
                         break
                     if t >= lib.periods[this] * (1.0 - WHOLE) or t < lib.shortest:
                         t = 0.0
-                    branches[branch, n] = t
+                    scratch.times[count, n] = t
                     if t > 0.0 and this < lib.n_trims:  # the turn of a free heading is no trim
                         cost += t * lib.rates[this] + price_of_switch(lib, trim, gear, this)
                         if t > lib.longest[this] or (t < lib.min_coast and trim != this):
@@ -333,13 +346,21 @@ def candidates(lib, words, n_words, start, before, goal, after, upper_bound, scr
                         cost += lib.direction_change
                 if not cost < upper_bound:
                     continue
-                times = branches[branch]
+                for n in range(n_trims, 3):
+                    scratch.times[count, n] = 0.0
                 t = slope
                 if slope > 0.0:
                     duration += slope
                 elif lib.climbs.shape[0] > 0:
                     t = climb_time(
-                        lib, words[row], last, goal_trim, climb, start_trim, g_z - z, times
+                        lib,
+                        words[row],
+                        last,
+                        goal_trim,
+                        climb,
+                        start_trim,
+                        g_z - z,
+                        scratch.times[count],
                     )
                     if not t >= 0.0 or (climb >= 0 and t < lib.shortest):
                         continue
@@ -348,7 +369,8 @@ def candidates(lib, words, n_words, start, before, goal, after, upper_bound, scr
                         duration += t
                 if n_trims < 3:  # fewer times than the goal has coordinates: does it meet the goal?
                     folded, target = (s_x, s_y, s_heading), (e_x, e_y, e_heading)
-                    if not word_misses(lib, words[row], folded, target, times) <= lib.met * size:
+                    missed = word_misses(lib, words[row], folded, target, scratch.times[count])
+                    if not missed <= lib.met * size:
                         continue
                 if not one_class:
                     if n_trims:
@@ -366,8 +388,6 @@ def candidates(lib, words, n_words, start, before, goal, after, upper_bound, scr
                 scratch.durations[count] = duration
                 scratch.rows[count] = row
                 scratch.climbs[count] = climb
-                for n in range(3):
-                    scratch.times[count, n] = times[n] if n < n_trims else 0.0
                 scratch.times[count, 3] = t
                 count += 1
     return count

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
+from maneuver_automaton._compile import inlined_kernel, inner_kernel, kernel
 
 
 @inner_kernel
@@ -82,7 +82,7 @@ def two_lines(point, first, second, tolerance):
     return (point.conjugate() * second).imag / area, (first.conjugate() * point).imag / area
 
 
-@bare_inner_kernel
+@inlined_kernel
 def steer(a, gap_ab, b, gap_bc, c, goal, tolerance, out):
     """Fill `out` (2, 3) with the coasting times that carry the identity to `goal`, NaN where none.
 
