@@ -338,7 +338,7 @@ def _most_different(twists: Array, n: int) -> IntArray:
 
     One after the other the farthest from all before, straight and forward ones first of equals.
     """
-    size = np.abs(twists).max(axis=0)
+    size = np.abs(twists).max(axis=0, initial=0.0)
     rows = twists / np.where(size > 0.0, size, 1.0)
     nearest = np.linalg.norm(rows, axis=1)
     zeros = np.count_nonzero(rows == 0.0, axis=1)
