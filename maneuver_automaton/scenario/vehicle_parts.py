@@ -174,6 +174,15 @@ class HelicopterPart(Part):
     footprint: Footprint | None = Field(None, description="shape of the body, seen from above")
 
 
+class LatticeBodyPart(Part):
+    """A body that moves by lattice primitives alone; its library is a file of Nav2 or SBPL."""
+
+    model: Literal["lattice_body"] = Field(description="lattice_body")
+    resolution_m: Positive = Field(description="side of a cell, a positive number")
+    turning_radius_m: Positive | None = Field(None, description="as the file of primitives has it")
+    footprint: Footprint | None = Field(None, description="shape of the body")
+
+
 PARTS: tuple[type[Part], ...] = (
     UnicyclePart,
     CarPart,
@@ -183,6 +192,7 @@ PARTS: tuple[type[Part], ...] = (
     SingleTrackPart,
     HovercraftPart,
     HelicopterPart,
+    LatticeBodyPart,
 )
 MODELS = tuple(str(part.model_fields["model"].description) for part in PARTS)
 
@@ -211,7 +221,8 @@ VehiclePart = Annotated[
     | Annotated[CarWithTrailerPart, Tag("<car_with_trailer>")]
     | Annotated[SingleTrackPart, Tag("<single_track>")]
     | Annotated[HovercraftPart, Tag("<hovercraft>")]
-    | Annotated[HelicopterPart, Tag("<helicopter>")],
+    | Annotated[HelicopterPart, Tag("<helicopter>")]
+    | Annotated[LatticeBodyPart, Tag("<lattice_body>")],
     Discriminator(_model_of),
     BeforeValidator(_check_model),
 ]

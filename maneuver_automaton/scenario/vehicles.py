@@ -11,6 +11,7 @@ from maneuver_automaton.models import (
     CarWithTrailer,
     Helicopter,
     Hovercraft,
+    LatticeBody,
     Model,
     SecondOrderCar,
     SecondOrderUnicycle,
@@ -47,6 +48,7 @@ KINDS: Mapping[str, Any] = {
         SingleTrack,
         Hovercraft,
         Helicopter,
+        LatticeBody,
     )
 }
 
