@@ -31,7 +31,9 @@ from maneuver_automaton.search.transfer import TransferArrays, TransferLibrary
 QUANTA = (0.17, 0.5)  # lengths of coasts, in length scales
 SPIN_QUANTA = (math.pi / 12.0, math.pi / 4.0)  # [rad] of turns on the spot
 CELL = 0.122  # side of a cell of the first pass, in length scales
-OF_A_LATTICE = 0.7  # of its resolution: the diagonal of a cell is shorter than the way between poses
+OF_A_LATTICE = (
+    0.7  # of its resolution: the diagonal of a cell is shorter than the way between poses
+)
 
 
 class ManeuverArrays(NamedTuple):
