@@ -16,6 +16,7 @@ from maneuver_automaton.models import (
     Hovercraft,
     LatticeBody,
     Model,
+    Omnidirectional,
     SecondOrderCar,
     SecondOrderUnicycle,
     SingleTrack,
@@ -35,6 +36,7 @@ KINDS: Mapping[str, Any] = {
         Helicopter,
         AcceleratingCar,
         LatticeBody,
+        Omnidirectional,
     )
 }
 

@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision import Box
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.commonroad import read_commonroad
@@ -31,7 +34,8 @@ def load_scenario(
         Scenario, TPCAP case, Nav2 map, dynobench problem, MovingAI map or queries, SBPL
         environment, Bench-MR world: told apart by their endings, YAML files by their keys.
     beside : Path or str, optional
-        A scenario for what the file leaves out, such as the vehicle. What the file states wins.
+        A scenario for what the file leaves out, such as the vehicle. What the file states wins;
+        start and goal may be missing in the scenario where the file states them.
     case : int, optional
         Which problem of a file that holds several, from 0.
 
@@ -56,7 +60,9 @@ def load_scenario(
     statement = _chosen(path, statements, case)
     if statement.road is not None:
         raise InvalidScenario(f"{path}: is a drive on roads, which only plan and mpc know")
-    rest = None if beside is None else _scenario_beside(Path(beside))
+    rest = None
+    if beside is not None:
+        rest = _scenario_beside(Path(beside), start=statement.start, goal=statement.goal)
     scenario = combined(statement, rest, path=path)
     made = scenario.timing_s.get("automaton", 0.0)
     load = time.perf_counter() - begin - made
@@ -85,7 +91,8 @@ def load_road(
     assert scene is not None  # every statement of this format has one
     if beside is None:
         return scene, RoadVehicle()
-    rest = _scenario_beside(Path(beside)).problem
+    anywhere = np.zeros(3)  # the scene states its own
+    rest = _scenario_beside(Path(beside), start=anywhere, goal=anywhere).problem
     model, footprint = rest.automaton.model, rest.footprint
     if not isinstance(model, SecondOrderCar):
         raise InvalidScenario(
@@ -116,10 +123,15 @@ def statements_of(path: Path) -> tuple[Statement, ...] | None:
     return read(path) if read else yaml_statements(parse(read_text(path), name=str(path)), path)
 
 
-def _scenario_beside(path: Path) -> Scenario:
+def _scenario_beside(path: Path, *, start: Array | None, goal: Array | None) -> Scenario:
+    """The scenario of --with; it needs no start and goal where the problem states them."""
     begin = time.perf_counter()
     try:
         document = parse(read_text(path), name=str(path))
+        if isinstance(document.value, dict):
+            known = {"start": start, "goal": goal}
+            ends = {k: {"pose": pose.tolist()} for k, pose in known.items() if pose is not None}
+            document = replace(document, value=ends | document.value)
         return scenario_of_document(document, path=path, begin=begin)
     except InvalidScenario as error:
         raise InvalidScenario(f"--with: {error}") from error

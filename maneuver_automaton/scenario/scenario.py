@@ -102,6 +102,7 @@ def scenario_of_document(document: Document, *, path: Path | None, begin: float)
             name: footprint_of(document, body, key=name)
             for name, body in carried_of(file.vehicle).items()
         },
+        height=getattr(file.vehicle, "footprint_height_m", None) or (0.0, 0.0),
     )
     obstacles, maps = obstacles_of(document, file.obstacles, folder)
     read = time.perf_counter()
@@ -124,6 +125,7 @@ class _Bodies(NamedTuple):
 
     vehicle: tuple[Shape, ...]
     parts: Mapping[str, tuple[Shape, ...]]  # what it carries, by name
+    height: tuple[float, float]  # [m] lowest and highest point about the altitude of the pose
 
 
 def _refuse_long_words(document: Document, file: ScenarioFile) -> None:
@@ -178,6 +180,7 @@ def _problem(
             obstacles=obstacles,
             footprint=bodies.vehicle,
             parts=bodies.parts,
+            body_height=bodies.height,
             margin=file.margin_m,
             zones=zones_of(document, file.zones),
         )

@@ -10,6 +10,7 @@ from pydantic import AllowInfNan, BeforeValidator, Discriminator, Field, Strict,
 from pydantic_core import PydanticCustomError
 
 from maneuver_automaton.scenario.checks import (
+    Interval,
     Need,
     NotNegative,
     Number,
@@ -172,6 +173,9 @@ class HelicopterPart(Part):
     min_speed_m_s: Number | None = Field(None, description="left out: as fast backwards")
     gravity_m_s2: Positive | None = Field(None, description="left out: 9.81")
     footprint: Footprint | None = Field(None, description="shape of the body, seen from above")
+    footprint_height_m: Interval | None = Field(
+        None, description="[low, high] of the body about its altitude; left out: a flat body"
+    )
 
 
 class LatticeBodyPart(Part):
@@ -180,6 +184,16 @@ class LatticeBodyPart(Part):
     model: Literal["lattice_body"] = Field(description="lattice_body")
     resolution_m: Positive = Field(description="side of a cell, a positive number")
     turning_radius_m: Positive | None = Field(None, description="as the file of primitives has it")
+    footprint: Footprint | None = Field(None, description="shape of the body")
+
+
+class OmnidirectionalPart(Part):
+    """A platform that moves ahead, aside and turns at once; control [v, v aside, omega]."""
+
+    model: Literal["omnidirectional"] = Field(description="omnidirectional")
+    max_speed_m_s: Positive | None = Field(None, description="left out: no limit")
+    max_lateral_speed_m_s: Positive | None = Field(None, description="left out: no limit")
+    max_turn_rate_rad_s: Positive | None = Field(None, description="left out: no limit")
     footprint: Footprint | None = Field(None, description="shape of the body")
 
 
@@ -193,6 +207,7 @@ PARTS: tuple[type[Part], ...] = (
     HovercraftPart,
     HelicopterPart,
     LatticeBodyPart,
+    OmnidirectionalPart,
 )
 MODELS = tuple(str(part.model_fields["model"].description) for part in PARTS)
 
@@ -222,7 +237,8 @@ VehiclePart = Annotated[
     | Annotated[SingleTrackPart, Tag("<single_track>")]
     | Annotated[HovercraftPart, Tag("<hovercraft>")]
     | Annotated[HelicopterPart, Tag("<helicopter>")]
-    | Annotated[LatticeBodyPart, Tag("<lattice_body>")],
+    | Annotated[LatticeBodyPart, Tag("<lattice_body>")]
+    | Annotated[OmnidirectionalPart, Tag("<omnidirectional>")],
     Discriminator(_model_of),
     BeforeValidator(_check_model),
 ]

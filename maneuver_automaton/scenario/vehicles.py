@@ -13,6 +13,7 @@ from maneuver_automaton.models import (
     Hovercraft,
     LatticeBody,
     Model,
+    Omnidirectional,
     SecondOrderCar,
     SecondOrderUnicycle,
     SingleTrack,
@@ -49,6 +50,7 @@ KINDS: Mapping[str, Any] = {
         Hovercraft,
         Helicopter,
         LatticeBody,
+        Omnidirectional,
     )
 }
 

@@ -92,9 +92,7 @@ def on_grid(result):
 @pytest.mark.parametrize("walled", [False, True])
 def test_a_goal_on_the_lattice_is_reached_at_the_least_cost(goal, there, walled):
     obstacles = (Obstacle(WALL),) if walled else ()
-    problem = Problem(
-        library(), [0, 0, 0], goal, footprint=BODY, obstacles=obstacles, search=WORK
-    )
+    problem = Problem(library(), [0, 0, 0], goal, footprint=BODY, obstacles=obstacles, search=WORK)
     result = plan(problem, time_limit=60.0)
     assert result.status is PlanStatus.FOUND, result.reason
     np.testing.assert_allclose(result.plan.end[:2], goal[:2], atol=1e-9)
