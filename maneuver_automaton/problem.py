@@ -333,7 +333,7 @@ class Problem:
             self.cost.rates(controls, model.body_velocity(states, controls))
             for states in (course.reduced_state[:-1], course.reduced_state[1:])
         ]
-        return float(np.diff(course.time) @ (ends[0] + ends[1])) / 2.0
+        return maneuver.cost_multiplier * float(np.diff(course.time) @ (ends[0] + ends[1])) / 2.0
 
     def _velocities(self, primitive: Primitive) -> Array:
         """Body velocities (n, dof) of a primitive, one for every stretch in one direction."""

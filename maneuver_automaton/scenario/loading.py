@@ -17,14 +17,18 @@ from maneuver_automaton.formats.recognition import reader_of, yaml_statements
 from maneuver_automaton.formats.statement import Statement
 from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import parse
-from maneuver_automaton.models import SecondOrderCar
+from maneuver_automaton.models import Model, SecondOrderCar
 from maneuver_automaton.roads import RoadScene, RoadVehicle
 from maneuver_automaton.scenario.combining import combined
 from maneuver_automaton.scenario.scenario import Scenario, scenario_of_document
 
 
 def load_scenario(
-    path: Path | str, *, beside: Path | str | None = None, case: int | None = None
+    path: Path | str,
+    *,
+    beside: Path | str | None = None,
+    case: int | None = None,
+    model: Model | None = None,
 ) -> Scenario:
     """The problem of a file: a scenario, or another format that states one or a part of one.
 
@@ -38,6 +42,8 @@ def load_scenario(
         start and goal may be missing in the scenario where the file states them.
     case : int, optional
         Which problem of a file that holds several, from 0.
+    model : Model, optional
+        A vehicle of the user's own, which the scenario names: a file cannot state it.
 
     Raises
     ------
@@ -55,14 +61,18 @@ def load_scenario(
         if found is None:
             if isinstance(document.value, dict) and "schema" in document.value:
                 _refuse_parts(path, beside, case)
-            return scenario_of_document(document, path=path, begin=begin)
+            return scenario_of_document(document, path=path, begin=begin, own=model)
         statements = found
     statement = _chosen(path, statements, case)
     if statement.road is not None:
         raise InvalidScenario(f"{path}: is a drive on roads, which only plan and mpc know")
     rest = None
     if beside is not None:
-        rest = _scenario_beside(Path(beside), start=statement.start, goal=statement.goal)
+        rest = _scenario_beside(Path(beside), start=statement.start, goal=statement.goal, own=model)
+    elif model is not None:
+        raise InvalidScenario(
+            f"{path}: names no vehicle of yours; need --with and a scenario that does"
+        )
     scenario = combined(statement, rest, path=path)
     made = scenario.timing_s.get("automaton", 0.0)
     load = time.perf_counter() - begin - made
@@ -123,7 +133,9 @@ def statements_of(path: Path) -> tuple[Statement, ...] | None:
     return read(path) if read else yaml_statements(parse(read_text(path), name=str(path)), path)
 
 
-def _scenario_beside(path: Path, *, start: Array | None, goal: Array | None) -> Scenario:
+def _scenario_beside(
+    path: Path, *, start: Array | None, goal: Array | None, own: Model | None = None
+) -> Scenario:
     """The scenario of --with; it needs no start and goal where the problem states them."""
     begin = time.perf_counter()
     try:
@@ -132,7 +144,7 @@ def _scenario_beside(path: Path, *, start: Array | None, goal: Array | None) -> 
             known = {"start": start, "goal": goal}
             ends = {k: {"pose": pose.tolist()} for k, pose in known.items() if pose is not None}
             document = replace(document, value=ends | document.value)
-        return scenario_of_document(document, path=path, begin=begin)
+        return scenario_of_document(document, path=path, begin=begin, own=own)
     except InvalidScenario as error:
         raise InvalidScenario(f"--with: {error}") from error
 

@@ -41,7 +41,6 @@ from maneuver_automaton.scenario.checks import (
 )
 from maneuver_automaton.scenario.vehicle_parts import VehiclePart
 
-
 Pose = Annotated[
     tuple[Number, ...],
     Several("a pose [x, y, heading], a list of 3 numbers", at_least=3, at_most=4),

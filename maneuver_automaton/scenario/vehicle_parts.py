@@ -6,11 +6,20 @@ import math
 from typing import Annotated, Any, ClassVar, Literal
 
 from annotated_types import Gt, Lt
-from pydantic import AllowInfNan, BeforeValidator, Discriminator, Field, Strict, Tag
+from pydantic import (
+    AllowInfNan,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    Strict,
+    Tag,
+    ValidationInfo,
+)
 from pydantic_core import PydanticCustomError
 
 from maneuver_automaton.scenario.checks import (
     Interval,
+    Name,
     Need,
     NotNegative,
     Number,
@@ -197,6 +206,19 @@ class OmnidirectionalPart(Part):
     footprint: Footprint | None = Field(None, description="shape of the body")
 
 
+class OwnPart(Part):
+    """A vehicle of the user's own, by its name: the model itself is given to the program."""
+
+    model: Name = Field(description="the name of a model that is given with --model")
+    footprint: Footprint | None = Field(None, description="shape of the body")
+    footprint_height_m: Interval | None = Field(
+        None, description="[low, high] of the body about its altitude; left out: a flat body"
+    )
+    parts: dict[str, Footprint] | None = Field(
+        None, description="shapes of what it carries, by the model's names of these"
+    )
+
+
 PARTS: tuple[type[Part], ...] = (
     UnicyclePart,
     CarPart,
@@ -212,20 +234,23 @@ PARTS: tuple[type[Part], ...] = (
 MODELS = tuple(str(part.model_fields["model"].description) for part in PARTS)
 
 
-def _check_model(value: Any) -> Any:
+def _check_model(value: Any, info: ValidationInfo) -> Any:
     if not isinstance(value, dict):
         raise need("a mapping with the key model")
-    what = f"one of {', '.join(MODELS)}"
+    own = (info.context or {}).get("own")  # the name of the model that is given beside the file
+    if own is not None and value.get("model") == own:
+        return value
+    what = f"{own!r}, the model that is given" if own else f"one of {', '.join(MODELS)}"
     if "model" not in value:
         raise PydanticCustomError("missing_key", "", {"key": "model", "what": what})
-    if value["model"] not in MODELS:
+    if value["model"] not in MODELS or own is not None:
         raise PydanticCustomError("at_key", "", {"key": "model", "need": what})
     return value
 
 
 def _model_of(value: Any) -> str:
     model = value["model"] if isinstance(value, dict) else value.model
-    return f"<{model}>"
+    return f"<{model}>" if model in MODELS else "<own>"
 
 
 VehiclePart = Annotated[
@@ -238,7 +263,8 @@ VehiclePart = Annotated[
     | Annotated[HovercraftPart, Tag("<hovercraft>")]
     | Annotated[HelicopterPart, Tag("<helicopter>")]
     | Annotated[LatticeBodyPart, Tag("<lattice_body>")]
-    | Annotated[OmnidirectionalPart, Tag("<omnidirectional>")],
+    | Annotated[OmnidirectionalPart, Tag("<omnidirectional>")]
+    | Annotated[OwnPart, Tag("<own>")],
     Discriminator(_model_of),
     BeforeValidator(_check_model),
 ]

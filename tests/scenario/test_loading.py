@@ -131,7 +131,7 @@ def test_a_scenario_beside_needs_no_start_and_goal_where_the_file_states_them(fo
 def test_a_map_needs_start_and_goal_beside(folder):
     text = BESIDE[: BESIDE.index("start:")]
     Path("bare.yaml").write_text(text)
-    with pytest.raises(InvalidScenario, match="--with: bare.yaml:1: the key 'start' is missing"):
+    with pytest.raises(InvalidScenario, match=r"--with: bare\.yaml:1: the key 'start' is missing"):
         load_scenario("nav.yaml", beside="bare.yaml")
 
 
