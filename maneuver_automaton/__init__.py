@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.models import CarWithTrailer as CarWithTrailer
     from maneuver_automaton.models import Helicopter as Helicopter
     from maneuver_automaton.models import Hovercraft as Hovercraft
+    from maneuver_automaton.models import Omnidirectional as Omnidirectional
     from maneuver_automaton.models import SecondOrderCar as SecondOrderCar
     from maneuver_automaton.models import SecondOrderUnicycle as SecondOrderUnicycle
     from maneuver_automaton.models import SingleTrack as SingleTrack
@@ -75,6 +76,7 @@ _HOMES = {
     "Motion": "collision",
     "Obstacle": "collision",
     "OccupancyMap": "collision",
+    "Omnidirectional": "models",
     "Plan": "automaton",
     "Planner": "planning",
     "PlanResult": "planning",

@@ -23,7 +23,7 @@ from maneuver_automaton.collision import (
 )
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.groups import SE2, LieGroup, SE2xR
-from maneuver_automaton.models import Model
+from maneuver_automaton.models import Model, OnLattice
 from maneuver_automaton.primitives import Maneuver, Trim
 
 STANDING = 1e-3  # [m/s] slower is no direction of travel
@@ -246,12 +246,35 @@ class Problem:
 
     @property
     def first_trim(self) -> Trim:
-        """The trim in which the vehicle starts; rest unless one is named."""
+        """The trim in which the vehicle starts; rest unless one is named.
+
+        On a lattice that is the rest at the heading next to that of the start.
+        """
+        if self.start_trim is None and isinstance(self.automaton.model, OnLattice):
+            return self._rest_facing(self.automaton.model, float(self.start[2]))
         return self._trim_or_rest(self.start_trim)
 
     def last_trim(self, goal: Goal) -> Trim:
-        """The trim in which the vehicle ends at `goal`; rest unless one is named."""
+        """The trim in which the vehicle ends at `goal`; rest unless one is named.
+
+        On a lattice that is the rest at the heading next to that of the goal, as the lattice lies
+        under the start.
+        """
+        model = self.automaton.model
+        if goal.trim is None and isinstance(model, OnLattice):
+            begun = model.heading(self.first_trim.reduced_state)
+            return self._rest_facing(model, float(goal.pose[2] - self.start[2]) + begun)
         return self._trim_or_rest(goal.trim)
+
+    def _rest_facing(self, model: OnLattice, heading: float) -> Trim:
+        """The trim at rest whose heading on the lattice is nearest; the first of equals."""
+        off = [
+            abs(math.remainder(model.heading(trim.reduced_state) - heading, 2.0 * math.pi))
+            if trim.is_rest
+            else math.inf
+            for trim in self.automaton.trims
+        ]
+        return self.automaton.trims[int(np.argmin(off))]
 
     def _trim_or_rest(self, name: str | None) -> Trim:
         if name is not None:
@@ -310,7 +333,7 @@ class Problem:
             self.cost.rates(controls, model.body_velocity(states, controls))
             for states in (course.reduced_state[:-1], course.reduced_state[1:])
         ]
-        return float(np.diff(course.time) @ (ends[0] + ends[1])) / 2.0
+        return maneuver.cost_multiplier * float(np.diff(course.time) @ (ends[0] + ends[1])) / 2.0
 
     def _velocities(self, primitive: Primitive) -> Array:
         """Body velocities (n, dof) of a primitive, one for every stretch in one direction."""

@@ -67,8 +67,12 @@ def test_the_same_format_is_written_to_the_last_bit(folder, capsys, name):
 
 
 def test_what_is_left_out_is_said(folder, capsys):
+    Path("a.mprim").write_text(MPRIM.replace("0.0 0.0 6.2832", "0.0 -0.5 6.2832").replace(
+        "endpose_c: 0 0 -4", "endpose_c: 0 -1 -4"))  # fmt: skip
     assert run(["convert", "a.mprim", "b.json"]) == 0
-    assert "cost multipliers are left out" in capsys.readouterr().out
+    assert "cost multipliers" not in capsys.readouterr().out
+    assert run(["convert", "b.json", "b.nav2.json"]) == 0
+    assert "b.nav2.json: cost multipliers are left out" in capsys.readouterr().out
     assert run(["convert", "a.xml", "b.json"]) == 0
     assert "driven with controls that are constant in each step" in capsys.readouterr().out
 

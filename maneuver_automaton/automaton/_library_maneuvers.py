@@ -33,7 +33,7 @@ from maneuver_automaton.primitives.maneuver import CLOSED
 
 WITHIN = 1e-9  # by which share of its size, at least 1, a value may exceed a limit
 NEEDED = ("name", "source", "target", "displacement", "duration")
-KNOWN = (*NEEDED, "control", "until", "samples", "comment")
+KNOWN = (*NEEDED, "control", "until", "samples", "cost_multiplier", "comment")
 
 
 def maneuver_entry(maneuver: Maneuver, inputs: Inputs | None) -> dict[str, Any]:
@@ -45,6 +45,8 @@ def maneuver_entry(maneuver: Maneuver, inputs: Inputs | None) -> dict[str, Any]:
         "displacement": listed(maneuver.displacement),
         "duration": float(maneuver.duration),
     }
+    if maneuver.cost_multiplier != 1.0:  # what says nothing new keeps its hash
+        entry["cost_multiplier"] = float(maneuver.cost_multiplier)
     if inputs is None:
         inputs = None if maneuver.course is None else inputs_of(maneuver.course)
     return entry if inputs is None else entry | inputs_entry(*inputs)
@@ -60,6 +62,7 @@ def maneuver_of(k: int, entry: Any, model: Model) -> tuple[Maneuver, Inputs | No
         target=text_of(f"{label}: target", entry["target"]),
         displacement=numbers_of(f"{label}: displacement", entry["displacement"]),
         duration=number_of(f"{label}: duration", entry["duration"]),
+        cost_multiplier=number_of(f"{label}: cost_multiplier", entry.get("cost_multiplier", 1.0)),
     )
     if "samples" in entry:
         return replace(maneuver, course=_samples(label, entry["samples"])), None

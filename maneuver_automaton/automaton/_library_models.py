@@ -16,6 +16,7 @@ from maneuver_automaton.models import (
     Hovercraft,
     LatticeBody,
     Model,
+    Omnidirectional,
     SecondOrderCar,
     SecondOrderUnicycle,
     SingleTrack,
@@ -35,6 +36,7 @@ KINDS: Mapping[str, Any] = {
         Helicopter,
         AcceleratingCar,
         LatticeBody,
+        Omnidirectional,
     )
 }
 
@@ -63,7 +65,7 @@ def model_of(entry: Any, *, own: Model | None) -> Model:
     if kind not in KINDS:
         raise InvalidLibrary(
             f"model: got the kind {kind!r}, need one of {', '.join(KINDS)}; "
-            "a model of your own has to be given to load_library"
+            "a model of your own has to be given: to load_library, or by --model MODULE:OBJECT"
         )
     fields = dataclasses.fields(KINDS[kind])
     known = tuple(field.name for field in fields)

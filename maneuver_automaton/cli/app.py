@@ -10,6 +10,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from maneuver_automaton.cli.guard import exits
+from maneuver_automaton.errors import InvalidScenario
 
 # Importing libraries makes a million objects and no garbage: look for it less often than usual.
 COLLECT_EVERY = 100_000  # objects
@@ -46,6 +47,12 @@ With = Annotated[
     Path | None,
     typer.Option(
         "--with", metavar="FILE", help="Scenario for what FILE leaves out, such as the vehicle."
+    ),
+]
+OwnModel = Annotated[
+    str | None,
+    typer.Option(
+        "--model", metavar="MODULE:OBJECT", help="Your own vehicle, for files that cannot state it."
     ),
 ]
 Case = Annotated[
@@ -87,6 +94,7 @@ def plan(
     jobs: Jobs = 1,
     with_file: With = None,
     case: Case = None,
+    model: OwnModel = None,
 ) -> int:
     """Plan the problem of a file, or of every file of a folder."""
     from maneuver_automaton.cli import plan_command
@@ -99,7 +107,7 @@ def plan(
         animate=animate,
         quiet=quiet,
     )
-    parts = Parts(beside=with_file, case=case)
+    parts = Parts(beside=with_file, case=case, model=model)
     if file.is_dir():
         return plan_command.plan_folder(file, out, settings=settings, parts=parts, jobs=jobs)
     return plan_command.plan_file(file, out, settings=settings, parts=parts)
@@ -142,12 +150,18 @@ def mpc(
         Path | None,
         typer.Option("--resume", metavar="LOG", help="Go on from a closed_loop.json."),
     ] = None,
+    model: OwnModel = None,
 ) -> int:
     """Drive a scenario in closed loop: plan, drive a step, plan again."""
     from maneuver_automaton.cli import mpc_command, plan_command
     from maneuver_automaton.cli.inputs import Parts
 
-    plan_command.Settings(time_limit=time_limit, alternatives=alternatives)  # checked alike
+    plan_command.Settings(time_limit=time_limit)  # checked alike
+    if alternatives:
+        raise InvalidScenario(
+            f"--alternatives: got {alternatives}, but a closed loop keeps one plan a step; "
+            "leave it out, or ask plan for them"
+        )
     settings = mpc_command.Settings(
         steps=steps,
         seed=seed,
@@ -160,7 +174,7 @@ def mpc(
         animate=animate,
         quiet=quiet,
     )
-    parts = Parts(beside=with_file, case=case)
+    parts = Parts(beside=with_file, case=case, model=model)
     if file.is_dir():
         return mpc_command.drive_folder(file, out, settings=settings, parts=parts)
     return mpc_command.drive_file(file, out, settings=settings, parts=parts)
@@ -168,12 +182,13 @@ def mpc(
 
 @app.command()
 @exits
-def check(file: File, with_file: With = None, case: Case = None) -> int:
+def check(file: File, with_file: With = None, case: Case = None, model: OwnModel = None) -> int:
     """Report symmetry, consistency and feasibility, without a plan."""
     from maneuver_automaton.cli import check_command
     from maneuver_automaton.cli.inputs import Parts
 
-    return check_command.check_file(file, parts=Parts(beside=with_file, case=case))
+    parts = Parts(beside=with_file, case=case, model=model)
+    return check_command.check_file(file, parts=parts)
 
 
 @automaton_app.command("build")
@@ -209,16 +224,17 @@ def automaton_show(
         bool,
         typer.Option("--coverage", help="How well its words cover the poses around, by samples."),
     ] = False,
+    model: OwnModel = None,
 ) -> int:
     """List the trims and maneuvers of a scenario, a library or another file of primitives."""
     from maneuver_automaton.cli import automaton_command
 
-    return automaton_command.show(file, coverage=coverage)
+    return automaton_command.show(file, coverage=coverage, model_text=model)
 
 
 @automaton_app.command("draw")
 @exits
-def automaton_draw(file: Library, out: Out = Path("out")) -> int:
+def automaton_draw(file: Library, out: Out = Path("out"), model: OwnModel = None) -> int:
     """Draw the trims and maneuvers of a scenario, a library or another file of primitives.
 
     The picture is DIR/automaton.png, or DIR itself if it ends in .png, .pdf or .svg; that of the
@@ -226,7 +242,7 @@ def automaton_draw(file: Library, out: Out = Path("out")) -> int:
     """
     from maneuver_automaton.cli import automaton_command
 
-    return automaton_command.draw(file, out)
+    return automaton_command.draw(file, out, model_text=model)
 
 
 @app.command()

@@ -28,6 +28,7 @@ class Settings:
 
 
 MOST_ROWS = 200  # trims, and maneuvers, that `show` lists
+EVERY_POSE = "every pose can be reached in free space, by words of any length"
 
 
 def build(file: Path, out: Path, *, settings: Settings) -> int:
@@ -93,9 +94,9 @@ def _print_library(path: Path, automaton: Automaton, settings: Settings) -> None
         console().print(said, soft_wrap=True)
 
 
-def show(file: Path, *, coverage: bool = False) -> int:
+def show(file: Path, *, coverage: bool = False, model_text: str | None = None) -> int:
     """List trims, maneuvers and what they can do."""
-    automaton = automaton_of(file)
+    automaton = automaton_of(file, model_text)
     model, out = automaton.model, console()
     columns = ["", "trim", *model.reduced_names, *model.control_names]
     columns += _velocity_names(model.group.dof)
@@ -142,9 +143,9 @@ def coverage_lines(automaton: Automaton) -> list[str]:
     ]
 
 
-def draw(file: Path, out: Path) -> int:
+def draw(file: Path, out: Path, *, model_text: str | None = None) -> int:
     """Draw the trims, and beside them the maneuvers."""
-    automaton = automaton_of(file)
+    automaton = automaton_of(file, model_text)
     path = target(out, "automaton.png")
     make_folder(path.parent)
     from maneuver_automaton import plotting
@@ -184,7 +185,7 @@ def _print_more(count: int) -> None:
 
 def report_lines(report: AutomatonReport) -> list[str]:
     """What validation found, in words."""
-    lines = ["every pose can be reached" if report.controllable else report.reason]
+    lines = [EVERY_POSE if report.controllable else report.reason]
     if not report.connected:
         sizes = ", ".join(str(len(component)) for component in report.components)
         lines.append(f"{len(report.components)} groups of trims out of each other's reach: {sizes}")

@@ -23,7 +23,7 @@ from maneuver_automaton.cli.inputs import Parts, scenario_of
 from maneuver_automaton.cli.progress import waiting
 from maneuver_automaton.cli.tables import console, table
 from maneuver_automaton.models import Model, rollout, vector_field
-from maneuver_automaton.planning import PlanStatus
+from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.planning.blocked import where_touched
 from maneuver_automaton.problem import Bounds, Problem
 
@@ -220,8 +220,17 @@ def _feasibility(problem: Problem, time_limit: float) -> Iterator[Finding]:
     yield Finding(
         what="goal: can be reached",
         holds=None if result.status in UNDECIDED else found,
-        words="a plan exists" if found else f"{result.status.value}: {result.reason}",
+        words=_reached(result),
     )
+
+
+def _reached(result: PlanResult) -> str:
+    """What is known of the goal: that it is reached, that it is not, or nothing."""
+    if result.status is PlanStatus.FOUND:
+        return "a plan exists"
+    if result.status is PlanStatus.OUT_OF_BUDGET:
+        return f"not known: {result.reason}, which does not prove that there is none"
+    return f"{result.status.value}: {result.reason}"
 
 
 def _ends_free(problem: Problem) -> Iterator[Finding]:

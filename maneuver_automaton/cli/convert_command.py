@@ -21,12 +21,21 @@ from maneuver_automaton.cli.inputs import (
 from maneuver_automaton.cli.tables import console
 from maneuver_automaton.collision import AnyObstacle, OccupancyMap
 from maneuver_automaton.errors import InvalidLibrary, InvalidScenario
-from maneuver_automaton.formats.libraries import read_primitives, write_again, writer_of
+from maneuver_automaton.formats.libraries import (
+    JSON,
+    MPRIM,
+    NAV2_JSON,
+    read_primitives,
+    write_again,
+    writer_of,
+)
 from maneuver_automaton.formats.movingai import save_movingai_map
 from maneuver_automaton.formats.nav2_map import save_nav2_map
 from maneuver_automaton.formats.recognition import YAML_ENDINGS
 from maneuver_automaton.formats.statement import MapFile
 from maneuver_automaton.scenario import Scenario, statements_of, to_yaml
+
+KEEP_MULTIPLIERS = (MPRIM, JSON)  # but Nav2's kind of JSON
 
 MAP_ENDINGS = (".map",)
 PICTURE_ENDINGS = (".png", ".pdf", ".svg")
@@ -74,6 +83,10 @@ def _convert_library(source: Path, target: Path, write: Callable[[Automaton, Pat
         raise not_written(Path(error.filename or target), error) from error
     if read is not None and read.remark:
         console().print(f"{source}: {read.remark}", soft_wrap=True)
+    name = target.name.lower()
+    kept = name.endswith(KEEP_MULTIPLIERS) and not name.endswith(NAV2_JSON)
+    if not kept and any(one.cost_multiplier != 1.0 for one in automaton.maneuvers):
+        console().print(f"{target}: cost multipliers are left out", soft_wrap=True)
     return FOUND
 
 

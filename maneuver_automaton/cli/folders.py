@@ -118,7 +118,7 @@ def _parts_for(path: Path, document: Document | None, parts: Parts) -> Parts:
         document is not None
         and (dynobench.is_dynobench(document) or nav2_map.is_nav2_map(document))
     ):
-        return Parts()
+        return Parts(model=parts.model)
     if ending == ".svg":
         with contextlib.suppress(InvalidScenario):
             several = benchmr_svg.n_queries(path) > 1

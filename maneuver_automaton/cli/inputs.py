@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from maneuver_automaton.cli.user_model import user_model
 from maneuver_automaton.errors import InvalidScenario
 
 if TYPE_CHECKING:
@@ -15,10 +16,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
-    """The options --with and --case: what completes a file that states a part of a problem."""
+    """The options --with, --case and --model: what completes a file, and what it cannot state."""
 
     beside: Path | None = None
     case: int | None = None
+    model: str | None = None  # MODULE:OBJECT
 
 
 def scenario_of(path: Path, parts: Parts | None = None) -> Scenario:
@@ -26,17 +28,29 @@ def scenario_of(path: Path, parts: Parts | None = None) -> Scenario:
     from maneuver_automaton.scenario import load_scenario
 
     parts = parts or Parts()
-    return load_scenario(path, beside=parts.beside, case=parts.case)
+    own = None if parts.model is None else user_model(parts.model)
+    return load_scenario(path, beside=parts.beside, case=parts.case, model=own)
 
 
-def automaton_of(path: Path) -> Automaton:
-    """The automaton of a library (.json), of primitives in another format, or of a scenario."""
+def automaton_of(path: Path, model: str | None = None) -> Automaton:
+    """The automaton of a library (.json), of primitives in another format, or of a scenario.
+
+    `model`, MODULE:OBJECT, is the vehicle of a library or scenario for a user's own.
+    """
     from maneuver_automaton.automaton.library import load_library
     from maneuver_automaton.formats.libraries import read_primitives
 
+    own = None if model is None else user_model(model)
     if (read := read_primitives(path)) is not None:
+        if own is not None:
+            raise InvalidScenario(
+                f"--model: {path} is a file of {read.kind}, which has a vehicle of its own; need a "
+                "library or a scenario"
+            )
         return read.automaton
-    return load_library(path) if path.suffix == ".json" else scenario_of(path).problem.automaton
+    if path.suffix == ".json":
+        return load_library(path, model=own)
+    return scenario_of(path, Parts(model=model)).problem.automaton
 
 
 def target(out: Path, name: str) -> Path:

@@ -122,6 +122,8 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
 def _road(path: Path, parts: Parts) -> tuple[RoadScene, RoadVehicle]:
     from maneuver_automaton.scenario import load_road
 
+    if parts.model is not None:
+        raise InvalidScenario("--model: is for scenarios and libraries, not for drives on roads")
     found = load_road(path, beside=parts.beside, case=parts.case)
     assert found is not None  # by its ending
     return found

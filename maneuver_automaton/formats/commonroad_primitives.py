@@ -37,6 +37,8 @@ ROOT, OLDER_ROOT = "MotionPrimitiveFile", "Trajectories"
 MOST_BYTES = 100_000_000
 FIELDS = ("x", "y", "orientation", "velocity", "steering_angle")
 STEP_UNIT = 0.1  # [s] of a deci-second
+DIGITS = 9  # of a second, to which durations in either unit are the same
+TENTHS, SECONDS = "deci-second", "second"  # units of a duration
 FITS = 0.01  # [m/s, rad] states closer than this follow each other, as in CommonRoad-search
 WHOLE = 1e-6  # of a deci-second
 LARGE = 1e-5  # [m, rad] off its states: worth a word
@@ -56,12 +58,18 @@ VEHICLES: Mapping[str, SecondOrderCar] = {
 class RoadPrimitive:
     """One primitive, as it stands in the file."""
 
-    duration: int  # [0.1 s] as stated: that of a whole primitive, if this one was cut
+    duration: float  # [unit] as stated: that of a whole primitive, if this one was cut
     states: Array  # (n, 5) x, y, orientation, velocity, steering angle [m, m, rad, m/s, rad]
     line: int = 0  # of the file; 0 if it came from none
+    unit: str = TENTHS  # of the duration; a whole number of deci-seconds
 
     def __post_init__(self) -> None:
         freeze(self, "states", last=len(FIELDS))
+
+    @property
+    def seconds(self) -> float:
+        """The duration [s]."""
+        return STEP_UNIT * self.duration if self.unit == TENTHS else self.duration
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -73,10 +81,11 @@ class RoadPrimitives:
 
     def steps(self) -> tuple[float, ...]:
         """Seconds from state to state of each primitive."""
-        most: dict[int, int] = {}
+        most: dict[float, int] = {}
         for one in self.primitives:
-            most[one.duration] = max(most.get(one.duration, 1), len(one.states) - 1)
-        return tuple(STEP_UNIT * one.duration / most[one.duration] for one in self.primitives)
+            lasting = round(one.seconds, DIGITS)
+            most[lasting] = max(most.get(lasting, 1), len(one.states) - 1)
+        return tuple(one.seconds / most[round(one.seconds, DIGITS)] for one in self.primitives)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -277,11 +286,14 @@ def commonroad_primitives_of_automaton(automaton: Automaton) -> RoadPrimitives:
 
 def _primitive(row: Element) -> RoadPrimitive:
     duration = row.need("Duration")
-    if duration.attributes.get("unit", "deci-second") != "deci-second":
-        raise duration.error(f"unit: got {duration.attributes['unit']!r:.40}, need deci-second")
-    tenths = duration.number()
-    if not (tenths >= 1.0 and tenths.is_integer()):
-        raise duration.error(f"got {tenths:g}, need a whole number of at least 1")
+    unit = duration.attributes.get("unit", TENTHS)
+    if unit not in (TENTHS, SECONDS):
+        raise duration.error(f"unit: got {unit!r:.40}, need {TENTHS} or {SECONDS}")
+    lasting = duration.number()
+    if unit == TENTHS and not (lasting >= 1.0 and lasting.is_integer()):
+        raise duration.error(f"got {lasting:g}, need a whole number of at least 1")
+    if not lasting > 0.0:
+        raise duration.error(f"got {lasting:g}, need a positive number of seconds")
     path = row.get("Path")
     between = [] if path is None else list(path.all("State"))
     rows = [row.need("Initial|Start"), *between, row.need("Final")]
@@ -297,13 +309,14 @@ def _primitive(row: Element) -> RoadPrimitive:
                 .need(name)
                 .error(f"got {states[0, k]:g}, need 0: a primitive begins at the origin")
             )
-    return RoadPrimitive(duration=int(tenths), states=states, line=row.line)
+    stated = int(lasting) if unit == TENTHS else lasting
+    return RoadPrimitive(duration=stated, states=states, line=row.line, unit=unit)
 
 
 def _trajectory_lines(one: RoadPrimitive, *, older: bool) -> list[str]:
     first = "Start" if older else "Initial"
     last = len(one.states) - 1
-    lines = ["<Trajectory>", f'   <Duration unit="deci-second">{one.duration}</Duration>']
+    lines = ["<Trajectory>", f'   <Duration unit="{one.unit}">{one.duration!r}</Duration>']
     lines += _state_lines(first, one.states[0], 0, pad="   ")
     lines += _state_lines("Final", one.states[-1], last, pad="   ")
     between = [

@@ -38,6 +38,7 @@ class Move:
     start: int  # position of the first heading among those of the lattice
     end: int
     poses: Array  # (n, 3) from (0, 0, first heading), headings continuous [m, m, rad]
+    cost_multiplier: float = 1.0  # of what the motion costs otherwise
 
     def __post_init__(self) -> None:
         freeze(self, "poses", last=3)
@@ -105,6 +106,7 @@ def automaton_of_lattice(
                 displacement=course.pose[-1],
                 duration=float(course.time[-1]),
                 course=course,
+                cost_multiplier=move.cost_multiplier,
             )
         )
         counts[move.start] += 1
@@ -226,7 +228,7 @@ def _move(automaton: Automaton, maneuver: Maneuver, headings: Array, kind: str) 
     course = maneuver.course
     seen = np.stack([np.zeros(3), maneuver.displacement]) if course is None else course.pose
     poses = (SE2(np.array([0.0, 0.0, headings[start]])) @ SE2(seen)).pose
-    move = Move(start=start, end=end, poses=poses)
+    move = Move(start=start, end=end, poses=poses, cost_multiplier=maneuver.cost_multiplier)
     body = automaton.model
     assert isinstance(body, LatticeBody)
     off = float(abs(wrapped(poses[-1, 2] - headings[end])))

@@ -104,8 +104,6 @@ def _of_mprim(path: Path) -> PrimitivesRead:
         f"last poses were moved by up to {position:.2g} m and {heading:.2g} rad onto the middle of "
         "their cells and their headings"
     )
-    if any(one.cost_multiplier != 1 for one in file.primitives):
-        remark += "; cost multipliers are left out"
     automaton = sbpl_mprim.automaton_of_mprim(file, name=path.stem)
     return PrimitivesRead(kind="SBPL", file=file, automaton=automaton, remark=remark)
 

@@ -1,8 +1,8 @@
 """Motion primitives of SBPL (.mprim): words in a fixed order, read and written.
 
 A line `min_turning_radius_m:` makes headings that are listed, one `angle:` each, and a radius for
-every primitive; without it they are evenly spaced. The cost multiplier of a primitive belongs to
-SBPL's search: it is kept from file to file, and an automaton has none.
+every primitive; without it they are evenly spaced. The cost multiplier of a primitive is that of
+its maneuver.
 
 Source: Likhachev, Ferguson (2009), *Planning long dynamically feasible maneuvers for autonomous
 vehicles*, IJRR 28(8), and the environments of SBPL.
@@ -221,13 +221,14 @@ def automaton_of_mprim(
 
 
 def mprim_of_automaton(automaton: Automaton) -> MprimFile:
-    """An automaton of lattice primitives as a file; every cost multiplier is 1.
+    """An automaton of lattice primitives as a file.
 
     Raises
     ------
     InvalidLibrary
         If the automaton is not on a grid, or its headings are neither evenly spaced nor has it a
-        turning radius, or they do not all have the same number of primitives.
+        turning radius, they do not all have the same number of primitives, or a cost multiplier is
+        no whole number.
     """
     lattice = lattice_of_automaton(automaton, kind=KIND)
     n = lattice.headings.size
@@ -250,12 +251,17 @@ def mprim_of_automaton(automaton: Automaton) -> MprimFile:
     for move in lattice.moves:
         across = cells(move, lattice.resolution)
         assert across is not None  # checked by `lattice_of_automaton`
+        if not float(move.cost_multiplier).is_integer():
+            raise InvalidLibrary(
+                f"{automaton.name or 'automaton'}: a maneuver from heading {move.start} has the "
+                f"cost multiplier {move.cost_multiplier:g}; a file of {KIND} needs whole numbers"
+            )
         primitives.append(
             MprimPrimitive(
                 id=given[move.start],
                 start=move.start,
                 end=(*across, move.end),
-                cost_multiplier=1,
+                cost_multiplier=int(move.cost_multiplier),
                 poses=move.poses,
                 turning_radius=None if radius is None else arcs(move.poses)[0],
             )
@@ -367,7 +373,7 @@ def _meant(file: MprimFile, one: MprimPrimitive) -> Move:
     poses[:, 2] -= _turns(poses[0, 2] - begin)
     poses[0] = 0.0, 0.0, begin
     poses[-1] = file.resolution * column, file.resolution * row, end + _turns(poses[-1, 2] - end)
-    return Move(start=one.start, end=last, poses=poses)
+    return Move(start=one.start, end=last, poses=poses, cost_multiplier=float(one.cost_multiplier))
 
 
 def _turns(angle: float) -> float:

@@ -7,6 +7,8 @@ from maneuver_automaton.models.helicopter import Helicopter as Helicopter
 from maneuver_automaton.models.hovercraft import Hovercraft as Hovercraft
 from maneuver_automaton.models.lattice_body import LatticeBody as LatticeBody
 from maneuver_automaton.models.model import Model as Model
+from maneuver_automaton.models.model import OnLattice as OnLattice
+from maneuver_automaton.models.omnidirectional import Omnidirectional as Omnidirectional
 from maneuver_automaton.models.rollout import rollout as rollout
 from maneuver_automaton.models.second_order_car import SecondOrderCar as SecondOrderCar
 from maneuver_automaton.models.second_order_unicycle import (

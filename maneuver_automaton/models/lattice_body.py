@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -61,6 +62,10 @@ class LatticeBody:
     def reduced_limits(self) -> Array:
         """Those of a cosine and a sine: (2, 2)."""
         return np.tile([-1.0, 1.0], (2, 1))
+
+    def heading(self, reduced_state: Array) -> float:
+        """Heading of the lattice [rad] that a direction (cos, sin) is."""
+        return math.atan2(float(reduced_state[1]), float(reduced_state[0]))
 
     def velocity(self, z: Components, u: Components, /) -> Components:
         """Components of the twist: the control."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import LieGroup
@@ -83,4 +83,22 @@ class Model(Protocol):
 
     def part_poses(self, reduced_state: Array) -> Array:
         """Planar poses (..., n, 3) of what it carries, seen from the vehicle."""
+        ...
+
+
+@runtime_checkable
+class OnLattice(Protocol):
+    """What a vehicle has besides whose library holds on a lattice of cells and headings.
+
+    Each heading of the lattice is a reduced state. The vehicle moves by the maneuvers of its
+    library alone: between them nothing is known of it.
+    """
+
+    @property
+    def resolution(self) -> float:
+        """Side of a cell [m]."""
+        ...
+
+    def heading(self, reduced_state: Array) -> float:
+        """Heading of the lattice [rad] in a reduced state (n_z,)."""
         ...

@@ -12,6 +12,7 @@ from maneuver_automaton.planning.among_obstacles import (
 from maneuver_automaton.planning.among_zones import plan_among_zones
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.free_space import plan_by_words
+from maneuver_automaton.planning.off_lattice import goals_off_lattice
 from maneuver_automaton.planning.result import PlanResult
 from maneuver_automaton.planning.with_inertia import load_inertia, plan_with_inertia
 from maneuver_automaton.problem import Problem
@@ -56,7 +57,7 @@ def plan(problem: Problem, *, time_limit: float = 5.0, alternatives: int = 0) ->
         raise ValueError(f"alternatives must be at least 0, got {alternatives}")
     _load(problem)
     began = time.monotonic()
-    blocked = blocked_ends(problem)
+    blocked = blocked_ends(problem) or goals_off_lattice(problem)
     if blocked is not None:
         return blocked
     if problem.zones:

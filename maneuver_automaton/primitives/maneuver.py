@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -20,7 +21,8 @@ class Maneuver:
     """A transition of fixed displacement, duration and cost from one trim to another.
 
     Its `course` runs from the identity pose and time 0, under controls that are constant between
-    samples; without one it is not known what happens in between.
+    samples; without one it is not known what happens in between. It costs `cost_multiplier` times
+    what the stage cost makes of its course.
 
     Source: Frazzoli, Dahleh, Feron (2005), Sec. III-B.
 
@@ -37,12 +39,18 @@ class Maneuver:
     displacement: Array  # (dof,) pose gained, in the frame where it starts
     duration: float = 0.0  # [s]
     course: Trajectory | None = None
+    cost_multiplier: float = 1.0
 
     def __post_init__(self) -> None:
         freeze(self, "displacement", last=(3, 4))
         if not self.duration >= 0.0:
             raise ValueError(
                 f"maneuver {self.name!r}: duration must not be negative, got {self.duration} s"
+            )
+        if not 0.0 <= self.cost_multiplier < math.inf:
+            raise ValueError(
+                f"maneuver {self.name!r}: cost_multiplier must be a number of at least 0, got "
+                f"{self.cost_multiplier}"
             )
         if self.course is None:
             return

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,26 +17,37 @@ from maneuver_automaton.primitives.trim import Trim
 
 POSE_SIGNS = (1.0, -1.0, -1.0, 1.0)  # x, y, heading, z, and their rates
 SAMPLES = 40
-AGREES = 1e-12  # [-] of the largest rate
+AGREES = 1e-12  # [-] of the largest rate, or of a limit
+MOST_SWAPS = 2  # pairs of components that are exchanged, of the reduced state and of the control
+MOST_CANDIDATES = 20_000  # that are tried
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Mirror:
-    """What left and right exchange: signs of the reduced state, and a matrix of the controls."""
+    """What left and right exchange: signs, and pairs of components that change places.
+
+    The image of a reduced state z is ``reduced * z[order]``, that of a control u ``control @ u``.
+    """
 
     reduced: Array  # (n_z,) signs
-    control: Array  # (n_u, n_u): signs, and at most one pair of controls exchanged
+    control: Array  # (n_u, n_u): signs and exchanges
+    order: tuple[int, ...] | None = None  # of the reduced state's components; None: as they are
 
     def __post_init__(self) -> None:
         freeze(self, "reduced")
         freeze(self, "control")
+
+    def state(self, reduced_state: Array) -> Array:
+        """Reduced states (..., n_z) on the other side."""
+        there = reduced_state if self.order is None else reduced_state[..., list(self.order)]
+        return np.asarray(there * self.reduced)
 
     def trajectory(self, course: Trajectory) -> Trajectory:
         """The course on the other side."""
         return Trajectory(
             time=course.time,
             pose=course.pose * _pose_signs(course.pose.shape[-1]),
-            reduced_state=course.reduced_state * self.reduced,
+            reduced_state=self.state(course.reduced_state),
             control=course.control @ self.control.T,
         )
 
@@ -49,12 +61,13 @@ class Mirror:
             displacement=maneuver.displacement * _pose_signs(maneuver.displacement.size),
             duration=maneuver.duration,
             course=None if course is None else self.trajectory(course),
+            cost_multiplier=maneuver.cost_multiplier,
         )
 
     def takes(self, trim: Trim, other: Trim) -> bool:
         """Whether `other` is the image of `trim`, to the last bits."""
         pairs = (
-            (trim.reduced_state * self.reduced, other.reduced_state),
+            (self.state(trim.reduced_state), other.reduced_state),
             (self.control @ trim.control, other.control),
             (trim.body_velocity * _pose_signs(trim.body_velocity.size), other.body_velocity),
         )
@@ -68,8 +81,9 @@ class Mirror:
 def mirror_of(model: Model, *, seed: int = 0) -> Mirror | None:
     """The mirror symmetry of a model, limits included, or None if it has none.
 
-    It is searched, not assumed: signs of reduced state and control, and exchanges of two
-    controls, are tried on random states, fewest changes first. It must hold
+    It is searched, not assumed, for a user's model as for those of the package: signs of reduced
+    state and control, and exchanges of up to two pairs of their components, such as the wheels of
+    either side, are tried on random states, fewest changes first. It must hold
     ``xi(M z, N u) = S xi(z, u)`` and ``f(M z, N u) = M f(z, u)`` with S the mirror of the plane.
 
     Examples
@@ -82,7 +96,13 @@ def mirror_of(model: Model, *, seed: int = 0) -> Mirror | None:
     state = _draws(rng, model.reduced_limits)
     control = _draws(rng, model.control_limits)
     few = slice(0, 2)  # most candidates fail on the first
-    for mirror in _candidates(len(model.reduced_names), len(model.control_names)):
+    candidates = _candidates(_changes(model.reduced_limits), _changes(model.control_limits))
+    for of_state, of_control in itertools.islice(candidates, MOST_CANDIDATES):
+        mirror = Mirror(
+            reduced=of_state.signs,
+            control=_matrix(of_control),
+            order=of_state.order if of_state.swaps else None,
+        )
         if _holds(model, mirror, state[few], control[few]) and _holds(
             model, mirror, state, control
         ):
@@ -90,52 +110,80 @@ def mirror_of(model: Model, *, seed: int = 0) -> Mirror | None:
     return None
 
 
-def _candidates(n_z: int, n_u: int) -> Iterator[Mirror]:
-    every = [
-        Mirror(reduced=np.array(reduced), control=exchange * np.array(signs)[:, None] + 0.0)
-        for exchange in _exchanges(n_u)
-        for reduced in itertools.product((1.0, -1.0), repeat=n_z)
-        for signs in itertools.product((1.0, -1.0), repeat=n_u)
-    ]
-    unchanged = np.eye(n_u)
-    every.sort(key=lambda m: (m.reduced < 0.0).sum() + np.abs(m.control - unchanged).sum() / 2.0)
-    yield from every
+class _Change(NamedTuple):
+    """Signs and exchanges of the components of a vector, which undo themselves."""
+
+    order: tuple[int, ...]
+    signs: Array
+    swaps: int
+
+    @property
+    def size(self) -> int:
+        """How much it changes: a sign counts once, an exchange twice."""
+        kept = sum(int(sign < 0.0) for sign in self.signs)
+        return kept + 2 * self.swaps
 
 
-def _exchanges(n: int) -> Iterator[Array]:
-    yield np.eye(n)
-    for a, b in itertools.combinations(range(n), 2):
-        order = list(range(n))
-        order[a], order[b] = b, a
-        yield np.eye(n)[order]
+def _changes(limits: Array) -> list[_Change]:
+    """All changes that leave limits (n, 2) as they are, those with the fewest exchanges first."""
+    n = len(limits)
+    found: list[_Change] = []
+    for swaps in range(min(MOST_SWAPS, n // 2) + 1):
+        for order in _exchanges(n, swaps):
+            for signs in itertools.product((1.0, -1.0), repeat=n):
+                undone = all(signs[k] == signs[other] for k, other in enumerate(order))
+                if undone and _same_limits(limits, order, np.array(signs)):
+                    found.append(_Change(order, np.array(signs), swaps))
+                if len(found) >= MOST_CANDIDATES:
+                    return found
+    return found
+
+
+def _exchanges(n: int, swaps: int) -> Iterator[tuple[int, ...]]:
+    """Orders of n components in which so many pairs have changed places."""
+    pairs = itertools.combinations(range(n), 2)
+    for chosen in itertools.combinations(pairs, swaps):
+        if len({k for pair in chosen for k in pair}) == 2 * swaps:
+            order = list(range(n))
+            for a, b in chosen:
+                order[a], order[b] = b, a
+            yield tuple(order)
+
+
+def _candidates(
+    states: list[_Change], controls: list[_Change]
+) -> Iterator[tuple[_Change, _Change]]:
+    """Pairs of changes, by how much they change together."""
+    by_size: tuple[dict[int, list[_Change]], ...] = ({}, {})
+    for table, changes in zip(by_size, (states, controls), strict=True):
+        for change in changes:
+            table.setdefault(change.size, []).append(change)
+    for total in range(max(by_size[0]) + max(by_size[1]) + 1):
+        for size in range(total + 1):
+            yield from itertools.product(by_size[0].get(total - size, ()), by_size[1].get(size, ()))
+
+
+def _same_limits(limits: Array, order: tuple[int, ...], signs: Array) -> bool:
+    """Whether limits (n, 2) are those of the images too, but for rounding."""
+    image = np.sort(limits[list(order)] * signs[:, None], axis=1)
+    return bool(np.isclose(image, limits, rtol=AGREES, atol=0.0).all())
+
+
+def _matrix(change: _Change) -> Array:
+    """The change as a matrix (n, n)."""
+    return np.asarray(change.signs[:, None] * np.eye(len(change.order))[list(change.order)] + 0.0)
 
 
 def _holds(model: Model, mirror: Mirror, state: Array, control: Array) -> bool:
     signs = _pose_signs(model.group.dof)
-    for limits, image in (
-        (model.reduced_limits, _image(model.reduced_limits, np.diag(mirror.reduced))),
-        (model.control_limits, _image(model.control_limits, mirror.control)),
-    ):
-        if not np.array_equal(limits, image):
-            return False
-    there = (state * mirror.reduced, control @ mirror.control.T)
+    there = (mirror.state(state), control @ mirror.control.T)
     for mine, other in (
         (model.body_velocity(state, control) * signs, model.body_velocity(*there)),
-        (model.reduced_dynamics(state, control) * mirror.reduced, model.reduced_dynamics(*there)),
+        (mirror.state(model.reduced_dynamics(state, control)), model.reduced_dynamics(*there)),
     ):
         if np.abs(mine - other).max(initial=0.0) > AGREES * np.abs(mine).max(initial=1.0):
             return False
     return True
-
-
-def _image(limits: Array, matrix: Array) -> Array:
-    """Limits (n, 2) of what `matrix`, signs and exchanges, makes of values within limits."""
-    if not len(limits):
-        return limits
-    order = np.abs(matrix).argmax(axis=1)
-    signs = matrix[np.arange(len(matrix)), order]
-    image = limits[order] * signs[:, None]
-    return np.sort(image, axis=1)
 
 
 def _draws(rng: np.random.Generator, limits: Array) -> Array:

@@ -11,6 +11,7 @@ from typing import Any
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import load_library
 from maneuver_automaton.automaton.stock import load_stock_library, stock_libraries
+from maneuver_automaton.formats.libraries import read_primitives
 from maneuver_automaton.formats.yaml_source import Document, Where, shown
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Trim, trims_of
@@ -19,7 +20,7 @@ from maneuver_automaton.primitives.quickest import quickest_maneuvers
 from maneuver_automaton.scenario.places import at
 from maneuver_automaton.scenario.presets import preset_automaton
 from maneuver_automaton.scenario.schema import AutomatonPart, Axis, Grid, ManeuversPart, NamedTrim
-from maneuver_automaton.scenario.vehicles import described
+from maneuver_automaton.scenario.vehicles import described, is_known
 
 MAX_GRID_TRIMS = 100_000
 MAX_STEADY_TRIMS = 2_000  # of a grid that has to be solved for
@@ -235,11 +236,20 @@ def _values(axis: Axis) -> list[float]:
 
 def _from_library(document: Document, path: Path, model: Model) -> Automaton:
     with at(document, (*WHERE, "file")):
-        return _fitting(load_library(path), model)
+        read = read_primitives(path)
+        if read is not None:
+            return _fitting(read.automaton, model)
+        if is_known(model):
+            return _fitting(load_library(path), model)
+        return load_library(path, model=model)
 
 
 def _fitting(automaton: Automaton, model: Model) -> Automaton:
     """The automaton of a library, if it is one of this vehicle."""
+    if not is_known(model):
+        raise ValueError(
+            f"got a library for {automaton.model.name}, but the vehicle is {model.name}"
+        )
     has, needs = described(automaton.model), described(model)
     if has["model"] != needs["model"]:
         raise ValueError(f"got a library for {shown(has)}, but the vehicle is {shown(needs)}")

@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar
 
 from annotated_types import Ge, Gt
 from pydantic import (
+    AfterValidator,
     AllowInfNan,
     BaseModel,
     ConfigDict,
@@ -81,6 +82,19 @@ Point = Annotated[
     tuple[Number, Number], Several("a point [x, y], two numbers", at_least=2, at_most=2)
 ]
 Polygon = Annotated[tuple[Point, ...], Several("a list of at least 3 points [x, y]", at_least=3)]
+
+
+def _rising(value: tuple[float, float]) -> tuple[float, float]:
+    if not value[0] < value[1]:
+        raise need("an interval [low, high] with low < high")
+    return value
+
+
+Interval = Annotated[
+    tuple[Number, Number],
+    Several("an interval [low, high], two numbers", at_least=2, at_most=2),
+    AfterValidator(_rising),
+]
 
 
 class Part(BaseModel):

@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision import Box
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.commonroad import read_commonroad
@@ -14,14 +17,18 @@ from maneuver_automaton.formats.recognition import reader_of, yaml_statements
 from maneuver_automaton.formats.statement import Statement
 from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import parse
-from maneuver_automaton.models import SecondOrderCar
+from maneuver_automaton.models import Model, SecondOrderCar
 from maneuver_automaton.roads import RoadScene, RoadVehicle
 from maneuver_automaton.scenario.combining import combined
 from maneuver_automaton.scenario.scenario import Scenario, scenario_of_document
 
 
 def load_scenario(
-    path: Path | str, *, beside: Path | str | None = None, case: int | None = None
+    path: Path | str,
+    *,
+    beside: Path | str | None = None,
+    case: int | None = None,
+    model: Model | None = None,
 ) -> Scenario:
     """The problem of a file: a scenario, or another format that states one or a part of one.
 
@@ -31,9 +38,12 @@ def load_scenario(
         Scenario, TPCAP case, Nav2 map, dynobench problem, MovingAI map or queries, SBPL
         environment, Bench-MR world: told apart by their endings, YAML files by their keys.
     beside : Path or str, optional
-        A scenario for what the file leaves out, such as the vehicle. What the file states wins.
+        A scenario for what the file leaves out, such as the vehicle. What the file states wins;
+        start and goal may be missing in the scenario where the file states them.
     case : int, optional
         Which problem of a file that holds several, from 0.
+    model : Model, optional
+        A vehicle of the user's own, which the scenario names: a file cannot state it.
 
     Raises
     ------
@@ -51,12 +61,18 @@ def load_scenario(
         if found is None:
             if isinstance(document.value, dict) and "schema" in document.value:
                 _refuse_parts(path, beside, case)
-            return scenario_of_document(document, path=path, begin=begin)
+            return scenario_of_document(document, path=path, begin=begin, own=model)
         statements = found
     statement = _chosen(path, statements, case)
     if statement.road is not None:
         raise InvalidScenario(f"{path}: is a drive on roads, which only plan and mpc know")
-    rest = None if beside is None else _scenario_beside(Path(beside))
+    rest = None
+    if beside is not None:
+        rest = _scenario_beside(Path(beside), start=statement.start, goal=statement.goal, own=model)
+    elif model is not None:
+        raise InvalidScenario(
+            f"{path}: names no vehicle of yours; need --with and a scenario that does"
+        )
     scenario = combined(statement, rest, path=path)
     made = scenario.timing_s.get("automaton", 0.0)
     load = time.perf_counter() - begin - made
@@ -85,7 +101,8 @@ def load_road(
     assert scene is not None  # every statement of this format has one
     if beside is None:
         return scene, RoadVehicle()
-    rest = _scenario_beside(Path(beside)).problem
+    anywhere = np.zeros(3)  # the scene states its own
+    rest = _scenario_beside(Path(beside), start=anywhere, goal=anywhere).problem
     model, footprint = rest.automaton.model, rest.footprint
     if not isinstance(model, SecondOrderCar):
         raise InvalidScenario(
@@ -116,11 +133,18 @@ def statements_of(path: Path) -> tuple[Statement, ...] | None:
     return read(path) if read else yaml_statements(parse(read_text(path), name=str(path)), path)
 
 
-def _scenario_beside(path: Path) -> Scenario:
+def _scenario_beside(
+    path: Path, *, start: Array | None, goal: Array | None, own: Model | None = None
+) -> Scenario:
+    """The scenario of --with; it needs no start and goal where the problem states them."""
     begin = time.perf_counter()
     try:
         document = parse(read_text(path), name=str(path))
-        return scenario_of_document(document, path=path, begin=begin)
+        if isinstance(document.value, dict):
+            known = {"start": start, "goal": goal}
+            ends = {k: {"pose": pose.tolist()} for k, pose in known.items() if pose is not None}
+            document = replace(document, value=ends | document.value)
+        return scenario_of_document(document, path=path, begin=begin, own=own)
     except InvalidScenario as error:
         raise InvalidScenario(f"--with: {error}") from error
 

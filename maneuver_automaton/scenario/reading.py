@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from maneuver_automaton.formats.yaml_source import Document, Where, shown
+from maneuver_automaton.models import Model
 from maneuver_automaton.scenario.schema import ScenarioFile
 from maneuver_automaton.scenario.vehicles import KINDS
 
@@ -19,8 +20,8 @@ OTHER_KINDS: Mapping[str, set[str]] = {  # and what only they have
 }
 
 
-def values_of(document: Document) -> ScenarioFile:
-    """The values of a scenario file.
+def values_of(document: Document, *, own: Model | None = None) -> ScenarioFile:
+    """The values of a scenario file; its vehicle is `own` where that is given.
 
     Raises
     ------
@@ -28,10 +29,10 @@ def values_of(document: Document) -> ScenarioFile:
         If a key is unknown or missing, or holds what it may not: the first one in the file.
     """
     _check_schema(document)
-    return checked(document, ScenarioFile)
+    return checked(document, ScenarioFile, own=own)
 
 
-def checked(document: Document, kind: type[File]) -> File:
+def checked(document: Document, kind: type[File], *, own: Model | None = None) -> File:
     """The values of a file of this kind.
 
     Raises
@@ -40,7 +41,7 @@ def checked(document: Document, kind: type[File]) -> File:
         If a key is unknown or missing, or holds what it may not: the first one in the file.
     """
     try:
-        return kind.model_validate(document.value, context=_context(document.value))
+        return kind.model_validate(document.value, context=_context(document.value, own))
     except ValidationError as error:
         found = [_message(document, item) for item in error.errors(include_url=False)]
         where, what = min(found, key=lambda item: document.line_of(item[0]))
@@ -62,7 +63,10 @@ def _check_schema(document: Document) -> None:
         raise document.error(("schema",), f"got {shown(schema)}, {what}")
 
 
-def _context(value: Any) -> dict[str, Any]:
+def _context(value: Any, own: Model | None) -> dict[str, Any]:
+    if own is not None:
+        names = {"control_names": own.control_names, "reduced_names": own.reduced_names}
+        return {"own": own.name, **names}
     vehicle = value.get("vehicle") if isinstance(value, dict) else None
     model = vehicle.get("model") if isinstance(vehicle, dict) else None
     kind = KINDS.get(model) if isinstance(model, str) else None

@@ -14,6 +14,7 @@ from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.formats.statement import MapFile
 from maneuver_automaton.formats.yaml_source import Document, Where, parse
+from maneuver_automaton.models import Model
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.scenario.automata import automaton_of
 from maneuver_automaton.scenario.places import at
@@ -82,26 +83,29 @@ def scenario_of_text(text: str, *, name: str) -> Scenario:
     return scenario_of_document(parse(text, name=name), path=None, begin=begin)
 
 
-def scenario_of_document(document: Document, *, path: Path | None, begin: float) -> Scenario:
-    """The scenario of a YAML file that was read since `begin` [s].
+def scenario_of_document(
+    document: Document, *, path: Path | None, begin: float, own: Model | None = None
+) -> Scenario:
+    """The scenario of a YAML file that was read since `begin` [s]; its vehicle is `own` if given.
 
     Raises
     ------
     InvalidScenario
         As `scenario_of_text`.
     """
-    file = values_of(document)
+    file = values_of(document, own=own)
     if file.search.method == "words":
         _refuse_long_words(document, file)
     folder = path.parent if path else Path()
     with at(document, ("vehicle",)):
-        model = model_of(file.vehicle)
+        model = model_of(file.vehicle, own=own)
     bodies = _Bodies(
         vehicle=footprint_of(document, file.vehicle.footprint, key="footprint"),
         parts={
             name: footprint_of(document, body, key=name)
             for name, body in carried_of(file.vehicle).items()
         },
+        height=_height_of(document, file.vehicle, model),
     )
     obstacles, maps = obstacles_of(document, file.obstacles, folder)
     read = time.perf_counter()
@@ -124,6 +128,15 @@ class _Bodies(NamedTuple):
 
     vehicle: tuple[Shape, ...]
     parts: Mapping[str, tuple[Shape, ...]]  # what it carries, by name
+    height: tuple[float, float]  # [m] lowest and highest point about the altitude of the pose
+
+
+def _height_of(document: Document, part: Any, model: Model) -> tuple[float, float]:
+    """Lowest and highest point of the body about its altitude [m]; a flat one if not stated."""
+    stated: tuple[float, float] | None = getattr(part, "footprint_height_m", None)
+    if stated is not None and model.group.dof == 3:
+        raise document.error(("vehicle", "footprint_height_m"), f"the {model.name} has no height")
+    return stated or (0.0, 0.0)
 
 
 def _refuse_long_words(document: Document, file: ScenarioFile) -> None:
@@ -178,6 +191,7 @@ def _problem(
             obstacles=obstacles,
             footprint=bodies.vehicle,
             parts=bodies.parts,
+            body_height=bodies.height,
             margin=file.margin_m,
             zones=zones_of(document, file.zones),
         )

@@ -25,6 +25,7 @@ from pydantic import (
 
 from maneuver_automaton.scenario.checks import (
     Count,
+    Interval,
     Name,
     Need,
     NotNegative,
@@ -40,18 +41,6 @@ from maneuver_automaton.scenario.checks import (
 )
 from maneuver_automaton.scenario.vehicle_parts import VehiclePart
 
-
-def _rising(value: tuple[float, float]) -> tuple[float, float]:
-    if not value[0] < value[1]:
-        raise need("an interval [low, high] with low < high")
-    return value
-
-
-Interval = Annotated[
-    tuple[Number, Number],
-    Several("an interval [low, high], two numbers", at_least=2, at_most=2),
-    AfterValidator(_rising),
-]
 Pose = Annotated[
     tuple[Number, ...],
     Several("a pose [x, y, heading], a list of 3 numbers", at_least=3, at_most=4),

@@ -6,10 +6,20 @@ import math
 from typing import Annotated, Any, ClassVar, Literal
 
 from annotated_types import Gt, Lt
-from pydantic import AllowInfNan, BeforeValidator, Discriminator, Field, Strict, Tag
+from pydantic import (
+    AllowInfNan,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    Strict,
+    Tag,
+    ValidationInfo,
+)
 from pydantic_core import PydanticCustomError
 
 from maneuver_automaton.scenario.checks import (
+    Interval,
+    Name,
     Need,
     NotNegative,
     Number,
@@ -172,6 +182,41 @@ class HelicopterPart(Part):
     min_speed_m_s: Number | None = Field(None, description="left out: as fast backwards")
     gravity_m_s2: Positive | None = Field(None, description="left out: 9.81")
     footprint: Footprint | None = Field(None, description="shape of the body, seen from above")
+    footprint_height_m: Interval | None = Field(
+        None, description="[low, high] of the body about its altitude; left out: a flat body"
+    )
+
+
+class LatticeBodyPart(Part):
+    """A body that moves by lattice primitives alone; its library is a file of Nav2 or SBPL."""
+
+    model: Literal["lattice_body"] = Field(description="lattice_body")
+    resolution_m: Positive = Field(description="side of a cell, a positive number")
+    turning_radius_m: Positive | None = Field(None, description="as the file of primitives has it")
+    footprint: Footprint | None = Field(None, description="shape of the body")
+
+
+class OmnidirectionalPart(Part):
+    """A platform that moves ahead, aside and turns at once; control [v, v aside, omega]."""
+
+    model: Literal["omnidirectional"] = Field(description="omnidirectional")
+    max_speed_m_s: Positive | None = Field(None, description="left out: no limit")
+    max_lateral_speed_m_s: Positive | None = Field(None, description="left out: no limit")
+    max_turn_rate_rad_s: Positive | None = Field(None, description="left out: no limit")
+    footprint: Footprint | None = Field(None, description="shape of the body")
+
+
+class OwnPart(Part):
+    """A vehicle of the user's own, by its name: the model itself is given to the program."""
+
+    model: Name = Field(description="the name of a model that is given with --model")
+    footprint: Footprint | None = Field(None, description="shape of the body")
+    footprint_height_m: Interval | None = Field(
+        None, description="[low, high] of the body about its altitude; left out: a flat body"
+    )
+    parts: dict[str, Footprint] | None = Field(
+        None, description="shapes of what it carries, by the model's names of these"
+    )
 
 
 PARTS: tuple[type[Part], ...] = (
@@ -183,24 +228,29 @@ PARTS: tuple[type[Part], ...] = (
     SingleTrackPart,
     HovercraftPart,
     HelicopterPart,
+    LatticeBodyPart,
+    OmnidirectionalPart,
 )
 MODELS = tuple(str(part.model_fields["model"].description) for part in PARTS)
 
 
-def _check_model(value: Any) -> Any:
+def _check_model(value: Any, info: ValidationInfo) -> Any:
     if not isinstance(value, dict):
         raise need("a mapping with the key model")
-    what = f"one of {', '.join(MODELS)}"
+    own = (info.context or {}).get("own")  # the name of the model that is given beside the file
+    if own is not None and value.get("model") == own:
+        return value
+    what = f"{own!r}, the model that is given" if own else f"one of {', '.join(MODELS)}"
     if "model" not in value:
         raise PydanticCustomError("missing_key", "", {"key": "model", "what": what})
-    if value["model"] not in MODELS:
+    if value["model"] not in MODELS or own is not None:
         raise PydanticCustomError("at_key", "", {"key": "model", "need": what})
     return value
 
 
 def _model_of(value: Any) -> str:
     model = value["model"] if isinstance(value, dict) else value.model
-    return f"<{model}>"
+    return f"<{model}>" if model in MODELS else "<own>"
 
 
 VehiclePart = Annotated[
@@ -211,7 +261,10 @@ VehiclePart = Annotated[
     | Annotated[CarWithTrailerPart, Tag("<car_with_trailer>")]
     | Annotated[SingleTrackPart, Tag("<single_track>")]
     | Annotated[HovercraftPart, Tag("<hovercraft>")]
-    | Annotated[HelicopterPart, Tag("<helicopter>")],
+    | Annotated[HelicopterPart, Tag("<helicopter>")]
+    | Annotated[LatticeBodyPart, Tag("<lattice_body>")]
+    | Annotated[OmnidirectionalPart, Tag("<omnidirectional>")]
+    | Annotated[OwnPart, Tag("<own>")],
     Discriminator(_model_of),
     BeforeValidator(_check_model),
 ]

@@ -11,14 +11,22 @@ from maneuver_automaton.models import (
     CarWithTrailer,
     Helicopter,
     Hovercraft,
+    LatticeBody,
     Model,
+    Omnidirectional,
     SecondOrderCar,
     SecondOrderUnicycle,
     SingleTrack,
     Unicycle,
 )
 from maneuver_automaton.scenario.checks import Part
-from maneuver_automaton.scenario.vehicle_parts import MODELS, PARTS, CarWithTrailerPart, Footprint
+from maneuver_automaton.scenario.vehicle_parts import (
+    MODELS,
+    PARTS,
+    CarWithTrailerPart,
+    Footprint,
+    OwnPart,
+)
 
 UNITS = (
     "m",
@@ -47,6 +55,8 @@ KINDS: Mapping[str, Any] = {
         SingleTrack,
         Hovercraft,
         Helicopter,
+        LatticeBody,
+        Omnidirectional,
     )
 }
 
@@ -63,8 +73,11 @@ def _keys(part: type[Part], kind: Any) -> dict[str, str]:
 KEYS = {name: _keys(part, KINDS[name]) for name, part in zip(MODELS, PARTS, strict=True)}
 
 
-def model_of(part: Any) -> Model:
-    """The model that a file describes, by its `VehiclePart`."""
+def model_of(part: Any, *, own: Model | None = None) -> Model:
+    """The model that a file describes, by its `VehiclePart`; `own` where it names a user's."""
+    if isinstance(part, OwnPart):
+        assert own is not None  # a file that names another is refused when it is read
+        return own
     given = {name: getattr(part, key) for name, key in KEYS[part.model].items()}
     model: Model = KINDS[part.model](**{k: v for k, v in given.items() if v is not None})
     return model
@@ -74,7 +87,14 @@ def carried_of(part: Any) -> Mapping[str, Footprint]:
     """Bodies of what a vehicle carries, as the file states them."""
     if isinstance(part, CarWithTrailerPart) and part.trailer is not None:
         return {"trailer": part.trailer}
+    if isinstance(part, OwnPart):
+        return part.parts or {}
     return {}
+
+
+def is_known(model: Model) -> bool:
+    """Whether scenario files can state a model; a user's own they can only name."""
+    return model.name in KINDS and isinstance(model, KINDS[model.name])
 
 
 def described(model: Model) -> dict[str, Any]:
@@ -90,7 +110,7 @@ def described(model: Model) -> dict[str, Any]:
     >>> described(Car(wheelbase=2.5))
     {'model': 'car', 'wheelbase_m': 2.5}
     """
-    if model.name not in KINDS or not isinstance(model, KINDS[model.name]):
+    if not is_known(model):
         raise ValueError(f"vehicle: a file cannot state {model.name!r}, only {', '.join(MODELS)}")
     values = {key: getattr(model, name) for name, key in KEYS[model.name].items()}
     return {"model": model.name} | {k: float(v) for k, v in values.items() if v is not None}

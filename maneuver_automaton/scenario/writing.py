@@ -65,6 +65,8 @@ def to_yaml(scenario: Scenario, *, folder: Path | None = None) -> str:
     if scenario.footprint:
         shapes = list(scenario.footprint)
         vehicle["footprint"] = shapes if len(shapes) > 1 else shapes[0]
+    if any(problem.body_height) and problem.start.size > 3:
+        vehicle["footprint_height_m"] = list(problem.body_height)
     for name, body in problem.parts.items():
         stated = list(stated_footprint(body))
         vehicle[name] = stated if len(stated) > 1 else stated[0]

@@ -12,6 +12,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.groups import SE2
+from maneuver_automaton.models import OnLattice
 from maneuver_automaton.search.maneuver_heights import altitude_ranges
 from maneuver_automaton.search.maneuver_motion import (
     CLOSE,
@@ -30,6 +31,10 @@ from maneuver_automaton.words.transitions import SWITCH, transitions_of
 
 QUANTA = (0.17, 0.5)  # lengths of coasts, in length scales
 SPIN_QUANTA = (math.pi / 12.0, math.pi / 4.0)  # [rad] of turns on the spot
+CELL = 0.122  # side of a cell of the first pass, in length scales
+OF_A_LATTICE = (
+    0.7  # of its resolution: the diagonal of a cell is shorter than the way between poses
+)
 
 
 class ManeuverArrays(NamedTuple):
@@ -71,6 +76,7 @@ class ManeuverLibrary(NamedTuple):
     transfer: Library
     edge_maneuver: IntArray  # (E,) index in the automaton, -1 for a switch at will
     radius: float  # [m] length scale: the tightest turn, or the size of the body
+    cell: float  # [m] side of a cell of the first pass
     per_metre: float  # least cost per metre
     per_climb: float  # least cost per metre of altitude
     lag: Array  # (C, C) least cost of maneuvers between classes beyond that of their way
@@ -101,8 +107,9 @@ def maneuver_library(
     steps = quanta[..., None] * trim_twists[:, None]
     moves = np.concatenate([SE2.exp(steps[..., :3]).pose, steps[..., 3:]], axis=-1)
     speed = np.hypot(trim_twists[:, 0], trim_twists[:, 1])
-    per_metre = _least(trim_rates, speed)
     lengths = np.array([0.0 if k < 0 else _way(automaton, k) for k in edges.maneuver])
+    # where no trim moves, only maneuvers cover ground
+    per_metre = _least(trim_rates, speed) if speed.any() else _least(edges.cost, lengths)
     reach = motion.piece_speed * motion.piece_time + 2.0 * motion.piece_error
     per_group = np.add.reduceat(np.append(reach, 0.0), motion.first_piece[:-1])
     per_group = np.where(np.diff(motion.first_piece) > 0, per_group, 0.0)
@@ -131,6 +138,7 @@ def maneuver_library(
         transfer=transfer,
         edge_maneuver=edges.maneuver,
         radius=radius,
+        cell=_cell(automaton, radius),
         per_metre=per_metre,
         per_climb=_least(trim_rates, np.abs(trim_twists[:, 3])),
         lag=_lags(transfer, np.maximum(edges.cost - per_metre * lengths, 0.0), edges),
@@ -287,6 +295,12 @@ def _least(rates: Array, speed: Array) -> float:
     """Least cost per metre; 0 if nothing moves."""
     moving = speed > 0.0
     return float((rates[moving] / speed[moving]).min()) if moving.any() else 0.0
+
+
+def _cell(automaton: Automaton, radius: float) -> float:
+    """Side of a cell [m]: poses of a lattice must not share one, since each has to be reached."""
+    model = automaton.model
+    return OF_A_LATTICE * model.resolution if isinstance(model, OnLattice) else CELL * radius
 
 
 def _length_scale(twists: Array, half_width: float, reach: float) -> float:

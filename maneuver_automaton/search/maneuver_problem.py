@@ -7,9 +7,11 @@ import functools
 import numpy as np
 
 from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.automaton.between import part_between
 from maneuver_automaton.collision import Shape
 from maneuver_automaton.costs import StageCost
 from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.search.lattice_goals import aim_of
 from maneuver_automaton.search.maneuver_motion import Part, parts_of
 from maneuver_automaton.search.maneuver_query import ManeuverQuery
 from maneuver_automaton.words.library import Library, library_of
@@ -18,6 +20,7 @@ from maneuver_automaton.words.library import Library, library_of
 def maneuver_problem_query(problem: Problem, goals: tuple[int, ...]) -> ManeuverQuery:
     """What the search over trims and maneuvers is asked to solve, for the goals of these numbers.
 
+    Trims that lead to no goal are left out: their speeds would make the estimates of cost too low.
     Prices of switches and changes of direction are left to whoever compares plans.
 
     Raises
@@ -25,20 +28,18 @@ def maneuver_problem_query(problem: Problem, goals: tuple[int, ...]) -> Maneuver
     ValueError
         If a maneuver has no course, and so no known cost.
     """
-    automaton = problem.automaton
-
-    def number(goal: Goal) -> int:
-        return automaton.index_of(problem.last_trim(goal).name)
-
     aims = [problem.goals[k] for k in goals]
+    first, last = problem.first_trim.name, [problem.last_trim(goal).name for goal in aims]
+    whole = problem.automaton
+    automaton = part_between(whole, whole.index_of(first), [whole.index_of(one) for one in last])
     most = problem.horizon.max_time
     return ManeuverQuery(
         transfer=priced_transfers(automaton, problem.cost),
         parts=_parts(automaton, problem.footprint, tuple(problem.parts.items())),
         start=problem.start,
-        goals=np.array([goal.pose for goal in aims]),
-        start_trim=automaton.index_of(problem.first_trim.name),
-        goal_trims=np.array([number(goal) for goal in aims], dtype=np.int64),
+        goals=np.array([aim_of(problem, goal) for goal in aims]),
+        start_trim=automaton.index_of(first),
+        goal_trims=np.array([automaton.index_of(one) for one in last], dtype=np.int64),
         obstacles=problem.obstacles,
         bounds=problem.bounds,
         keep=problem.margin,

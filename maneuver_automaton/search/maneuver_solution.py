@@ -13,6 +13,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.automaton.between import trims_between
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.groups import LieGroup, group_of
 from maneuver_automaton.primitives import Maneuver, Trim
@@ -258,7 +259,9 @@ def word_setup(
     goal_trim = automaton.index_of(problem.last_trim(goal).name)
     pads = problem.horizon.time is not None and automaton.rest is not None
     wanted = tuple(sorted({start_trim, goal_trim, *also}))
-    letters, library = _library(automaton, problem.cost, pads, most_trims, wanted, steers)
+    useful = trims_between(automaton, start_trim, [goal_trim])
+    kept = None if len(useful) == len(automaton) else tuple(useful.tolist())
+    letters, library = _library(automaton, problem.cost, pads, most_trims, wanted, steers, kept)
     return WordSetup(
         problem=problem,
         goal=goal,
@@ -285,11 +288,17 @@ def _library(
     most_trims: int,
     wanted: tuple[int, ...],
     steers: bool,
+    useful: tuple[int, ...] | None,
 ) -> tuple[tuple[int, ...], Library]:
-    """Trims that words are made of, and the transitions; words to be steered along on demand."""
+    """Trims that words are made of, and the transitions; words to be steered along on demand.
+
+    Where only some trims are `useful`, the others, which lead nowhere, are not among them.
+    """
     library = _transitions(automaton, cost, pads)
     twists = library.arrays.twists[: library.arrays.n_trims]
     moving = np.flatnonzero(twists[:, :3].any(axis=1))
+    if useful is not None:
+        moving = np.intersect1d(moving, useful)
     chosen = set(moving[most_different(twists[moving], most_trims)].tolist())
     chosen |= set(wanted) & set(moving.tolist())
     letters = tuple(sorted(chosen))

@@ -13,7 +13,6 @@ from maneuver_automaton.search.maneuver_query import ManeuverQuery
 from maneuver_automaton.words.library import Library
 from maneuver_automaton.words.word import MANEUVER, TRIM
 
-CELL = 0.122  # of the first pass, in length scales
 RISE = 0.25  # of altitude
 HEADINGS = 72
 TRIES = 6  # candidates of one transfer that are tried
@@ -98,14 +97,16 @@ def task_of(query: ManeuverQuery, rung: Rung) -> Task:
         frame_heading=float(frame[2]),
         frame_cos=math.cos(float(frame[2])),
         frame_sin=math.sin(float(frame[2])),
-        cell=float(rung.scale * CELL * library.radius),
+        cell=float(rung.scale * library.cell),
         rise=float(rung.scale * RISE * library.radius),
         headings=HEADINGS,
         tick=float(tick),
         weight=float(rung.weight),
         per_metre=library.per_metre,
         per_climb=library.per_climb,
-        per_shot=float(SHOTS * scale) or 1.0,
+        # the way to the goal says how long to wait, unless no trim moves: then nothing is solved
+        # for, and the node that ends at the goal must not be missed
+        per_shot=float(SHOTS * scale) or 1.0 if query.transfer.arrays.n_few > 1 else math.inf,
         most_patience=MOST_PATIENCE,
         least_patience=float(query.transfer.arrays.n_few / WORDS_AN_EXPANSION),
         patience=PATIENCE,

@@ -28,7 +28,7 @@ from tests import inertia
 
 KINDS = (
     "unicycle, car, second_order_unicycle, second_order_car, car_with_trailer, single_track, "
-    "hovercraft, helicopter, accelerating_car, lattice_body"
+    "hovercraft, helicopter, accelerating_car, lattice_body, omnidirectional"
 )
 ROBOT = Automaton.of_controls(Unicycle(max_speed=2.0), {"ahead": (1.5, 0.0), "spin": (0.0, 1.0)})
 
@@ -129,7 +129,7 @@ def test_the_file_of_a_users_own_model_is_read_with_the_model(path):
         load_library(path)
     assert str(error.value) == (
         f"robot.json: model: got the kind 'boat', need one of {KINDS}; a model of your own has "
-        "to be given to load_library"
+        "to be given: to load_library, or by --model MODULE:OBJECT"
     )
     with pytest.raises(
         InvalidLibrary, match=r"model: got .*'boat'.*, but the model given is .*uni"
@@ -313,7 +313,7 @@ AHEAD = {"name": "ahead", "control": [1.5, 0.0], "body_velocity": [1.5, 0.0, 0.0
         ({"trims": [AHEAD | {"max_duration": -1}]},
          ": trim 'ahead': max_duration must be positive, got -1.0 s"),
         ({"model": {"kind": "tank"}}, ": model: got the kind 'tank', need one of " + KINDS +
-         "; a model of your own has to be given to load_library"),
+         "; a model of your own has to be given: to load_library, or by --model MODULE:OBJECT"),
         ({"model": {"kind": "car"}}, ": model: the key 'wheelbase' is missing"),
         ({"model": {"kind": "car", "wheelbase": -1}},
          ": car: wheelbase must be positive, got -1.0 m"),

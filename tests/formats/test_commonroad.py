@@ -181,7 +181,7 @@ def test_the_given_scenarios_are_read():
             found[file.stem] = read_commonroad(file)[0].road
         except InvalidScenario as error:
             refused.append(str(error))
-    assert len(found) == 11
+    assert len(found) >= 11
     (said,) = refused
     assert "got 31598, but no lanelet of the file has this id" in said
     assert [len(found["DEU_Ffb-1_6_T-1"].lanelets), len(found["DEU_Gar-1_1_T-1"].traffic)] == [

@@ -83,6 +83,21 @@ def test_a_primitive_is_a_maneuver_between_states(tmp_path):
     assert found.position < 1e-12
 
 
+@pytest.mark.parametrize("seconds", ["0.2", "0.25"])
+def test_a_duration_may_be_in_seconds(tmp_path, seconds):
+    path = tmp_path / "a.xml"
+    path.write_text(XML.replace('"deci-second">2<', f'"second">{seconds}<'))
+    file = read_commonroad_primitives(path)
+    assert file.steps() == (pytest.approx(float(seconds) / 2),)
+    (one,) = automaton_of_commonroad_primitives(file).maneuvers
+    assert one.duration == pytest.approx(float(seconds))
+    np.testing.assert_allclose(one.course.control[0], [2.0 / float(seconds), 0.0], atol=1e-9)
+    save_commonroad_primitives(file, tmp_path / "b.xml")
+    assert f'<Duration unit="second">{seconds}</Duration>' in (tmp_path / "b.xml").read_text()
+    again = read_commonroad_primitives(tmp_path / "b.xml")
+    assert again.primitives[0].seconds == file.primitives[0].seconds
+
+
 def test_what_does_not_hold_is_named(tmp_path):
     path = tmp_path / "a.xml"
     path.write_text(XML.replace("<x>0.25</x>", "<x>0.26</x>"))
@@ -158,8 +173,10 @@ def test_a_wheelbase_that_nothing_tells(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("<Duration unit=\"deci-second\">2", "<Duration unit=\"second\">2",
-         ":6: Duration: unit: got 'second', need deci-second"),
+        ("<Duration unit=\"deci-second\">2", "<Duration unit=\"minute\">2",
+         ":6: Duration: unit: got 'minute', need deci-second or second"),
+        ("<Duration unit=\"deci-second\">2", "<Duration unit=\"second\">0",
+         ":6: Duration: got 0, need a positive number of seconds"),
         (">2</Duration>", ">2.5</Duration>",
          ":6: Duration: got 2.5, need a whole number of at least 1"),
         (">2</Duration>", ">long</Duration>",

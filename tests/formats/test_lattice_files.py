@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from maneuver_automaton._arrays import wrapped
 from maneuver_automaton.automaton import Automaton, Plan
-from maneuver_automaton.automaton.library import load_library, save_library
+from maneuver_automaton.automaton.library import automaton_hash, load_library, save_library
 from maneuver_automaton.errors import InvalidLibrary
 from maneuver_automaton.formats.lattice import (
     Lattice,
@@ -31,7 +32,9 @@ from maneuver_automaton.formats.sbpl_mprim import (
     save_mprim,
 )
 from maneuver_automaton.models import LatticeBody, Unicycle
+from maneuver_automaton.planning import plan
 from maneuver_automaton.primitives.resimulation import maneuver_defect
+from maneuver_automaton.problem import Problem
 from tests.formats.outside import DATA, message_of, needs_data
 
 MPRIM = """\
@@ -158,6 +161,49 @@ def test_mprim_there_and_back(tmp_path, pace):
     automaton = automaton_of_mprim(file, **pace)
     save_mprim(mprim_of_automaton(automaton), tmp_path / "c.mprim")
     assert_same_automaton(automaton_of_mprim(read_mprim(tmp_path / "c.mprim"), **pace), automaton)
+
+
+def test_cost_multipliers_outlive_a_library_file(tmp_path):
+    automaton = automaton_of_mprim(read_mprim(write(tmp_path, "a.mprim", MPRIM)))
+    assert [one.cost_multiplier for one in automaton.maneuvers] == [1.0, 2.0, 1.0, 5.0]
+    save_library(automaton, tmp_path / "b.json")
+    again = load_library(tmp_path / "b.json")
+    assert [one.cost_multiplier for one in again.maneuvers] == [1.0, 2.0, 1.0, 5.0]
+    assert automaton_hash(again) == automaton_hash(automaton)
+    file = mprim_of_automaton(again)
+    assert [one.cost_multiplier for one in file.primitives] == [1, 2, 1, 5]
+    problem = Problem(again, [0, 0, 0], [0.5, 0, 0], start_trim="heading 0")
+    costs = [problem.maneuver_cost(one) / one.duration for one in again.maneuvers]
+    np.testing.assert_allclose(costs, [1.0, 2.0, 1.0, 5.0], rtol=1e-12)
+
+
+def test_a_cost_multiplier_of_a_part_is_for_no_mprim(tmp_path):
+    automaton = automaton_of_mprim(read_mprim(write(tmp_path, "a.mprim", MPRIM)))
+    first, *others = automaton.maneuvers
+    half = replace(automaton, maneuvers=(replace(first, cost_multiplier=0.5), *others))
+    with pytest.raises(InvalidLibrary, match=r"multiplier 0\.5; a file of SBPL primitives needs"):
+        mprim_of_automaton(half)
+
+
+@pytest.mark.parametrize("dear", [1, 9])
+def test_a_plan_keeps_away_from_dear_primitives(tmp_path, dear):
+    """To a cell ahead and one to the left: two steps aside, or a diagonal one that may be dear."""
+    rows = []
+    for number, (columns, lines) in enumerate([(1, 0), (0, 1), (1, 1)]):
+        multiplier = dear if (columns, lines) == (1, 1) else 1
+        rows.append(
+            f"primID: {number}\nstartangle_c: 0\nendpose_c: {columns} {lines} 0\n"
+            f"additionalactioncostmult: {multiplier}\nintermediateposes: 2\n0.0 0.0 0.0\n"
+            f"{0.5 * columns} {0.5 * lines} 0.0\n"
+        )
+    text = "resolution_m: 0.5\nnumberofangles: 1\ntotalnumberofprimitives: 3\n" + "".join(rows)
+    automaton = automaton_of_mprim(read_mprim(write(tmp_path, "a.mprim", text)))
+    save_library(automaton, tmp_path / "a.json")
+    library = load_library(tmp_path / "a.json")
+    result = plan(Problem(library, [0, 0, 0], [0.5, 0.5, 0.0]), time_limit=60.0)
+    straight = result.plan.word == ("2 from heading 0",)
+    assert straight == (dear == 1)
+    assert result.cost == pytest.approx(np.sqrt(0.5) if dear == 1 else 1.0)
 
 
 @pytest.mark.parametrize(

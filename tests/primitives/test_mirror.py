@@ -60,14 +60,70 @@ def test_two_controls_may_change_places():
     assert mirror.reduced.tolist() == [1]
 
 
+def wheels(**changes):
+    """Two wheels with a speed each: the mirror exchanges the speeds, and what drives them."""
+    return UserModel(
+        name="wheels", group=SE2, control_names=("left", "right"),
+        reduced_names=("left_speed", "right_speed"),
+        velocity=lambda z, u: [0.5 * (z[0] + z[1]), 0.0, z[1] - z[0]],
+        dynamics=lambda z, u: [u[0] - z[0] * abs(z[0]), u[1] - z[1] * abs(z[1])],
+        **{"control_limits": [-1.0, 1.0], "reduced_limits": [0.0, 2.0], **changes},
+    )  # fmt: skip
+
+
+def test_components_of_the_reduced_state_may_change_places():
+    mirror = mirror_of(wheels())
+    assert mirror.control.tolist() == [[0, 1], [1, 0]]
+    np.testing.assert_array_equal(mirror.state(np.array([[1.0, 2.0]])), [[2.0, 1.0]])
+    model, state, control = wheels(), np.array([0.3, 1.2]), np.array([0.7, -0.4])
+    there = mirror.state(state), mirror.control @ control
+    signs = np.array([1.0, -1.0, -1.0])
+    np.testing.assert_allclose(
+        model.body_velocity(*there), signs * model.body_velocity(state, control), atol=1e-15
+    )
+    np.testing.assert_allclose(
+        model.reduced_dynamics(*there),
+        mirror.state(model.reduced_dynamics(state, control)),
+        atol=1e-15,
+    )
+
+
+def test_two_pairs_of_controls_may_change_places():
+    thrusters = UserModel(
+        name="thrusters", group=SE2, control_names=("fl", "fr", "rl", "rr"),
+        reduced_names=("u", "v", "r"), control_limits=[0.0, 1.0],
+        velocity=lambda z, u: [z[0], z[1], z[2]],
+        dynamics=lambda z, u: [
+            u[0] + u[1] - u[2] - u[3] - z[0], u[0] - u[1] + u[2] - u[3] - z[1],
+            0.5 * (u[1] - u[0]) + 0.3 * (u[2] - u[3]) - z[2],
+        ],
+    )  # fmt: skip
+    mirror = mirror_of(thrusters)
+    assert mirror.reduced.tolist() == [1, -1, -1]
+    exchanged = [[0, 1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1], [0, 0, 1, 0]]
+    assert mirror.control.tolist() == exchanged
+
+
+def test_limits_that_differ_by_rounding_are_alike():
+    steering = [-0.1 - 0.2, 0.3]
+    assert steering[0] != -steering[1]
+    model = UserModel(
+        name="skate", group=SE2, control_names=("speed", "steering"),
+        velocity=lambda z, u: [u[0], 0.0, u[0] * np.tan(u[1])],
+        control_limits=[[0.0, 1.0], steering],
+    )  # fmt: skip
+    assert mirror_of(model).control.tolist() == [[1, 0], [0, -1]]
+
+
 @pytest.mark.parametrize(
     "model",
     [
         two_tracks(control_limits=[[-1.0, 1.0], [-1.0, 2.0]]),
         dataclasses.replace(two_tracks(), velocity=lambda z, u: [z[0], 0.01 * z[0], u[1] - u[0]]),
         dataclasses.replace(two_tracks(), dynamics=lambda z, u: [u[0] + 1.1 * u[1] - z[0]]),
+        wheels(reduced_limits=[[0.0, 2.0], [0.0, 1.9]]),
     ],
-    ids=["limits", "velocity", "dynamics"],
+    ids=["limits", "velocity", "dynamics", "wheels"],
 )
 def test_a_lopsided_vehicle_has_none(model):
     assert mirror_of(model) is None

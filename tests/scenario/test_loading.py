@@ -113,6 +113,28 @@ def test_start_and_goals_of_a_map_are_those_beside(folder):
     assert (problem.bounds.x, problem.bounds.y) == ((1.0, 3.0), (2.0, 4.0))
 
 
+@pytest.mark.parametrize(("name", "case"), STATED)
+def test_a_scenario_beside_needs_no_start_and_goal_where_the_file_states_them(folder, name, case):
+    lines = [
+        line
+        for line in BESIDE.splitlines()
+        if not line.startswith(("start:", "goal:", "  - {pose"))
+    ]
+    Path("bare.yaml").write_text("\n".join(lines) + "\n")
+    problem = load_scenario(name, beside="bare.yaml", case=case).problem
+    whole = load_scenario(name, beside="beside.yaml", case=case).problem
+    np.testing.assert_array_equal(problem.start, whole.start)
+    np.testing.assert_array_equal(problem.goals[0].pose, whole.goals[0].pose)
+    assert problem.cost == whole.cost or problem.cost.effort == whole.cost.effort
+
+
+def test_a_map_needs_start_and_goal_beside(folder):
+    text = BESIDE[: BESIDE.index("start:")]
+    Path("bare.yaml").write_text(text)
+    with pytest.raises(InvalidScenario, match=r"--with: bare\.yaml:1: the key 'start' is missing"):
+        load_scenario("nav.yaml", beside="bare.yaml")
+
+
 @pytest.mark.parametrize(("name", "free"), [("room.map.scen", True), ("flat.env", True),
                                             ("Case0.csv", False), ("room.cfg", False)])  # fmt: skip
 def test_a_free_heading_is_for_files_that_state_none(folder, name, free):

@@ -1,0 +1,89 @@
+"""Poses of the lattice on which the maneuvers of a library end, next to a goal."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.models import OnLattice
+from maneuver_automaton.problem import Goal, Problem
+
+ENDS = 1e-3  # of a cell, between the end of a primitive and the cell it is taken for
+EXACT = 1e-9  # [m, rad] by which a plan may miss its goal, as in the audit
+
+
+class LatticePose(NamedTuple):
+    """The pose of a lattice that is next to a goal, at the heading of the goal's trim."""
+
+    pose: Array  # (3,) [m, m, rad]
+    way: float  # [m] from the goal
+    turn: float  # [rad] from the goal, 0 if its heading is free
+
+    def is_near(self, goal: Goal) -> bool:
+        """Whether it is within the goal's tolerance."""
+        exact = EXACT * (1.0 + float(np.abs(self.pose[:2]).max()))
+        return self.way <= goal.tolerance_m + exact and self.turn <= goal.tolerance_rad + EXACT
+
+
+def nearest_on_lattice(problem: Problem, goal: Goal) -> LatticePose | None:
+    """The pose next to a goal on the lattice of the start; None if the library has no lattice.
+
+    Primitives move with the vehicle, so any pose will do for the start, where the lattice begins.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
+    >>> problem = Problem(robot, [0, 0, 0], [1, 0, 0])
+    >>> nearest_on_lattice(problem, problem.goals[0]) is None
+    True
+    """
+    automaton, model = problem.automaton, problem.automaton.model
+    if not isinstance(model, OnLattice) or not _stays_on_grid(automaton, model):
+        return None
+    first, last = problem.first_trim, problem.last_trim(goal)
+    # the lattice's own frame, seen from the world: at the start it has the first trim's heading
+    world = SE2(problem.start) @ SE2(_facing(-model.heading(first.reduced_state)))
+    seen = (world.inverse() @ SE2(goal.pose)).pose
+    cell = np.round(seen[:2] / model.resolution) * model.resolution
+    turn = math.remainder(model.heading(last.reduced_state) - float(seen[2]), 2.0 * math.pi)
+    pose = np.array((world @ SE2(np.append(cell, 0.0))).pose)
+    pose[2] = goal.pose[2] + turn
+    way = float(np.linalg.norm(seen[:2] - cell))
+    return LatticePose(pose, way, 0.0 if goal.free_heading else abs(turn))
+
+
+def aim_of(problem: Problem, goal: Goal) -> Array:
+    """The pose at which a search aims: the goal's, or the one of the lattice within its tolerance.
+
+    A goal on the lattice keeps its own digits.
+    """
+    near = nearest_on_lattice(problem, goal)
+    if near is None or not near.is_near(goal) or max(near.way, near.turn) <= EXACT:
+        return goal.pose
+    return near.pose
+
+
+def _stays_on_grid(automaton: Automaton, model: OnLattice) -> bool:
+    """Whether every trim stands still, and every maneuver ends in the middle of a cell."""
+    if automaton.body_velocities.any():
+        return False
+    ends = np.array([_end(automaton, model, k) for k in range(len(automaton.maneuvers))])
+    across = ends.reshape(-1, 2) / model.resolution
+    return bool(np.abs(across - np.round(across)).max(initial=0.0) <= ENDS)
+
+
+def _end(automaton: Automaton, model: OnLattice, k: int) -> Array:
+    """Where maneuver `k` ends (2,) [m], along the axes of the lattice."""
+    one = automaton.maneuvers[k]
+    heading = model.heading(automaton[one.source].reduced_state)
+    return np.asarray(SE2(_facing(heading)).act(one.displacement[:2]))
+
+
+def _facing(heading: float) -> Array:
+    return np.array([0.0, 0.0, heading])
