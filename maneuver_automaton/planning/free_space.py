@@ -92,6 +92,7 @@ class _Chosen:
     plans: list[_Candidate]
     outside: int
     hit: int  # an obstacle
+    broken: int  # conditions on the word and its times
     rejected: int
     complaint: str
 
@@ -156,7 +157,7 @@ def _distinct(candidates: Iterable[_Candidate]) -> list[_Candidate]:
 def _audited(problem: Problem, candidates: Sequence[_Candidate], alternatives: int) -> _Chosen:
     """The cheapest candidates that stay inside the bounds, are free, and pass the audit."""
     plans: list[_Candidate] = []
-    outside = hit = rejected = 0
+    outside = hit = broken = rejected = 0
     complaint = ""
     for candidate in candidates:
         if len(plans) > alternatives:
@@ -164,6 +165,8 @@ def _audited(problem: Problem, candidates: Sequence[_Candidate], alternatives: i
         checked = check_plan(problem, candidate.plan, problem.goals[candidate.goal_index])
         if checked.passed:
             plans.append(replace(candidate, audit=checked.audit))
+        elif not checked.admitted:
+            broken += 1
         elif not checked.inside:
             outside += 1
         elif not checked.free:
@@ -171,7 +174,14 @@ def _audited(problem: Problem, candidates: Sequence[_Candidate], alternatives: i
         else:
             rejected += 1
             complaint = complaint or checked.reason
-    return _Chosen(plans=plans, outside=outside, hit=hit, rejected=rejected, complaint=complaint)
+    return _Chosen(
+        plans=plans,
+        outside=outside,
+        hit=hit,
+        broken=broken,
+        rejected=rejected,
+        complaint=complaint,
+    )
 
 
 def _why_none(
@@ -222,20 +232,17 @@ def _least_time(problem: Problem) -> tuple[PlanStatus, str] | None:
     hurry = replace(
         problem, cost=Cost(time=1.0), horizon=Horizon(max_trims=problem.horizon.max_trims)
     )
-    quickest = [
-        (solution.duration, index, solution, result.exhaustive)
-        for index, goal in enumerate(problem.goals)
-        for result in search_goal(hurry, goal, alternatives=0, time_limit=5.0)
-        for solution in result.solutions
-    ]
-    if not quickest:
-        return None
-    least, index, solution, exhaustive = min(quickest, key=lambda row: row[:2])
+    quickest: list[float] = []
+    proven = True
+    for goal in problem.goals:
+        results = search_goal(hurry, goal, alternatives=0, time_limit=5.0)
+        # Only a search over all admitted words is a proof: a certificate is but necessary.
+        proven = proven and any(result.exhaustive for result in results)
+        quickest += [one.duration for result in results for one in result.solutions]
+    least = min(quickest, default=0.0)
     if least <= limit:
         return None
-    evidence = certificate(hurry, problem.goals[index], solution)
-    settled = exhaustive or (evidence is not None and evidence >= -1e-9)
-    return (PlanStatus.UNREACHABLE if settled else PlanStatus.NO_PLAN), (
+    return (PlanStatus.UNREACHABLE if proven else PlanStatus.NO_PLAN), (
         f"the goal cannot be reached in {limit:g} s: the least time found is {least:.6g} s"
     )
 
