@@ -17,11 +17,12 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.same_motion import is_new
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.exact_end import corrected, with_fewer_digits
 from maneuver_automaton.search.library_arrays import LibraryArrays, library_arrays
-from maneuver_automaton.search.result import SearchResult, SearchStatus, Solution
+from maneuver_automaton.search.result import SearchResult, SearchStatus, Solution, plan_of
 from maneuver_automaton.search.setup import MovingLibrary, SearchSetup, search_setup
 from maneuver_automaton.search.shortening import shortened
 from maneuver_automaton.search.time_limit import UNUSED, within_time
@@ -94,7 +95,7 @@ def search_insertion(
     exact, setup = setup.goal, with_fewer_digits(setup)
     if seeds is None:
         many = len(setup.trims) > FEW
-        seeds = max(SEEDS_OF_MANY if many else SEEDS, alternatives + 1)
+        seeds = max(SEEDS_OF_MANY if many else SEEDS, 2 * alternatives + 1)
     library = library_arrays(problem, setup)
     asked = _Asked(problem, setup, library, exact, alternatives, seeds, deadline)
     found = _improved(asked, known)
@@ -108,7 +109,7 @@ def search_insertion(
             in_time += [one for one in more.solutions if one.duration <= most_time + LATE]
             found = more.after(found)
         found = replace(found, solutions=in_time)
-    solutions = tuple(_distinct(in_order(found.solutions)))[: alternatives + 1]
+    solutions = tuple(_distinct(problem, in_order(found.solutions), most=alternatives + 1))
     return SearchResult(
         status=SearchStatus.FOUND if solutions else found.status,
         solutions=solutions,
@@ -188,6 +189,11 @@ def _improved(asked: _Asked, known: Plan | None) -> _Improved:
         works += _from_longer(library, begun, most, counts)
     if _prices_switches(problem) and time.monotonic() < deadline:
         works += _with_fewer_switches(library, works)
+    if alternatives > 0:  # the best times of a seed's own word are locally optimal, too
+        for word, times in begun:
+            work = _Work(word, times)
+            work.improve(library, most, 0, counts)
+            works.append(work)
     if time.monotonic() > deadline:
         status = SearchStatus.OUT_OF_BUDGET
     improved = [
@@ -197,7 +203,7 @@ def _improved(asked: _Asked, known: Plan | None) -> _Improved:
         for solution in work.solutions(problem, library, asked.exact)
         if solution.word.size <= (problem.horizon.max_trims or LONGEST)
     ]
-    return _Improved(list(_distinct(in_order(improved))), status, counts)
+    return _Improved(list(in_order(improved)), status, counts)
 
 
 def compile_calming(problem: Problem) -> None:
@@ -454,11 +460,13 @@ def _far_reaching(library: MovingLibrary) -> IntArray:
     return np.array(list(dict.fromkeys(chosen)))
 
 
-def _distinct(solutions: Iterator[Solution]) -> Iterator[Solution]:
-    """Each word once, with its cheapest times."""
-    seen: set[tuple[int, ...]] = set()
+def _distinct(problem: Problem, solutions: Iterator[Solution], *, most: int) -> Iterator[Solution]:
+    """The `most` cheapest motions, each with the word that comes first."""
+    known: list[Plan] = []
     for solution in solutions:
-        word = tuple(solution.word.tolist())
-        if word not in seen:
-            seen.add(word)
+        if len(known) == most:
+            return
+        plan = plan_of(problem, solution)
+        if is_new(plan, known):
+            known.append(plan)
             yield solution
