@@ -22,7 +22,7 @@ from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus,
 from maneuver_automaton.problem import Problem, moves
 from maneuver_automaton.refinement.improve import Improved, Patience, improve
 from maneuver_automaton.search.choose import search_goal
-from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable, cost_to_go_table
+from maneuver_automaton.search.cost_to_go import CostTable, cost_to_go_table
 from maneuver_automaton.search.lattice import FirstPlan, first_plan
 from maneuver_automaton.search.lattice_pass import Word, with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
@@ -203,9 +203,7 @@ def prepare_map(problem: Problem) -> None:
 
 
 def library_table(problem: Problem) -> CostTable:
-    """The cost to go of the library, made once for all problems; none for several aims at once."""
-    if len(problem.goals) > 1 or problem.goals[0].free_heading:
-        return NO_TABLE
+    """The cost to go of the library, made once for all problems."""
     return cost_to_go_table(problem)
 
 
