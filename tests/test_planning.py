@@ -518,7 +518,7 @@ def test_start_and_goal_must_be_inside_the_bounds(start, goals, status, reason):
          "the goal cannot be reached in 1 s: way and turn alone take at least 3 s"),
         (TABLE_2, [0, -1, 0], Horizon(time=2.0, max_trims=4),
          "the goal cannot be reached in 2 s: the least time found is 3.37218 s"),
-        (TABLE_2, [0, -1, 0], Horizon(max_time=3.0),
+        (TABLE_2, [0, -1, 0], Horizon(max_time=3.0, max_trims=4),
          "the goal cannot be reached in 3 s: the least time found is 3.37218 s"),
     ],
 )  # fmt: skip

@@ -2,30 +2,48 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import time
 from collections import Counter
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.same_motion import is_new
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.checking import check_plan, load_checks
+from maneuver_automaton.planning.detours import with_stones
 from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
 from maneuver_automaton.problem import Problem, moves
 from maneuver_automaton.refinement.improve import Improved, Patience, improve
-from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable, cost_to_go_table
+from maneuver_automaton.search.choose import search_goal
+from maneuver_automaton.search.cost_to_go import CostTable, cost_to_go_table
 from maneuver_automaton.search.lattice import FirstPlan, first_plan
 from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.limits import why_impossible
+from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.waiting import with_waits
 from maneuver_automaton.search.word_plan import plan_of_word
 from maneuver_automaton.words.word import Word
 
+AT_ONCE = Patience(attempts=0, passes=0)
+SOME = Patience(attempts=400, passes=0)  # of a plan beside a stone
 BRIEF = Patience(attempts=1000, passes=3)  # of the way among what stands still
 MOST_WAYS = 4  # that are tried with rests
 QUICK = 1500  # expansions in space and time before a way with rests is tried
+FOR_THE_BEST = 0.6  # share of what is left that the best plan gets where alternatives are asked for
+FREE_WORDS = 4  # words of free space that are looked at for every alternative
+FREE_WORDS_SHARE = 0.3  # of the time that is left for alternatives
+MOST_DETOURS = 8  # known ways beside which others are looked for
+UNFINISHED_M = 0.02  # [m] per metre of way that plans of one motion differ by: none is converged
+UNFINISHED_RAD = 0.3  # [rad] the same for headings
+CHEAPER = 1e-7  # share of a cost that closing the end of a plan may change it by
 REJECTED = 8  # plans in a row that the checks may refuse before it is given up
 
 
@@ -92,18 +110,26 @@ def plan_on_lattice(
     if problem.moves:
         _let_pass(progress)
     bound = lattice_bound(query)
+    share = FOR_THE_BEST if alternatives else 1.0
+    left = _left(progress)
     better = progress.improve(
         query,
         progress.words[-1],
-        deadline=progress.deadline,
+        deadline=found + share * (progress.deadline - found),
         patience=Patience(),
         floor=bound - query.padding,
-        max_expansions=_left(progress),
+        max_expansions=None if left is None else int(share * left),
         better=progress.heard,
         meanwhile=lambda: load_checks(problem),
     )
+    candidates = [_candidate(query, word) for word in (*progress.words, *better.others)]
+    if alternatives:
+        candidates += [*_free_words(progress, alternatives)]
+        candidates += _detours(progress, better.word, 2 * alternatives)
     refined = time.monotonic()
-    chosen = _checked(progress, better, alternatives)
+    chosen = _checked(progress, candidates, alternatives)
+    if chosen.plans and chosen.plans[0].cost < progress.improvements[-1][1] * (1.0 - CHEAPER):
+        progress.improvements.append((refined - began, chosen.plans[0].cost))
     timing["first_plan"] = progress.improvements[0][0]
     timing["refine"], timing["audit"] = refined - found, time.monotonic() - refined
     if not chosen.plans:
@@ -178,9 +204,7 @@ def prepare_map(problem: Problem) -> None:
 
 
 def library_table(problem: Problem) -> CostTable:
-    """The cost to go of the library, made once for all problems; none for several aims at once."""
-    if len(problem.goals) > 1 or problem.goals[0].free_heading:
-        return NO_TABLE
+    """The cost to go of the library, made once for all problems."""
     return cost_to_go_table(problem)
 
 
@@ -193,31 +217,94 @@ class _Chosen:
     reason: str = ""
 
 
-def _checked(progress: _Progress, better: Improved, alternatives: int) -> _Chosen:
-    """The cheapest plans that pass; of equal words one."""
-    query, problem = progress.query, progress.query.problem
+@dataclass(frozen=True, slots=True, eq=False)
+class _Candidate:
+    """A plan that has still to be checked; it is made when it is its turn."""
+
+    cost: float
+    goal_index: int
+    plan: Callable[[], Plan]
+    proven: bool = True  # the search took it to be free
+
+
+def _candidate(query: LatticeQuery, word: Word) -> _Candidate:
+    make = functools.partial(plan_of_word, query, word)
+    return _Candidate(word.cost + query.padding, query.goal_index[word.goal], make)
+
+
+def _free_words(progress: _Progress, alternatives: int) -> Iterator[_Candidate]:
+    """Words that are locally optimal in free space: those that hit nothing are so here, too."""
+    problem = progress.query.problem
+    for index in progress.query.goal_index:
+        left = FREE_WORDS_SHARE * (progress.deadline - time.monotonic())
+        if left <= 0.0:
+            return
+        found = search_goal(
+            problem, problem.goals[index], alternatives=FREE_WORDS * alternatives, time_limit=left
+        )
+        for solution in (one for result in found for one in result.solutions):
+            make = functools.partial(plan_of, problem, solution)
+            yield _Candidate(solution.cost, index, make, proven=False)
+
+
+def _detours(progress: _Progress, best: Word, most: int) -> Iterator[_Candidate]:
+    """Up to `most` plans on other ways round the obstacles: a stone closes each known way."""
+    query = progress.query
+    known = [plan_of_word(query, best)]
+    for n_th in range(MOST_DETOURS):
+        if n_th >= len(known) or len(known) > most:
+            return
+        for problem in with_stones(query, known[n_th]):
+            left = _left(progress)
+            if time.monotonic() >= progress.deadline or left == 0:
+                return
+            closed = lattice_query(problem, query.goal_index)
+            first = progress.first_plan(closed, most=left)
+            if first.word is None:
+                continue
+            word = with_cost(first.word, closed)
+            for where in (closed, query):  # away from the stone, then without it
+                left = _left(progress)
+                word = progress.improve(
+                    where,
+                    word,
+                    deadline=progress.deadline,
+                    patience=SOME if where is closed else AT_ONCE,
+                    max_expansions=left,
+                ).word
+            plan = plan_of_word(query, word)
+            if _differs(plan, known):
+                known.append(plan)
+                yield _candidate(query, word)
+
+
+def _differs(plan: Plan, known: list[Plan]) -> bool:
+    """Whether a plan is another motion than those known, which need not be converged either."""
+    way = float(np.hypot(*np.diff(plan.switching_poses[:, :2], axis=0).T).sum())
+    return is_new(plan, known, tolerance_m=UNFINISHED_M * way, tolerance_rad=UNFINISHED_RAD)
+
+
+def _checked(progress: _Progress, candidates: list[_Candidate], alternatives: int) -> _Chosen:
+    """The cheapest plans that pass; of plans that are one motion, the cheapest."""
+    problem = progress.query.problem
     progress.counts["rejected_by_fcl"] = progress.counts["rejected_by_audit"] = 0
     chosen = _Chosen()
-    seen: set[tuple[int, ...]] = set()
-    words = sorted([*progress.words, *better.others], key=lambda word: word.cost)
-    for word in words:
-        key = (word.goal, *word.trims.tolist())
-        if len(chosen.plans) > alternatives or key in seen:
-            continue
+    for candidate in sorted(candidates, key=lambda one: one.cost):
+        if len(chosen.plans) > alternatives:
+            break
         if chosen.rejected >= REJECTED and not chosen.plans:
             break
-        plan = plan_of_word(query, word)
-        most = problem.horizon.max_trims
-        if most is not None and len(plan.trims) > most:
+        plan, index = candidate.plan(), candidate.goal_index
+        if not _differs(plan, [one.plan for one in chosen.plans]):
             continue
-        index = query.goal_index[word.goal]
         checked = check_plan(problem, plan, problem.goals[index])
         if checked.audit is not None and checked.passed:
-            seen.add(key)
             cost = problem.cost_of(plan)
             chosen.plans.append(
                 Accepted(plan=plan, goal_index=index, cost=cost, audit=checked.audit)
             )
+            continue
+        if not (candidate.proven and checked.admitted):
             continue
         by = "fcl" if checked.audit is None else "audit"
         progress.counts[f"rejected_by_{by}"] += 1

@@ -19,6 +19,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.automaton.same_motion import is_new
 from maneuver_automaton.collision import Obstacle, Zone
 from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.collision.surroundings import fastest_point, parts_of, surroundings_of
@@ -71,13 +72,13 @@ def plan_among_zones(
         best = result if best is None else best
         for name, value in result.counts.items():
             counts[name] = counts.get(name, 0) + value
-        for plan in _plans(problem, result):
-            one = _checked(problem, plan, result.goal_index)
+        for plan, goal_index in _plans(problem, result):
+            one = _checked(problem, plan, goal_index)
             if one is not None:
                 if one.cost < min((other.cost for other in accepted), default=math.inf):
                     improvements.append((time.monotonic() - began, one.cost))
                 accepted.append(one)
-        if k == 0 and accepted and result.plan is accepted[0].plan:
+        if k == 0 and accepted and result.plan is accepted[0].plan and not alternatives:
             return replace(result, problem=problem)
     timing = {"search": time.monotonic() - began, "refine": 0.0, "audit": 0.0}
     if not accepted:
@@ -91,11 +92,15 @@ def plan_among_zones(
             problem=problem, status=status, reason=reason, timing_s=timing, counts=counts
         )
     accepted.sort(key=lambda one: one.cost)
+    kept: list[Accepted] = []
+    for one in accepted:
+        if len(kept) <= alternatives and is_new(one.plan, (other.plan for other in kept)):
+            kept.append(one)
     timing["first_plan"] = improvements[0][0]
     bound = 0.0 if best is None or best.lower_bound is None else best.lower_bound
     return found_plans(
         problem,
-        accepted[: alternatives + 1],
+        kept,
         bound=bound,
         timing_s=timing,
         counts=counts,
@@ -114,14 +119,22 @@ def _checked(problem: Problem, plan: Plan, goal_index: int | None) -> Accepted |
     return Accepted(plan=plan, goal_index=goal_index, cost=cost, audit=checked.audit)
 
 
-def _plans(problem: Problem, result: PlanResult) -> Iterator[Plan]:
-    """What a search found, and the same quickened outside of the zones."""
+def _plans(problem: Problem, result: PlanResult) -> Iterator[tuple[Plan, int | None]]:
+    """What a search found, the best first, and the same quickened outside of the zones."""
     if result.plan is None:
         return
-    yield result.plan
-    quick = quickened(problem, result.plan)
-    if quick is not None:
-        yield quick
+    found = [result.plan, *(other.plan for other in result.alternatives)]
+    for plan in found:
+        goal_index = result.goal_index if plan is result.plan else _nearest_goal(problem, plan)
+        yield plan, goal_index
+        quick = quickened(problem, plan)
+        if quick is not None:
+            yield quick, goal_index
+
+
+def _nearest_goal(problem: Problem, plan: Plan) -> int:
+    """The goal that a plan ends at."""
+    return min(range(len(problem.goals)), key=lambda k: sum(problem.goals[k].off(plan.end)))
 
 
 def _questions(problem: Problem) -> Iterator[Problem]:

@@ -20,6 +20,7 @@ from maneuver_automaton.collision.heights import Layer, layers_of
 from maneuver_automaton.collision.surroundings import surroundings_of
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Unicycle
+from maneuver_automaton.planning.conditions import broken_condition
 from maneuver_automaton.planning.zones import what_zone_forbids
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.problem import Goal, Problem
@@ -34,6 +35,7 @@ class Checked:
     free: bool  # FCL on every edge
     audit: Audit | None  # None if an earlier check failed
     reason: str = ""
+    admitted: bool = True  # the horizon and the limits of its trims
 
     @property
     def passed(self) -> bool:
@@ -42,7 +44,10 @@ class Checked:
 
 
 def check_plan(problem: Problem, plan: Plan, goal: Goal) -> Checked:
-    """Bounds, FCL, audit, in this order; the first that fails ends it."""
+    """Horizon and limits, bounds, FCL, audit, in this order; the first that fails ends it."""
+    broken = broken_condition(problem, plan)
+    if broken:
+        return Checked(inside=True, free=True, audit=None, reason=broken, admitted=False)
     if not stays_inside(plan, problem.bounds):
         return Checked(inside=False, free=True, audit=None, reason="it leaves the bounds")
     hit = what_is_hit(problem, plan, goal)

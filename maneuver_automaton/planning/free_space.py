@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from maneuver_automaton.audit import Audit
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.same_motion import is_new
 from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
 from maneuver_automaton.problem import Horizon, Problem
@@ -20,6 +19,8 @@ from maneuver_automaton.search.choose import search_goal
 from maneuver_automaton.search.inside import outside
 from maneuver_automaton.search.limits import closed_bound, why_impossible
 from maneuver_automaton.search.result import plan_of
+
+SPARE = 2  # solutions for every alternative, as some may be one motion
 
 
 def plan_by_words(
@@ -92,6 +93,7 @@ class _Chosen:
     plans: list[_Candidate]
     outside: int
     hit: int  # an obstacle
+    broken: int  # conditions on the word and its times
     rejected: int
     complaint: str
 
@@ -108,9 +110,8 @@ def _search_goals(problem: Problem, alternatives: int, began: float, deadline: f
         if outside(goal.pose, problem.bounds):
             continue
         left = max(deadline - time.monotonic(), 1e-3)
-        results = search_goal(
-            problem, goal, alternatives=None if sorted_out else alternatives, time_limit=left
-        )
+        asked = None if sorted_out else SPARE * alternatives
+        results = search_goal(problem, goal, alternatives=asked, time_limit=left)
         if math.isnan(first_plan) and any(result.solutions for result in results):
             first_plan = time.monotonic() - began
         proven = proven and any(result.exhaustive for result in results)
@@ -124,7 +125,7 @@ def _search_goals(problem: Problem, alternatives: int, began: float, deadline: f
             ]
     order = sorted(candidates, key=_order)
     return _Found(
-        candidates=_distinct(order),
+        candidates=order,
         counts=counts,
         first_plan=first_plan if math.isfinite(first_plan) else time.monotonic() - began,
         exhausted=exhausted,
@@ -137,33 +138,21 @@ def _order(candidate: _Candidate) -> tuple[float, int, tuple[int, ...]]:
     return float(f"{candidate.cost:.9g}"), len(word), tuple(word.tolist())
 
 
-def _distinct(candidates: Iterable[_Candidate]) -> list[_Candidate]:
-    """Each motion once: the same word with the same times may come from two searches."""
-    kept: list[_Candidate] = []
-    for candidate in candidates:
-        solution = candidate.solution
-        for other in kept:
-            same_word = other.plan.word == candidate.plan.word
-            if same_word and np.allclose(
-                other.solution.durations, solution.durations, rtol=1e-6, atol=1e-6
-            ):
-                break
-        else:
-            kept.append(candidate)
-    return kept
-
-
 def _audited(problem: Problem, candidates: Sequence[_Candidate], alternatives: int) -> _Chosen:
     """The cheapest candidates that stay inside the bounds, are free, and pass the audit."""
     plans: list[_Candidate] = []
-    outside = hit = rejected = 0
+    outside = hit = broken = rejected = 0
     complaint = ""
     for candidate in candidates:
         if len(plans) > alternatives:
             break
+        if not is_new(candidate.plan, (other.plan for other in plans)):
+            continue
         checked = check_plan(problem, candidate.plan, problem.goals[candidate.goal_index])
         if checked.passed:
             plans.append(replace(candidate, audit=checked.audit))
+        elif not checked.admitted:
+            broken += 1
         elif not checked.inside:
             outside += 1
         elif not checked.free:
@@ -171,7 +160,14 @@ def _audited(problem: Problem, candidates: Sequence[_Candidate], alternatives: i
         else:
             rejected += 1
             complaint = complaint or checked.reason
-    return _Chosen(plans=plans, outside=outside, hit=hit, rejected=rejected, complaint=complaint)
+    return _Chosen(
+        plans=plans,
+        outside=outside,
+        hit=hit,
+        broken=broken,
+        rejected=rejected,
+        complaint=complaint,
+    )
 
 
 def _why_none(
@@ -222,20 +218,17 @@ def _least_time(problem: Problem) -> tuple[PlanStatus, str] | None:
     hurry = replace(
         problem, cost=Cost(time=1.0), horizon=Horizon(max_trims=problem.horizon.max_trims)
     )
-    quickest = [
-        (solution.duration, index, solution, result.exhaustive)
-        for index, goal in enumerate(problem.goals)
-        for result in search_goal(hurry, goal, alternatives=0, time_limit=5.0)
-        for solution in result.solutions
-    ]
-    if not quickest:
-        return None
-    least, index, solution, exhaustive = min(quickest, key=lambda row: row[:2])
+    quickest: list[float] = []
+    proven = True
+    for goal in problem.goals:
+        results = search_goal(hurry, goal, alternatives=0, time_limit=5.0)
+        # Only a search over all admitted words is a proof: a certificate is but necessary.
+        proven = proven and any(result.exhaustive for result in results)
+        quickest += [one.duration for result in results for one in result.solutions]
+    least = min(quickest, default=0.0)
     if least <= limit:
         return None
-    evidence = certificate(hurry, problem.goals[index], solution)
-    settled = exhaustive or (evidence is not None and evidence >= -1e-9)
-    return (PlanStatus.UNREACHABLE if settled else PlanStatus.NO_PLAN), (
+    return (PlanStatus.UNREACHABLE if proven else PlanStatus.NO_PLAN), (
         f"the goal cannot be reached in {limit:g} s: the least time found is {least:.6g} s"
     )
 

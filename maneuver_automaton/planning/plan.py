@@ -56,6 +56,8 @@ def plan(problem: Problem, *, time_limit: float = 5.0, alternatives: int = 0) ->
     if alternatives < 0:
         raise ValueError(f"alternatives must be at least 0, got {alternatives}")
     _load(problem)
+    if alternatives and uses_lattice(problem):
+        load_search(problem)
     began = time.monotonic()
     blocked = blocked_ends(problem) or goals_off_lattice(problem)
     if blocked is not None:

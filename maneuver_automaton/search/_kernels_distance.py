@@ -66,7 +66,11 @@ def blocked_cell(grid, field, i, j):
 def distance_at(grid, field, x, y):
     """Distance [m] from the nearest seed to the cell of (x, y); inf if there is no way.
 
-    Cells in whose middle the vehicle cannot be count more: an estimate, not a bound.
+    Cells in whose middle the vehicle cannot be count more: an estimate, not a bound. Where a wall
+    may pass between the middles of two cells although neither is blocked (the body is small and
+    the wall thin), a way through costs `grid.detour` more in `rank`, by which ways are compared.
+    `value` keeps the length alone: it is compared with costs, and is finite behind every gap that
+    the cells cannot show.
 
     Grows until that cell is settled, in the order of distance plus the straight way to where the
     grid is aimed at, so that cells off the way are not looked at.
@@ -91,7 +95,7 @@ def distance_at(grid, field, x, y):
         h_j, h_i = here // grid.columns, here % grid.columns
         if h_i == 0 or h_j == 0 or h_i == grid.columns - 1 or h_j == grid.rows - 1:
             grid.state[2] = 1  # the rim was reached: what is beyond is not known
-        value = grid.value[here]
+        value, rank = grid.value[here], grid.rank[here]
         for b in range(-1, 2):
             for a in range(-1, 2):
                 n_i, n_j = h_i + a, h_j + b
@@ -107,10 +111,11 @@ def distance_at(grid, field, x, y):
                 step = grid.cell * (1.4142135623730951 if a != 0 and b != 0 else 1.0)
                 if room < grid.wanted:
                     step *= NARROW
-                if value + step < grid.value[there]:
-                    grid.value[there] = value + step
+                ranked = rank + step + (grid.detour if room < grid.cut else 0.0)
+                if ranked < grid.rank[there]:
+                    grid.rank[there], grid.value[there] = ranked, value + step
                     e_x, e_y = (n_i - grid.aim_i) * grid.cell, (n_j - grid.aim_j) * grid.cell
-                    key = value + step + math.sqrt(e_x * e_x + e_y * e_y)
+                    key = ranked + math.sqrt(e_x * e_x + e_y * e_y)
                     if grid.state[0] < grid.keys.shape[0]:
                         push(grid.keys, grid.items, grid.state[0], key, there)
                         grid.state[0] += 1
@@ -126,7 +131,7 @@ def seed(grid, points):
         if 0 <= i < grid.columns and 0 <= j < grid.rows:
             here = j * grid.columns + i
             if grid.value[here] > 0.0:
-                grid.value[here] = 0.0
+                grid.rank[here], grid.value[here] = 0.0, 0.0
                 e_x, e_y = (i - grid.aim_i) * grid.cell, (j - grid.aim_j) * grid.cell
                 key = math.sqrt(e_x * e_x + e_y * e_y)
                 push(grid.keys, grid.items, grid.state[0], key, here)

@@ -61,14 +61,15 @@ def node_in(table, generation, slot):
 
 
 @inlined_kernel
-def table_value(table, task, x, y, heading):
-    """Cost to go from a table made without obstacles; 0 where it does not reach."""
-    if table.value.shape[0] == 0:
-        return 0.0
-    g_x, g_y, g_heading = task.aim_x, task.aim_y, task.aim_heading
+def table_value(table, task, aim, x, y, heading):
+    """Cost to go to one aim from a table made without obstacles; 0 where it does not reach."""
+    g_x, g_y, g_heading = task.aims[aim, 0], task.aims[aim, 1], task.aims[aim, 2]
+    values = table.value
     if task.sign > 0.0:  # this pose seen from the goal
         c, s = math.cos(g_heading), math.sin(g_heading)
         d_x, d_y, turn = x - g_x, y - g_y, heading - g_heading
+        if task.aim_free[aim]:
+            values = table.free
     else:  # the start seen from this pose
         c, s = math.cos(heading), math.sin(heading)
         d_x, d_y, turn = g_x - x, g_y - y, g_heading - heading
@@ -76,11 +77,24 @@ def table_value(table, task, x, y, heading):
     j = math.floor((c * d_y - s * d_x) / table.cell + 0.5) + table.half
     if not (0 <= i <= 2 * table.half and 0 <= j <= 2 * table.half):
         return 0.0
-    n = table.value.shape[0]
+    n = values.shape[0]
     share = turn / FULL_TURN
     k = math.floor((share - math.floor(share)) * n + 0.5) % n
-    value = table.value[k, j, i]
+    value = values[k, j, i]
     return value if value < math.inf else 0.0
+
+
+@bare_inner_kernel
+def table_to_go(table, task, x, y, heading):
+    """Cost to go to the nearest aim by the table; 0 where it does not reach one of them."""
+    if table.value.shape[0] == 0:
+        return 0.0
+    least = math.inf
+    for aim in range(task.aims.shape[0]):
+        least = min(least, table_value(table, task, aim, x, y, heading))
+        if least == 0.0:
+            break
+    return least
 
 
 @inlined_kernel
@@ -95,7 +109,7 @@ def cost_to_go(task, grid, table, world, x, y, heading):
             way = min(way, math.sqrt(e_x * e_x + e_y * e_y))
     estimate = way * task.per_metre
     if estimate < math.inf:
-        estimate = max(estimate, table_value(table, task, x, y, heading))
+        estimate = max(estimate, table_to_go(table, task, x, y, heading))
     return estimate
 
 

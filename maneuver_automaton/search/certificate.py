@@ -9,7 +9,9 @@ from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.library_arrays import LibraryArrays, library_arrays
 from maneuver_automaton.search.result import Solution
 from maneuver_automaton.search.setup import search_setup
+from maneuver_automaton.search.time_limit import within_time
 
+BINDING = 1e-9  # share of a greatest time [s] that may be left where it binds
 CUTS = 60  # rounds of the linear program where multipliers are not unique
 
 
@@ -24,6 +26,9 @@ def certificate(problem: Problem, goal: Goal, solution: Solution) -> float | Non
         return None
     setup = search_setup(problem, goal)
     library = library_arrays(problem, setup)
+    most_time = problem.horizon.max_time
+    if most_time is not None and solution.duration > most_time - BINDING * (1.0 + most_time):
+        library = within_time(library, most_time)  # time has a price where its limit binds
     used = solution.durations > 0.0
     moving = library.number_of[solution.word] >= 0
     if not (used & moving).any():

@@ -33,11 +33,13 @@ class CostTable(NamedTuple):
     """Cost to go around a goal; a table of no cells where there is none."""
 
     value: NDArray[np.float32]  # (headings, 2 half + 1, 2 half + 1), inf where not known
+    free: NDArray[np.float32]  # the same to a goal whose heading is free
     cell: float  # [m]
     half: int
 
 
-NO_TABLE = CostTable(np.zeros((0, 1, 1), dtype=np.float32), 1.0, 0)
+NOTHING = np.zeros((0, 1, 1), dtype=np.float32)
+NO_TABLE = CostTable(NOTHING, NOTHING, 1.0, 0)
 
 
 def cost_to_go_table(
@@ -120,7 +122,30 @@ def _kept(
             mirrored,
         )
         _save(value, path)
-    return CostTable(value, cell, HALF)
+    return CostTable(value, _to_any_heading(value), cell, HALF)
+
+
+def _to_any_heading(value: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The least of a table over the headings of its goal, from every pose seen from the goal.
+
+    To turn the goal is to turn the pose around it the other way. So the least depends on the
+    distance and on the heading against the direction to the goal alone.
+    """
+    n, size, _ = value.shape
+    half = size // 2
+    turns = np.arange(n) * (2.0 * np.pi / n)
+    # rings: from (r, 0) with a heading, turned around the goal by all turns
+    reach = np.arange(half + 1)
+    i = np.rint(reach[:, None] * np.cos(turns)).astype(int) + half
+    j = np.rint(reach[:, None] * np.sin(turns)).astype(int) + half
+    k = (np.arange(n)[:, None] + np.arange(n)) % n  # (heading, turn)
+    rings = value[k[None], j[:, None, :], i[:, None, :]].min(axis=2)  # (r, heading)
+    x, y = np.meshgrid(np.arange(size) - half, np.arange(size) - half)
+    radius = np.rint(np.hypot(x, y)).astype(int)
+    bearing = np.rint(np.arctan2(y, x) / (2.0 * np.pi / n)).astype(int)
+    heading = (np.arange(n)[:, None, None] - bearing) % n
+    rings = np.vstack([rings, np.full((1, n), np.inf, dtype=np.float32)])
+    return np.ascontiguousarray(rings[np.minimum(radius, half + 1), heading])
 
 
 def _load(path: Path) -> NDArray[np.float32] | None:

@@ -13,12 +13,14 @@ from maneuver_automaton.collision.world import World
 from maneuver_automaton.search import _kernels_distance
 
 MOST_CELLS = 1_000_000
+DETOUR = 4.0  # [sides of the grid] that are preferred to a way through a wall thinner than a cell
 
 
 class DistanceGrid(NamedTuple):
     """What the kernels see; cells coincide with cells of the world's field of distances."""
 
-    value: Array  # (cells,) [m]
+    value: Array  # (cells,) [m] length of the way that ranks first
+    rank: Array  # (cells,) [m] that length with a detour for every cell that a wall may cut
     mark: NDArray[np.uint8]  # (cells,) 0 open, 1 blocked, 2 settled
     keys: Array
     items: IntArray
@@ -33,6 +35,8 @@ class DistanceGrid(NamedTuple):
     shift_y: int
     inflation: float  # [m] clearance of a cell's centre below which the pose cannot be in it
     wanted: float  # [m] clearance of a cell's centre below which the vehicle cannot be there
+    cut: float  # [m] clearance of a cell's centre below which a wall may cut the cell; -inf: none
+    detour: float  # [m] how long a way is preferred to one through such a cell
     aim_i: int  # cell towards which it grows first
     aim_j: int
 
@@ -41,7 +45,8 @@ def distance_grid(world: World, box: Array, seeds: Array, aim: Array) -> Distanc
     """Distances from `seeds` (n, 2 or more) inside `box` (4,), grown towards `aim` (2 or more,).
 
     Source of the inflation: a pose in a cell is at most half its diagonal from the centre, and a
-    disc of the body's inscribed radius around it must be free.
+    disc of the body's inscribed radius around it must be free. A wall between the middles of two
+    neighbours is at most half a diagonal from one of them: it is seen where the radius is a whole one.
     """
     field = world.arrays.field
     low, high = box[:2], box[2:]
@@ -58,9 +63,11 @@ def distance_grid(world: World, box: Array, seeds: Array, aim: Array) -> Distanc
     columns, rows = (int(n) for n in np.maximum(last - first, 0) + 1)
     start = origin + first * cell
     n = columns * rows
+    half_diagonal = float(cell) * math.sqrt(0.5)
     aim_i, aim_j = (int(k) for k in np.floor((aim[:2] - start) / cell))
     grid = DistanceGrid(
         value=np.full(n, np.inf),
+        rank=np.full(n, np.inf),
         mark=np.zeros(n, dtype=np.uint8),
         keys=np.empty(8 * n + 8),
         items=np.empty(8 * n + 8, dtype=np.int64),
@@ -73,8 +80,10 @@ def distance_grid(world: World, box: Array, seeds: Array, aim: Array) -> Distanc
         stride=stride,
         shift_x=int(first[0]) * stride,
         shift_y=int(first[1]) * stride,
-        inflation=world.body.inscribed - cell * math.sqrt(0.5),
+        inflation=world.body.inscribed - half_diagonal,
         wanted=world.body.inscribed,
+        cut=half_diagonal if world.body.inscribed < 2.0 * half_diagonal else -math.inf,
+        detour=float(DETOUR * (columns + rows) * cell),
         aim_i=aim_i,
         aim_j=aim_j,
     )
@@ -87,6 +96,7 @@ def _none() -> DistanceGrid:
     empty, none = np.zeros(0), np.zeros(0, dtype=np.int64)
     return DistanceGrid(
         value=empty,
+        rank=empty,
         mark=np.zeros(0, dtype=np.uint8),
         keys=empty,
         items=none,
@@ -101,6 +111,8 @@ def _none() -> DistanceGrid:
         shift_y=0,
         inflation=0.0,
         wanted=0.0,
+        cut=-math.inf,
+        detour=0.0,
         aim_i=0,
         aim_j=0,
     )

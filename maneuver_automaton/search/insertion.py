@@ -17,13 +17,15 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.same_motion import is_new
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.exact_end import corrected, with_fewer_digits
 from maneuver_automaton.search.library_arrays import LibraryArrays, library_arrays
-from maneuver_automaton.search.result import SearchResult, SearchStatus, Solution
+from maneuver_automaton.search.result import SearchResult, SearchStatus, Solution, plan_of
 from maneuver_automaton.search.setup import SearchSetup, search_setup
 from maneuver_automaton.search.shortening import shortened
+from maneuver_automaton.search.time_limit import UNUSED, within_time
 from maneuver_automaton.search.words import in_order, resting, search_setup_words
 from maneuver_automaton.words.library import MovingTrims
 
@@ -40,6 +42,7 @@ ROUNDS = 60  # insertions into these
 GROWN = 2  # seeds that may grow beyond the limit before they are shortened
 SHORTENED = 3  # words that are tried with fewer trims where switches cost
 CHATTER = 5  # trims of a word in which two may chatter
+LATE = 1e-9  # [s] by which rounding may exceed a time
 
 
 def search_insertion(
@@ -91,15 +94,79 @@ def search_insertion(
     if setup.start_is_goal and (problem.horizon.time is None or setup.rest is not None):
         return resting(problem, setup)
     exact, setup = setup.goal, with_fewer_digits(setup)
-    library = library_arrays(problem, setup)
-    many = len(setup.trims) > FEW
     if seeds is None:
-        seeds = max(SEEDS_OF_MANY if many else SEEDS, alternatives + 1)
-    begun = list(_seeds(problem, setup, library, seeds, deadline))
+        many = len(setup.trims) > FEW
+        seeds = max(SEEDS_OF_MANY if many else SEEDS, 2 * alternatives + 1)
+    library = library_arrays(problem, setup)
+    asked = _Asked(problem, setup, library, exact, alternatives, seeds, deadline)
+    found = _improved(asked, known)
+    most_time = problem.horizon.max_time
+    if most_time is not None:
+        late = not found.solutions or found.solutions[0].duration > most_time + LATE
+        in_time = [one for one in found.solutions if one.duration <= most_time + LATE]
+        if late and time.monotonic() < deadline:  # the limit binds: it is a condition of the search
+            limited = replace(asked, library=within_time(library, most_time), limit=most_time)
+            more = _improved(limited, known)
+            in_time += [one for one in more.solutions if one.duration <= most_time + LATE]
+            found = more.after(found)
+        found = replace(found, solutions=in_time)
+    solutions = tuple(_distinct(problem, in_order(found.solutions), most=alternatives + 1))
+    return SearchResult(
+        status=SearchStatus.FOUND if solutions else found.status,
+        solutions=solutions,
+        complete=False,
+        counts=found.counts,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Asked:
+    """One search by insertion: what it is asked, and until when."""
+
+    problem: Problem
+    setup: SearchSetup
+    library: LibraryArrays
+    exact: Array  # (4,) the goal with all its digits
+    alternatives: int
+    seeds: int
+    deadline: float
+    limit: float | None = None  # [s] greatest time, if the library prices it
+
+    @property
+    def total(self) -> float | None:
+        """What the times of a word add up to, rest or unused time included; None if free [s]."""
+        return self.problem.horizon.time if self.limit is None else self.limit
+
+    @property
+    def most(self) -> int:
+        """Columns of the library that one word may have."""
+        most = self.problem.horizon.max_trims
+        return LONGEST if most is None else min(most + int(self.limit is not None), LONGEST)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Improved:
+    """What one search by insertion came to."""
+
+    solutions: list[Solution]
+    status: SearchStatus
+    counts: dict[str, int]
+
+    def after(self, first: _Improved) -> _Improved:
+        """The same with what the search before it took."""
+        counts = {name: first.counts[name] + count for name, count in self.counts.items()}
+        return replace(self, counts=counts)
+
+
+def _improved(asked: _Asked, known: Plan | None) -> _Improved:
+    """Solutions of all seeds and of what insertion makes of them, each word once."""
+    problem, setup, library = asked.problem, asked.setup, asked.library
+    deadline, alternatives, most = asked.deadline, asked.alternatives, asked.most
+    many = len(setup.trims) > FEW
+    begun = list(_seeds(asked))
     if known is not None:
-        begun = [*_as_seed(problem, library, known), *begun]
+        begun = [*_as_seed(asked, known), *begun]
     counts = {"expansions": 0, "insertions": 0, "seeds": 0}
-    most = problem.horizon.max_trims or LONGEST
     limit = problem.search.max_expansions
     works: list[_Work] = []
     status = SearchStatus.EXHAUSTED
@@ -123,21 +190,21 @@ def search_insertion(
         works += _from_longer(library, begun, most, counts)
     if _prices_switches(problem) and time.monotonic() < deadline:
         works += _with_fewer_switches(library, works)
+    if alternatives > 0:  # the best times of a seed's own word are locally optimal, too
+        for word, times in begun:
+            work = _Work(word, times)
+            work.improve(library, most, 0, counts)
+            works.append(work)
     if time.monotonic() > deadline:
         status = SearchStatus.OUT_OF_BUDGET
     improved = [
         solution
         for work in works
         if work.size - library.tail <= most
-        for solution in work.solutions(problem, library, exact)
+        for solution in work.solutions(problem, library, asked.exact)
+        if solution.word.size <= (problem.horizon.max_trims or LONGEST)
     ]
-    solutions = tuple(_distinct(in_order(improved)))[: alternatives + 1]
-    return SearchResult(
-        status=SearchStatus.FOUND if solutions else status,
-        solutions=solutions,
-        complete=False,
-        counts=counts,
-    )
+    return _Improved(list(in_order(improved)), status, counts)
 
 
 def compile_calming(problem: Problem) -> None:
@@ -194,16 +261,14 @@ def _with_fewer_switches(library: LibraryArrays, works: list[_Work]) -> Iterator
             word, times = short.word, short.times
 
 
-def _as_seed(
-    problem: Problem, library: LibraryArrays, known: Plan
-) -> Iterator[tuple[IntArray, Array]]:
+def _as_seed(asked: _Asked, known: Plan) -> Iterator[tuple[IntArray, Array]]:
     """A plan in the library's numbers, rest and free turn appended; none if a trim is not there."""
-    automaton = problem.automaton
+    automaton, library = asked.problem.automaton, asked.library
     names = set(automaton.trim_names)
     if all(trim.name in names for trim in known.trims):
         word = np.array([automaton.index_of(trim.name) for trim in known.trims], dtype=np.int64)
         if not word.size or (library.number_of[word] >= 0).all():
-            yield _in_library(problem, library, word, known.durations)
+            yield _in_library(asked, word, known.durations)
 
 
 class _Work:
@@ -267,82 +332,75 @@ class _Work:
             return
         cost = float(self.cost) + float(library.rates[word] @ (times - self.times[: self.size]))
         kept = slice(0, self.size - library.tail)
-        trims = library.trims[word[kept]]
+        trims, lasting = _without_unused(library.trims[word[kept]], times[kept])
         switching = problem.cost.switching(problem.automaton.body_velocities[trims])
         yield Solution(
             word=trims,
-            durations=times[kept],
+            durations=lasting,
             cost=cost + library.fixed_cost + switching,
             certificate=float(self.least),
         )
 
 
-def _seeds(
-    problem: Problem, setup: SearchSetup, library: LibraryArrays, seeds: int, deadline: float
-) -> Iterator[tuple[IntArray, Array]]:
+def _without_unused(trims: IntArray, times: Array) -> tuple[IntArray, Array]:
+    """A word without unused time; neighbours that it has parted become one."""
+    if not (trims == UNUSED).any():
+        return trims, times
+    used = trims != UNUSED
+    trims, times = trims[used], times[used]
+    if not trims.size:
+        return trims, times
+    begins = np.flatnonzero(np.append(True, trims[1:] != trims[:-1]))
+    return trims[begins], np.add.reduceat(times, begins)
+
+
+def _seeds(asked: _Asked) -> Iterator[tuple[IntArray, Array]]:
     """Cheapest words of the sub-library, in the library's numbers, rest and free turn appended."""
-    small = sub_library(setup)
-    start = _Start(problem, setup, small, library, seeds, deadline)
-    found = start.words(problem)
-    if not found and problem.horizon.time is not None:
-        found = start.fast_words()
+    found = _words_of_few(asked, asked.problem)
+    if not found and asked.total is not None:
+        found = _fast_words(asked)
     yield from found
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Start:
-    """Where seeds come from."""
-
-    problem: Problem
-    setup: SearchSetup
-    small: SearchSetup
-    library: LibraryArrays
-    seeds: int
-    deadline: float
-
-    def words(self, problem: Problem) -> list[tuple[IntArray, Array]]:
-        """Seeds of `problem` from the sub-library."""
-        solutions = search_setup_words(
-            problem,
-            self.small,
-            alternatives=self.seeds - 1,
-            deadline=self.deadline,
-            spare=True,
-        )
-        return [self._in_library(solution.word, solution.durations) for solution in solutions]
-
-    def _in_library(self, word: IntArray, durations: Array) -> tuple[IntArray, Array]:
-        return _in_library(self.problem, self.library, word, durations)
-
-    def fast_words(self) -> list[tuple[IntArray, Array]]:
-        """For a fixed time that no seed meets: first insert for least time, then pad."""
-        from maneuver_automaton.problem import Horizon
-
-        limit = self.problem.horizon.time
-        hurry = replace(self.problem, cost=Cost(time=1.0), horizon=Horizon())
-        setup = search_setup(hurry, self.problem.goals[0])
-        setup = replace(setup, goal=self.setup.goal, free_heading=self.setup.free_heading)
-        library = library_arrays(hurry, setup)
-        start = _Start(hurry, setup, sub_library(setup), library, self.seeds, self.deadline)
-        met = []
-        for word, times in start.words(hurry):
-            work = _Work(word, times)
-            work.improve(library, LONGEST, ROUNDS, {"insertions": 0})
-            if not math.isfinite(work.cost):
-                continue
-            quick = next(work.solutions(hurry, library, library.goal), None)
-            if quick is not None and limit is not None and quick.duration <= limit + 1e-9:
-                met.append(self._in_library(quick.word, quick.durations))
-        return met
+def _words_of_few(asked: _Asked, problem: Problem) -> list[tuple[IntArray, Array]]:
+    """Seeds of `problem` from the sub-library."""
+    solutions = search_setup_words(
+        problem,
+        sub_library(asked.setup),
+        alternatives=asked.seeds - 1,
+        deadline=asked.deadline,
+        spare=True,
+    )
+    return [_in_library(asked, solution.word, solution.durations) for solution in solutions]
 
 
-def _in_library(
-    problem: Problem, library: LibraryArrays, trims: IntArray, durations: Array
-) -> tuple[IntArray, Array]:
+def _fast_words(asked: _Asked) -> list[tuple[IntArray, Array]]:
+    """For a time that no seed meets: first insert for least time, then fill up the time."""
+    from maneuver_automaton.problem import Horizon
+
+    limit = asked.total
+    hurry = replace(asked.problem, cost=Cost(time=1.0), horizon=Horizon())
+    setup = search_setup(hurry, hurry.goals[0])
+    setup = replace(setup, goal=asked.setup.goal, free_heading=asked.setup.free_heading)
+    library = library_arrays(hurry, setup)
+    least = replace(asked, problem=hurry, setup=setup, library=library, limit=None)
+    met = []
+    for word, times in _words_of_few(least, hurry):
+        work = _Work(word, times)
+        work.improve(library, LONGEST, ROUNDS, {"insertions": 0})
+        if not math.isfinite(work.cost):
+            continue
+        quick = next(work.solutions(hurry, library, library.goal), None)
+        if quick is not None and limit is not None and quick.duration <= limit + LATE:
+            met.append(_in_library(asked, quick.word, quick.durations))
+    return met
+
+
+def _in_library(asked: _Asked, trims: IntArray, durations: Array) -> tuple[IntArray, Array]:
     """A word of the automaton in the library's numbers, rest and free turn appended."""
+    library, limit = asked.library, asked.total
     word = library.number_of[trims].tolist()
     times = durations.tolist()
-    limit = problem.horizon.time
     if limit is not None and library.rest is not None and word[-1:] != [library.rest]:
         word.append(library.rest)
         times.append(max(0.0, limit - sum(times)))
@@ -403,11 +461,13 @@ def _far_reaching(library: MovingTrims) -> IntArray:
     return np.array(list(dict.fromkeys(chosen)))
 
 
-def _distinct(solutions: Iterator[Solution]) -> Iterator[Solution]:
-    """Each word once, with its cheapest times."""
-    seen: set[tuple[int, ...]] = set()
+def _distinct(problem: Problem, solutions: Iterator[Solution], *, most: int) -> Iterator[Solution]:
+    """The `most` cheapest motions, each with the word that comes first."""
+    known: list[Plan] = []
     for solution in solutions:
-        word = tuple(solution.word.tolist())
-        if word not in seen:
-            seen.add(word)
+        if len(known) == most:
+            return
+        plan = plan_of(problem, solution)
+        if is_new(plan, known):
+            known.append(plan)
             yield solution

@@ -27,6 +27,7 @@ TIMELY = 256  # expansions between two looks at the clock
 TRIES = 6  # candidates of one steering that are tried
 PATIENCE = 1.5  # a connection may cost so much more than the estimate ...
 SLACK = 2.0  # ... and so many turning radii
+MOST_JOINTS = 4  # of a connection of three trims, those with what is before and after it included
 BACK_OFF = 0.01  # [half widths of the body] kept before contact
 SHORTEST_CONTACT = 0.03  # [half widths] of an edge that ends there
 SAMPLED_HEADINGS = 16  # roots at a goal whose heading is free
@@ -54,9 +55,6 @@ class Task(NamedTuple):
     roots: Array  # (R, 3)
     aims: Array  # (A, 3)
     aim_free: NDArray[np.bool_]  # (A,)
-    aim_x: float
-    aim_y: float
-    aim_heading: float
     frame_x: float
     frame_y: float
     frame_heading: float
@@ -192,15 +190,11 @@ def task_of(query: LatticeQuery, rung: Rung, sign: float) -> Task:
     cost = library.arrays.library
     price = library.per_metre
     sharp = 0.25 * radius * price
-    aim = goals[0] if sign > 0.0 else query.start
     return Task(
         sign=sign,
         roots=query.start[None].copy() if sign > 0.0 else _goal_roots(query),
         aims=goals.copy() if sign > 0.0 else query.start[None].copy(),
         aim_free=query.free_heading.copy() if sign > 0.0 else np.zeros(1, dtype=np.bool_),
-        aim_x=float(aim[0]),
-        aim_y=float(aim[1]),
-        aim_heading=float(aim[2]),
         frame_x=float(frame[0]),
         frame_y=float(frame[1]),
         frame_heading=float(frame[2]),
@@ -215,7 +209,7 @@ def task_of(query: LatticeQuery, rung: Rung, sign: float) -> Task:
         per_metre=float(price),
         per_shot=float(sharp) if sharp > 0.0 else 1.0,
         patience=PATIENCE,
-        slack=float(SLACK * radius * price + library.per_turn) or math.inf,
+        slack=_slack(query),
         tries=TRIES,
         stop_at_first=bool(rung.stop),
         contact=rung.contact,
@@ -232,6 +226,18 @@ def task_of(query: LatticeQuery, rung: Rung, sign: float) -> Task:
         by_count=problem.horizon.max_trims is not None,
         window=query.window,
     )
+
+
+def _slack(query: LatticeQuery) -> float:
+    """What a connection may cost beyond a multiple of the estimate, which knows no prices.
+
+    Two turning radii and a full turn, and the switches and changes of direction of three trims and
+    of the joints at both their ends.
+    """
+    library = query.library
+    way = SLACK * library.radius * library.per_metre + library.per_turn
+    prices = MOST_JOINTS * (library.arrays.switch + library.arrays.direction_change)
+    return float(way + prices) if way > 0.0 else math.inf
 
 
 def _tick(query: LatticeQuery, rung: Rung) -> float:

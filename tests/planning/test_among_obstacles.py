@@ -438,3 +438,39 @@ def test_among_what_moves():
         problem = quick(scenes.moving_scene(seed, movers=5), n=1000)
         by = SE2([*rng.integers(-99, 99, 2).astype(float), 0.0])
         assert_moved(problem, by)
+
+
+@pytest.mark.parametrize("price", [24.0, 240.0])
+@pytest.mark.parametrize("name", ["car", "dubins"])
+def test_a_dear_price_of_a_switch_is_no_wall(name, price):
+    problem = replace(KINDS[name], cost=Cost(time=1.0, switch=price), obstacles=(BLOCKS[1],))
+    dear = found(replace(problem, search=SearchSettings(max_expansions=4000)))
+    plain = found(replace(problem, cost=Cost(time=1.0)))
+    assert len(dear.plan.word) <= len(plain.plan.word)
+    assert len(dear.plan.word) <= 5
+
+
+@pytest.mark.parametrize("heading", ["free", "several"])
+def test_the_table_of_costs_serves_every_goal(heading):
+    # a bay: what guides the search is the cost to go without obstacles
+    bay = scenes.bay(2.6, 6.0)
+    goal = bay.goals[0]
+    goals = (
+        (replace(goal, free_heading=True),)
+        if heading == "free"
+        else (goal, replace(goal, pose=goal.pose + [0.0, 0.05, 0.0]))
+    )
+    result = found(replace(bay, goals=goals, search=SearchSettings(max_expansions=3000)))
+    alone = found(replace(bay, search=SearchSettings(max_expansions=3000)))
+    assert result.cost <= alone.cost * 1.05
+
+
+@pytest.mark.parametrize("radius", [0.05, 0.22])
+def test_a_small_disc_finds_the_way_round_a_thin_wall(radius):
+    walls = [Box([60, 0.05], [50, 50]), Box([0.05, 60], [20, 20]), Box([0.05, 60], [80, 20])]
+    problem = Problem(
+        ROBOT, [50, 45, 0], [50, 52, 0], obstacles=walls, footprint=Disc(radius),
+        search=SearchSettings(max_expansions=20_000),
+    )  # fmt: skip
+    result = found(problem)
+    assert result.cost > 2 * 130.0  # at 0.5 m/s, out of the trap and round it

@@ -204,3 +204,20 @@ def test_start_goal_and_obstacles_do_not_matter():
     moved = Problem(SMALL.automaton, [5, 6, 1], [7, 8, 2], obstacles=Box([1.0, 1.0]))
     one, other = cost_to_go_table(SMALL, reach=1.5), cost_to_go_table(moved, reach=1.5)
     assert one.value is other.value
+
+
+def test_a_free_heading_costs_the_least_of_all_headings():
+    table = cost_to_go_table(Problem(scenes.reeds_shepp(1.0), [0, 0, 0], [1, 0, 0]))
+    n, half = len(table.value), table.half
+    rng = np.random.default_rng(3)
+    off = []
+    for _ in range(200):
+        x, y = rng.integers(-half // 2, half // 2, 2)
+        k = int(rng.integers(n))
+        turns = np.arange(n) * (2.0 * np.pi / n)  # of the goal: the pose is seen from it
+        seen_x = np.rint(np.cos(turns) * x + np.sin(turns) * y).astype(int) + half
+        seen_y = np.rint(np.cos(turns) * y - np.sin(turns) * x).astype(int) + half
+        least = table.value[(k - np.arange(n)) % n, seen_y, seen_x].min()
+        off.append(abs(table.free[k, y + half, x + half] - least))
+    assert np.max(off) < 0.4  # cells are 1 / 16 of a turning radius, and are rounded twice
+    assert np.mean(off) < 0.05

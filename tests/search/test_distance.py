@@ -138,3 +138,35 @@ def test_on_the_rim_of_what_is_searched():
     grid = distance_grid(world, box, goal[None], start)
     ends = np.ascontiguousarray(np.vstack([start, goal])[:, :2])
     assert np.isfinite(distances(grid, world.arrays.field, ends)).all()
+
+
+# --- walls thinner than a cell ---
+
+THIN = [
+    Obstacle(Box([60.0, 0.05], [50.0, 50.0])),
+    Obstacle(Box([0.05, 60.0], [20.0, 20.0])),
+    Obstacle(Box([0.05, 60.0], [80.0, 20.0])),
+]
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.05, 0.22, 0.3])
+def test_a_small_body_is_not_led_through_a_thin_wall(radius):
+    footprint = (Disc(radius),) if radius else ()
+    start, goal = np.array([50.0, 45.0, 0.0]), np.array([50.0, 52.0, 0.0])
+    grid, world, _ = grid_and_world(footprint, THIN, goal, start)
+    places = world.into(np.array([start, [50.0, 51.0, 0.0]]))[:, :2]
+    far, near = distances(grid, world.arrays.field, np.ascontiguousarray(places))
+    assert far > 100.0  # round the wall; straight through it are 7 m
+    assert near == pytest.approx(1.0, abs=2.0 * grid.cell)
+
+
+def test_a_gap_that_the_cells_cannot_show_is_no_wall():
+    gap = [Obstacle(Box([40.0, 0.05], [-20.05, 5.0])), Obstacle(Box([40.0, 0.05], [20.05, 5.0]))]
+    ring = [Obstacle(Box([0.05, 40.0], [x, 0.0])) for x in (-40.0, 40.0)]
+    floor = [Obstacle(Box([80.0, 0.05], [0.0, -20.0]))]
+    grid, world, _ = grid_and_world(
+        (Disc(0.02),), [*gap, *ring, *floor], np.array([0.0, 10.0, 0.0]), np.zeros(3)
+    )
+    assert grid.cell > 0.2  # the gap is 0.1 m wide
+    (way,) = distances(grid, world.arrays.field, world.into(np.zeros((1, 3)))[:, :2].copy())
+    assert np.isfinite(way)  # what is not proven to be closed may be open

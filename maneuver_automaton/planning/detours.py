@@ -1,0 +1,40 @@
+"""Other ways round the obstacles than those that are known: a stone is laid on each known way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.collision import Disc, Obstacle
+from maneuver_automaton.planning.blocked import blocked_ends
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.search.lattice_query import LatticeQuery
+
+STONES = (  # where stones are laid and their radii, in shares of the way
+    (0.5, 0.12),  # so wide that the other side of an obstacle is the shorter way
+    (0.5, 0.02),  # so small that it closes a narrow passage alone
+    (0.3, 0.08),
+    (0.7, 0.08),
+)
+
+
+def with_stones(query: LatticeQuery, known: Plan) -> Iterator[Problem]:
+    """The problem with one more obstacle on the way of a known plan, which closes that way.
+
+    Problems whose start or goal the stone touches are left out.
+    """
+    problem = query.problem
+    times = np.linspace(0.0, known.duration, 101)
+    poses = known.pose_at(times)
+    way = np.append(0.0, np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T)))
+    if not way[-1] > 0.0:
+        return
+    for share, radius in STONES:
+        place = poses[int(np.searchsorted(way, share * way[-1]))]
+        disc = Obstacle(Disc(radius * float(way[-1]), place[:2].tolist()), name="stone")
+        closed = replace(problem, obstacles=(*problem.obstacles, disc))
+        if blocked_ends(closed) is None:
+            yield closed
