@@ -445,7 +445,7 @@ def same_maneuvers(here: Problem, plan: Plan, goal: Goal, *, under_way: bool) ->
         np.array([trim.body_velocity for trim in plan.trims]),
         here.rates_of(plan),
         (group(plan.start).inverse() @ group(goal.pose)).pose,
-        displacements=np.array(steps).reshape(len(plan.trims) - 1, -1),
+        displacements=np.array(steps).reshape(-1, plan.start.size),  # none beside one trim
         total=total,
         free_heading=goal.free_heading,
         longest=longest,

@@ -32,6 +32,7 @@ AT_FIRST = 0.25  # [s] an inserted trim lasts before its times are solved for
 CHUNK = 30  # changes that are tried before the best of them is taken
 MOST_TRIES = 240  # changes of one word that are tried, by rising price
 MOST_TRIMS = 400  # of a larger library those that differ most
+EXPANSIONS_A_WORD = 8  # of the lattice, in place of solving one word for its times
 FEW = 2  # trims of a word that may be taken out at once
 
 
@@ -52,7 +53,8 @@ def improve_maneuver_words(
     seeds : sequence of (trims, durations)
         Words that lead to the goal, by the indices of the trims between the first and the last.
     time_limit : float
-        [s] after which the search ends with what it has.
+        [s] after which the search ends with what it has; ``search.max_expansions`` of the problem
+        limits it by the number of words that are solved for instead, the same at every call.
     most_tries : int
         Changes of one word that are tried: those of the least prices.
 
@@ -85,7 +87,7 @@ def improve_maneuver_words(
             best = climb.top(word)
             if not any(best.same_as(other) for other in found):
                 found.append(best)
-        if time.monotonic() > deadline:
+        if climb.is_over():
             break
     found.sort(key=lambda one: (float(f"{one.cost:.9g}"), len(one.trims), one.trims))
     return ManeuverSearch(
@@ -113,6 +115,12 @@ class _Climb:
     solved: int = 0
     changes: int = 0
 
+    def is_over(self) -> bool:
+        """Whether no time is left, or as many words were solved for as the problem admits."""
+        most = self.setup.problem.search.max_expansions
+        work = EXPANSIONS_A_WORD * self.solved
+        return time.monotonic() > self.deadline or (most is not None and work >= most)
+
     def top(self, word: TimedWord) -> TimedWord:
         """The word that no change makes cheaper, from this one on."""
         seen = {word.trims}
@@ -129,7 +137,7 @@ class _Climb:
         best: TimedWord | None = None
         tried = 0
         for change in changes[: self.most_tries]:
-            if time.monotonic() > self.deadline:
+            if self.is_over():
                 break
             if change.trims in seen:
                 continue

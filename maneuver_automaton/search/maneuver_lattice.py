@@ -211,6 +211,7 @@ def maneuver_words(
     *,
     deadline: float = math.inf,
     max_expansions: int | None = None,
+    better_share: float = 1.0,
 ) -> Iterator[Heard]:
     """Words from the start to a goal as they are found, each cheaper than the one before.
 
@@ -225,6 +226,8 @@ def maneuver_words(
         Of `time.monotonic()` [s].
     max_expansions : int, optional
         Nodes of all passes together.
+    better_share : float
+        Of the time that is left when the first word is found: so much is for better ones.
     """
     room = 2**62 if max_expansions is None else max_expansions
 
@@ -238,6 +241,9 @@ def maneuver_words(
     total = first
     if word is not None:
         yield Heard(word, first, SearchStatus.FOUND)
+        if better_share < 1.0:
+            now = time.monotonic()
+            deadline = now + better_share * (deadline - now)
         for better, more in _better(query, grid, word, room=room - first, deadline=deadline):
             total = first + more
             if better is not None:
