@@ -72,9 +72,9 @@ def closed(
     for _ in range(STEPS):
         try:
             course = drive(model, start_state, control=u, durations=h)
-        except ValueError as error:  # a step of Newton's method led where no motion is
+        except ValueError as why:  # a step of Newton's method led where no motion is
             if best is None:
-                return f"the end could not be closed: {error}"
+                return f"the end could not be closed: {why}"
             break
         last = np.concatenate([course.pose[-1], course.reduced_state[-1]])
         miss = aim - last[wanted]

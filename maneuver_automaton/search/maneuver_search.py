@@ -61,12 +61,10 @@ def search_words_with_maneuvers(
     >>> search_words_with_maneuvers(problem, goal).plans[0].word
     ('left', 'ahead', 'right')
     """
-    found = ManeuverSearch(status=SearchStatus.OUT_OF_BUDGET, solutions=())
-    for found in maneuver_word_stages(
+    *_, last = maneuver_word_stages(
         problem, goal, time_limit=time_limit, alternatives=alternatives, ceiling=ceiling
-    ):
-        pass
-    return found
+    )
+    return last
 
 
 def maneuver_word_stages(
