@@ -79,6 +79,9 @@ def maneuver_word_stages(
 
     The parameters are those of `search_words_with_maneuvers`; the last stage is its answer.
     """
+    if not problem.automaton.body_velocities.any():  # nothing that words are made of
+        yield ManeuverSearch(status=SearchStatus.EXHAUSTED, solutions=())
+        return
     deadline = time.monotonic() + time_limit
     counted = problem.search.max_expansions is not None
     asked = max(alternatives, SEEDS - 1)
