@@ -6,16 +6,17 @@ import functools
 import math
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.among_obstacles import library_table
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import lattice_bound
-from maneuver_automaton.planning.checking import check_plan, load_checking, load_checks
+from maneuver_automaton.planning.checking import check_plan, load_checking, load_checks, what_is_hit
 from maneuver_automaton.planning.polishing import (
     Aimed,
     guess_along,
@@ -28,7 +29,12 @@ from maneuver_automaton.planning.polishing import (
 from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
 from maneuver_automaton.planning.tracking import Tracked, track
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.refinement.fitting import fitted_plans, padded, why_not_fitted
+from maneuver_automaton.refinement.fitting import (
+    fitted_plans,
+    padded,
+    why_not_fitted,
+    with_best_times,
+)
 from maneuver_automaton.refinement.improve import Patience
 from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinematic_problem
 from maneuver_automaton.refinement.ready import load_lattice
@@ -47,6 +53,7 @@ WORDS_SHARE = 0.4  # of what is left, for words in free space where there is no 
 MANEUVER_SHARE = 0.2  # of what is left, for words of maneuvers where there is a plan already
 AT_ONCE = Patience(attempts=0, passes=0)
 EXPANSIONS_AN_ITERATION = 4  # of the lattice, in place of one iteration of polishing
+WAITS = 9  # at rest, before a path is followed among obstacles that move
 OTHERS = 3  # dearer words that are looked at where bounds or obstacles may refuse the cheapest
 SAME_MOTION = 0.01  # share of their size, and of a turn, by which like motions differ at most
 INSTANTS = 33  # at which two motions are compared
@@ -269,9 +276,20 @@ def _over_maneuvers(found: _Incumbents) -> Iterator[tuple[Plan, int]]:
     ):
         found.counts["expansions"] = before + heard.expansions
         if heard.word is not None:
-            yield plan_of(query, heard.word), goals[heard.word.goal]
-        elif heard.status is SearchStatus.EXHAUSTED and not found.accepted:
-            found.reason = "; none over trims and maneuvers at any resolution tried"
+            owner = heard.word.goal if query.owners is None else int(query.owners[heard.word.goal])
+            plan = plan_of(query, heard.word)
+            yield plan, owner
+            if problem.goals[owner].free_heading:
+                better = with_best_times(problem, plan, problem.goals[owner])
+                if better is not None:
+                    yield better, owner
+        elif not found.accepted:
+            if heard.status is SearchStatus.EXHAUSTED:
+                found.reason = "; none over trims and maneuvers at any resolution tried"
+            if math.isfinite(heard.nearest):
+                found.reason += (
+                    f"; the nearest place that was reached is {heard.nearest:.3g} m from the goal"
+                )
 
 
 def _by_words(found: _Incumbents) -> Iterator[tuple[Plan, int]]:
@@ -301,22 +319,43 @@ def _along_paths(found: _Incumbents) -> Iterator[tuple[Plan, int]]:
         found.enclosed = first.reason if first.enclosed else ""
         found.reason = f" ({first.reason})" if first.reason else ""
         return
-    yield _stopping(problem, first.plan, first.goal_index), first.goal_index
+    yield from _stopping(problem, first.plan, first.goal_index)
     if first.plan.duration > 0.0:
         found.paths.append(guess_along(problem, first.plan))
     left = found.share(IMPROVED_SHARE)
     better = found.count(track(kinematic_problem(problem), time_limit=left, known=first.plan))
     if better.plan is not None and better.goal_index is not None:
-        yield _stopping(problem, better.plan, better.goal_index), better.goal_index
+        yield from _stopping(problem, better.plan, better.goal_index)
 
 
-def _stopping(problem: Problem, path: Plan, goal_index: int) -> Plan:
-    return stop_and_steer(
+def _stopping(problem: Problem, path: Plan, goal_index: int) -> Iterator[tuple[Plan, int]]:
+    """Stop and steer along a path, once obstacles that move let it.
+
+    The path was free at the pace of the kinematic vehicle. This one is slower, so that it meets
+    what moves elsewhere: it waits before it starts, as long as it takes, or it does not go.
+    """
+    goal = problem.goals[goal_index]
+    plan = stop_and_steer(
         problem.automaton.model,  # type: ignore[arg-type]
         path,
         first=problem.first_trim,
-        last=problem.last_trim(problem.goals[goal_index]),
+        last=problem.last_trim(goal),
     )
+    if not problem.moves:
+        yield plan, goal_index
+        return
+    settled = max(
+        float(one.motion.time[-1])
+        for one in problem.obstacles
+        if isinstance(one, Obstacle) and one.motion is not None
+    )
+    for wait in np.linspace(0.0, max(settled - problem.start_time, 0.0), WAITS):
+        durations = plan.durations.copy()
+        durations[0] += wait
+        later = replace(plan, durations=durations)
+        if not what_is_hit(problem, later, goal):
+            yield later, goal_index
+            return
 
 
 def _is_bounded(problem: Problem) -> bool:

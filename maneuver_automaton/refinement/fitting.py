@@ -53,6 +53,13 @@ def fitted_plans(problem: Problem, plan: Plan, goal: Goal) -> Iterator[Plan]:
     yield from sorted(found, key=problem.cost_of)
 
 
+def with_best_times(problem: Problem, plan: Plan, goal: Goal) -> Plan | None:
+    """The same word with its best times to a goal, say of any heading; None if none are found."""
+    longest = np.array([trim.max_duration for trim in plan.trims])
+    again = _solved(problem, plan, goal, np.zeros(len(longest)), longest)
+    return None if again is None or problem.cost_of(again) >= problem.cost_of(plan) else again
+
+
 def padded(problem: Problem, plan: Plan) -> Plan:
     """The plan with a rest that fills a fixed time, at its end or else at its begin."""
     total = problem.horizon.time

@@ -25,6 +25,7 @@ from maneuver_automaton.search.maneuver_solution import (
     WordSetup,
     word_setup,
 )
+from maneuver_automaton.search.maneuver_words import EXPANSIONS_A_WORD
 from maneuver_automaton.search.result import SearchStatus
 
 GAIN = 1e-7  # relative: less is none
@@ -32,7 +33,6 @@ AT_FIRST = 0.25  # [s] an inserted trim lasts before its times are solved for
 CHUNK = 30  # changes that are tried before the best of them is taken
 MOST_TRIES = 240  # changes of one word that are tried, by rising price
 MOST_TRIMS = 400  # of a larger library those that differ most
-EXPANSIONS_A_WORD = 8  # of the lattice, in place of solving one word for its times
 FEW = 2  # trims of a word that may be taken out at once
 
 

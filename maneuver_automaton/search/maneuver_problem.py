@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import Shape
 from maneuver_automaton.costs import StageCost
@@ -14,11 +16,15 @@ from maneuver_automaton.search.maneuver_motion import Part, parts_of
 from maneuver_automaton.search.maneuver_query import ManeuverQuery
 from maneuver_automaton.search.transfer import TransferLibrary, transfer_library
 
+FREE_HEADINGS = 16  # that stand for a free one
+
 
 def maneuver_problem_query(problem: Problem, goals: tuple[int, ...]) -> ManeuverQuery:
     """What the search over trims and maneuvers is asked to solve, for the goals of these numbers.
 
-    Prices of switches and changes of direction are left to whoever compares plans.
+    A goal of any heading is asked for at several: best times then let the heading go. A fixed time
+    is a longest one, since rest fills it. Prices of switches and changes of direction are left to
+    whoever compares plans.
 
     Raises
     ------
@@ -31,21 +37,48 @@ def maneuver_problem_query(problem: Problem, goals: tuple[int, ...]) -> Maneuver
         return automaton.index_of(problem.last_trim(goal).name)
 
     aims = [problem.goals[k] for k in goals]
-    most = problem.horizon.max_time
-    return ManeuverQuery(
+    poses = [_poses(problem, goal) for goal in aims]
+    owners = np.repeat(goals, [len(rows) for rows in poses])
+    horizon = problem.horizon
+    most = horizon.max_time if horizon.time is None else horizon.time
+    query = ManeuverQuery(
         transfer=priced_transfers(automaton, problem.cost),
         parts=_parts(automaton, problem.footprint, tuple(problem.parts.items())),
         start=problem.start,
-        goals=np.array([goal.pose for goal in aims]),
+        goals=np.concatenate(poses),
         start_trim=automaton.index_of(problem.first_trim.name),
-        goal_trims=np.array([number(goal) for goal in aims], dtype=np.int64),
+        goal_trims=np.array([number(problem.goals[k]) for k in owners], dtype=np.int64),
         obstacles=problem.obstacles,
         bounds=problem.bounds,
         keep=problem.margin,
         body_height=problem.body_height,
         start_time=problem.start_time,
         most_time=np.inf if most is None else most,
+        zones=problem.zones,
+        least_coast=horizon.min_coast,
+        settings=problem.search,
+        owners=owners,
     )
+    open_ = query.end_clearances()[1:] > 0.0
+    if open_.all() or not open_.any():
+        return query
+    return replace(
+        query,
+        goals=query.goals[open_],
+        goal_trims=query.goal_trims[open_],
+        owners=owners[open_],
+    )
+
+
+def _poses(problem: Problem, goal: Goal) -> Array:
+    """The pose of a goal (1, dof), or those of several headings: from the way there on."""
+    if not goal.free_heading:
+        return goal.pose[None].copy()
+    ahead = goal.pose[:2] - problem.start[:2]
+    first = float(np.arctan2(ahead[1], ahead[0])) if ahead.any() else float(problem.start[2])
+    poses = np.tile(goal.pose, (FREE_HEADINGS, 1))
+    poses[:, 2] = first + np.arange(FREE_HEADINGS) * (2.0 * np.pi / FREE_HEADINGS)
+    return poses
 
 
 @functools.lru_cache(maxsize=8)
