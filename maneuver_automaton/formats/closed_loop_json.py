@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +17,12 @@ import numpy as np
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.automaton import Automaton, Plan, Primitive
+from maneuver_automaton.automaton.courses import samples_entry
 from maneuver_automaton.automaton.cutting import tail_of, with_samples_at
 from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.plan_json import package_version, read_json
-from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 from maneuver_automaton.receding_horizon import (
     ClosedLoop,
     Deed,
@@ -75,7 +76,7 @@ def closed_loop_to_dict(loop: ClosedLoop) -> dict[str, Any]:
         ],
         "steps": [
             *(
-                _step(step, where.tolist())
+                _step(step, where.tolist(), loop.problem.automaton)
                 for step, where in zip(loop.steps, loop.poses, strict=False)
             ),
             _last(loop),
@@ -135,7 +136,7 @@ def load_steps(path: Path | str, automaton: Automaton) -> tuple[tuple[Step, ...]
     return steps, poses
 
 
-def _step(step: Step, vehicle_pose: list[float]) -> dict[str, Any]:
+def _step(step: Step, vehicle_pose: list[float], automaton: Automaton) -> dict[str, Any]:
     return {
         "time_s": step.time,
         "pose": step.pose.tolist(),
@@ -144,7 +145,7 @@ def _step(step: Step, vehicle_pose: list[float]) -> dict[str, Any]:
         "control": None if step.control is None else step.control.tolist(),
         "word": list(step.plan.word),
         "plan": [
-            _primitive(primitive, float(duration))
+            _primitive(primitive, float(duration), automaton)
             for primitive, duration in zip(
                 step.plan.primitives, step.plan.primitive_durations, strict=True
             )
@@ -173,21 +174,29 @@ def _step(step: Step, vehicle_pose: list[float]) -> dict[str, Any]:
     }
 
 
-def _primitive(primitive: Primitive, duration: float) -> dict[str, Any]:
+def _primitive(primitive: Primitive, duration: float, automaton: Automaton) -> dict[str, Any]:
+    """A trim or maneuver by its name; with what it does if the library holds none such."""
     if isinstance(primitive, Trim):
-        return {
+        entry = {
             "kind": "trim",
             "name": primitive.name,
             "control": primitive.control.tolist(),
             "duration_s": duration,
         }
-    return {
+        if not automaton.is_kinematic and primitive.name not in automaton.trim_names:
+            entry["body_velocity"] = primitive.body_velocity.tolist()
+            entry["reduced_state"] = primitive.reduced_state.tolist()
+        return entry
+    entry = {
         "kind": "maneuver",
         "name": primitive.name,
         "source": primitive.source,
         "target": primitive.target,
         "duration_s": duration,
     }
+    if primitive.course is not None and _in_library(entry, automaton) is None:
+        entry["course"] = samples_entry(primitive.course)
+    return entry
 
 
 def _last(loop: ClosedLoop) -> dict[str, Any]:
@@ -243,8 +252,8 @@ def _plan(
     if all(one["kind"] == "trim" for one in entries) and automaton.is_kinematic:
         trims = tuple(_trim(one, automaton) for one in entries)
         return Plan(pose, trims, durations=durations, start_time=start_time)
-    primitives = [
-        automaton[one["name"]] if one["kind"] == "trim" else _maneuver(one, automaton)
+    primitives: list[Primitive] = [
+        _coasted(one, automaton) if one["kind"] == "trim" else _maneuver(one, automaton)
         for one in entries
     ]
     if not primitives and automaton.rest is not None:
@@ -254,26 +263,84 @@ def _plan(
         pose,
         primitives,
         durations=durations,
-        trims={trim.name: trim for trim in automaton.trims},
+        trims=_passed(primitives, automaton),
         start_time=start_time,
+    )
+
+
+def _passed(primitives: Sequence[Primitive], automaton: Automaton) -> dict[str, Trim]:
+    """Trims between maneuvers and at their ends, by name: of the library, or of a course's ends."""
+    model = automaton.model
+    still = np.zeros(len(model.control_names))
+    known = {trim.name: trim for trim in automaton.trims}
+    known |= {one.name: one for one in primitives if isinstance(one, Trim)}
+    for one in primitives:
+        if isinstance(one, Trim) or one.course is None:
+            continue
+        for name, state in ((one.source, 0), (one.target, -1)):
+            if name not in known:
+                reduced = one.course.reduced_state[state]
+                velocity = np.asarray(model.body_velocity(reduced, still))
+                known[name] = Trim(
+                    name=name, body_velocity=velocity, control=still, reduced_state=reduced
+                )
+    return known
+
+
+def _coasted(entry: Mapping[str, Any], automaton: Automaton) -> Trim:
+    """A trim of the library, or one that the log tells all about."""
+    if entry["name"] in automaton.trim_names or "reduced_state" not in entry:
+        return automaton[entry["name"]]
+    return Trim(
+        name=entry["name"],
+        body_velocity=entry["body_velocity"],
+        control=entry["control"],
+        reduced_state=entry["reduced_state"],
+    )
+
+
+def _in_library(entry: Mapping[str, Any], automaton: Automaton) -> Maneuver | None:
+    """The maneuver of the library that has the name and the ends of an entry."""
+    sought = (entry["name"], entry["source"], entry["target"])
+    return next(
+        (one for one in automaton.maneuvers if (one.name, one.source, one.target) == sought), None
     )
 
 
 def _maneuver(entry: Mapping[str, Any], automaton: Automaton) -> Maneuver:
     """The maneuver of the library, or what was left of it when the step began."""
-    for one in automaton.maneuvers:
-        if (one.name, one.source, one.target) != (entry["name"], entry["source"], entry["target"]):
-            continue
-        begun = one.duration - float(entry["duration_s"])
-        if begun <= 0.0:
-            return one
-        trims = (automaton[one.source], automaton[one.target])
-        still = np.zeros(automaton.model.group.dof)
-        whole = Plan(still, trims, durations=[0.0, 0.0], maneuvers=(one,))
-        rest = tail_of(with_samples_at(whole, [begun], automaton.model), begun)
-        assert rest.maneuvers[0] is not None
-        return rest.maneuvers[0]
-    raise ValueError(f"maneuver {entry['name']!r}: the library has none of this name and ends")
+    one = _in_library(entry, automaton)
+    if one is None:
+        return _written(entry)
+    begun = one.duration - float(entry["duration_s"])
+    if begun <= 0.0:
+        return one
+    trims = (automaton[one.source], automaton[one.target])
+    still = np.zeros(automaton.model.group.dof)
+    whole = Plan(still, trims, durations=[0.0, 0.0], maneuvers=(one,))
+    rest = tail_of(with_samples_at(whole, [begun], automaton.model), begun)
+    assert rest.maneuvers[0] is not None
+    return rest.maneuvers[0]
+
+
+def _written(entry: Mapping[str, Any]) -> Maneuver:
+    """A maneuver whose course is written in the log."""
+    if "course" not in entry:
+        raise ValueError(f"maneuver {entry['name']!r}: the library has none of this name and ends")
+    course = Trajectory(
+        **{
+            name: np.array(entry["course"][name], dtype=np.float64)
+            for name in ("time", "pose", "reduced_state", "control")
+        }
+    )
+    return Maneuver(
+        name=entry["name"],
+        source=entry["source"],
+        target=entry["target"],
+        displacement=course.pose[-1],
+        duration=float(course.time[-1]),
+        course=course,
+    )
 
 
 def _trim(entry: Mapping[str, Any], automaton: Automaton) -> Trim:

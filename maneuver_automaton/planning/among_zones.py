@@ -27,9 +27,9 @@ from maneuver_automaton.models import Model
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
-from maneuver_automaton.planning.zones import admitted_stretches, piece_is_admitted
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.search.admission import admitted_stretches, piece_is_admitted
 
 MOST_QUESTIONS = 8  # ways to enter some zones and go around others
 STEP = 0.02  # [m, rad] between places where a trim may be replaced by a faster one
@@ -56,7 +56,9 @@ def plan_among_zones(
     """
     deadline = began + time_limit
     free = replace(problem, zones=())
-    questions = [free, *(one for one in _questions(problem) if blocked_ends(one) is None)]
+    # vehicles with inertia are searched with the zones themselves: crossed slowly, left fast
+    itself = [] if problem.automaton.is_kinematic else [problem]
+    questions = [free, *itself, *(one for one in _questions(problem) if blocked_ends(one) is None)]
     accepted: list[Accepted] = []
     counts: dict[str, int] = {}
     improvements: list[tuple[float, float]] = []

@@ -120,9 +120,13 @@ def polish_plans(
     goal_index: int,
     *,
     time_limit: float,
+    most_iterations: int | None = None,
     accepts: Callable[[Plan], bool],
 ) -> PolishResult:
-    """Polish guesses that lead to one goal; `accepts` checks and audits what comes out."""
+    """Polish guesses that lead to one goal; `accepts` checks and audits what comes out.
+
+    With `most_iterations` of the solver the work is counted, and time only ends it earlier.
+    """
     goal = problem.goals[goal_index]
     first, last = problem.first_trim, problem.last_trim(goal)
     pose: list[float | None] = goal.pose.tolist()
@@ -157,6 +161,7 @@ def polish_plans(
         guesses,
         stage_cost=_stage_cost(problem),
         time_limit=time_limit,
+        most_iterations=most_iterations,
         accepts=sound,
     )
 

@@ -11,11 +11,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.among_obstacles import library_table
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import lattice_bound
-from maneuver_automaton.planning.checking import check_plan, load_checking, load_checks
+from maneuver_automaton.planning.checking import check_plan, load_checking, load_checks, what_is_hit
 from maneuver_automaton.planning.polishing import (
     Aimed,
     guess_along,
@@ -28,6 +29,12 @@ from maneuver_automaton.planning.polishing import (
 from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
 from maneuver_automaton.planning.tracking import Tracked, track
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.refinement.fitting import (
+    fitted_plans,
+    padded,
+    why_not_fitted,
+    with_best_times,
+)
 from maneuver_automaton.refinement.improve import Patience
 from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinematic_problem
 from maneuver_automaton.refinement.ready import load_lattice
@@ -37,15 +44,19 @@ from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.maneuver_lattice import maneuver_words, plan_of
 from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
 from maneuver_automaton.search.maneuver_ready import load_maneuver_kernels
-from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
+from maneuver_automaton.search.maneuver_search import maneuver_word_stages
 from maneuver_automaton.search.maneuver_words import load_maneuver_words
 
-LATE = 1e-12  # relative, by which a plan may exceed a limit of time
 FIRST_SHARE = 0.8  # of the time limit, for a first path
 IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
+WORDS_SHARE = 0.4  # of what is left, for words in free space where there is no plan yet
 MANEUVER_SHARE = 0.2  # of what is left, for words of maneuvers where there is a plan already
-ONLY_MANEUVERS_SHARE = 0.4  # of what is left, where there is none; the rest is for polishing
 AT_ONCE = Patience(attempts=0, passes=0)
+EXPANSIONS_AN_ITERATION = 4  # of the lattice, in place of one iteration of polishing
+WAITS = 9  # at rest, before a path is followed among obstacles that move
+OTHERS = 3  # dearer words that are looked at where bounds or obstacles may refuse the cheapest
+SAME_MOTION = 0.01  # share of their size, and of a turn, by which like motions differ at most
+INSTANTS = 33  # at which two motions are compared
 
 
 def plan_with_inertia(
@@ -53,44 +64,47 @@ def plan_with_inertia(
 ) -> PlanResult:
     """The cheapest plan found for a vehicle with inertia; every one that is kept was audited.
 
-    The time limit [s] counts from `began`, as `time.monotonic` does.
+    The time limit [s] counts from `began`, as `time.monotonic` does. Where the problem limits its
+    expansions, all stages count their work: the plan is then the same at every call, unless the
+    time is over before.
     """
-    heard = _Heard(problem, began, began + time_limit)
-    for plan, goal_index in _candidates(heard):
-        heard.hear(plan, goal_index)
-        if time.monotonic() >= heard.deadline:
+    found = _Incumbents(problem, began, began + time_limit, alternatives)
+    for plan, goal_index in _candidates(found):
+        found.offer(plan, goal_index)
+        if time.monotonic() >= found.deadline:
             break
-    _polish(heard)
-    heard.searched = heard.searched or time.monotonic()
+    _polish(found)
+    found.searched = found.searched or time.monotonic()
     timing = {
-        "search": heard.searched - began,
-        "first_plan": heard.improvements[0][0] if heard.improvements else math.nan,
-        "refine": max(time.monotonic() - heard.searched, 0.0),
-        "audit": heard.checking,
+        "search": found.searched - began,
+        "first_plan": found.improvements[0][0] if found.improvements else math.nan,
+        "refine": max(time.monotonic() - found.searched, 0.0),
+        "audit": found.checking,
     }
-    if not heard.accepted:
-        status, reason = heard.why_none(time_limit)
+    if not found.accepted:
+        status, reason = found.why_none(time_limit)
         timing.pop("first_plan")
         return PlanResult(
-            problem=problem, status=status, reason=reason, timing_s=timing, counts=heard.counts
+            problem=problem, status=status, reason=reason, timing_s=timing, counts=found.counts
         )
     return found_plans(
         problem,
-        heard.accepted[: alternatives + 1],
+        found.accepted[: alternatives + 1],
         bound=_lower_bound(problem),
         timing_s=timing,
-        counts=heard.counts,
-        improvements=tuple(heard.improvements),
+        counts=found.counts,
+        improvements=tuple(found.improvements),
     )
 
 
 @dataclass(slots=True, eq=False)
-class _Heard:
+class _Incumbents:
     """Plans that were found and passed every check, cheapest first."""
 
     problem: Problem
     began: float
     deadline: float
+    alternatives: int
     searched: float = 0.0
     accepted: list[Accepted] = field(default_factory=list)
     improvements: list[tuple[float, float]] = field(default_factory=list)
@@ -108,19 +122,41 @@ class _Heard:
         """Time that is left [s]."""
         return self.deadline - time.monotonic()
 
+    @property
+    def most_work(self) -> int | None:
+        """Expansions that every stage may take; None if only the time counts."""
+        return self.problem.search.max_expansions
+
+    @property
+    def cost(self) -> float:
+        """Cost of the cheapest plan, an upper bound; inf if there is none."""
+        return self.accepted[0].cost if self.accepted else math.inf
+
+    def share(self, share: float) -> float:
+        """Time [s] for a stage: a share of what is left; all of it where work is counted."""
+        return max(self.left if self.most_work is not None else share * self.left, 0.0)
+
     def count(self, found: Tracked) -> Tracked:
         """Add up what a search for a path took."""
         self.counts["expansions"] += found.expansions
         self.counts["collision_queries"] += found.queries
         return found
 
-    def hear(self, plan: Plan, goal_index: int) -> bool:
-        """Keep a plan if it passes the checks, and say so."""
+    def offer(self, plan: Plan, goal_index: int) -> bool:
+        """Keep a plan, or one of the same word that meets the horizon, if it passes the checks."""
+        goal = self.problem.goals[goal_index]
+        against = why_not_fitted(self.problem, padded(self.problem, plan))
+        kept = False
+        for fitted in fitted_plans(self.problem, plan, goal):
+            against = ""
+            kept = self._offer(fitted, goal_index)
+            if kept:
+                break
+        self.refused = self.refused or against
+        return kept
+
+    def _offer(self, plan: Plan, goal_index: int) -> bool:
         begin = time.monotonic()
-        plan, against = _fitted(self.problem, plan)
-        if against:
-            self.refused = self.refused or against
-            return False
         checked = check_plan(self.problem, plan, self.problem.goals[goal_index])
         now = time.monotonic()
         self.checking += now - begin
@@ -128,19 +164,29 @@ class _Heard:
             self.counts["rejected"] += 1
             self.refused = self.refused or checked.reason
             return False
-        cost = self.problem.cost_of(plan)
-        best = self.accepted[0].cost if self.accepted else math.inf
-        self.accepted.append(
-            Accepted(plan=plan, goal_index=goal_index, cost=cost, audit=checked.audit)
+        one = Accepted(
+            plan=plan,
+            goal_index=goal_index,
+            cost=self.problem.cost_of(plan),
+            audit=checked.audit,
         )
-        self.accepted.sort(key=lambda one: one.cost)
-        if cost < best:
-            self.improvements.append((now - self.began, cost))
-        if not self.searched:
-            self.searched = now
+        if one.cost < self.cost:
+            self.improvements.append((now - self.began, one.cost))
+        self._insert(one)
+        self.searched = self.searched or now
         return True
 
+    def _insert(self, one: Accepted) -> None:
+        """Keep a plan by its cost; of plans of the same motion only the cheapest."""
+        same = [other for other in self.accepted if _same_motion(one.plan, other.plan)]
+        if any(other.cost <= one.cost for other in same):
+            return
+        self.accepted = [other for other in self.accepted if other not in same]
+        self.accepted.append(one)
+        self.accepted.sort(key=lambda other: other.cost)
+
     def why_none(self, time_limit: float) -> tuple[PlanStatus, str]:
+        """How a search ended that found no plan, and why."""
         if self.enclosed:
             return PlanStatus.UNREACHABLE, self.enclosed
         if self.refused:
@@ -148,129 +194,172 @@ class _Heard:
         return PlanStatus.OUT_OF_BUDGET, f"no plan within {time_limit:g} s{self.reason}"
 
 
-def _fitted(problem: Problem, plan: Plan) -> tuple[Plan, str]:
-    """The plan with a rest that fills a fixed time, and which limit of the horizon it breaks."""
-    horizon = problem.horizon
-    limit = horizon.max_time if horizon.time is None else horizon.time
-    if limit is not None and plan.duration > limit * (1.0 + LATE):
-        return plan, f"it takes {plan.duration:.6g} s, {limit:g} s are left"
-    if horizon.time is not None and plan.duration < horizon.time:
-        if not plan.trims[-1].is_rest:
-            return (
-                plan,
-                f"it takes {plan.duration:.6g} s and ends in motion, {horizon.time:g} s are asked",
-            )
-        padded = plan.durations.copy()
-        padded[-1] += horizon.time - plan.duration
-        plan = replace(plan, durations=padded)
-    if plan.duration == 0.0:
-        return Plan(plan.start, (), durations=[], start_time=plan.start_time), ""
-    lasting = [
-        (trim, time) for trim, time in zip(plan.trims, plan.durations, strict=True) if time > 0.0
-    ]
-    if horizon.max_trims is not None and len(lasting) > horizon.max_trims:
-        return plan, f"it has {len(lasting)} trims, {horizon.max_trims} are admitted"
-    if any(time < horizon.min_coast for trim, time in lasting if not trim.is_rest):
-        return plan, f"a trim lasts less than {horizon.min_coast:g} s"
-    return plan, ""
+def _same_motion(one: Plan, other: Plan) -> bool:
+    """Whether two plans from one start are the same motion but for trifles, of whatever pieces."""
+    longer = max(one.duration, other.duration)
+    if abs(one.duration - other.duration) > SAME_MOTION * longer:
+        return False
+    shares = np.linspace(0.0, 1.0, INSTANTS)
+    mine, theirs = (plan.pose_at(plan.start_time + shares * plan.duration) for plan in (one, other))
+    off = np.abs(mine - theirs)
+    off[:, 2] = np.abs(np.remainder(mine[:, 2] - theirs[:, 2] + np.pi, 2.0 * np.pi) - np.pi)
+    size = np.abs(mine - mine[0]).max(axis=0)
+    size[:2], size[2] = size[:2].max(), 2.0 * np.pi
+    return bool((off <= SAME_MOTION * size).all())
 
 
-def _candidates(heard: _Heard) -> Iterator[tuple[Plan, int]]:
-    """Plans as they are found, and the goals they reach."""
-    problem = heard.problem
+def _candidates(found: _Incumbents) -> Iterator[tuple[Plan, int]]:
+    """Plans as they are found, and the goals they reach.
+
+    Where nothing is in the way, words come before the lattice: they are found sooner, and keep to
+    every condition of the horizon. Among obstacles the lattice alone finds its way round.
+    """
+    problem, method = found.problem, found.problem.search.method
     load_checks(problem)
-    along = follows_paths(problem.automaton.model) and _rests(problem)
-    if along:
-        yield from _along_paths(heard)
-    if problem.automaton.maneuvers:
-        share = MANEUVER_SHARE if heard.accepted else ONLY_MANEUVERS_SHARE
-        yield from _over_maneuvers(heard, 1.0 if why_not_polished(problem) else share)
-        if not heard.accepted:
-            yield from _over_maneuvers(heard, 1.0)
-        if not problem.obstacles:
-            yield from _by_words(heard)
-
-
-def _polish(heard: _Heard) -> None:
-    """Polish kinematic plans of different gears, and what has been found; keep what is cheaper."""
-    problem = heard.problem
-    if not heard.accepted or heard.left <= 0.0 or why_not_polished(problem):
+    if method in ("auto", "lattice") and follows_paths(problem.automaton.model) and _rests(problem):
+        yield from _along_paths(found)
+    if not problem.automaton.maneuvers:
         return
-    if not heard.accepted[0].plan.duration > 0.0:
+    if method in ("words", "insertion") or (method == "auto" and not problem.obstacles):
+        yield from _by_words(found)
+    if method in ("auto", "lattice"):
+        yield from _over_maneuvers(found)
+
+
+def _polish(found: _Incumbents) -> None:
+    """Polish kinematic plans of different gears, and what has been found; keep what is cheaper."""
+    problem = found.problem
+    if not found.accepted or found.left <= 0.0 or why_not_polished(problem):
+        return
+    if not found.accepted[0].plan.duration > 0.0:
         return  # it is there already
-    aimed = [Aimed(guess_of_plan(heard.accepted[0].plan), heard.accepted[0].goal_index)]
+    aimed = [Aimed(guess_of_plan(found.accepted[0].plan), found.accepted[0].goal_index)]
     if _rests(problem):
-        along = list(guesses_along_paths(problem, time_limit=heard.left))
-        aimed = along or [*heard.paths, *aimed]
+        along = list(guesses_along_paths(problem, time_limit=found.left))
+        aimed = along or [*found.paths, *aimed]
+    work = None if found.most_work is None else 1 + found.most_work // EXPANSIONS_AN_ITERATION
     for goal_index in dict.fromkeys(one.goal_index for one in aimed):
-        if heard.left <= 0.0:
+        if found.left <= 0.0 or (work is not None and work <= 0):
             return
         try:
-            found = polish_plans(
+            polished = polish_plans(
                 problem,
                 [one.guess for one in aimed if one.goal_index == goal_index],
                 goal_index,
-                time_limit=heard.left,
-                accepts=functools.partial(heard.hear, goal_index=goal_index),
+                time_limit=found.left,
+                most_iterations=work,
+                accepts=functools.partial(found.offer, goal_index=goal_index),
             )
         except RuntimeError:  # the solver gave up on a number; the plan in hand stays
-            heard.counts["solver_errors"] = heard.counts.get("solver_errors", 0) + 1
+            found.counts["solver_errors"] = found.counts.get("solver_errors", 0) + 1
             continue
-        heard.counts["polished"] = heard.counts.get("polished", 0) + len(found.attempts)
+        found.counts["polished"] = found.counts.get("polished", 0) + len(polished.attempts)
+        if work is not None:
+            work -= sum(attempt.iterations for attempt in polished.attempts)
 
 
-def _over_maneuvers(heard: _Heard, share: float) -> Iterator[tuple[Plan, int]]:
-    """Words of trims and maneuvers, the cheapest first, in a share of the time that is left."""
-    problem = heard.problem
+def _over_maneuvers(found: _Incumbents) -> Iterator[tuple[Plan, int]]:
+    """Words of trims and maneuvers from the lattice, each cheaper than the one before.
+
+    All the time that is left may go by until there is a plan; a share of it is for better ones
+    where polishing comes after.
+    """
+    problem = found.problem
     goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
     query = maneuver_problem_query(problem, goals)
-    most = problem.search.max_expansions
-    until = time.monotonic() + share * heard.left
-    before = heard.counts["expansions"]
-    for found in maneuver_words(query, deadline=until, max_expansions=most):
-        heard.counts["expansions"] = before + found.expansions
-        if found.word is not None:
-            yield plan_of(query, found.word), goals[found.word.goal]
-        elif found.status is SearchStatus.EXHAUSTED and not heard.accepted:
-            heard.reason = "; none over trims and maneuvers at any resolution tried"
+    before = found.counts["expansions"]
+    counted = found.most_work is not None
+    share = 1.0 if counted or why_not_polished(problem) else MANEUVER_SHARE
+    until = time.monotonic() + (share if found.accepted else 1.0) * found.left
+    for heard in maneuver_words(
+        query, deadline=until, max_expansions=found.most_work, better_share=share
+    ):
+        found.counts["expansions"] = before + heard.expansions
+        if heard.word is not None:
+            owner = heard.word.goal if query.owners is None else int(query.owners[heard.word.goal])
+            plan = plan_of(query, heard.word)
+            yield plan, owner
+            if problem.goals[owner].free_heading:
+                better = with_best_times(problem, plan, problem.goals[owner])
+                if better is not None:
+                    yield better, owner
+        elif not found.accepted:
+            if heard.status is SearchStatus.EXHAUSTED:
+                found.reason = "; none over trims and maneuvers at any resolution tried"
+            if math.isfinite(heard.nearest):
+                found.reason += (
+                    f"; the nearest place that was reached is {heard.nearest:.3g} m from the goal"
+                )
 
 
-def _by_words(heard: _Heard) -> Iterator[tuple[Plan, int]]:
-    """Words of trims and maneuvers where nothing is in the way: short ones, then insertion."""
-    problem = heard.problem
+def _by_words(found: _Incumbents) -> Iterator[tuple[Plan, int]]:
+    """Words of trims and maneuvers that look at no obstacle: short ones, then insertion."""
+    problem = found.problem
+    guarded = bool(problem.obstacles) or _is_bounded(problem)
+    others = max(found.alternatives, OTHERS if guarded else 0)
+    seen: list[Plan] = []
     for index, goal in enumerate(problem.goals):
-        best = heard.accepted[0].cost if heard.accepted else math.inf
-        left = MANEUVER_SHARE * heard.left
-        found = search_words_with_maneuvers(problem, goal, time_limit=left, ceiling=best)
-        for plan in found.plans:
-            yield plan, index
+        share = MANEUVER_SHARE if found.accepted else WORDS_SHARE
+        best = found.cost if others == 0 else math.inf
+        for stage in maneuver_word_stages(
+            problem, goal, time_limit=found.share(share), alternatives=others, ceiling=best
+        ):
+            for plan in stage.plans:
+                if not any(plan is one for one in seen):
+                    seen.append(plan)
+                    yield plan, index
 
 
-def _along_paths(heard: _Heard) -> Iterator[tuple[Plan, int]]:
+def _along_paths(found: _Incumbents) -> Iterator[tuple[Plan, int]]:
     """Stop and steer along a first path, then along one that is fast to follow so."""
-    problem = heard.problem
+    problem = found.problem
     free = kinematic_problem(problem, switch=0.0)
-    first = heard.count(track(free, time_limit=FIRST_SHARE * heard.left, patience=AT_ONCE))
+    first = found.count(track(free, time_limit=found.share(FIRST_SHARE), patience=AT_ONCE))
     if first.plan is None or first.goal_index is None:
-        heard.enclosed = first.reason if first.enclosed else ""
-        heard.reason = f" ({first.reason})" if first.reason else ""
+        found.enclosed = first.reason if first.enclosed else ""
+        found.reason = f" ({first.reason})" if first.reason else ""
         return
-    yield _stopping(problem, first.plan, first.goal_index), first.goal_index
+    yield from _stopping(problem, first.plan, first.goal_index)
     if first.plan.duration > 0.0:
-        heard.paths.append(guess_along(problem, first.plan))
-    left = IMPROVED_SHARE * heard.left
-    better = heard.count(track(kinematic_problem(problem), time_limit=left, known=first.plan))
+        found.paths.append(guess_along(problem, first.plan))
+    left = found.share(IMPROVED_SHARE)
+    better = found.count(track(kinematic_problem(problem), time_limit=left, known=first.plan))
     if better.plan is not None and better.goal_index is not None:
-        yield _stopping(problem, better.plan, better.goal_index), better.goal_index
+        yield from _stopping(problem, better.plan, better.goal_index)
 
 
-def _stopping(problem: Problem, path: Plan, goal_index: int) -> Plan:
-    return stop_and_steer(
+def _stopping(problem: Problem, path: Plan, goal_index: int) -> Iterator[tuple[Plan, int]]:
+    """Stop and steer along a path, once obstacles that move let it.
+
+    The path was free at the pace of the kinematic vehicle. This one is slower, so that it meets
+    what moves elsewhere: it waits before it starts, as long as it takes, or it does not go.
+    """
+    goal = problem.goals[goal_index]
+    plan = stop_and_steer(
         problem.automaton.model,  # type: ignore[arg-type]
         path,
         first=problem.first_trim,
-        last=problem.last_trim(problem.goals[goal_index]),
+        last=problem.last_trim(goal),
     )
+    if not problem.moves:
+        yield plan, goal_index
+        return
+    settled = max(
+        float(one.motion.time[-1])
+        for one in problem.obstacles
+        if isinstance(one, Obstacle) and one.motion is not None
+    )
+    for wait in np.linspace(0.0, max(settled - problem.start_time, 0.0), WAITS):
+        durations = plan.durations.copy()
+        durations[0] += wait
+        later = replace(plan, durations=durations)
+        if not what_is_hit(problem, later, goal):
+            yield later, goal_index
+            return
+
+
+def _is_bounded(problem: Problem) -> bool:
+    return any(getattr(problem.bounds, name) is not None for name in ("x", "y", "z"))
 
 
 def load_inertia(problem: Problem) -> None:
@@ -283,7 +372,7 @@ def load_inertia(problem: Problem) -> None:
             load_polishing(problem)
     if problem.automaton.maneuvers:
         load_maneuver_kernels()
-        if not problem.obstacles:
+        if not problem.obstacles or problem.search.method in ("words", "insertion"):
             load_maneuver_words()
 
 

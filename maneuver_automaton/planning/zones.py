@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from itertools import groupby
 
-import numpy as np
-from numpy.typing import NDArray
-
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Obstacle, Zone
@@ -14,6 +11,7 @@ from maneuver_automaton.collision.fcl_checker import FclChecker
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.search.admission import admitted_stretches, piece_is_admitted
 
 
 def what_zone_forbids(problem: Problem, plan: Plan, origin: tuple[float, float]) -> str:
@@ -36,11 +34,6 @@ def what_zone_forbids(problem: Problem, plan: Plan, origin: tuple[float, float])
     return ""
 
 
-def piece_is_admitted(zone: Zone, trim: Trim) -> bool:
-    """Whether a zone admits a trim."""
-    return zone.admits_names([trim.name]) and bool(zone.admits(trim.body_velocity))
-
-
 def _course_enters(
     zone: Zone, checker: FclChecker, maneuver: Maneuver, start: Array, model: Model
 ) -> bool:
@@ -57,15 +50,3 @@ def _course_enters(
             if hit is not None:
                 return True
     return False
-
-
-def admitted_stretches(zone: Zone, maneuver: Maneuver, model: Model) -> NDArray[np.bool_]:
-    """Which stretches (n - 1,) between samples of a maneuver a zone admits, by both their ends."""
-    course = maneuver.course
-    assert course is not None
-    if not zone.admits_names([maneuver.source, maneuver.target]):
-        return np.zeros(course.time.size - 1, dtype=np.bool_)
-    control = course.control[:-1]
-    begins = model.body_velocity(course.reduced_state[:-1], control)
-    ends = model.body_velocity(course.reduced_state[1:], control)
-    return np.asarray(zone.admits(begins) & zone.admits(ends))

@@ -104,7 +104,7 @@ def simulate(
     controller: RecedingHorizon | ManeuverHorizon
     inertia = has_inertia(problem) or bool(problem.zones)
     if inertia:
-        _check_inertia(upset, stay=stay, retimed=retimed, seen=obstacles)
+        _check_inertia(upset, stay=stay, retimed=retimed)
         controller = ManeuverHorizon(
             problem, step=step, margin=margin, time_limit=time_limit, last=last, first=first
         )
@@ -240,12 +240,11 @@ def _stands(step: Step) -> bool:
     return left.duration <= NOTHING or not moves_on(left)
 
 
-def _check_inertia(upset: Disturbance, *, stay: bool, retimed: bool, seen: Seen | None) -> None:
+def _check_inertia(upset: Disturbance, *, stay: bool, retimed: bool) -> None:
     """Refuse what loops of vehicles with inertia do not know."""
     asked = {
         "stay": stay,
         "retimed": retimed,
-        "obstacles": seen is not None,
         "disturbance: twist_scale": upset.twist_scale is not None,
     }
     for name, given in asked.items():

@@ -25,17 +25,23 @@ from maneuver_automaton.automaton.cutting import (
     tail_of,
     with_samples_at,
 )
-from maneuver_automaton.collision import AnyObstacle, Shape
+from maneuver_automaton.collision import AnyObstacle, Shape, as_obstacles
+from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning import plan as planned
+from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.checking import what_is_hit
-from maneuver_automaton.primitives import Maneuver
-from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.problem import Goal, Horizon, Problem
 from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.guarantees import broken, promises
 from maneuver_automaton.receding_horizon.log import Deed, Guarantee, Origin, Step, Violation
 from maneuver_automaton.receding_horizon.reanchoring import distance, missed
 from maneuver_automaton.receding_horizon.settings import EXACT
+from maneuver_automaton.refinement.fitting import fitted_plans
 from maneuver_automaton.search.inside import outside, stays_inside
+from maneuver_automaton.search.maneuver_lattice import maneuver_words, plan_of
+from maneuver_automaton.search.maneuver_problem import maneuver_problem_query, priced_transfers
+from maneuver_automaton.search.maneuver_ready import load_maneuver_kernels
 from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
 from maneuver_automaton.search.maneuver_words import load_maneuver_words
 from maneuver_automaton.search.words import TIE
@@ -44,6 +50,7 @@ from maneuver_automaton.words import TimesStatus, solve_switching_times
 FIRST_SHARE = 0.5  # of a step's time limit, for the words of the first step
 EASED = 0.5  # share of a goal's tolerance that may be given up before the end
 DETOUR = 0.1  # share of its cost that a plan which ends within the goal's tolerance may rise by
+STAND = 2.0  # [s] that the goal must stay free after arrival, where obstacles move
 OTHERS = 3  # dearer words that are tried where the cheapest ones are not free
 
 
@@ -52,14 +59,19 @@ class ManeuverHorizon:
 
     Every step shifts the last plan, which always leads to the goal, and looks for a cheaper one
     from the end of the maneuver under way on. Off the plan, the last word gets new times from where
-    the vehicle was measured; its maneuvers stay. Obstacles stand still.
+    the vehicle was measured; its maneuvers stay.
+
+    Where obstacles move, or others are seen than before, the last plan is checked against where
+    they are predicted now, and another one is searched if it hits. Where none is found, the vehicle
+    brakes as soon as it is free to, and waits.
 
     Source: the paper, Algorithm 14, for the automaton of Sec. 3.3.
 
     Parameters
     ----------
     problem : Problem
-        From a trim to a trim, rest if none is named. A fixed time ends in a trim at rest.
+        From a trim to a trim, rest if none is named. A fixed time that ends at rest is prolonged by
+        it; one that ends in motion is what is left of it at every step.
     step : float
         delta [s]: the loop closes every so often.
     margin : float
@@ -74,7 +86,7 @@ class ManeuverHorizon:
     Raises
     ------
     ValueError
-        If a number is out of range, obstacles move, or a fixed time does not end at rest.
+        If a number is out of range.
     """
 
     def __init__(
@@ -92,21 +104,19 @@ class ManeuverHorizon:
                 raise ValueError(f"receding horizon: {name} must be positive, got {value} s")
         if not margin >= 0.0:
             raise ValueError(f"receding horizon: margin must be at least 0, got {margin}")
-        if problem.moves:
-            raise ValueError(
-                "receding horizon: with maneuvers, need obstacles that stand still in this version"
-            )
-        fixed = problem.horizon.time is not None
-        if fixed and not all(problem.last_trim(goal).is_rest for goal in problem.goals):
-            raise ValueError(
-                "receding horizon: a fixed time needs goals at rest, which prolongs the last plan"
-            )
         self.problem = problem
         self.delta = step
         self.margin = margin
         self.time_limit = time_limit
         self.first = first
         self.last = last
+        self.reactive = problem.moves  # obstacles are not where they were at the last step
+        # a fixed time that ends in motion cannot be prolonged: it ends then [s]
+        total, ends_at_rest = (
+            problem.horizon.time,
+            all(problem.last_trim(goal).is_rest for goal in problem.goals),
+        )
+        self.arrival = None if total is None or ends_at_rest else problem.start_time + total
         # along a maneuver the vehicle may stand nearly still, so no trim's rate is promised
         self.promises = replace(promises(problem, step=step), least_rate=0.0)
         self.most_steps: int | None = None
@@ -114,6 +124,8 @@ class ManeuverHorizon:
             bound = self.promises.most_steps(last.value)
             self.most_steps = None if bound is None else bound + last.number
         load_maneuver_words()
+        if problem.obstacles or problem.zones:
+            load_maneuver_kernels()
 
     def step(
         self,
@@ -127,11 +139,12 @@ class ManeuverHorizon:
         Raises
         ------
         ValueError
-            If the state is no pose, the time negative, or obstacles are given: those of the
-            problem are known.
+            If the state is no pose, or the time negative.
         """
+        changed = obstacles is not None and as_obstacles(obstacles) != self.problem.obstacles
         if obstacles is not None:
-            raise ValueError("receding horizon: with maneuvers, obstacles are those of the problem")
+            self.problem = replace(self.problem, obstacles=as_obstacles(obstacles))
+        self.reactive = self.reactive or self.problem.moves or obstacles is not None
         dof = self.problem.automaton.model.group.dof
         pose = np.array(as_array("measured_state", measured_state, last=dof))
         if pose.shape != (dof,):
@@ -144,11 +157,18 @@ class ManeuverHorizon:
         if last is not None:
             last = self._cut(last, passed)
         at = self.problem.start_time if last is None else last.time + passed
-        here = replace(self.problem, start=pose, start_time=at)
+        here = replace(self.problem, start=pose, start_time=at, horizon=self._horizon(at))
         decision = _Decision(self, here, last, passed, began)
-        now = self._logged(decision, here, last, began)
+        now = self._logged(decision, here, last, began, changed=changed)
         self.last = now
         return now.control, now
+
+    def _horizon(self, at: float) -> Horizon:
+        """The horizon of a step at a time [s] of the world's clock."""
+        horizon = self.problem.horizon
+        if self.arrival is None:
+            return horizon
+        return replace(horizon, time=max(self.arrival - at, NOTHING))
 
     def _cut(self, last: Step, passed: float) -> Step:
         """The last step as it was driven, for `passed` seconds; one cut short is not counted."""
@@ -160,7 +180,9 @@ class ManeuverHorizon:
         spent = self.problem.cost_of(plan) - self.problem.cost_of(tail_of(plan, passed))
         return replace(last, plan=plan, applied=passed, applied_cost=spent)
 
-    def _logged(self, decision: _Decision, here: Problem, last: Step | None, began: float) -> Step:
+    def _logged(
+        self, decision: _Decision, here: Problem, last: Step | None, began: float, *, changed: bool
+    ) -> Step:
         chosen = decision.chosen()
         instants = here.start_time + self.delta * np.arange(
             1, 2 + chosen.plan.duration / self.delta
@@ -191,7 +213,7 @@ class ManeuverHorizon:
             deed=chosen.deed,
         )
         if last is None or now.off_plan:  # from here on, undisturbed
-            most = self.promises.most_steps(now.value) if leads else None
+            most = self.promises.most_steps(now.value) if leads and not self.reactive else None
             self.most_steps = None if most is None else most + now.number
         found = list(chosen.violations)
         if last is not None and leads and last.deed.leads:
@@ -202,6 +224,7 @@ class ManeuverHorizon:
                 now,
                 most_steps=self.most_steps,
                 uniform=False,
+                moved=here.moves or changed,
             )
         return replace(now, violations=tuple(found))
 
@@ -256,6 +279,8 @@ class _Decision:
         bar = math.inf if kept is None else self.here.cost_of(kept[0])
         known = None if math.isinf(bar) else bar
         found = self._searched(bar - self.loop.margin - TIE * (1.0 + abs(known or 0.0)))
+        if found is None and kept is None:
+            found = self._on_lattice()
         if found is not None:
             plan, goal_index = found
             return _Chosen(
@@ -288,15 +313,15 @@ class _Decision:
                 "ends at the goal"
             )
         found = self._searched(math.inf) if not here.obstacles else None
+        if found is None and self.loop.reactive:
+            found = self._on_lattice()
         if found is None:
             left = max(self.deadline - time.monotonic(), 1e-3)
             result = planned(here, time_limit=left)
             late = result.plan is not None and self._is_late(result.plan)
             if result.plan is None or result.goal_index is None or late:
-                still = Plan(here.start, (here.first_trim,), durations=[0.0])
-                still = replace(still, start_time=here.start_time)
                 why = "it takes too long" if late else result.reason
-                return self._helpless(still, 0, reason=f": {why}")
+                return self._helpless(self._standing(here.first_trim), 0, reason=f": {why}")
             found = result.plan, result.goal_index
         return self._as_first(self._padded(found[0]), found[1])
 
@@ -304,19 +329,108 @@ class _Decision:
         return _Chosen(plan=plan, goal_index=index, origin=Origin.FIRST, deed=Deed.PLANNED)
 
     def _helpless(self, rest: Plan, index: int, reason: str = "") -> _Chosen:
-        """Nothing leads to the goal: the last plan is driven to its end, where it rests."""
+        """Nothing leads to the goal: the last plan is driven to its end, or braked if that hits."""
         off = self.off_plan or 0.0
-        flag = Violation(
-            guarantee=Guarantee.FEASIBILITY,
-            reason=f"no word was found to the goal from {off:.3g} off the plan{reason}",
-        )
+        flags = [
+            Violation(
+                guarantee=Guarantee.FEASIBILITY,
+                reason=f"no word was found to the goal from {off:.3g} off the plan{reason}",
+            )
+        ]
+        if self.loop.reactive:
+            rest, hit = self._failsafe(rest)
+            if hit:
+                flags.append(Violation(guarantee=Guarantee.SAFETY, reason=hit))
+        harmful = len(flags) > 1
+        stands = Deed.APPROACHED if moves_on(rest) else Deed.STOPPED
         return _Chosen(
             plan=rest,
             goal_index=index,
             origin=Origin.SHIFTED,
-            deed=Deed.APPROACHED if moves_on(rest) else Deed.STOPPED,
-            violations=(flag,),
+            deed=Deed.HARMFUL if harmful else stands,
+            violations=tuple(flags),
         )
+
+    def _failsafe(self, rest: Plan) -> tuple[Plan, str]:
+        """A motion that is not to the goal, and what it hits: the last plan, or braking soon."""
+        goal = self.here.goals[0]
+        hits: list[tuple[Plan, str]] = []
+        for plan in (self._braking(rest), rest):
+            if plan is None:
+                continue
+            hit = what_is_hit(self.here, self._stood(plan), goal)
+            if not hit:
+                return plan, ""
+            hits.append((plan, hit))
+        return hits[0]
+
+    def _braking(self, rest: Plan) -> Plan | None:
+        """What is under way, then the quickest maneuvers to rest; None if there are none."""
+        automaton, done = self.here.automaton, head_of(rest, self.busy)
+        begin = done.trims[-1]
+        if begin.is_rest:
+            still = self._standing(begin, at=done)
+            return still if not self.busy else joined(done, still)
+        if automaton.rest is None or begin.name not in automaton.trim_names:
+            return None
+        library = priced_transfers(automaton, Cost(time=1.0))
+        source = automaton.index_of(begin.name)
+        if not math.isfinite(library.transitions.cost[library.class_pair(source, automaton.rest)]):
+            return None
+        links = library.chain(source, automaton.rest)
+        stop = Plan(
+            done.end if self.busy else rest.start,
+            (begin, *(automaton.trims[target] for _, target in links)),
+            durations=[0.0] * len(links) + [self.loop.delta],
+            maneuvers=tuple(automaton.maneuvers[k] if k >= 0 else None for k, _ in links),
+            start_time=self.here.start_time + self.busy,
+        )
+        return joined(done, stop) if self.busy else stop
+
+    def _standing(self, trim: Trim, *, at: Plan | None = None) -> Plan:
+        """A step in a trim at rest, where a plan ends or where the vehicle is."""
+        start = self.here.start if at is None else at.end
+        lasting = self.loop.delta if self.loop.reactive else 0.0
+        begin = self.here.start_time + (0.0 if at is None else self.busy)
+        return Plan(start, (trim,), durations=[lasting], start_time=begin)
+
+    def _stood(self, plan: Plan) -> Plan:
+        """The plan with a while of rest at its end, where obstacles may come."""
+        if not (self.loop.reactive and plan.trims and plan.trims[-1].is_rest):
+            return plan
+        durations = np.array(plan.durations)
+        durations[-1] += STAND
+        return replace(plan, durations=durations)
+
+    def _on_lattice(self) -> tuple[Plan, int] | None:
+        """A plan from the end of the maneuver under way that the lattice finds in what is left."""
+        done = None if self.rest is None else head_of(self.rest, self.busy)
+        begin = self.here.first_trim if done is None else done.trims[-1]
+        if begin.name not in self.here.automaton.trim_names:
+            return None
+        problem = self._from_there(done, begin.name)
+        if problem is None or not problem.automaton.maneuvers:
+            return None
+        goals = tuple(
+            k for k, one in enumerate(problem.goals) if not why_goal_blocked(problem, one)
+        )
+        if not goals:
+            return None
+        query = maneuver_problem_query(problem, goals)
+        best: tuple[Plan, int] | None = None
+        cost = math.inf
+        most = problem.search.max_expansions
+        for heard in maneuver_words(query, deadline=self.deadline, max_expansions=most):
+            if heard.word is None:
+                continue
+            owner = heard.word.goal if query.owners is None else int(query.owners[heard.word.goal])
+            goal = problem.goals[owner]
+            for plan in fitted_plans(problem, plan_of(query, heard.word), goal):
+                whole = plan if done is None or not self.busy else joined(done, plan)
+                if self.here.cost_of(whole) < cost and self._is_free(whole, goal):
+                    best, cost = (whole, owner), self.here.cost_of(whole)
+                    break
+        return best
 
     def _kept(self, index: int) -> tuple[Plan, Origin] | None:
         """The rest of the last plan: as it is, or with times that meet the goal from here."""
@@ -324,6 +438,8 @@ class _Decision:
         if rest is None:
             return None
         if self.off_plan == 0.0 and missed(rest, goal) <= EXACT * _size(rest):
+            if self.loop.reactive and not self._is_free(rest, goal):
+                return None
             return rest, Origin.SHIFTED
         most = (1.0 + DETOUR) * self.here.cost_of(rest)
         found: list[Plan] = []
@@ -391,7 +507,7 @@ class _Decision:
         """Whether a plan keeps clear of obstacles, and inside the bounds if it starts there."""
         if not (outside(plan.start, self.here.bounds) or stays_inside(plan, self.here.bounds)):
             return False
-        return not what_is_hit(self.here, plan, goal)
+        return not what_is_hit(self.here, self._stood(plan), goal)
 
     def _is_late(self, plan: Plan) -> bool:
         """Whether a plan takes longer than it may."""
@@ -444,7 +560,7 @@ def same_maneuvers(here: Problem, plan: Plan, goal: Goal, *, under_way: bool) ->
         np.array([trim.body_velocity for trim in plan.trims]),
         here.rates_of(plan),
         (group(plan.start).inverse() @ group(goal.pose)).pose,
-        displacements=np.array(steps).reshape(len(plan.trims) - 1, -1),
+        displacements=np.array(steps).reshape(-1, plan.start.size),  # none beside one trim
         total=total,
         free_heading=goal.free_heading,
         longest=longest,

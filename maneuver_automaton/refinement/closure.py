@@ -70,7 +70,12 @@ def closed(
     best: Closed | None = None
     u, h = np.clip(control, low, high), np.array(durations)
     for _ in range(STEPS):
-        course = drive(model, start_state, control=u, durations=h)
+        try:
+            course = drive(model, start_state, control=u, durations=h)
+        except ValueError as why:  # a step of Newton's method led where no motion is
+            if best is None:
+                return f"the end could not be closed: {why}"
+            break
         last = np.concatenate([course.pose[-1], course.reduced_state[-1]])
         miss = aim - last[wanted]
         error = float(np.abs(miss).max(initial=0.0))
@@ -82,6 +87,8 @@ def closed(
         room = np.minimum(np.minimum(u - low, high - u), 1.0)
         columns = np.hstack([(by_control * room).reshape(len(by_control), -1), by_pace[:, None]])
         change = np.linalg.lstsq(columns[wanted], miss, rcond=None)[0]
+        if not change[-1] > -1.0:
+            break  # no pace leads there: times would be negative
         u = np.clip(u + room * change[:-1].reshape(u.shape), low, high)
         h = h * (1.0 + change[-1])
     assert best is not None

@@ -34,7 +34,7 @@ PRICES = (  # of a change of direction, and of a switch of trims, in the time of
     (2.0, 0.0),
 )
 BRIEF = Patience(attempts=300, passes=1)
-MOST = 20_000  # expansions of one search: what it finds does not depend on the clock
+MOST = 20_000  # expansions of one search, unless the problem asks for fewer
 SAME = 0.15  # share of a stroke in which it differs at most from that of a like sequence
 SMALL = 0.02  # share of the whole way by which a stroke counts as longer
 OTHERS = 8  # further words of each search that are looked at
@@ -140,7 +140,8 @@ def _plans(problem: Problem, deadline: float) -> Iterator[Plan]:
     """Plans of one search: what improving its first one comes to, and what it met on the way."""
     query = lattice_query(problem, tuple(range(len(problem.goals))))
     table = cost_to_go_table(problem)
-    first = first_plan(query, deadline=deadline, max_expansions=MOST, table=table)
+    most = min(MOST, problem.search.max_expansions or MOST)  # the clock decides nothing
+    first = first_plan(query, deadline=deadline, max_expansions=most, table=table)
     if first.word is None:
         return
     improved = improve(query, first.word, deadline=deadline, patience=BRIEF, table=table)

@@ -193,6 +193,7 @@ def polish_guesses(
     stage_cost: RunningCost | None = None,
     settings: PolishSettings | None = None,
     time_limit: float = 8.0,
+    most_iterations: int | None = None,
     accepts: Accepts = lambda motion: True,
 ) -> PolishResult:
     """The best exact motion that some guesses lead to.
@@ -207,6 +208,9 @@ def polish_guesses(
     settings : PolishSettings, optional
     time_limit : float
         [s].
+    most_iterations : int, optional
+        Of the solver, over all guesses: what is tried then does not depend on the clock, unless
+        the time is over before.
     accepts : callable
         Whether a motion is sound, say by an audit: solver success proves nothing.
 
@@ -216,8 +220,9 @@ def polish_guesses(
         If CasADi is not installed.
     """
     settings = settings or PolishSettings()
+    deadline = time.monotonic() + time_limit
     return _Polishing(
-        task, task.scene, guesses, stage_cost, settings, time.monotonic() + time_limit, accepts
+        task, task.scene, guesses, stage_cost, settings, deadline, most_iterations, accepts
     ).run()
 
 
@@ -231,6 +236,7 @@ class _Polishing:
     stage_cost: RunningCost | None
     settings: PolishSettings
     deadline: float
+    most_iterations: int | None  # None: the clock alone says when to stop
     accepts: Accepts
     best: PolishedMotion | None = None
     best_raw: Polished | None = None
@@ -241,7 +247,7 @@ class _Polishing:
     def run(self) -> PolishResult:
         quick: list[tuple[float, int, Polished]] = []
         for number in range(len(self.guesses)):
-            if self._left() <= 0.0:
+            if self._is_over():
                 break
             rough = self._rough(number)
             if rough is None:
@@ -260,6 +266,24 @@ class _Polishing:
     def _left(self) -> float:
         """Time for a solver [s]: what is left less what it takes to write a problem down."""
         return self.deadline - time.monotonic() - self.building
+
+    def _work_left(self) -> int | None:
+        """Iterations that are left; None if they are not counted."""
+        if self.most_iterations is None:
+            return None
+        return self.most_iterations - sum(one.iterations for one in self.attempts)
+
+    def _is_over(self) -> bool:
+        """Whether neither time nor iterations are left for another solve."""
+        work = self._work_left()
+        return self._left() <= 0.0 or (work is not None and work <= 0)
+
+    def _room_for(self, last: Sequence[Attempt]) -> bool:
+        """Whether three more solves like the longest of some fit in what is left."""
+        work = self._work_left()
+        if work is not None:
+            return work >= 3 * max((one.iterations for one in last), default=0)
+        return self._left() >= 3.0 * max((one.seconds for one in last), default=0.0)
 
     def _rough(self, number: int) -> Polished | None:
         """Where a guess leads with fixed planes, or with fixed gears."""
@@ -285,7 +309,7 @@ class _Polishing:
 
     def _lines(self, number: int, rough: Polished) -> None:
         """Free lines from what fixed planes came to, which counts itself if they fail."""
-        if self._left() > 0.0:
+        if not self._is_over():
             found = self._solve("lines", number, rough.as_guess)
             if found.status is SolveStatus.SOLVED and self._consider(found):
                 return
@@ -294,9 +318,10 @@ class _Polishing:
 
     def _finer(self) -> None:
         """The best once more with smaller steps, while there is time for it."""
-        last = max((a.seconds for a in self.attempts if a.kind != "fixed planes"), default=0.0)
         raw = self.best_raw
-        if raw is None or self._left() < 3.0 * last or np.ptp(raw.durations) > 1e-9:
+        if raw is None or self._is_over() or np.ptp(raw.durations) > 1e-9:
+            return
+        if not self._room_for([one for one in self.attempts if one.kind != "fixed planes"]):
             return
         count = math.ceil(len(raw.durations) / FINER)
         if count > self.settings.nodes[1]:
@@ -323,6 +348,10 @@ class _Polishing:
     ) -> Polished:
         began = time.monotonic()
         settings = self.settings
+        work = self._work_left()
+        if work is not None:
+            most = max(min(work, settings.max_iterations if most is None else most), 1)
+            settings = replace(settings, fixed_iterations=min(most, settings.fixed_iterations))
         if most is not None:
             settings = replace(settings, max_iterations=min(most, settings.max_iterations))
         found = polish(

@@ -14,6 +14,7 @@ from maneuver_automaton.groups._kernels import compose
 from maneuver_automaton.search._kernels_distance import distance_at, pop, push
 from maneuver_automaton.search._kernels_lattice import node_in, slot_of
 from maneuver_automaton.search._kernels_maneuver_motion import (
+    coasts_long_enough,
     edge_inside,
     edge_proven,
     transfer_free,
@@ -38,7 +39,7 @@ def cell_key(task, x, y, heading, z, trim, time):
     turn = (heading - task.frame_heading) / FULL_TURN
     k = math.floor((turn - math.floor(turn)) * task.headings + 0.5) % task.headings
     tick = math.floor(time / task.tick) & 0x7FF if task.tick > 0.0 else 0
-    key = ((int(trim) * 2048 + tick) * 256 + level) * 128 + k
+    key = ((int(trim) * 2048 + tick) * 256 + level) * task.headings + k
     return (key * 16384 + j) * 16384 + i
 
 
@@ -81,6 +82,16 @@ def connect(search, task, lib, layers, node, ceiling, estimate):
             best, which = most, -1
             for k in range(n):
                 if scratch.costs[k] < best and scratch.durations[k] <= left:
+                    if task.least_coast > 0.0 and not coasts_long_enough(
+                        task,
+                        lib,
+                        trim,
+                        nodes[node, 7],
+                        lib.transfer.words[scratch.rows[k]],
+                        scratch.climbs[k],
+                        scratch.times[k],
+                    ):
+                        continue
                     best, which = scratch.costs[k], k
             if which < 0:
                 break
@@ -164,7 +175,8 @@ def expand(search, task, lib, layers, grid, n, ceiling):
     """
     nodes, links, state = search.nodes, search.links, search.state
     room = nodes.shape[0] - lib.most_children - 1
-    moving = layers.movers.speed.shape[0] > 0
+    # clearance known from before spares a test, unless obstacles move or zones are in the way
+    moving = layers.movers.speed.shape[0] > 0 or task.zone_trims.shape[0] > 0
     for _ in range(n):
         node = -1
         while state[HEAP] > 0:

@@ -72,6 +72,27 @@ def trim_proven(task, lib, layers, trim, x, y, heading, z, t, clock):
                 return -1.0
             if end == t:
                 nearest = min(nearest, gap)
+    for k in range(task.zone_trims.shape[0]):
+        if not task.zone_trims[k, trim]:
+            # the body keeps out of zones that do not admit the trim; their distance is not part of
+            # the clearance, since the next motion may be admitted
+            proven, _ = free_time(
+                layer_world(task.zones, k),
+                part_body(lib.bodies, 0),
+                x,
+                y,
+                heading,
+                lib.part_twists[0, trim, 0],
+                lib.part_twists[0, trim, 1],
+                lib.part_twists[0, trim, 2],
+                lib.speeds[0, trim],
+                t,
+                0.0,
+                task.margin,
+                clock,
+            )
+            if proven < t:
+                return -1.0
     return nearest
 
 
@@ -133,6 +154,30 @@ def edge_proven(task, lib, layers, edge, x, y, heading, z, clock):
                 time += t
                 if k == end - 1:
                     nearest = min(nearest, gap)
+    for n in range(task.zone_trims.shape[0]):
+        for k in range(lib.first_piece[edge], lib.first_piece[edge + 1]):  # of the vehicle itself
+            if task.zone_pieces[n, k]:
+                continue
+            p_x, p_y, p_heading = compose(
+                x, y, heading, lib.piece_pose[k, 0], lib.piece_pose[k, 1], lib.piece_pose[k, 2]
+            )
+            proven, _ = free_time(
+                layer_world(task.zones, n),
+                part_body(lib.bodies, 0),
+                p_x,
+                p_y,
+                p_heading,
+                lib.piece_twist[k, 0],
+                lib.piece_twist[k, 1],
+                lib.piece_twist[k, 2],
+                lib.piece_speed[k],
+                lib.piece_time[k],
+                lib.piece_error[k],
+                task.margin,
+                clock,
+            )
+            if proven < lib.piece_time[k]:
+                return -1.0
     return nearest
 
 
@@ -193,6 +238,37 @@ def coast_free(task, lib, layers, trim, pose, t, clock):
     d_x, d_y, turn = coast(twists[trim, 0], twists[trim, 1], twists[trim, 2], t)
     x, y, heading = compose(x, y, heading, d_x, d_y, turn)
     return True, (x, y, heading, z + t * twists[trim, 3])
+
+
+@bare_inner_kernel
+def coasts_long_enough(task, lib, start_trim, run, word, climb, times):
+    """Whether every trim of a transfer that moves lasts for no time, or for the least one.
+
+    `run` is how long `start_trim` has lasted already: the first trim may go on with it.
+    """
+    before = run
+    trim_before = start_trim
+    for n in range(4):
+        trim, t = climb, times[3]
+        if n < 3:
+            trim, t = word[n], times[n]
+        if trim < 0:
+            continue
+        lasting = t
+        if trim == trim_before:
+            lasting += before
+        elif 0.0 < before < task.least_coast and not is_still(lib, trim_before):
+            return False
+        trim_before, before = trim, lasting
+    return not 0.0 < before < task.least_coast or is_still(lib, trim_before)
+
+
+@bare_inner_kernel
+def is_still(lib, trim):
+    """Whether a trim stands still: a rest may last as short as it likes."""
+    twists = lib.transfer.twists
+    turns = twists[trim, 2] != 0.0
+    return not (turns or twists[trim, 0] != 0.0 or twists[trim, 1] != 0.0 or twists[trim, 3] != 0.0)
 
 
 @bare_inner_kernel

@@ -234,9 +234,9 @@ def _slack(query: LatticeQuery) -> float:
     Two turning radii and a full turn, and the switches and changes of direction of three trims and
     of the joints at both their ends.
     """
-    library = query.library
+    library, arrays = query.library, query.library.arrays.library
     way = SLACK * library.radius * library.per_metre + library.per_turn
-    prices = MOST_JOINTS * (library.arrays.switch + library.arrays.direction_change)
+    prices = MOST_JOINTS * (arrays.switch + arrays.direction_change)
     return float(way + prices) if way > 0.0 else math.inf
 
 

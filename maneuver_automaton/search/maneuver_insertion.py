@@ -26,6 +26,7 @@ from maneuver_automaton.search.maneuver_solution import (
     WordSetup,
     word_setup,
 )
+from maneuver_automaton.search.maneuver_words import EXPANSIONS_A_WORD
 from maneuver_automaton.search.result import SearchStatus
 
 GAIN = 1e-7  # relative: less is none
@@ -53,7 +54,8 @@ def improve_maneuver_words(
     seeds : sequence of (trims, durations)
         Words that lead to the goal, by the indices of the trims between the first and the last.
     time_limit : float
-        [s] after which the search ends with what it has.
+        [s] after which the search ends with what it has; ``search.max_expansions`` of the problem
+        limits it by the number of words that are solved for instead, the same at every call.
     most_tries : int
         Changes of one word that are tried: those of the least prices.
 
@@ -86,7 +88,7 @@ def improve_maneuver_words(
             best = climb.top(word)
             if not any(best.same_as(other) for other in found):
                 found.append(best)
-        if time.monotonic() > deadline:
+        if climb.is_over():
             break
     found.sort(key=lambda one: (float(f"{one.cost:.9g}"), len(one.trims), one.trims))
     return ManeuverSearch(
@@ -114,6 +116,12 @@ class _Climb:
     solved: int = 0
     changes: int = 0
 
+    def is_over(self) -> bool:
+        """Whether no time is left, or as many words were solved for as the problem admits."""
+        most = self.setup.problem.search.max_expansions
+        work = EXPANSIONS_A_WORD * self.solved
+        return time.monotonic() > self.deadline or (most is not None and work >= most)
+
     def top(self, word: TimedWord) -> TimedWord:
         """The word that no change makes cheaper, from this one on."""
         seen = {word.trims}
@@ -130,7 +138,7 @@ class _Climb:
         best: TimedWord | None = None
         tried = 0
         for change in changes[: self.most_tries]:
-            if time.monotonic() > self.deadline:
+            if self.is_over():
                 break
             if change.trims in seen:
                 continue

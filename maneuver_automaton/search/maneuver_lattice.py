@@ -17,6 +17,7 @@ from maneuver_automaton.search import _kernels_maneuver_lattice as kernels
 from maneuver_automaton.search.distance_grid import DistanceGrid, distance_grid
 from maneuver_automaton.search.lattice_memory import widened
 from maneuver_automaton.search.maneuver_query import ManeuverQuery
+from maneuver_automaton.search.maneuver_reversal import forward_word, reversed_query
 from maneuver_automaton.search.maneuver_shortcuts import LEAST, shortened
 from maneuver_automaton.search.maneuver_task import Rung, Task, task_of, transfer_steps
 from maneuver_automaton.search.result import SearchStatus
@@ -28,6 +29,7 @@ FIRST_CHUNK = 128  # expansions
 MOST_CHUNK = 16384
 TIMELY = 256  # expansions between two looks at the clock
 SMALLEST = 4096  # nodes
+LONGER = 1.6  # times a least coasting time, for the longer of two coasts
 
 
 FIRST: tuple[tuple[int, tuple[Rung, ...]], ...] = (
@@ -35,6 +37,8 @@ FIRST: tuple[tuple[int, tuple[Rung, ...]], ...] = (
     (0, (Rung(stop=True),)),
     (300, (Rung(scale=0.5, quanta=0.5, stop=True), Rung(quanta=0.7, stop=True))),
     (2000, (Rung(scale=0.25, quanta=0.25, stop=True), Rung(scale=0.5, quanta=0.7, stop=True))),
+    (2000, (Rung(stop=True, backwards=True),)),
+    (8000, (Rung(scale=0.5, quanta=0.5, weight=1.5, stop=True, backwards=True),)),
     (40000, (Rung(scale=0.25, quanta=0.25, stop=True, margin=0.1),)),
 )
 LATER: tuple[Rung, ...] = (
@@ -44,6 +48,8 @@ LATER: tuple[Rung, ...] = (
     Rung(scale=0.5, quanta=0.5, weight=1.2),
     Rung(scale=0.5, quanta=0.5, weight=1.0),
 )
+FAST = 1.5  # length scales of the tightest turn from which on there are passes of its size
+FAST_WEIGHT = 1.2  # of these: there is little to be decided at a place, so that greed leads astray
 IN_SPACE: tuple[Rung, ...] = (
     # one more dimension: coarse cells and little greed find the way, fine ones do not end
     Rung(scale=12.0, quanta=4.0, weight=1.0, most=40000),
@@ -90,6 +96,7 @@ class Heard(NamedTuple):
     word: Word | None
     expansions: int
     status: SearchStatus
+    nearest: float = math.inf  # [m] from a goal to the nearest place that was reached
 
 
 @dataclass(slots=True, eq=False)
@@ -160,13 +167,22 @@ class ManeuverPass:
         times = arrays.found[1:5].tolist()
         tail += [int(state[kernels.CLIMB]), int(query.goal_trims[goal])]
         ahead, beyond = transfer_steps(query.transfer, last, tail, [*times, 0.0])
-        return word_of_steps(
+        word = word_of_steps(
             query.transfer,
             start_trim=query.start_trim,
             steps=steps[::-1] + ahead,
             targets=targets[::-1] + beyond,
             goal=goal,
         )
+        return forward_word(word) if self.rung.backwards else word
+
+    @property
+    def nearest(self) -> float:
+        """Distance [m] from the nearest place that was reached to where the pass leads."""
+        places = self.arrays.nodes[: self.arrays.state[kernels.N_NODES], :2]
+        aims = self.query.seen_goals[:, :2]
+        gaps = np.linalg.norm(places[:, None] - aims[None], axis=-1)
+        return float(gaps.min(initial=math.inf))
 
 
 def search_maneuvers(
@@ -206,6 +222,7 @@ def maneuver_words(
     *,
     deadline: float = math.inf,
     max_expansions: int | None = None,
+    better_share: float = 1.0,
 ) -> Iterator[Heard]:
     """Words from the start to a goal as they are found, each cheaper than the one before.
 
@@ -220,6 +237,8 @@ def maneuver_words(
         Of `time.monotonic()` [s].
     max_expansions : int, optional
         Nodes of all passes together.
+    better_share : float
+        Of the time that is left when the first word is found: so much is for better ones.
     """
     room = 2**62 if max_expansions is None else max_expansions
 
@@ -227,17 +246,25 @@ def maneuver_words(
         over = time.monotonic() >= deadline or total >= room
         return SearchStatus.OUT_OF_BUDGET if over else SearchStatus.EXHAUSTED
 
-    own = query.around(query.parts[0], query.plane)
-    grid = distance_grid(own, query.window[0], query.seen_goals, query.seen_start)
-    word, first = _first(query, grid, room=room, deadline=deadline)
+    grid = _grid(query)
+    word, first, nearest = _first(query, grid, room=room, deadline=deadline)
     total = first
     if word is not None:
         yield Heard(word, first, SearchStatus.FOUND)
+        if better_share < 1.0:
+            now = time.monotonic()
+            deadline = now + better_share * (deadline - now)
         for better, more in _better(query, grid, word, room=room - first, deadline=deadline):
             total = first + more
             if better is not None:
                 yield Heard(better, total, SearchStatus.FOUND)
-    yield Heard(None, total, ended(total))
+    yield Heard(None, total, ended(total), nearest)
+
+
+def _grid(query: ManeuverQuery) -> DistanceGrid:
+    """Distances in the plane to the goals of a query."""
+    own = query.around(query.parts[0], query.plane)
+    return distance_grid(own, query.window[0], query.seen_goals, query.seen_start)
 
 
 def plan_of(query: ManeuverQuery, word: Word) -> Plan:
@@ -253,17 +280,20 @@ def plan_of(query: ManeuverQuery, word: Word) -> Plan:
 
 def _first(
     query: ManeuverQuery, grid: DistanceGrid, *, room: int, deadline: float
-) -> tuple[Word | None, int]:
-    """Passes of rising resolution in turn until one connects: the word, and expansions."""
-    ladder = list(FIRST)
+) -> tuple[Word | None, int, float]:
+    """Passes of rising resolution in turn until one connects.
+
+    The word, expansions, and the distance [m] from a goal to the nearest place that was reached.
+    """
+    schedule = _first_schedule(query)
     passes: list[ManeuverPass] = []
     total = 0
     while total < room and time.monotonic() < deadline:
         alive = [one for one in passes if one.alive]
-        if ladder and (not alive or total >= ladder[0][0]):
-            passes += [pass_of(query, rung, grid) for rung in ladder.pop(0)[1]]
+        if schedule and (not alive or total >= schedule[0][0]):
+            passes += _passes_of(query, schedule.pop(0)[1], grid)
             alive = [one for one in passes if one.alive]
-        if not alive:
+        if not alive and not schedule:
             break
         for one in alive:
             before = one.expansions
@@ -272,8 +302,38 @@ def _first(
             total += one.expansions - before
             one.chunk = min(2 * one.chunk, MOST_CHUNK)
             if word is not None:
-                return word, total
-    return None, total
+                return word, total, 0.0
+    ahead = [one.nearest for one in passes if not one.rung.backwards]
+    return None, total, min(ahead, default=math.inf)
+
+
+def _first_schedule(query: ManeuverQuery) -> list[tuple[int, tuple[Rung, ...]]]:
+    """Which passes begin after how many expansions of all of them together.
+
+    A vehicle that turns widely for its size gets passes whose cells and coasts are as wide: it
+    decides little from one length of its body to the next.
+    """
+    wide = query.library.turns
+    schedule = list(FIRST)
+    if wide > FAST:
+        fast = Rung(scale=wide, quanta=wide, weight=FAST_WEIGHT, stop=True)
+        schedule.insert(1, (FIRST[1][0], (fast,)))
+    return schedule
+
+
+def _passes_of(
+    query: ManeuverQuery, rungs: Sequence[Rung], grid: DistanceGrid
+) -> list[ManeuverPass]:
+    """Passes that are ready to run; those from the goal only where that can be asked."""
+    passes = []
+    for rung in rungs:
+        if not rung.backwards:
+            passes.append(pass_of(query, rung, grid))
+            continue
+        back = reversed_query(query)
+        if back is not None:
+            passes.append(pass_of(back, rung, _grid(back)))
+    return passes
 
 
 def _better(
@@ -283,7 +343,10 @@ def _better(
     total = 0
     arrays: ManeuverSearchArrays | None = None
     coarse = IN_SPACE if query.start.size > 3 else ()
-    for rungs, all_words in ((coarse, False), (LATER, True)):
+    wide = query.library.turns
+    fast = tuple(Rung(scale=wide, quanta=wide, weight=w) for w in (FAST_WEIGHT, 1.0))
+    later = LATER if wide <= FAST else (*fast, *LATER)
+    for rungs, all_words in ((coarse, False), (later, True)):
         for shorter in _shorter(query, best, rungs, all_words=all_words, deadline=deadline):
             best = shorter
             yield best, total
@@ -328,6 +391,10 @@ def pass_of(
     """A pass that is ready to run."""
     library = query.library.arrays
     quanta = library.quanta * rung.quanta
+    if query.least_coast > 0.0:  # no coast that would have to be gone on with
+        lasting = np.array([not trim.is_rest for trim in query.automaton.trims])[:, None]
+        least = query.least_coast * np.array([1.0, LONGER])
+        quanta = np.where(lasting & (quanta > 0.0), np.maximum(quanta, least), quanta)
     steps = quanta[..., None] * library.transfer.twists[: library.transfer.n_trims, None]
     task = task_of(query, rung)
     room = _search_arrays(query) if arrays is None else arrays

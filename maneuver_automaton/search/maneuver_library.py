@@ -77,10 +77,12 @@ class ManeuverLibrary(NamedTuple):
     edge_maneuver: IntArray  # (E,) index in the automaton, -1 for a switch at will
     radius: float  # [m] length scale: the tightest turn, or the size of the body
     cell: float  # [m] side of a cell of the first pass
+    turns: float  # radius of the tightest turn, in length scales; 1 for none
     per_metre: float  # least cost per metre
     per_climb: float  # least cost per metre of altitude
     lag: Array  # (C, C) least cost of maneuvers between classes beyond that of their way
     worst_error: float  # [m] of the pose along any piece
+    spans: IntArray  # (N, 2) samples of its course between which each piece of the vehicle lies
 
 
 @functools.lru_cache(maxsize=16)
@@ -100,7 +102,7 @@ def maneuver_library(
     offsets = np.array([part.trim_poses for part in parts])
     twists = [carried_twists(trim_twists, poses) for poses in offsets]
     speeds = np.array([fastest_of(b, t) for b, t in zip(bodies, twists, strict=True)])
-    motion = _motion(automaton, parts, edges, np.array(twists), timed=timed)
+    motion, spans = _motion(automaton, parts, edges, np.array(twists), timed=timed)
     radius = _length_scale(trim_twists, bodies[0].half_width, bodies[0].reach)
     quanta = _quanta(trim_twists, radius, waits=waits)
     counts = np.bincount(edges.source, minlength=m)
@@ -139,10 +141,12 @@ def maneuver_library(
         edge_maneuver=edges.maneuver,
         radius=radius,
         cell=_cell(automaton, radius),
+        turns=_tightest(trim_twists) / radius if _tightest(trim_twists) else 1.0,
         per_metre=per_metre,
         per_climb=_least(trim_rates, np.abs(trim_twists[:, 3])),
         lag=_lags(transfer, np.maximum(edges.cost - per_metre * lengths, 0.0), edges),
         worst_error=float(motion.piece_error[pose_rows:].max(initial=0.0)),
+        spans=spans,
     )
 
 
@@ -198,8 +202,8 @@ def _edges(automaton: Automaton, transfer: Library) -> _Edges:
 
 def _motion(
     automaton: Automaton, parts: Sequence[Part], edges: _Edges, twists: Array, *, timed: bool
-) -> _Motion:
-    """Pieces of every part, then of the pose alone, along every edge."""
+) -> tuple[_Motion, IntArray]:
+    """Pieces of every part, then of the pose alone, along every edge; samples of the first part."""
     bodies = bodies_of(parts)
     own = carried_twists(automaton.body_velocities, np.zeros((len(automaton), 3)))
     close = CLOSE * min(b.half_width or 0.05 * max(b.reach, 1.0) for b in bodies)
@@ -209,6 +213,7 @@ def _motion(
     climbs = automaton.body_velocities[:, 3:].sum(axis=1)
     ends = np.stack([climbs[sources], climbs[targets]], axis=1)
     found, counts, speeds, heights = [], [np.zeros(1, dtype=np.int64)], [], []
+    spans = np.zeros((0, 2), dtype=np.int64)
     for p in range(len(parts) + 1):
         body = bodies[p] if p < len(parts) else None
         table = own if body is None else twists[p]
@@ -224,6 +229,10 @@ def _motion(
             close=close,
             timed=timed,
         )
+        if p == 0:
+            sizes = np.array([len(times) for _, times in courses], dtype=np.int64)
+            begins = np.repeat(np.cumsum(sizes) - sizes, np.diff(pieces.first))
+            spans = np.stack([pieces.begin - begins, pieces.end - begins], axis=1)
         count = np.zeros(len(edges.source), dtype=np.int64)
         count[driven] = np.diff(pieces.first)
         counts.append(count)
@@ -235,7 +244,7 @@ def _motion(
     if driven.size:
         low[driven] = np.minimum.reduceat(heights[-1][0], pieces.first[:-1])
         high[driven] = np.maximum.reduceat(heights[-1][1], pieces.first[:-1])
-    return _Motion(
+    motion = _Motion(
         first_piece=np.cumsum(np.concatenate(counts)),
         piece_pose=np.concatenate([row.pose for row in found]),
         piece_twist=np.concatenate([row.twist for row in found]),
@@ -247,6 +256,7 @@ def _motion(
         edge_low=low,
         edge_high=high,
     )
+    return motion, spans
 
 
 def _via_edges(transfer: Library, edges: _Edges) -> IntArray:
@@ -303,12 +313,16 @@ def _cell(automaton: Automaton, radius: float) -> float:
     return OF_A_LATTICE * model.resolution if isinstance(model, OnLattice) else CELL * radius
 
 
-def _length_scale(twists: Array, half_width: float, reach: float) -> float:
-    """Radius of the tightest turn that drives, at most a few widths of the body."""
+def _tightest(twists: Array) -> float:
+    """Radius of the tightest turn that drives [m]; 0 if none does."""
     speed, turn = np.hypot(twists[:, 0], twists[:, 1]), np.abs(twists[:, 2])
     turns = (turn > 0.0) & (speed > 0.0)
-    body = 4.0 * half_width or 4.0 * reach
-    if not turns.any():
+    return float((speed[turns] / turn[turns]).min(initial=np.inf)) if turns.any() else 0.0
+
+
+def _length_scale(twists: Array, half_width: float, reach: float) -> float:
+    """Radius of the tightest turn that drives, at most a few widths of the body."""
+    radius, body = _tightest(twists), 4.0 * half_width or 4.0 * reach
+    if radius == 0.0:
         return body or 1.0
-    radius = float((speed[turns] / turn[turns]).min())
     return min(max(radius, 0.5 * body), 2.0 * body) if body else radius

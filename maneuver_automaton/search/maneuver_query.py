@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from maneuver_automaton._arrays import Array, IntArray, as_array
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.collision import AnyObstacle
+from maneuver_automaton.collision import AnyObstacle, Obstacle, Zone
 from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.collision.body import body_of
 from maneuver_automaton.collision.convex import DIGITS
@@ -26,7 +27,8 @@ from maneuver_automaton.collision.layers import (
 )
 from maneuver_automaton.collision.world import World, own_frame, world_of
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.problem import Bounds
+from maneuver_automaton.problem import Bounds, SearchSettings
+from maneuver_automaton.search.admission import admitted_stretches, piece_is_admitted
 from maneuver_automaton.search.lattice_query import window_of
 from maneuver_automaton.search.maneuver_library import ManeuverLibrary, maneuver_library
 from maneuver_automaton.search.maneuver_motion import Part
@@ -63,6 +65,14 @@ class ManeuverQuery:
         [s] that a plan may last.
     body_height : (float, float)
         Lowest and highest point of the vehicle about its altitude [m].
+    zones : tuple of Zone
+        Where not every motion is admitted.
+    least_coast : float
+        [s] that every trim which moves lasts at least.
+    settings : SearchSettings
+        Cells, headings and weight of the lattice.
+    owners : (n,) array of int, optional
+        Which goal of the problem each goal stands for: several headings stand for a free one.
     """
 
     transfer: Library
@@ -77,6 +87,10 @@ class ManeuverQuery:
     start_time: float = 0.0
     most_time: float = math.inf
     body_height: tuple[float, float] = (0.0, 0.0)
+    zones: tuple[Zone, ...] = ()
+    least_coast: float = 0.0
+    settings: SearchSettings = field(default_factory=SearchSettings)
+    owners: IntArray | None = None
 
     def __post_init__(self) -> None:
         dof = self.automaton.model.group.dof
@@ -131,6 +145,37 @@ class ManeuverQuery:
             plane=self.plane,
         )
 
+    @cached_property
+    def zone_layers(self) -> LayerArrays:
+        """The zones, a world each, as the kernels see them; one empty world if there are none."""
+        worlds = [self._world_of((Obstacle(zone.shape),)) for zone in self.zones]
+        worlds = worlds or [self._world_of(())]
+        low, high = np.full(len(worlds), -math.inf), np.full(len(worlds), math.inf)
+        return layer_arrays(worlds, low=low, high=high, plane=worlds[0])
+
+    @cached_property
+    def zone_trims(self) -> NDArray[np.bool_]:
+        """Which trims each zone admits, (Z, m)."""
+        trims = self.automaton.trims
+        rows = [[piece_is_admitted(zone, trim) for trim in trims] for zone in self.zones]
+        return np.array(rows, dtype=np.bool_).reshape(len(self.zones), len(trims))
+
+    @cached_property
+    def zone_pieces(self) -> NDArray[np.bool_]:
+        """Which pieces of the vehicle's own motion along edges each zone admits, (Z, N)."""
+        library = self.library
+        first, spans = library.arrays.first_piece, library.spans
+        admitted = np.zeros((len(self.zones), len(spans)), dtype=np.bool_)
+        for z, zone in enumerate(self.zones):
+            for edge, k in enumerate(library.edge_maneuver.tolist()):
+                maneuver = self.automaton.maneuvers[k] if k >= 0 else None
+                if maneuver is None or maneuver.course is None:
+                    continue
+                good = admitted_stretches(zone, maneuver, self.automaton.model)
+                for n in range(first[edge], first[edge + 1]):
+                    admitted[z, n] = good[spans[n, 0] : spans[n, 1]].all()
+        return admitted
+
     @property
     def level(self) -> float:
         """Altitude from which the kernels count [m]."""
@@ -152,6 +197,15 @@ class ManeuverQuery:
     def moves(self) -> bool:
         """Whether an obstacle moves."""
         return bool(self.world.arrays.movers.speed.size)
+
+    @property
+    def costs_are_times(self) -> bool:
+        """Whether what a motion costs is how long it lasts, at one price."""
+        rates = self.transfer.arrays.rates
+        lasting = np.array([one.duration for one in self.automaton.maneuvers])
+        price = float(rates[0])
+        close = functools.partial(np.allclose, rtol=1e-9, atol=1e-12)
+        return bool(close(rates, price) and close(self.transfer.maneuver_costs, price * lasting))
 
     @cached_property
     def library(self) -> ManeuverLibrary:
@@ -208,7 +262,9 @@ class ManeuverQuery:
     def window(self) -> tuple[Array, Array, bool]:
         """Box in the world's frame, window as in `_kernels_connect.inside_window`, if bounded."""
         ends = np.vstack([self.seen_start[None], self.seen_goals])
-        return window_of(self.bounds, self.world, ends, radius=self.library.radius)
+        around = tuple(Obstacle(zone.shape) for zone in self.zones)  # so that ways lead round them
+        world = self._world_of((*self.obstacles, *around)) if around else self.world
+        return window_of(self.bounds, world, ends, radius=self.library.radius)
 
     def _seen(self, poses: Array) -> Array:
         planar = self.world.into(poses[:, :3])

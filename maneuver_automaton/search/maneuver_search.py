@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterator
 
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.maneuver_insertion import improve_maneuver_words
@@ -36,7 +37,8 @@ def search_words_with_maneuvers(
         are not looked at.
     goal : Goal
     time_limit : float
-        [s] after which the search ends with what it has.
+        [s] after which the search ends with what it has. Where the problem limits its expansions,
+        every stage counts its work, and the time only ends it earlier.
     alternatives : int
         How many plans beside the cheapest.
     ceiling : float
@@ -59,50 +61,72 @@ def search_words_with_maneuvers(
     >>> search_words_with_maneuvers(problem, goal).plans[0].word
     ('left', 'ahead', 'right')
     """
+    *_, last = maneuver_word_stages(
+        problem, goal, time_limit=time_limit, alternatives=alternatives, ceiling=ceiling
+    )
+    return last
+
+
+def maneuver_word_stages(
+    problem: Problem,
+    goal: Goal,
+    *,
+    time_limit: float = math.inf,
+    alternatives: int = 0,
+    ceiling: float = math.inf,
+) -> Iterator[ManeuverSearch]:
+    """What is found so far after each stage: short words, longer ones, and then insertion.
+
+    The parameters are those of `search_words_with_maneuvers`; the last stage is its answer.
+    """
+    if not problem.automaton.body_velocities.any():  # nothing that words are made of
+        yield ManeuverSearch(status=SearchStatus.EXHAUSTED, solutions=())
+        return
     deadline = time.monotonic() + time_limit
+    counted = problem.search.max_expansions is not None
     asked = max(alternatives, SEEDS - 1)
     near = ceiling * (1.0 + SEED_SLACK)
-    short = search_maneuver_words(
-        problem,
-        goal,
-        alternatives=asked,
-        most_letters=CLOSED_FORM,
-        time_limit=time_limit,
-        ceiling=near,
-    )
-    left = max(deadline - time.monotonic(), 0.0)
-    found = list(short.solutions)
-    counts = dict(short.counts)
-    if left > 0.0:
-        longer = search_maneuver_words(
+    found: list[ManeuverSolution] = []
+    counts: dict[str, int] = {}
+
+    def stage(more: ManeuverSearch) -> ManeuverSearch:
+        nonlocal found
+        found = _distinct([*found, *more.solutions])
+        _add(counts, more.counts)
+        kept = tuple(one for one in found if one.cost < ceiling)[: alternatives + 1]
+        out = time.monotonic() > deadline
+        none = SearchStatus.OUT_OF_BUDGET if out else SearchStatus.EXHAUSTED
+        status = SearchStatus.FOUND if kept else none
+        return ManeuverSearch(status=status, solutions=kept, counts=dict(counts))
+
+    yield stage(
+        search_maneuver_words(
             problem,
             goal,
             alternatives=asked,
-            most_letters=SCANNED,
-            most_trims=SCANNED_TRIMS,
-            time_limit=SCAN_SHARE * left,
+            most_letters=CLOSED_FORM,
+            time_limit=time_limit,
             ceiling=near,
         )
-        found = _distinct([*found, *longer.solutions])
-        _add(counts, longer.counts)
-    left = max(deadline - time.monotonic(), 0.0)
+    )
+    left = deadline - time.monotonic()
+    if left > 0.0:
+        yield stage(
+            search_maneuver_words(
+                problem,
+                goal,
+                alternatives=asked,
+                most_letters=SCANNED,
+                most_trims=SCANNED_TRIMS,
+                time_limit=left if counted else SCAN_SHARE * left,
+                ceiling=near,
+            )
+        )
+    left = deadline - time.monotonic()
     most = problem.horizon.max_trims
     if left > 0.0 and found and (most is None or most > CLOSED_FORM):
-        better = improve_maneuver_words(
-            problem,
-            goal,
-            [(one.trims, one.durations) for one in found[:SEEDS]],
-            time_limit=left,
-        )
-        found = _distinct([*found, *better.solutions])
-        _add(counts, better.counts)
-    found = [one for one in found if one.cost < ceiling]
-    if found:
-        status = SearchStatus.FOUND
-    else:
-        out = time.monotonic() > deadline
-        status = SearchStatus.OUT_OF_BUDGET if out else SearchStatus.EXHAUSTED
-    return ManeuverSearch(status=status, solutions=tuple(found[: alternatives + 1]), counts=counts)
+        seeds = [(one.trims, one.durations) for one in found[:SEEDS]]
+        yield stage(improve_maneuver_words(problem, goal, seeds, time_limit=left))
 
 
 def _distinct(solutions: list[ManeuverSolution]) -> list[ManeuverSolution]:

@@ -171,6 +171,12 @@ def _once(
     late = better.duration > query.most_time
     if late or (query.moves and not word_is_free(query, better)):
         return None
+    lasting = zip(better.trims, better.durations.tolist(), strict=True)
+    if any(
+        0.0 < time < query.least_coast and not query.automaton.trims[trim].is_rest
+        for trim, time in lasting
+    ):
+        return None
     return better
 
 

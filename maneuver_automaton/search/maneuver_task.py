@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.collision.layers import LayerArrays
 from maneuver_automaton.search.maneuver_query import ManeuverQuery
 from maneuver_automaton.words.library import Library
 from maneuver_automaton.words.word import MANEUVER, TRIM
@@ -20,6 +22,7 @@ PATIENCE = 1.5  # a connection may cost so much more than the estimate ...
 SLACK = 6.0  # ... and so many times the way of a length scale
 SHOTS = 0.25  # of a length scale's cost between two transfers that are tried, times the estimate
 MOST_PATIENCE = 400.0  # expansions between two transfers
+ROUNDING = 1e-12  # relative, by which a coast may fall short of the least one
 WORDS_AN_EXPANSION = 150.0  # words of a transfer that take as long as an expansion
 
 
@@ -33,6 +36,7 @@ class Rung:
     stop: bool = False  # at the first connection
     margin: float = 1.0  # of the proven clearance
     most: int = 2**62  # expansions
+    backwards: bool = False  # from the goal
 
 
 class Task(NamedTuple):
@@ -71,11 +75,15 @@ class Task(NamedTuple):
     edge_window: Array  # narrower by what courses may be off
     lowest: float  # [m] altitudes
     highest: float
+    least_coast: float  # [s] that a trim which moves lasts at least
+    zones: LayerArrays  # a world for every zone; where there is none, one that is not looked at
+    zone_trims: NDArray[np.bool_]  # (Z, m) trims that a zone admits
+    zone_pieces: NDArray[np.bool_]  # (Z, N) pieces of edges that a zone admits
 
 
 def task_of(query: ManeuverQuery, rung: Rung) -> Task:
     """Limits and sizes of a pass, as the kernels see them."""
-    library, world = query.library, query.world
+    library, world, settings = query.library, query.world, query.settings
     scale = library.radius * library.per_metre
     frame = query.seen_goals[0]
     window = query.window[1]
@@ -83,7 +91,8 @@ def task_of(query: ManeuverQuery, rung: Rung) -> Task:
     edge_window[8] -= library.worst_error
     goal_trims, classes = query.goal_trims, query.transfer.transitions.class_of
     tick = 0.0
-    if query.moves or math.isfinite(query.most_time):
+    timed = math.isfinite(query.most_time) and not query.costs_are_times
+    if query.moves or timed:  # a dearer way to a cell may be the one that is in time
         lengths = library.arrays.quanta[library.arrays.quanta > 0.0]
         tick = rung.quanta * float(lengths.min()) if lengths.size else 1.0
     return Task(
@@ -97,18 +106,18 @@ def task_of(query: ManeuverQuery, rung: Rung) -> Task:
         frame_heading=float(frame[2]),
         frame_cos=math.cos(float(frame[2])),
         frame_sin=math.sin(float(frame[2])),
-        cell=float(rung.scale * library.cell),
+        cell=float(rung.scale * (settings.cell or library.cell)),
         rise=float(rung.scale * RISE * library.radius),
-        headings=HEADINGS,
+        headings=settings.headings or HEADINGS,
         tick=float(tick),
-        weight=float(rung.weight),
+        weight=float(rung.weight if settings.weight is None or not rung.stop else settings.weight),
         per_metre=library.per_metre,
         per_climb=library.per_climb,
         # the way to the goal says how long to wait, unless no trim moves: then nothing is solved
         # for, and the node that ends at the goal must not be missed
         per_shot=float(SHOTS * scale) or 1.0 if query.transfer.arrays.n_few > 1 else math.inf,
         most_patience=MOST_PATIENCE,
-        least_patience=float(query.transfer.arrays.n_few / WORDS_AN_EXPANSION),
+        least_patience=float(len(goal_trims) * query.transfer.arrays.n_few / WORDS_AN_EXPANSION),
         patience=PATIENCE,
         slack=float(SLACK * scale) or math.inf,
         tries=TRIES,
@@ -122,6 +131,10 @@ def task_of(query: ManeuverQuery, rung: Rung) -> Task:
         edge_window=edge_window,
         lowest=query.altitudes[0],
         highest=query.altitudes[1],
+        least_coast=float(query.least_coast * (1.0 - ROUNDING)),
+        zones=query.zone_layers,
+        zone_trims=query.zone_trims,
+        zone_pieces=query.zone_pieces,
     )
 
 

@@ -35,6 +35,7 @@ CLOSED_FORM = 3  # trims at the end of a word whose times are not scanned
 NODES = (0, 16, 8, 5)  # grid nodes per scanned time, by how many times are scanned
 HEADINGS = 24  # a free heading is tried at so many
 SLACK = 0.1  # share by which a grid value may be dearer than what is asked for, and yet be refined
+EXPANSIONS_A_WORD = 8  # steering calls, or expansions, in place of solving one word for its times
 LEAP = 0.35  # share of the grid's step by which times of one family change more, at most, per time
 
 
@@ -62,7 +63,8 @@ def search_maneuver_words(
         How many solutions beside the cheapest. None: all that are found, nothing is pruned.
     time_limit : float
         [s] after which the search ends with what it has; ``search.max_expansions`` of the problem
-        limits it by the number of steering calls instead, the same at every call.
+        limits it by the number of steering calls, and of words solved for their times, instead:
+        the same at every call.
     ceiling : float
         Cost of a plan that is known: what is dearer may be left out.
     most_letters : int
@@ -177,7 +179,8 @@ class _Job:
 
     def _over(self) -> bool:
         limit = self.problem.search.max_expansions
-        return time.monotonic() > self.deadline or (limit is not None and self.calls >= limit)
+        work = self.calls + EXPANSIONS_A_WORD * self.polished
+        return time.monotonic() > self.deadline or (limit is not None and work >= limit)
 
     def _bar(self) -> float:
         """What costs more is not asked for."""

@@ -458,7 +458,7 @@ def test_the_table_of_costs_serves_every_goal(heading):
     goals = (
         (replace(goal, free_heading=True),)
         if heading == "free"
-        else (goal, replace(goal, pose=goal.pose + [0.0, 0.05, 0.0]))
+        else (goal, replace(goal, pose=goal.pose + np.array([0.0, 0.05, 0.0])))
     )
     result = found(replace(bay, goals=goals, search=SearchSettings(max_expansions=3000)))
     alone = found(replace(bay, search=SearchSettings(max_expansions=3000)))

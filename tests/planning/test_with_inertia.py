@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -15,6 +18,7 @@ from maneuver_automaton.optimal_control import has_casadi
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.primitives import Maneuver
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
+from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
 from tests.inertia import CAR, resting, unicycle_automaton
 
 BODY = Box([4.689, 1.942], [1.4155, 0.0])
@@ -151,3 +155,53 @@ def test_a_start_that_is_the_goal_is_an_empty_word(automaton):
         result = plan(Problem(automaton, [1.0, 2.0, 0.5], goal), time_limit=2.0)
         assert result.status is PlanStatus.FOUND
         assert (result.plan.word, result.cost, result.plan.duration) == ((), 0.0, 0.0)
+
+
+def one_of(name, goal, *, trim=None, **changes):
+    values = {"search": SearchSettings(max_expansions=800)} | changes
+    goals = Goal(pose=goal, trim=trim)
+    start = np.zeros(len(goal))
+    return Problem(load_stock_library(name), start, goals, start_trim=trim, **values)
+
+
+FREE = {
+    "car_with_trailer": one_of("car_with_trailer", (24.0, 6.0, 0.3)),
+    "hovercraft": one_of("hovercraft", (9.0, 3.0, 0.5)),
+    "single_track": one_of("single_track", (120.0, 12.0, 0.1), trim="speed 20, turn_rate 0"),
+}
+
+
+@pytest.mark.parametrize("name", FREE)
+def test_words_come_first_where_nothing_is_in_the_way(name):
+    """A search over words knows effort alone; no expansion of the lattice comes before it."""
+    problem = replace(FREE[name], cost=Cost(effort=1.0))
+    words = search_words_with_maneuvers(problem, problem.goals[0], time_limit=60.0)
+    result = plan(problem, time_limit=60.0)
+    assert result.status is PlanStatus.FOUND
+    assert result.cost <= problem.cost_of(words.plans[0]) * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("name", FREE)
+def test_counted_work_gives_the_same_plan_and_the_moved_one(name):
+    problem = replace(FREE[name], obstacles=(Obstacle(Box([0.5, 0.5], [300.0, 50.0])),))
+    one, again = plan(problem, time_limit=90.0), plan(problem, time_limit=90.0)
+    assert one.plan.word == again.plan.word
+    np.testing.assert_array_equal(one.plan.durations, again.plan.durations)
+    assert one.cost == again.cost
+    by = SE2([20.0, -7.0, 1.1])
+    moved = plan(problem.moved(by), time_limit=90.0)
+    assert moved.plan.word == one.plan.word
+    assert moved.cost == pytest.approx(one.cost, abs=1e-7)
+    np.testing.assert_allclose((by @ SE2(one.plan.end)).pose, moved.plan.end, atol=1e-6)
+
+
+def test_alternatives_are_other_motions():
+    problem = FREE["hovercraft"]
+    result = plan(problem, time_limit=60.0, alternatives=3)
+    plans = [result.plan, *(one.plan for one in result.alternatives)]
+    assert len(plans) > 2
+    shares = np.linspace(0.0, 1.0, 101)
+    for a, b in itertools.combinations(plans, 2):
+        off = np.abs(a.pose_at(shares * a.duration) - b.pose_at(shares * b.duration))
+        apart = max(off.max() / 9.0, abs(a.duration - b.duration) / a.duration)
+        assert apart > 0.005

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.automaton.cutting import NOTHING, committed, head_of
-from maneuver_automaton.collision import Box
+from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.formats.closed_loop_json import (
     closed_loop_to_dict,
@@ -18,7 +18,7 @@ from maneuver_automaton.formats.closed_loop_json import (
     save_closed_loop,
 )
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.problem import Goal, Horizon, Problem
+from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.receding_horizon import (
     Deed,
     Disturbance,
@@ -27,7 +27,7 @@ from maneuver_automaton.receding_horizon import (
     Origin,
     simulate,
 )
-from tests.inertia import car_automaton, unicycle_automaton
+from tests.inertia import ROBOT, car_automaton, resting, unicycle_automaton
 from tests.search.cases import compiled_only
 
 pytestmark = compiled_only
@@ -177,7 +177,97 @@ def test_what_is_not_known_is_refused():
     with pytest.raises(ValueError) as error:
         ManeuverHorizon(posed(), step=0.0)
     assert str(error.value) == "receding horizon: step must be positive, got 0.0 s"
-    ends_moving = posed(Goal(pose=[3.0, 0.0, 0.0], trim="1, 0"), horizon=Horizon(time=9.0))
-    with pytest.raises(ValueError) as error:
-        ManeuverHorizon(ends_moving, step=0.5)
-    assert str(error.value).startswith("receding horizon: a fixed time needs goals at rest")
+
+
+@pytest.mark.parametrize("robot", ["stops and steers", "polished"])
+def test_a_loop_with_motions_of_its_own_goes_on_from_its_file(robot, tmp_path):
+    """Neither strokes nor what polishing finds is in the library: the log tells their courses."""
+    automaton = resting(ROBOT) if robot == "stops and steers" else unicycle_automaton()
+    problem = posed(
+        [3.0, 1.0, 1.0],
+        automaton=automaton,
+        obstacles=[Box([0.4, 0.4], [1.5, -1.5])],
+        footprint=Box([0.4, 0.3]),
+        search=SearchSettings(max_expansions=80),
+    )
+    whole = simulate(problem, step=0.9, time_limit=60.0)
+    assert whole.reached, whole.reason
+    begun = simulate(problem, step=0.9, time_limit=60.0, steps=3)
+    save_closed_loop(begun, tmp_path / "loop.json")
+    steps, poses = load_steps(tmp_path / "loop.json", problem.automaton)
+    assert any("course" in one for one in plan_entries(tmp_path / "loop.json"))
+    assert steps[-1].plan.word == begun.steps[-1].plan.word
+    rest = simulate(replace(problem, start=poses[-1]), step=0.9, time_limit=60.0, last=steps[-1])
+    assert rest.reached
+    assert np.abs(rest.poses - whole.poses[3:]).max() < 1e-9
+    assert rest.cost == pytest.approx(whole.cost, abs=1e-9)
+
+
+def plan_entries(path):
+    return [one for step in json.loads(path.read_text())["steps"] for one in step["plan"] or ()]
+
+
+def test_a_log_without_courses_still_loads(tmp_path):
+    """As earlier versions wrote it: names alone, of maneuvers that the library holds."""
+    begun = simulate(posed(), step=0.4, time_limit=5.0, steps=2)
+    save_closed_loop(begun, tmp_path / "loop.json")
+    assert not any("course" in one for one in plan_entries(tmp_path / "loop.json"))
+    steps, _ = load_steps(tmp_path / "loop.json", unicycle_automaton())
+    assert [step.plan.word for step in steps] == [step.plan.word for step in begun.steps]
+
+
+def crossing(begin=1.0, lasting=6.0, *, radius=0.4):
+    """A disc that crosses the way of a robot from the origin to (5, 0)."""
+    motion = Motion([begin, begin + lasting], [[2.5, -3.0, 0.0], [2.5, 3.0, 0.0]])
+    return Obstacle(Disc(radius), motion=motion)
+
+
+@pytest.mark.parametrize("begin", [0.0, 1.5, 3.0])
+def test_past_a_moving_obstacle_nothing_is_hit(begin):
+    problem = posed(
+        [5.0, 0.0, 0.0],
+        obstacles=[crossing(begin)],
+        footprint=Box([0.4, 0.3]),
+        search=SearchSettings(max_expansions=2000),
+    )
+    loop = simulate(problem, step=0.5, time_limit=30.0, steps=60)
+    assert loop.reached, loop.reason
+    assert not list(loop.collisions)
+    assert loop.min_clearance_m > 0.0
+    assert_nothing_interrupted(loop)
+
+
+def test_an_obstacle_that_was_not_foreseen_is_answered():
+    """It is predicted to stand still for a second, then it is seen to cross."""
+    there = crossing(1.0)
+    still = Obstacle(Disc(0.4, [2.5, -3.0]))
+    problem = posed(
+        [5.0, 0.0, 0.0],
+        obstacles=[there],
+        footprint=Box([0.4, 0.3]),
+        search=SearchSettings(max_expansions=2000),
+    )
+    loop = simulate(
+        problem,
+        step=0.5,
+        time_limit=30.0,
+        steps=60,
+        obstacles=lambda number: [still] if number < 3 else [there],
+    )
+    assert loop.reached, loop.reason
+    assert not list(loop.collisions)
+    assert_nothing_interrupted(loop)
+
+
+def test_a_fixed_time_that_ends_in_motion_is_what_is_left_of_it():
+    goal = Goal(pose=[6.0, 0.5, 0.0], trim="1, 0")
+    problem = posed(
+        goal,
+        start_trim="1, 0",
+        horizon=Horizon(time=9.0),
+        cost=Cost(effort=1.0),
+        search=SearchSettings(max_expansions=400),
+    )
+    loop = simulate(problem, step=0.5, time_limit=30.0, steps=40)
+    assert loop.reached, loop.reason
+    assert loop.times[-1] == pytest.approx(9.0, abs=1e-6)

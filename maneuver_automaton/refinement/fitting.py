@@ -1,0 +1,157 @@
+"""Plans that keep to the horizon of their problem: padded by rest, or with other coasting times.
+
+A search that knows no least coasting time, or no exact final time, finds words that break them. The
+word is kept and its times are solved for once more, under the conditions of the horizon. Whether
+the new times are collision-free is to be checked by whoever asked.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.words import TimesStatus, solve_switching_times
+
+LATE = 1e-12  # relative, by which a plan may exceed a limit of time
+CHANGED = 2  # trims at most that are left out, or no longer so, to meet a least coasting time
+RESTARTS = 2
+
+
+def fitted_plans(problem: Problem, plan: Plan, goal: Goal) -> Iterator[Plan]:
+    """Plans of the same word that keep to the horizon, the cheapest first; none if none is known.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Horizon, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0.0, 0.0), "ahead": (1.0, 0.0)})
+    >>> problem = Problem(robot, [0, 0, 0], [2, 0, 0], horizon=Horizon(time=5.0))
+    >>> rest, ahead = robot.trims
+    >>> plan = Plan([0, 0, 0], (ahead, rest), durations=[2.0, 0.0])
+    >>> [one.durations.tolist() for one in fitted_plans(problem, plan, problem.goals[0])]
+    [[2.0, 3.0]]
+    """
+    plan = padded(problem, plan)
+    if not why_not_fitted(problem, plan):
+        yield plan
+        return
+    if not plan.trims:
+        return
+    found: list[Plan] = []
+    for least, longest in _coasting_limits(problem, plan):
+        again = _solved(problem, plan, goal, least, longest)
+        if again is None or why_not_fitted(problem, again):
+            continue
+        if not any(np.allclose(again.durations, one.durations, atol=1e-9) for one in found):
+            found.append(again)
+    yield from sorted(found, key=problem.cost_of)
+
+
+def with_best_times(problem: Problem, plan: Plan, goal: Goal) -> Plan | None:
+    """The same word with its best times to a goal, say of any heading; None if none are found."""
+    longest = np.array([trim.max_duration for trim in plan.trims])
+    again = _solved(problem, plan, goal, np.zeros(len(longest)), longest)
+    return None if again is None or problem.cost_of(again) >= problem.cost_of(plan) else again
+
+
+def padded(problem: Problem, plan: Plan) -> Plan:
+    """The plan with a rest that fills a fixed time, at its end or else at its begin."""
+    total = problem.horizon.time
+    if total is None or not plan.trims or plan.duration >= total:
+        return _without_nothing(plan)
+    durations = plan.durations.copy()
+    for place in (-1, 0):
+        if plan.trims[place].is_rest:
+            durations[place] += total - plan.duration
+            return replace(plan, durations=durations)
+    return plan
+
+
+def why_not_fitted(problem: Problem, plan: Plan) -> str:
+    """Which condition of the horizon a plan breaks; empty if none."""
+    horizon = problem.horizon
+    limit = horizon.max_time if horizon.time is None else horizon.time
+    if limit is not None and plan.duration > limit * (1.0 + LATE):
+        return f"it takes {plan.duration:.6g} s, {limit:g} s are left"
+    if horizon.time is not None and plan.duration < horizon.time * (1.0 - LATE):
+        return f"it takes {plan.duration:.6g} s and ends in motion, {horizon.time:g} s are asked"
+    lasting = [
+        (trim, time) for trim, time in zip(plan.trims, plan.durations, strict=True) if time > 0.0
+    ]
+    if horizon.max_trims is not None and len(lasting) > horizon.max_trims:
+        return f"it has {len(lasting)} trims, {horizon.max_trims} are admitted"
+    shortest = horizon.min_coast * (1.0 - LATE)
+    if any(time < shortest for trim, time in lasting if not trim.is_rest):
+        return f"a trim lasts less than {horizon.min_coast:g} s"
+    return ""
+
+
+def _without_nothing(plan: Plan) -> Plan:
+    """An empty word where a plan lasts no time."""
+    if plan.duration == 0.0 and plan.trims:
+        return Plan(plan.start, (), durations=[], start_time=plan.start_time)
+    return plan
+
+
+def _coasting_limits(problem: Problem, plan: Plan) -> Iterator[tuple[Array, Array]]:
+    """Least and greatest coasting times (n,) [s] to try.
+
+    Every trim lasts as long as it must at least, or is left out. As many are left out as the plan
+    leaves out, but for a few.
+    """
+    least_coast = problem.horizon.min_coast
+    longest = np.array([trim.max_duration for trim in plan.trims])
+    still = np.array([trim.is_rest for trim in plan.trims])
+    yield np.zeros(len(longest)), longest  # the times alone may be what is wrong
+    if least_coast == 0.0:
+        return
+    moving = np.flatnonzero(~still & (longest >= least_coast)).tolist()
+    for count in range(CHANGED + 1):
+        for changed in itertools.combinations(moving, count):
+            lasts = plan.durations > 0.0
+            lasts[list(changed)] ^= True
+            lasts &= longest >= least_coast
+            yield (
+                np.where(still | ~lasts, 0.0, least_coast),
+                np.where(still | lasts, longest, 0.0),
+            )
+
+
+def _solved(problem: Problem, plan: Plan, goal: Goal, least: Array, longest: Array) -> Plan | None:
+    """The word of a plan with the best times within limits, as long as the horizon asks for."""
+    group, dof = problem.automaton.model.group, plan.start.size
+    lasting = sum(one.duration for one in plan.maneuvers if one)
+    steps = [np.zeros(dof) if one is None else one.displacement for one in plan.maneuvers]
+    steps = steps or [np.zeros(dof)] * (len(plan.trims) - 1)
+    horizon = problem.horizon
+    totals = [horizon.time]
+    if horizon.max_time is not None:
+        totals = [None, horizon.max_time]
+    rates = problem.rates_of(plan)
+    for total in totals:
+        left = None if total is None else total - lasting
+        if left is not None and left < 0.0:
+            return None
+        solved = solve_switching_times(
+            np.array([trim.body_velocity for trim in plan.trims]),
+            rates,
+            (group(plan.start).inverse() @ group(goal.pose)).pose,
+            displacements=np.array(steps).reshape(-1, dof),
+            total=left,
+            free_heading=goal.free_heading,
+            least=least,
+            longest=longest,
+            guesses=[np.clip(plan.durations, least, longest)],
+            restarts=RESTARTS,
+        )
+        if solved.status is TimesStatus.FAILED:
+            continue
+        again = replace(plan, durations=solved.durations)
+        if not why_not_fitted(problem, again):
+            return again
+    return None

@@ -1,0 +1,196 @@
+"""Vehicles with inertia among obstacles: every condition takes part in the search."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+from maneuver_automaton.automaton.stock import load_stock_library
+from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Zone
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.planning import PlanStatus, plan
+from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
+from maneuver_automaton.search.maneuver_lattice import maneuver_words, plan_of
+from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
+from maneuver_automaton.search.maneuver_reversal import forward_word, reversed_query
+from maneuver_automaton.search.maneuver_task import Rung, task_of
+from tests.inertia import unicycle_automaton
+from tests.search.cases import compiled_only
+
+pytestmark = compiled_only
+WALL = Box([0.6, 2.4], [3.0, 0.0])
+BODY = Box([0.5, 0.3])
+CORNERS = np.array([[-0.25, -0.15], [0.25, -0.15], [0.25, 0.15], [-0.25, 0.15]])
+WORK = SearchSettings(max_expansions=4000)
+SLOW = ((0.0, 0.0), (1.0, 0.0), (0.3, 0.0), (0.8, 0.8), (0.8, -0.8))
+
+
+def posed(goal=(6.0, 0.0, 0.0), *, states=None, **changes):
+    automaton = unicycle_automaton() if states is None else unicycle_automaton(states)
+    values = {"obstacles": (Obstacle(WALL),), "footprint": BODY, "search": WORK} | changes
+    return Problem(automaton, [0.0, 0.0, 0.0], goal, **values)
+
+
+def bodies_of(one):
+    """The body at a dense sample of a plan, and the times, for shapely."""
+    times = np.linspace(0.0, one.duration, 2000)
+    return times, shapely.polygons(SE2(one.pose_at(times)[:, None]).act(CORNERS))
+
+
+def box_of(shape):
+    low, high = np.array(shape.center) - np.array(shape.size) / 2, shape.center
+    return shapely.box(*low, *(np.array(high) + np.array(shape.size) / 2))
+
+
+def assert_free(one):
+    assert not shapely.intersects(bodies_of(one)[1], box_of(WALL)).any()
+
+
+def coasts_of(one):
+    lasting = zip(one.trims, one.durations.tolist(), strict=True)
+    return [time for trim, time in lasting if time > 0.0 and not trim.is_rest]
+
+
+@pytest.fixture(scope="module")
+def usual():
+    """The plan without any condition."""
+    result = plan(posed(), time_limit=60.0)
+    assert result.status is PlanStatus.FOUND
+    assert_free(result.plan)
+    return result
+
+
+def test_any_heading_is_as_good_among_obstacles():
+    """A goal whose heading points back costs a turn; where any will do, it costs none."""
+    goal = Goal(pose=[6.0, 0.0, 3.0])
+    fixed = plan(posed(goal), time_limit=60.0)
+    free = plan(posed(replace(goal, free_heading=True)), time_limit=60.0)
+    assert free.status is PlanStatus.FOUND
+    np.testing.assert_allclose(free.plan.end[:2], [6.0, 0.0], atol=1e-9)
+    assert free.cost < fixed.cost - 1.0
+    assert_free(free.plan)
+
+
+@pytest.mark.parametrize("share", [1.3, 1.1])
+def test_a_longest_time_is_kept_among_obstacles(usual, share):
+    """Effort alone would take its time; the longest time leaves it less."""
+    most = share * usual.plan.duration
+    problem = posed(cost=Cost(effort=1.0), horizon=Horizon(max_time=most))
+    result = plan(problem, time_limit=60.0)
+    assert result.status is PlanStatus.FOUND, result.reason
+    assert result.plan.duration <= most * (1.0 + 1e-9)
+    assert_free(result.plan)
+
+
+def test_a_fixed_time_is_kept_among_obstacles(usual):
+    total = 1.4 * usual.plan.duration
+    result = plan(posed(horizon=Horizon(time=total)), time_limit=60.0)
+    assert result.status is PlanStatus.FOUND, result.reason
+    assert result.plan.duration == pytest.approx(total, rel=1e-12)
+    assert_free(result.plan)
+
+
+def test_no_trim_lasts_less_than_it_must_among_obstacles():
+    automaton = unicycle_automaton()
+    problem = posed(horizon=Horizon(min_coast=0.4))
+    query = maneuver_problem_query(problem, (0,))
+    words = [one.word for one in maneuver_words(query, max_expansions=4000) if one.word]
+    assert words
+    for word in words:
+        for trim, time in zip(word.trims, word.durations.tolist(), strict=True):
+            assert time == 0.0 or time >= 0.4 * (1 - 1e-9) or automaton.trims[trim].is_rest
+    result = plan(problem, time_limit=60.0)
+    assert result.status is PlanStatus.FOUND, result.reason
+    assert all(time >= 0.4 * (1.0 - 1e-9) for time in coasts_of(result.plan))
+    assert_free(result.plan)
+
+
+def test_settings_of_the_lattice_are_read():
+    settings = SearchSettings(cell=0.31, headings=36, weight=1.3)
+    query = maneuver_problem_query(posed(search=settings), (0,))
+    first = task_of(query, Rung(stop=True))
+    assert (first.cell, first.headings, first.weight) == (0.31, 36, 1.3)
+    finer = task_of(query, Rung(scale=0.5, weight=1.0))
+    assert (finer.cell, finer.weight) == (0.155, 1.0)
+
+
+def test_a_search_from_the_goal_finds_plans_from_the_start():
+    """Every word of the reversed query, turned round, is a free plan of the query."""
+    query = maneuver_problem_query(posed(), (0,))
+    back = reversed_query(query)
+    words = [one.word for one in maneuver_words(back, max_expansions=3000) if one.word]
+    assert words
+    for word in words:
+        one = plan_of(query, forward_word(word))
+        np.testing.assert_allclose(one.start, [0.0, 0.0, 0.0])
+        np.testing.assert_allclose(one.end, [6.0, 0.0, 0.0], atol=1e-9)
+        assert one.duration == pytest.approx(word.duration, abs=1e-6)
+        assert_free(one)
+
+
+def test_it_says_how_near_it_came():
+    """The way into the pocket is long for so few expansions: the reason tells what is missing."""
+    walls = [Obstacle(Box(size, middle)) for size, middle in (
+        ([0.2, 4.2], [4.0, 0.0]),
+        ([4.2, 0.2], [6.0, 2.0]),
+        ([4.2, 0.2], [6.0, -2.0]),
+    )]  # fmt: skip
+    goal = Goal(pose=[6.0, 0.0, 0.0], trim="1, 0")
+    result = plan(posed(goal, obstacles=walls, search=SearchSettings(max_expansions=15)))
+    assert result.plan is None
+    assert result.reason.endswith("m from the goal")
+
+
+@pytest.mark.parametrize("aside", [0.0, 1.5, -1.5])
+@pytest.mark.parametrize("along", [40.0, 60.0, 80.0])
+def test_a_fast_car_passes_a_box(along, aside):
+    """Its turns are wide for its size: cells and coasts of that width find the way."""
+    box = Box([3.0, 3.0], [along, 0.1 * along + aside])
+    problem = Problem(
+        load_stock_library("single_track"),
+        [0.0, 0.0, 0.0],
+        Goal(pose=[120.0, 12.0, 0.1], trim="speed 20, turn_rate 0"),
+        start_trim="speed 20, turn_rate 0",
+        obstacles=(Obstacle(box),),
+        footprint=Box([4.5, 1.6]),
+    )
+    query = maneuver_problem_query(problem, (0,))
+    found = next(one for one in maneuver_words(query, max_expansions=60_000))
+    assert found.word is not None
+    assert found.word.duration < 8.0
+
+
+def test_a_zone_is_crossed_slowly_and_left_fast():
+    """A strip of 1 m at 0.4 m/s: neither the whole way slowly, nor 40 m around it."""
+    strip = Zone(shape=Box([1.0, 60.0], [5.0, 0.0]), max_speed=0.4)
+    problem = posed((10.0, 0.0, 0.0), states=SLOW, obstacles=(), zones=(strip,))
+    result = plan(problem, time_limit=60.0)
+    assert result.status is PlanStatus.FOUND, result.reason
+    assert result.plan.duration < 18.0
+    times, bodies = bodies_of(result.plan)
+    speeds = np.linalg.norm(np.diff(result.plan.pose_at(times)[:, :2], axis=0), axis=1)
+    speeds /= np.diff(times)
+    inside = shapely.intersects(bodies, box_of(strip.shape))
+    both = inside[1:] & inside[:-1]
+    assert both.any()
+    assert speeds[both].max() < 0.4 + 1e-6
+    assert speeds.max() > 0.9
+
+
+def test_nothing_is_refused_by_the_checks_where_an_obstacle_moves():
+    """A path that is free at the pace of a kinematic vehicle is not so at one with inertia."""
+    for begin in (0.0, 2.0, 4.0):
+        crossing = Obstacle(
+            Disc(0.6), motion=Motion([begin, begin + 6.0], [[3.0, -4.0, 0.0], [3.0, 4.0, 0.0]])
+        )
+        result = plan(posed(obstacles=(crossing,)), time_limit=60.0)
+        assert result.status is PlanStatus.FOUND, result.reason
+        assert result.counts["rejected"] == 0
+        times, bodies = bodies_of(result.plan)
+        centers = np.stack([np.interp(times, [begin, begin + 6.0], [v, w]) for v, w in
+                            ((3.0, 3.0), (-4.0, 4.0))], axis=1)  # fmt: skip
+        assert (shapely.distance(bodies, shapely.points(centers)) > 0.6).all()
