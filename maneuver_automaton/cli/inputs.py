@@ -22,11 +22,14 @@ class Parts:
 
 
 def scenario_of(path: Path, parts: Parts | None = None) -> Scenario:
-    """The problem of a file, completed by `parts`."""
-    from maneuver_automaton.scenario import load_scenario
+    """The problem of a file, completed by `parts`; no drive on roads."""
+    from maneuver_automaton.scenario import Scenario, load_scenario
 
     parts = parts or Parts()
-    return load_scenario(path, beside=parts.beside, case=parts.case)
+    found = load_scenario(path, beside=parts.beside, case=parts.case)
+    if not isinstance(found, Scenario):
+        raise InvalidScenario(f"{path}: is a drive on roads, which only plan and mpc know")
+    return found
 
 
 def automaton_of(path: Path) -> Automaton:

@@ -48,6 +48,7 @@ class GoalArrays(NamedTuple):
     heading: np.ndarray  # (G, 2) least heading, width of the interval
     speed: np.ndarray  # (G, 2)
     tick: np.ndarray  # (G, 2)
+    every: int  # ticks: only at multiples of these is a goal looked at
     way: np.ndarray  # (G, 4) stations and offsets
     turned: np.ndarray  # (G, 2) least and greatest heading, seen from the route's direction there
 
@@ -298,6 +299,8 @@ def in_ring(goals, ring, x, y):
 def goal_at(horizon, x, y, heading, speed, tick):
     """Number of the goal that a state of the rear axle meets at a tick, -1 for none."""
     goals, ahead = horizon.goals, horizon.clearing.body.ahead
+    if tick % goals.every != 0:
+        return -1
     m_x, m_y = x + ahead * math.cos(heading), y + ahead * math.sin(heading)
     full = 2.0 * math.pi
     for g in range(goals.tick.shape[0]):
@@ -418,7 +421,7 @@ def braked(horizon, x, y, heading, speed, steering, share, tick, controls):
             return -1
         slower = max(speed - body.braking * limits.tick, 0.0)
         square = max(speed * speed, 1.0)
-        sharpest = min(math.atan(limits.lateral * limits.wheelbase / square), 0.6)
+        sharpest = min(math.atan(limits.lateral * limits.wheelbase / square), limits.sharpest)
         rate = (share * sharpest - steering) / limits.tick
         if share != share:  # hold
             rate = 0.0
