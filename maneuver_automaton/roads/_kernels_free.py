@@ -39,6 +39,7 @@ class AreaArrays(NamedTuple):
 
     tile: np.ndarray  # (rows, columns) which tile is at a place, -1 where nothing is drivable
     distance: np.ndarray  # (tiles, n + 1, n + 1) [m] at the corners of a tile's cells; zero outside
+    bits: int  # a tile has 2 ** bits cells along each side, so that shifts find its number
     cell: float  # [m]
     origin_x: float  # of the first tile
     origin_y: float
@@ -104,15 +105,16 @@ def room(area, x, y):
     """Distance to the edge of the area at a place: bilinear between the corners of its cell."""
     u, v = (x - area.origin_x) / area.cell, (y - area.origin_y) / area.cell
     i, j = math.floor(u), math.floor(v)
-    # Neighbouring tiles share their border, so that all four corners are in one of them.
-    n = area.distance.shape[1] - 1
-    if i < 0 or j < 0 or i >= n * area.tile.shape[1] or j >= n * area.tile.shape[0]:
+    column, row = i >> area.bits, j >> area.bits
+    if column < 0 or row < 0 or column >= area.tile.shape[1] or row >= area.tile.shape[0]:
         return 0.0
-    place = area.tile[j // n, i // n]
+    place = area.tile[row, column]
     if place < 0:
         return 0.0
     a, b = u - i, v - j
-    i, j = i % n, j % n
+    # Neighbouring tiles share their border, so that all four corners are in one of them.
+    mask = (1 << area.bits) - 1
+    i, j = i & mask, j & mask
     low = (1.0 - a) * area.distance[place, j, i] + a * area.distance[place, j, i + 1]
     high = (1.0 - a) * area.distance[place, j + 1, i] + a * area.distance[place, j + 1, i + 1]
     return (1.0 - b) * low + b * high
@@ -161,9 +163,8 @@ def within_edges(body, area, x_0, y_0, h_0, x_1, y_1, h_1):
     m_x, m_y = 0.5 * (x_0 + x_1), 0.5 * (y_0 + y_1)
     if room(area, x_1, y_1) <= 0.0:
         return False
-    width = area.cell * (area.distance.shape[1] - 1)
-    i = math.floor((m_x - area.origin_x) / width)
-    j = math.floor((m_y - area.origin_y) / width)
+    i = math.floor((m_x - area.origin_x) / area.cell) >> area.bits
+    j = math.floor((m_y - area.origin_y) / area.cell) >> area.bits
     if i < 0 or j < 0 or i >= area.tile.shape[1] or j >= area.tile.shape[0]:
         return False
     place = area.tile[j, i]

@@ -299,14 +299,12 @@ def in_ring(goals, ring, x, y):
 def goal_at(horizon, x, y, heading, speed, tick):
     """Number of the goal that a state of the rear axle meets at a tick, -1 for none."""
     goals, ahead = horizon.goals, horizon.clearing.body.ahead
-    if tick % goals.every != 0:
-        return -1
     m_x, m_y = x + ahead * math.cos(heading), y + ahead * math.sin(heading)
     full = 2.0 * math.pi
     for g in range(goals.tick.shape[0]):
         if tick < goals.tick[g, 0] or tick > goals.tick[g, 1]:
             continue
-        if speed < goals.speed[g, 0] or speed > goals.speed[g, 1]:
+        if speed < goals.speed[g, 0] or speed > goals.speed[g, 1] or tick % goals.every != 0:
             continue
         turn = (heading - goals.heading[g, 0]) / full
         if (turn - math.floor(turn)) * full > goals.heading[g, 1]:

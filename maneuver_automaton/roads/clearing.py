@@ -23,9 +23,10 @@ from maneuver_automaton.roads.scene import RoadScene, unwrapped
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
 CELL = 0.2  # [m] of the field of distances
-TILE = 20  # cells along each side of a tile
+BITS = 4
+TILE = 1 << BITS  # cells along each side of a tile
 SIMPLER = 0.005  # [m] by which the edge may be drawn more simply
-MOST_TILES = 100_000  # of 16 m^2 each
+MOST_TILES = 150_000  # of 10 m^2 each
 SNUG = 0.1  # [m] by which a rectangle may reach beyond a piece of a polygon
 TINY = 1e-9  # [m] of an edge that has no direction
 SHORTEST = 0.4  # [m] of a piece that is not cut any more
@@ -134,6 +135,7 @@ def area_arrays(area: Any, *, reach: float, margin: float) -> AreaArrays:
     return AreaArrays(
         tile=tile,
         distance=distance,
+        bits=BITS,
         cell=CELL,
         origin_x=float(origin[0]),
         origin_y=float(origin[1]),

@@ -170,7 +170,7 @@ def test_the_field_is_as_large_as_the_road_in_use():
         Lanelet(4, [[0, 0], [0, 700]], [[3, 0], [3, 700]]),
     ]
     wide = area_of(*legs, last_tick=400)
-    tiles = shapely.Polygon(corner).length / 2.0 / (wide.cell * 20)
+    tiles = shapely.Polygon(corner).length / 2.0 / (wide.cell * (1 << wide.bits))
     assert len(wide.distance) < 3.0 * tiles
     assert wide.distance.nbytes < 0.05 * 700.0 * 700.0 / wide.cell**2 * 8
 
