@@ -55,6 +55,10 @@ if TYPE_CHECKING:
     from maneuver_automaton.receding_horizon import Disturbance as Disturbance
     from maneuver_automaton.receding_horizon import RecedingHorizon as RecedingHorizon
     from maneuver_automaton.receding_horizon import simulate as simulate
+    from maneuver_automaton.roads import RoadScene as RoadScene
+    from maneuver_automaton.roads import RoadVehicle as RoadVehicle
+    from maneuver_automaton.roads import drive_road as drive_road
+    from maneuver_automaton.roads import plan_road as plan_road
     from maneuver_automaton.scenario import load_scenario as load_scenario
 
 __version__ = "0.1.0"
@@ -84,6 +88,8 @@ _HOMES = {
     "Polygon": "collision",
     "Problem": "problem",
     "RecedingHorizon": "receding_horizon",
+    "RoadScene": "roads",
+    "RoadVehicle": "roads",
     "SE2": "groups",
     "SE2xR": "groups",
     "SearchSettings": "problem",
@@ -94,11 +100,13 @@ _HOMES = {
     "Trim": "primitives",
     "Unicycle": "models",
     "UserModel": "models",
+    "drive_road": "roads",
     "load_library": "automaton.library",
     "load_plan": "formats.plan_json",
     "load_scenario": "scenario",
     "load_stock_library": "automaton.stock",
     "plan": "planning",
+    "plan_road": "roads",
     "save_library": "automaton.library",
     "save_plan": "formats.plan_json",
     "simulate": "receding_horizon",

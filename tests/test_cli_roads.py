@@ -45,7 +45,8 @@ def test_a_goal_that_is_missed_ends_with_one(folder, capsys):
     Path("late.xml").write_text(commonroad(*LANES, problem(goal=LATE)))
     assert run(["mpc", "late.xml", *QUICK]) == 1
     assert capsys.readouterr().err.endswith(
-        "late.xml: missed: no goal was reached until 0.5 s, when the last one is over\n"
+        "late.xml: missed: no goal was reached until 0.5 s, when the last one is over; "
+        "nearest to it at 0.5 s: 1.83 m away\n"
     )
     assert run(["plan", "late.xml", "--time-limit", "0.001", *QUICK]) == 1
     document = json.loads(Path("out/plan.json").read_text())

@@ -24,12 +24,15 @@ class Parts:
 
 
 def scenario_of(path: Path, parts: Parts | None = None) -> Scenario:
-    """The problem of a file, completed by `parts`."""
-    from maneuver_automaton.scenario import load_scenario
+    """The problem of a file, completed by `parts`; no drive on roads."""
+    from maneuver_automaton.scenario import Scenario, load_scenario
 
     parts = parts or Parts()
     own = None if parts.model is None else user_model(parts.model)
-    return load_scenario(path, beside=parts.beside, case=parts.case, model=own)
+    found = load_scenario(path, beside=parts.beside, case=parts.case, model=own)
+    if not isinstance(found, Scenario):
+        raise InvalidScenario(f"{path}: is a drive on roads, which only plan and mpc know")
+    return found
 
 
 def automaton_of(path: Path, model: str | None = None) -> Automaton:

@@ -178,7 +178,7 @@ def _road_row(path: Path, parts: Parts, out: Path, settings: Settings) -> Row:
         code=FOUND,
         status="found",
         cost=result.planner.price(result.plan),
-        duration=result.plan.duration,
+        duration=result.planner.tick * result.plan.lasting,
         clearance=result.verdict.clearance_m,
         first_plan=result.search_s,
     )

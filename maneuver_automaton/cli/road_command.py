@@ -71,7 +71,7 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
     the vehicle sets off, and told apart from the steps.
     """
     from maneuver_automaton.formats.road_json import road_drive_to_dict, save_road_document
-    from maneuver_automaton.roads import drive_scene, plan_road, road_planner
+    from maneuver_automaton.roads import drive_scene, plan_before, road_planner
 
     for name, value in (("--seeds", settings.seeds), ("--resume", settings.resume)):
         if value is not None:
@@ -83,12 +83,9 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
             planner = road_planner(scene, vehicle)
         except ValueError as error:
             raise _in_file(path, error) from error
-        before = None
-        first = planner.search(planner.start_state, tick=0)
-        if first is None or not first.reaches:
-            limit = settings.time_limit or TIME_LIMIT
-            with waiting(f"planning before the start, at most {limit:g} s", quiet=settings.quiet):
-                before = plan_road(scene, vehicle, time_limit=limit)
+        limit = settings.time_limit or TIME_LIMIT
+        with waiting(f"planning before the start, at most {limit:g} s", quiet=settings.quiet):
+            before = plan_before(planner, time_limit=limit)
         most = min(settings.steps or planner.last_tick, planner.last_tick)
         with progress_bar("steps", most, quiet=settings.quiet) as advance:
             drive = drive_scene(
@@ -120,13 +117,13 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
 
 
 def _road(path: Path, parts: Parts) -> tuple[RoadScene, RoadVehicle]:
-    from maneuver_automaton.scenario import load_road
+    from maneuver_automaton.scenario import RoadScenario, load_scenario
 
     if parts.model is not None:
         raise InvalidScenario("--model: is for scenarios and libraries, not for drives on roads")
-    found = load_road(path, beside=parts.beside, case=parts.case)
-    assert found is not None  # by its ending
-    return found
+    found = load_scenario(path, beside=parts.beside, case=parts.case)
+    assert isinstance(found, RoadScenario)  # by its ending
+    return found.scene, found.vehicle
 
 
 def _draw(

@@ -1,8 +1,8 @@
 """Scenarios of CommonRoad (XML, versions 2017a, 2018b and 2020a): roads, traffic, problems.
 
-Lanelets, obstacles with their recorded trajectories, and planning problems, each with an initial
-state and a goal: a region, a lanelet, intervals of heading, speed and time. Times are counted in
-steps of `timeStepSize`; positions are those of the middle of a vehicle.
+Lanelets, obstacles with their recorded trajectories or sets of occupancies, and planning problems,
+each with an initial state and a goal: a region, a lanelet, intervals of heading, speed and time.
+Times are counted in steps of `timeStepSize`; positions are those of the middle of a vehicle.
 
 The file is read here and not by commonroad-io: release 2026.1 of that library reads the goals of
 2017a as goals without any condition, and silently; it needs protobuf 3 and eight more packages;
@@ -33,6 +33,7 @@ from maneuver_automaton.roads.scene import unwrapped
 FORMAT = "CommonRoad"
 MOST_BYTES = 50_000_000
 STEP = "timeStepSize"
+OPEN = 1e-3  # share of a step by which sets of occupancies are shorter at both ends
 
 
 def is_commonroad(path: Path) -> bool:
@@ -69,6 +70,7 @@ def read_commonroad(path: Path) -> tuple[Statement, ...]:
             start=_start(problem.need("initialState"), step),
             goals=tuple(_goals(problem, lanelets, step)),
             traffic=traffic,
+            step=step,
             source=", ".join(
                 root.attributes[key] for key in ("author", "source") if root.attributes.get(key)
             ),
@@ -85,7 +87,8 @@ def _lanelets(root: Element) -> dict[int, Lanelet]:
         number = element.whole("id")
         if number in lanelets:
             raise element.error(f"id: got {number}, which another lanelet has")
-        beside = [element.get("adjacentLeft"), element.get("adjacentRight")]
+        sides = (element.get("adjacentLeft"), element.get("adjacentRight"))
+        beside = [one for one in sides if one is not None]
         stated = element.get("speedLimit")
         allowed = [limits[k] for k in _refs(element, "trafficSignRef") if k in limits]
         if stated is not None and stated.text.strip().lower() != "inf":
@@ -96,11 +99,8 @@ def _lanelets(root: Element) -> dict[int, Lanelet]:
                 _points(element.need("leftBound")),
                 _points(element.need("rightBound")),
                 successors=list(_refs(element, "successor")),
-                beside=[
-                    one.whole("ref")
-                    for one in beside
-                    if one is not None and one.attributes.get("drivingDir") == "same"
-                ],
+                beside=[one.whole("ref") for one in beside if _runs(one, "same")],
+                against=[one.whole("ref") for one in beside if _runs(one, "opposite")],
                 speed_limit=min(allowed, default=None),
             )
         except ValueError as error:
@@ -108,6 +108,10 @@ def _lanelets(root: Element) -> dict[int, Lanelet]:
     if not lanelets:
         raise root.error("holds no lanelet, need at least one")
     return lanelets
+
+
+def _runs(neighbour: Element, direction: str) -> bool:
+    return neighbour.attributes.get("drivingDir") == direction
 
 
 def _signs(root: Element) -> dict[int, float]:
@@ -140,20 +144,24 @@ def _traffic(root: Element, step: float) -> Iterator[Obstacle]:
     for element in root.children:
         if element.tag not in ("obstacle", "staticObstacle", "dynamicObstacle"):
             continue
+        name = (
+            f"{_text(element.get('type'), 'obstacle')} {element.attributes.get('id', '')}".strip()
+        )
         shapes = list(_shapes(element.need("shape")))
         states = [element.need("initialState")]
         if (recorded := element.get("trajectory")) is not None:
             states += recorded.all("state")
-        elif element.get("occupancySet") is not None:
-            raise element.need("occupancySet").error("is not read, need a trajectory")
+        elif (predicted := element.get("occupancySet")) is not None:
+            begin, pose = _time(states[0], step), SE2(np.array(_pose(states[0])))
+            for shape in shapes:
+                yield _there(shape.moved(pose), (begin, begin + step), step, name)
+            yield from _occupancies(predicted, step, name)
+            continue
         poses, times = (
             np.array([_pose(one) for one in states]),
             [_time(one, step) for one in states],
         )
         poses[:, 2] = unwrapped(poses[:, 2].tolist())
-        name = (
-            f"{_text(element.get('type'), 'obstacle')} {element.attributes.get('id', '')}".strip()
-        )
         for shape in shapes:
             if len(states) == 1:
                 yield Obstacle(shape.moved(SE2(poses[0])), name=name)
@@ -162,6 +170,29 @@ def _traffic(root: Element, step: float) -> Iterator[Obstacle]:
                 yield Obstacle(shape, motion=Motion(times, poses), name=name)
             except ValueError as error:
                 raise _at(element, error) from error
+
+
+def _occupancies(predicted: Element, step: float, name: str) -> Iterator[Obstacle]:
+    """Where somebody may be, set by set.
+
+    A set of an interval holds there. A set of one instant holds from the instant before to the one
+    after, so that whoever is between two instants is in one of their sets.
+    """
+    for element in predicted.all("occupancy"):
+        time = element.need("time")
+        begin, end = _interval(time)
+        if time.get("exact") is not None:
+            begin, end = begin - 1.0, end + 1.0
+        if not begin < end:
+            raise time.error(f"got the interval [{begin:g}, {end:g}], need a begin before its end")
+        for shape in _shapes(element.need("shape")):
+            yield _there(shape, (step * begin, step * end), step, name)
+
+
+def _there(shape: Shape, time: tuple[float, float], step: float, name: str) -> Obstacle:
+    """Somebody who stands in a place between two times, which themselves do not belong to it."""
+    times = [time[0] + OPEN * step, time[1] - OPEN * step]
+    return Obstacle(shape, motion=Motion(times, np.zeros((2, 3))), name=name)
 
 
 def _text(element: Element | None, otherwise: str) -> str:

@@ -20,8 +20,15 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.formats.plan_json import package_version
 from maneuver_automaton.primitives import Trajectory
-from maneuver_automaton.roads import RoadDrive, RoadPlanner, RoadPlanResult, RoadStep, RoadVerdict
-from maneuver_automaton.roads.library import TICK, RoadLibrary
+from maneuver_automaton.roads import (
+    RoadDrive,
+    RoadPlan,
+    RoadPlanner,
+    RoadPlanResult,
+    RoadStep,
+    RoadVerdict,
+)
+from maneuver_automaton.roads.library import RoadLibrary
 
 SCHEMA = 1
 SAME = 1e-9  # of two controls in a row
@@ -39,12 +46,12 @@ def road_plan_to_dict(result: RoadPlanResult) -> dict[str, Any]:
         "status": "found" if found else "no_plan",
         "reason": result.reason,
         "cost": None if plan is None else planner.price(plan),
-        "duration_s": TICK * n if found else None,
+        "duration_s": planner.tick * n if found else None,
         "lower_bound": None,
         "gap": None,
         "certificate": None,
-        "primitives": [] if plan is None else primitives_of(plan.controls[:n], plan.states[:n]),
-        "stop": [] if plan is None else primitives_of(plan.controls[n:], plan.states[n:]),
+        "primitives": [] if plan is None else _primitives(planner, plan, 0, n),
+        "stop": [] if plan is None else _primitives(planner, plan, n),
         "terminal_error": None,
         "clearance_m": None if verdict is None else _number(verdict.clearance_m),
         "trajectory": _trajectory(result.driven),
@@ -71,7 +78,7 @@ def road_drive_to_dict(drive: RoadDrive, *, before: RoadPlanResult | None = None
         "reached": drive.reached,
         "cost": float(spent[-1]),
         "duration_s": float(end.time[-1] - end.time[0]),
-        "step_s": TICK,
+        "step_s": drive.planner.tick,
         "steps_bound": None,
         "planned_before_s": None if before is None else before.search_s,
         "audit": {**_audit(verdict), "pieces": len(drive.steps), "failed": len(broken)},
@@ -109,8 +116,10 @@ def save_road_document(document: dict[str, Any], path: Path | str) -> None:
     write_text_atomically(Path(path), "{\n" + ",\n".join(lines) + "\n}\n")
 
 
-def primitives_of(controls: Array, states: Array) -> list[dict[str, Any]]:
-    """Controls (n, 2), a tick each, as primitives; `states` (n, 5) are those at their beginnings.
+def primitives_of(controls: Array, states: Array, *, tick: float = 0.1) -> list[dict[str, Any]]:
+    """Controls (n, 2), a `tick` [s] each, as primitives.
+
+    `states` (n, 5) are those at their beginnings.
 
     Examples
     --------
@@ -123,7 +132,14 @@ def primitives_of(controls: Array, states: Array) -> list[dict[str, Any]]:
         return []
     changes = np.flatnonzero((np.abs(np.diff(controls, axis=0)) > SAME).any(axis=1)) + 1
     bounds = [0, *changes.tolist(), len(controls)]
-    return [_primitive(controls[a], states[a], b - a) for a, b in itertools.pairwise(bounds)]
+    return [_primitive(controls[a], states[a], b - a, tick) for a, b in itertools.pairwise(bounds)]
+
+
+def _primitives(
+    planner: RoadPlanner, plan: RoadPlan, begin: int = 0, end: int | None = None
+) -> list[dict[str, Any]]:
+    """Primitives of a plan from one of its ticks to another."""
+    return primitives_of(plan.controls[begin:end], plan.states[begin:end], tick=planner.tick)
 
 
 def library_hash(library: RoadLibrary) -> str:
@@ -134,7 +150,7 @@ def library_hash(library: RoadLibrary) -> str:
     return digest.hexdigest()
 
 
-def _primitive(control: Array, state: Array, ticks: int) -> dict[str, Any]:
+def _primitive(control: Array, state: Array, ticks: int, tick: float) -> dict[str, Any]:
     trim = not control.any()
     speed, steering = state[3:].tolist()
     name = (
@@ -146,12 +162,12 @@ def _primitive(control: Array, state: Array, ticks: int) -> dict[str, Any]:
         "kind": "trim" if trim else "maneuver",
         "name": name,
         "control": control.tolist(),
-        "duration_s": TICK * ticks,
+        "duration_s": tick * ticks,
     }
 
 
 def _step(planner: RoadPlanner, step: RoadStep, spent: float) -> dict[str, Any]:
-    plan = primitives_of(step.plan.controls, step.plan.states[:-1])
+    plan = _primitives(planner, step.plan)
     return {
         "time_s": step.time,
         "pose": planner.world(step.state[:3]).tolist(),
@@ -165,7 +181,7 @@ def _step(planner: RoadPlanner, step: RoadStep, spent: float) -> dict[str, Any]:
         "solve_s": step.solve_s,
         "number": step.number,
         "reaches": step.plan.reaches,
-        "lasting_s": TICK * step.plan.lasting,
+        "lasting_s": planner.tick * step.plan.lasting,
         "stops": step.plan.stops,
     }
 

@@ -16,5 +16,7 @@ from maneuver_automaton.roads.lanelets import off_road as off_road
 from maneuver_automaton.roads.scene import RoadScene as RoadScene
 from maneuver_automaton.roads.scene import RoadStart as RoadStart
 from maneuver_automaton.roads.single_plan import RoadPlanResult as RoadPlanResult
+from maneuver_automaton.roads.single_plan import drive_road as drive_road
+from maneuver_automaton.roads.single_plan import plan_before as plan_before
 from maneuver_automaton.roads.single_plan import plan_road as plan_road
 from maneuver_automaton.roads.vehicle import RoadVehicle as RoadVehicle

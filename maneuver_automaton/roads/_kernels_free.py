@@ -37,16 +37,15 @@ class BodyArrays(NamedTuple):
 class AreaArrays(NamedTuple):
     """Where one may drive: distances to the edge inside, and the edge near every place."""
 
-    distance: np.ndarray  # (rows, columns) [m] at the corners of cells; zero outside
-    origin_x: float
-    origin_y: float
+    tile: np.ndarray  # (rows, columns) which tile is at a place, -1 where nothing is drivable
+    distance: np.ndarray  # (tiles, n + 1, n + 1) [m] at the corners of a tile's cells; zero outside
+    bits: int  # a tile has 2 ** bits cells along each side, so that shifts find its number
     cell: float  # [m]
+    origin_x: float  # of the first tile
+    origin_y: float
     edges: np.ndarray  # (K, 4) segments of the edge
-    first: np.ndarray  # (buckets + 1,)
-    items: np.ndarray  # segments near each bucket
-    bucket: float  # [m]
-    columns: int  # of buckets
-    rows: int
+    first: np.ndarray  # (tiles + 1,) where the segments of each tile begin in `items`
+    items: np.ndarray  # segments near each tile
     margin: float  # [m] kept from the edge
 
 
@@ -106,12 +105,18 @@ def room(area, x, y):
     """Distance to the edge of the area at a place: bilinear between the corners of its cell."""
     u, v = (x - area.origin_x) / area.cell, (y - area.origin_y) / area.cell
     i, j = math.floor(u), math.floor(v)
-    if i < 0 or j < 0 or i + 1 >= area.distance.shape[1] or j + 1 >= area.distance.shape[0]:
+    column, row = i >> area.bits, j >> area.bits
+    if column < 0 or row < 0 or column >= area.tile.shape[1] or row >= area.tile.shape[0]:
+        return 0.0
+    place = area.tile[row, column]
+    if place < 0:
         return 0.0
     a, b = u - i, v - j
-    i, j = int(i), int(j)
-    low = (1.0 - a) * area.distance[j, i] + a * area.distance[j, i + 1]
-    high = (1.0 - a) * area.distance[j + 1, i] + a * area.distance[j + 1, i + 1]
+    # Neighbouring tiles share their border, so that all four corners are in one of them.
+    mask = (1 << area.bits) - 1
+    i, j = i & mask, j & mask
+    low = (1.0 - a) * area.distance[place, j, i] + a * area.distance[place, j, i + 1]
+    high = (1.0 - a) * area.distance[place, j + 1, i] + a * area.distance[place, j + 1, i + 1]
     return (1.0 - b) * low + b * high
 
 
@@ -158,11 +163,13 @@ def within_edges(body, area, x_0, y_0, h_0, x_1, y_1, h_1):
     m_x, m_y = 0.5 * (x_0 + x_1), 0.5 * (y_0 + y_1)
     if room(area, x_1, y_1) <= 0.0:
         return False
-    i = math.floor((m_x - area.origin_x) / area.bucket)
-    j = math.floor((m_y - area.origin_y) / area.bucket)
-    if i < 0 or j < 0 or i >= area.columns or j >= area.rows:
+    i = math.floor((m_x - area.origin_x) / area.cell) >> area.bits
+    j = math.floor((m_y - area.origin_y) / area.cell) >> area.bits
+    if i < 0 or j < 0 or i >= area.tile.shape[1] or j >= area.tile.shape[0]:
         return False
-    place = int(j) * area.columns + int(i)
+    place = area.tile[j, i]
+    if place < 0:  # the middle is off the road between two ticks
+        return False
     near = body.reach + area.margin + 0.5 * math.hypot(x_1 - x_0, y_1 - y_0)
     for k in range(area.first[place], area.first[place + 1]):
         edge = area.edges[area.items[k]]

@@ -48,6 +48,7 @@ class GoalArrays(NamedTuple):
     heading: np.ndarray  # (G, 2) least heading, width of the interval
     speed: np.ndarray  # (G, 2)
     tick: np.ndarray  # (G, 2)
+    every: int  # ticks: only at multiples of these is a goal looked at
     way: np.ndarray  # (G, 4) stations and offsets
     turned: np.ndarray  # (G, 2) least and greatest heading, seen from the route's direction there
 
@@ -303,7 +304,7 @@ def goal_at(horizon, x, y, heading, speed, tick):
     for g in range(goals.tick.shape[0]):
         if tick < goals.tick[g, 0] or tick > goals.tick[g, 1]:
             continue
-        if speed < goals.speed[g, 0] or speed > goals.speed[g, 1]:
+        if speed < goals.speed[g, 0] or speed > goals.speed[g, 1] or tick % goals.every != 0:
             continue
         turn = (heading - goals.heading[g, 0]) / full
         if (turn - math.floor(turn)) * full > goals.heading[g, 1]:
@@ -418,7 +419,7 @@ def braked(horizon, x, y, heading, speed, steering, share, tick, controls):
             return -1
         slower = max(speed - body.braking * limits.tick, 0.0)
         square = max(speed * speed, 1.0)
-        sharpest = min(math.atan(limits.lateral * limits.wheelbase / square), 0.6)
+        sharpest = min(math.atan(limits.lateral * limits.wheelbase / square), limits.sharpest)
         rate = (share * sharpest - steering) / limits.tick
         if share != share:  # hold
             rate = 0.0

@@ -26,7 +26,7 @@ class Trims(NamedTuple):
 
     speed: np.ndarray  # (S,) [m/s]
     steering: np.ndarray  # (S,) [rad]
-    per_speed: int
+    first: np.ndarray  # (speeds + 1,) first trim of each speed: slow ones have more angles
 
 
 class Limits(NamedTuple):
@@ -36,6 +36,7 @@ class Limits(NamedTuple):
     tick: float  # [s]
     ticks: int  # of every maneuver
     rate: float  # [rad/s] of the steering
+    sharpest: float  # [rad] of the steering
     braking: float  # [m/s^2] at most
     lateral: float  # [m/s^2] at most
     friction: float  # [m/s^2] along and across together
@@ -125,11 +126,13 @@ def maneuvers_between(limits, trims, most):
     control, effort = np.empty((most, 2)), np.empty(most)
     pose = np.empty((most, limits.ticks, 3))
     first = np.zeros(count + 1, dtype=np.int64)
-    n = 0
+    n, step = 0, 0
+    speeds = trims.first.shape[0] - 1
     for source in range(count):
-        step = source // trims.per_speed
-        low = max(0, step - limits.fastest_change) * trims.per_speed
-        high = min(count, (step + limits.fastest_change + 1) * trims.per_speed)
+        while source >= trims.first[step + 1]:
+            step += 1
+        low = trims.first[max(0, step - limits.fastest_change)]
+        high = trims.first[min(speeds, step + limits.fastest_change + 1)]
         speed, steering = trims.speed[source], trims.steering[source]
         if n + high - low > most:
             break

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision import Box, Disc, Obstacle, Shape
+from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads._kernels_free import (
     AreaArrays,
@@ -17,14 +18,18 @@ from maneuver_automaton.roads._kernels_free import (
     Clearing,
     TrafficArrays,
 )
-from maneuver_automaton.roads.lanelets import drivable_area
+from maneuver_automaton.roads.lanelets import Lanelet, drivable_area
 from maneuver_automaton.roads.scene import RoadScene, unwrapped
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
 CELL = 0.2  # [m] of the field of distances
-BUCKET = 4.0  # [m]
+BITS = 4
+TILE = 1 << BITS  # cells along each side of a tile
 SIMPLER = 0.005  # [m] by which the edge may be drawn more simply
-MOST_CELLS = 20_000_000
+MOST_TILES = 150_000  # of 10 m^2 each
+SNUG = 0.1  # [m] by which a rectangle may reach beyond a piece of a polygon
+TINY = 1e-9  # [m] of an edge that has no direction
+SHORTEST = 0.4  # [m] of a piece that is not cut any more
 DISC_SPACING = 0.75  # [m]
 ALWAYS = 1 << 40  # a tick that never comes
 
@@ -53,13 +58,27 @@ def clearing_of(
     braking : float
         Deceleration when the vehicle has to stop [m/s^2].
     """
+    import shapely
+
     body = body_arrays(vehicle, tick=tick, braking=braking)
     reach = body.reach + 0.5 * tick * vehicle.model.max_speed + off_edge
-    area = area_arrays(drivable_area(scene.lanelets), reach=reach, margin=off_edge)
+    # Where the vehicle can be until the end, and nothing of a map beyond.
+    far = vehicle.model.max_speed * tick * last_tick + vehicle.length
+    x, y = scene.start.middle[:2].tolist()
+    around = shapely.box(x - far, y - far, x + far, y + far)
+    near = [lanelet for lanelet in scene.lanelets if _meets(lanelet, around)]
+    drivable = shapely.intersection(drivable_area(near), around)
+    area = area_arrays(drivable, reach=reach, margin=off_edge)
     traffic = traffic_arrays(
         scene.traffic, start=scene.start.time, tick=tick, last_tick=last_tick, margin=off_traffic
     )
     return Clearing(body=body, area=area, traffic=traffic, tick=tick)
+
+
+def _meets(lanelet: Lanelet, box: Any) -> bool:
+    low_x, low_y, high_x, high_y = box.bounds
+    low, high = lanelet.ring.min(axis=0), lanelet.ring.max(axis=0)
+    return bool(low[0] <= high_x and low_x <= high[0] and low[1] <= high_y and low_y <= high[1])
 
 
 def body_arrays(vehicle: RoadVehicle, *, tick: float, braking: float) -> BodyArrays:
@@ -87,6 +106,8 @@ def body_arrays(vehicle: RoadVehicle, *, tick: float, braking: float) -> BodyArr
 def area_arrays(area: Any, *, reach: float, margin: float) -> AreaArrays:
     """Field of distances and edges of a shapely area; `reach` [m] is how far a body gets in a tick.
 
+    The field is laid out in tiles, and only where the area is.
+
     Raises
     ------
     ValueError
@@ -94,41 +115,71 @@ def area_arrays(area: Any, *, reach: float, margin: float) -> AreaArrays:
     """
     import shapely
 
-    low_x, low_y, high_x, high_y = area.bounds
-    columns, rows = (
-        int((high - low) / CELL) + 4 for low, high in ((low_x, high_x), (low_y, high_y))
-    )
-    if columns * rows > MOST_CELLS:
-        raise ValueError(
-            f"roads: the area of {high_x - low_x:.0f} m x {high_y - low_y:.0f} m is too large, "
-            f"need at most {MOST_CELLS * CELL * CELL / 1e6:g} km^2"
-        )
-    origin = np.array([low_x - CELL, low_y - CELL])
-    x = origin[0] + CELL * np.arange(columns)
-    distance = np.zeros((rows, columns))
     shapely.prepare(area)
     edges = _edges(area)
     tree = shapely.STRtree(shapely.linestrings(edges.reshape(-1, 2, 2)))
-    for row in range(rows):
-        inside = np.flatnonzero(shapely.contains_xy(area, x, origin[1] + CELL * row))
+    origin = np.array(area.bounds[:2]) - CELL
+    tile, places = _tiles(area, origin)
+    steps = CELL * np.arange(TILE + 1)
+    distance = np.zeros((len(places), TILE + 1, TILE + 1))
+    for k, (column, row) in enumerate(places):
+        x, y = np.meshgrid(
+            origin[0] + CELL * TILE * column + steps, origin[1] + CELL * TILE * row + steps
+        )
+        inside = np.flatnonzero(shapely.contains_xy(area, x.ravel(), y.ravel()))
         if inside.size:
-            points = shapely.points(x[inside], origin[1] + CELL * row)
+            points = shapely.points(x.ravel()[inside], y.ravel()[inside])
             (found, _), away = tree.query_nearest(points, return_distance=True, all_matches=False)
-            distance[row, inside[found]] = away
-    first, items, across, up = _buckets(edges, origin, (columns, rows), reach)
+            distance[k].ravel()[inside[found]] = away
+    first, items = _edges_near(tree, origin, places, reach)
     return AreaArrays(
+        tile=tile,
         distance=distance,
+        bits=BITS,
+        cell=CELL,
         origin_x=float(origin[0]),
         origin_y=float(origin[1]),
-        cell=CELL,
         edges=edges,
         first=first,
         items=items,
-        bucket=BUCKET,
-        columns=across,
-        rows=up,
         margin=margin + SIMPLER,
     )
+
+
+def _tiles(area: Any, origin: Array) -> tuple[IntArray, IntArray]:
+    """Tiles (rows, columns) by their numbers, -1 where the area is not; column and row (n, 2)."""
+    import shapely
+
+    width = CELL * TILE
+    low_x, low_y, high_x, high_y = area.bounds
+    columns, rows = (
+        int((high - low + 2.0 * CELL) / width) + 1
+        for low, high in ((low_x, high_x), (low_y, high_y))
+    )
+    # Cut into strips first: a road around a block has the whole block as its bounding box.
+    found: set[tuple[int, int]] = set()
+    for column in range(columns):
+        x = origin[0] + width * column
+        strip = shapely.intersection(area, shapely.box(x, low_y, x + width, high_y))
+        for piece in shapely.get_parts(strip):
+            if piece.is_empty:
+                continue
+            begin, end = (int((y - origin[1]) / width) for y in piece.bounds[1::2])
+            rings = shapely.box(
+                x, origin[1] + width * np.arange(begin, end + 1), x + width,
+                origin[1] + width * np.arange(begin + 1, end + 2),
+            )  # fmt: skip
+            used = np.flatnonzero(shapely.intersects(piece, rings))
+            found.update((row, column) for row in (begin + used).tolist())
+    if len(found) > MOST_TILES:
+        raise ValueError(
+            f"roads: the lanelets within reach cover {len(found)} tiles of {width:g} m x "
+            f"{width:g} m, need at most {MOST_TILES}"
+        )
+    tile = np.full((rows, columns), -1, dtype=np.int64)
+    places = np.array(sorted(found), dtype=np.int64).reshape(-1, 2)
+    tile[places[:, 0], places[:, 1]] = np.arange(len(places))
+    return tile, places[:, ::-1]
 
 
 def _edges(area: Any) -> Array:
@@ -144,24 +195,20 @@ def _edges(area: Any) -> Array:
     return np.ascontiguousarray(edges[(edges[:, :2] != edges[:, 2:]).any(axis=1)])
 
 
-def _buckets(
-    edges: Array, origin: Array, cells: tuple[int, int], reach: float
-) -> tuple[IntArray, IntArray, int, int]:
-    """Segments within `reach` [m] of every bucket, row by row; numbers of columns and rows."""
+def _edges_near(
+    tree: Any, origin: Array, places: IntArray, reach: float
+) -> tuple[IntArray, IntArray]:
+    """Segments within `reach` [m] of every tile: where those of each begin, and their numbers."""
     import shapely
 
-    across, up = (int(CELL * n / BUCKET) + 1 for n in cells)
-    i, j = np.meshgrid(np.arange(across), np.arange(up))
-    middles = shapely.points(
-        origin[0] + BUCKET * (i.ravel() + 0.5), origin[1] + BUCKET * (j.ravel() + 0.5)
-    )
-    tree = shapely.STRtree(shapely.linestrings(edges.reshape(-1, 2, 2)))
-    near = reach + BUCKET * math.sqrt(0.5)
+    width = CELL * TILE
+    middles = shapely.points(origin + width * (places + 0.5))
+    near = reach + width * math.sqrt(0.5)
     place, item = tree.query(middles, predicate="dwithin", distance=near)
     order = np.lexsort((item, place))
-    first = np.zeros(across * up + 1, dtype=np.int64)
+    first = np.zeros(len(places) + 1, dtype=np.int64)
     np.add.at(first, place + 1, 1)
-    return np.cumsum(first), item[order].astype(np.int64), across, up
+    return np.cumsum(first), item[order].astype(np.int64)
 
 
 def traffic_arrays(
@@ -172,19 +219,20 @@ def traffic_arrays(
     A rectangle is as much larger as its owner leaves the straight motion between two ticks.
     """
     times: Array = start + tick * np.arange(last_tick + 2, dtype=np.float64)
-    poses = np.zeros((len(users), len(times), 3))
-    first = np.zeros(len(users), dtype=np.int64)
-    last = np.full(len(users), ALWAYS, dtype=np.int64)
-    half = np.zeros((len(users), 2))
-    for m, user in enumerate(users):
-        center, turn, size = _rectangle(user.shape)
+    pieces = [(user, place) for user in users for place in rectangles_around(user.shape)]
+    poses = np.zeros((len(pieces), len(times), 3))
+    first = np.zeros(len(pieces), dtype=np.int64)
+    last = np.full(len(pieces), ALWAYS, dtype=np.int64)
+    half = np.zeros((len(pieces), 2))
+    for m, (user, (center, turn, size)) in enumerate(pieces):
         half[m] = 0.5 * size
         middle = SE2(np.append(center, turn))
         if user.motion is None:
             poses[m] = middle.pose
             continue
-        first[m] = math.floor((user.motion.time[0] - start) / tick + 1e-6)
-        last[m] = math.ceil((user.motion.time[-1] - start) / tick - 1e-6)
+        # First and last tick at which it is there: it counts from the tick before to that after.
+        first[m] = math.ceil((user.motion.time[0] - start) / tick - 1e-6)
+        last[m] = math.floor((user.motion.time[-1] - start) / tick + 1e-6)
         recorded = (SE2(user.motion.at(times)) @ middle).pose
         poses[m] = recorded
         poses[m, :, 2] = unwrapped(recorded[:, 2].tolist())
@@ -199,19 +247,63 @@ def traffic_arrays(
     )
 
 
-def _rectangle(shape: Shape) -> tuple[Array, float, Array]:
-    """Center, heading and size (length, width) of a rectangle around a shape."""
+Rectangle: TypeAlias = tuple[Array, float, Array]  # center, heading, size (length, width)
+
+
+def rectangles_around(shape: Shape, *, snug: float = SNUG) -> list[Rectangle]:
+    """Rectangles (center, heading, size) that cover a shape and reach little beyond it.
+
+    A polygon is cut into convex pieces, and these across their length, until no corner of a
+    rectangle is further than `snug` [m] from its piece, or the piece is shorter than `SHORTEST`.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.collision import Polygon
+    >>> corner = Polygon([[0, 0], [3, 0], [3, 1], [1, 1], [1, 3], [0, 3]])
+    >>> pieces = rectangles_around(corner)
+    >>> round(float(sum(size.prod() for _, _, size in pieces)), 1)
+    5.3
+    """
     if isinstance(shape, Box):
-        return np.array(shape.center), shape.heading, np.array(shape.size)
+        return [(np.array(shape.center), shape.heading, np.array(shape.size))]
     if isinstance(shape, Disc):
-        return np.array(shape.center), 0.0, np.full(2, 2.0 * shape.radius)
+        return [(np.array(shape.center), 0.0, np.full(2, 2.0 * shape.radius))]
+    return [one for ring, _ in convex_pieces(shape) for one in _snug(ring, snug)]
+
+
+def _snug(ring: Array, snug: float) -> list[Rectangle]:
+    """Rectangles around a convex ring (n, 2)."""
     import shapely
 
-    around = shapely.minimum_rotated_rectangle(shapely.Polygon(shape.corners))
-    corners = np.asarray(around.exterior.coords)
-    along, aside = corners[1] - corners[0], corners[2] - corners[1]
-    size = np.array([np.hypot(*along), np.hypot(*aside)])
-    return 0.5 * (corners[0] + corners[2]), float(np.arctan2(along[1], along[0])), size
+    piece = shapely.Polygon(ring)
+    center, heading, size = _smallest(ring)
+    corners = Box(size, center, heading).corners
+    beyond = float(shapely.distance(shapely.points(corners), piece).max())
+    if beyond <= snug or size[0] <= SHORTEST:
+        return [(center, heading, size)]
+    found: list[Rectangle] = []
+    for side in (-1.0, 1.0):  # each half is what is on one side of the center
+        ahead = side * size[0] * np.array([math.cos(heading), math.sin(heading)])
+        half = Box([size[0], 2.0 * size[1]], center + 0.5 * ahead, heading)
+        part = shapely.intersection(piece, shapely.Polygon(half.corners))
+        if part.geom_type == "Polygon" and part.area > 0.0:
+            found += _snug(np.asarray(part.exterior.coords)[:-1], snug)
+    return found
+
+
+def _smallest(ring: Array) -> Rectangle:
+    """The smallest rectangle around a convex ring (n, 2): one of its sides is along an edge."""
+    edges = np.roll(ring, -1, axis=0) - ring
+    edges = edges[np.hypot(edges[:, 0], edges[:, 1]) > TINY]
+    along = edges / np.hypot(edges[:, 0], edges[:, 1])[:, None]
+    aside = np.stack([-along[:, 1], along[:, 0]], axis=-1)
+    u, v = ring @ along.T, ring @ aside.T
+    sizes = np.stack([np.ptp(u, axis=0), np.ptp(v, axis=0)], axis=-1)
+    k = int(np.argmin(sizes.prod(axis=1)))
+    low_u, low_v = u[:, k].min(), v[:, k].min()
+    center = (low_u + 0.5 * sizes[k, 0]) * along[k] + (low_v + 0.5 * sizes[k, 1]) * aside[k]
+    long = along[k] if sizes[k, 0] >= sizes[k, 1] else aside[k]
+    return center, math.atan2(long[1], long[0]), np.sort(sizes[k])[::-1].copy()
 
 
 def _off_line(user: Obstacle, middle: SE2, times: Array, poses: Array, size: float) -> float:

@@ -1,7 +1,8 @@
-"""Driving a scene in closed loop: plan, drive a step of 0.1 s, plan again."""
+"""Driving a scene in closed loop: plan, drive one tick, plan again."""
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -14,10 +15,10 @@ from maneuver_automaton.primitives import Trajectory
 from maneuver_automaton.primitives.driving import drive
 from maneuver_automaton.roads.horizon import RoadPlan, RoadPlanner
 from maneuver_automaton.roads.judge import RoadVerdict, judged
-from maneuver_automaton.roads.library import TICK
+from maneuver_automaton.roads.missed import nearest_miss
 
 FINE = 5  # samples of a tick at least
-MOST_STEPS = 600
+LONGEST = 60.0  # [s] of a drive whose goal has no last time
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -84,7 +85,8 @@ def drive_scene(
     """
     planner.warm()
     last = planner.last_tick
-    limit = min(MOST_STEPS if steps is None else steps, last)
+    longest = math.ceil(LONGEST / planner.tick) if math.isinf(planner.scene.last_time) else last
+    limit = min(longest if steps is None else steps, last)
     state, rest = planner.start_state, first
     done: list[RoadStep] = []
     pieces: list[Trajectory] = []
@@ -113,7 +115,8 @@ def drive_scene(
         if progress is not None:
             progress(tick)
     reached = planner.at_goal(state, tick=tick)
-    status, reason = _ending(planner, reached=reached, over=tick >= last, tick=tick)
+    states = np.array([*(step.state for step in done), state])
+    status, reason = _ending(planner, states, stood=_stood(done), reached=reached)
     local = joined(pieces) if pieces else standing(planner, state, tick=tick)
     driven = replace(local, pose=planner.world(local.pose))
     return RoadDrive(
@@ -136,7 +139,7 @@ def driven_from(planner: RoadPlanner, state: Array, controls: Array, *, tick: in
         planner.vehicle.model,
         state[3:],
         control=np.repeat(controls, FINE, axis=0),
-        durations=np.full(FINE * len(controls), TICK / FINE),
+        durations=np.full(FINE * len(controls), planner.tick / FINE),
     )
     return Trajectory(
         time=planner.time_of(tick) + course.time,
@@ -171,10 +174,27 @@ def standing(planner: RoadPlanner, state: Array, *, tick: int) -> Trajectory:
     )
 
 
-def _ending(planner: RoadPlanner, *, reached: bool, over: bool, tick: int) -> tuple[str, str]:
+def _stood(steps: Sequence[RoadStep]) -> tuple[float, float] | None:
+    """First and last time at which the vehicle stood, as there was no way on [s]."""
+    times = [step.time for step in steps if step.plan.stands]
+    return (times[0], times[-1]) if times else None
+
+
+def _ending(
+    planner: RoadPlanner, states: Array, *, stood: tuple[float, float] | None, reached: bool
+) -> tuple[str, str]:
+    """Status and reason after the `states` (n, 5) at all ticks."""
     if reached:
         return "reached", ""
-    now = planner.time_of(tick)
+    tick = len(states) - 1
+    now, over = planner.time_of(tick), tick >= planner.last_tick
+    looked_at = np.arange(0, len(states), planner.horizon.goals.every)
+    times = np.array([planner.time_of(k) for k in looked_at.tolist()])
+    why = nearest_miss(planner.local.goals, planner.vehicle, times, states[looked_at])
+    if stood is not None:
+        first, last = stood
+        since = f"at {first:.6g} s" if first == last else f"from {first:.6g} s to {last:.6g} s"
+        why += f"; no way on was found {since}"
     if over:
-        return "missed", f"no goal was reached until {now:.6g} s, when the last one is over"
-    return "steps_spent", f"no goal was reached in {tick} steps, until {now:.6g} s"
+        return "missed", f"no goal was reached until {now:.6g} s, when the last one is over; {why}"
+    return "steps_spent", f"no goal was reached in {tick} steps, until {now:.6g} s; {why}"

@@ -66,6 +66,25 @@ class GoalRegion:
             return False
         return self.places is None or any(_covers(place, x, y) for place in self.places)
 
+    def off_by(self, middle: ArrayLike, *, speed: float) -> tuple[float, float, float]:
+        """How far a pose (3,) of the middle [m, rad] and a speed [m/s] are from it, time apart.
+
+        Zero where a condition holds; the speed is positive where it is too high.
+
+        Examples
+        --------
+        >>> goal = GoalRegion(places=(Box([4.0, 2.0], [10.0, 0.0]),), speed=(5.0, 8.0))
+        >>> goal.off_by([5.0, 0.5, 0.1], speed=4.0)
+        (3.0, 0.0, -1.0)
+        """
+        x, y, heading = np.asarray(middle, dtype=np.float64).tolist()
+        away = 0.0 if self.places is None else min(_away(place, x, y) for place in self.places)
+        turned = 0.0
+        if self.heading is not None and not turns_within(heading, self.heading):
+            turned = min(abs(math.remainder(heading - end, 2.0 * math.pi)) for end in self.heading)
+        low, high = self.speed or (-math.inf, math.inf)
+        return away, turned, min(speed - low, 0.0) + max(speed - high, 0.0)
+
 
 def turns_within(heading: float, interval: Interval, *, tolerance: float = 0.0) -> bool:
     """Whether a heading is in an interval, whatever full turns are between.
@@ -95,10 +114,15 @@ def outlines_of(places: Sequence[Shape]) -> list[Array]:
 
 
 def _covers(place: Shape, x: float, y: float) -> bool:
+    return _away(place, x, y) <= 0.0
+
+
+def _away(place: Shape, x: float, y: float) -> float:
+    """Distance to a place, 0 inside [m]."""
     import shapely
 
     if isinstance(place, Disc):
-        return math.hypot(x - place.center[0], y - place.center[1]) <= place.radius
+        return max(math.hypot(x - place.center[0], y - place.center[1]) - place.radius, 0.0)
     holes = place.holes if isinstance(place, Polygon) else ()
     corners = place.corners if isinstance(place, Box | Polygon) else np.zeros((0, 2))
-    return bool(shapely.covers(shapely.Polygon(corners, holes), shapely.Point(x, y)))
+    return float(shapely.distance(shapely.Polygon(corners, holes), shapely.Point(x, y)))

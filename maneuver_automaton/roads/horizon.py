@@ -23,7 +23,7 @@ from maneuver_automaton.roads._kernels_horizon import (
 from maneuver_automaton.roads.clearing import clearing_of
 from maneuver_automaton.roads.goal_region import GoalRegion, outlines_of
 from maneuver_automaton.roads.lanelets import drivable_area
-from maneuver_automaton.roads.library import TICK, TICKS, RoadLibrary, road_library
+from maneuver_automaton.roads.library import RoadLibrary, road_library, tick_of
 from maneuver_automaton.roads.route import SPACING, Route, extent_on, route_of
 from maneuver_automaton.roads.scene import RoadScene
 from maneuver_automaton.roads.vehicle import RoadVehicle
@@ -33,7 +33,7 @@ CELL, TURN_CELL, SPEED_CELL = 0.5, 0.06, 2.0  # [m], [rad], [m/s] of equal nodes
 SHARES = (math.nan, 0.0, 0.2, -0.2, 0.5, -0.5, 1.0, -1.0)  # of steering while it stops; nan: held
 SHARE = 0.25  # of the nodes of a level that one strip along the route may hold
 STRIPS = 17
-LONGEST_STOP = 120  # ticks
+LONGEST_STOP = 12.0  # [s]
 FAR_TICK = 1 << 40
 AT_REST = 1e-9  # [m/s]
 DIGITS = 9  # of the numbers of a scene [m, rad]
@@ -41,13 +41,7 @@ DIGITS = 9  # of the numbers of a scene [m, rad]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RoadSettings:
-    """How a drive is planned.
-
-    Examples
-    --------
-    >>> RoadSettings(horizon_s=4.0).step_s
-    0.1
-    """
+    """How a drive is planned."""
 
     horizon_s: float = 6.0  # how far a plan looks ahead at most, its stop apart
     width: int = 80  # nodes of a level that the search goes on from
@@ -57,11 +51,6 @@ class RoadSettings:
     top_speed: float = 36.0  # [m/s] of the trims, if the start is not faster still
     greed: float = 1.0  # weight of the cost-to-go
     gain: float = 0.02  # share of the cost by which a new plan has to be better than the old one
-
-    @property
-    def step_s(self) -> float:
-        """Time between two plans [s]."""
-        return TICK
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -84,9 +73,9 @@ class RoadPlan:
         return bool(self.states[-1, 3] <= AT_REST)
 
     @property
-    def duration(self) -> float:
-        """Time until it stops, or the goal is reached [s]."""
-        return TICK * self.lasting
+    def stands(self) -> bool:
+        """Whether it is to stay at rest, as there is no way on."""
+        return not self.lasting and not self.reaches and bool(self.states[0, 3] <= AT_REST)
 
     def rest(self) -> RoadPlan:
         """What remains of it a tick later."""
@@ -118,6 +107,11 @@ class RoadPlanner:
     memory: HorizonArrays = field(repr=False)
 
     @property
+    def tick(self) -> float:
+        """Time between two plans [s]."""
+        return self.library.limits.tick
+
+    @property
     def last_tick(self) -> int:
         """Tick at which the last goal is over."""
         return int(self.horizon.goals.tick[:, 1].max())
@@ -135,10 +129,15 @@ class RoadPlanner:
 
     def time_of(self, tick: int) -> float:
         """Time of a tick [s]."""
-        return self.scene.start.time + TICK * tick
+        return self.scene.start.time + self.tick * tick
 
     def at_goal(self, state: Array, *, tick: int) -> bool:
-        """Whether a state (5,) at a tick is within a goal, by the goal's own words."""
+        """Whether a state (5,) at a tick is within a goal, by the goal's own words.
+
+        Goals are looked at only when the scene's own clock ticks.
+        """
+        if tick % self.horizon.goals.every:
+            return False
         middle = self.vehicle.middle_of(state[:3])
         return any(
             goal.contains(middle, speed=float(state[3]), time=self.time_of(tick))
@@ -148,7 +147,7 @@ class RoadPlanner:
     def wider(self, width: int) -> RoadPlanner:
         """The same planner with another width of its search."""
         settings = replace(self.settings, width=width)
-        return replace(self, settings=settings, memory=_memory(settings))
+        return replace(self, settings=settings, memory=_memory(settings, self.library))
 
     def warm(self) -> None:
         """Compile, and touch the memory, before time counts."""
@@ -171,9 +170,12 @@ class RoadPlanner:
         return new, True
 
     def search(self, state: Array, *, tick: int, narrow: bool = False) -> RoadPlan | None:
-        """A new plan from a state (5,); None if none with a way to stop was found."""
+        """A new plan from a state (5,); None if none with a way to stop was found.
+
+        A vehicle at rest that has no way on stands, as long as that is free.
+        """
         library, settings = self.library, self.settings
-        until = min(tick + round(settings.horizon_s / TICK), self.last_tick)
+        until = min(tick + round(settings.horizon_s / self.tick), self.last_tick)
         if until <= tick:
             return None
         x, y, heading, speed, steering = state.tolist()
@@ -194,7 +196,8 @@ class RoadPlanner:
             greed=settings.greed,
         )
         first = _kernels_library.maneuvers_from(library.limits, library.trims, speed, steering)
-        controls = np.zeros((until - tick + library.limits.ticks + LONGEST_STOP, 2))
+        stop = math.ceil(LONGEST_STOP / self.tick)
+        controls = np.zeros((until - tick + library.limits.ticks + stop, 2))
         reaches, n, whole = _kernels_horizon.search_horizon(
             task,
             self.horizon,
@@ -203,15 +206,25 @@ class RoadPlanner:
             np.array(SHARES),
             controls,
         )
+        if whole == 0:
+            rest = self._standing(state, tick)
+            free = _kernels_free.free_ticks(self.horizon.clearing, np.array(rest.states), tick)
+            return rest if free else None
         if whole < 0:
             return None
         return self._of_controls(state, tick, controls[:whole], n, reaches=reaches)
+
+    def _standing(self, state: Array, tick: int) -> RoadPlan:
+        """A tick of rest."""
+        return self._of_controls(state, tick, np.zeros((1, 2)), 0, reaches=False)
 
     def _of_controls(
         self, state: Array, tick: int, controls: Array, lasting: int, *, reaches: bool
     ) -> RoadPlan:
         model = self.vehicle.model
-        states = _kernels_free.driven(model.wheelbase, TICK, np.array(state), np.array(controls))
+        states = _kernels_free.driven(
+            model.wheelbase, self.tick, np.array(state), np.array(controls)
+        )
         return RoadPlan(
             tick=tick, states=states, controls=controls, lasting=lasting, reaches=reaches
         )
@@ -239,7 +252,8 @@ class RoadPlanner:
         if new.stops != old.stops:
             return new.stops
         if not new.reaches:
-            return True  # it looks a tick further
+            # It looks a tick further, unless nothing better than to stop at once was found.
+            return new.lasting > 0 or not old.lasting
         return self.price(new) < (1.0 - self.settings.gain) * self.price(old)
 
     def price(self, plan: RoadPlan, *, ticks: int | None = None) -> float:
@@ -255,11 +269,11 @@ class RoadPlanner:
         """Full braking straight on, free or not."""
         braking, speeds = self.vehicle.model.max_acceleration, [float(state[3])]
         while speeds[-1] > 0.0:
-            speeds.append(max(speeds[-1] - braking * TICK, 0.0))
-        rates = np.diff(speeds) / TICK
+            speeds.append(max(speeds[-1] - braking * self.tick, 0.0))
+        rates = np.diff(speeds) / self.tick
         controls = np.stack([rates, np.zeros_like(rates)], axis=-1).reshape(-1, 2)
         if not len(controls):
-            controls = np.zeros((1, 2))
+            return self._standing(state, tick)
         return self._of_controls(state, tick, controls, 0, reaches=False)
 
 
@@ -275,18 +289,18 @@ def road_planner(
     """
     vehicle, settings = vehicle or RoadVehicle(), settings or RoadSettings()
     top = min(max(settings.top_speed, math.ceil(scene.start.speed)), vehicle.model.max_speed)
-    library = road_library(vehicle, top_speed=top)
+    tick = tick_of(scene.step)
+    library = road_library(vehicle, top_speed=top, tick=tick)
     frame = vehicle.rear_of(scene.start.middle)
     local = scene.moved(SE2(frame).inverse(), digits=DIGITS)
     route = route_of(local)
-    horizon_ticks = round(settings.horizon_s / TICK)
     last = scene.last_time if math.isfinite(scene.last_time) else scene.start.time + 60.0
-    last_tick = math.ceil((last - scene.start.time) / TICK) + horizon_ticks + LONGEST_STOP
+    lasting = last - scene.start.time + settings.horizon_s + LONGEST_STOP
     clearing = clearing_of(
         local,
         vehicle,
-        tick=TICK,
-        last_tick=last_tick,
+        tick=tick,
+        last_tick=math.ceil(lasting / tick),
         off_edge=settings.off_edge_m,
         off_traffic=settings.off_traffic_m,
         braking=vehicle.model.max_acceleration,
@@ -303,7 +317,7 @@ def road_planner(
             np.array(route.limit),
             SPACING,
         ),
-        goals=goal_arrays(local, route),
+        goals=goal_arrays(local, route, tick=tick),
         blocks=block_arrays(local, route, vehicle),
         weights=_weights(scene, vehicle),
     )
@@ -316,21 +330,21 @@ def road_planner(
         route=route,
         library=library,
         horizon=horizon,
-        memory=_memory(settings),
+        memory=_memory(settings, library),
     )
 
 
-def goal_arrays(scene: RoadScene, route: Route) -> GoalArrays:
-    """Goals for the kernels; times as ticks from the start of the scene."""
+def goal_arrays(scene: RoadScene, route: Route, *, tick: float) -> GoalArrays:
+    """Goals for the kernels; times as ticks [s] from the start of the scene."""
     rings = [outlines_of(goal.places or ()) for goal in scene.goals]
     flat = [ring for group in rings for ring in group]
     start = scene.start.time
     ticks, headings, speeds = [], [], []
     for goal in scene.goals:
-        end = (goal.time[1] - start) / TICK
+        end = (goal.time[1] - start) / tick
         ticks.append(
             (
-                max(math.ceil((goal.time[0] - start) / TICK - 1e-6), 0),
+                max(math.ceil((goal.time[0] - start) / tick - 1e-6), 0),
                 math.floor(end + 1e-6) if math.isfinite(end) else FAR_TICK,
             )
         )
@@ -345,6 +359,7 @@ def goal_arrays(scene: RoadScene, route: Route) -> GoalArrays:
         heading=np.array(headings),
         speed=np.array(speeds),
         tick=np.array(ticks, dtype=np.int64),
+        every=round(scene.step / tick),
         way=np.array(route.ways),
         turned=np.array(
             [_turned(goal, way, route) for goal, way in zip(scene.goals, route.ways, strict=True)]
@@ -405,8 +420,9 @@ def _weights(scene: RoadScene, vehicle: RoadVehicle) -> Weights:
     )
 
 
-def _memory(settings: RoadSettings) -> HorizonArrays:
-    levels = round(settings.horizon_s / TICK) // TICKS + 1
+def _memory(settings: RoadSettings, library: RoadLibrary) -> HorizonArrays:
+    limits = library.limits
+    levels = round(settings.horizon_s / limits.tick) // limits.ticks + 1
     nodes = CHILDREN * settings.width * levels + 1024
     return HorizonArrays(
         pose=np.empty((nodes, 4)),

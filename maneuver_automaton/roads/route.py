@@ -59,7 +59,9 @@ def route_of(scene: RoadScene) -> Route:
     path = _path(lanelets, sources, targets)
     line, limits = _line([lanelets[k] for k in path], lanelets)
     points, heading, limit = _spaced(line, limits)
-    ways = np.array([_way(goal, points, heading) for goal in scene.goals])
+    # A route that returns to where it starts passes a goal there at its end.
+    here = int(np.argmin(np.hypot(*(points - scene.start.middle[:2]).T)))
+    ways = np.array([_way(goal, points, heading, here) for goal in scene.goals])
     return Route(lanelets=tuple(path), points=points, heading=heading, limit=limit, ways=ways)
 
 
@@ -191,11 +193,15 @@ def _spaced(line: Array, limits: Array) -> tuple[Array, Array, Array]:
     return points, heading, limits[after]
 
 
-def _way(goal: GoalRegion, points: Array, heading: Array) -> Array:
-    """Stations and offsets between which a goal lies; all of them if it is no place."""
+def _way(goal: GoalRegion, points: Array, heading: Array, here: int) -> Array:
+    """Stations and offsets between which a goal lies; all of them if it is no place.
+
+    It is looked for from the point `here` on, where the vehicle starts.
+    """
     if goal.places is None:
         return np.array([-np.inf, np.inf, -np.inf, np.inf])
-    return _extent(outlines_of(goal.places), points, heading)
+    way = _extent(outlines_of(goal.places), points[here:], heading[here:])
+    return np.asarray(way + np.array([SPACING * here, SPACING * here, 0.0, 0.0]))
 
 
 def extent_on(rings: Sequence[Array], route: Route) -> Array:

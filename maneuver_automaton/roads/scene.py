@@ -53,12 +53,17 @@ class RoadScene:
     goals: tuple[GoalRegion, ...]  # one of them
     traffic: tuple[Obstacle, ...] = ()
     source: str = ""  # who made and measured it, for pictures
+    step: float = 0.1  # [s] of the clock that the scene was recorded with
 
     def __post_init__(self) -> None:
         if not self.lanelets:
             raise ValueError(f"road scene {self.name!r}: got no lanelet, need at least one")
         if not self.goals:
             raise ValueError(f"road scene {self.name!r}: got no goal, need at least one")
+        if not 0.0 < self.step < math.inf:
+            raise ValueError(
+                f"road scene {self.name!r}: the time step must be positive, got {self.step} s"
+            )
 
     @property
     def last_time(self) -> float:

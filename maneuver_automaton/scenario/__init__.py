@@ -1,6 +1,6 @@
 """The scenario file: YAML to `Problem` and back; files of other formats, with a scenario beside."""
 
-from maneuver_automaton.scenario.loading import load_road as load_road
+from maneuver_automaton.scenario.loading import RoadScenario as RoadScenario
 from maneuver_automaton.scenario.loading import load_scenario as load_scenario
 from maneuver_automaton.scenario.loading import statements_of as statements_of
 from maneuver_automaton.scenario.scenario import Scenario as Scenario

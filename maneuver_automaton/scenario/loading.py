@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,20 +23,34 @@ from maneuver_automaton.scenario.combining import combined
 from maneuver_automaton.scenario.scenario import Scenario, scenario_of_document
 
 
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RoadScenario:
+    """A drive on roads that a file states, and who drives."""
+
+    name: str
+    scene: RoadScene
+    vehicle: RoadVehicle
+
+
 def load_scenario(
     path: Path | str,
     *,
     beside: Path | str | None = None,
     case: int | None = None,
     model: Model | None = None,
-) -> Scenario:
+) -> Scenario | RoadScenario:
     """The problem of a file: a scenario, or another format that states one or a part of one.
+
+    A CommonRoad file states a drive on roads: `plan_road` and `drive_road` take its scene and its
+    vehicle. That is the BMW 320i of CommonRoad, or the one of the scenario `beside`: a second-order
+    car with a rectangular body along its axis.
 
     Parameters
     ----------
     path : Path or str
-        Scenario, TPCAP case, Nav2 map, dynobench problem, MovingAI map or queries, SBPL
-        environment, Bench-MR world: told apart by their endings, YAML files by their keys.
+        Scenario, CommonRoad scenario, TPCAP case, Nav2 map, dynobench problem, MovingAI map or
+        queries, SBPL environment, Bench-MR world: told apart by their endings, YAML files by
+        their keys.
     beside : Path or str, optional
         A scenario for what the file leaves out, such as the vehicle. What the file states wins;
         start and goal may be missing in the scenario where the file states them.
@@ -53,6 +67,8 @@ def load_scenario(
     """
     begin, path = time.perf_counter(), Path(path)
     read = reader_of(path)
+    if read is None and path.suffix.lower() == ".xml":
+        read = read_commonroad  # which says what is wrong with the file
     if read is not None:
         statements = read(path)
     else:
@@ -65,7 +81,8 @@ def load_scenario(
         statements = found
     statement = _chosen(path, statements, case)
     if statement.road is not None:
-        raise InvalidScenario(f"{path}: is a drive on roads, which only plan and mpc know")
+        vehicle = RoadVehicle() if beside is None else _road_vehicle(Path(beside))
+        return RoadScenario(name=statement.name, scene=statement.road, vehicle=vehicle)
     rest = None
     if beside is not None:
         rest = _scenario_beside(Path(beside), start=statement.start, goal=statement.goal, own=model)
@@ -79,30 +96,10 @@ def load_scenario(
     return replace(scenario, timing_s={"load": load, "automaton": made})
 
 
-def load_road(
-    path: Path | str, *, beside: Path | str | None = None, case: int | None = None
-) -> tuple[RoadScene, RoadVehicle] | None:
-    """The drive on roads that a file states, and who drives; None if the file is another one.
-
-    The vehicle is the BMW 320i of CommonRoad, or that of the scenario `beside`: a second-order car
-    with a rectangular body along its axis.
-
-    Raises
-    ------
-    InvalidScenario
-        If the file cannot be used, holds several problems and none is chosen, or the vehicle is
-        another one.
-    """
-    path = Path(path)
-    if path.suffix.lower() != ".xml":
-        return None
-    read = reader_of(path) or read_commonroad  # which tells primitives from scenarios
-    scene = _chosen(path, read(path), case).road
-    assert scene is not None  # every statement of this format has one
-    if beside is None:
-        return scene, RoadVehicle()
+def _road_vehicle(beside: Path) -> RoadVehicle:
+    """The vehicle of a scenario beside a drive on roads."""
     anywhere = np.zeros(3)  # the scene states its own
-    rest = _scenario_beside(Path(beside), start=anywhere, goal=anywhere).problem
+    rest = _scenario_beside(beside, start=anywhere, goal=anywhere).problem
     model, footprint = rest.automaton.model, rest.footprint
     if not isinstance(model, SecondOrderCar):
         raise InvalidScenario(
@@ -114,7 +111,7 @@ def load_road(
         )
     length, width = footprint[0].size.tolist()
     ahead = float(footprint[0].center[0])
-    return scene, RoadVehicle(model=model, length=length, width=width, ahead=ahead)
+    return RoadVehicle(model=model, length=length, width=width, ahead=ahead)
 
 
 def _is_along(body: Box) -> bool:

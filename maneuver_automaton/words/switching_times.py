@@ -125,12 +125,13 @@ def solve_switching_times(
     if prices.shape != (n,):
         raise ValueError(f"rates: got shape {prices.shape}, need ({n},), one per trim")
     end = as_array("goal", goal, last=(3, 4))
+    given = None if total is None else as_array("total", total).item()
     starts = [as_array("guesses", guess) for guess in guesses]
     for guess in starts:
         if guess.shape != (n,):
             raise ValueError(f"guesses: got shape {guess.shape}, need ({n},)")
     if displacements is None and least is None and longest is None and not free_heading:
-        return _solved(rows, prices, end, total, np.ones(n), starts, restarts)
+        return _solved(rows, prices, end, given, np.ones(n), starts, restarts)
     rows, end = _of_equal_size(rows, end)
     floors = np.zeros(n) if least is None else np.array(as_array("least", least))
     limits = np.full(n, math.inf) if longest is None else np.asarray(longest, dtype=np.float64)
@@ -140,7 +141,7 @@ def solve_switching_times(
     free = np.ones(n, dtype=np.bool_)
     while True:
         word = _ConjugatedWord(rows, steps, floors, end, free_heading)
-        solved = word.solved(prices, free, total, starts, restarts)
+        solved = word.solved(prices, free, given, starts, restarts)
         late = free & (solved.durations > limits)
         if solved.status is TimesStatus.FAILED or not late.any():
             return solved
@@ -292,10 +293,13 @@ def _steps(displacements: ArrayLike | None, n: int, dof: int) -> Array:
     steps = np.zeros((n, dof))
     if displacements is None:
         return steps
-    given = as_array("displacements", displacements).reshape(-1, dof)
-    if len(given) not in (n - 1, n):
-        raise ValueError(f"displacements: got {len(given)}, need {n - 1}, one between each two")
-    steps[: len(given)] = given
+    given = as_array("displacements", displacements)
+    if given.size and (given.ndim != 2 or given.shape[1] != dof):
+        raise ValueError(f"displacements: got shape {given.shape}, need ({n - 1}, {dof})")
+    rows = given.reshape(-1, dof)
+    if len(rows) not in (n - 1, n):
+        raise ValueError(f"displacements: got {len(rows)}, need {n - 1}, one between each two")
+    steps[: len(rows)] = rows
     return steps
 
 

@@ -12,7 +12,19 @@ from maneuver_automaton.collision import Box, Disc, Polygon
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.commonroad import is_commonroad, read_commonroad
 from tests.formats.outside import DATA, needs_data
-from tests.roads.files import GOAL, LANES, car, commonroad, interval, parked, problem, state
+from tests.roads.files import (
+    GOAL,
+    LANES,
+    car,
+    commonroad,
+    interval,
+    lanelet,
+    parked,
+    predicted,
+    problem,
+    square,
+    state,
+)
 
 SCENARIOS = DATA / "commonroad" / "scenarios"
 
@@ -96,6 +108,43 @@ def test_times_are_steps(tmp_path):
     (statement,) = read(tmp_path, commonroad(*parts, step=0.25))
     assert_close(statement.road.traffic[0].motion.time[-1], 2.0)
     assert_close(statement.road.goals[0].time, [5.0, 10.0])
+
+
+def test_the_time_step_is_that_of_the_file(tmp_path):
+    (statement,) = read(tmp_path, commonroad(*LANES, problem(), step=0.25))
+    assert statement.road.step == 0.25
+
+
+def test_neighbours_in_the_opposite_direction(tmp_path):
+    here = lanelet(1, 0.0, 4.0, '<adjacentLeft ref="2" drivingDir="opposite"/>')
+    (statement,) = read(tmp_path, commonroad(here, LANES[1], problem()))
+    assert [one.against for one in statement.road.lanelets] == [(2,), ()]
+    assert [one.beside for one in statement.road.lanelets] == [(), (1,)]
+
+
+def test_sets_of_occupancies_are_there_around_their_instants(tmp_path):
+    sets = [
+        ([square(40.0, 2.0, 4.0), square(44.0, 2.0, 2.0)], "<time><exact>2</exact></time>"),
+        ([square(50.0, 2.0, 4.0)], interval("time", 4, 6)),
+    ]
+    (statement,) = read(tmp_path, commonroad(*LANES, predicted(7, sets, x=35.0, y=2.0), problem()))
+    road = statement.road
+    assert {one.name for one in road.traffic} == {"car 7"}
+
+    def places(time):
+        return sorted(one.at(time).corners.mean(axis=0)[0] for one in road.present(time))
+
+    found = {time: places(time) for time in (0.05, 0.15, 0.2, 0.25, 0.35, 0.5, 0.7)}
+    assert found[0.05] == [35.0]
+    assert found[0.15] == found[0.2] == found[0.25] == [40.0, 44.0]
+    assert (found[0.35], found[0.5], found[0.7]) == ([], [50.0], [])
+
+
+def test_a_set_of_no_time_is_told(tmp_path):
+    wrong = predicted(7, [([square(40.0, 2.0, 4.0)], interval("time", 4, 4))], x=35.0, y=2.0)
+    with pytest.raises(InvalidScenario) as caught:
+        read(tmp_path, commonroad(*LANES, wrong, problem()))
+    assert "time: got the interval [4, 4], need a begin before its end" in str(caught.value)
 
 
 def test_every_planning_problem_is_a_case(tmp_path):
@@ -216,6 +265,30 @@ def test_the_reference_reader_sees_the_same(name):
     assert_close(scene.start.middle[:2], given.initial_state.position)
     stated = given.goal.state_list[0].time_step
     assert_close(scene.goals[0].time, [stated.start * scenario.dt, stated.end * scenario.dt])
+
+
+@needs_data
+@pytest.mark.parametrize(
+    "name", ["DEU_Ffb-1_6_T-1", "DEU_Muc-2_1_T-1", "USA_US101-32_1_T-1", "CHN_Sha-4_2_T-1"]
+)
+def test_the_official_checker_sees_the_same_road(name):
+    reader = pytest.importorskip("commonroad.common.file_reader")
+    construction = pytest.importorskip("commonroad_dc.boundary.construction")
+    import shapely
+
+    from maneuver_automaton.roads import drivable_area
+
+    scenario, _ = reader.CommonRoadFileReader(str(SCENARIOS / f"{name}.xml")).open()
+    built = construction.construct(scenario, ["section_triangles", "triangulation"])
+    beyond, road = (
+        shapely.union_all([shapely.Polygon(one.vertices()) for one in built[key].unpack()])
+        for key in ("triangulation", "section_triangles")
+    )
+    area = drivable_area(read_commonroad(SCENARIOS / f"{name}.xml")[0].road.lanelets)
+    # What rounding left is closed, up to 20 micrometres wide.
+    allowed = 1e-4 + 2e-5 * shapely.length(shapely.boundary(area))
+    assert shapely.intersection(area, beyond).area < allowed
+    assert shapely.symmetric_difference(area, road).area < allowed
 
 
 def test_goals_without_a_time_are_told(tmp_path):

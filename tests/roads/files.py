@@ -39,6 +39,26 @@ def car(number, *, x, y, speed, steps, size=(4.5, 1.8), step=0.1):
     )
 
 
+def square(x, y, size):
+    low, high = -0.5 * size, 0.5 * size
+    corners = [(x + a, y + b) for a, b in ((low, low), (high, low), (high, high), (low, high))]
+    ring = "".join(f"<point><x>{a}</x><y>{b}</y></point>" for a, b in corners)
+    return f"<polygon>{ring}</polygon>"
+
+
+def predicted(number, sets, *, x, y, speed=0.0):
+    """Somebody whose occupancies are given: (shapes, what is in the element time)."""
+    occupancies = "".join(
+        f"<occupancy><shape>{''.join(shapes)}</shape>{time}</occupancy>" for shapes, time in sets
+    )
+    return (
+        f'<obstacle id="{number}"><role>dynamic</role><type>car</type>'
+        "<shape><rectangle><length>4.5</length><width>1.8</width></rectangle></shape>"
+        f"{state('initialState', x=x, y=y, speed=speed)}"
+        f"<occupancySet>{occupancies}</occupancySet></obstacle>"
+    )
+
+
 def parked(number, *, x, y, size=(4.5, 1.8)):
     return (
         f'<obstacle id="{number}"><role>static</role><type>parkedVehicle</type>'
@@ -78,7 +98,7 @@ def commonroad(*parts, step=0.1):
     )
 
 
-def scene_of(folder, *parts, case=0):
+def scene_of(folder, *parts, case=0, step=0.1):
     file = folder / "road.xml"
-    file.write_text(commonroad(*parts))
+    file.write_text(commonroad(*parts, step=step))
     return read_commonroad(file)[case].road

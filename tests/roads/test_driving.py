@@ -4,11 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import shapely
 
+import maneuver_automaton as ma
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads import RoadSettings, drive_scene, judged, plan_road, road_planner
 from tests.formats.outside import DATA, needs_data
-from tests.roads.files import GOAL, LANES, car, interval, parked, problem, scene_of
+from tests.roads.files import (
+    GOAL,
+    LANES,
+    car,
+    commonroad,
+    interval,
+    parked,
+    predicted,
+    problem,
+    scene_of,
+    square,
+)
 
 QUICK = RoadSettings(width=40, narrow=20)
 ANY = "<goalState>" + interval("time", 30, 32) + "</goalState>"
@@ -40,8 +53,90 @@ def test_a_goal_out_of_reach_is_missed_without_harm(tmp_path):
     goal = GOAL.replace(interval("time", 20, 40), interval("time", 0, 5))
     drive = driven(scene_of(tmp_path, *LANES, problem(goal=goal)))
     assert (drive.reached, drive.status) == (False, "missed")
-    assert drive.reason == "no goal was reached until 0.5 s, when the last one is over"
+    assert drive.reason == (
+        "no goal was reached until 0.5 s, when the last one is over; "
+        "nearest to it at 0.5 s: 1.83 m away"
+    )
     assert drive.verdict.clean
+
+
+def test_a_car_at_rest_with_no_way_on_stands_and_says_so(tmp_path):
+    behind = car(8, x=10.0, y=2.0, speed=8.0, steps=40)
+    walls = [parked(3, x=33.6, y=2.0, size=(1.0, 4.0)), parked(4, x=30.0, y=4.6, size=(9.0, 0.5))]
+    start = problem(goal=ANY, x=30.0, speed=0.0)
+    drive = driven(scene_of(tmp_path, LANES[0], *walls, behind, start))
+    assert drive.reached
+    goal = GOAL.replace(interval("orientation", -0.2, 0.2), interval("orientation", 1.0, 1.2))
+    start = problem(goal=goal, x=30.0, speed=0.0)
+    drive = driven(scene_of(tmp_path, *LANES, *walls, behind, start))
+    assert drive.status == "missed"
+    stood = [step for step in drive.steps if step.plan.stands]
+    assert stood
+    assert all(step.control.tolist() == [0.0, 0.0] for step in stood)
+    assert "; no way on was found from " in drive.reason
+    assert len(drive.steps) == 40
+
+
+def test_why_a_goal_was_missed(tmp_path):
+    slow = GOAL.replace(
+        interval("time", 20, 40), interval("velocity", 60, 70) + interval("time", 20, 40)
+    )
+    drive = driven(scene_of(tmp_path, *LANES, problem(goal=slow)))
+    assert drive.reason.startswith(
+        "no goal was reached until 4 s, when the last one is over; nearest"
+    )
+    assert drive.reason.endswith(" m/s too slow")
+    drive = driven(scene_of(tmp_path), steps=3)
+    assert drive.reason == "no goal was reached in 3 steps, until 0.3 s; its time begins at 2 s"
+    early = GOAL.replace('ref="2"', 'ref="1"')
+    drive = driven(scene_of(tmp_path, *LANES, problem(goal=early)), steps=3)
+    assert drive.reason == (
+        "no goal was reached in 3 steps, until 0.3 s; "
+        "everything but the time was right at 0 s, need 2 s to 4 s"
+    )
+
+
+@pytest.mark.parametrize("step", [0.25, 0.04])
+def test_goals_are_reached_when_the_clock_of_the_scene_ticks(tmp_path, step):
+    goal = GOAL.replace(
+        interval("time", 20, 40), interval("time", round(2 / step), round(3 / step))
+    )
+    other = car(7, x=35.0, y=2.0, speed=6.0, steps=40, step=step)
+    drive = driven(scene_of(tmp_path, *LANES, other, problem(goal=goal), step=step))
+    assert drive.reached
+    assert drive.verdict.clean
+    ticks = drive.driven.time[-1] / step
+    assert ticks == pytest.approx(round(ticks), abs=1e-9)
+    assert drive.planner.tick <= 0.1
+    assert len(drive.steps) * drive.planner.tick == pytest.approx(drive.driven.time[-1])
+
+
+def test_sets_of_occupancies_are_driven_around(tmp_path):
+    sets = [
+        ([square(30.0 + 0.6 * k, 1.5, 2.0 + 0.02 * k)], f"<time><exact>{k}</exact></time>")
+        for k in range(1, 41)
+    ]
+    other = predicted(7, sets, x=30.0, y=1.5, speed=6.0)
+    drive = driven(scene_of(tmp_path, *LANES, other, problem()))
+    assert drive.reached
+    assert drive.verdict.collisions == 0
+    for k in range(1, len(drive.steps)):
+        pose = drive.driven.pose_at(0.1 * k)
+        body = shapely.Polygon(SE2(pose).act(drive.planner.vehicle.footprint.corners))
+        x, y, size = 30.0 + 0.6 * k, 1.5, 1.0 + 0.01 * k
+        assert body.distance(shapely.box(x - size, y - size, x + size, y + size)) > 0.0
+
+
+def test_a_file_is_driven_from_python(tmp_path):
+    file = tmp_path / "road.xml"
+    file.write_text(commonroad())
+    road = ma.load_scenario(file)
+    assert road.name == road.scene.name == "TST_Lanes-1_1_T-1"
+    drive = ma.drive_road(road.scene, road.vehicle)
+    assert drive.reached
+    result = ma.plan_road(road.scene, road.vehicle)
+    assert result.plan is not None
+    assert result.verdict.clean
 
 
 def test_steps_are_counted(tmp_path):
@@ -106,7 +201,8 @@ def test_no_plan_says_why(tmp_path):
     result = plan_road(scene_of(tmp_path, *LANES, problem(goal=goal)), time_limit=1e-6)
     assert result.plan is None
     assert result.reason == (
-        "no goal is reached until 0.5 s by any of the words searched, 100 at a time"
+        "no goal is reached until 0.5 s by any of the words searched, 100 at a time; the one that "
+        "leads furthest, until 0.5 s, was nearest to it at 0.5 s: 1.57 m away"
     )
 
 
@@ -126,8 +222,26 @@ def test_the_judge_sees_contacts_and_the_edge(tmp_path):
 
 
 @needs_data
+def test_a_tight_junction_is_driven_with_the_steering_that_the_car_has():
+    file = DATA / "commonroad" / "scenarios" / "DEU_Muc-11_1_T-1.xml"
+    result = plan_road(ma.load_scenario(file).scene)
+    assert result.plan is not None
+    assert result.verdict.clean
+    steering = np.abs(result.plan.states[:, 4]).max()
+    assert 0.6 < steering <= result.planner.vehicle.model.max_steering
+
+
+@needs_data
 @pytest.mark.parametrize(
-    "name", ["DEU_A9-2_1_T-1", "DEU_Ffb-1_6_T-1", "RUS_Bicycle-11_1_T-1", "USA_Peach-1_1_T-1"]
+    "name",
+    [
+        "DEU_A9-2_1_T-1",
+        "DEU_Ffb-1_6_T-1",
+        "RUS_Bicycle-11_1_T-1",
+        "USA_Peach-1_1_T-1",
+        "USA_US101-1_1_S-1",
+        "ZAM_Urban-3_1",
+    ],
 )
 def test_given_scenarios_are_driven_without_contact(name):
     from maneuver_automaton.formats.commonroad import read_commonroad

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -53,6 +55,9 @@ def clearing():
         off_traffic=OFF_TRAFFIC,
         braking=8.0,
     )
+
+
+FIELD = clearing().area
 
 
 def states_of(x, y, heading, speed, steering, controls):
@@ -125,16 +130,55 @@ def test_motion_of_a_tick_is_that_of_the_model(control):
     np.testing.assert_allclose(states[-1], exact, atol=1e-6)
 
 
-def test_polygons_count_by_a_rectangle_around_them():
-    corners = [[0.0, 0.0], [2.0, 0.0], [0.0, 1.0]]
-    scene = RoadScene(
-        name="one",
-        lanelets=SCENE.lanelets,
-        start=SCENE.start,
-        goals=SCENE.goals,
-        traffic=(Obstacle(Polygon(corners), name="wedge"),),
-    )
+@pytest.mark.parametrize(
+    "corners",
+    [
+        [[0, 0], [2, 0], [0, 1]],
+        [[0, 0], [9, 0], [9, 2], [2, 2], [2, 8], [0, 8]],
+        [[6.1, 3.7], [7.7, 3.7], [13.0, 3.7], [13.0, 1.9], [7.7, 1.9], [6.1, 1.9]],
+    ],
+)
+def test_rectangles_cover_a_polygon_and_little_more(corners):
+    scene = replace(SCENE, traffic=(Obstacle(Polygon(corners), name="one"),))
     found = clearing_of(
         scene, VEHICLE, tick=TICK, last_tick=5, off_edge=0.03, off_traffic=0.05, braking=8.0
     ).traffic
-    assert sorted(np.round(2.0 * found.half[0], 9)) in ([1.0, 2.0], [0.894427191, 2.236067977])
+    boxes = [
+        shapely.Polygon(Box(2.0 * half, pose[0, :2], pose[0, 2]).corners)
+        for half, pose in zip(found.half, found.pose, strict=True)
+    ]
+    shape, covered = shapely.Polygon(corners), shapely.union_all(boxes)
+    assert shapely.difference(shape, covered).area < 1e-9
+    outline = shapely.points(shapely.get_coordinates(shapely.segmentize(covered, 0.05)))
+    assert shapely.distance(outline, shape).max() < 0.35
+
+
+def area_of(*lanelets, last_tick=60):
+    scene = replace(SCENE, lanelets=lanelets, traffic=())
+    return clearing_of(
+        scene, VEHICLE, tick=TICK, last_tick=last_tick, off_edge=0.03, off_traffic=0.05, braking=8.0
+    ).area
+
+
+def test_the_field_is_as_large_as_the_road_in_use():
+    here = area_of(LANE)
+    far = Lanelet(2, LEFT + 20_000.0, RIGHT + 20_000.0)
+    assert area_of(LANE, far).distance.shape == here.distance.shape
+    corner = [[0, 0], [700, 0], [700, 3], [3, 3], [3, 700], [0, 700]]
+    legs = [
+        Lanelet(3, [[0, 3], [700, 3]], [[0, 0], [700, 0]]),
+        Lanelet(4, [[0, 0], [0, 700]], [[3, 0], [3, 700]]),
+    ]
+    wide = area_of(*legs, last_tick=400)
+    tiles = shapely.Polygon(corner).length / 2.0 / (wide.cell * (1 << wide.bits))
+    assert len(wide.distance) < 3.0 * tiles
+    assert wide.distance.nbytes < 0.05 * 700.0 * 700.0 / wide.cell**2 * 8
+
+
+@settings(max_examples=100)
+@given(x=st.floats(-5.0, 70.0), y=st.floats(-10.0, 45.0))
+def test_the_field_is_the_distance_to_the_edge(x, y):
+    place = shapely.Point(x, y)
+    true = AREA.boundary.distance(place) if AREA.covers(place) else 0.0
+    room = getattr(kernels.room, "py_func", kernels.room)  # compiled, only kernels may call it
+    assert abs(room(FIELD, x, y) - true) < 0.15

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
+import pytest
 
 from maneuver_automaton.primitives.driving import drive
 from maneuver_automaton.roads import RoadVehicle, _kernels_library
-from maneuver_automaton.roads.library import TICK, TICKS, road_library
+from maneuver_automaton.roads.library import road_library, tick_of
 
 VEHICLE = RoadVehicle()
 LIBRARY = road_library(VEHICLE, top_speed=14.0)
+TICK, TICKS = LIBRARY.limits.tick, LIBRARY.limits.ticks
 
 
 def sources():
@@ -64,6 +68,29 @@ def test_a_state_beside_the_grid_has_maneuvers_too():
 
 def test_the_library_has_a_mirror_image():
     trims = LIBRARY.trims
-    mirrored = np.arange(trims.speed.size).reshape(-1, trims.per_speed)[:, ::-1].ravel()
+    rows = itertools.pairwise(trims.first.tolist())
+    mirrored = np.concatenate([np.arange(low, high)[::-1] for low, high in rows])
     pairs = set(zip(sources().tolist(), LIBRARY.maneuvers.target.tolist(), strict=True))
     assert {(mirrored[a], mirrored[b]) for a, b in pairs} == pairs
+
+
+def test_slow_driving_steers_as_far_as_the_car_can():
+    trims = LIBRARY.trims
+    slow = trims.steering[trims.first[1] : trims.first[2]]
+    assert slow[[0, -1]].tolist() == [-VEHICLE.model.max_steering, VEHICLE.model.max_steering]
+
+
+def test_neighbouring_angles_are_one_maneuver_apart():
+    trims, maneuvers, source = LIBRARY.trims, LIBRARY.maneuvers, sources()
+    pairs = set(zip(source.tolist(), maneuvers.target.tolist(), strict=True))
+    for low, high in itertools.pairwise(trims.first.tolist()):
+        assert {(k, k + 1) for k in range(low, high - 1)} <= pairs
+
+
+@pytest.mark.parametrize(
+    ("step", "tick", "ticks"), [(0.1, 0.1, 5), (0.25, 0.25 / 3, 6), (0.04, 0.04, 12)]
+)
+def test_ticks_divide_the_time_step(step, tick, ticks):
+    assert tick_of(step) == pytest.approx(tick)
+    limits = road_library(VEHICLE, top_speed=2.0, tick=tick_of(step)).limits
+    assert (limits.tick, limits.ticks) == (tick_of(step), ticks)

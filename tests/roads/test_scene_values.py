@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,11 +69,27 @@ def test_a_goal_of_no_place_is_refused():
     )
 
 
-def test_slivers_between_lanelets_are_closed_and_holes_are_not():
-    area = drivable_area([straight(1, 0.0), straight(2, 4.1)])
-    assert area.geom_type == "Polygon"
-    apart = drivable_area([straight(1, 0.0), straight(2, 5.0)])
+@pytest.mark.parametrize("gap", [0.002, 0.05, 0.3])
+def test_there_is_road_between_stated_neighbours_only(gap):
+    apart = drivable_area([straight(1, 0.0), straight(2, 4.0 + gap)])
     assert apart.geom_type == "MultiPolygon"
+    assert_allclose(apart.area, 800.0, atol=1e-3)
+    back = Lanelet(2, [[100, 2 + gap], [0, 2 + gap]], [[100, 6 + gap], [0, 6 + gap]])
+    for beside, other in (([2], straight(2, 4.0 + gap)), ([], back)):
+        against = [] if beside else [2]
+        joined = drivable_area([straight(1, 0.0, beside=beside, against=against), other])
+        assert joined.geom_type == "Polygon"
+        assert_allclose(joined.area, 100.0 * (8.0 + gap), atol=1e-3)
+
+
+def test_rounding_leaves_no_gap():
+    area = drivable_area([straight(1, 0.0), straight(2, 4.0 + 1e-7)])
+    assert area.geom_type == "Polygon"
+
+
+def test_a_scene_needs_a_time_step():
+    with pytest.raises(ValueError, match=r"the time step must be positive, got 0\.0 s"):
+        replace(scene([straight(1, 0.0)]), step=0.0)
 
 
 def test_what_is_off_the_road_and_the_road_fill_the_frame():

@@ -300,12 +300,17 @@ def test_what_leaves_the_altitude_open_gives_none():
 @pytest.mark.parametrize(
     ("twists", "goal", "options", "message"),
     [
-        ([LEFT, AHEAD], [1, 0, 0], {}, r"twists: got shape \(2, 3\), need \(3, 3\)"),
-        ([[1, 0]] * 3, [1, 0, 0], {}, r"twists: got shape \(3, 2\), need 3 components last"),
+        ([LEFT, AHEAD], [1, 0, 0], {}, r"twists: got shape \(2, 3\), need \(3, 3\) or \(4, 4\)"),
+        ([[1, 0]] * 3, [1, 0, 0], {}, r"twists: got shape \(3, 2\), need 3 or 4 components last"),
         ([LEFT, AHEAD, [np.nan] * 3], [1, 0, 0], {}, "twists: got nan, need finite numbers"),
         ([LEFT] * 3, [[1, 0, 0]], {}, r"goal: got shape \(1, 3\), need \(3,\)"),
         ([LEFT] * 3, [1, 0, 0, 0], {}, r"goal: got shape \(4,\), need 3 components last"),
-        ([LEFT] * 3, [1, 0, 0], {"gaps": [[0, 0, 0]]}, r"gaps: got shape \(1, 3\), need \(2, 3\)"),
+        (
+            [LEFT] * 3,
+            [1, 0, 0],
+            {"displacements": [[0, 0, 0]]},
+            r"displacements: got shape \(1, 3\), need \(2, 3\)",
+        ),
         ([LEFT] * 3, [1, 0, 0], {"tolerance": 0.0}, "tolerance: got 0.0, need a positive number"),
         (
             [LEFT] * 3,
@@ -323,9 +328,14 @@ def test_wrong_input(twists, goal, options, message):
 @pytest.mark.parametrize(
     ("twists", "goal", "options", "message"),
     [
-        ([RISE] * 3, [1, 0, 0, 0], {}, r"twists: got shape \(3, 4\), need \(4, 4\)"),
+        ([RISE] * 3, [1, 0, 0, 0], {}, r"twists: got shape \(3, 4\), need \(3, 3\) or \(4, 4\)"),
         ([RISE] * 4, [1, 0, 0], {}, r"goal: got shape \(3,\), need 4 components last"),
-        ([RISE] * 4, [1, 0, 0, 0], {"gaps": [RISE]}, r"gaps: got shape \(1, 4\), need \(3, 4\)"),
+        (
+            [RISE] * 4,
+            [1, 0, 0, 0],
+            {"displacements": [RISE]},
+            r"displacements: got shape \(1, 4\), need \(3, 4\)",
+        ),
         ([RISE] * 4, [1, 0, 0, 0], {"longest": -1.0}, "longest: got -1.0, need a positive number"),
         ([RISE] * 4, [1, 0, 0, 0], {"nodes": 0}, "nodes: got 0, need at least 1"),
         ([RISE] * 4, [1, 0, 0, 0], {"tolerance": -1}, "tolerance: got -1, need a positive number"),

@@ -242,12 +242,8 @@ def test_results_cannot_be_written_to():
         ({"guesses": [[1, 2]]}, r"guesses: got shape \(2,\), need \(1,\)"),
         ({"guesses": [[np.nan]]}, "guesses: got nan, need finite numbers"),
         ({"total": np.nan}, "total: got nan, need finite numbers"),
-        pytest.param(
-            {"gaps": [[0, 0, 0, 0]] * 2},
-            r"gaps: got shape \(2, 4\), need",
-            marks=pytest.mark.xfail(strict=True, reason="rows of gaps are not counted"),
-        ),
-        ({"gaps": [1, 0, 0, 0]}, r"gaps: got shape \(4,\), need \(n, 3\) or \(n, 4\)"),
+        ({"displacements": [[0, 0, 0]] * 2}, "displacements: got 2, need 0, one between each two"),
+        ({"displacements": [1, 0, 0, 0]}, r"displacements: got shape \(4,\), need \(0, 3\)"),
     ],
 )
 def test_wrong_input(change, message):
