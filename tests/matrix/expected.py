@@ -1,0 +1,2 @@
+EXPECTED: dict[tuple[str, str], str] = {}
+QUICK: set[tuple[str, str]] = set()
