@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from tests.matrix.features import FEATURES, Dearer, Feature, Nothing
 from tests.matrix.vehicles import VEHICLES, Vehicle
 
-WORKS, NOTHING, IGNORED, ERROR, REFUSED, DEARER, SENSELESS = ".", "F", "I", "E", "R", "p", "-"
+WORKS, NOTHING, IGNORED, ERROR, REFUSED, DEARER, SENSELESS = (".", "F", "I", "E", "R", "p", "-")
 SECONDS = 60  # of one cell, at most
 
 
@@ -56,11 +56,7 @@ def tried(feature: str, vehicle: str, *, seconds: int = SECONDS) -> Outcome:
     except Exception as error:  # noqa: BLE001  # whatever it is, it is this cell's alone
         sign, reason = sign_of(error), _line(error)
     return Outcome(
-        feature=feature,
-        vehicle=vehicle,
-        sign=sign,
-        reason=reason,
-        seconds=time.monotonic() - began,
+        feature=feature, vehicle=vehicle, sign=sign, reason=reason, seconds=time.monotonic() - began
     )
 
 

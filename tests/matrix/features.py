@@ -11,12 +11,13 @@ import itertools
 import json
 import math
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import (
@@ -83,6 +84,7 @@ class Feature:
     check: Check
     mutant: Engine  # the feature means nothing to it
     mutant_vehicle: str  # on which the check fails with the mutant
+    says: str  # how it then complains
     applies: Callable[[Vehicle], bool]
 
     def __call__(self, vehicle: Vehicle, engine: Engine = PACKAGE) -> None:
@@ -94,14 +96,18 @@ FEATURES: dict[str, Feature] = {}
 
 
 def feature(
-    mutant: Engine, *, on: str = "dubins", applies: Callable[[Vehicle], bool] = lambda _: True
+    mutant: Engine,
+    *,
+    says: str,
+    on: str = "dubins",
+    applies: Callable[[Vehicle], bool] = lambda _: True,
 ) -> Callable[[Check], Check]:
     """Enter a check as a row of the matrix, under its name."""
 
     def entered(check: Check) -> Check:
         name = check.__name__
         FEATURES[name] = Feature(
-            name=name, check=check, mutant=mutant, mutant_vehicle=on, applies=applies
+            name=name, check=check, mutant=mutant, mutant_vehicle=on, says=says, applies=applies
         )
         return check
 
@@ -328,6 +334,10 @@ def midway(vehicle: Vehicle, share: float = 0.5) -> np.ndarray:
     return np.asarray(motion.pose_at(share * motion.duration))
 
 
+def heading_midway(vehicle: Vehicle) -> float:
+    return float(outside.flat(midway(vehicle))[2])
+
+
 def pillar(vehicle: Vehicle) -> Disc:
     """A disc that stands in the way."""
     return Disc(0.8 * vehicle.size, midway(vehicle)[:2])
@@ -348,20 +358,28 @@ def passing(vehicle: Vehicle) -> PlanResult:
 
 def beside(vehicle: Vehicle, offset: float) -> np.ndarray:
     """A place to the left of the middle of the plan in free space, so far off [m]."""
-    pose = midway(vehicle)
-    return pose[:2] + offset * np.array([-math.sin(pose[2]), math.cos(pose[2])])
+    return midway(vehicle)[:2] + offset * _left(heading_midway(vehicle))
+
+
+def _left(heading: float) -> np.ndarray:
+    """Unit vector to the left of a heading."""
+    return np.array([-math.sin(heading), math.cos(heading)])
 
 
 # --- free space -----------------------------------------------------------------------------------
 
 
-@feature(with_goals(lambda goal: replace(goal, free_heading=True)))
+@feature(with_goals(lambda goal: replace(goal, free_heading=True)), says="its heading is")
 def free_space(vehicle: Vehicle, engine: Engine) -> None:
     result = asked(vehicle, engine)
     assert result.plan.word
 
 
-@feature(with_goals(lambda goal: replace(goal, free_heading=False)))
+@feature(
+    with_goals(lambda goal: replace(goal, free_heading=False)),
+    says="the heading is not used",
+    applies=lambda vehicle: vehicle.has_heading,
+)
 def free_heading(vehicle: Vehicle, engine: Engine) -> None:
     result = asked(vehicle, engine, goals=vehicle.target(free_heading=True))
     known = base(vehicle).cost
@@ -369,7 +387,10 @@ def free_heading(vehicle: Vehicle, engine: Engine) -> None:
     assert result.cost < known * (1.0 - SAME), "the heading is not used"
 
 
-@feature(changed(lambda problem: replace(problem, goals=problem.goals[:1])))
+@feature(
+    changed(lambda problem: replace(problem, goals=problem.goals[:1])),
+    says="the plan to the nearer goal costs",
+)
 def several_goals(vehicle: Vehicle, engine: Engine) -> None:
     """The nearer one is taken, at the cost of the plan to it alone."""
     far = np.array(vehicle.goal)
@@ -380,7 +401,7 @@ def several_goals(vehicle: Vehicle, engine: Engine) -> None:
     assert result.goal_index == 1
 
 
-@feature(without("horizon"))
+@feature(without("horizon"), says="it has 3 trims")
 def max_trims(vehicle: Vehicle, engine: Engine) -> None:
     count = len(trims_lasting(found(base(vehicle))))
     result = asked(vehicle, engine, horizon=Horizon(max_trims=max(count, 1)))
@@ -404,7 +425,7 @@ def _blank(_: PlanResult, path: Path) -> None:
     Figure().savefig(path)
 
 
-@feature(Engine(save_figure=_blank))
+@feature(Engine(save_figure=_blank), says="nothing is drawn")
 def pictures(vehicle: Vehicle, engine: Engine) -> None:
     import matplotlib.image
 
@@ -421,7 +442,7 @@ def _moved_file(result: PlanResult, path: Path) -> None:
     save_plan(replace(result, plan=replace(result.plan, start=result.plan.start + 0.01)), path)
 
 
-@feature(Engine(save_plan=_moved_file))
+@feature(Engine(save_plan=_moved_file), says="another motion")
 def plan_file(vehicle: Vehicle, engine: Engine) -> None:
     """plan.json holds the plan: read back it is the same motion, and its numbers agree."""
     result = base(vehicle)
@@ -430,7 +451,7 @@ def plan_file(vehicle: Vehicle, engine: Engine) -> None:
         path = Path(folder) / "plan.json"
         engine.save_plan(result, path)
         again, document = load_plan(path), json.loads(path.read_text())
-    assert outside.apart(motion, again) <= 1e-6
+    assert outside.apart(motion, again) <= 1e-6, "the file holds another motion"
     lasting = sum(one["duration_s"] for one in document["primitives"])
     close(lasting, document["duration_s"], "duration")
     close(motion.duration, document["duration_s"], "duration")
@@ -449,19 +470,19 @@ def _around_them(vehicle: Vehicle, engine: Engine, *obstacles: AnyObstacle | Sha
     return result
 
 
-@feature(without("obstacles"))
+@feature(without("obstacles"), says="clearance")
 def discs(vehicle: Vehicle, engine: Engine) -> None:
     _around_them(vehicle, engine, pillar(vehicle))
 
 
-@feature(without("obstacles"))
+@feature(without("obstacles"), says="clearance")
 def polygons(vehicle: Vehicle, engine: Engine) -> None:
     """A concave polygon: an L whose corner stands in the way."""
     corner = np.array([[-1, -1], [1, -1], [1, -0.2], [-0.2, -0.2], [-0.2, 1], [-1, 1]], float)
     _around_them(vehicle, engine, Polygon(0.7 * vehicle.size * corner + midway(vehicle)[:2]))
 
 
-@feature(without("obstacles"))
+@feature(without("obstacles"), says="clearance")
 def occupancy_map(vehicle: Vehicle, engine: Engine) -> None:
     cells = np.zeros((9, 9), dtype=bool)
     cells[3:6, 3:6] = True
@@ -480,12 +501,12 @@ def _crossing(vehicle: Vehicle) -> Obstacle:
     return Obstacle(Disc(0.6 * vehicle.size), motion=motion)
 
 
-@feature(without("obstacles"))
+@feature(without("obstacles"), says="clearance")
 def moving_obstacles(vehicle: Vehicle, engine: Engine) -> None:
     _around_them(vehicle, engine, _crossing(vehicle))
 
 
-@feature(without("margin"))
+@feature(without("margin"), says="clearance")
 def margin(vehicle: Vehicle, engine: Engine) -> None:
     """A disc beside the way is passed at the distance asked for."""
     disc = Disc(0.5 * vehicle.size, beside(vehicle, 2.0 * vehicle.size))
@@ -496,7 +517,7 @@ def margin(vehicle: Vehicle, engine: Engine) -> None:
     _ = asked(vehicle, engine, obstacles=[disc], margin=clear + 0.3 * vehicle.size)
 
 
-@feature(without("zones"))
+@feature(without("zones"), says="m/s in a zone")
 def zones(vehicle: Vehicle, engine: Engine) -> None:
     """A small zone in the way is entered slowly or not at all."""
     zone = Zone(shape=Box([1.5 * vehicle.size] * 2, midway(vehicle)[:2]), max_speed=_slow(vehicle))
@@ -509,11 +530,16 @@ def _slow(vehicle: Vehicle) -> float:
     return (vehicle.slow or 0.5 * vehicle.fastest) * 1.02
 
 
-@feature(without("zones"), on="grid", applies=lambda vehicle: vehicle.slow is not None)
+@feature(
+    without("zones"),
+    on="grid",
+    applies=lambda vehicle: vehicle.slow is not None,
+    says="m/s in a zone",
+)
 def zones_crossed(vehicle: Vehicle, engine: Engine) -> None:
     """A zone without a way around is crossed: slowly in it, and only there."""
-    pose, width = midway(vehicle), 1.5 * vehicle.size
-    strip = Box([width, 20.0 * vehicle.reach], pose[:2], float(pose[2]))
+    width = 1.5 * vehicle.size
+    strip = Box([width, 20.0 * vehicle.reach], midway(vehicle)[:2], heading_midway(vehicle))
     slow = _slow(vehicle)
     result = asked(vehicle, engine, zones=[Zone(shape=strip, max_speed=slow)])
     free, inside = found(base(vehicle)).duration, width + 2.0 * vehicle.size
@@ -523,7 +549,7 @@ def zones_crossed(vehicle: Vehicle, engine: Engine) -> None:
         no_dearer(result, ideal + 0.6 * (throughout - ideal), "to be slow in the zone alone")
 
 
-@feature(without("bounds"))
+@feature(without("bounds"), says="it leaves the bounds")
 def bounds(vehicle: Vehicle, engine: Engine) -> None:
     """The side on which it would pass a pillar is closed by a bound."""
     pose = np.array(vehicle.goal)
@@ -543,7 +569,9 @@ def _arm(vehicle: Vehicle) -> Disc:
     return Disc(0.25 * vehicle.size, [0.0, 1.6 * vehicle.size])
 
 
-@feature(changed(lambda problem: replace(problem, footprint=problem.footprint[:1])))
+@feature(
+    changed(lambda problem: replace(problem, footprint=problem.footprint[:1])), says="clearance"
+)
 def several_parts(vehicle: Vehicle, engine: Engine) -> None:
     """Only what sticks out of the body would touch the disc."""
     disc = Disc(0.2 * vehicle.size, beside(vehicle, 1.6 * vehicle.size))
@@ -552,47 +580,53 @@ def several_parts(vehicle: Vehicle, engine: Engine) -> None:
     assert result.cost >= base(vehicle).cost * (1.0 - 1e-2)
 
 
-@feature(without(parts={}), on="car_with_trailer", applies=lambda vehicle: bool(vehicle.parts))
+@feature(
+    without(parts={}),
+    on="car_with_trailer",
+    applies=lambda vehicle: bool(vehicle.parts),
+    says="clearance",
+)
 def carried_parts(vehicle: Vehicle, engine: Engine) -> None:
     """What is carried cuts the corner: a disc where only the trailer would touch it."""
-    motion = found(base(vehicle))
+    pose = np.array(vehicle.goal)
+    pose[:3] = 0.5 * vehicle.reach, 0.5 * vehicle.reach, 0.5 * math.pi
+    goal = vehicle.target(pose=pose)
+    motion = asked(vehicle, PACKAGE, goals=goal).plan
+    assert motion is not None
     course = fine(vehicle, motion)
     own = outside.bodies(course, vehicle.footprint)
     everything = around(vehicle, course, vehicle.footprint)
-    spots = [beside_at(vehicle, share, side) for share in (0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
-             for side in (1.0, -1.0)]  # fmt: skip
-    scored = [
-        (
-            float(outside.clearances(course, own, (Obstacle(spot),)).min())
-            - float(outside.clearances(course, everything, (Obstacle(spot),)).min()),
-            k,
-        )
-        for k, spot in enumerate(spots)
+    spots = [
+        spot
+        for share in (0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
+        for side in (1.0, -1.0)
+        for spot in _just_beside(vehicle, motion.pose_at(share * motion.duration), own, side)
+        if outside.clearances(course, everything, (Obstacle(spot),)).min() == 0.0
     ]
-    assert max(scored)[0] > 0.0, "the trailer follows the car exactly"
-    spot = spots[max(scored)[1]]
-    _ = asked(vehicle, engine, obstacles=[spot])
+    assert spots, "no part that is carried leaves the track of the body"
+    _ = asked(vehicle, engine, goals=goal, obstacles=[spots[len(spots) // 2]])
 
 
-def beside_at(vehicle: Vehicle, share: float, side: float) -> Disc:
-    """A small disc that the vehicle's own body just misses at a share of its way."""
-    course = fine(vehicle, found(base(vehicle)))
-    own = outside.bodies(course, vehicle.footprint)
-    pose = midway(vehicle, share)
-    normal = side * np.array([-math.sin(pose[2]), math.cos(pose[2])])
-    radius = 0.1 * vehicle.size
+def _just_beside(
+    vehicle: Vehicle, pose: np.ndarray, bodies: np.ndarray, side: float
+) -> Iterator[Disc]:
+    """A small disc beside a pose which all bodies of a course just miss, if there is one."""
     for offset in np.linspace(0.1, 2.0, 96) * vehicle.size:
-        disc = Disc(radius, pose[:2] + offset * normal)
-        if float(outside.clearances(course, own, (Obstacle(disc),)).min()) > 0.005 * vehicle.size:
-            return disc
-    raise AssertionError("no place beside the body")
+        disc = Disc(0.05 * vehicle.size, pose[:2] + side * offset * _left(float(pose[2])))
+        if float(shapely.distance(bodies, outside.solid(disc)).min()) > 0.005 * vehicle.size:
+            yield disc
+            return
 
 
-@feature(with_goals(lambda goal: replace(goal, free_heading=False)))
+@feature(
+    with_goals(lambda goal: replace(goal, free_heading=False)),
+    says="a heading that does not matter",
+    applies=lambda vehicle: vehicle.has_heading,
+)
 def free_heading_among_obstacles(vehicle: Vehicle, engine: Engine) -> None:
     """With any heading it is no dearer than with the one that suits, and ends with another."""
     pose = np.array(vehicle.goal)
-    pose[2] += 2.5
+    pose[2] += 2.5  # a heading to which to turn would be dear
     goal = vehicle.target(pose=pose, free_heading=True)
     result = asked(vehicle, engine, goals=goal, obstacles=[pillar(vehicle)])
     _, turn = outside.off_goal(result.plan.end, goal)
@@ -609,7 +643,10 @@ def found_cost(result: PlanResult) -> float:
 # --- ends and horizon -----------------------------------------------------------------------------
 
 
-@feature(with_goals(lambda goal: replace(goal, tolerance_m=0.0, tolerance_rad=0.0)))
+@feature(
+    with_goals(lambda goal: replace(goal, tolerance_m=0.0, tolerance_rad=0.0)),
+    says="the tolerance is not used",
+)
 def goal_tolerance(vehicle: Vehicle, engine: Engine) -> None:
     """Above zero the plan may end anywhere within, so it is cheaper; at zero it ends exactly."""
     goal = vehicle.target(tolerance_m=0.05 * vehicle.reach, tolerance_rad=0.1)
@@ -629,6 +666,7 @@ def _at_rest(problem: Problem) -> Problem:
     changed(_at_rest),
     on="user",
     applies=lambda vehicle: vehicle.inertia and vehicle.moving_trim is not None,
+    says="reduced state",
 )
 def moving_ends(vehicle: Vehicle, engine: Engine) -> None:
     """It starts and ends in a moving trim, sooner than from rest to rest."""
@@ -646,7 +684,7 @@ def _fixed(vehicle: Vehicle) -> float:
     return 1.5 * found(base(vehicle)).duration
 
 
-@feature(without("horizon"), on="unicycle")
+@feature(without("horizon"), on="unicycle", says="it takes")
 def fixed_time(vehicle: Vehicle, engine: Engine) -> None:
     """The plan lasts exactly as long as asked, with no more effort than the quick one needs."""
     time = _fixed(vehicle)
@@ -663,7 +701,7 @@ def _idle(vehicle: Vehicle) -> float:
     return float((vehicle.automaton.trims[index].control ** 2).sum())
 
 
-@feature(without("horizon"), on="grid")
+@feature(without("horizon"), on="grid", says="it takes")
 def max_time(vehicle: Vehicle, engine: Engine) -> None:
     """What is cheap but slow is cut short, and too little time is not enough."""
     quick, cost = found(base(vehicle)).duration, Cost(effort=1.0, time=0.1)
@@ -677,7 +715,7 @@ def max_time(vehicle: Vehicle, engine: Engine) -> None:
         obeys(vehicle, short, result.plan)
 
 
-@feature(without("horizon"), on="dubins")
+@feature(without("horizon"), on="dubins", says="it takes")
 def max_time_among_obstacles(vehicle: Vehicle, engine: Engine) -> None:
     """A limit just above the quickest known plan is met; too little is not exceeded."""
     known = found(passing(vehicle)).duration
@@ -689,7 +727,7 @@ def max_time_among_obstacles(vehicle: Vehicle, engine: Engine) -> None:
         obeys(vehicle, short, result.plan)
 
 
-@feature(without("horizon"))
+@feature(without("horizon"), says="lasts")
 def min_coast(vehicle: Vehicle, engine: Engine) -> None:
     """No trim lasts less than asked: longer than the shortest one of the plan without it."""
     motion = found(base(vehicle))
@@ -710,42 +748,44 @@ def _cheapest(vehicle: Vehicle, engine: Engine, cost: Cost, **changes: object) -
     return result
 
 
-@feature(without("cost"))
+@feature(without("cost"), says="cost: ")
 def effort(vehicle: Vehicle, engine: Engine) -> None:
     _ = _cheapest(vehicle, engine, Cost(effort=1.0, time=0.1))
 
 
-@feature(without("cost"))
+@feature(without("cost"), says="cost: ")
 def length(vehicle: Vehicle, engine: Engine) -> None:
     _ = _cheapest(vehicle, engine, Cost(length=1.0, time=0.01))
 
 
-@feature(without("cost"))
+@feature(without("cost"), says="cost: ")
 def norm(vehicle: Vehicle, engine: Engine) -> None:
     _ = _cheapest(vehicle, engine, Cost(norm=1.0, time=0.1))
 
 
-@feature(without("cost"))
+@feature(without("cost"), says="cost: ")
 def switch_price(vehicle: Vehicle, engine: Engine) -> None:
     _ = _cheapest(vehicle, engine, Cost(time=1.0, switch=0.05 * base(vehicle).cost))
 
 
-@feature(without("cost"))
+@feature(without("cost"), says="cost: ")
 def dear_switch(vehicle: Vehicle, engine: Engine) -> None:
     _ = _cheapest(vehicle, engine, Cost(time=1.0, switch=3.0 * base(vehicle).cost))
 
 
-@feature(without("cost"))
+@feature(without("cost"), says="cost: ")
 def dear_switch_among_obstacles(vehicle: Vehicle, engine: Engine) -> None:
     cost = Cost(time=1.0, switch=3.0 * base(vehicle).cost)
     result = asked(vehicle, engine, cost=cost, obstacles=[pillar(vehicle)])
     no_dearer(result, cost_of(cost, found(passing(vehicle))), "the quickest plan", share=SAMPLED)
 
 
-@feature(without("cost"), on="car", applies=lambda vehicle: vehicle.reverses)
+@feature(without("cost"), on="car", applies=lambda vehicle: vehicle.reverses, says="cost: ")
 def direction_price(vehicle: Vehicle, engine: Engine) -> None:
     """To the side, where a vehicle that drives back and forth changes its direction."""
-    goal = vehicle.target(pose=[0.1 * vehicle.reach, 0.3 * vehicle.reach, 0.0])
+    pose = np.zeros(len(vehicle.goal))
+    pose[:2] = 0.1 * vehicle.reach, 0.3 * vehicle.reach
+    goal = vehicle.target(pose=pose)
     quick = asked(vehicle, PACKAGE, goals=goal)
     cost = Cost(time=1.0, direction_change=0.3 * quick.cost)
     result = asked(vehicle, engine, goals=goal, cost=cost)
@@ -760,7 +800,7 @@ class Calm:
 
     def rates(self, controls: np.ndarray, body_velocities: np.ndarray) -> np.ndarray:
         del controls
-        return 1.0 + self.turning * np.abs(body_velocities[..., 2])
+        return 1.0 + self.turning * np.abs(outside.flat(body_velocities)[..., 2])
 
     def switching(self, body_velocities: np.ndarray) -> float:
         del body_velocities
@@ -768,14 +808,14 @@ class Calm:
 
     def of(self, motion: Plan) -> float:
         course = fine_turns(motion)
-        return course.duration + self.turning * float(np.abs(np.diff(course.pose[:, 2])).sum())
+        return course.duration + self.turning * float(np.abs(np.diff(course.flat[:, 2])).sum())
 
 
 def fine_turns(motion: Plan) -> Course:
     return Course.of(motion, step_rad=0.002)
 
 
-@feature(without("cost"))
+@feature(without("cost"), says="cost: ")
 def stage_cost(vehicle: Vehicle, engine: Engine) -> None:
     """A user's own cost is what the plan costs, and it is no dearer than the quickest plan."""
     cost: StageCost = Calm(0.3 * base(vehicle).cost)
@@ -812,12 +852,12 @@ def _different(vehicle: Vehicle, engine: Engine, **changes: object) -> None:
     assert not same, f"plans {same[0][0]} and {same[0][1]} are the same motion"
 
 
-@feature(Engine(plan=_one_motion))
+@feature(Engine(plan=_one_motion), says="are the same motion")
 def alternatives(vehicle: Vehicle, engine: Engine) -> None:
     _different(vehicle, engine)
 
 
-@feature(Engine(plan=_one_motion))
+@feature(Engine(plan=_one_motion), says="are the same motion")
 def alternatives_among_obstacles(vehicle: Vehicle, engine: Engine) -> None:
     _different(vehicle, engine, obstacles=[pillar(vehicle)])
 
@@ -842,12 +882,12 @@ def _twice(vehicle: Vehicle, engine: Engine, **changes: object) -> None:
     assert np.array_equal(one.plan.primitive_durations, other.plan.primitive_durations)
 
 
-@feature(Engine(plan=_Fickle()))
+@feature(Engine(plan=_Fickle()), says="and then")
 def same_plan_twice(vehicle: Vehicle, engine: Engine) -> None:
     _twice(vehicle, engine)
 
 
-@feature(Engine(plan=_Fickle()))
+@feature(Engine(plan=_Fickle()), says="and then")
 def same_plan_twice_among_obstacles(vehicle: Vehicle, engine: Engine) -> None:
     _twice(vehicle, engine, obstacles=[pillar(vehicle)])
 
@@ -861,7 +901,7 @@ def _answering(**values: object) -> Engine:
     return Engine(plan=planned)
 
 
-@feature(_answering(lower_bound=0.0))
+@feature(_answering(lower_bound=0.0), says="lower bound 0.0")
 def lower_bound(vehicle: Vehicle, engine: Engine) -> None:
     """It is above zero, and below what every known plan costs."""
     result = asked(vehicle, engine)
@@ -871,7 +911,7 @@ def lower_bound(vehicle: Vehicle, engine: Engine) -> None:
     assert result.lower_bound <= base(vehicle).cost * (1.0 + SAME)
 
 
-@feature(_answering(certificate=None))
+@feature(_answering(certificate=None), says="no certificate")
 def certificate(vehicle: Vehicle, engine: Engine) -> None:
     """The smallest reduced cost is given; a quickest plan has none below zero."""
     result = asked(vehicle, engine)
@@ -880,7 +920,7 @@ def certificate(vehicle: Vehicle, engine: Engine) -> None:
     assert -1e-3 * result.cost <= result.certificate <= 1e-6, f"certificate {result.certificate}"
 
 
-@feature(without("obstacles"))
+@feature(without("obstacles"), says="clearance")
 def planner(vehicle: Vehicle, engine: Engine) -> None:
     """Used again, for other ends and another map, it gives the plans of `plan`."""
     common: dict[str, Any] = {"footprint": vehicle.footprint, "search": vehicle.problem().search}
@@ -904,7 +944,7 @@ def _short_of_words(
     return Planner(automaton, obstacles=obstacles, footprint=footprint, search=search)
 
 
-@feature(Engine(planner=_short_of_words), on="car")
+@feature(Engine(planner=_short_of_words), on="car", says="m/s in a zone")
 def planner_with_all(vehicle: Vehicle, engine: Engine) -> None:
     """It takes parts, zones, a start trim and the height of the body."""
     zone = Zone(shape=Box([1.5 * vehicle.size] * 2, midway(vehicle)[:2]), max_speed=_slow(vehicle))
@@ -948,12 +988,12 @@ def _moves(vehicle: Vehicle, engine: Engine, **changes: object) -> None:
     obeys(vehicle, problem.moved(group_of(len(by))(by)), other)
 
 
-@feature(Engine(plan=_still))
+@feature(Engine(plan=_still), says="cost of the moved plan")
 def moved_problem(vehicle: Vehicle, engine: Engine) -> None:
     _moves(vehicle, engine)
 
 
-@feature(Engine(plan=_still))
+@feature(Engine(plan=_still), says="cost of the moved plan")
 def moved_problem_among_obstacles(vehicle: Vehicle, engine: Engine) -> None:
     _moves(vehicle, engine, obstacles=[pillar(vehicle)])
 
@@ -962,11 +1002,7 @@ def moved_problem_among_obstacles(vehicle: Vehicle, engine: Engine) -> None:
 
 
 def driven(
-    vehicle: Vehicle,
-    engine: Engine,
-    *,
-    options: Mapping[str, Any] | None = None,
-    **changes: object,
+    vehicle: Vehicle, engine: Engine, *, options: Mapping[str, Any] | None = None, **changes: object
 ) -> ClosedLoop:
     """A loop that reaches the goal, its pieces joined, and all it drove within the problem."""
     problem = vehicle.problem(**changes)
@@ -1006,23 +1042,23 @@ def _lazy(problem: Problem, **options: Any) -> ClosedLoop:
     return simulate(problem, **(options | {"steps": 1}))
 
 
-@feature(Engine(simulate=_lazy))
+@feature(Engine(simulate=_lazy), says="the goal is not reached")
 def loop(vehicle: Vehicle, engine: Engine) -> None:
     ended = driven(vehicle, engine)
     assert ended.cost <= base(vehicle).cost * 1.05, f"it spends {ended.cost:.6g}"
 
 
-@feature(without("obstacles"))
+@feature(without("obstacles"), says="clearance")
 def loop_obstacles(vehicle: Vehicle, engine: Engine) -> None:
     _ = driven(vehicle, engine, obstacles=[pillar(vehicle)])
 
 
-@feature(without("obstacles"))
+@feature(without("obstacles"), says="clearance")
 def loop_moving_obstacles(vehicle: Vehicle, engine: Engine) -> None:
     _ = driven(vehicle, engine, obstacles=[_crossing(vehicle)])
 
 
-@feature(without("zones"))
+@feature(without("zones"), says="m/s in a zone")
 def loop_zones(vehicle: Vehicle, engine: Engine) -> None:
     zone = Zone(shape=Box([1.5 * vehicle.size] * 2, midway(vehicle)[:2]), max_speed=_slow(vehicle))
     _ = driven(vehicle, engine, zones=[zone])
@@ -1032,7 +1068,7 @@ def _undisturbed(problem: Problem, **options: Any) -> ClosedLoop:
     return simulate(problem, **{k: v for k, v in options.items() if k != "disturbance"})
 
 
-@feature(Engine(simulate=_undisturbed))
+@feature(Engine(simulate=_undisturbed), says="nothing was disturbed")
 def loop_noise(vehicle: Vehicle, engine: Engine) -> None:
     """Pushed a little after every step, it still gets there, to within the goal's tolerance."""
     goal = vehicle.target(tolerance_m=0.02 * vehicle.reach, tolerance_rad=0.1)
@@ -1045,7 +1081,7 @@ def loop_noise(vehicle: Vehicle, engine: Engine) -> None:
     assert max(pushed) > 1e-6, "nothing was disturbed"
 
 
-@feature(without("horizon"), on="unicycle")
+@feature(without("horizon"), on="unicycle", says="duration of a step's plan")
 def loop_fixed_time(vehicle: Vehicle, engine: Engine) -> None:
     """As in the paper: every step plans for the same time again, and the value falls to zero."""
     horizon = Horizon(time=_fixed(vehicle))
@@ -1082,12 +1118,12 @@ def _resumed(vehicle: Vehicle, engine: Engine, **changes: object) -> None:
     close(rest.times[0], begun.times[-1], "time")
 
 
-@feature(Engine(load_last=_forgetful))
+@feature(Engine(load_last=_forgetful), says="the steps are not counted on")
 def resume(vehicle: Vehicle, engine: Engine) -> None:
     _resumed(vehicle, engine)
 
 
-@feature(Engine(load_last=_forgetful))
+@feature(Engine(load_last=_forgetful), says="the steps are not counted on")
 def resume_among_obstacles(vehicle: Vehicle, engine: Engine) -> None:
     _resumed(vehicle, engine, obstacles=[pillar(vehicle)])
 
@@ -1102,7 +1138,10 @@ def _unpolished(problem: Problem, **options: Any) -> PlanResult:
 
 
 @feature(
-    Engine(plan=_unpolished), on="second_order_unicycle", applies=lambda vehicle: vehicle.inertia
+    Engine(plan=_unpolished),
+    on="second_order_unicycle",
+    applies=lambda vehicle: vehicle.inertia,
+    says="nothing was polished",
 )
 def polishing(vehicle: Vehicle, engine: Engine) -> None:
     """A motion that the library does not have, cheaper than what it has."""
@@ -1120,7 +1159,7 @@ def _tall(problem: Problem) -> Problem:
     return replace(problem, obstacles=solid)
 
 
-@feature(changed(_tall))
+@feature(changed(_tall), says="the plan without the bridge costs")
 def heights(vehicle: Vehicle, engine: Engine) -> None:
     """Under a bridge it drives on; what hangs lower it goes around, or flies over."""
     height, disc = float(midway(vehicle)[3]) if vehicle.flies else 0.0, pillar(vehicle)

@@ -32,6 +32,11 @@ class Course:
         return cls(samples.time, samples.pose, samples.reduced_state, samples.control)
 
     @property
+    def flat(self) -> np.ndarray:
+        """Planar poses (n, 3); the heading is zero where there is none."""
+        return flat(self.pose)
+
+    @property
     def duration(self) -> float:
         return float(self.time[-1] - self.time[0])
 
@@ -63,7 +68,7 @@ class Course:
     def forward(self) -> np.ndarray:
         """Speed (n - 1,) along the body's own axis, by differences [m/s]; NaN where no time is."""
         step = np.diff(self.pose[:, :2], axis=0)
-        middle = (self.pose[1:, 2] + self.pose[:-1, 2]) / 2.0
+        middle = (self.flat[1:, 2] + self.flat[:-1, 2]) / 2.0
         along = step[:, 0] * np.cos(middle) + step[:, 1] * np.sin(middle)
         return _ratio(along, self.lasting)
 
@@ -82,6 +87,13 @@ class Course:
 def _ratio(way: np.ndarray, time: np.ndarray) -> np.ndarray:
     lasting = time > 1e-12
     return np.where(lasting, way / np.where(lasting, time, 1.0), np.nan)
+
+
+def flat(pose: np.ndarray) -> np.ndarray:
+    """Planar poses (..., 3) of poses, or of twists: zero turns where there are none."""
+    if pose.shape[-1] > 2:
+        return pose[..., :3]
+    return np.concatenate([pose, np.zeros((*pose.shape[:-1], 1))], axis=-1)
 
 
 def solid(shape: Shape) -> shapely.Geometry:
@@ -117,9 +129,9 @@ def bodies(
     A trailer's axle is `hitch_length` [m] behind the vehicle's, its heading less by the first
     component of the reduced state.
     """
-    columns = [_along(shape, course.pose[:, :3]) for shape in footprint]
+    columns = [_along(shape, course.flat) for shape in footprint]
     for shapes in (parts or {}).values():
-        heading = course.pose[:, 2] - course.state[:, 0]
+        heading = course.flat[:, 2] - course.state[:, 0]
         behind = hitch_length * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
         frames = np.column_stack([course.pose[:, :2] - behind, heading])
         columns += [_along(shape, frames) for shape in shapes]
@@ -200,7 +212,7 @@ def outside_bounds(course: Course, bounds: Bounds) -> float:
 def off_goal(pose: np.ndarray, goal: Goal) -> tuple[float, float]:
     """Distance [m] and difference of headings modulo a turn [rad] between a pose and a goal."""
     places = [0, 1, *range(3, len(pose))]
-    turn = math.remainder(float(pose[2] - goal.pose[2]), 2.0 * math.pi)
+    turn = math.remainder(float(flat(pose)[2] - flat(goal.pose)[2]), 2.0 * math.pi)
     return float(np.linalg.norm((pose - goal.pose)[places])), abs(turn)
 
 
@@ -221,6 +233,6 @@ def repeated(plans: Sequence[Plan], *, tolerance: float) -> Iterator[tuple[int, 
 
 def moved(pose: np.ndarray, by: np.ndarray) -> np.ndarray:
     """Poses (..., 3 or 4) moved by a motion (3 or 4,) of the plane or of space."""
-    place = _placed(np.asarray(pose)[..., :2].reshape(-1, 2), by).reshape(*pose.shape[:-1], 2)
+    place = _placed(pose[..., :2].reshape(-1, 2), flat(by)).reshape(*pose.shape[:-1], 2)
     rest = pose[..., 2:] + by[2:]
     return np.concatenate([place, rest], axis=-1)

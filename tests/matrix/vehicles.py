@@ -53,6 +53,11 @@ class Vehicle:
         return _library(self.library)
 
     @property
+    def has_heading(self) -> bool:
+        """Whether its poses have a heading."""
+        return len(self.goal) > 2
+
+    @property
     def reach(self) -> float:
         """Distance [m] from the start to the goal in the plane."""
         return float(np.hypot(*self.goal[:2]))
@@ -237,17 +242,9 @@ def _stock(name: str) -> Callable[[], Automaton]:
 
 
 ALL = (
+    Vehicle(name="unicycle", library=_unicycle, footprint=(Box([0.5, 0.3]),), goal=(4.0, 1.0, 0.5)),
     Vehicle(
-        name="unicycle",
-        library=_unicycle,
-        footprint=(Box([0.5, 0.3]),),
-        goal=(4.0, 1.0, 0.5),
-    ),
-    Vehicle(
-        name="car",
-        library=_car,
-        footprint=(Box([1.4, 0.6], [0.5, 0.0]),),
-        goal=(8.0, 2.0, 0.5),
+        name="car", library=_car, footprint=(Box([1.4, 0.6], [0.5, 0.0]),), goal=(8.0, 2.0, 0.5)
     ),
     Vehicle(
         name="dubins",
@@ -257,18 +254,9 @@ ALL = (
         reverses=False,
     ),
     Vehicle(
-        name="grid",
-        library=_grid,
-        footprint=(Box([0.6, 0.4]),),
-        goal=(5.0, 2.0, 0.5),
-        slow=1.0,
+        name="grid", library=_grid, footprint=(Box([0.6, 0.4]),), goal=(5.0, 2.0, 0.5), slow=1.0
     ),
-    Vehicle(
-        name="boat",
-        library=_boat,
-        footprint=(Box([0.8, 0.4]),),
-        goal=(7.0, 2.0, 0.5),
-    ),
+    Vehicle(name="boat", library=_boat, footprint=(Box([0.8, 0.4]),), goal=(7.0, 2.0, 0.5)),
     Vehicle(
         name="glider",
         library=_glider,
@@ -277,12 +265,7 @@ ALL = (
         reverses=False,
         flies=True,
     ),
-    Vehicle(
-        name="omni",
-        library=_omni,
-        footprint=(Box([0.6, 0.4]),),
-        goal=(4.0, 1.5, 0.5),
-    ),
+    Vehicle(name="omni", library=_omni, footprint=(Box([0.6, 0.4]),), goal=(4.0, 1.5, 0.5)),
     Vehicle(
         name="second_order_unicycle",
         library=_stock("second_order_unicycle"),
