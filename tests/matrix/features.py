@@ -1159,10 +1159,15 @@ def _tall(problem: Problem) -> Problem:
     return replace(problem, obstacles=solid)
 
 
-@feature(changed(_tall), says="the plan without the bridge costs")
+@feature(
+    changed(_tall),
+    says="the plan without the bridge costs",
+    on="helicopter",
+    applies=lambda vehicle: vehicle.flies,
+)
 def heights(vehicle: Vehicle, engine: Engine) -> None:
-    """Under a bridge it drives on; what hangs lower it goes around, or flies over."""
-    height, disc = float(midway(vehicle)[3]) if vehicle.flies else 0.0, pillar(vehicle)
+    """It flies on under a bridge; what hangs lower it avoids."""
+    height, disc = float(midway(vehicle)[3]), pillar(vehicle)
     body = (-0.5, 0.5)
     over = Obstacle(disc, height=(height + 2.0, height + 3.0))
     under = asked(vehicle, engine, obstacles=[over], body_height=body)
