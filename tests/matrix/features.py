@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import shapely
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import (
@@ -40,7 +39,7 @@ from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
 from maneuver_automaton.receding_horizon import ClosedLoop, Disturbance, simulate
 from tests.matrix import outside
-from tests.matrix.outside import Course
+from tests.matrix.outside import Bodies, Course
 from tests.matrix.vehicles import Vehicle
 
 TIME_LIMIT = 20.0  # [s] the work is limited by expansions; this is for what does not count any
@@ -240,14 +239,15 @@ def hitch_length(vehicle: Vehicle) -> float:
     return float(getattr(vehicle.automaton.model, "hitch_length", 0.0))
 
 
-def around(vehicle: Vehicle, course: Course, footprint: Sequence[Shape]) -> np.ndarray:
+def around(vehicle: Vehicle, course: Course, footprint: Sequence[Shape]) -> Bodies:
     """Geometries of the vehicle and what it carries along a course."""
     return outside.bodies(course, footprint, vehicle.parts, hitch_length=hitch_length(vehicle))
 
 
 def fine(vehicle: Vehicle, motion: Plan) -> Course:
     """Samples a small share of the body apart."""
-    return Course.of(motion, step_m=min(0.1 * vehicle.size, 0.1), step_rad=0.02)
+    step = min(0.1 * vehicle.size, 0.1)
+    return Course.driven(motion, vehicle.automaton.model, step_m=step)
 
 
 def obeys(
@@ -299,7 +299,7 @@ def _lasts(problem: Problem, motion: Plan) -> None:
             assert time >= horizon.min_coast - EXACT, f"{trim.name!r} lasts {time:.6g} s"
 
 
-def _keeps_to(zone: Zone, vehicle: Vehicle, course: Course, bodies: np.ndarray) -> None:
+def _keeps_to(zone: Zone, vehicle: Vehicle, course: Course, bodies: Bodies) -> None:
     """Speeds between two samples in a zone, by a little, are those it admits."""
     there = outside.inside(bodies, zone.shape, depth=0.01 * vehicle.size)
     both = there[1:] & there[:-1] & (course.lasting > 1e-12)
@@ -607,13 +607,11 @@ def carried_parts(vehicle: Vehicle, engine: Engine) -> None:
     _ = asked(vehicle, engine, goals=goal, obstacles=[spots[len(spots) // 2]])
 
 
-def _just_beside(
-    vehicle: Vehicle, pose: np.ndarray, bodies: np.ndarray, side: float
-) -> Iterator[Disc]:
+def _just_beside(vehicle: Vehicle, pose: np.ndarray, bodies: Bodies, side: float) -> Iterator[Disc]:
     """A small disc beside a pose which all bodies of a course just miss, if there is one."""
     for offset in np.linspace(0.1, 2.0, 96) * vehicle.size:
         disc = Disc(0.05 * vehicle.size, pose[:2] + side * offset * _left(float(pose[2])))
-        if float(shapely.distance(bodies, outside.solid(disc)).min()) > 0.005 * vehicle.size:
+        if float(bodies.gap(*outside.solid(disc)).min()) > 0.005 * vehicle.size:
             yield disc
             return
 

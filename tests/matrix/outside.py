@@ -10,10 +10,10 @@ import numpy as np
 import shapely
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.collision import AnyObstacle, Box, Disc, OccupancyMap, Polygon, Shape
+from maneuver_automaton.collision import AnyObstacle, Box, Disc, OccupancyMap, Shape
+from maneuver_automaton.models import Model
+from maneuver_automaton.primitives import Maneuver, Trajectory
 from maneuver_automaton.problem import Bounds, Goal
-
-ROUND = 32  # segments of a quarter of a disc
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +30,28 @@ class Course:
         """Samples of a plan, closer than both steps."""
         samples = plan.sample(max_step_m=step_m, max_step_rad=step_rad)
         return cls(samples.time, samples.pose, samples.reduced_state, samples.control)
+
+    @classmethod
+    def driven(cls, plan: Plan, model: Model, *, step_m: float, step_rad: float = 0.02) -> Course:
+        """Samples of a plan whose maneuvers are driven again, from one of their samples on.
+
+        Between those the plan says where it is by constant twists, which is a little off.
+        """
+        if not any(plan.maneuvers):
+            return cls.of(plan, step_m=step_m, step_rad=step_rad)
+        columns: list[tuple[np.ndarray, ...]] = []
+        begin = plan.start_time
+        for primitive, lasting in zip(plan.primitives, plan.primitive_durations, strict=True):
+            if isinstance(primitive, Maneuver):
+                assert primitive.course is not None
+                time, pose, state, control = _driven(primitive.course, model, step_m)
+            else:
+                alone = Plan(np.zeros_like(plan.start), (primitive,), durations=[lasting])
+                one = cls.of(alone, step_m=step_m, step_rad=step_rad)
+                time, pose, state, control = one.time, one.pose, one.state, one.control
+            columns.append((begin + time, moved(pose, plan.pose_at(begin)), state, control))
+            begin += lasting
+        return cls(*(np.concatenate(parts) for parts in zip(*columns, strict=True)))
 
     @property
     def flat(self) -> np.ndarray:
@@ -96,17 +118,79 @@ def flat(pose: np.ndarray) -> np.ndarray:
     return np.concatenate([pose, np.zeros((*pose.shape[:-1], 1))], axis=-1)
 
 
-def solid(shape: Shape) -> shapely.Geometry:
-    """A shape as shapely has it; a disc as a polygon around it."""
+def _driven(course: Trajectory, model: Model, step_m: float) -> tuple[np.ndarray, ...]:
+    """Times, poses, states and controls of a course, every interval integrated from its begin.
+
+    Runge-Kutta of order four, all intervals at once: in each the control is constant.
+    """
+    lasting, control = np.diff(course.time), course.control[:-1]
+    speed = np.abs(model.body_velocity(course.reduced_state, course.control)[:, :2]).max()
+    steps = max(4, math.ceil(float(speed * lasting.max(initial=0.0)) / step_m))
+    size, dof = (lasting / steps)[:, None], course.pose.shape[1]
+
+    def rates(x: np.ndarray) -> np.ndarray:
+        twist = model.body_velocity(x[:, dof:], control)
+        heading = flat(x[:, :dof])[:, 2]
+        cos, sin = np.cos(heading), np.sin(heading)
+        forward, aside = twist[:, 0], twist[:, 1]
+        world = np.stack([cos * forward - sin * aside, sin * forward + cos * aside], axis=-1)
+        return np.hstack([world, twist[:, 2:], model.reduced_dynamics(x[:, dof:], control)])
+
+    x = np.hstack([course.pose, course.reduced_state])[:-1]
+    rows = [x]
+    for _ in range(steps - 1):
+        a = rates(x)
+        b = rates(x + size / 2.0 * a)
+        c = rates(x + size / 2.0 * b)
+        d = rates(x + size * c)
+        x = x + size / 6.0 * (a + 2.0 * b + 2.0 * c + d)
+        rows.append(x)
+    every = np.stack(rows, axis=1).reshape(-1, x.shape[1])
+    last = np.append(course.pose[-1], course.reduced_state[-1])
+    every = np.vstack([every, last])
+    since = size * np.arange(steps)
+    time = np.append((course.time[:-1, None] + since).ravel(), course.time[-1])
+    controls = np.vstack([np.repeat(control, steps, axis=0), course.control[-1:]])
+    return time, every[:, :dof], every[:, dof:], controls
+
+
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """Bodies (n,) made of shapes (k,): all within `radii` [m] of geometries without a radius."""
+
+    shapes: np.ndarray  # (n, k) geometries
+    radii: np.ndarray  # (k,) [m], zero but for discs
+
+    def gap(self, thing: shapely.Geometry | np.ndarray, radius: float = 0.0) -> np.ndarray:
+        """Distance (n,) [m] of each to a geometry, or its own one, with a radius; 0 if it meets."""
+        things = thing[:, None] if isinstance(thing, np.ndarray) else thing
+        apart = shapely.distance(self.shapes, things) - self.radii - radius
+        return np.maximum(apart, 0.0).min(axis=1)
+
+
+def core(shape: Shape) -> tuple[np.ndarray, float]:
+    """Corners (m, 2) and radius [m] of a shape without holes: a disc is a point with a radius."""
     if isinstance(shape, Disc):
-        outside = shape.radius / math.cos(math.pi / (4 * ROUND))
-        return shapely.Point(shape.center).buffer(outside, quad_segs=ROUND)
+        return np.array([shape.center]), shape.radius
     if isinstance(shape, Box):
-        length, width = shape.size / 2.0
-        corners = np.array([[-length, -width], [length, -width], [length, width], [-length, width]])
-        return shapely.Polygon(_placed(corners, np.append(shape.center, shape.heading)))
-    assert isinstance(shape, Polygon)
-    return shapely.Polygon(shape.corners, [np.asarray(hole) for hole in shape.holes])
+        x, y = shape.size / 2.0
+        corners = np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
+        return _placed(corners, np.append(shape.center, shape.heading)), 0.0
+    assert not shape.holes
+    return np.asarray(shape.corners), 0.0
+
+
+def _geometries(corners: np.ndarray) -> np.ndarray:
+    """Points or polygons of corners (..., m, 2)."""
+    if corners.shape[-2] == 1:
+        return np.asarray(shapely.points(corners[..., 0, :]))
+    return np.asarray(shapely.polygons(corners))
+
+
+def solid(shape: Shape) -> tuple[shapely.Geometry, float]:
+    """A shape as a geometry and a radius [m]."""
+    corners, radius = core(shape)
+    return _geometries(corners).item(), radius
 
 
 def _placed(points: np.ndarray, pose: np.ndarray) -> np.ndarray:
@@ -123,51 +207,47 @@ def bodies(
     parts: Mapping[str, Sequence[Shape]] | None = None,
     *,
     hitch_length: float = 0.0,
-) -> np.ndarray:
-    """Geometries (n, shapes) of the body along a course, its trailer included.
+) -> Bodies:
+    """The body along a course (n,), its trailer included.
 
     A trailer's axle is `hitch_length` [m] behind the vehicle's, its heading less by the first
     component of the reduced state.
     """
-    columns = [_along(shape, course.flat) for shape in footprint]
+    placed = [(core(shape), course.flat) for shape in footprint]
     for shapes in (parts or {}).values():
         heading = course.flat[:, 2] - course.state[:, 0]
         behind = hitch_length * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
         frames = np.column_stack([course.pose[:, :2] - behind, heading])
-        columns += [_along(shape, frames) for shape in shapes]
-    return np.stack(columns, axis=-1)
-
-
-def _along(shape: Shape, poses: np.ndarray) -> np.ndarray:
-    ring = np.asarray(shapely.get_coordinates(solid(shape).exterior))[:-1]
-    return np.asarray(shapely.polygons(_placed(ring, poses)))
+        placed += [(core(shape), frames) for shape in shapes]
+    columns = [_geometries(_placed(corners, poses)) for (corners, _), poses in placed]
+    return Bodies(np.stack(columns, axis=-1), np.array([radius for (_, radius), _ in placed]))
 
 
 def clearances(
     course: Course,
-    around: np.ndarray,
+    around: Bodies,
     obstacles: Sequence[AnyObstacle],
     *,
     body_height: tuple[float, float] = (0.0, 0.0),
 ) -> np.ndarray:
-    """Least distance (n,) [m] of a body `around` its poses (n, shapes) to obstacles.
+    """Least distance (n,) [m] of bodies along a course to obstacles.
 
     Zero where they overlap, infinite without obstacles; one at another height is none.
     """
     least = np.full(len(course.time), np.inf)
     for obstacle in obstacles:
         if isinstance(obstacle, OccupancyMap):
-            least = np.minimum(least, _nearest(around, _blocked(obstacle)))
+            least = np.minimum(least, around.gap(_blocked(obstacle)))
             continue
+        corners, radius = core(obstacle.shape)
         if obstacle.motion is None:
-            gap = _nearest(around, solid(obstacle.shape))
+            gap = around.gap(_geometries(corners).item(), radius)
         else:
             place = [
                 np.interp(course.time, obstacle.motion.time, obstacle.motion.pose[:, k])
                 for k in range(3)
             ]
-            moving = _along(obstacle.shape, np.stack(place, axis=-1))
-            gap = shapely.distance(around, moving[:, None]).min(axis=1)
+            gap = around.gap(_geometries(_placed(corners, np.stack(place, axis=-1))), radius)
         if obstacle.height is not None:
             low, high = obstacle.height
             z = course.pose[:, 3] if course.pose.shape[1] > 3 else 0.0
@@ -175,10 +255,6 @@ def clearances(
             gap = np.where(apart, np.inf, gap)
         least = np.minimum(least, gap)
     return least
-
-
-def _nearest(around: np.ndarray, thing: shapely.Geometry) -> np.ndarray:
-    return np.asarray(shapely.distance(around, thing).min(axis=1))
 
 
 def _blocked(cells: OccupancyMap) -> shapely.Geometry:
@@ -192,11 +268,12 @@ def _blocked(cells: OccupancyMap) -> shapely.Geometry:
     return shapely.union_all(squares)
 
 
-def inside(around: np.ndarray, shape: Shape, *, depth: float = 0.0) -> np.ndarray:
-    """Whether any part of a body (n, shapes) is in a shape, by more than `depth` [m]: (n,)."""
-    zone = solid(shape)
-    zone = zone.buffer(-depth) if depth else zone
-    return np.asarray(shapely.intersects(around, zone).any(axis=1))
+def inside(around: Bodies, shape: Shape, *, depth: float = 0.0) -> np.ndarray:
+    """Whether any part of each body is in a shape, by more than `depth` [m]: (n,)."""
+    zone, radius = solid(shape)
+    if radius:
+        return around.gap(zone, radius - depth) == 0.0
+    return around.gap(zone.buffer(-depth)) == 0.0
 
 
 def outside_bounds(course: Course, bounds: Bounds) -> float:
