@@ -384,7 +384,8 @@ def free_heading(vehicle: Vehicle, engine: Engine) -> None:
     result = asked(vehicle, engine, goals=vehicle.target(free_heading=True))
     known = base(vehicle).cost
     no_dearer(result, known, "the plan with the heading")
-    assert result.cost < known * (1.0 - SAME), "the heading is not used"
+    _, turn = outside.off_goal(result.plan.end, vehicle.target())
+    assert turn > SAME or result.cost < known * (1.0 - SAME), "the heading is not used"
 
 
 @feature(
@@ -1043,7 +1044,9 @@ def _lazy(problem: Problem, **options: Any) -> ClosedLoop:
 @feature(Engine(simulate=_lazy), says="the goal is not reached")
 def loop(vehicle: Vehicle, engine: Engine) -> None:
     ended = driven(vehicle, engine)
-    assert ended.cost <= base(vehicle).cost * 1.05, f"it spends {ended.cost:.6g}"
+    promised = ended.steps[0].value
+    if ended.cost > promised * (1.0 + SAME):
+        raise Dearer(f"it spends {ended.cost:.6g}, its first plan cost {promised:.6g}")
 
 
 @feature(without("obstacles"), says="clearance")
