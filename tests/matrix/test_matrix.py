@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from tests.matrix.cells import cells
-from tests.matrix.expected import EXPECTED, QUICK
+from tests.matrix.expected import EXPECTED, QUICK, SLOW_MUTANTS
 from tests.matrix.features import FEATURES
 from tests.matrix.vehicles import VEHICLES
 from tests.search.cases import compiled_only
@@ -30,7 +30,13 @@ def test_a_feature_works_for_a_vehicle(feature, vehicle):
     FEATURES[feature](VEHICLES[vehicle])
 
 
-@pytest.mark.parametrize("name", list(FEATURES))
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] if name in SLOW_MUTANTS else [])
+        for name in FEATURES
+    ],
+)
 def test_a_check_fails_where_its_feature_is_ignored(name):
     feature = FEATURES[name]
     with pytest.raises(AssertionError, match=re.escape(feature.says)):
