@@ -142,15 +142,16 @@ def answer(case: Case) -> dict[str, Any]:
 
 
 def keys(value: Any, at: str = "") -> dict[str, set[str]]:
-    """Every key of a document, with the types of its values; [] stands for all entries of a list.
+    """Every key of a document, with the types of its values.
 
-    Numbers and whole numbers count as one type.
+    [] stands for all entries of a list, [trim] for those of the kind trim. Numbers and whole
+    numbers count as one type.
     """
     if isinstance(value, dict):
         inside = [(f"{at}.{key}" if at else key, one) for key, one in value.items()]
         found = {at: {"object"}} if at else {}
     elif isinstance(value, list):
-        inside = [(f"{at}[]", one) for one in value]
+        inside = [(f"{at}[{_kind(one)}]", one) for one in value]
         found = {at: {"list"}}
     else:
         return {at: {_TYPES[type(value)]}}
@@ -160,6 +161,26 @@ def keys(value: Any, at: str = "") -> dict[str, set[str]]:
     return found
 
 
+def _kind(value: Any) -> str:
+    """The kind of an entry of a list, where it states one."""
+    return str(value.get("kind", "")) if isinstance(value, dict) else ""
+
+
+def differences(before: dict[str, str], now: dict[str, str]) -> dict[str, tuple[Any, Any]]:
+    """Keys that are gone, are new, or have another type, with the types before and now.
+
+    Of what has kinds only those kinds are compared that both hold: whether a plan coasts, or is one
+    maneuver, or breaks a guarantee, is no matter of its format.
+    """
+    found = {}
+    for key in sorted({*before, *now}):
+        ends = [at + len(end) for end in OF_A_KIND if (at := key.find(end)) >= 0]
+        if all(key[:end] in before and key[:end] in now for end in ends):
+            found[key] = (before.get(key), now.get(key))
+    return {key: pair for key, pair in found.items() if pair[0] != pair[1]}
+
+
+OF_A_KIND = ("[trim]", "[maneuver]", "broken_guarantees[]")
 _TYPES = {bool: "bool", int: "number", float: "number", str: "text", type(None): "null"}
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.goldens.documents import KEYS, all_cases, answer, keys, unpacked
+from tests.goldens.documents import KEYS, all_cases, answer, differences, keys, unpacked
 from tests.goldens.measured import kept, params
 from tests.search.cases import compiled_only
 
@@ -12,7 +12,7 @@ CASES = all_cases()
 
 
 def test_keys_are_told_with_their_types():
-    document = {"a": 1, "b": [{"c": None}, {"c": "x", "d": True}], "e": []}
+    document = {"a": 1, "b": [{"c": None}, {"c": "x", "d": True}], "e": [{"kind": "trim"}]}
     assert keys(document) == {
         "a": {"number"},
         "b": {"list"},
@@ -20,6 +20,8 @@ def test_keys_are_told_with_their_types():
         "b[].c": {"null", "text"},
         "b[].d": {"bool"},
         "e": {"list"},
+        "e[trim]": {"object"},
+        "e[trim].kind": {"text"},
     }
 
 
@@ -33,6 +35,17 @@ def test_the_file_has_the_same_keys(name):
     before, now = unpacked(kept("documents"), name), answer(CASES[name])
     for key in ("exit", "file", "status"):
         assert now[key] == before[key], key
-    gone = {key: kind for key, kind in before["keys"].items() if now["keys"].get(key) != kind}
-    new = {key: kind for key, kind in now["keys"].items() if before["keys"].get(key) != kind}
-    assert (gone, new) == ({}, {})
+    assert differences(before["keys"], now["keys"]) == {}
+
+
+def test_kinds_that_one_document_lacks_are_left_out():
+    plan = {"p": "list", "p[trim]": "object", "p[trim].control": "list"}
+    other = {"p": "list", "p[maneuver]": "object", "p[maneuver].control": "null"}
+    assert differences(plan, other) == {}
+    assert differences(plan, plan | {"p[trim].control": "null"}) == {
+        "p[trim].control": ("list", "null")
+    }
+    assert differences(plan, {"p": "list", "p[trim]": "object"}) == {
+        "p[trim].control": ("list", None)
+    }
+    assert differences({"a": "text"}, {"b": "text"}) == {"a": ("text", None), "b": (None, "text")}
