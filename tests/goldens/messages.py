@@ -1,0 +1,217 @@
+"""Inputs that cannot be used, and the whole message and exit code that each of them gets."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import maneuver_automaton as ma
+from maneuver_automaton.cli import run
+from tests.inertia import unicycle_automaton
+from tests.scenario.files import SCENARIO, but, grid
+from tests.scenario.files import automaton as library
+
+UNIT = "{min: -1, max: 1, step: 1}"
+LOOP = SCENARIO + "receding_horizon: {step_s: 0.5}\n"
+FIXED = SCENARIO.replace("time_s: free", "time_s: 4.0")
+
+
+def _obstacle(text: str) -> str:
+    return f"{SCENARIO}obstacles:\n  - {text}\n"
+
+
+def _vehicle(text: str) -> str:
+    return but("{model: unicycle}", text)
+
+
+# Scenario files, read by `plan`.
+FILES: dict[str, str] = {
+    "unknown key": but("name: A case", "nam: A case"),
+    "unknown key inside": but("max_trims: 4", "max_trim: 4"),
+    "wrong schema": but("schema: 1", "schema: 2"),
+    "no goal": but("goal: {pose: [1.0, 1.0, 0.0]}\n", ""),
+    "no pose": but("goal: {pose: [1.0, 1.0, 0.0]}", "goal: {tolerance_m: 0.1}"),
+    "pose too short": but("goal: {pose: [1.0, 1.0, 0.0]}", "goal: {pose: [1.0, 1.0]}"),
+    "pose with height": but("goal: {pose: [1.0, 1.0, 0.0]}", "goal: {pose: [1, 1, 0, 2]}"),
+    "pose that is nan": but("goal: {pose: [1.0, 1.0, 0.0]}", "goal: {pose: [.nan, 1, 0]}"),
+    "trim of the goal": but("1.0, 0.0]}\ncost", "1.0, 0.0], trim: spinn}\ncost"),
+    "control of a word": but("control: [0.0, 1.0]", "control: abc"),
+    "two trims of a name": but("name: spin", "name: ahead"),
+    "unknown preset": library("preset: dubbins"),
+    "library that is missing": library("file: nowhere.json"),
+    "grid of one axis": grid(f"[{UNIT}]"),
+    "grid that is huge": grid(f"[{{min: -1, max: 1, count: 100001}}, {UNIT}]"),
+    "unknown model": _vehicle("{model: tank}"),
+    "car without wheelbase": _vehicle("{model: car}"),
+    "beyond the limits": _vehicle("{model: unicycle, max_speed_m_s: 0.5}"),
+    "footprint of no area": _vehicle("{model: unicycle, footprint: {rectangle_m: [1, 0]}}"),
+    "negative weight": but("effort: 1.0", "effort: -1.0"),
+    "all weights zero": but("effort: 1.0", "effort: 0.0"),
+    "time and greatest time": but("time_s: free", "time_s: 8.0, max_time_s: 9.0"),
+    "time of zero": but("time_s: free", "time_s: 0"),
+    "unknown method": but("time_limit_s: 5.0", "method: astar"),
+    "obstacle that crosses itself": _obstacle("{polygon_m: [[0, 0], [2, 2], [2, 0], [0, 3]]}"),
+    "obstacle of two kinds": _obstacle("{disc_m: {center: [3, 0], radius: 1}, map: a.yaml}"),
+    "motion backwards": _obstacle(
+        "{disc_m: {center: [3, 0], radius: 1}, motion: [[0, 0, 0, 0], [0, 1, 0, 0]]}"
+    ),
+    "map that is missing": _obstacle("{map: nowhere.yaml}"),
+    "bounds reversed": SCENARIO + "bounds_m: {x: [5, -5]}\n",
+    "loop without a step": SCENARIO + "receding_horizon: {steps: 12}\n",
+    "the key twice": SCENARIO + "name: again\n",
+    "empty": "",
+}
+
+# Command lines; the folder holds x.yaml, a scenario, and loop.yaml, one with a closed loop.
+COMMANDS: dict[str, list[str]] = {
+    "no such file": ["plan", "nowhere.yaml"],
+    "time limit of zero": ["plan", "x.yaml", "--time-limit", "0"],
+    "a scenario beside a scenario": ["plan", "x.yaml", "--with", "x.yaml"],
+    "a case that is not there": ["plan", "x.yaml", "--case", "1"],
+    "no closed loop": ["mpc", "x.yaml"],
+    "resume and seeds": ["mpc", "loop.yaml", "--resume", "a.json", "--seeds", "2"],
+    "resume from nothing": ["mpc", "loop.yaml", "--resume", "a.json"],
+    "out is a file": ["plan", "x.yaml", "--out", "x.yaml"],
+    "no such plan": ["plot", "plan.json"],
+    "convert to what is not written": ["convert", "x.yaml", "x.csv"],
+    "check nothing": ["check", "nowhere.yaml"],
+    "show nothing": ["automaton", "show", "nowhere.json"],
+    "a folder of nothing": ["plan", "empty"],
+    "a step longer than the horizon": ["mpc", "long.yaml"],
+}
+
+# Wrong usage: only the exit code is kept, the words are those of the library that parses it.
+USAGE: dict[str, list[str]] = {
+    "no command": [],
+    "unknown command": ["plam"],
+    "no file": ["plan"],
+    "unknown option": ["plan", "x.yaml", "--bad"],
+    "no whole number": ["mpc", "loop.yaml", "--steps", "two"],
+}
+
+
+def _robot() -> ma.Automaton:
+    return ma.Automaton.of_controls(ma.Unicycle(), {"rest": (0, 0), "ahead": (1, 0)})
+
+
+def _problem(**changed: Any) -> ma.Problem:
+    return ma.Problem(_robot(), [0, 0, 0], [1, 0, 0], **changed)
+
+
+# Calls, and the exception that each raises.
+CALLS: dict[str, Callable[[], Any]] = {
+    "pose of two numbers": lambda: ma.Problem(_robot(), [0, 0], [1, 0, 0]),
+    "goal of four numbers": lambda: ma.Problem(_robot(), [0, 0, 0], [1, 0, 0, 2]),
+    "no goal": lambda: ma.Problem(_robot(), [0, 0, 0], []),
+    "start that is nan": lambda: ma.Problem(_robot(), [np.nan, 0, 0], [1, 0, 0]),
+    "unknown start trim": lambda: _problem(start_trim="ahed"),
+    "margin below zero": lambda: _problem(margin=-0.1),
+    "start time that is infinite": lambda: _problem(start_time=np.inf),
+    "time and greatest time": lambda: ma.Horizon(time=1.0, max_time=2.0),
+    "no trims at all": lambda: ma.Horizon(max_trims=0),
+    "least coasting time below zero": lambda: ma.Horizon(min_coast=-1.0),
+    "cost of nothing": lambda: ma.Cost(),
+    "matrix that is indefinite": lambda: ma.Cost(
+        effort=1.0, effort_matrix=np.array([[1.0, 2.0], [2.0, 1.0]])
+    ),
+    "time limit of zero": lambda: ma.plan(_problem(), time_limit=0.0),
+    "alternatives below zero": lambda: ma.plan(_problem(), alternatives=-1),
+    "unknown method": lambda: ma.SearchSettings(method="astar"),
+    "no expansions": lambda: ma.SearchSettings(max_expansions=0),
+    "bounds reversed": lambda: ma.Bounds(x=(1.0, 0.0)),
+    "tolerance below zero": lambda: ma.Goal(pose=[0, 0, 0], tolerance_m=-1.0),
+    "disc of no size": lambda: ma.Disc(0.0),
+    "polygon of two corners": lambda: ma.Polygon([[0, 0], [1, 1]]),
+    "motion backwards": lambda: ma.Motion([1.0, 0.0], [[0, 0, 0], [1, 0, 0]]),
+    "unknown trim": lambda: _robot().index_of("ahed"),
+    "no trim": lambda: ma.Automaton.of_controls(ma.Unicycle(), {}),
+    "steps of zero": lambda: ma.simulate(_problem(), step=0.5, steps=0),
+    "step of zero": lambda: ma.simulate(_problem(), step=0.0),
+    "step of zero with inertia": lambda: ma.simulate(
+        ma.Problem(unicycle_automaton(), [0, 0, 0], [1, 0, 0]), step=0.0
+    ),
+    "noise below zero": lambda: ma.Disturbance(position_m=-1.0),
+    "unknown stock library": lambda: ma.load_stock_library("hovercrafts"),
+    "plan that is missing": lambda: ma.load_plan("nowhere.json"),
+    "library that is missing": lambda: ma.load_library("nowhere.json"),
+    "bounds that would have to move": lambda: _problem(bounds=ma.Bounds(x=(0.0, 1.0))).moved(
+        ma.SE2([1.0, 0.0, 0.0])
+    ),
+    "part that is not carried": lambda: _problem(parts={"trailer": ma.Disc(1.0)}),
+    "attribute that is not there": lambda: getattr(ma, "plam"),  # noqa: B009
+}
+
+
+@contextlib.contextmanager
+def folder() -> Iterator[Path]:
+    """A current folder of its own, with the files that the commands read."""
+    before = Path.cwd()
+    with tempfile.TemporaryDirectory() as name:
+        os.chdir(name)
+        try:
+            Path("empty").mkdir()
+            Path("x.yaml").write_text(SCENARIO)
+            Path("loop.yaml").write_text(LOOP)
+            Path("long.yaml").write_text(FIXED + "receding_horizon: {step_s: 5.0}\n")
+            yield Path(name)
+        finally:
+            os.chdir(before)
+
+
+def of_command(arguments: list[str]) -> dict[str, Any]:
+    """Exit code, and what is printed where."""
+    out, err = io.StringIO(), io.StringIO()
+    with folder(), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = run(arguments)
+    return {"exit": code, "out": out.getvalue(), "err": err.getvalue()}
+
+
+def of_file(text: str) -> dict[str, Any]:
+    """Exit code and message of `plan` for a scenario file."""
+    err = io.StringIO()
+    with folder(), contextlib.redirect_stderr(err):
+        Path("bad.yaml").write_text(text)
+        code = run(["plan", "bad.yaml", "--quiet", "--no-plot"])
+    return {"exit": code, "err": err.getvalue()}
+
+
+def of_call(call: Callable[[], Any]) -> dict[str, Any]:
+    """Name and message of the exception that a call raises."""
+    with folder():
+        try:
+            call()
+        except Exception as error:  # noqa: BLE001, whatever it is, it is kept
+            return {"error": type(error).__name__, "message": str(error)}
+    return {"error": None, "message": ""}
+
+
+def of_usage(arguments: list[str]) -> dict[str, Any]:
+    """Exit code of a wrong command line."""
+    return {"exit": of_command(arguments)["exit"]}
+
+
+def cases() -> dict[str, Callable[[], dict[str, Any]]]:
+    """What to call for the answer to every bad input, by its name."""
+    kinds: list[tuple[str, dict[str, Any], Callable[[Any], dict[str, Any]]]] = [
+        ("file", FILES, of_file),
+        ("command", COMMANDS, of_command),
+        ("usage", USAGE, of_usage),
+        ("call", CALLS, of_call),
+    ]
+    return {
+        f"{kind}: {name}": lambda answer=answer, given=given: answer(given)
+        for kind, inputs, answer in kinds
+        for name, given in inputs.items()
+    }
+
+
+def recorded() -> dict[str, Any]:
+    """The answers to all of them."""
+    return {name: answer() for name, answer in cases().items()}

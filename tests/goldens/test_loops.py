@@ -1,0 +1,66 @@
+"""Closed loops: the values of their steps, or a cheaper loop; no other guarantee is broken."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.goldens.loops import all_loops
+from tests.goldens.measured import (
+    EQUAL,
+    dearer,
+    driven,
+    kept,
+    params,
+    record_of_loop,
+    share_dearer,
+)
+from tests.search.cases import compiled_only
+
+LOOPS = all_loops()
+KINEMATIC = {name: loop.quick for name, loop in LOOPS.items() if not loop.inertia}
+WITH_INERTIA = {name: loop.quick for name, loop in LOOPS.items() if loop.inertia}
+SHARE = 1e-3  # by which a loop with inertia may be dearer than the cheapest of five
+TRIES = 3
+
+
+def test_every_loop_is_kept_and_no_other():
+    assert list(kept("loops")) == list(LOOPS)
+
+
+def against(name, before, now, *, share: float) -> str:
+    """What is wrong with a later loop, empty if nothing."""
+    if (now["status"], now["reached"]) != (before["status"], before["reached"]):
+        return f"{name}: {now['status']}, was {before['status']}"
+    more = set(now["guarantees"]) - set(before["guarantees"])
+    if more:
+        return f"{name}: broke {', '.join(sorted(more))}"
+    if now["steps"] > before["steps"]:
+        return f"{name}: {now['steps']} steps, were {before['steps']}"
+    most = share + dearer().get(f"loop/{name}", {"share": 0.0})["share"]
+    risen = share_dearer(now["cost"], before["cost"])
+    if risen > most:
+        return f"{name}: cost {now['cost']} is {risen:.3g} dearer than {before['cost']}"
+    return ""
+
+
+@compiled_only
+@pytest.mark.parametrize("name", params(KINEMATIC))
+def test_a_loop_is_the_same_or_cheaper(name):
+    before, now = kept("loops")[name], driven(name)
+    problem = against(name, before, now, share=EQUAL)
+    assert not problem, problem
+    same_cost = abs(share_dearer(now["cost"], before["cost"])) <= EQUAL
+    if same_cost and f"loop/{name}" not in dearer():
+        scale = EQUAL * max(1.0, *before["values"])
+        assert now["values"] == pytest.approx(before["values"], rel=EQUAL, abs=scale)
+
+
+@compiled_only
+@pytest.mark.parametrize("name", params(WITH_INERTIA))
+def test_a_loop_with_inertia_is_not_much_dearer(name):
+    before, problem = kept("loops")[name], ""
+    for _ in range(TRIES):  # the clock decides what a step finds
+        problem = against(name, before, record_of_loop(LOOPS[name].run()), share=SHARE)
+        if not problem:
+            return
+    pytest.fail(problem)
