@@ -372,6 +372,18 @@ class TestCheck:
         assert run(["check", "x.yaml"]) == 1
         assert "NO" in capsys.readouterr().out
 
+    def test_it_says_what_is_known_of_a_goal_without_a_plan(self, folder, capsys):
+        """A narrow slot, and no time to look for a plan: nothing is proven either way."""
+        Path("x.yaml").write_text(
+            SCENARIO.replace("time_limit_s: 5.0", "time_limit_s: 1e-6")
+            + "obstacles: [{box_m: {center: [0.5, 0.5], size: [0.2, 0.2]}}]\n"
+        )
+        assert run(["check", "x.yaml"]) == 0
+        printed = " ".join(capsys.readouterr().out.split())
+        assert "every pose can be reached in free space, by words of any length" in printed
+        assert "not known: no plan within 1e-06 s" in printed
+        assert "which does not prove that there is none" in printed
+
     def test_a_library_of_1681_trims(self, folder):
         assert run(["check", str(SCENARIOS / "grid_1681.yaml")]) == 0
 

@@ -363,3 +363,12 @@ def test_an_animation_on_demand(folder):
     assert run(["mpc", "x.yaml", "--quiet", "--no-plot", "--animate"]) == 0
     assert {"closed_loop.gif", "closed_loop.json"} <= set(files())
     assert "closed_loop.png" not in files()
+
+
+def test_a_closed_loop_has_no_alternatives(folder, capsys):
+    assert run(["mpc", "x.yaml", "--alternatives", "2"]) == 2
+    assert capsys.readouterr().err == (
+        "--alternatives: got 2, but a closed loop keeps one plan a step; leave it out, or ask plan "
+        "for them\n"
+    )
+    assert not Path("out").exists()

@@ -18,6 +18,7 @@ from maneuver_automaton.models import (
     Helicopter,
     Hovercraft,
     LatticeBody,
+    Omnidirectional,
     SecondOrderCar,
     SecondOrderUnicycle,
     SingleTrack,
@@ -90,6 +91,7 @@ MODELS = [
     ),
     AcceleratingCar(wheelbase=2.3, max_steering=0.8, max_speed=3.0, max_acceleration=2.0),
     LatticeBody(resolution=0.1),
+    Omnidirectional(max_speed=1.0, max_lateral_speed=0.5, max_turn_rate=2.0),
     BOAT,
     BALLOON,
 ]

@@ -17,7 +17,7 @@ TOP = (
 )
 MODELS = (
     "unicycle, car, second_order_unicycle, second_order_car, car_with_trailer, single_track, "
-    "hovercraft, helicopter"
+    "hovercraft, helicopter, lattice_body, omnidirectional"
 )
 SECOND_ORDER = (
     "{model: second_order_car, wheelbase_m: 2.8, max_steering_rad: 0.75, max_speed_m_s: 2.5, "
