@@ -201,7 +201,7 @@ def _way(goal: GoalRegion, points: Array, heading: Array, here: int) -> Array:
     if goal.places is None:
         return np.array([-np.inf, np.inf, -np.inf, np.inf])
     way = _extent(outlines_of(goal.places), points[here:], heading[here:])
-    return way + np.array([SPACING * here, SPACING * here, 0.0, 0.0])
+    return np.asarray(way + np.array([SPACING * here, SPACING * here, 0.0, 0.0]))
 
 
 def extent_on(rings: Sequence[Array], route: Route) -> Array:
