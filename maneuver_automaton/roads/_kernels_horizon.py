@@ -24,6 +24,7 @@ PARENT, MANEUVER, TRIM, NEAR = range(4)
 N_NODES, HEAP, KEPT, CHECKS = range(4)
 EMPTY = -1
 STRIP = 1.0  # [m] width of a strip along the route
+TWICE = 2.0  # [m] by which a route may be nearer when it passes a place again
 TRIES = 16  # nodes of a level from which a way to stop is looked for
 IMPOSSIBLE = 1e4  # cost of what cannot be reached any more
 
@@ -489,13 +490,19 @@ def finish(task, horizon, search, first, node, last, shares, controls):
 
 @inner_kernel
 def nearest_of_all(route, x, y):
-    """Index of the point of the route that is nearest."""
-    index, best = 0, math.inf
+    """Index of the point of the route that is nearest.
+
+    Where the route passes a place twice, as at the end of a loop, the first time counts.
+    """
+    best = math.inf
     for k in range(route.point.shape[0]):
         away = math.hypot(x - route.point[k, 0], y - route.point[k, 1])
-        if away < best:
-            index, best = k, away
-    return index
+        best = min(best, away)
+    for k in range(route.point.shape[0]):
+        away = math.hypot(x - route.point[k, 0], y - route.point[k, 1])
+        if away <= best + TWICE:
+            return nearest_point(route, x, y, k)
+    return 0
 
 
 @inner_kernel

@@ -51,6 +51,7 @@ HEAD = (
     "cpu p99 [ms]",
 )
 TYRES = 11.5  # [m/s^2]
+LONGEST = 30.0  # [s] of a plan made before the start
 
 
 def main() -> None:
@@ -73,6 +74,8 @@ def main() -> None:
             drive = drive_scene(planner)
             plan = _plan(scene, RoadVehicle(), arguments.wide)
             rows.append(_row(scene.name, drive, reachable=plan is not None))
+            if not drive.reached:
+                said.append(f"{scene.name}: {drive.reason}")
             wall += [step.solve_s for step in drive.steps]
             cpu += [step.cpu_s for step in drive.steps]
             if plan is None:
@@ -113,8 +116,9 @@ def _row(name: str, drive: RoadDrive, *, reachable: bool) -> list[object]:
 
 def _plan(scene: RoadScene, vehicle: RoadVehicle, wide: int) -> RoadPlan | None:
     """A plan to a goal, or None if the search finds none."""
+    lasting = scene.last_time - scene.start.time
     planner = road_planner(
-        scene, vehicle, RoadSettings(width=wide, horizon_s=scene.last_time - scene.start.time)
+        scene, vehicle, RoadSettings(width=wide, horizon_s=min(lasting, LONGEST))
     )
     plan = planner.search(planner.start_state, tick=0)
     return plan if plan is not None and plan.reaches else None

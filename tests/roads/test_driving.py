@@ -7,8 +7,19 @@ import pytest
 import shapely
 
 import maneuver_automaton as ma
+from maneuver_automaton.collision import Box
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.roads import RoadSettings, drive_scene, judged, plan_road, road_planner
+from maneuver_automaton.roads import (
+    GoalRegion,
+    Lanelet,
+    RoadScene,
+    RoadSettings,
+    RoadStart,
+    drive_scene,
+    judged,
+    plan_road,
+    road_planner,
+)
 from tests.formats.outside import DATA, needs_data
 from tests.roads.files import (
     GOAL,
@@ -75,6 +86,27 @@ def test_a_car_at_rest_with_no_way_on_stands_and_says_so(tmp_path):
     assert all(step.control.tolist() == [0.0, 0.0] for step in stood)
     assert "; no way on was found from " in drive.reason
     assert len(drive.steps) == 40
+
+
+def test_a_goal_behind_the_start_is_reached_around_a_loop(tmp_path):
+    halves = [np.linspace(a, a + np.pi, 33) for a in (-0.5 * np.pi, 0.5 * np.pi)]
+    inner, outer = (
+        [radius * np.stack([np.cos(a), np.sin(a)], axis=-1) for a in halves]
+        for radius in (14.0, 18.0)
+    )
+    lanes = [Lanelet(k, inner[k], outer[k], successors=[1 - k]) for k in range(2)]
+    goal = GoalRegion(places=(Box([4.0, 3.0], [-6.0, -15.0], -0.38),), time=(0.0, 25.0))
+    scene = RoadScene(
+        name="loop",
+        lanelets=tuple(lanes),
+        start=RoadStart(middle=np.array([2.0, -16.0, 0.1]), speed=6.0),
+        goals=(goal,),
+    )
+    drive = driven(scene)
+    assert drive.reached
+    assert drive.verdict.clean
+    turned = drive.driven.pose[-1, 2] - drive.driven.pose[0, 2]
+    assert turned > 1.7 * np.pi
 
 
 def test_why_a_goal_was_missed(tmp_path):
