@@ -49,7 +49,8 @@ def plan_by_words(
             problem=problem, status=status, reason=reason, timing_s=timing, counts=counts
         )
     best = chosen.plans[0]
-    free = found.candidates[0].cost if found.proven else None
+    exact = not any(goal.tolerance_m or goal.tolerance_rad for goal in problem.goals)
+    free = found.candidates[0].cost if found.proven and exact else None
     goal = problem.goals[best.goal_index]
     return found_plans(
         problem,
@@ -190,13 +191,10 @@ def _why_none(
             "the method lattice knows the obstacles"
         )
     impossible = why_impossible(problem)
-    if any(goal.tolerance_m or goal.tolerance_rad for goal in problem.goals):
-        return PlanStatus.NO_PLAN, (
-            "no word was found to end exactly at the goal; what ends within its tolerance "
-            "is not searched for"
-        )
     if impossible:
         return PlanStatus.UNREACHABLE, impossible
+    if any(goal.tolerance_m or goal.tolerance_rad for goal in problem.goals):
+        return PlanStatus.NO_PLAN, "no word was found to end within the tolerance of the goal"
     too_short = _least_time(problem)
     if too_short is not None:
         return too_short

@@ -15,6 +15,7 @@ from maneuver_automaton.planning.free_space import plan_by_words
 from maneuver_automaton.planning.off_lattice import goals_off_lattice
 from maneuver_automaton.planning.result import PlanResult
 from maneuver_automaton.planning.with_inertia import load_inertia, plan_with_inertia
+from maneuver_automaton.planning.within_tolerance import has_tolerance, plan_within_tolerance
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.search.choose import load_search
@@ -59,6 +60,17 @@ def plan(problem: Problem, *, time_limit: float = 5.0, alternatives: int = 0) ->
     if alternatives and uses_lattice(problem):
         load_search(problem)
     began = time.monotonic()
+    if has_tolerance(problem):
+        return plan_within_tolerance(
+            problem, _answered, began=began, time_limit=time_limit, alternatives=alternatives
+        )
+    return _answered(problem, began=began, time_limit=time_limit, alternatives=alternatives)
+
+
+def _answered(
+    problem: Problem, /, *, began: float, time_limit: float, alternatives: int
+) -> PlanResult:
+    """The answer to a problem whose goals are met exactly."""
     blocked = blocked_ends(problem) or goals_off_lattice(problem)
     if blocked is not None:
         return blocked

@@ -46,8 +46,8 @@ def distance_grid(world: World, box: Array, seeds: Array, aim: Array) -> Distanc
 
     Source of the inflation: a pose in a cell is at most half its diagonal from the centre, and a
     disc of the body's inscribed radius around it must be free. A wall between the middles of two
-    neighbours is at most half a diagonal from one of them: it is seen where the radius is a whole
-    one.
+    neighbours is at most half a diagonal from one of them, which is blocked if the radius is a
+    whole diagonal.
     """
     field = world.arrays.field
     low, high = box[:2], box[2:]

@@ -22,25 +22,28 @@ HARDLY_TURNING = 1e-6  # turn rate, as a share of a twist, that is too small to 
 
 def why_impossible(problem: Problem) -> str:
     """Why no word of whatever length can reach any goal, as far as a glance proves it."""
-    reasons = [_impossible(problem, search_setup(problem, goal)) for goal in problem.goals]
+    reasons = [_impossible(problem, goal, search_setup(problem, goal)) for goal in problem.goals]
     return reasons[0] if all(reasons) else ""
 
 
-def _impossible(problem: Problem, setup: SearchSetup) -> str:
+def _impossible(problem: Problem, goal: Goal, setup: SearchSetup) -> str:
+    """Why no word ends within the tolerance of a goal, as far as a glance proves it."""
     if not len(setup.trims):
         return "no trim of the library moves"
-    turn = 0.0 if setup.free_heading else abs(math.remainder(setup.goal[2], 2.0 * math.pi))
+    turn = _turn_to(setup, goal)
     if turn > 1e-9 and not setup.twists[:, 2].any():
         return f"no trim of the library turns, and the goal is {turn:.6g} rad away"
-    if abs(setup.goal[3]) > 1e-9 and not (setup.twists[:, 3] * setup.goal[3] > 0.0).any():
+    climb = abs(setup.goal[3]) - goal.tolerance_m
+    if climb > 1e-9 and not (setup.twists[:, 3] * setup.goal[3] > 0.0).any():
         return f"no trim of the library climbs towards the goal, {setup.goal[3]:.6g} m away"
     directions = setup.twists / np.linalg.norm(setup.twists, axis=1, keepdims=True)
     one_curve = np.linalg.matrix_rank(directions, tol=1e-9) == 1
-    if one_curve and not setup.free_heading and _misses(directions, setup.goal):
+    exact = goal.tolerance_m == goal.tolerance_rad == 0.0 and not setup.free_heading
+    if one_curve and exact and _misses(directions, setup.goal):
         return "all trims of the library move along one and the same curve, which misses the goal"
     limit = problem.horizon.time or problem.horizon.max_time
     if limit is not None:
-        way = float(np.linalg.norm(setup.goal[[0, 1, 3]]))
+        way = _way_to(setup, goal)
         speed = float(np.linalg.norm(setup.twists[:, [0, 1, 3]], axis=1).max())
         turning = float(np.abs(setup.twists[:, 2]).max())
         least = max(way / speed if way else 0.0, turn / turning if turn else 0.0)
@@ -50,6 +53,18 @@ def _impossible(problem: Problem, setup: SearchSetup) -> str:
                 f"way and turn alone take at least {least:.6g} s"
             )
     return ""
+
+
+def _way_to(setup: SearchSetup, goal: Goal) -> float:
+    """Straight way to the nearest place within the tolerance of a goal [m]."""
+    return max(0.0, float(np.linalg.norm(setup.goal[[0, 1, 3]])) - goal.tolerance_m)
+
+
+def _turn_to(setup: SearchSetup, goal: Goal) -> float:
+    """Turn to the nearest heading within the tolerance of a goal [rad]."""
+    if setup.free_heading:
+        return 0.0
+    return max(0.0, abs(math.remainder(setup.goal[2], 2.0 * math.pi)) - goal.tolerance_rad)
 
 
 def _misses(directions: Array, goal: Array) -> bool:
@@ -78,7 +93,7 @@ def _misses(directions: Array, goal: Array) -> bool:
 
 
 def closed_bound(problem: Problem, goal: Goal) -> float:
-    """No plan to `goal` is cheaper, whatever its word.
+    """No plan that ends within the tolerance of `goal` is cheaper, whatever its word.
 
     The largest of: the way at the best price per metre, the turn at the best price per radian, a
     fixed time at the best price per second, and, for a fixed time T, ``k (way^2 + turn^2) / T``
@@ -107,9 +122,7 @@ def closed_bound(problem: Problem, goal: Goal) -> float:
     prices = _prices(problem.automaton, problem.cost, pads)
     if prices is None:
         return 0.0
-    x, y, _, z = setup.goal.tolist()
-    way = math.sqrt(x * x + y * y + z * z)
-    turn = 0.0 if goal.free_heading else abs(math.remainder(float(setup.goal[2]), 2.0 * math.pi))
+    way, turn = _way_to(setup, goal), _turn_to(setup, goal)
     bound = max(
         way * prices.per_metre if way > 0.0 else 0.0,
         turn * prices.per_radian if turn > 0.0 else 0.0,

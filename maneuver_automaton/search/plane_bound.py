@@ -12,7 +12,7 @@ FACTOR = 1.0823922002923938  # an octile way is at most so much longer than the 
 
 
 def plane_bound(query: LatticeQuery) -> float:
-    """No way in the plane from the start to any goal is shorter [m]; 0 where none is known.
+    """No way in the plane from the start to a goal's tolerance is shorter [m]; 0 if unknown.
 
     The shortest way round blocked cells leads over their corners, and among the corners of cells
     an octile way is at most 1.0824 times as long; start and goal are at most half a diagonal from
@@ -33,4 +33,5 @@ def plane_bound(query: LatticeQuery) -> float:
     )
     if not np.isfinite(way):
         return 0.0
-    return max(0.0, way / FACTOR - grid.cell * float(np.sqrt(2.0)))
+    beside = max(query.problem.goals[k].tolerance_m for k in query.goal_index)
+    return max(0.0, way / FACTOR - grid.cell * float(np.sqrt(2.0)) - beside)

@@ -81,7 +81,9 @@ def assert_consistent(result):
         assert min(moving, default=math.inf) >= horizon.min_coast - 1e-9
     slow = check_plan(problem, result.plan, result.goal_index)
     assert slow.passes(problem, result.goal_index), slow
-    assert max(slow.terminal_m, slow.terminal_rad) < 1e-8
+    goal = problem.goals[result.goal_index]
+    assert slow.terminal_m < goal.tolerance_m + 1e-8
+    assert slow.terminal_rad < goal.tolerance_rad + 1e-8
     if problem.obstacles:
         clear = result.clearance_m
         assert clear is None or slow.clearance_m >= clear - 0.11 * clear - 1e-3

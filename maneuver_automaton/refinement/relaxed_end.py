@@ -1,0 +1,239 @@
+"""Let a plan end anywhere within the tolerance of its goal where that is cheaper."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray, wrapped
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.groups import group_of
+from maneuver_automaton.groups.chain import chained
+from maneuver_automaton.problem import Goal, Problem
+
+INSIDE = 1e-7  # share of a tolerance that is left to rounding
+ITERATIONS = 100
+ACCURACY = 1e-12  # of the cost, relative to itself
+NOTHING = 1e-9  # [s] coasting times below it are none
+CLOSING_STEPS = 4
+RANK = 1e-9  # singular values below this, relative, count as none
+
+
+def with_relaxed_end(
+    problem: Problem, plan: Plan, goal: Goal, *, share: float = 1.0, first: int = 0
+) -> Plan | None:
+    """The same word with the cheapest coasting times that end within the tolerance of a goal.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its cost and horizon hold; obstacles, bounds and zones are not looked at.
+    plan : Plan
+        A plan that ends within the tolerance; maneuvers stay as they are.
+    goal : Goal
+    share : float
+        Of the tolerance that may be used.
+    first : int
+        Trim from which on the times may change: what is before stays, and stays collision-free.
+
+    Returns
+    -------
+    Plan or None
+        None where no cheaper times were found.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "left": (0.0, 1.0)})
+    >>> goal = Goal(pose=[2.0, 0.0, 0.0], tolerance_m=0.5)
+    >>> problem = Problem(robot, [0, 0, 0], goal)
+    >>> plan = Plan([0, 0, 0], robot.trims[:1], durations=[2.0])
+    >>> with_relaxed_end(problem, plan, goal).durations.round(6).tolist()
+    [1.5]
+    """
+    if not plan.trims:
+        return None
+    times = _best_times(_Relaxation(problem, plan, goal, share, first))
+    if times is None:
+        return None
+    relaxed = _without_nothing(replace(plan, durations=times))
+    return relaxed if problem.cost_of(relaxed) < problem.cost_of(plan) else None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Relaxation:
+    """A word, and where it may end."""
+
+    problem: Problem
+    plan: Plan
+    goal: Goal
+    share: float
+    first: int
+
+    @property
+    def far(self) -> float:
+        """Distance from the goal that is admitted [m]."""
+        return self.goal.tolerance_m * self.share * (1.0 - INSIDE)
+
+    @property
+    def turned(self) -> float:
+        """Heading off the goal's that is admitted [rad]."""
+        return self.goal.tolerance_rad * self.share * (1.0 - INSIDE)
+
+    @property
+    def total(self) -> float | None:
+        """What the coasting times add up to, if that is fixed [s]."""
+        fixed = self.problem.horizon.time
+        return None if fixed is None else fixed - self._under_way
+
+    @property
+    def most(self) -> float | None:
+        """What the coasting times add up to at most [s]."""
+        most = self.problem.horizon.max_time
+        return None if most is None else most - self._under_way
+
+    @property
+    def _under_way(self) -> float:
+        return sum(one.duration for one in self.plan.maneuvers if one)
+
+    def off(self, times: Array) -> tuple[Array, Array]:
+        """The last pose seen from the goal's place (dof,), and how it follows the times (dof, n).
+
+        Source: product rule, as in `switching_times.closing`.
+        """
+        plan, goal = self.plan, self.goal
+        dof, n = plan.start.size, len(plan.trims)
+        twists = np.array([trim.body_velocity for trim in plan.trims])
+        start = np.array(plan.start)
+        places = [0, 1, *range(3, dof)]
+        start[places] -= goal.pose[places]  # places first, so that no digit is lost
+        steps = np.zeros((2 * n - 1, dof))
+        steps[::2] = group_of(dof).exp(times[:, None] * twists).pose
+        for k, maneuver in enumerate(plan.maneuvers):
+            if maneuver:
+                steps[2 * k + 1] = maneuver.displacement
+        poses = chained(start, steps)
+        after, end = poses[1::2], poses[-1].copy()
+        c, s = np.cos(after[:, 2]), np.sin(after[:, 2])
+        arm = end[:2] - after[:, :2]
+        columns = np.array(twists.T)
+        columns[0] = c * twists[:, 0] - s * twists[:, 1] - twists[:, 2] * arm[:, 1]
+        columns[1] = s * twists[:, 0] + c * twists[:, 1] + twists[:, 2] * arm[:, 0]
+        end[2] = wrapped(end[2] - goal.pose[2])
+        return end, columns
+
+    def exact(self, times: Array) -> tuple[Array, Array]:
+        """What must be zero (m,), and how it follows the times (m, n)."""
+        end, columns = self.off(times)
+        rows = [] if self.far else [0, 1, *range(3, end.size)]
+        if not (self.turned or self.goal.free_heading):
+            rows.append(2)
+        values, jacobian = end[rows], columns[rows]
+        if self.total is not None:
+            values = np.append(values, times.sum() - self.total)
+            jacobian = np.vstack([jacobian, np.ones(times.size)])
+        return values, jacobian
+
+    def room(self, times: Array) -> tuple[Array, Array]:
+        """What must be at least zero (m,), and how it follows the times (m, n)."""
+        end, columns = self.off(times)
+        values, rows = [], []
+        if self.far:
+            places = [0, 1, *range(3, end.size)]
+            square = self.far * self.far
+            values.append(1.0 - float(end[places] @ end[places]) / square)
+            rows.append(-2.0 * end[places] @ columns[places] / square)
+        if self.turned and not self.goal.free_heading:
+            values += [1.0 - end[2] / self.turned, 1.0 + end[2] / self.turned]
+            rows += [-columns[2] / self.turned, columns[2] / self.turned]
+        if self.most is not None:
+            values.append(self.most - float(times.sum()))
+            rows.append(-np.ones(times.size))
+        return np.array(values), np.array(rows).reshape(len(values), times.size)
+
+
+def _best_times(task: _Relaxation) -> Array | None:
+    """The cheapest times; None if the solver found none that keep the conditions."""
+    from scipy.optimize import Bounds, minimize
+
+    plan, horizon = task.plan, task.problem.horizon
+    rates = task.problem.rates_of(plan)
+    scale = max(float(np.abs(rates).max()), 1e-300)
+    moving = np.array([not trim.is_rest for trim in plan.trims])
+    least = np.where(moving & (plan.durations > 0.0), horizon.min_coast, 0.0)
+    longest = np.array([trim.max_duration for trim in plan.trims])
+    if horizon.min_coast > 0.0:  # what is not in the word stays out of it
+        longest = np.where(moving & (plan.durations == 0.0), 0.0, longest)
+    least[: task.first] = longest[: task.first] = plan.durations[: task.first]
+    begin = np.clip(plan.durations, least, longest)
+    rows = _independent(task.exact(begin)[1][:, task.first :])
+    conditions: list[Any] = []
+    if rows.size:
+        conditions.append(
+            {
+                "type": "eq",
+                "fun": lambda t: task.exact(t)[0][rows],
+                "jac": lambda t: task.exact(t)[1][rows],
+            }
+        )
+    if task.room(begin)[0].size:
+        conditions.append(
+            {"type": "ineq", "fun": lambda t: task.room(t)[0], "jac": lambda t: task.room(t)[1]}
+        )
+    solved = minimize(  # type: ignore[call-overload]  # its stubs want one-dimensional types
+        lambda t: float(rates @ t) / scale,
+        begin,
+        jac=lambda t: rates / scale,
+        method="SLSQP",
+        bounds=Bounds(least, longest),
+        constraints=conditions,
+        options={"maxiter": ITERATIONS, "ftol": ACCURACY},
+    )
+    times = np.clip(np.where(solved.x > NOTHING, solved.x, least), least, longest)
+    return _closed(task, times) if np.isfinite(times).all() else None
+
+
+def _independent(jacobian: Array) -> IntArray:
+    """Rows of a matrix (m, n) that span all of them: a straight word cannot change its heading."""
+    from scipy.linalg import qr
+
+    if not jacobian.size:
+        return np.zeros(0, dtype=np.int64)
+    _, r, order = qr(jacobian.T, mode="economic", pivoting=True)
+    sizes = np.abs(np.diag(r))
+    return np.sort(order[: sizes.size][sizes > RANK * max(1.0, float(sizes[0]))]).astype(np.int64)
+
+
+def _closed(task: _Relaxation, times: Array) -> Array | None:
+    """Times near `times` that meet exactly what must be; None if they would be negative."""
+    used = times > 0.0
+    used[: task.first] = False
+    for _ in range(CLOSING_STEPS):
+        values, jacobian = task.exact(times)
+        if not values.size or not used.any():
+            break
+        times = times.copy()
+        times[used] -= np.linalg.lstsq(jacobian[:, used], values, rcond=RANK)[0]
+    room = task.room(times)[0]
+    fine = (times >= 0.0).all() and (not room.size or bool((room >= -math.sqrt(ACCURACY)).all()))
+    return times if fine else None
+
+
+def _without_nothing(plan: Plan) -> Plan:
+    """The plan without trims that last no time, and neighbours that are one trim joined."""
+    if plan.maneuvers:
+        return plan
+    word: list[int] = []
+    lasting: list[float] = []
+    for k, time in enumerate(plan.durations.tolist()):
+        if time == 0.0:
+            continue
+        if word and plan.trims[word[-1]] is plan.trims[k]:
+            lasting[-1] += time
+        else:
+            word.append(k)
+            lasting.append(time)
+    return replace(plan, trims=tuple(plan.trims[k] for k in word), durations=np.array(lasting))
