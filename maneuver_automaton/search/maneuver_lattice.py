@@ -25,6 +25,7 @@ from maneuver_automaton.search.maneuver_word import (
     TRIM,
     ManeuverWord,
     plan_of_word,
+    priced,
     word_of,
 )
 from maneuver_automaton.search.result import SearchStatus
@@ -228,6 +229,7 @@ def maneuver_words(
     deadline: float = math.inf,
     max_expansions: int | None = None,
     better_share: float = 1.0,
+    known: ManeuverWord | None = None,
 ) -> Iterator[Heard]:
     """Words from the start to a goal as they are found, each cheaper than the one before.
 
@@ -244,6 +246,8 @@ def maneuver_words(
         Nodes of all passes together.
     better_share : float
         Of the time that is left when the first word is found: so much is for better ones.
+    known : ManeuverWord, optional
+        A word that is free, with its cost: better ones are searched at once.
     """
     room = 2**62 if max_expansions is None else max_expansions
 
@@ -252,10 +256,13 @@ def maneuver_words(
         return SearchStatus.OUT_OF_BUDGET if over else SearchStatus.EXHAUSTED
 
     grid = _grid(query)
-    word, first, nearest = _first(query, grid, room=room, deadline=deadline)
+    word, first, nearest = known, 0, 0.0
+    if word is None:
+        word, first, nearest = _first(query, grid, room=room, deadline=deadline)
     total = first
     if word is not None:
-        yield Heard(word, first, SearchStatus.FOUND)
+        if known is None:
+            yield Heard(word, first, SearchStatus.FOUND)
         if better_share < 1.0:
             now = time.monotonic()
             deadline = now + better_share * (deadline - now)
@@ -270,6 +277,25 @@ def _grid(query: ManeuverQuery) -> DistanceGrid:
     """Distances in the plane to the goals of a query."""
     own = query.around(query.parts[0], query.plane)
     return distance_grid(own, query.window[0], query.seen_goals, query.seen_start)
+
+
+def quick_word(
+    query: ManeuverQuery,
+    quick: ManeuverQuery,
+    *,
+    deadline: float = math.inf,
+    max_expansions: int | None = None,
+) -> tuple[ManeuverWord | None, int]:
+    """The first word in time for `quick`, the same at the price of time, and expansions.
+
+    Its cost is that at the prices of `query`. Where coasting costs next to nothing, a search by cost alone looks everywhere.
+    """
+    total = 0
+    for heard in maneuver_words(quick, deadline=deadline, max_expansions=max_expansions):
+        total = heard.expansions
+        if heard.word is not None and heard.word.duration <= query.most_time:
+            return priced(query.transfer, heard.word), total
+    return None, total
 
 
 def plan_of(query: ManeuverQuery, word: ManeuverWord) -> Plan:
