@@ -210,7 +210,7 @@ def search_maneuvers(
     total, status = 0, SearchStatus.EXHAUSTED
     for heard in maneuver_words(query, deadline=deadline, max_expansions=max_expansions):
         total, status = heard.expansions, heard.status
-        if heard.word is not None:
+        if heard.word is not None and heard.word.duration <= query.most_time:
             found.append((heard.word, total, time.monotonic() - begun))
             if first_only:
                 break
@@ -233,9 +233,10 @@ def maneuver_words(
 ) -> Iterator[Heard]:
     """Words from the start to a goal as they are found, each cheaper than the one before.
 
-    Passes of greater weight come first; every word is shortened, and later passes are pruned by the
-    best. What is found in a number of expansions is the same at every call; shortcuts are rounds
-    that are not counted. The last thing heard has no word.
+    Where cost is time, the first words may last longer than the query admits: what they are
+    improved to need not. Passes of greater weight come first; every word is shortened, and later
+    passes are pruned by the best. What is found in a number of expansions is the same at every
+    call; shortcuts are rounds that are not counted. The last thing heard has no word.
 
     Parameters
     ----------
@@ -288,7 +289,8 @@ def quick_word(
 ) -> tuple[ManeuverWord | None, int]:
     """The first word in time for `quick`, the same at the price of time, and expansions.
 
-    Its cost is that at the prices of `query`. Where coasting costs next to nothing, a search by cost alone looks everywhere.
+    Its cost is that at the prices of `query`. Where coasting costs next to nothing, a search by
+    cost alone looks everywhere.
     """
     total = 0
     for heard in maneuver_words(quick, deadline=deadline, max_expansions=max_expansions):
