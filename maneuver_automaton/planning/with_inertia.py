@@ -41,11 +41,13 @@ from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
 from maneuver_automaton.search import SearchStatus
 from maneuver_automaton.search.lattice_query import lattice_query
-from maneuver_automaton.search.maneuver_lattice import maneuver_words, plan_of
+from maneuver_automaton.search.maneuver_lattice import maneuver_words, plan_of, quick_word
 from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
+from maneuver_automaton.search.maneuver_query import ManeuverQuery
 from maneuver_automaton.search.maneuver_ready import load_maneuver_kernels
 from maneuver_automaton.search.maneuver_search import maneuver_word_stages
 from maneuver_automaton.search.maneuver_words import load_maneuver_words
+from maneuver_automaton.words.word import Word
 
 FIRST_SHARE = 0.8  # of the time limit, for a first path
 IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
@@ -54,7 +56,7 @@ MANEUVER_SHARE = 0.2  # of what is left, for words of maneuvers where there is a
 AT_ONCE = Patience(attempts=0, passes=0)
 EXPANSIONS_AN_ITERATION = 4  # of the lattice, in place of one iteration of polishing
 WAITS = 9  # at rest, before a path is followed among obstacles that move
-OTHERS = 3  # dearer words that are looked at where bounds or obstacles may refuse the cheapest
+OTHERS = 6  # dearer words that are looked at where bounds or obstacles may refuse the cheapest
 SAME_MOTION = 0.01  # share of their size, and of a turn, by which like motions differ at most
 INSTANTS = 33  # at which two motions are compared
 
@@ -116,6 +118,7 @@ class _Incumbents:
     reason: str = ""
     enclosed: str = ""  # why no plan can exist
     paths: list[Aimed] = field(default_factory=list)  # guesses along kinematic plans
+    late: list[tuple[Plan, int]] = field(default_factory=list)  # refused by the horizon alone
 
     @property
     def left(self) -> float:
@@ -152,7 +155,9 @@ class _Incumbents:
             kept = self._offer(fitted, goal_index)
             if kept:
                 break
-        self.refused = self.refused or against
+        if against:
+            self.refused = self.refused or against
+            self.late.append((plan, goal_index))
         return kept
 
     def _offer(self, plan: Plan, goal_index: int) -> bool:
@@ -220,7 +225,7 @@ def _candidates(found: _Incumbents) -> Iterator[tuple[Plan, int]]:
         yield from _along_paths(found)
     if not problem.automaton.maneuvers:
         return
-    if method in ("words", "insertion") or (method == "auto" and not problem.obstacles):
+    if method in ("words", "insertion") or (method == "auto" and _suits_words(problem)):
         yield from _by_words(found)
     if method in ("auto", "lattice"):
         yield from _over_maneuvers(found)
@@ -229,11 +234,14 @@ def _candidates(found: _Incumbents) -> Iterator[tuple[Plan, int]]:
 def _polish(found: _Incumbents) -> None:
     """Polish kinematic plans of different gears, and what has been found; keep what is cheaper."""
     problem = found.problem
-    if not found.accepted or found.left <= 0.0 or why_not_polished(problem):
+    known = [(one.plan, one.goal_index) for one in found.accepted[:1]]
+    if not known and problem.horizon.max_time is not None:  # what is late may be made quicker
+        known = sorted(found.late, key=lambda one: one[0].duration)[:1]
+    if not known or found.left <= 0.0 or why_not_polished(problem):
         return
-    if not found.accepted[0].plan.duration > 0.0:
+    if not known[0][0].duration > 0.0:
         return  # it is there already
-    aimed = [Aimed(guess_of_plan(found.accepted[0].plan), found.accepted[0].goal_index)]
+    aimed = [Aimed(guess_of_plan(plan), goal_index) for plan, goal_index in known]
     if _rests(problem):
         along = list(guesses_along_paths(problem, time_limit=found.left))
         aimed = along or [*found.paths, *aimed]
@@ -271,12 +279,23 @@ def _over_maneuvers(found: _Incumbents) -> Iterator[tuple[Plan, int]]:
     counted = found.most_work is not None
     share = 1.0 if counted or why_not_polished(problem) else MANEUVER_SHARE
     until = time.monotonic() + (share if found.accepted else 1.0) * found.left
+    known: Word | None = None
+    if _needs_quick_word(problem, query):
+        quick = maneuver_problem_query(replace(problem, cost=Cost(time=1.0)), goals)
+        known, more = quick_word(query, quick, deadline=until, max_expansions=found.most_work)
+        before += more
+        if known is not None:
+            yield plan_of(query, known), query.owner(known)
     for heard in maneuver_words(
-        query, deadline=until, max_expansions=found.most_work, better_share=share
+        query,
+        deadline=until,
+        max_expansions=found.most_work,
+        better_share=share,
+        known=known,
     ):
         found.counts["expansions"] = before + heard.expansions
         if heard.word is not None:
-            owner = heard.word.goal if query.owners is None else int(query.owners[heard.word.goal])
+            owner = query.owner(heard.word)
             plan = plan_of(query, heard.word)
             yield plan, owner
             if problem.goals[owner].free_heading:
@@ -290,6 +309,22 @@ def _over_maneuvers(found: _Incumbents) -> Iterator[tuple[Plan, int]]:
                 found.reason += (
                     f"; the nearest place that was reached is {heard.nearest:.3g} m from the goal"
                 )
+
+
+def _needs_quick_word(problem: Problem, query: ManeuverQuery) -> bool:
+    """Whether a search by cost alone would look everywhere, or for too long motions."""
+    horizon = problem.horizon
+    timed = horizon.time is not None or horizon.max_time is not None
+    return not query.costs_are_times and (timed or query.library.per_metre == 0.0)
+
+
+def _suits_words(problem: Problem) -> bool:
+    """Whether words may be searched first: nothing is in the way, or the time is to be met exactly.
+
+    Where no rest fills a fixed time, words alone have times that add up to it.
+    """
+    rests = problem.first_trim.is_rest or problem.last_trim(problem.goals[0]).is_rest
+    return not problem.obstacles or (problem.horizon.time is not None and not rests)
 
 
 def _by_words(found: _Incumbents) -> Iterator[tuple[Plan, int]]:
@@ -372,7 +407,7 @@ def load_inertia(problem: Problem) -> None:
             load_polishing(problem)
     if problem.automaton.maneuvers:
         load_maneuver_kernels()
-        if not problem.obstacles or problem.search.method in ("words", "insertion"):
+        if _suits_words(problem) or problem.search.method in ("words", "insertion"):
             load_maneuver_words()
 
 

@@ -423,7 +423,7 @@ class _Decision:
         for heard in maneuver_words(query, deadline=self.deadline, max_expansions=most):
             if heard.word is None:
                 continue
-            owner = heard.word.goal if query.owners is None else int(query.owners[heard.word.goal])
+            owner = query.owner(heard.word)
             goal = problem.goals[owner]
             for plan in fitted_plans(problem, plan_of(query, heard.word), goal):
                 whole = plan if done is None or not self.busy else joined(done, plan)

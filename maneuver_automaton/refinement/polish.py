@@ -37,6 +37,7 @@ NEAR = 1.12  # share of the best cost so far up to which free lines are tried
 DEEP_ITERATIONS = 150  # from a guess inside obstacles, before it is led out of them
 SHUFFLE = 6  # changes of gear from which on gears are fixed first
 FIRST_BUILD = 0.3  # [s] that writing a problem down is expected to take
+LONGER = 3  # times the usual iterations, for free lines: among many obstacles they take so many
 FINER = 0.6  # share of the step with which the best is solved once more
 
 
@@ -310,8 +311,11 @@ class _Polishing:
     def _lines(self, number: int, rough: Polished) -> None:
         """Free lines from what fixed planes came to, which counts itself if they fail."""
         if not self._is_over():
-            found = self._solve("lines", number, rough.as_guess)
-            if found.status is SolveStatus.SOLVED and self._consider(found):
+            found = self._solve("lines", number, rough.as_guess, longer=LONGER)
+            # what the solver did not finish may be sound all the same: it is closed and audited
+            cheaper = found.objective < rough.objective
+            unfinished = found.status is SolveStatus.OUT_OF_BUDGET and cheaper
+            if (found.status is SolveStatus.SOLVED or unfinished) and self._consider(found):
                 return
         if self.best is None:
             self._consider(rough)
@@ -345,9 +349,10 @@ class _Polishing:
         elastic: bool = False,
         gears: Array | None = None,
         most: int | None = None,
+        longer: int = 1,
     ) -> Polished:
         began = time.monotonic()
-        settings = self.settings
+        settings = replace(self.settings, max_iterations=longer * self.settings.max_iterations)
         work = self._work_left()
         if work is not None:
             most = max(min(work, settings.max_iterations if most is None else most), 1)

@@ -22,7 +22,7 @@ from maneuver_automaton.search.maneuver_shortcuts import LEAST, shortened
 from maneuver_automaton.search.maneuver_task import Rung, Task, task_of, transfer_steps
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.words.library import Scratch
-from maneuver_automaton.words.word import MANEUVER, TRIM, Word, word_of_steps
+from maneuver_automaton.words.word import MANEUVER, TRIM, Word, with_price, word_of_steps
 from maneuver_automaton.words.word import plan_of as plan_of_word
 
 FIRST_CHUNK = 128  # expansions
@@ -204,7 +204,7 @@ def search_maneuvers(
     total, status = 0, SearchStatus.EXHAUSTED
     for heard in maneuver_words(query, deadline=deadline, max_expansions=max_expansions):
         total, status = heard.expansions, heard.status
-        if heard.word is not None:
+        if heard.word is not None and heard.word.duration <= query.most_time:
             found.append((heard.word, total, time.monotonic() - begun))
             if first_only:
                 break
@@ -223,12 +223,14 @@ def maneuver_words(
     deadline: float = math.inf,
     max_expansions: int | None = None,
     better_share: float = 1.0,
+    known: Word | None = None,
 ) -> Iterator[Heard]:
     """Words from the start to a goal as they are found, each cheaper than the one before.
 
-    Passes of greater weight come first; every word is shortened, and later passes are pruned by the
-    best. What is found in a number of expansions is the same at every call; shortcuts are rounds
-    that are not counted. The last thing heard has no word.
+    Where cost is time, the first words may last longer than the query admits: what they are
+    improved to need not. Passes of greater weight come first; every word is shortened, and later
+    passes are pruned by the best. What is found in a number of expansions is the same at every
+    call; shortcuts are rounds that are not counted. The last thing heard has no word.
 
     Parameters
     ----------
@@ -239,6 +241,8 @@ def maneuver_words(
         Nodes of all passes together.
     better_share : float
         Of the time that is left when the first word is found: so much is for better ones.
+    known : Word, optional
+        A word that is free, with its cost: better ones are searched at once.
     """
     room = 2**62 if max_expansions is None else max_expansions
 
@@ -247,10 +251,13 @@ def maneuver_words(
         return SearchStatus.OUT_OF_BUDGET if over else SearchStatus.EXHAUSTED
 
     grid = _grid(query)
-    word, first, nearest = _first(query, grid, room=room, deadline=deadline)
+    word, first, nearest = known, 0, 0.0
+    if word is None:
+        word, first, nearest = _first(query, grid, room=room, deadline=deadline)
     total = first
     if word is not None:
-        yield Heard(word, first, SearchStatus.FOUND)
+        if known is None:
+            yield Heard(word, first, SearchStatus.FOUND)
         if better_share < 1.0:
             now = time.monotonic()
             deadline = now + better_share * (deadline - now)
@@ -265,6 +272,26 @@ def _grid(query: ManeuverQuery) -> DistanceGrid:
     """Distances in the plane to the goals of a query."""
     own = query.around(query.parts[0], query.plane)
     return distance_grid(own, query.window[0], query.seen_goals, query.seen_start)
+
+
+def quick_word(
+    query: ManeuverQuery,
+    quick: ManeuverQuery,
+    *,
+    deadline: float = math.inf,
+    max_expansions: int | None = None,
+) -> tuple[Word | None, int]:
+    """The first word in time for `quick`, the same at the price of time, and expansions.
+
+    Its cost is that at the prices of `query`. Where coasting costs next to nothing, a search by
+    cost alone looks everywhere.
+    """
+    total = 0
+    for heard in maneuver_words(quick, deadline=deadline, max_expansions=max_expansions):
+        total = heard.expansions
+        if heard.word is not None and heard.word.duration <= query.most_time:
+            return with_price(query.transfer, heard.word), total
+    return None, total
 
 
 def plan_of(query: ManeuverQuery, word: Word) -> Plan:

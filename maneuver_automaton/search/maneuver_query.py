@@ -33,6 +33,7 @@ from maneuver_automaton.search.lattice_query import window_of
 from maneuver_automaton.search.maneuver_library import ManeuverLibrary, maneuver_library
 from maneuver_automaton.search.maneuver_motion import Part
 from maneuver_automaton.words.library import Library
+from maneuver_automaton.words.word import Word
 
 MARGIN = 0.005  # proven clearance of every pose looked at, in half widths of the body
 LEAST_MARGIN = 1e-7  # [m]
@@ -197,6 +198,18 @@ class ManeuverQuery:
     def moves(self) -> bool:
         """Whether an obstacle moves."""
         return bool(self.world.arrays.movers.speed.size)
+
+    @property
+    def searched_time(self) -> float:
+        """Longest time [s] that a search admits: none where cheaper words are quicker ones.
+
+        There a first word may be late, and what it is improved to is in time.
+        """
+        return math.inf if self.costs_are_times else self.most_time
+
+    def owner(self, word: Word) -> int:
+        """Which goal of the problem a word leads to."""
+        return word.goal if self.owners is None else int(self.owners[word.goal])
 
     @property
     def costs_are_times(self) -> bool:

@@ -168,7 +168,7 @@ def _once(
     better = word_of_steps(
         query.transfer, start_trim=int(word.trims[0]), steps=found, targets=targets, goal=word.goal
     )
-    late = better.duration > query.most_time
+    late = better.duration > query.searched_time
     if late or (query.moves and not word_is_free(query, better)):
         return None
     lasting = zip(better.trims, better.durations.tolist(), strict=True)

@@ -91,8 +91,9 @@ def task_of(query: ManeuverQuery, rung: Rung) -> Task:
     edge_window[8] -= library.worst_error
     goal_trims, classes = query.goal_trims, query.transfer.transitions.class_of
     tick = 0.0
-    timed = math.isfinite(query.most_time) and not query.costs_are_times
-    if query.moves or timed:  # a dearer way to a cell may be the one that is in time
+    if query.moves or math.isfinite(
+        query.searched_time
+    ):  # a dearer way to a cell may be the one that is in time
         lengths = library.arrays.quanta[library.arrays.quanta > 0.0]
         tick = rung.quanta * float(lengths.min()) if lengths.size else 1.0
     return Task(
@@ -126,7 +127,7 @@ def task_of(query: ManeuverQuery, rung: Rung) -> Task:
         margin=float(query.margin * rung.margin),
         far=float(world.arrays.field.outside),
         clock=float(query.start_time),
-        most_time=float(query.most_time),
+        most_time=float(query.searched_time),
         window=window,
         edge_window=edge_window,
         lowest=query.altitudes[0],

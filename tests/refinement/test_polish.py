@@ -13,6 +13,7 @@ from maneuver_automaton.collision import Box
 from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import CarWithTrailer, SecondOrderCar, SecondOrderUnicycle
+from maneuver_automaton.optimal_control import has_casadi
 from maneuver_automaton.optimal_control.polish_values import PolishSettings
 from maneuver_automaton.optimal_control.separation import BodyPart
 from maneuver_automaton.primitives import Trim
@@ -227,3 +228,17 @@ def least_gap(poses: np.ndarray, obstacle: Box) -> float:
     """Least distance of the body from an obstacle."""
     ring = shapely.Polygon(obstacle.corners)
     return min(shapely.Polygon(SE2(p).act(BODY.corners)).distance(ring) for p in poses)
+
+
+@pytest.mark.skipif(not has_casadi(), reason="polishing needs CasADi")
+def test_a_solve_that_needs_many_iterations_is_not_thrown_away() -> None:
+    """With half of the iterations that one solve takes, free lines come to the same motion."""
+    best = polish_guesses(swerve(), [around()], time_limit=60.0, most_iterations=3000)
+    needed = max(one.iterations for one in best.attempts if one.kind == "lines")
+    few = PolishSettings(max_iterations=needed // 4)
+    again = polish_guesses(
+        swerve(), [around()], settings=few, time_limit=60.0, most_iterations=3000
+    )
+    lines = [one for one in again.attempts if one.kind == "lines"]
+    assert max(one.iterations for one in lines) > few.max_iterations
+    assert again.motion.duration == pytest.approx(best.motion.duration, rel=0.01)
