@@ -173,8 +173,11 @@ QUICK_FEATURES = (  # that all kinematic vehicles are tried with
     "loop",
     "resume",
 )
-SLOW = {("fixed_time", "glider")}
-WITH_INERTIA = ("plan_file", "fixed_time", "max_trims", "loop_moving_obstacles", "planner_with_all")
+SLOW = {  # four coasting times at a climb take long
+    (feature, "glider")
+    for feature in ("fixed_time", "free_heading", "same_plan_twice", "loop", "resume")
+}
+WITH_INERTIA = ("plan_file", "fixed_time", "loop_moving_obstacles", "planner_with_all")
 ONE_BY_ONE = {  # so that every feature is tried with a few vehicles
     *(("car", feature) for feature in ("discs", "polygons", "zones", "margin", "bounds")),
     *(("car", feature) for feature in ("max_time", "min_coast", "loop_noise", "moving_obstacles")),
@@ -185,11 +188,13 @@ ONE_BY_ONE = {  # so that every feature is tried with a few vehicles
     ("boat", "moved_problem_among_obstacles"),
     ("grid", "zones_crossed"),
     ("glider", "heights"),
-    ("glider", "pictures"),
+    ("boat", "pictures"),
     ("car_with_trailer", "carried_parts"),
     ("user", "moving_ends"),
     ("user", "discs"),
     ("user", "loop"),
+    ("user", "max_trims"),
+    ("hovercraft", "max_trims"),
     ("user", "resume"),
     ("user", "polishing"),
     ("user", "alternatives"),
