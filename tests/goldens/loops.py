@@ -23,6 +23,7 @@ WORK = SearchSettings(max_expansions=800)
 NOISE = Disturbance(position_m=0.02, heading_rad=0.02, seed=1)
 BLURRED = Disturbance(measured_position_m=0.01, measured_heading_rad=0.01, seed=2)
 LITTLE = Disturbance(position_m=0.004, heading_rad=0.004, seed=0)
+LIMIT, LONG = 4.0, 10.0  # [s] for one step of a loop with inertia
 FREE_GOAL = Goal(pose=[6.0, 0.0, 0.0], free_heading=True, tolerance_m=0.1, tolerance_rad=0.1)
 
 
@@ -146,7 +147,8 @@ def _with_inertia() -> Iterator[Loop]:
         Loop(name="kinematic in a zone", make=of(strip, 0, max_speed=0.5), step=1.0),
     ]  # fmt: skip
     for loop in loops:
-        yield replace(loop, name=f"inertia/{loop.name}", inertia=True, time_limit=4.0)
+        limit = LONG if loop.name in ("hovercraft", "helicopter") else LIMIT
+        yield replace(loop, name=f"inertia/{loop.name}", inertia=True, time_limit=limit)
 
 
 def _over_grid(horizon: Horizon) -> Problem:

@@ -19,6 +19,7 @@ from tests.goldens.scenes import Scene, all_kinematic
 FOLDER = Path(__file__).parent
 EQUAL = 1e-9  # relative, by which two costs may differ and count as the same
 RUNS = 5  # of a scene with inertia, of which the cheapest counts
+LONGER = (1.0, 2.0, 4.0)  # times a limit, in turn: a machine that is busy may need it
 DIGITS = 13
 
 

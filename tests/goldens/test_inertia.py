@@ -7,12 +7,11 @@ from dataclasses import replace
 import pytest
 
 from tests.goldens.inertia import all_with_inertia
-from tests.goldens.measured import RUNS, answer, dearer, kept, params, share_dearer
+from tests.goldens.measured import LONGER, RUNS, answer, dearer, kept, params, share_dearer
 from tests.search.cases import compiled_only
 
 SCENES = all_with_inertia()
 SHARE = 1e-3
-LONGER = (1.0, 2.0, 4.0)  # times the limit, in turn: a machine that is busy may need it
 
 
 def test_every_scene_is_kept_and_no_other():
@@ -23,7 +22,7 @@ def test_what_is_kept_is_the_cheapest_of_its_runs():
     for name, one in kept("inertia").items():
         if "cost" in one:
             assert one["cost"] == one["costs"][0] == min(one["costs"]), name
-            assert len(one["costs"]) <= RUNS, name
+            assert len(one["costs"]) >= RUNS, name
 
 
 @compiled_only

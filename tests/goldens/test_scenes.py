@@ -75,3 +75,25 @@ def test_what_may_be_dearer_says_why():
         assert set(entry) == {"reason", "share"}, name
         assert entry["reason"], name
         assert 0.0 <= entry["share"] <= MOST, name
+
+
+BEFORE = {"status": "found", "cost": 2.0, "goal": 0, "word": ["a"], "durations": [2.0]}
+LOST = {"status": "no_plan"}
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "passes"),
+    [
+        (BEFORE, BEFORE, True),
+        (BEFORE, BEFORE | {"cost": 2.0 + 1e-9}, True),
+        (BEFORE, BEFORE | {"cost": 2.0 + 1e-8}, False),
+        (BEFORE, BEFORE | {"word": ["b"]}, False),
+        (BEFORE, BEFORE | {"cost": 1.9, "word": ["b"]}, True),
+        (BEFORE, LOST, False),
+        (LOST, BEFORE, True),
+        (LOST, {"status": "unreachable"}, False),
+        ({"status": "unreachable"}, BEFORE, False),
+    ],
+)
+def test_what_counts_as_the_same_or_cheaper(before, now, passes):
+    assert (not against_kept("none of the scenes", before, now)) is passes
