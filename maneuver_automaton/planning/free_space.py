@@ -13,12 +13,13 @@ from maneuver_automaton.automaton.same_motion import is_new
 from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
 from maneuver_automaton.problem import Horizon, Problem
-from maneuver_automaton.search import SearchStatus, Solution
+from maneuver_automaton.search import SearchStatus
 from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.choose import search_goal
 from maneuver_automaton.search.inside import outside
 from maneuver_automaton.search.limits import closed_bound, why_impossible
 from maneuver_automaton.search.result import plan_of
+from maneuver_automaton.words.word import Word
 
 SPARE = 2  # solutions for every alternative, as some may be one motion
 
@@ -67,7 +68,7 @@ class _Candidate:
     """A solution as a plan."""
 
     goal_index: int
-    solution: Solution
+    solution: Word
     plan: Plan
     audit: Audit | None = None
 
@@ -135,7 +136,7 @@ def _search_goals(problem: Problem, alternatives: int, began: float, deadline: f
 
 
 def _order(candidate: _Candidate) -> tuple[float, int, tuple[int, ...]]:
-    word = candidate.solution.word
+    word = candidate.solution.trims
     return float(f"{candidate.cost:.9g}"), len(word), tuple(word.tolist())
 
 

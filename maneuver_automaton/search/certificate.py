@@ -7,22 +7,22 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.library_arrays import LibraryArrays, library_arrays
-from maneuver_automaton.search.result import Solution
 from maneuver_automaton.search.setup import search_setup
 from maneuver_automaton.search.time_limit import within_time
+from maneuver_automaton.words.word import Word
 
 BINDING = 1e-9  # share of a greatest time [s] that may be left where it binds
 CUTS = 60  # rounds of the linear program where multipliers are not unique
 
 
-def certificate(problem: Problem, goal: Goal, solution: Solution) -> float | None:
+def certificate(problem: Problem, goal: Goal, solution: Word) -> float | None:
     """Smallest reduced cost of inserting any trim at any time into a solution; None if it is empty.
 
     At least zero (up to rounding) where Pontryagin's condition holds over the whole library: a
     necessary condition for the optimum. Where the multipliers are not unique, those are taken that
     make it largest. With a binding ``max_trims`` it may be negative.
     """
-    if solution.word.size == 0:
+    if solution.trims.size == 0:
         return None
     setup = search_setup(problem, goal)
     library = library_arrays(problem, setup)
@@ -30,10 +30,10 @@ def certificate(problem: Problem, goal: Goal, solution: Solution) -> float | Non
     if most_time is not None and solution.duration > most_time - BINDING * (1.0 + most_time):
         library = within_time(library, most_time)  # time has a price where its limit binds
     used = solution.durations > 0.0
-    moving = library.number_of[solution.word] >= 0
+    moving = library.number_of[solution.trims] >= 0
     if not (used & moving).any():
         return None
-    word = library.number_of[solution.word[used & moving]]
+    word = library.number_of[solution.trims[used & moving]]
     times = solution.durations[used & moving]
     if library.free_heading:
         word = np.append(word, len(library.rates) - 1)

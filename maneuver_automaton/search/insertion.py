@@ -22,12 +22,13 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.exact_end import corrected, with_fewer_digits
 from maneuver_automaton.search.library_arrays import LibraryArrays, library_arrays
-from maneuver_automaton.search.result import SearchResult, SearchStatus, Solution, plan_of
+from maneuver_automaton.search.result import SearchResult, SearchStatus, plan_of
 from maneuver_automaton.search.setup import SearchSetup, search_setup
 from maneuver_automaton.search.shortening import shortened
 from maneuver_automaton.search.time_limit import UNUSED, within_time
 from maneuver_automaton.search.words import in_order, resting, search_setup_words
 from maneuver_automaton.words.library import MovingTrims
+from maneuver_automaton.words.word import Word
 
 SEEDS = 10  # cheapest words that are improved, where the library is its own sub-library
 SEEDS_OF_MANY = 4  # the same for larger libraries: insertion makes more of them
@@ -148,7 +149,7 @@ class _Asked:
 class _Improved:
     """What one search by insertion came to."""
 
-    solutions: list[Solution]
+    solutions: list[Word]
     status: SearchStatus
     counts: dict[str, int]
 
@@ -202,7 +203,7 @@ def _improved(asked: _Asked, known: Plan | None) -> _Improved:
         for work in works
         if work.size - library.tail <= most
         for solution in work.solutions(problem, library, asked.exact)
-        if solution.word.size <= (problem.horizon.max_trims or LONGEST)
+        if solution.trims.size <= (problem.horizon.max_trims or LONGEST)
     ]
     return _Improved(list(in_order(improved)), status, counts)
 
@@ -322,9 +323,7 @@ class _Work:
             self.cost,
         )
 
-    def solutions(
-        self, problem: Problem, library: LibraryArrays, goal: Array
-    ) -> Iterator[Solution]:
+    def solutions(self, problem: Problem, library: LibraryArrays, goal: Array) -> Iterator[Word]:
         """What it has come to, ending at `goal` itself; none if it cannot."""
         word = self.word[: self.size]
         times = corrected(library, word, self.times[: self.size], goal)
@@ -334,8 +333,8 @@ class _Work:
         kept = slice(0, self.size - library.tail)
         trims, lasting = _without_unused(library.trims[word[kept]], times[kept])
         switching = problem.cost.switching(problem.automaton.body_velocities[trims])
-        yield Solution(
-            word=trims,
+        yield Word(
+            trims=trims,
             durations=lasting,
             cost=cost + library.fixed_cost + switching,
             certificate=float(self.least),
@@ -371,7 +370,7 @@ def _words_of_few(asked: _Asked, problem: Problem) -> list[tuple[IntArray, Array
         deadline=asked.deadline,
         spare=True,
     )
-    return [_in_library(asked, solution.word, solution.durations) for solution in solutions]
+    return [_in_library(asked, solution.trims, solution.durations) for solution in solutions]
 
 
 def _fast_words(asked: _Asked) -> list[tuple[IntArray, Array]]:
@@ -392,7 +391,7 @@ def _fast_words(asked: _Asked) -> list[tuple[IntArray, Array]]:
             continue
         quick = next(work.solutions(hurry, library, library.goal), None)
         if quick is not None and limit is not None and quick.duration <= limit + LATE:
-            met.append(_in_library(asked, quick.word, quick.durations))
+            met.append(_in_library(asked, quick.trims, quick.durations))
     return met
 
 
@@ -461,7 +460,7 @@ def _far_reaching(library: MovingTrims) -> IntArray:
     return np.array(list(dict.fromkeys(chosen)))
 
 
-def _distinct(problem: Problem, solutions: Iterator[Solution], *, most: int) -> Iterator[Solution]:
+def _distinct(problem: Problem, solutions: Iterator[Word], *, most: int) -> Iterator[Word]:
     """The `most` cheapest motions, each with the word that comes first."""
     known: list[Plan] = []
     for solution in solutions:

@@ -12,10 +12,11 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.result import SearchResult, SearchStatus, Solution
+from maneuver_automaton.search.result import SearchResult, SearchStatus
 from maneuver_automaton.search.setup import SearchSetup, search_setup
 from maneuver_automaton.search.words import in_order, resting
 from maneuver_automaton.words import TimesStatus, solve_switching_times
+from maneuver_automaton.words.word import Word
 
 MOST_TRIMS = 4  # moving trims of a word
 RESTARTS = 3  # starts of each word beside the first
@@ -47,7 +48,7 @@ def search_with_least_times(
         return resting(problem, setup)
     padded = problem.horizon.time is not None and setup.rest is not None
     most = min(problem.horizon.max_trims or MOST_TRIMS + 1, MOST_TRIMS + int(padded))
-    found: list[Solution] = []
+    found: list[Word] = []
     words = 0
     status = SearchStatus.EXHAUSTED
     for word in _words(setup, most):
@@ -79,7 +80,7 @@ def _words(setup: SearchSetup, most: int) -> Iterator[tuple[int, ...]]:
 
 def _solved(
     problem: Problem, setup: SearchSetup, word: tuple[int, ...], *, rest: bool
-) -> list[Solution]:
+) -> list[Word]:
     """The word with its best times, if it reaches the goal."""
     rows = list(word)
     least = problem.horizon.min_coast
@@ -108,10 +109,10 @@ def _solved(
         return []
     if rest and times[-1] <= 1e-9:
         return []  # the same word without rest is tried too
-    return [_priced(problem, Solution(word=trims, durations=times, cost=0.0), rates)]
+    return [_priced(problem, Word(trims=trims, durations=times, cost=0.0), rates)]
 
 
-def _priced(problem: Problem, solution: Solution, rates: Array) -> Solution:
-    velocities = problem.automaton.body_velocities[solution.word]
+def _priced(problem: Problem, solution: Word, rates: Array) -> Word:
+    velocities = problem.automaton.body_velocities[solution.trims]
     cost = float(rates @ solution.durations) + problem.cost.switching(velocities)
     return replace(solution, cost=cost)

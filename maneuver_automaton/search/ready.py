@@ -22,9 +22,9 @@ from maneuver_automaton.models import Unicycle
 from maneuver_automaton.problem import Goal, Horizon, Problem
 from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.insertion import compile_calming, search_insertion
-from maneuver_automaton.search.result import Solution
 from maneuver_automaton.search.words import compile_polishing, compile_scanning, search_words
 from maneuver_automaton.words import solve_switching_times
+from maneuver_automaton.words.word import Word
 
 if TYPE_CHECKING:
     from maneuver_automaton.search.lattice_query import LatticeQuery
@@ -60,7 +60,7 @@ def load_times_kernels() -> None:
     """Have the kernels that solve the times of a given word ready, and those that price it."""
     solve_switching_times([[1.0, 0.0, 0.0]], [1.0], [1.0, 0.0, 0.0])
     problem = _smallest_problem()
-    straight = Solution(word=np.array([0]), durations=np.array([1.0]), cost=1.0)
+    straight = Word(trims=np.array([0]), durations=np.array([1.0]), cost=1.0)
     certificate(problem, problem.goals[0], straight)
 
 
@@ -85,7 +85,7 @@ def compile_the_rest() -> None:
     """What the second process does: compile what refines words and prices them."""
     problem = _smallest_problem()
     compile_polishing(problem)
-    straight = Solution(word=np.array([0]), durations=np.array([1.0]), cost=1.0)
+    straight = Word(trims=np.array([0]), durations=np.array([1.0]), cost=1.0)
     certificate(problem, problem.goals[0], straight)
 
 

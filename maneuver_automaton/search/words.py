@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.result import SearchResult, SearchStatus, Solution
+from maneuver_automaton.search.result import SearchResult, SearchStatus
 from maneuver_automaton.search.setup import SearchSetup, search_setup
+from maneuver_automaton.words.word import Word
 
 MOST_TRIMS = 5  # moving trims of one word; each beyond three is scanned on a grid
 NODES = 64  # per scanned time, bisected where the function bends
@@ -79,7 +80,7 @@ def search_words(
     >>> robot = Automaton.of_controls(Unicycle(), controls)
     >>> problem = Problem(robot, [0, 0, 0], [1, 1, 0])
     >>> best = search_words(problem, problem.goals[0]).solutions[0]
-    >>> [robot.trim_names[k] for k in best.word], round(best.cost, 4)
+    >>> [robot.trim_names[k] for k in best.trims], round(best.cost, 4)
     (['left', 'ahead', 'right'], 2.985)
     """
     deadline = time.monotonic() + time_limit
@@ -154,7 +155,7 @@ def search_setup_words(
     alternatives: int,
     deadline: float,
     spare: bool,
-) -> list[Solution]:
+) -> list[Word]:
     """Cheapest words of as few trims as the conditions need, from the trims of `setup` alone.
 
     `spare`: where a rest pads a fixed time, words that meet it exactly have two trims at most.
@@ -174,12 +175,12 @@ def resting(problem: Problem, setup: SearchSetup) -> SearchResult:
     """Start equal to goal: an empty word, or the whole of a fixed time at rest."""
     time_s = problem.horizon.time
     if time_s is None or setup.rest is None:
-        empty = Solution(word=np.zeros(0, dtype=np.int64), durations=np.zeros(0), cost=0.0)
+        empty = Word(trims=np.zeros(0, dtype=np.int64), durations=np.zeros(0), cost=0.0)
         return SearchResult(
             status=SearchStatus.FOUND, solutions=(empty,), complete=False, exhaustive=True
         )
-    rest = Solution(
-        word=np.array([setup.rest]),
+    rest = Word(
+        trims=np.array([setup.rest]),
         durations=np.array([time_s]),
         cost=setup.rest_rate * time_s,
     )
@@ -369,7 +370,7 @@ class _Job:
             tail=len(rates) - 1 if setup.free_heading else -1,
         )
 
-    def solutions(self) -> Iterator[Solution]:
+    def solutions(self) -> Iterator[Word]:
         """What was found by rising cost, rest last; if pruned, what was asked for, and ties."""
         n = self.n_found
         costs = self.found.costs[:n]
@@ -385,7 +386,7 @@ class _Job:
             rows.append(self._padded(word, self.found.times[k, :size], float(costs[k])))
         yield from rows
 
-    def _padded(self, word: IntArray, times: Array, cost: float) -> Solution:
+    def _padded(self, word: IntArray, times: Array, cost: float) -> Word:
         time_s = self.problem.horizon.time
         if time_s is not None and self.setup.rest is not None:
             left = time_s - float(times.sum())
@@ -394,7 +395,7 @@ class _Job:
                 times = np.append(times, left)
         if self.own_prices:
             cost += self.problem.cost.switching(self.problem.automaton.body_velocities[word])
-        return Solution(word=word, durations=times, cost=cost)
+        return Word(trims=word, durations=times, cost=cost)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -454,9 +455,9 @@ def _tied(cost: float) -> float:
     return cost + TIE * (1.0 + abs(cost))
 
 
-def in_order(solutions: Iterable[Solution]) -> Iterator[Solution]:
+def in_order(solutions: Iterable[Word]) -> Iterator[Word]:
     """Solutions by rising cost; among equal costs, fewer trims first, then by word."""
-    group: list[Solution] = []
+    group: list[Word] = []
     for row in sorted(solutions, key=lambda solution: solution.cost):
         if group and row.cost - group[0].cost > TIE * (1.0 + abs(group[0].cost)):
             yield from sorted(group, key=_simplicity)
@@ -465,5 +466,5 @@ def in_order(solutions: Iterable[Solution]) -> Iterator[Solution]:
     yield from sorted(group, key=_simplicity)
 
 
-def _simplicity(solution: Solution) -> tuple[int, tuple[int, ...]]:
-    return len(solution.word), tuple(solution.word.tolist())
+def _simplicity(solution: Word) -> tuple[int, tuple[int, ...]]:
+    return len(solution.trims), tuple(solution.trims.tolist())

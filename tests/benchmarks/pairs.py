@@ -42,7 +42,7 @@ def exactness(pairs: int) -> None:
         )
         found = search_words(problem, problem.goals[0]).solutions
         if found:
-            trims = tuple(LIBRARY.trims[k] for k in found[0].word)
+            trims = tuple(LIBRARY.trims[k] for k in found[0].trims)
             plan = Plan(problem.start, trims, durations=found[0].durations)
             error = terminal_error(plan, problem.goals[0])
             worst = max(worst, error.position_m, error.heading_rad)
@@ -71,7 +71,7 @@ def law(pairs: int) -> None:
                 unsolved += 1
                 other_words += bool(one) != bool(two)
                 continue
-            other_words += one[0].word.tolist() != two[0].word.tolist()
+            other_words += one[0].trims.tolist() != two[0].trims.tolist()
             worst = max(worst, abs(one[0].cost - two[0].cost))
         print(
             f"{name}: {pairs} moved pairs, {other_words} with another word, {unsolved} out of "

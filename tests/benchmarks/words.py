@@ -52,8 +52,8 @@ def agreement(problem, starts: int) -> None:
     rest = problem.automaton.rest
     listed = [
         (
-            tuple(k for k in s.word if k != rest),
-            s.durations[: len(s.word) - (rest in s.word)],
+            tuple(k for k in s.trims if k != rest),
+            s.durations[: len(s.trims) - (rest in s.trims)],
             s.cost,
         )
         for s in search_words(problem, problem.goals[0], alternatives=None).solutions

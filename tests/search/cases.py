@@ -17,7 +17,7 @@ from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.models.user import UserModel
 from maneuver_automaton.problem import Horizon, Problem
-from maneuver_automaton.search import Solution
+from maneuver_automaton.words import Word as FoundWord
 from tests.reference import Word
 
 # The paper's Table 2; with the spin reversed, the sequence that the paper names is the best one.
@@ -80,15 +80,15 @@ def helicopter() -> Automaton:
     )
 
 
-def names(problem: Problem, solution: Solution) -> tuple[str, ...]:
-    return tuple(problem.automaton.trim_names[k] for k in solution.word)
+def names(problem: Problem, solution: FoundWord) -> tuple[str, ...]:
+    return tuple(problem.automaton.trim_names[k] for k in solution.trims)
 
 
-def end_off_goal(problem: Problem, solution: Solution, goal: int = 0) -> tuple[float, float]:
+def end_off_goal(problem: Problem, solution: FoundWord, goal: int = 0) -> tuple[float, float]:
     """Distance [m] and heading difference [rad] between the end of a solution and a goal."""
     group = SE2 if problem.start.size == 3 else SE2xR
     pose = group(problem.start)
-    for trim, time in zip(solution.word, solution.durations, strict=True):
+    for trim, time in zip(solution.trims, solution.durations, strict=True):
         pose = pose @ group.exp(time * problem.automaton.body_velocities[trim])
     off = pose.pose - problem.goals[goal].pose
     return float(np.linalg.norm(np.delete(off, 2))), float(
@@ -96,18 +96,18 @@ def end_off_goal(problem: Problem, solution: Solution, goal: int = 0) -> tuple[f
     )
 
 
-def reference_word(problem: Problem, solution: Solution) -> tuple[Word, np.ndarray]:
+def reference_word(problem: Problem, solution: FoundWord) -> tuple[Word, np.ndarray]:
     """The moving trims of a solution as a word for the slow twin, with their times."""
     group = SE2 if problem.start.size == 3 else SE2xR
     twists = problem.automaton.body_velocities
-    moving = twists[solution.word].any(axis=1)
-    rows = solution.word[moving]
+    moving = twists[solution.trims].any(axis=1)
+    rows = solution.trims[moving]
     goal = (group(problem.start).inverse() @ group(problem.goals[0].pose)).pose
     padded = not moving.all()
     time = problem.horizon.time
     rates = problem.rates[rows]
     if padded:
-        rest = int(solution.word[~moving][0])
+        rest = int(solution.trims[~moving][0])
         rates = rates - problem.rates[rest]
     word = Word(
         twists[rows],

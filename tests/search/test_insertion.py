@@ -96,7 +96,7 @@ def test_reeds_shepp_by_hand():
     assert best(shortest(REEDS_SHEPP, [-2.0, 0, 0])).cost == pytest.approx(2.0)
     turn = shortest(REEDS_SHEPP, [0, 0, np.pi])
     assert best(turn).cost == pytest.approx(np.pi)
-    assert len(best(turn).word) == 3
+    assert len(best(turn).trims) == 3
 
 
 def test_dubins_by_hand():
@@ -137,7 +137,7 @@ def test_agrees_with_exhaustive_search(cost, horizon, least_equal):
         exhaustive = search_words(problem, problem.goals[0]).solutions[0]
         inserted = best(problem)
         assert_ends_at_the_goal(problem, inserted)
-        assert len(inserted.word) <= 4
+        assert len(inserted.trims) <= 4
         assert inserted.cost > exhaustive.cost - 1e-9
         equal += inserted.cost < exhaustive.cost + 1e-8
     assert equal >= least_equal  # an upper bound elsewhere: insertion proves no global optimum
@@ -157,7 +157,7 @@ def test_agrees_with_exhaustive_search_over_five_trims():
 def test_a_certificate_where_nothing_pays():
     problem = parking(max_trims=None)
     solution = best(problem)
-    assert len(solution.word) > 4
+    assert len(solution.trims) > 4
     assert solution.certificate > -1e-9
     assert certificate(problem, problem.goals[0], solution) > -1e-9
 
@@ -165,7 +165,7 @@ def test_a_certificate_where_nothing_pays():
 def test_a_binding_number_of_trims_is_reported():
     problem = parking()
     solution = best(problem)
-    assert len(solution.word) == 4
+    assert len(solution.trims) == 4
     assert solution.certificate < -0.1
     reported = certificate(problem, problem.goals[0], solution)
     assert reported == pytest.approx(solution.certificate, abs=1e-6)
@@ -192,7 +192,7 @@ def test_the_certificate_is_the_smallest_reduced_cost(max_trims):
 def test_a_single_trim_is_certified(first):
     problem = shortest(REEDS_SHEPP, SE2.exp(0.8 * np.array(first)).pose)
     solution = best(problem)
-    assert solution.word.size == 1
+    assert solution.trims.size == 1
     assert certificate(problem, problem.goals[0], solution) > -1e-9
 
 
@@ -279,7 +279,7 @@ def test_a_goal_on_an_arc_may_have_a_cheaper_word():
 def test_a_number_of_trims_is_kept():
     for most in (4, 5, 6):
         solution = best(parking(max_trims=most))
-        assert len(solution.word) <= most
+        assert len(solution.trims) <= most
 
 
 def test_alternatives_are_different_words_by_rising_cost():
@@ -315,7 +315,7 @@ def test_without_rest_a_fixed_time_is_met():
 def test_start_equal_to_goal():
     problem = replace(parking(), start=np.zeros(3))
     assert names(problem, best(problem)) == ("rest",)
-    assert best(replace(problem, horizon=Horizon())).word.size == 0
+    assert best(replace(problem, horizon=Horizon())).trims.size == 0
 
 
 def test_a_goal_out_of_reach():
@@ -336,7 +336,7 @@ def test_a_limit_on_expansions_ends_the_search():
 def test_results_are_the_same_in_every_run():
     problem = parking(max_trims=None)
     first, second = best(problem), best(problem)
-    assert first.word.tolist() == second.word.tolist()
+    assert first.trims.tolist() == second.trims.tolist()
     assert first.durations.tolist() == second.durations.tolist()
 
 
@@ -351,10 +351,10 @@ from tests.search.cases import *
 answers = []
 for problem in (parking(), parking(REVERSED_SPIN), parking(cost=Cost(time=1.0), time=None)):
     for solution in search_words(problem, problem.goals[0], alternatives=3).solutions:
-        answers.append([solution.word.tolist(), solution.durations.tolist(), solution.cost])
+        answers.append([solution.trims.tolist(), solution.durations.tolist(), solution.cost])
 for problem in (parking(), parking(max_trims=None)):
     solution = search_insertion(problem, problem.goals[0], seeds=3).solutions[0]
-    answers.append([solution.word.tolist(), solution.durations.tolist(), solution.cost])
+    answers.append([solution.trims.tolist(), solution.durations.tolist(), solution.cost])
 left, ahead, right = [1, 0, 1], [1, 0, 0], [1, 0, -1]
 for triple in ([left, ahead, right], [left, right, left], [ahead, left, right]):
     answers.append([[], steer(triple, [2.5, 1.0, 0.3]).ravel().tolist(), 0.0])
@@ -397,7 +397,7 @@ def test_a_moved_problem_has_the_moved_word_under_a_limit(start, most):
     for by in ([3.0, -2.0, 0.7], [40.0, 7.0, -2.9]):
         moved = problem.moved(SE2(by))
         there = search_insertion(moved, moved.goals[0]).solutions[0]
-        assert there.word.tolist() == here.word.tolist()
+        assert there.trims.tolist() == here.trims.tolist()
         assert there.cost == pytest.approx(here.cost, abs=1e-9)
         np.testing.assert_allclose(there.durations, here.durations, atol=1e-7)
 
@@ -409,7 +409,7 @@ def test_the_end_is_exact_however_near_the_goal(size):
     library = Automaton.of_grid(Unicycle(), [AXIS, AXIS])
     problem = Problem(library, [0, 0, 0], goal, cost=Cost(effort=1.0, time=1.0))
     found = search_insertion(problem, problem.goals[0]).solutions[0]
-    twists = library.body_velocities[found.word]
+    twists = library.body_velocities[found.trims]
     np.testing.assert_allclose(end_pose(twists, found.durations), goal, atol=1e-14)
 
 

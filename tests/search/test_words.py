@@ -40,7 +40,7 @@ def best(problem, **options):
 
 def listed(result):
     """Words with their times, as plain numbers."""
-    return [(tuple(s.word.tolist()), s.durations, s.cost) for s in result.solutions]
+    return [(tuple(s.trims.tolist()), s.durations, s.cost) for s in result.solutions]
 
 
 def assert_same_solutions(one, other, *, atol=1e-9):
@@ -63,9 +63,9 @@ def assert_valid(problem, solution):
     if horizon.max_time is not None:
         assert solution.duration <= horizon.max_time + 1e-9
     if horizon.max_trims is not None:
-        assert len(solution.word) <= horizon.max_trims
-    twists = problem.automaton.body_velocities[solution.word]
-    expected = problem.rates[solution.word] @ solution.durations + problem.cost.switching(twists)
+        assert len(solution.trims) <= horizon.max_trims
+    twists = problem.automaton.body_velocities[solution.trims]
+    expected = problem.rates[solution.trims] @ solution.durations + problem.cost.switching(twists)
     assert solution.cost == pytest.approx(expected, abs=1e-9)
 
 
@@ -81,7 +81,7 @@ def test_parking_with_four_trims():
     straight = np.sqrt(2.0 / 3.0)
     expected = [angle, straight, angle, 8.0 - straight - 2.0 * angle]
     assert solution.durations == pytest.approx(expected)
-    rates = problem.rates[solution.word]
+    rates = problem.rates[solution.trims]
     assert solution.cost == pytest.approx(rates @ solution.durations, abs=1e-12)
     assert solution.cost == pytest.approx(6.664468057636666, abs=1e-9)
     word, times = reference_word(problem, solution)
@@ -209,7 +209,7 @@ def test_of_equal_trims_the_cheapest_is_taken():
 def test_five_trims_do_better():
     four, five = parking(), parking(max_trims=5)
     solution = best(five)
-    assert len(solution.word) == 5
+    assert len(solution.trims) == 5
     assert_valid(five, solution)
     assert solution.cost < best(four).cost - 0.1
     word, times = reference_word(five, solution)
@@ -269,7 +269,7 @@ def test_least_coasting_time():
     result = search(problem, alternatives=None)
     assert result.solutions
     for solution in result.solutions:
-        moving = problem.automaton.body_velocities[solution.word].any(axis=1)
+        moving = problem.automaton.body_velocities[solution.trims].any(axis=1)
         assert solution.durations[moving].min() >= 1.0 - 1e-9
         assert_valid(problem, solution)
 
@@ -351,7 +351,7 @@ def test_a_fixed_time_without_rest_is_met_exactly():
     for solution in result.solutions:
         assert_valid(problem, solution)
     with_rest = search(parking(), alternatives=None)
-    full = [s.cost for s in with_rest.solutions if 0 not in s.word]
+    full = [s.cost for s in with_rest.solutions if 0 not in s.trims]
     assert [s.cost for s in result.solutions] == pytest.approx(full, abs=1e-9)
 
 
@@ -362,10 +362,10 @@ def test_start_equal_to_goal():
     assert rest.durations.tolist() == [8.0]
     assert rest.cost == 0.0
     free = best(replace(parking(time=None), start=np.zeros(3)))
-    assert free.word.size == 0
+    assert free.trims.size == 0
     assert free.cost == 0.0
     whole_turn = replace(parking(time=None), start=np.array([0.0, 0.0, -4.0 * np.pi]))
-    assert best(whole_turn).word.size == 0
+    assert best(whole_turn).trims.size == 0
 
 
 def test_start_equal_to_goal_without_rest_moves_for_the_whole_time():
