@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.models.greatest_speed import greatest_speed
+from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.limits import closed_bound
 from maneuver_automaton.search.plane_bound import plane_bound
@@ -24,3 +29,36 @@ def lattice_bound(query: LatticeQuery) -> float:
     per_metre = float((rates[drives] / library.speeds[drives]).min())
     fixed = library.rest_rate * (problem.horizon.time or 0.0) if pads else 0.0
     return max(closed, fixed + per_metre * plane_bound(query))
+
+
+def speed_bound(problem: Problem) -> float:
+    """No plan of whatever kind is cheaper: the straight way at the greatest speed of the model."""
+    cost, fastest = problem.cost, greatest_speed(problem.automaton.model)
+    if not isinstance(cost, Cost):
+        return 0.0
+    return _least_way(problem) * (cost.time / fastest + cost.length)
+
+
+def word_bound(problem: Problem) -> float:
+    """No word of the library is cheaper: the straight way at its best price per metre.
+
+    A maneuver leads as far as its displacement, so it has a price per metre like a trim.
+    """
+    automaton = problem.automaton
+    velocities = automaton.body_velocities[:, [0, 1, *range(3, problem.start.size)]]
+    speeds, rates = np.linalg.norm(velocities, axis=1), problem.rates
+    prices = (rates[speeds > 0.0] / speeds[speeds > 0.0]).tolist()
+    for maneuver in automaton.maneuvers:
+        way = float(np.linalg.norm(maneuver.displacement[[0, 1, *range(3, problem.start.size)]]))
+        if way > 0.0:
+            prices.append(problem.maneuver_cost(maneuver) / way)
+    return _least_way(problem) * max(0.0, min(prices, default=0.0))
+
+
+def _least_way(problem: Problem) -> float:
+    """Straight way from the start to the tolerance of the nearest goal [m]."""
+
+    def way(goal: Goal) -> float:
+        return max(0.0, goal.off(problem.start)[0] - goal.tolerance_m)
+
+    return min(way(goal) for goal in problem.goals)

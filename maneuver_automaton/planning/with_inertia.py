@@ -15,7 +15,7 @@ from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.among_obstacles import library_table
 from maneuver_automaton.planning.blocked import why_goal_blocked
-from maneuver_automaton.planning.bounds import lattice_bound
+from maneuver_automaton.planning.bounds import lattice_bound, speed_bound, word_bound
 from maneuver_automaton.planning.checking import check_plan, load_checking, load_checks, what_is_hit
 from maneuver_automaton.planning.polishing import (
     Aimed,
@@ -40,6 +40,7 @@ from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinemat
 from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
 from maneuver_automaton.search import SearchStatus
+from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.maneuver_lattice import maneuver_words, plan_of, quick_word
 from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
@@ -47,7 +48,7 @@ from maneuver_automaton.search.maneuver_query import ManeuverQuery
 from maneuver_automaton.search.maneuver_ready import load_maneuver_kernels
 from maneuver_automaton.search.maneuver_search import maneuver_word_stages
 from maneuver_automaton.search.maneuver_words import load_maneuver_words
-from maneuver_automaton.words.word import Word
+from maneuver_automaton.words.word import Word, word_of_plan
 
 FIRST_SHARE = 0.8  # of the time limit, for a first path
 IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
@@ -93,6 +94,7 @@ def plan_with_inertia(
         problem,
         found.accepted[: alternatives + 1],
         bound=_lower_bound(problem),
+        certificate=_certificate(problem, found.accepted[0]),
         timing_s=timing,
         counts=found.counts,
         improvements=tuple(found.improvements),
@@ -418,6 +420,12 @@ def _rests(problem: Problem) -> bool:
     )
 
 
+def _certificate(problem: Problem, best: Accepted) -> float | None:
+    """The certificate of a plan that is a word of the library; None for one that is not."""
+    word = word_of_plan(problem.automaton, best.plan)
+    return None if word is None else certificate(problem, problem.goals[best.goal_index], word)
+
+
 def _lower_bound(problem: Problem) -> float:
     """No plan is cheaper: the shortest way, driven from rest to rest at the limits.
 
@@ -425,11 +433,14 @@ def _lower_bound(problem: Problem) -> float:
     the acceleration a, or ``2 sqrt(B v / a)`` where v is not reached.
     """
     model, cost = problem.automaton.model, problem.cost
+    known = speed_bound(problem)
+    if why_not_polished(problem) and not follows_paths(model):  # all plans are words
+        known = max(known, word_bound(problem))
     if not (follows_paths(model) and _rests(problem) and isinstance(cost, Cost)):
-        return 0.0
+        return known
     simpler = kinematic_problem(problem, switch=0.0)
     least = lattice_bound(lattice_query(simpler, tuple(range(len(problem.goals)))))
     fastest = float(np.abs(model.reduced_limits[0]).max())
     ramp = fastest / float(model.control_limits[0, 1])
     duration = least + ramp if least >= ramp else 2.0 * math.sqrt(least * ramp)
-    return cost.time * duration + cost.length * least * fastest
+    return max(known, cost.time * duration + cost.length * least * fastest)

@@ -263,12 +263,20 @@ def lengthen(twists, goal, rows, targets, word, times, n, grown, share):
 
 
 @kernel
-def price_word(twists, rates, rows, n_priced, word, times, n, p):
-    """Smallest reduced cost of all trims at all times of a plan: (value, trim, position, time)."""
-    values = np.empty(max(n, 1))
-    trims = np.empty(max(n, 1), dtype=np.int64)
-    moments = np.empty(max(n, 1))
-    k = price_positions(twists, rates, rows, n_priced, word, times, n, p, values, trims, moments)
+def price_word(twists, rates, rows, n_priced, word, times, first, last, p):
+    """Smallest reduced cost of all trims at any time of a stretch: (value, trim, position, time).
+
+    The stretch reaches from the trim at position `first` of the word to the one before `last`.
+    """
+    n = word.size
+    values = np.empty(n)
+    trims = np.empty(n, dtype=np.int64)
+    moments = np.empty(n)
+    price_positions(twists, rates, rows, n_priced, word, times, n, p, values, trims, moments)
+    k = first
+    for i in range(first, last):
+        if values[i] < values[k]:
+            k = i
     return values[k], trims[k], k, moments[k]
 
 

@@ -1,121 +1,237 @@
-"""The certificate of a plan: the smallest reduced cost over the whole library and all times."""
+"""The certificate of a plan: the smallest reduced cost over the whole library and all times.
+
+A trim can be inserted for an instant wherever the vehicle switches to it at will: among trims of
+its class. So a word is cut at its maneuvers into stretches, and in each of them the trims of one
+class are priced, seen from before all displacements. A word without maneuvers is one stretch.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
 import numpy as np
 
-from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.groups import SE2, group_of
+from maneuver_automaton.groups.chain import chained
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.library_arrays import LibraryArrays, library_arrays
+from maneuver_automaton.search.library_arrays import library_arrays
 from maneuver_automaton.search.setup import search_setup
-from maneuver_automaton.search.time_limit import within_time
-from maneuver_automaton.words.word import Word
+from maneuver_automaton.words.conjugation import conjugated, conjugated_turn
+from maneuver_automaton.words.library import FULL_TURN, four_columns
+from maneuver_automaton.words.transitions import SWITCH
+from maneuver_automaton.words.word import Word, displacements_of
 
-BINDING = 1e-9  # share of a greatest time [s] that may be left where it binds
 CUTS = 60  # rounds of the linear program where multipliers are not unique
+NEGLIGIBLE = 1e-9  # relative: reduced costs above minus this count as none
 
 
-def certificate(problem: Problem, goal: Goal, solution: Word) -> float | None:
-    """Smallest reduced cost of inserting any trim at any time into a solution; None if it is empty.
+def certificate(problem: Problem, goal: Goal, word: Word) -> float | None:
+    """Smallest reduced cost of inserting any trim at any time into a word; None if it is empty.
 
-    At least zero (up to rounding) where Pontryagin's condition holds over the whole library: a
-    necessary condition for the optimum. Where the multipliers are not unique, those are taken that
-    make it largest. With a binding ``max_trims`` it may be negative.
+    At least zero (up to rounding) where Pontryagin's condition holds over all trims that can be
+    switched to: a necessary condition for the optimum. Where the multipliers are not unique, those
+    are taken that make it largest. With a binding ``max_trims`` it may be negative. What another
+    maneuver would bring is no infinitesimal change, and is not priced.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.automaton import Automaton
+    >>> from maneuver_automaton.models import Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"slow": (1, 0), "fast": (2, 0)})
+    >>> problem = Problem(robot, [0, 0, 0], [2, 0, 0])
+    >>> [certificate(problem, problem.goals[0], Word(trims=[k], durations=[t]))
+    ...  for k, t in ((0, 2.0), (1, 1.0))]
+    [-1.0, 0.0]
     """
-    if solution.trims.size == 0:
+    if word.trims.size == 0:
         return None
-    setup = search_setup(problem, goal)
-    library = library_arrays(problem, setup)
-    most_time = problem.horizon.max_time
-    if most_time is not None and solution.duration > most_time - BINDING * (1.0 + most_time):
-        library = within_time(library, most_time)  # time has a price where its limit binds
-    used = solution.durations > 0.0
-    moving = library.number_of[solution.trims] >= 0
-    if not (used & moving).any():
-        return None
-    word = library.number_of[solution.trims[used & moving]]
-    times = solution.durations[used & moving]
-    if library.free_heading:
-        word = np.append(word, len(library.rates) - 1)
-        turned = float(library.twists[word[:-1], 2] @ times)
-        times = np.append(times, np.remainder(setup.goal[2] - turned, 2.0 * np.pi))
-    return smallest_reduced_cost(library, word, times)
+    find = _with_maneuvers if word.has_maneuvers else _without_maneuvers
+    priced = find(problem, goal, word)
+    return None if priced is None else smallest_reduced_cost(priced)
 
 
-def smallest_reduced_cost(library: LibraryArrays, word: IntArray, times: Array) -> float:
-    """`certificate` of a word in the numbers of `library`."""
+class Stretch(NamedTuple):
+    """Positions of a word at which the same trims can be inserted."""
+
+    twists: Array  # (k, 4) seen from before all displacements
+    rates: Array  # (k,)
+    rows: Array  # (m, k) of the linear conditions
+    first: int  # position of its first trim in the word
+    last: int  # and of the one after its last
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PricedWord:
+    """A word seen from before its displacements, with what can be inserted where."""
+
+    twists: Array  # (n, 4)
+    rates: Array  # (n,)
+    rows: Array  # (m, n)
+    times: Array  # (n,) [s]
+    stretches: tuple[Stretch, ...]
+    scale: float  # size of a typical rate
+
+    def least(self, p: Array) -> tuple[float, tuple[Array, float]]:
+        """Smallest reduced cost under multipliers (3 + m,): it, and the column that it belongs to.
+
+        The column says how the end and the conditions move, and comes with the trim's rate.
+        """
+        from maneuver_automaton.search import _kernels_insertion as kernels
+
+        best, where = np.inf, (self.stretches[0], 0, 0, 0.0)
+        n = self.times.size
+        for stretch in self.stretches:
+            k = len(stretch.rates)
+            value, trim, position, when = kernels.price_word(
+                np.vstack([stretch.twists, self.twists]),
+                np.append(stretch.rates, self.rates),
+                np.hstack([stretch.rows, self.rows]),
+                k,
+                k + np.arange(n),
+                self.times,
+                stretch.first,
+                stretch.last,
+                p,
+            )
+            if value < best:
+                best, where = float(value), (stretch, int(trim), int(position), float(when))
+        stretch, trim, position, when = where
+        poses = self.poses()
+        at = (SE2(poses[position]) @ SE2.exp(when * self.twists[position, :3])).pose
+        column = _column(stretch.twists[trim], stretch.rows[:, trim], at, poses[-1])
+        return best, (column, float(stretch.rates[trim]))
+
+    def columns(self) -> Array:
+        """Derivatives (3 + m, n) of all conditions by the times that are not zero."""
+        poses = self.poses()
+        return np.array(
+            [
+                _column(self.twists[i], self.rows[:, i], poses[i], poses[-1])
+                for i in np.flatnonzero(self.times > 0.0)
+            ]
+        ).T
+
+    def poses(self) -> Array:
+        """Poses (n + 1, 3) at which trims begin, and the end."""
+        pose, poses = SE2.identity(), [np.zeros(3)]
+        for twist, time in zip(self.twists, self.times, strict=True):
+            pose = pose @ SE2.exp(time * twist[:3])
+            poses.append(pose.pose)
+        return np.array(poses)
+
+
+def smallest_reduced_cost(word: PricedWord) -> float:
+    """`certificate` of a word that is prepared for it."""
     from maneuver_automaton.search import _kernels_insertion as kernels
 
-    p = kernels.multipliers_of_word(library.twists, library.rates, library.rows, word, times)
-    least, trim, position, when = _price(library, word, times, p)
-    columns = _conditions(library, word, times)
-    scale = library.scale
-    if least >= -1e-9 * scale or np.linalg.matrix_rank(columns, tol=1e-9) == len(columns):
-        return least
-    cuts = [_insertion_column(library, word, times, trim, position, when)]
-    best = least
+    lasting = np.flatnonzero(word.times > 0.0)
+    p = kernels.multipliers_of_word(
+        word.twists, word.rates, word.rows, lasting, word.times[lasting].copy()
+    )
+    best, cut = word.least(p)
+    columns, enough = word.columns(), -NEGLIGIBLE * word.scale
+    if best >= enough or np.linalg.matrix_rank(columns, tol=1e-9) == len(columns):
+        return best
+    cuts = [cut]
     for _ in range(CUTS):
-        solved = _largest_least(columns, library.rates[word], cuts)
+        solved = _largest_least(columns, word.rates[lasting], cuts)
         if solved is None:
             return best
         p, bound = solved
-        least, trim, position, when = _price(library, word, times, p)
+        least, cut = word.least(p)
         best = max(best, least)
-        if least >= bound - 1e-10 * scale or best >= -1e-9 * scale:
+        if least >= bound - 0.1 * NEGLIGIBLE * word.scale or best >= enough:
             return best
-        cuts.append(_insertion_column(library, word, times, trim, position, when))
+        cuts.append(cut)
     return best
 
 
-def _price(
-    library: LibraryArrays, word: IntArray, times: Array, p: Array
-) -> tuple[float, int, int, float]:
-    from maneuver_automaton.search import _kernels_insertion as kernels
-
-    n = word.size - (1 if library.free_heading else 0)
-    value, trim, position, when = kernels.price_word(
-        library.twists, library.rates, library.rows, library.n_priced, word, times, n, p
+def _without_maneuvers(problem: Problem, goal: Goal, word: Word) -> PricedWord | None:
+    """A word of trims alone: every trim of the library can be inserted anywhere."""
+    setup = search_setup(problem, goal)
+    library = library_arrays(problem, setup)
+    used = (word.durations > 0.0) & (library.number_of[word.trims] >= 0)
+    if not used.any():
+        return None
+    numbers, times = library.number_of[word.trims[used]], word.durations[used]
+    priced = slice(0, library.n_priced)
+    everywhere = Stretch(
+        library.twists[priced],
+        library.rates[priced],
+        library.rows[:, priced],
+        0,
+        numbers.size,
     )
-    return float(value), int(trim), int(position), float(when)
+    if library.free_heading:
+        numbers = np.append(numbers, len(library.rates) - 1)
+        turned = float(library.twists[numbers[:-1], 2] @ times)
+        times = np.append(times, np.remainder(setup.goal[2] - turned, FULL_TURN))
+    return PricedWord(
+        twists=library.twists[numbers],
+        rates=library.rates[numbers],
+        rows=library.rows[:, numbers],
+        times=times,
+        stretches=(everywhere,),
+        scale=library.scale,
+    )
 
 
-def _conditions(library: LibraryArrays, word: IntArray, times: Array) -> Array:
-    """Derivatives (3 + m, n) of all conditions by the times."""
-    from maneuver_automaton.groups import SE2
+def _with_maneuvers(problem: Problem, goal: Goal, word: Word) -> PricedWord | None:
+    """A word with maneuvers: between two of them the trims of one class can be inserted."""
+    if not (word.durations > 0.0).any():
+        return None
+    automaton = problem.automaton
+    own, all_rates = automaton.body_velocities, problem.rates
+    steps = displacements_of(automaton, word.transitions)
+    before = chained(np.zeros(own.shape[1]), steps)
+    twists, product = conjugated(own[word.trims], steps)
+    times, rates = np.array(word.durations), all_rates[word.trims]
+    fixed = problem.horizon.time is not None
+    stretches = []
+    for first, last in _stretches(word):
+        chosen = np.flatnonzero(automaton.trim_classes == automaton.trim_classes[word.trims[first]])
+        seen = own[chosen] @ group_of(own.shape[1])(before[first]).adjoint().T
+        rows = _rows(seen, fixed=fixed)
+        stretches.append(Stretch(four_columns(seen), all_rates[chosen], rows, first, last))
+    rows = _rows(twists, fixed=fixed)
+    if goal.free_heading:  # a full turn in place at the end, which costs nothing
+        twists = np.vstack([twists, conjugated_turn(product)])
+        rows = np.hstack([rows, np.zeros((len(rows), 1))])
+        rates, times = np.append(rates, 0.0), np.append(times, FULL_TURN)
+    return PricedWord(
+        twists=four_columns(twists),
+        rates=rates,
+        rows=rows,
+        times=times,
+        stretches=tuple(stretches),
+        scale=max(1.0, float(np.abs(all_rates).max())),
+    )
 
-    twists = library.twists[word]
-    pose = SE2.identity()
-    poses = []
-    for twist, time in zip(twists, times, strict=True):
-        poses.append(pose.pose)
-        pose = pose @ SE2.exp(time * twist[:3])
-    columns = [
-        _column(library, trim, begin, pose.pose) for trim, begin in zip(word, poses, strict=True)
-    ]
-    return np.array(columns).T
+
+def _stretches(word: Word) -> Iterator[tuple[int, int]]:
+    """First trim and the one after the last, of every run of trims without a maneuver."""
+    cuts = [0, *(np.flatnonzero(word.transitions != SWITCH) + 1).tolist(), word.trims.size]
+    yield from pairwise(cuts)
 
 
-def _column(library: LibraryArrays, trim: int, at: Array, end: Array) -> Array:
-    """How the end and the linear conditions move when `trim` is inserted at the pose `at`."""
-    v, u, w = library.twists[trim, :3]
+def _rows(twists: Array, *, fixed: bool) -> Array:
+    """Linear conditions (m, n) of trims: altitude, and the time where it is fixed."""
+    rows = [twists[:, 3]] if twists.shape[1] > 3 else []
+    if fixed:
+        rows.append(np.ones(len(twists)))
+    return np.array(rows).reshape(len(rows), len(twists))
+
+
+def _column(twist: Array, row: Array, at: Array, end: Array) -> Array:
+    """How the end and the linear conditions (3 + m,) move when a trim is inserted at a pose."""
+    v, u, w = twist[:3]
     c, s = np.cos(at[2]), np.sin(at[2])
     motion = [c * v - s * u - w * (end[1] - at[1]), s * v + c * u + w * (end[0] - at[0]), w]
-    return np.array([*motion, *library.rows[:, trim]])
-
-
-def _insertion_column(
-    library: LibraryArrays, word: IntArray, times: Array, trim: int, position: int, when: float
-) -> tuple[Array, float]:
-    from maneuver_automaton.groups import SE2
-
-    at = SE2.identity()
-    for k in range(position):
-        at = at @ SE2.exp(times[k] * library.twists[word[k], :3])
-    at = at @ SE2.exp(when * library.twists[word[position], :3])
-    end = SE2.identity()
-    for k in range(word.size):
-        end = end @ SE2.exp(times[k] * library.twists[word[k], :3])
-    return _column(library, trim, at.pose, end.pose), float(library.rates[trim])
+    return np.array([*motion, *row])
 
 
 def _largest_least(

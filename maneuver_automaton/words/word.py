@@ -140,6 +140,33 @@ def plan_of(
     )
 
 
+def word_of_plan(automaton: Automaton, plan: Plan) -> Word | None:
+    """A plan as a word of an automaton; None if it has trims or maneuvers of its own.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
+    >>> plan = Plan([0, 0, 0], (robot.trims[1], robot.trims[0]), durations=[0.5, 2.0])
+    >>> word_of_plan(robot, plan).trims.tolist()
+    [1, 0]
+    """
+    numbers = {id(maneuver): k for k, maneuver in enumerate(automaton.maneuvers)}
+    between = plan.maneuvers or (None,) * max(0, len(plan.trims) - 1)
+    transitions = [SWITCH if one is None else numbers.get(id(one)) for one in between]
+    known = all(
+        trim.name in automaton.trim_names and automaton[trim.name] is trim for trim in plan.trims
+    )
+    if not known or None in transitions:
+        return None
+    return Word(
+        trims=np.array([automaton.index_of(trim.name) for trim in plan.trims], dtype=np.int64),
+        durations=plan.durations,
+        transitions=np.array(transitions, dtype=np.int64),
+        maneuver_time=sum(one.duration for one in plan.maneuvers if one),
+    )
+
+
 def displacements_of(automaton: Automaton, transitions: Sequence[int] | IntArray) -> Array:
     """Displacement (n, dof) of each transition of a word."""
     steps = np.zeros((len(transitions), automaton.model.group.dof))

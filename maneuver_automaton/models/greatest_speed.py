@@ -1,0 +1,97 @@
+"""How fast a model can be at all, by interval arithmetic through its own velocity."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from maneuver_automaton.models.model import Model
+
+
+def greatest_speed(model: Model) -> float:
+    """An upper bound of the speed [m/s], climb included, within the limits of a model.
+
+    Infinite where a limit is missing, or where the velocity is made of functions that intervals
+    do not know.
+
+    Source: Moore, Kearfott, Cloud (2009), *Introduction to Interval Analysis*, Ch. 5: the value of
+    an expression on intervals contains all its values.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import CarWithTrailer
+    >>> greatest_speed(CarWithTrailer(wheelbase=2.5, hitch_length=3.0, max_steering=0.6,
+    ...                               max_speed=3.0, min_speed=-1.0))
+    3.0
+    """
+    state = [Interval(low, high) for low, high in model.reduced_limits.tolist()]
+    control = [Interval(low, high) for low, high in model.control_limits.tolist()]
+    try:
+        velocity = model.velocity(state, control)
+        sides = [_interval(velocity[k]).size for k in range(len(velocity)) if k != 2]
+    except (TypeError, AttributeError, ZeroDivisionError):
+        return math.inf
+    fastest = math.hypot(*sides)
+    return fastest if not math.isnan(fastest) else math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """All numbers from `low` to `high`; operations contain every result they may have."""
+
+    low: float
+    high: float
+
+    @property
+    def size(self) -> float:
+        """Greatest absolute value."""
+        return max(abs(self.low), abs(self.high))
+
+    def __neg__(self) -> Interval:
+        return Interval(-self.high, -self.low)
+
+    def __add__(self, other: Interval | float) -> Interval:
+        more = _interval(other)
+        return Interval(self.low + more.low, self.high + more.high)
+
+    def __sub__(self, other: Interval | float) -> Interval:
+        return self + -_interval(other)
+
+    def __rsub__(self, other: float) -> Interval:
+        return _interval(other) - self
+
+    def __mul__(self, other: Interval | float) -> Interval:
+        by = _interval(other)
+        ends = [_times(a, b) for a in (self.low, self.high) for b in (by.low, by.high)]
+        return Interval(min(ends), max(ends))
+
+    def __truediv__(self, other: float) -> Interval:
+        return self * (1.0 / other)
+
+    __radd__ = __add__
+    __rmul__ = __mul__
+
+    def sin(self) -> Interval:
+        """What `np.sin` of an interval asks for."""
+        return Interval(-1.0, 1.0)
+
+    def cos(self) -> Interval:
+        """What `np.cos` of an interval asks for."""
+        return Interval(-1.0, 1.0)
+
+    def tan(self) -> Interval:
+        """What `np.tan` of an interval asks for."""
+        if self.size < math.pi / 2.0:
+            return Interval(math.tan(self.low), math.tan(self.high))
+        return Interval(-math.inf, math.inf)
+
+
+def _interval(value: Interval | float) -> Interval:
+    return value if isinstance(value, Interval) else Interval(float(value), float(value))
+
+
+def _times(a: float, b: float) -> float:
+    """A product in which zero times infinity is zero: a limit that is zero stays zero."""
+    return 0.0 if a == 0.0 or b == 0.0 else a * b
