@@ -305,13 +305,6 @@ class TestFolder:
             "x.yaml: receding_horizon: step is 9 s, need at most the horizon, 8 s",
         ),
         (
-            LOOP.replace("time_s: free", "time_s: 8.0").replace(
-                "    - {name: rest, control: [0.0, 0.0]}\n", ""
-            ),
-            "x.yaml: receding_horizon: a fixed time needs a rest trim, which prolongs the last "
-            "plan; the library has none",
-        ),
-        (
             LOOP.replace("step_s: 0.5", "step_s: 0.5, retimed: true"),
             "x.yaml: receding_horizon: retimed plans need a fixed horizon and a cost with effort",
         ),

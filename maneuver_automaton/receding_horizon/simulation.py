@@ -102,7 +102,9 @@ def simulate(
     upset = checked(upset, problem.start.size)
     random = draws(upset, problem.start.size)
     controller: RecedingHorizon | ManeuverHorizon
-    inertia = has_inertia(problem) or bool(problem.zones)
+    # a fixed time that no rest prolongs is what is left of it, which that controller knows
+    shrinks = problem.horizon.time is not None and problem.automaton.rest is None
+    inertia = has_inertia(problem) or bool(problem.zones) or shrinks
     if inertia:
         _check_inertia(upset, stay=stay, retimed=retimed)
         controller = ManeuverHorizon(
@@ -133,7 +135,8 @@ def simulate(
     inside: list[bool] = [_inside(problem, where)]
     arrived = inside[-1] and (last is None or last.deed.leads)
     if inertia:  # it may pass the goal before it gets there
-        arrived = inside[-1] and (problem.first_trim.is_rest if last is None else _stands(last))
+        stands = problem.automaton.is_kinematic or problem.first_trim.is_rest
+        arrived = inside[-1] and (stands if last is None else _stands(last))
     for number in range(begin, begin + steps):
         if arrived and not stay:
             break

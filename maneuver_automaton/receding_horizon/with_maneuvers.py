@@ -104,6 +104,7 @@ class ManeuverHorizon:
                 raise ValueError(f"receding horizon: {name} must be positive, got {value} s")
         if not margin >= 0.0:
             raise ValueError(f"receding horizon: margin must be at least 0, got {margin}")
+        problem = with_trims_at_ends(problem)
         self.problem = problem
         self.delta = step
         self.margin = margin
@@ -522,6 +523,29 @@ class _Decision:
         durations = np.array(plan.durations)
         durations[-1] += max(0.0, total - plan.duration)
         return replace(plan, durations=durations)
+
+
+def with_trims_at_ends(problem: Problem) -> Problem:
+    """The problem with a trim at its start and goals, where a kinematic vehicle has no rest.
+
+    Which one it is makes no difference: it lasts no time, and is left at will.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
+    >>> with_trims_at_ends(Problem(robot, [0, 0, 0], [1, 0, 0])).start_trim
+    'ahead'
+    """
+    automaton = problem.automaton
+    if automaton.rest is not None or not automaton.is_kinematic:
+        return problem
+    name = automaton.trim_names[0]
+    return replace(
+        problem,
+        start_trim=problem.start_trim or name,
+        goals=tuple(replace(goal, trim=goal.trim or name) for goal in problem.goals),
+    )
 
 
 def same_maneuvers(here: Problem, plan: Plan, goal: Goal, *, under_way: bool) -> Plan | None:

@@ -291,21 +291,29 @@ class _Polishing:
         guess = self.guesses[number]
         gears = _gears(self.task.model, guess)
         shuffles = np.count_nonzero(np.diff(gears)) >= SHUFFLE
+        unfinished: list[Polished] = []
         if not shuffles:
             found = self._solve("fixed planes", number, guess, fixed_planes=True)
             if found.status is SolveStatus.SOLVED:
                 return found
             found = self._solve("lines", number, guess, most=DEEP_ITERATIONS)
+            unfinished.append(found)
             if found.status is not SolveStatus.SOLVED:
                 out = self._solve("elastic", number, guess, elastic=True)
                 if out.status is SolveStatus.SOLVED:
                     found = self._solve("lines", number, out.as_guess)
+                    unfinished.append(found)
             if found.status is SolveStatus.SOLVED:
                 self._consider(found)
                 return None
         found = self._solve("gears", number, guess, gears=gears)
         if found.status is SolveStatus.SOLVED:
             self._consider(found)
+            return None
+        # nothing was solved; what is near enough to a motion is closed and audited all the same
+        for one in [*unfinished, found]:
+            if self.best is None and one.status is SolveStatus.OUT_OF_BUDGET and one.iterations:
+                self._consider(one)
         return None
 
     def _lines(self, number: int, rough: Polished) -> None:

@@ -171,10 +171,11 @@ FREE = {
 }
 
 
+@pytest.mark.parametrize("cost", [Cost(effort=1.0), Cost(length=1.0)], ids=["effort", "length"])
 @pytest.mark.parametrize("name", FREE)
-def test_words_come_first_where_nothing_is_in_the_way(name):
-    """A search over words knows effort alone; no expansion of the lattice comes before it."""
-    problem = replace(FREE[name], cost=Cost(effort=1.0))
+def test_words_come_first_where_nothing_is_in_the_way(name, cost):
+    """No plan is dearer than what the search over words finds by itself."""
+    problem = replace(FREE[name], cost=cost)
     words = search_words_with_maneuvers(problem, problem.goals[0], time_limit=60.0)
     result = plan(problem, time_limit=60.0)
     assert result.status is PlanStatus.FOUND

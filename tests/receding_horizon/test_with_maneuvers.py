@@ -9,8 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.cutting import NOTHING, committed, head_of
-from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
+from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Zone
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.formats.closed_loop_json import (
     closed_loop_to_dict,
@@ -18,6 +19,7 @@ from maneuver_automaton.formats.closed_loop_json import (
     save_closed_loop,
 )
 from maneuver_automaton.groups import SE2
+from maneuver_automaton.models import Unicycle
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.receding_horizon import (
     Deed,
@@ -271,3 +273,19 @@ def test_a_fixed_time_that_ends_in_motion_is_what_is_left_of_it():
     loop = simulate(problem, step=0.5, time_limit=30.0, steps=40)
     assert loop.reached, loop.reason
     assert loop.times[-1] == pytest.approx(9.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("case", ["zones", "fixed time"])
+def test_a_vehicle_that_cannot_rest_meets_zones_and_a_fixed_time(case):
+    """Dubins' car has no rest, neither to begin with nor to fill a fixed time."""
+    controls = {"left": (1.0, 1.0), "straight": (1.0, 0.0), "right": (1.0, -1.0)}
+    robot = Automaton.of_controls(Unicycle(), controls)
+    zone = Zone(shape=Box([1.0, 1.0], [3.0, -4.0]), max_speed=0.5)
+    changed = {"zones": {"zones": (zone,)}, "fixed time": {"horizon": Horizon(time=16.0)}}[case]
+    search = SearchSettings(max_expansions=400)
+    problem = posed([6.0, 2.0, 0.5], automaton=robot, search=search, **changed)
+    loop = simulate(problem, step=1.0, time_limit=30.0, steps=30)
+    assert loop.reached, loop.reason
+    assert max(problem.goals[0].off(loop.poses[-1])) < 1e-8
+    if case == "fixed time":
+        assert loop.times[-1] == pytest.approx(16.0, abs=1e-6)
