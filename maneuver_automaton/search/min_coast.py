@@ -13,6 +13,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import SE2xR
 from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.search.insertion import sub_library
 from maneuver_automaton.search.result import SearchResult, SearchStatus, Solution
 from maneuver_automaton.search.setup import SearchSetup, search_setup
 from maneuver_automaton.search.words import in_order, resting
@@ -28,7 +29,8 @@ def search_with_least_times(
     """Words in which every moving trim lasts at least ``horizon.min_coast``.
 
     What must be coasted at least is a fixed displacement after each trim; what is coasted beyond
-    it is solved for. Each word is solved from several starts, so solutions may be missed.
+    it is solved for. Each word is solved from several starts, so solutions may be missed. Of a
+    large library only the trims that reach far are combined.
 
     Examples
     --------
@@ -51,7 +53,8 @@ def search_with_least_times(
     found: list[Solution] = []
     words = 0
     status = SearchStatus.EXHAUSTED
-    for word in _words(setup, most):
+    reaching = np.flatnonzero(np.isin(setup.trims, sub_library(setup).trims)).tolist()
+    for word in _words(reaching, most):
         if time.monotonic() > deadline or words == problem.search.max_expansions:
             status = SearchStatus.OUT_OF_BUDGET
             break
@@ -70,10 +73,10 @@ def search_with_least_times(
     )
 
 
-def _words(setup: SearchSetup, most: int) -> Iterator[tuple[int, ...]]:
-    """Words of moving trims without equal neighbours, shorter ones first."""
+def _words(trims: list[int], most: int) -> Iterator[tuple[int, ...]]:
+    """Words of these trims without equal neighbours, shorter ones first."""
     for n in range(1, most + 1):
-        for word in itertools.product(range(len(setup.trims)), repeat=n):
+        for word in itertools.product(trims, repeat=n):
             if all(a != b for a, b in itertools.pairwise(word)):
                 yield word
 
@@ -96,21 +99,30 @@ def _solved(
     if setup.free_heading:
         twists = np.vstack([twists, [0.0, 0.0, 1.0, 0.0]])
         rates, floors = np.append(rates, 0.0), np.append(floors, 0.0)
-    if setup.free_heading and problem.horizon.time is not None:
-        return []  # the turn of a free heading takes no time, which this formulation cannot say
-    total = problem.horizon.time
-    beyond = None if total is None else total - float(floors.sum())
-    if beyond is not None and beyond < 0.0:
-        return []
     gaps = SE2xR.exp(floors[:, None] * twists).pose
-    solved = solve_switching_times(
-        twists, rates, setup.goal, total=beyond, gaps=gaps, restarts=RESTARTS
-    )
-    if solved.status is TimesStatus.FAILED:
-        return []
-    times = (np.maximum(solved.durations, 0.0) + floors)[:counted]
     longest = problem.horizon.max_time
-    if longest is not None and times.sum() > longest + 1e-9:
+    times = None
+    # Where the cheapest times are too long, the greatest time binds: it becomes a fixed one.
+    for total in (problem.horizon.time,) if longest is None else (None, longest):
+        beyond = None if total is None else total - float(floors[:counted].sum())
+        if beyond is not None and beyond < 0.0:
+            return []
+        weights = None if total is None else np.append(np.ones(counted), np.zeros(len(rates)))
+        solved = solve_switching_times(
+            twists,
+            rates,
+            setup.goal,
+            total=beyond,
+            weights=None if weights is None else weights[: len(rates)],
+            gaps=gaps,
+            restarts=RESTARTS,
+        )
+        if solved.status is TimesStatus.FAILED:
+            return []
+        times = (np.maximum(solved.durations, 0.0) + floors)[:counted]
+        if longest is None or times.sum() <= longest + 1e-9:
+            break
+    if times is None or (longest is not None and times.sum() > longest + 1e-9):
         return []
     if rest and times[-1] <= 1e-9:
         return []  # the same word without rest is tried too
