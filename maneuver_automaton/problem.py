@@ -231,8 +231,6 @@ class Problem:
             raise ValueError(f"margin must be a number of at least 0, got {self.margin} m")
         if not self.automaton.is_kinematic:
             self._check_ends()
-        elif self.obstacles and dof != 3:
-            raise ValueError("obstacles: this version knows them for vehicles in the plane only")
 
     def _check_ends(self) -> None:
         """A vehicle with inertia begins and ends in a trim."""

@@ -98,6 +98,7 @@ def plan_on_lattice(
     found = time.monotonic()
     timing = {"search": found - began, "first_plan": found - began, "refine": 0.0, "audit": 0.0}
     if not progress.words:
+        del timing["first_plan"]
         status, reason = _why_none(query, first, time_limit)
         return PlanResult(
             problem=problem,

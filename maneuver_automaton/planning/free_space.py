@@ -45,6 +45,7 @@ def plan_by_words(
     if problem.obstacles:
         counts["words_that_hit"] = chosen.hit
     if not chosen.plans:
+        del timing["first_plan"]
         status, reason = _why_none(problem, found, chosen, time_limit)
         return PlanResult(
             problem=problem, status=status, reason=reason, timing_s=timing, counts=counts

@@ -12,6 +12,11 @@ from maneuver_automaton.planning.among_obstacles import (
 from maneuver_automaton.planning.among_zones import plan_among_zones
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.free_space import plan_by_words
+from maneuver_automaton.planning.in_space import (
+    climbs_among_obstacles,
+    load_in_space,
+    plan_in_space,
+)
 from maneuver_automaton.planning.off_lattice import goals_off_lattice
 from maneuver_automaton.planning.result import PlanResult
 from maneuver_automaton.planning.with_inertia import load_inertia, plan_with_inertia
@@ -86,6 +91,8 @@ def _searched(
 ) -> PlanResult:
     """The answer of the search that suits a problem without zones."""
     kinematic = plan_on_lattice if uses_lattice(problem) else plan_by_words
+    if climbs_among_obstacles(problem):
+        kinematic = plan_in_space
     how = plan_with_inertia if has_inertia(problem) else kinematic
     return how(problem, began=began, time_limit=time_limit, alternatives=alternatives)
 
@@ -101,6 +108,9 @@ def _load(problem: Problem) -> None:
     """Compile or load what planning needs, before the clock runs."""
     if has_inertia(problem):
         load_inertia(problem)
+        return
+    if problem.start.size > 3 and (problem.obstacles or problem.zones):
+        load_in_space(problem)
         return
     if problem.obstacles or problem.zones or uses_lattice(problem):
         load_lattice()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.collision import AnyObstacle, Shape, as_footprint, as_obstacles
+from maneuver_automaton.collision import AnyObstacle, Shape, Zone, as_footprint, as_obstacles
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.planning.plan import plan, prepare
 from maneuver_automaton.planning.result import PlanResult
@@ -43,7 +43,11 @@ class Planner:
     search: SearchSettings = field(default_factory=SearchSettings, kw_only=True)
     obstacles: tuple[AnyObstacle, ...] = field(default=(), kw_only=True)
     footprint: tuple[Shape, ...] = field(default=(), kw_only=True)
+    parts: Mapping[str, tuple[Shape, ...]] = field(default_factory=dict, kw_only=True)  # carried
+    body_height: tuple[float, float] = field(default=(0.0, 0.0), kw_only=True)  # [m] about z
     margin: float = field(default=0.0, kw_only=True)  # [m]
+    zones: tuple[Zone, ...] = field(default=(), kw_only=True)
+    start_trim: str | None = field(default=None, kw_only=True)  # of queries that name none
 
     if TYPE_CHECKING:
 
@@ -57,14 +61,24 @@ class Planner:
             search: SearchSettings = ...,
             obstacles: AnyObstacle | Shape | Sequence[AnyObstacle | Shape] = (),
             footprint: Shape | Sequence[Shape] = (),
+            parts: Mapping[str, Shape | Sequence[Shape]] = ...,
+            body_height: tuple[float, float] = (0.0, 0.0),
             margin: float = 0.0,
+            zones: Sequence[Zone] = (),
+            start_trim: str | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "obstacles", as_obstacles(self.obstacles))
         object.__setattr__(self, "footprint", as_footprint(self.footprint))
-        dof = self.automaton.model.group.dof
-        prepare(self.problem(np.zeros(dof), np.ones(dof)))
+        object.__setattr__(self, "zones", tuple(self.zones))
+        automaton = self.automaton
+        dof = automaton.model.group.dof
+        # A vehicle without a rest has to be given a trim to end in; any will do here.
+        last = None if automaton.rest is not None else automaton.trim_names[0]
+        first = self.start_trim or last
+        aim = Goal(pose=np.ones(dof), trim=last)
+        prepare(self.problem(np.zeros(dof), aim, start_trim=first))
 
     def problem(
         self,
@@ -72,8 +86,9 @@ class Planner:
         goals: ArrayLike | Goal | Sequence[Goal],
         *,
         start_time: float = 0.0,
+        start_trim: str | None = None,
     ) -> Problem:
-        """The problem of one query."""
+        """The problem of one query; `start_trim` goes before the planner's own."""
         return Problem(
             self.automaton,
             start,
@@ -84,8 +99,12 @@ class Planner:
             search=self.search,
             obstacles=self.obstacles,
             footprint=self.footprint,
+            parts=self.parts,
+            body_height=self.body_height,
             margin=self.margin,
+            zones=self.zones,
             start_time=start_time,
+            start_trim=self.start_trim if start_trim is None else start_trim,
         )
 
     def plan(
@@ -96,9 +115,13 @@ class Planner:
         time_limit: float = 5.0,
         alternatives: int = 0,
         start_time: float = 0.0,
+        start_trim: str | None = None,
     ) -> PlanResult:
-        """As `plan` of the problem from `start` (dof,) to `goals`, at `start_time` [s]."""
-        problem = self.problem(start, goals, start_time=start_time)
+        """As `plan` of the problem from `start` (dof,) to `goals`, at `start_time` [s].
+
+        It starts in `start_trim`, or else in the planner's own; a `Goal` names the last trim.
+        """
+        problem = self.problem(start, goals, start_time=start_time, start_trim=start_trim)
         return plan(problem, time_limit=time_limit, alternatives=alternatives)
 
     def with_obstacles(

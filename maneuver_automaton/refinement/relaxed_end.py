@@ -59,7 +59,7 @@ def with_relaxed_end(
     times = _best_times(_Relaxation(problem, plan, goal, share, first))
     if times is None:
         return None
-    relaxed = _without_nothing(replace(plan, durations=times))
+    relaxed = without_nothing(replace(plan, durations=times))
     return relaxed if problem.cost_of(relaxed) < problem.cost_of(plan) else None
 
 
@@ -222,7 +222,7 @@ def _closed(task: _Relaxation, times: Array) -> Array | None:
     return times if fine else None
 
 
-def _without_nothing(plan: Plan) -> Plan:
+def without_nothing(plan: Plan) -> Plan:
     """The plan without trims that last no time, and neighbours that are one trim joined."""
     if plan.maneuvers:
         return plan

@@ -12,6 +12,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.search.insertion import sub_library
 from maneuver_automaton.search.result import SearchResult, SearchStatus
 from maneuver_automaton.search.setup import SearchSetup, search_setup
 from maneuver_automaton.search.words import in_order, resting
@@ -28,7 +29,8 @@ def search_with_least_times(
     """Words in which every moving trim lasts at least ``horizon.min_coast``.
 
     What must be coasted at least is a fixed displacement after each trim; what is coasted beyond
-    it is solved for. Each word is solved from several starts, so solutions may be missed.
+    it is solved for. Each word is solved from several starts, so solutions may be missed. Of a
+    large library only the trims that reach far are combined.
 
     Examples
     --------
@@ -51,7 +53,8 @@ def search_with_least_times(
     found: list[Word] = []
     words = 0
     status = SearchStatus.EXHAUSTED
-    for word in _words(setup, most):
+    reaching = np.flatnonzero(np.isin(setup.trims, sub_library(setup).trims)).tolist()
+    for word in _words(reaching, most):
         if time.monotonic() > deadline or words == problem.search.max_expansions:
             status = SearchStatus.OUT_OF_BUDGET
             break
@@ -70,10 +73,10 @@ def search_with_least_times(
     )
 
 
-def _words(setup: SearchSetup, most: int) -> Iterator[tuple[int, ...]]:
-    """Words of moving trims without equal neighbours, shorter ones first."""
+def _words(trims: list[int], most: int) -> Iterator[tuple[int, ...]]:
+    """Words of these trims without equal neighbours, shorter ones first."""
     for n in range(1, most + 1):
-        for word in itertools.product(range(len(setup.trims)), repeat=n):
+        for word in itertools.product(trims, repeat=n):
             if all(a != b for a, b in itertools.pairwise(word)):
                 yield word
 
@@ -92,19 +95,23 @@ def _solved(
         rates = np.append(rates, setup.rest_rate)
         floors = np.append(floors, 0.0)
         trims = np.append(trims, setup.rest)
-    solved = solve_switching_times(
-        twists,
-        rates,
-        setup.goal,
-        total=problem.horizon.time,
-        free_heading=setup.free_heading,
-        least=floors,
-        restarts=RESTARTS,
-    )
-    if solved.status is TimesStatus.FAILED:
-        return []
-    times = solved.durations
     longest = problem.horizon.max_time
+    # Where the cheapest times are too long, the greatest time binds: it becomes a fixed one.
+    for total in (problem.horizon.time,) if longest is None else (None, longest):
+        solved = solve_switching_times(
+            twists,
+            rates,
+            setup.goal,
+            total=total,
+            free_heading=setup.free_heading,
+            least=floors,
+            restarts=RESTARTS,
+        )
+        if solved.status is TimesStatus.FAILED:
+            return []
+        if longest is None or solved.durations.sum() <= longest + 1e-9:
+            break
+    times = solved.durations
     if longest is not None and times.sum() > longest + 1e-9:
         return []
     if rest and times[-1] <= 1e-9:

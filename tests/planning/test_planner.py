@@ -1,0 +1,45 @@
+"""A planner keeps all that a problem states but its start, its goals and its start time."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+
+from maneuver_automaton.collision import Box, Disc, Zone
+from maneuver_automaton.planning import Planner, plan
+from maneuver_automaton.problem import Goal, Problem
+from tests import inertia
+from tests.search.cases import TABLE_2, robot
+
+QUERY = {"start", "goals", "start_time"}
+
+
+def test_every_field_of_a_problem_is_stated_once():
+    of_problem = {one.name for one in fields(Problem)} - QUERY
+    assert {one.name for one in fields(Planner)} == of_problem
+
+
+def test_zones_hold_in_every_query():
+    zone = Zone(shape=Box([1.0, 2.0], [2.0, 0.0]), trims=("spin", "acw"))
+    planner = Planner(robot(TABLE_2), zones=[zone], footprint=Disc(0.1))
+    for goal in ([4.0, 0.0, 0.0], [4.0, 0.5, 0.0]):
+        result = planner.plan([0, 0, 0], goal, time_limit=3.0)
+        poses = result.plan.pose_at(np.linspace(0.0, result.plan.duration, 400))
+        inside = (np.abs(poses[:, 0] - 2.0) < 0.5) & (np.abs(poses[:, 1]) < 1.0)
+        assert not inside.any()
+        free = plan(Problem(robot(TABLE_2), [0, 0, 0], goal), time_limit=3.0)
+        assert result.cost > free.cost
+
+
+def test_parts_heights_and_trims_reach_the_problem():
+    trailer = inertia.resting(inertia.TRAILER)
+    part = {name: Box([0.3, 0.2]) for name in trailer.model.part_names}
+    name = trailer.trim_names[0]
+    planner = Planner(trailer, parts=part, body_height=(-0.1, 0.4), start_trim=name)
+    problem = planner.problem([0, 0, 0], Goal(pose=[1, 0, 0], trim=name))
+    assert set(problem.parts) == set(part)
+    assert problem.body_height == (-0.1, 0.4)
+    assert problem.start_trim == name
+    again = Planner(trailer, parts=part).problem([0, 0, 0], [1, 0, 0], start_trim=name)
+    assert again.start_trim == name
