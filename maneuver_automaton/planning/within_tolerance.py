@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -31,8 +31,12 @@ DENSE = 16  # the same where the goal itself is blocked
 RINGS = (1.0, 0.5)  # shares of the tolerance at which these lie
 MOST_AIMS = 12  # poses that are aimed at where the goal itself is blocked
 SHARES = (1.0, 0.5, 0.25)  # of the tolerance that an end may use, until it is free
+LATER = (0.45, 0.8)  # shares of the time left for the first question, and for the second of three
 MOST_LAST = 4  # trims at the end whose times alone are changed where all of them hit something
 SPARE = 3  # plans asked for each alternative: with loose ends some are one motion
+
+
+T = TypeVar("T", int, float)
 
 
 class Answer(Protocol):
@@ -57,49 +61,88 @@ def plan_within_tolerance(
 
     The time limit [s] counts from `began`, as `time.monotonic` does.
     """
-    aimed = replace(problem, goals=tuple(_aims(problem)))
-    result = answer(aimed, began=began, time_limit=time_limit, alternatives=SPARE * alternatives)
-    if result.plan is None:
-        return _none(problem, result)
+    asked = list(_questions(problem))
+    results: list[PlanResult] = []
+    improvements: list[tuple[float, float]] = []
+    for k, question in enumerate(asked):
+        now = time.monotonic()
+        share = 1.0 if k == len(asked) - 1 else LATER[k]
+        left = share * max(began + time_limit - now, 1e-3)
+        result = answer(question, began=now, time_limit=left, alternatives=SPARE * alternatives)
+        results.append(result)
+        best = improvements[-1][1] if improvements else math.inf
+        found = [(now - began + at, cost) for at, cost in result.improvements if cost < best]
+        improvements += found
+    counts = _sums(result.counts for result in results)
+    timing = _sums(result.timing_s for result in results)
     begin = time.monotonic()
     accepted: list[Accepted] = []
     reason = ""
-    for plan in (result.plan, *(other.plan for other in result.alternatives)):
-        one, why = _loosened(problem, plan)
-        reason = reason or why
-        if one is not None:
-            accepted.append(one)
+    for result in results:
+        if result.plan is None:
+            continue
+        for plan in (result.plan, *(other.plan for other in result.alternatives)):
+            one, why = _loosened(problem, plan)
+            reason = reason or why
+            if one is not None:
+                accepted.append(one)
+    if not accepted:
+        timing.pop("first_plan", None)
+        return _none(problem, results[0], reason, timing, counts)
     accepted.sort(key=lambda one: one.cost)
     kept: list[Accepted] = []
     for one in accepted:
         if len(kept) <= alternatives and is_new(one.plan, (other.plan for other in kept)):
             kept.append(one)
     done = time.monotonic()
-    timing = dict(result.timing_s)
     timing["refine"] = timing.get("refine", 0.0) + done - begin
-    if not kept:
-        return PlanResult(
-            problem=problem,
-            status=PlanStatus.NO_PLAN,
-            reason=f"every plan found was refused: {reason}",
-            timing_s=timing,
-            counts=result.counts,
-        )
-    improvements = result.improvements
+    timing["first_plan"] = next(
+        result.timing_s["first_plan"] for result in results if "first_plan" in result.timing_s
+    )
     if improvements and kept[0].cost < improvements[-1][1]:
-        improvements = (*improvements, (done - began, kept[0].cost))
-    bound = result.lower_bound or 0.0
-    if any(why_goal_blocked(problem, goal) for goal in problem.goals):
-        bound = min(bound, *(closed_bound(problem, goal) for goal in problem.goals))
+        improvements.append((done - began, kept[0].cost))
     return found_plans(
         problem,
         kept,
-        bound=bound,
+        bound=_lower_bound(problem, results[0]),
         timing_s=timing,
-        counts=result.counts,
-        improvements=improvements,
-        nodes=result.nodes,
+        counts=counts,
+        improvements=tuple(improvements),
+        nodes=results[0].nodes,
     )
+
+
+def _questions(problem: Problem) -> Iterator[Problem]:
+    """The goals themselves where a plan may end there, the poses nearest to the start, all others.
+
+    Each has its share of the time and of the expansions: many aims at once would take from the
+    searches that improve one plan what they need, and cost more than the exact goal alone.
+    """
+    aims = list(_aims(problem))
+    exact, beside = tuple(aims[: len(problem.goals)]), tuple(aims[len(problem.goals) :])
+    near, others = beside[:1], beside[1:]
+    blocked = all(why_goal_blocked(problem, goal) for goal in exact)
+    asked = [goals for goals in (() if blocked and beside else exact, near, others) if goals]
+    most = problem.search.max_expansions
+    share = None if most is None else max(1, most // len(asked))
+    for goals in asked:
+        yield replace(problem, goals=goals, search=replace(problem.search, max_expansions=share))
+
+
+def _lower_bound(problem: Problem, exact: PlanResult) -> float:
+    """No plan that ends within a tolerance is cheaper: bounds count it for the goals themselves."""
+    if exact.lower_bound is not None and exact.problem.goals == problem.goals:
+        return exact.lower_bound
+    return min(closed_bound(problem, goal) for goal in problem.goals)
+
+
+def _sums(rows: Iterable[dict[str, T]]) -> dict[str, T]:
+    """Sums by name."""
+    sums: dict[str, T] = {}
+    for row in rows:
+        for name, value in row.items():
+            sums[name] = sums[name] + value if name in sums else value
+    return sums
 
 
 def _aims(problem: Problem) -> Iterator[Goal]:
@@ -204,9 +247,17 @@ def _goals_met(problem: Problem, plan: Plan) -> Iterator[int]:
             yield index
 
 
-def _none(problem: Problem, result: PlanResult) -> PlanResult:
+def _none(
+    problem: Problem,
+    result: PlanResult,
+    refused: str,
+    timing: dict[str, float],
+    counts: dict[str, int],
+) -> PlanResult:
     """The verdict on the poses that were aimed at, as far as it holds for all within tolerance."""
-    status = result.status
-    if status is PlanStatus.UNREACHABLE and not why_impossible(problem):
+    status, reason = result.status, result.reason
+    if refused:
+        status, reason = PlanStatus.NO_PLAN, f"every plan found was refused: {refused}"
+    elif status is PlanStatus.UNREACHABLE and not why_impossible(problem):
         status = PlanStatus.NO_PLAN  # proven for these poses alone
-    return replace(result, problem=problem, status=status)
+    return PlanResult(problem=problem, status=status, reason=reason, timing_s=timing, counts=counts)
