@@ -127,9 +127,7 @@ def _inertia() -> Iterator[Scene]:
     yield _scene("slot", slot)
     for path in sorted(SCENARIOS.glob("*.yaml")):
         if path.stem in WITH_INERTIA:
-            yield _scene(
-                f"scenario/{path.stem}", of(scenario, path), path.stem == "robot_with_inertia"
-            )
+            yield _scene(f"scenario/{path.stem}", of(scenario, path), path.stem == "lane_change")
 
 
 def _truck(goal, **changed) -> Problem:
