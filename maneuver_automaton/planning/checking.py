@@ -27,6 +27,9 @@ from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.inside import stays_inside
 
 
+PROVEN = (1e-3, 2e-5)  # [m] a hit counts if it is one for the finer cover of round shapes too
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Checked:
     """What the checks of one plan found."""
@@ -85,15 +88,17 @@ def load_checking() -> None:
     check_plan(problem, Plan([0, 0, 0], ahead.trims, durations=[1.0]), problem.goals[0])
 
 
-@functools.lru_cache(maxsize=4)
+@functools.lru_cache(maxsize=8)
 def checker_of(
     footprint: tuple[Shape, ...],
     obstacles: tuple[AnyObstacle, ...],
     margin: float,
     origin: tuple[float, float],
+    *,
+    proven: float = PROVEN[0],
 ) -> FclChecker:
-    """FCL's view of a map."""
-    return FclChecker(footprint, obstacles, margin=margin, origin=origin)
+    """FCL's view of a map; what it reports as hit comes closer than ``margin + proven`` [m]."""
+    return FclChecker(footprint, obstacles, margin=margin, origin=origin, proven=proven)
 
 
 def what_is_hit(problem: Problem, plan: Plan, goal: Goal) -> str:
@@ -107,8 +112,13 @@ def what_is_hit(problem: Problem, plan: Plan, goal: Goal) -> str:
     layers = layers_of(problem.obstacles, in_space=plan.start.size > 3)
     for what, moving, shapes in bodies:
         for layer in layers:
-            checker = checker_of(shapes, layer.obstacles, problem.margin, _origin(goal))
-            hit = _what_hits(checker, moving, layer, problem)
+            for proven in PROVEN:
+                checker = checker_of(
+                    shapes, layer.obstacles, problem.margin, _origin(goal), proven=proven
+                )
+                hit = _what_hits(checker, moving, layer, problem)
+                if not hit:
+                    break
             if hit:
                 return what + hit
     return ""
