@@ -51,11 +51,6 @@ class Word:
         """Time the motion takes, maneuvers included [s]."""
         return float(self.durations.sum()) + self.maneuver_time
 
-    @property
-    def has_maneuvers(self) -> bool:
-        """Whether a transition is more than a switch."""
-        return bool((self.transitions != SWITCH).any())
-
 
 def word_of_steps(
     library: Library,
