@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import SE2, LieGroup
 from maneuver_automaton.models._components import Components, no_parts, no_rates, on_arrays
 from maneuver_automaton.models._limits import check_positive, symmetric_limits
@@ -75,76 +74,3 @@ class Unicycle:
     def part_poses(self, reduced_state: Array) -> Array:
         """Carries nothing: (..., 0, 3)."""
         return no_parts(reduced_state)
-
-
-def spatial_twist(state: ArrayLike, control: ArrayLike) -> Array:
-    """Twist (..., 3) of the unicycle in the world frame: (v_1, v_2, u_2).
-
-    With it the flow is ``exp(t xi) @ start``, with the twist in front; it depends on the state.
-    The body twist of a trim stands behind, ``start @ exp(t xi)``, and does not. The two are
-    related by ``spatial == Ad(start) body``.
-
-    Source: the paper, Prop. 6.
-
-    Examples
-    --------
-    >>> spatial_twist([0.0, 2.0, 0.0], [1.0, 0.5]).tolist()
-    [2.0, 0.0, 0.5]
-    """
-    x, y, heading = np.moveaxis(as_array("state", state, last=3), -1, 0)
-    speed, turn_rate = np.moveaxis(as_array("control", control, last=2), -1, 0)
-    v_1 = speed * np.cos(heading) + turn_rate * y
-    v_2 = speed * np.sin(heading) - turn_rate * x
-    return np.stack([v_1, v_2, np.broadcast_to(turn_rate, v_1.shape)], axis=-1)
-
-
-def flow(state: ArrayLike, control: ArrayLike, *, duration: ArrayLike) -> Array:
-    """States (..., 3) reached under a constant control after `duration` (...,) [s].
-
-    Source: the paper, Prop. 6, by its spatial twist. The second entry of the translation in
-    the proof has a wrong sign in print; the statement, used here, is right.
-
-    Examples
-    --------
-    >>> flow([0.0, 2.0, 0.0], [1.0, 0.5], duration=np.pi).round(3).tolist()
-    [2.0, 4.0, 1.571]
-    """
-    seconds = as_array("duration", duration)[..., None]
-    return (SE2.exp(seconds * spatial_twist(state, control)) @ SE2(as_array("state", state))).pose
-
-
-def symmetry_matrix(shift: ArrayLike) -> Array:
-    """Matrices (..., 4, 4) of the symmetry group of the unicycle, for shifts (..., 3) [m, m, rad].
-
-    They multiply the state in homogeneous coordinates, (x, y, heading, 1).
-
-    Source: the paper, Prop. 3.
-
-    Examples
-    --------
-    >>> symmetry_matrix([1.0, 2.0, 0.0])[:, 3].tolist()
-    [1.0, 2.0, 0.0, 1.0]
-    """
-    shift = as_array("shift", shift, last=3)
-    matrix = np.zeros((*shift.shape[:-1], 4, 4))
-    matrix[..., :2, :2] = SE2(shift).matrix()[..., :2, :2]
-    matrix[..., 2, 2] = matrix[..., 3, 3] = 1.0
-    matrix[..., :3, 3] = shift
-    return matrix
-
-
-def symmetry_action(shift: ArrayLike, state: ArrayLike) -> Array:
-    """States (..., 3) moved by shifts (..., 3): ``E g (x, 1)``; the same as ``SE2(g) @ SE2(x)``.
-
-    Source: the paper, Prop. 3.
-
-    Examples
-    --------
-    >>> symmetry_action([1.0, 0.0, np.pi / 2], [2.0, 0.0, 0.0]).round(3).tolist()
-    [1.0, 2.0, 1.571]
-    """
-    state = as_array("state", state, last=3)
-    homogeneous = np.concatenate([state, np.ones((*state.shape[:-1], 1))], axis=-1)
-    projection = np.eye(3, 4)
-    moved: Array = np.einsum("ij,...jk,...k->...i", projection, symmetry_matrix(shift), homogeneous)
-    return moved

@@ -15,12 +15,10 @@ from maneuver_automaton.optimal_control.problem import (
 )
 from maneuver_automaton.optimal_control.problem import straight_guess as straight_guess
 from maneuver_automaton.optimal_control.separation import BodyPart as BodyPart
-from maneuver_automaton.optimal_control.separation import trailer_pose as trailer_pose
 from maneuver_automaton.optimal_control.solution import (
     OptimalControlSolution as OptimalControlSolution,
 )
 from maneuver_automaton.optimal_control.solution import SolveStatus as SolveStatus
-from maneuver_automaton.optimal_control.solution import dynamics_defect as dynamics_defect
 from maneuver_automaton.optimal_control.transcription import SolverSettings as SolverSettings
 from maneuver_automaton.optimal_control.transcription import Transcription as Transcription
 from maneuver_automaton.optimal_control.transcription import solve as solve

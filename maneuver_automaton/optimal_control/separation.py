@@ -49,23 +49,6 @@ class BodyPart:
         return float(np.hypot(*(high - low))) / 2.0
 
 
-def trailer_pose(hitch_length: float) -> PartPose:
-    """Pose of a trailer's axle in the frame of a car whose reduced state is [hitch].
-
-    Source: turned back by the hitch angle, then back along the trailer by its length [m].
-
-    Examples
-    --------
-    >>> [round(float(value), 3) for value in trailer_pose(0.5)([np.pi / 2])]
-    [-0.0, 0.5, -1.571]
-    """
-
-    def pose(z: Components) -> Sequence[Any]:
-        return -hitch_length * np.cos(z[0]), hitch_length * np.sin(z[0]), -z[0]
-
-    return pose
-
-
 class Pairs(NamedTuple):
     """Which interval, piece of the body and piece of the obstacles each line parts."""
 

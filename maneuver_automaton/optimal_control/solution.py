@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -106,35 +106,6 @@ def evaluate(
         worst_defect=_largest(np.abs(defects)),
         worst_violation=_violation(problem, state, control, duration),
     )
-
-
-def dynamics_defect(
-    problem: OptimalControlProblem,
-    f: Callable[[Array, Array], Array],
-    *,
-    states: Array,
-    controls: Array,
-) -> float:
-    """Greatest difference between the problem's dynamics and `f` at states (m, n_x).
-
-    With `models.vector_field` of a model as `f`, it says whether the formulas for the solver are
-    those of the model.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.groups import SE2
-    >>> from maneuver_automaton.models import Unicycle, vector_field
-    >>> from maneuver_automaton.optimal_control.uniform_effort import example_problem
-    >>> x, u = np.random.default_rng(0).normal(size=(2, 9, 3))
-    >>> dynamics_defect(example_problem(), vector_field(Unicycle()), states=x, controls=u[:, :2])
-    0.0
-    """
-    mine = [np.broadcast_to(r, (len(states),)) for r in _rates(problem, states, controls)]
-    return _largest(np.abs(np.stack(mine, axis=-1) - f(states, controls)))
-
-
-def _rates(problem: OptimalControlProblem, states: Array, controls: Array) -> Sequence[Any]:
-    return problem.dynamics(list(states.T), list(controls.T))
 
 
 def _nothing(x: Sequence[Any], u: Sequence[Any]) -> float:

@@ -26,7 +26,6 @@ from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.inside import stays_inside
 
-
 PROVEN = (1e-3, 2e-5)  # [m] a hit counts if it is one for the finer cover of round shapes too
 
 

@@ -13,14 +13,9 @@ from maneuver_automaton.primitives.maneuver import Maneuver as Maneuver
 from maneuver_automaton.primitives.mirror import Mirror as Mirror
 from maneuver_automaton.primitives.mirror import mirror_of as mirror_of
 from maneuver_automaton.primitives.resimulation import maneuver_defect as maneuver_defect
-from maneuver_automaton.primitives.resimulation import trim_defect as trim_defect
 from maneuver_automaton.primitives.strokes import Ramp as Ramp
-from maneuver_automaton.primitives.strokes import Stroke as Stroke
 from maneuver_automaton.primitives.strokes import ramp_of as ramp_of
-from maneuver_automaton.primitives.strokes import steer_at_rest as steer_at_rest
-from maneuver_automaton.primitives.strokes import stroke as stroke
 from maneuver_automaton.primitives.strokes import strokes as strokes
-from maneuver_automaton.primitives.strokes import turn as turn
 from maneuver_automaton.primitives.strokes import turns as turns
 from maneuver_automaton.primitives.trajectory import Trajectory as Trajectory
 from maneuver_automaton.primitives.trim import Trim as Trim

@@ -53,42 +53,6 @@ def hitch_trims(model: CarWithTrailer, hitches: Sequence[float]) -> tuple[Trim, 
     return tuple(trims)
 
 
-def hitch_maneuver(model: CarWithTrailer, source: Trim, target: Trim, *, speed: float) -> Maneuver:
-    """The quickest change of the hitch at a constant `speed` [m/s].
-
-    The wheels are at their limit all the time: with them there the hitch moves one way at every
-    angle that the motion passes, and any other steering is slower. The time is the integral of
-    ``1 / hitch'`` over the hitch.
-
-    Source: the dynamics of `CarWithTrailer`; the comparison of rates for one state.
-
-    Raises
-    ------
-    ValueError
-        If the hitch is the same at both trims, or the wheels cannot bring it there.
-
-    Examples
-    --------
-    >>> truck = CarWithTrailer(wheelbase=0.25, hitch_length=0.5, max_steering=1.0, max_speed=0.5)
-    >>> rest, *_, bent = hitch_trims(truck, [0.0, 0.5])
-    >>> turned = hitch_maneuver(truck, rest, bent, speed=0.5)
-    >>> turned.course.reduced_state[-1].tolist(), round(turned.duration, 3)
-    ([0.5], 0.175)
-    """
-    if source.reduced_state[0] == target.reduced_state[0] or not speed:
-        raise ValueError(
-            f"hitch maneuver from {source.name!r} to {target.name!r}: got equal angles or no "
-            "speed, need a change"
-        )
-    made = _driven(model, [(source, target, speed)])
-    if not made:
-        raise ValueError(
-            f"hitch maneuver from {source.name!r} to {target.name!r}: the wheels cannot bring the "
-            f"hitch there at {speed:g} m/s"
-        )
-    return made[0]
-
-
 def connect_hitches(model: CarWithTrailer, trims: Sequence[Trim]) -> tuple[Maneuver, ...]:
     """Maneuvers between all angles of the hitch, ahead and back, from rest to rest of each.
 

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
-from maneuver_automaton.groups import LieGroup
 from maneuver_automaton.primitives.trajectory import Trajectory
 
-Pose = TypeVar("Pose", bound=LieGroup)
 CLOSED = 1e-9  # [m, rad, s] between what a maneuver states and where its course ends
 
 
@@ -29,8 +26,8 @@ class Maneuver:
     Examples
     --------
     >>> Maneuver(name="brake", source="cruise", target="rest", displacement=[2.0, 0.0, 0.0],
-    ...          duration=1.5).is_identity
-    False
+    ...          duration=1.5).displacement.tolist()
+    [2.0, 0.0, 0.0]
     """
 
     name: str
@@ -66,12 +63,3 @@ class Maneuver:
                 f"maneuver {self.name!r}: its course must run from the identity and time 0 to its "
                 f"displacement and duration, got a difference of {off:.3g}"
             )
-
-    @property
-    def is_identity(self) -> bool:
-        """Whether it changes nothing and takes no time: the switch of a kinematic vehicle."""
-        return self.duration == 0.0 and not self.displacement.any()
-
-    def carry(self, start: Pose) -> Pose:
-        """Pose after the maneuver from `start`."""
-        return start @ type(start)(self.displacement)

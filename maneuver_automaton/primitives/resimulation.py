@@ -1,4 +1,4 @@
-"""What an ODE solver says of trims and maneuvers: how far from where they claim to lead."""
+"""What an ODE solver says of maneuvers: how far from where they claim to lead."""
 
 from __future__ import annotations
 
@@ -11,24 +11,6 @@ from maneuver_automaton.primitives.maneuver import Maneuver
 from maneuver_automaton.primitives.trim import Trim
 
 RTOL, ATOL = 1e-10, 1e-12
-
-
-def trim_defect(model: Model, trim: Trim, *, duration: float = 5.0, rtol: float = RTOL) -> float:
-    """Greatest error of a trim's pose and reduced state after `duration` [s], in their units.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Unicycle
-    >>> turn = Trim(name="turn", body_velocity=[1.0, 0.0, 1.0], control=[1.0, 1.0])
-    >>> trim_defect(Unicycle(), turn) < 1e-8
-    True
-    """
-    dof = model.group.dof
-    start = np.concatenate([np.zeros(dof), trim.reduced_state])
-    times = [0.0, duration]
-    end = rollout(_rates(model), start, control=trim.control, times=times, rtol=rtol, atol=ATOL)[-1]
-    pose = trim.coast(model.group.identity(), duration).pose
-    return float(np.abs(end - np.concatenate([pose, trim.reduced_state])).max())
 
 
 def maneuver_defect(

@@ -1,17 +1,17 @@
-"""From rest to rest over any length: speed up, cruise, brake; and turning the wheels at rest."""
+"""From rest to rest over any length: speed up, cruise, brake."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from maneuver_automaton.errors import NotATrim
 from maneuver_automaton.models import Model
-from maneuver_automaton.primitives.bang_bang import bang_bang, check_limited_rates
+from maneuver_automaton.primitives.bang_bang import check_limited_rates
 from maneuver_automaton.primitives.driving import drive_all
 from maneuver_automaton.primitives.maneuver import Maneuver
 from maneuver_automaton.primitives.trim import Trim
@@ -30,21 +30,6 @@ class Ramp:
     def duration(self) -> float:
         """Time it takes [s]."""
         return self.speed_up + self.cruise + self.brake
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Stroke:
-    """A motion from rest to rest in three primitives; the trim between may last no time."""
-
-    speed_up: Maneuver  # from the rest to the cruise
-    cruise: Trim
-    cruise_duration: float  # [s]
-    brake: Maneuver  # back to the rest
-
-    @property
-    def duration(self) -> float:
-        """Time it takes [s]."""
-        return self.speed_up.duration + self.cruise_duration + self.brake.duration
 
 
 def ramp_of(
@@ -88,21 +73,13 @@ def ramp_of(
     )
 
 
-def stroke(model: Model, rest: Trim, length: float, *, max_speed: float | None = None) -> Stroke:
-    """Quickest way of `length` [m] ahead, or back if negative, from a rest to the same rest.
+def strokes(
+    model: Model, rests: Sequence[Trim], lengths: Sequence[float], *, max_speed: float | None = None
+) -> tuple[Maneuver, ...]:
+    """The quickest ways of every length [m] from every rest, each a maneuver back to the same rest.
 
     What else the reduced state holds, such as the steering angle, stays: an arc of a circle.
-
-    Parameters
-    ----------
-    model : Model
-        A vehicle with a component `speed` whose rate is a limited control.
-    rest : Trim
-        Where it begins and ends.
-    length : float
-        Length of the path of the pose, not zero [m].
-    max_speed : float, optional
-        Greatest speed [m/s], at most that of the model, which stands for None.
+    Negative lengths are driven backwards.
 
     Raises
     ------
@@ -118,28 +95,13 @@ def stroke(model: Model, rest: Trim, length: float, *, max_speed: float | None =
     >>> car = SecondOrderCar(wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0,
     ...                      max_steering_rate=0.5)
     >>> (rest,) = trims_of(car, {"speed": [0.0], "steering": [0.0]}).trims
-    >>> back = stroke(car, rest, -10.0)
-    >>> back.speed_up.displacement.round(12).tolist(), back.cruise_duration, back.duration
-    ([-3.125, 0.0, 0.0], 1.5, 6.5)
+    >>> (back,) = strokes(car, [rest], [-10.0])
+    >>> back.displacement.round(12).tolist(), back.duration
+    ([-10.0, 0.0, 0.0], 6.5)
     """
-    return _in_parts(model, _swing(model, rest, length, "speed", max_speed))
-
-
-def strokes(
-    model: Model, rests: Sequence[Trim], lengths: Sequence[float], *, max_speed: float | None = None
-) -> tuple[Maneuver, ...]:
-    """Strokes of every length from every rest, each as one maneuver from the rest to itself."""
     return _whole(
         model, [_swing(model, r, way, "speed", max_speed) for r in rests for way in lengths]
     )
-
-
-def turn(model: Model, rest: Trim, angle: float, *, max_turn_rate: float | None = None) -> Stroke:
-    """Quickest turn on the spot by `angle` [rad], left if positive, from a rest to the same rest.
-
-    See `stroke`; here the vehicle has a component `turn_rate` whose rate is a limited control.
-    """
-    return _in_parts(model, _swing(model, rest, angle, "turn_rate", max_turn_rate))
 
 
 def turns(
@@ -153,19 +115,6 @@ def turns(
     return _whole(
         model, [_swing(model, r, way, "turn_rate", max_turn_rate) for r in rests for way in angles]
     )
-
-
-def steer_at_rest(model: Model, source: Trim, target: Trim) -> Maneuver:
-    """Quickest change of what can change at rest, such as the steering angle; see `bang_bang`.
-
-    Raises
-    ------
-    NotATrim
-        If the vehicle does not rest at both trims.
-    """
-    for trim in (source, target):
-        _check_rest(trim)
-    return bang_bang(model, source, target)
 
 
 class _Swing(NamedTuple):
@@ -198,24 +147,6 @@ def _swing(model: Model, rest: Trim, way: float, component: str, limit: float | 
         deceleration=float(down),
     )
     return _Swing(f"{rest.name}, {component} over {way:.6g}", rest, k, ramp)
-
-
-def _in_parts(model: Model, swing: _Swing) -> Stroke:
-    state = np.array(swing.rest.reduced_state)
-    state[swing.component] = swing.ramp.peak
-    component = model.reduced_names[swing.component]
-    cruise = replace(
-        swing.rest,
-        name=f"{component} {swing.ramp.peak:.6g} from {swing.rest.name}",
-        reduced_state=state,
-        body_velocity=model.body_velocity(state, swing.rest.control),
-    )
-    return Stroke(
-        speed_up=bang_bang(model, swing.rest, cruise),
-        cruise=cruise,
-        cruise_duration=swing.ramp.cruise,
-        brake=bang_bang(model, cruise, swing.rest),
-    )
 
 
 def _whole(model: Model, swings: Sequence[_Swing]) -> tuple[Maneuver, ...]:

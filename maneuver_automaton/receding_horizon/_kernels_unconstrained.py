@@ -66,16 +66,6 @@ def next_pose(tables, trim, x, y, heading):
 
 
 @kernel
-def interval_costs(tables, pose):
-    """Cost of one interval of every trim from a pose: (m,)."""
-    c, s = math.cos(pose[2]), math.sin(pose[2])
-    costs = np.empty(tables.effort.size)
-    for trim in range(costs.size):
-        costs[trim] = interval_cost(tables, trim, pose[0], pose[1], pose[2], c, s)
-    return costs
-
-
-@kernel
 def roll_out(tables, pose, sequence, poses, costs):
     """Fill `poses` (n + 1, 3) and `costs` (n,) of a sequence (n,) of trims; the total cost."""
     total = 0.0
@@ -216,44 +206,3 @@ def beam(tables, pose, n, width, growth, same):
                 break
     order = np.argsort(spent[:kept], kind="mergesort")
     return words[order], spent[order]
-
-
-@kernel
-def exhaust(tables, pose, sequence, most):
-    """Best of all sequences by depth-first search: whether it is proven, and the intervals tried.
-
-    `sequence` (n,) holds a first guess and then the answer. Costs only add up, so a partial
-    sequence that costs as much as the best one is left. After `most` intervals the search gives up.
-    """
-    n, m = sequence.size, tables.effort.size
-    poses, costs = np.empty((n + 1, 3)), np.empty(n)
-    best = roll_out(tables, pose, sequence, poses, costs)
-    word, spent, tried = np.zeros(n, np.int64), np.zeros(n + 1), 0
-    orders, steps, place = np.empty((n, m), np.int64), np.empty((n, m)), np.zeros(n, np.int64)
-    level, fresh = 0, True
-    while level >= 0:
-        x, y, heading = poses[level]
-        if fresh:
-            c, s = math.cos(heading), math.sin(heading)
-            for trim in range(m):
-                steps[level, trim] = interval_cost(tables, trim, x, y, heading, c, s)
-            orders[level] = np.argsort(steps[level], kind="mergesort")
-            place[level] = 0
-            tried += m
-            if tried > most:
-                return False, tried
-        trim = orders[level, place[level]] if place[level] < m else -1
-        if trim < 0 or spent[level] + steps[level, trim] >= best:
-            level, fresh = level - 1, False  # dearer ones follow in the order
-            continue
-        place[level] += 1
-        word[level] = trim
-        spent[level + 1] = spent[level] + steps[level, trim]
-        if level == n - 1:
-            best = spent[n]
-            sequence[:] = word
-            fresh = False
-            continue
-        poses[level + 1] = next_pose(tables, trim, x, y, heading)
-        level, fresh = level + 1, True
-    return True, tried

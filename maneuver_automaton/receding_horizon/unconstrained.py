@@ -1,7 +1,7 @@
 """A fixed horizon without terminal constraint or cost: sequences of trims, one per interval.
 
 The goal attracts by the stage cost alone. Sequences are searched by a beam and then improved one or
-two trims at a time; a depth-first search over all of them proves the best where that is affordable.
+two trims at a time.
 """
 
 from __future__ import annotations
@@ -178,35 +178,11 @@ class HorizonPlan:
     trims: IntArray  # (n,) indices, one per interval
     poses: Array  # (n + 1, 3) seen from the goal [m, m, rad]
     costs: Array  # (n,) of each interval
-    proven: bool = False  # whether no other sequence is cheaper
 
     @property
     def value(self) -> float:
         """Cost of the whole horizon."""
         return float(self.costs.sum())
-
-
-def roll_out_horizon(
-    problem: UnconstrainedProblem, pose: ArrayLike, trims: ArrayLike
-) -> HorizonPlan:
-    """What a sequence of trims (n,), one per interval, does from a `pose` (3,) of the world.
-
-    The cost is integrated by five Gauss-Legendre nodes per interval: exact along straights for
-    orders up to 9 that are even. Along a turn of up to 0.4 rad per interval the relative error was
-    below 1e-10 in every case tried; orders that are not even cost digits where a term is zero.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "ahead": (1, 0)})
-    >>> cost = MixedOrderCost(pose_weights=[1, 1, 1], control_weights=[1, 1])
-    >>> horizon = FixedHorizon(interval=1.0, intervals=2)
-    >>> problem = UnconstrainedProblem(robot, [1, 0, 0], cost=cost, horizon=horizon)
-    >>> roll_out_horizon(problem, [0, 0, 0], [1, 0]).costs.round(9).tolist()
-    [1.2, 0.0]
-    """
-    sequence = _sequence(problem, trims)
-    return _plan(problem, problem.seen(_one_pose(pose)), sequence)
 
 
 def search_horizon(
@@ -249,58 +225,14 @@ def search_horizon(
     return min(plans, key=lambda plan: plan.value)
 
 
-def exhaust_horizon(
-    problem: UnconstrainedProblem,
-    pose: ArrayLike,
-    *,
-    first: ArrayLike | None = None,
-    max_intervals: int = 100_000_000,
-) -> HorizonPlan:
-    """The cheapest of all sequences of trims from a `pose` (3,): proven, if it comes to an end.
-
-    Depth first from the sequence `first` (n,) or that of `search_horizon`; what costs as much as
-    the best one before its end is left. After `max_intervals` intervals the best one met is
-    returned, not `proven`.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Unicycle
-    >>> robot = Automaton.of_grid(Unicycle(), [[-1, 0, 1], [-1, 0, 1]])
-    >>> cost = MixedOrderCost(pose_weights=[1, 5, 0.1], control_weights=[0.5, 0.05])
-    >>> horizon = FixedHorizon(interval=0.5, intervals=4)
-    >>> problem = UnconstrainedProblem(robot, [0, 0, 0], cost=cost, horizon=horizon)
-    >>> exhaust_horizon(problem, [0, 1, 0]).proven
-    True
-    """
-    from maneuver_automaton.receding_horizon import _kernels_unconstrained as kernels
-
-    if max_intervals < 1:
-        raise ValueError(f"max_intervals: got {max_intervals}, need at least 1")
-    seen = problem.seen(_one_pose(pose))
-    guess = search_horizon(problem, pose).trims if first is None else first
-    sequence = _sequence(problem, guess, count=problem.horizon.intervals)
-    proven, _ = kernels.exhaust(problem.tables, seen, sequence, max_intervals)
-    return _plan(problem, seen, sequence, proven=bool(proven))
-
-
-def interval_costs(problem: UnconstrainedProblem, pose: ArrayLike) -> Array:
-    """Cost of one interval of each trim (m,) from a `pose` (3,) of the world."""
-    from maneuver_automaton.receding_horizon import _kernels_unconstrained as kernels
-
-    costs: Array = kernels.interval_costs(problem.tables, problem.seen(_one_pose(pose)))
-    return costs
-
-
-def _plan(
-    problem: UnconstrainedProblem, seen: Array, sequence: IntArray, *, proven: bool = False
-) -> HorizonPlan:
+def _plan(problem: UnconstrainedProblem, seen: Array, sequence: IntArray) -> HorizonPlan:
     from maneuver_automaton.receding_horizon import _kernels_unconstrained as kernels
 
     poses, costs = np.empty((sequence.size + 1, 3)), np.empty(sequence.size)
     kernels.roll_out(problem.tables, seen, sequence, poses, costs)
     for array in (sequence, poses, costs):
         array.setflags(write=False)
-    return HorizonPlan(trims=sequence, poses=poses, costs=costs, proven=proven)
+    return HorizonPlan(trims=sequence, poses=poses, costs=costs)
 
 
 def _one_pose(pose: ArrayLike) -> Array:
@@ -310,14 +242,13 @@ def _one_pose(pose: ArrayLike) -> Array:
     return row
 
 
-def _sequence(
-    problem: UnconstrainedProblem, trims: ArrayLike, *, count: int | None = None
-) -> IntArray:
+def _sequence(problem: UnconstrainedProblem, trims: ArrayLike, *, count: int) -> IntArray:
     """A writable copy of a sequence of trims, checked."""
     rows = np.array(trims, dtype=np.int64)
-    if rows.ndim != 1 or (count is not None and rows.size != count):
-        need = "one axis" if count is None else f"({count},), a trim for each interval"
-        raise ValueError(f"sequence: got shape {rows.shape}, need {need}")
+    if rows.shape != (count,):
+        raise ValueError(
+            f"sequence: got shape {rows.shape}, need ({count},), a trim for each interval"
+        )
     for row in rows:
         if not 0 <= row < len(problem.automaton):
             raise ValueError(

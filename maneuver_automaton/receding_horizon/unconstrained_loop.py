@@ -32,11 +32,6 @@ class UnconstrainedLoop:
         """Cost of the whole loop."""
         return float(self.stage_costs.sum())
 
-    @property
-    def decreases(self) -> Array:
-        """Decrease of the value per cost driven (k,): what the suboptimality index bounds."""
-        return (self.values[:-1] - self.values[1:]) / self.stage_costs
-
 
 def simulate_unconstrained(
     problem: UnconstrainedProblem,
@@ -62,8 +57,8 @@ def simulate_unconstrained(
     >>> horizon = FixedHorizon(interval=0.5, intervals=4)
     >>> problem = UnconstrainedProblem(robot, [1, 0, 0], cost=cost, horizon=horizon)
     >>> loop = simulate_unconstrained(problem, [0, 0, 0], steps=9)
-    >>> loop.settled, loop.poses[:, 0].tolist(), loop.decreases.round(9).tolist()
-    (True, [0.0, 0.5, 1.0], [1.0, 1.0])
+    >>> loop.settled, loop.poses[:, 0].tolist()
+    (True, [0.0, 0.5, 1.0])
     """
     if steps < 1:
         raise ValueError(f"steps: got {steps}, need at least 1")

@@ -15,7 +15,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.models import CarWithTrailer, SecondOrderCar, SecondOrderUnicycle
+from maneuver_automaton.models import SecondOrderCar, SecondOrderUnicycle
 from maneuver_automaton.optimal_control import Guess
 from maneuver_automaton.primitives import Trajectory
 
@@ -191,28 +191,6 @@ def unicycle_guess(model: SecondOrderUnicycle, plan: Plan, *, intervals: Step) -
     turn = _followed(wanted, model.max_angular_acceleration, at[1])
     turn[[0, -1]] = 0.0
     return _second_order(run, at, turn, model.control_limits)
-
-
-def trailer_guess(
-    model: CarWithTrailer, plan: Plan, *, intervals: Step, hitch: float = 0.0
-) -> Guess:
-    """Guess for a car with a trailer, which follows as it is pulled, from a hitch angle [rad]."""
-    low, high = model.control_limits[0]
-    pace = Pace(speed=high, reverse_speed=-low, acceleration=math.inf, wheelbase=model.wheelbase)
-    run = timed(plan, pace)
-    at = np.linspace(0.0, run.duration, intervals(run.duration) + 1)
-    middle = 0.5 * (at[1:] + at[:-1])
-    control = np.stack([np.interp(middle, run.time, run.twist[:, 0]),
-                        np.interp(middle, run.time, run.steering)], axis=1)  # fmt: skip
-    control = np.clip(control, *model.control_limits.T)
-    angles = np.empty(len(at))
-    angles[0] = hitch
-    least, most = model.reduced_limits[0]
-    for k, (speed, steering) in enumerate(control):
-        bend = math.tan(steering) / model.wheelbase - math.sin(angles[k]) / model.hitch_length
-        angles[k + 1] = min(max(angles[k] + at[1] * speed * bend, least), most)
-    state = np.column_stack([_at(run, at), angles])
-    return Guess(state=state, control=control, duration=run.duration)
 
 
 def course_guess(course: Trajectory, *, intervals: Step) -> Guess:

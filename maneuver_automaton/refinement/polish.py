@@ -26,7 +26,7 @@ from maneuver_automaton.optimal_control.polish_values import (
     PolishSettings,
     Scene,
 )
-from maneuver_automaton.optimal_control.polishing import intervals_for, polish
+from maneuver_automaton.optimal_control.polishing import polish
 from maneuver_automaton.optimal_control.problem import RunningCost, resampled
 from maneuver_automaton.optimal_control.separation import BodyPart
 from maneuver_automaton.primitives import Maneuver, Trajectory
@@ -435,8 +435,3 @@ def _gears(model: Model, guess: Guess) -> Array:
     for k in range(1, len(signs)):
         signs[k] = signs[k] or signs[k - 1]
     return np.where(signs == 0.0, 1.0, signs)
-
-
-def guess_intervals(settings: PolishSettings) -> Callable[[float], int]:
-    """How many intervals a guess of a duration [s] gets, for the functions in `guesses`."""
-    return lambda duration: intervals_for(duration, settings)

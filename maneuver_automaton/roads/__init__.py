@@ -12,7 +12,6 @@ from maneuver_automaton.roads.judge import RoadVerdict as RoadVerdict
 from maneuver_automaton.roads.judge import judged as judged
 from maneuver_automaton.roads.lanelets import Lanelet as Lanelet
 from maneuver_automaton.roads.lanelets import drivable_area as drivable_area
-from maneuver_automaton.roads.lanelets import off_road as off_road
 from maneuver_automaton.roads.scene import RoadScene as RoadScene
 from maneuver_automaton.roads.scene import RoadStart as RoadStart
 from maneuver_automaton.roads.single_plan import RoadPlanResult as RoadPlanResult

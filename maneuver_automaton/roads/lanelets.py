@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, freeze
-from maneuver_automaton.collision import Obstacle, Polygon
 from maneuver_automaton.groups import LieGroup
 
 ROUNDED = 1e-5  # [m] gaps of less than twice this are what rounding left
@@ -169,31 +168,3 @@ def _flat(area: Any) -> Any:
     import shapely
 
     return shapely.union_all(_polygons(area))
-
-
-def off_road(area: Any, *, frame: float = 20.0) -> tuple[Obstacle, ...]:
-    """What is not drivable within `frame` [m] around the area, as obstacles that stand still.
-
-    Examples
-    --------
-    >>> import shapely
-    >>> (verge,) = off_road(shapely.box(0, 0, 9, 3), frame=1.0)
-    >>> len(verge.shape.holes), verge.shape.corners.max(axis=0).tolist()
-    (1, [10.0, 4.0])
-    """
-    import shapely
-
-    low_x, low_y, high_x, high_y = area.bounds
-    around = shapely.box(low_x - frame, low_y - frame, high_x + frame, high_y + frame)
-    outside = shapely.get_parts(shapely.difference(around, area))
-    return tuple(
-        Obstacle(
-            Polygon(
-                np.asarray(part.exterior.coords)[:-1],
-                tuple(np.asarray(ring.coords)[:-1] for ring in part.interiors),
-            ),
-            name="off the road" if k == 0 else f"off the road {k + 1}",
-        )
-        for k, part in enumerate(outside)
-        if part.geom_type == "Polygon"
-    )

@@ -32,11 +32,6 @@ class Route:
     limit: Array  # (n,) speed limit [m/s], inf where there is none
     ways: Array  # (goals, 4) least and greatest station of each goal, and least and greatest offset
 
-    @property
-    def stations(self) -> Array:
-        """Distance (n,) along the line [m]."""
-        return np.asarray(SPACING * np.arange(len(self.points)), dtype=np.float64)
-
 
 def route_of(scene: RoadScene) -> Route:
     """The cheapest way through the lanelets from the start to a goal.

@@ -92,8 +92,3 @@ class RoadVehicle:
         squares = np.maximum(np.square(np.asarray(speed, dtype=np.float64)), 1e-9)
         angles = np.arctan(self.lateral * self.model.wheelbase / squares)
         return np.minimum(angles, self.model.max_steering)
-
-    def strongest(self, speed: ArrayLike) -> Array:
-        """Greatest acceleration at speeds [m/s] [m/s^2]."""
-        speeds = np.maximum(np.asarray(speed, dtype=np.float64), self.power_speed)
-        return np.minimum(self.engine * self.power_speed / speeds, self.model.max_acceleration)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -71,23 +71,6 @@ class ManeuverSearchArrays(NamedTuple):
     state: IntArray  # (11,)
     found: Array  # (5,) cost, four durations
     scratch: Scratch
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class ManeuverResult:
-    """Plans of one query, each cheaper than the one before."""
-
-    status: SearchStatus
-    words: tuple[Word, ...]  # the last is the best
-    found_after: tuple[int, ...] = ()  # expansions until each was found
-    found_s: tuple[float, ...] = ()  # [s]
-    expansions: int = 0
-    counts: dict[str, int] = field(default_factory=dict)
-
-    @property
-    def best(self) -> Word | None:
-        """The cheapest word, None if there is none."""
-        return self.words[-1] if self.words else None
 
 
 class Heard(NamedTuple):
@@ -183,38 +166,6 @@ class ManeuverPass:
         aims = self.query.seen_goals[:, :2]
         gaps = np.linalg.norm(places[:, None] - aims[None], axis=-1)
         return float(gaps.min(initial=math.inf))
-
-
-def search_maneuvers(
-    query: ManeuverQuery,
-    *,
-    deadline: float = math.inf,
-    max_expansions: int | None = None,
-    first_only: bool = False,
-) -> ManeuverResult:
-    """Words from the start to a goal, each cheaper than the one before: see `maneuver_words`.
-
-    Returns
-    -------
-    ManeuverResult
-        EXHAUSTED without a word: none at these resolutions, which proves nothing.
-    """
-    begun = time.monotonic()
-    found: list[tuple[Word, int, float]] = []
-    total, status = 0, SearchStatus.EXHAUSTED
-    for heard in maneuver_words(query, deadline=deadline, max_expansions=max_expansions):
-        total, status = heard.expansions, heard.status
-        if heard.word is not None and heard.word.duration <= query.most_time:
-            found.append((heard.word, total, time.monotonic() - begun))
-            if first_only:
-                break
-    return ManeuverResult(
-        status=SearchStatus.FOUND if found else status,
-        words=tuple(word for word, _, _ in found),
-        found_after=tuple(n for _, n, _ in found),
-        found_s=tuple(s for _, _, s in found),
-        expansions=total,
-    )
 
 
 def maneuver_words(

@@ -1,7 +1,5 @@
 """Words: trims, how long each lasts, and the transitions between them, for every vehicle."""
 
-from maneuver_automaton.words.end_pose import end_pose as end_pose
-from maneuver_automaton.words.end_pose import end_twists as end_twists
 from maneuver_automaton.words.steering import steer as steer
 from maneuver_automaton.words.switching_times import SwitchingTimes as SwitchingTimes
 from maneuver_automaton.words.switching_times import TimesStatus as TimesStatus

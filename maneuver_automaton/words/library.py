@@ -163,7 +163,7 @@ def library_of(
     >>> from maneuver_automaton.models import Unicycle
     >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
     >>> library_of(robot).arrays.words.tolist()[:4]
-    [[-1, -1, -1], [0, -1, -1], [1, -1, -1], [1, 0, -1]]
+    [[-1, -1, -1], [0, -1, -1], [1, -1, -1], [0, 1, -1]]
     """
     m = len(automaton)
     per_second = _costs("rates", np.ones(m) if rates is None else rates, m)

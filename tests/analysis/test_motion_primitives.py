@@ -11,8 +11,8 @@ from hypothesis.extra.numpy import arrays
 from maneuver_automaton.analysis import same_motion_primitive
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import moved_state
-from maneuver_automaton.models.unicycle import flow
 from tests.compare import assert_same_motion
+from tests.reference_dynamics import flow
 
 TIMES = np.linspace(0.0, 3.0, 13)
 POSES = arrays(np.float64, 3, elements=st.floats(-10.0, 10.0))

@@ -18,7 +18,7 @@ from maneuver_automaton.analysis import (
 )
 from maneuver_automaton.groups import SE2, SE2xR, product, translations
 from maneuver_automaton.models import moved_state
-from maneuver_automaton.models.unicycle import flow
+from tests.reference_dynamics import flow
 
 POSES = arrays(np.float64, 3, elements=st.floats(-5.0, 5.0))
 CONTROLS = arrays(np.float64, 2, elements=st.floats(-2.0, 2.0))

@@ -22,7 +22,7 @@ from maneuver_automaton.analysis.suboptimality import continuous_index, discrete
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.errors import InvalidAutomaton
 from maneuver_automaton.models import Unicycle
-from maneuver_automaton.receding_horizon.unconstrained import interval_costs, search_horizon
+from maneuver_automaton.receding_horizon.unconstrained import search_horizon
 from maneuver_automaton.receding_horizon.unconstrained_loop import simulate_unconstrained
 from tests.receding_horizon.unconstrained_cases import (
     MIXED,
@@ -31,7 +31,7 @@ from tests.receding_horizon.unconstrained_cases import (
     octaves,
     problem_of,
 )
-from tests.reference_unconstrained import index_by_program
+from tests.reference_unconstrained import index_by_program, interval_costs
 
 TIMES = np.arange(1, 17) / 2.0
 GROWTHS = st.lists(st.floats(0.0, 1.5), min_size=2, max_size=8).map(lambda d: 1.0 + np.cumsum(d))

@@ -11,7 +11,8 @@ import maneuver_automaton as ma
 from maneuver_automaton.automaton.stock import stock_libraries
 from maneuver_automaton.automaton.validation import validate
 from maneuver_automaton.errors import InvalidLibrary
-from maneuver_automaton.primitives.resimulation import maneuver_defect, trim_defect
+from maneuver_automaton.primitives.resimulation import maneuver_defect
+from tests.reference_dynamics import trim_defect
 
 LEAST = {  # trims, maneuvers
     "car_with_trailer": (20, 80),

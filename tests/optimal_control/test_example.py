@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from maneuver_automaton.models import Unicycle, vector_field
+from maneuver_automaton.models import Unicycle
 from maneuver_automaton.optimal_control import (
     Guess,
     SolveStatus,
-    dynamics_defect,
     solve_uniform_effort_example,
 )
 from maneuver_automaton.optimal_control.uniform_effort import END, START, example_problem
 from tests.optimal_control import pontryagin
+from tests.reference_dynamics import dynamics_defect
 
 pytest.importorskip("casadi")
 PRINTED = 0.5141
@@ -108,7 +108,7 @@ def test_its_dynamics_are_those_of_the_unicycle():
     rng = np.random.default_rng(1)
     worst = dynamics_defect(
         example_problem(),
-        vector_field(Unicycle()),
+        Unicycle(),
         states=rng.normal(size=(20, 3)),
         controls=rng.normal(size=(20, 2)),
     )

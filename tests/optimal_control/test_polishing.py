@@ -17,8 +17,8 @@ from maneuver_automaton.optimal_control.separation import (
     first_lines,
     near_pairs,
     reaches,
-    trailer_pose,
 )
+from tests.reference_dynamics import trailer_pose
 
 casadi = pytest.importorskip("casadi")
 SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])

@@ -10,20 +10,20 @@ import pytest
 
 from maneuver_automaton.errors import MissingExtra
 from maneuver_automaton.groups import SE2, SE2xR, translations
-from maneuver_automaton.models import Car, Unicycle, UserModel, rollout, vector_field
+from maneuver_automaton.models import Car, Unicycle, UserModel, rollout
 from maneuver_automaton.optimal_control import (
     Grid,
     Guess,
     OptimalControlProblem,
     SolverSettings,
     SolveStatus,
-    dynamics_defect,
     moving_frame,
     solve,
     straight_guess,
     transcribe,
 )
 from maneuver_automaton.optimal_control._casadi import load_casadi, numpy_on_symbols
+from tests.reference_dynamics import dynamics_defect
 
 casadi = pytest.importorskip("casadi")
 RULES = ("trapezoidal", "rk4")
@@ -162,8 +162,8 @@ def test_the_formulas_for_the_solver_are_those_of_the_models():
     car = unicycle_problem(
         dynamics=moving_frame(SE2, velocity=lambda z, u: [u[0], 0.0, u[0] * np.tan(u[1]) / 2.5])
     )
-    f = vector_field(Car(wheelbase=2.5))
-    assert dynamics_defect(car, f, states=states[:, :3], controls=controls[:, :2]) < 1e-12
+    model = Car(wheelbase=2.5)
+    assert dynamics_defect(car, model, states=states[:, :3], controls=controls[:, :2]) < 1e-12
     boat = UserModel(
         name="boat", group=SE2, control_names=("push", "turn"), reduced_names=("speed",),
         velocity=lambda z, u: [z[0], 0.1 * z[0], u[1]], dynamics=lambda z, u: [u[0] - z[0]],
@@ -174,8 +174,7 @@ def test_the_formulas_for_the_solver_are_those_of_the_models():
         end=(1.0,) * 4,
         dynamics=moving_frame(SE2, velocity=boat.velocity, reduced=boat.dynamics),
     )
-    f = vector_field(boat)
-    assert dynamics_defect(own, f, states=states, controls=controls[:, :2]) < 1e-12
+    assert dynamics_defect(own, boat, states=states, controls=controls[:, :2]) < 1e-12
     plane = UserModel(
         name="plane", group=SE2xR, control_names=("speed", "turn", "climb"),
         velocity=lambda z, u: [u[0], 0.0, u[1], u[2]],
@@ -187,8 +186,7 @@ def test_the_formulas_for_the_solver_are_those_of_the_models():
         end=(1.0,) * 4,
         dynamics=moving_frame(SE2xR, velocity=plane.velocity),
     )
-    f = vector_field(plane)
-    assert dynamics_defect(flying, f, states=states, controls=controls) < 1e-12
+    assert dynamics_defect(flying, plane, states=states, controls=controls) < 1e-12
 
 
 def test_what_cannot_be_is_a_status():

@@ -15,21 +15,6 @@ def maneuver(**changes):
     return Maneuver(**(values | changes))
 
 
-@pytest.mark.parametrize(
-    ("changes", "identity"),
-    [
-        ({}, True),
-        ({"displacement": np.zeros(4)}, True),
-        ({"displacement": [-0.0, 0.0, 0.0]}, True),
-        ({"duration": 0.5}, False),
-        ({"displacement": [0.0, 0.0, 1e-12]}, False),
-        ({"displacement": [0.0, 0.0, 0.0, 1.0]}, False),
-    ],
-)
-def test_only_what_changes_nothing_is_an_identity(changes, identity):
-    assert maneuver(**changes).is_identity is identity
-
-
 def test_the_displacement_is_a_read_only_copy():
     gained = np.array([2.0, 0.0, 0.0])
     brake = maneuver(displacement=gained)

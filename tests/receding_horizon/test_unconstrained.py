@@ -15,9 +15,6 @@ from maneuver_automaton.receding_horizon.unconstrained import (
     FixedHorizon,
     HorizonSearch,
     UnconstrainedProblem,
-    exhaust_horizon,
-    interval_costs,
-    roll_out_horizon,
     search_horizon,
 )
 from maneuver_automaton.receding_horizon.unconstrained_loop import shifted, simulate_unconstrained
@@ -29,7 +26,7 @@ from tests.receding_horizon.unconstrained_cases import (
     octaves,
     problem_of,
 )
-from tests.reference_unconstrained import best_of_all, horizon_cost
+from tests.reference_unconstrained import best_of_all, exhausted, horizon_cost, rolled_out
 
 POSES = st.tuples(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5), st.floats(-3.0, 3.0))
 FEW = settings(max_examples=15)
@@ -41,7 +38,7 @@ FEW = settings(max_examples=15)
 @FEW
 def test_the_cost_of_a_sequence_is_its_integral(pose, trims, quadratic):
     problem = problem_of(even(5), QUADRATIC if quadratic else MIXED, intervals=3)
-    assert roll_out_horizon(problem, pose, trims).value == pytest.approx(
+    assert rolled_out(problem, pose, trims) == pytest.approx(
         horizon_cost(problem, pose, trims), rel=1e-10
     )
 
@@ -51,7 +48,7 @@ def test_orders_that_are_not_even_cost_digits_but_few():
         pose_weights=np.ones(3), control_weights=np.ones(2), pose_orders=[1, 3, 1]
     )
     problem = problem_of(even(3), cost, intervals=2)
-    assert roll_out_horizon(problem, [0.3, 0.1, -0.2], [8, 0]).value == pytest.approx(
+    assert rolled_out(problem, [0.3, 0.1, -0.2], [8, 0]) == pytest.approx(
         horizon_cost(problem, [0.3, 0.1, -0.2], [8, 0]), rel=2e-2
     )
 
@@ -68,8 +65,8 @@ def test_a_moved_problem_has_the_moved_plan(start, goal, shift):
     assert search_horizon(moved, there).value == pytest.approx(
         search_horizon(fixed, start).value, rel=1e-9
     )
-    assert roll_out_horizon(moved, there, trims).value == pytest.approx(
-        roll_out_horizon(fixed, start, trims).value, rel=1e-9
+    assert rolled_out(moved, there, trims) == pytest.approx(
+        rolled_out(fixed, start, trims), rel=1e-9
     )
 
 
@@ -95,8 +92,8 @@ def test_the_mirror_image_costs_the_same():
 @pytest.mark.parametrize("pose", [PARKING, (0.5, -0.4, 1.0), (0.0, 0.05, 0.0)])
 def test_depth_first_finds_the_best_of_all(pose, cost):
     problem = problem_of(even(3), cost, intervals=3)
-    found = exhaust_horizon(problem, pose, first=[0, 0, 0])
-    _, value = best_of_all(lambda word: roll_out_horizon(problem, pose, word).value, 9, 3)
+    found = exhausted(problem, pose, first=[0, 0, 0])
+    _, value = best_of_all(lambda word: rolled_out(problem, pose, word), 9, 3)
     assert found.proven
     assert found.value == pytest.approx(value, rel=1e-12)
 
@@ -106,7 +103,7 @@ def test_the_search_finds_what_is_proven(cost):
     rng = np.random.default_rng(3)
     problem = problem_of(even(5), cost, intervals=5)
     for pose in rng.uniform(-1.0, 1.0, (6, 3)):
-        best = exhaust_horizon(problem, pose)
+        best = exhausted(problem, pose)
         assert best.proven
         assert search_horizon(problem, pose).value == pytest.approx(best.value, rel=1e-12)
 
@@ -114,7 +111,7 @@ def test_the_search_finds_what_is_proven(cost):
 def test_a_beam_that_keeps_everything_is_exhaustive():
     problem, pose = problem_of(even(3), MIXED, intervals=3), [0.1, 0.9, -0.4]
     wide = search_horizon(problem, pose, search=HorizonSearch(width=9**3, same=0.0))
-    assert wide.value == pytest.approx(exhaust_horizon(problem, pose).value, rel=1e-12)
+    assert wide.value == pytest.approx(exhausted(problem, pose).value, rel=1e-12)
 
 
 def test_no_single_change_gains():
@@ -124,26 +121,14 @@ def test_no_single_change_gains():
         for trim in range(25):
             other = np.array(plan.trims)
             other[k] = trim
-            assert roll_out_horizon(problem, pose, other).value >= plan.value * (1.0 - 1e-11)
+            assert rolled_out(problem, pose, other) >= plan.value * (1.0 - 1e-11)
 
 
 def test_the_warm_sequence_is_never_lost():
     problem = problem_of(even(5), MIXED, intervals=5)
-    best = exhaust_horizon(problem, PARKING)
+    best = exhausted(problem, PARKING)
     poor = HorizonSearch(width=1)
     assert search_horizon(problem, PARKING, warm=best.trims, search=poor).value == best.value
-
-
-def test_a_budget_that_ends_is_no_proof():
-    problem = problem_of(even(5), MIXED, intervals=5)
-    assert not exhaust_horizon(problem, PARKING, max_intervals=100).proven
-
-
-def test_interval_costs_are_those_of_one_interval():
-    problem = problem_of(even(3), MIXED, intervals=2)
-    costs = interval_costs(problem, PARKING)
-    assert costs[5] == pytest.approx(roll_out_horizon(problem, PARKING, [5]).value)
-    assert costs.shape == (9,)
 
 
 def test_by_hand_on_a_straight():
@@ -152,7 +137,7 @@ def test_by_hand_on_a_straight():
     problem = UnconstrainedProblem(
         robot, [1.0, 0.0, 0.0], cost=MIXED, horizon=FixedHorizon(interval=1.0, intervals=1)
     )
-    assert roll_out_horizon(problem, [0, 0, 0], [1]).value == pytest.approx(0.2 + 1.0)
+    assert rolled_out(problem, [0, 0, 0], [1]) == pytest.approx(0.2 + 1.0)
 
 
 def test_mixed_orders_park_where_squares_stall():
@@ -167,7 +152,7 @@ def test_mixed_orders_park_where_squares_stall():
 
 def test_where_squares_stall_no_sequence_is_better_than_rest():
     problem = problem_of(even(3), QUADRATIC, intervals=6)
-    stalled = exhaust_horizon(problem, [0.0, 0.1, 0.0])
+    stalled = exhausted(problem, [0.0, 0.1, 0.0])
     assert stalled.proven
     assert not problem.automaton.body_velocities[stalled.trims].any()
 
@@ -253,7 +238,7 @@ def test_headings_count_modulo_a_turn_from_the_start():
             "mixed-order cost: got 1 control_weights, need 2 (speed, turn_rate)",
         ),
         (
-            lambda: roll_out_horizon(problem_of(even(3), MIXED), PARKING, [9]),
+            lambda: search_horizon(problem_of(even(3), MIXED), PARKING, warm=[9] * 8),
             "sequence: got trim 9, need an index from 0 to 8",
         ),
         (
@@ -263,10 +248,6 @@ def test_headings_count_modulo_a_turn_from_the_start():
         (
             lambda: search_horizon(problem_of(even(3), MIXED), [PARKING]),
             "pose: got shape (1, 3), need one pose (3,)",
-        ),
-        (
-            lambda: exhaust_horizon(problem_of(even(3), MIXED), PARKING, max_intervals=0),
-            "max_intervals: got 0, need at least 1",
         ),
         (
             lambda: simulate_unconstrained(problem_of(even(3), MIXED), PARKING, steps=0),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -12,9 +13,10 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Box
 from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.models import CarWithTrailer, SecondOrderCar, SecondOrderUnicycle
+from maneuver_automaton.models import SecondOrderCar, SecondOrderUnicycle
 from maneuver_automaton.optimal_control import has_casadi
 from maneuver_automaton.optimal_control.polish_values import PolishSettings
+from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.separation import BodyPart
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.primitives.driving import drive
@@ -26,10 +28,9 @@ from maneuver_automaton.refinement.guesses import (
     course_guess,
     pace_of_car,
     timed,
-    trailer_guess,
     unicycle_guess,
 )
-from maneuver_automaton.refinement.polish import PolishTask, guess_intervals, polish_guesses
+from maneuver_automaton.refinement.polish import PolishTask, polish_guesses
 
 CAR = SecondOrderCar(
     wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
@@ -37,7 +38,7 @@ CAR = SecondOrderCar(
 BODY = Box([4.689, 1.942], [1.4155, 0.0])
 SETTINGS = PolishSettings()
 HERE = SE2([0.0, 0.0, 0.0])
-STEPS = guess_intervals(SETTINGS)
+STEPS = functools.partial(intervals_for, settings=SETTINGS)
 
 
 def trim(speed: float, curvature: float, name: str) -> Trim:
@@ -118,13 +119,6 @@ def test_the_unicycle_turns_on_the_spot_between_strokes() -> None:
     guess = unicycle_guess(robot, whole, intervals=STEPS)
     assert guess.state[-1, :3] == pytest.approx([1.0, 0.0, 1.0], abs=1e-6)
     assert np.abs(guess.state[:, 3:]).max() <= 0.5
-
-
-def test_a_trailer_follows() -> None:
-    truck = CarWithTrailer(wheelbase=0.25, hitch_length=0.5, max_steering=1.0, max_speed=0.5)
-    whole = plan((0.5, 1.0, 30.0))
-    guess = trailer_guess(truck, whole, intervals=STEPS)
-    assert guess.state[-1, 3] == pytest.approx(math.asin(0.5), abs=1e-2)  # hitch of a steady turn
 
 
 def test_a_course_is_a_guess() -> None:

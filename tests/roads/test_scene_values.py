@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import shapely
 from numpy.testing import assert_allclose
 
 from maneuver_automaton.collision import Box, Disc
@@ -19,7 +18,6 @@ from maneuver_automaton.roads import (
     RoadStart,
     RoadVehicle,
     drivable_area,
-    off_road,
 )
 from maneuver_automaton.roads.goal_region import turns_within
 from maneuver_automaton.roads.route import lanelets_at, lanelets_of_goal, route_of
@@ -90,13 +88,6 @@ def test_rounding_leaves_no_gap():
 def test_a_scene_needs_a_time_step():
     with pytest.raises(ValueError, match=r"the time step must be positive, got 0\.0 s"):
         replace(scene([straight(1, 0.0)]), step=0.0)
-
-
-def test_what_is_off_the_road_and_the_road_fill_the_frame():
-    area = drivable_area([straight(1, 0.0)])
-    outside = off_road(area, frame=5.0)
-    total = sum(shapely.Polygon(one.shape.corners, one.shape.holes).area for one in outside)
-    assert_allclose(total + area.area, 110.0 * 14.0)
 
 
 def test_a_lanelet_needs_two_points_on_each_side():

@@ -22,7 +22,6 @@ from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.library_arrays import library_arrays
 from maneuver_automaton.search.setup import search_setup
 from maneuver_automaton.search.shortening import shortened
-from maneuver_automaton.words.end_pose import end_pose
 from tests import reference
 from tests.search.cases import (
     DUBINS,
@@ -410,7 +409,7 @@ def test_the_end_is_exact_however_near_the_goal(size):
     problem = Problem(library, [0, 0, 0], goal, cost=Cost(effort=1.0, time=1.0))
     found = search_insertion(problem, problem.goals[0]).solutions[0]
     twists = library.body_velocities[found.trims]
-    np.testing.assert_allclose(end_pose(twists, found.durations), goal, atol=1e-14)
+    np.testing.assert_allclose(reference.plain_end(twists, found.durations), goal, atol=1e-14)
 
 
 def test_only_a_fixed_time_fixes_the_time_of_a_shorter_word():
@@ -423,12 +422,12 @@ def test_only_a_fixed_time_fixes_the_time_of_a_shorter_word():
         velocity=lambda _, u: np.asarray(u),
     )
     library = Automaton.of_controls(model, {str(k): row for k, row in enumerate(climbing)})
-    goal = end_pose(climbing[1:3] + climbing[:1], [0.5, 0.4, 1.0])
+    goal = reference.plain_end(climbing[1:3] + climbing[:1], [0.5, 0.4, 1.0])
     problem = Problem(library, [0, 0, 0, 0], goal)
     setup = search_setup(problem, problem.goals[0])
     arrays = library_arrays(problem, setup)
     word = arrays.number_of[[1, 2, 0]]
     short = shortened(arrays, word, np.array([0.5, 0.4, 1.0]), 3)
     assert short is not None
-    end = end_pose(arrays.twists[short.word], short.times)
+    end = reference.plain_end(arrays.twists[short.word], short.times)
     np.testing.assert_allclose(end, goal, atol=1e-9)

@@ -20,13 +20,14 @@ from maneuver_automaton.groups import SE2xR
 from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.problem import Bounds, Goal, Problem
 from maneuver_automaton.search.maneuver_heights import altitude_ranges
-from maneuver_automaton.search.maneuver_lattice import plan_of, search_maneuvers
+from maneuver_automaton.search.maneuver_lattice import plan_of
 from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.words._kernels_candidates import NO_TRIM
 from maneuver_automaton.words.library import library_of
 from tests.reference_words import candidates
 from tests.search.cases import compiled_only
+from tests.search.maneuver_searches import search_maneuvers
 
 pytestmark = compiled_only  # whole searches; their kernels have tests of their own
 

@@ -16,7 +16,7 @@ from maneuver_automaton.collision import Box, Motion, Obstacle
 from maneuver_automaton.errors import UnknownTrim
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds
-from maneuver_automaton.search.maneuver_lattice import plan_of, search_maneuvers
+from maneuver_automaton.search.maneuver_lattice import plan_of
 from maneuver_automaton.search.maneuver_motion import parts_of
 from maneuver_automaton.search.maneuver_query import maneuver_query
 from maneuver_automaton.search.maneuver_shortcuts import word_is_free
@@ -24,6 +24,7 @@ from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.words.library import library_of
 from tests.search.automata import inertial_unicycle, linked, truck_with_trailer
 from tests.search.cases import compiled_only
+from tests.search.maneuver_searches import search_maneuvers
 
 pytestmark = compiled_only  # whole searches; their kernels have tests of their own
 

@@ -9,8 +9,8 @@ import pytest
 from maneuver_automaton.search import _kernels_maneuver_lattice as lattice
 from maneuver_automaton.search import _kernels_maneuver_motion as motion
 from maneuver_automaton.search import _kernels_maneuver_shortcuts as shortcuts
-from maneuver_automaton.search.maneuver_lattice import search_maneuvers
 from maneuver_automaton.search.maneuver_ready import load_maneuver_kernels
+from tests.search.maneuver_searches import search_maneuvers
 from tests.search.test_maneuver_lattice import query
 
 KERNELS = (lattice.begin, lattice.expand, shortcuts.shorten_to, motion.word_free)

@@ -20,7 +20,6 @@ ROBOT = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "left": (1.0, 1.
 def test_a_kinematic_word_switches_everywhere():
     word = Word(trims=[0, 1, 0], durations=[1.0, 2.0, 0.5])
     assert word.transitions.tolist() == [SWITCH, SWITCH]
-    assert not word.has_maneuvers
     assert word.duration == 3.5
     assert not word.durations.flags.writeable
     assert not word.trims.flags.writeable

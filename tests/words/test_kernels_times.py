@@ -10,8 +10,7 @@ from hypothesis.extra.numpy import arrays
 
 from maneuver_automaton._arrays import wrapped
 from maneuver_automaton._compile import kernel
-from maneuver_automaton.groups import SE2, group_of
-from maneuver_automaton.words import end_pose, end_twists
+from maneuver_automaton.groups import SE2
 from maneuver_automaton.words._kernels_times import (
     end_and_columns,
     lagrangian_hessian,
@@ -56,15 +55,6 @@ def words(draw, dof=4, least=1):
     return twists, times, gaps
 
 
-@pytest.mark.parametrize("dof", [3, 4])
-@settings(max_examples=50)
-@given(data=st.data())
-def test_end_is_the_product_of_exponentials(dof, data):
-    twists, times, _ = data.draw(words(dof))
-    off = reference.off_goal(end_pose(twists, times), reference.word_end(twists, times))
-    assert np.abs(off).max() < 1e-11
-
-
 @settings(max_examples=50)
 @given(words())
 def test_kernel_agrees_on_the_end_with_displacements(word):
@@ -103,22 +93,16 @@ def test_hessian_is_the_derivative_of_the_columns(word, p_x, p_y):
     assert hessian == pytest.approx(expected, abs=1e-3)
 
 
-@pytest.mark.parametrize("dof", [3, 4])
-@settings(max_examples=30)
-@given(data=st.data())
-def test_end_twists_are_the_derivatives_seen_from_the_end(dof, data):
-    twists, times, _ = data.draw(words(dof))
-    end = group_of(dof)(end_pose(twists, times))
-    rates = np.array([end.pose_rates(twist) for twist in end_twists(twists, times)])
-    assert np.abs(rates.T - reference.jacobian(twists, times)).max() < 1e-6
-
-
-@given(words(dof=3), st.floats(0.0, 1.0))
+@settings(max_examples=50)
+@given(words(), st.floats(0.0, 1.0))
 def test_a_trim_cut_in_two_ends_in_the_same_place(word, share):
     twists, times, _ = word
     cut = np.concatenate([[share * times[0], (1.0 - share) * times[0]], times[1:]])
     twice = np.vstack([twists[:1], twists])
-    assert end_pose(twice, cut) == pytest.approx(end_pose(twists, times), abs=1e-11)
+    off = reference.off_goal(
+        derivatives(twice, cut, 0.0, 0.0)[0], derivatives(twists, times, 0.0, 0.0)[0]
+    )
+    assert np.abs(off).max() < 1e-11
 
 
 @given(arrays(np.float64, (4, 5), elements=st.integers(-2, 2).map(float)))
@@ -134,16 +118,6 @@ def test_least_squares_and_null_space_find_the_rank(matrix):
 
 def test_by_hand():
     quarter = np.pi / 2
-    assert end_pose([[1, 0, 1], [2, 0, 0]], [quarter, 3.0]) == pytest.approx([1.0, 7.0, quarter])
-    assert end_twists([[0, 0, 1], [1, 0, 0]], [0.0, 2.0]).tolist() == [[0, 2, 1], [1, 0, 0]]
-    assert end_pose(np.zeros((0, 3)), []).tolist() == [0.0, 0.0, 0.0]
-
-
-@pytest.mark.parametrize("function", [end_pose, end_twists])
-def test_wrong_input(function):
-    with pytest.raises(ValueError, match=r"got shape \(1,\) for twists of shape \(2, 3\)"):
-        function([[1, 0, 0], [0, 0, 1]], [1.0])
-    with pytest.raises(ValueError, match=r"twists: got shape \(1, 2\), need 3 or 4"):
-        function([[1, 0]], [1.0])
-    with pytest.raises(ValueError, match="durations: got nan, need finite numbers"):
-        function([[1, 0, 0]], [np.nan])
+    twists, times = np.array([[1.0, 0, 1, 0], [2.0, 0, 0, 0]]), np.array([quarter, 3.0])
+    end, _, _ = derivatives(twists, times, 0.0, 0.0)
+    assert end == pytest.approx([1.0, 7.0, quarter])

@@ -1,0 +1,60 @@
+"""A whole search over trims and maneuvers in one call, for tests and benchmarks."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+
+from maneuver_automaton.search.maneuver_lattice import maneuver_words
+from maneuver_automaton.search.maneuver_query import ManeuverQuery
+from maneuver_automaton.search.result import SearchStatus
+from maneuver_automaton.words.word import Word
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ManeuverResult:
+    """Plans of one query, each cheaper than the one before."""
+
+    status: SearchStatus
+    words: tuple[Word, ...]  # the last is the best
+    found_after: tuple[int, ...] = ()  # expansions until each was found
+    found_s: tuple[float, ...] = ()  # [s]
+    expansions: int = 0
+
+    @property
+    def best(self) -> Word | None:
+        """The cheapest word, None if there is none."""
+        return self.words[-1] if self.words else None
+
+
+def search_maneuvers(
+    query: ManeuverQuery,
+    *,
+    deadline: float = math.inf,
+    max_expansions: int | None = None,
+    first_only: bool = False,
+) -> ManeuverResult:
+    """Words from the start to a goal, each cheaper than the one before: see `maneuver_words`.
+
+    Returns
+    -------
+    ManeuverResult
+        EXHAUSTED without a word: none at these resolutions, which proves nothing.
+    """
+    begun = time.monotonic()
+    found: list[tuple[Word, int, float]] = []
+    total, status = 0, SearchStatus.EXHAUSTED
+    for heard in maneuver_words(query, deadline=deadline, max_expansions=max_expansions):
+        total, status = heard.expansions, heard.status
+        if heard.word is not None:
+            found.append((heard.word, total, time.monotonic() - begun))
+            if first_only:
+                break
+    return ManeuverResult(
+        status=SearchStatus.FOUND if found else status,
+        words=tuple(word for word, _, _ in found),
+        found_after=tuple(n for _, n, _ in found),
+        found_s=tuple(s for _, _, s in found),
+        expansions=total,
+    )
