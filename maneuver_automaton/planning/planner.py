@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.automaton.headings import origin_of
 from maneuver_automaton.collision import AnyObstacle, Shape, as_footprint, as_obstacles
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.planning.plan import plan, prepare
@@ -63,8 +64,9 @@ class Planner:
     def __post_init__(self) -> None:
         object.__setattr__(self, "obstacles", as_obstacles(self.obstacles))
         object.__setattr__(self, "footprint", as_footprint(self.footprint))
-        dof = self.automaton.model.group.dof
-        prepare(self.problem(np.zeros(dof), np.ones(dof)))
+        here = origin_of(self.automaton, self.automaton.trims[0])
+        there = np.where(np.arange(here.size) == 2, here, 1.0)
+        prepare(self.problem(here, there))
 
     def problem(
         self,
