@@ -241,8 +241,10 @@ class Problem:
     def _give_headings(self) -> None:
         """Start and goals of a vehicle that translations alone move get headings of its trims.
 
-        A goal of any heading becomes one goal for each heading.
+        A goal of any heading, or of none, becomes one goal for each heading.
         """
+        model = self.automaton.model
+        assert isinstance(model, OnlyTranslated)
         start = as_array("start", self.start)
         ((pose, trim),) = posed(self.automaton, start, "start", trim=self.start_trim)
         object.__setattr__(self, "start", pose)
@@ -251,7 +253,11 @@ class Problem:
             replace(goal, pose=pose, trim=trim, free_heading=False)
             for goal in self.goals
             for pose, trim in posed(
-                self.automaton, goal.pose, "goal", trim=goal.trim, free=goal.free_heading
+                self.automaton,
+                goal.pose,
+                "goal",
+                trim=goal.trim,
+                free=goal.free_heading or goal.pose.size == model.stated.group.dof,
             )
         )
         object.__setattr__(self, "goals", goals)

@@ -90,7 +90,7 @@ def posed(
     trim : str, optional
         The trim there, if it is known.
     free : bool
-        Whether any heading will do; where a pose without one leaves several, it must.
+        Whether any heading will do.
 
     Raises
     ------
