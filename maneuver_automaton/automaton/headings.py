@@ -106,6 +106,7 @@ def posed(
             f"{model.name}, or {model.group.dof} with a heading"
         )
     names: tuple[str | None, ...]
+    headings: tuple[float, ...]
     if trim is not None:
         headings, names = (model.heading(automaton[trim].reduced_state),), (trim,)
     elif free or stated:

@@ -10,8 +10,8 @@ from maneuver_automaton.models.in_world import as_stated as as_stated
 from maneuver_automaton.models.in_world import in_world as in_world
 from maneuver_automaton.models.lattice_body import LatticeBody as LatticeBody
 from maneuver_automaton.models.model import Model as Model
-from maneuver_automaton.models.model import OnlyTranslated as OnlyTranslated
 from maneuver_automaton.models.model import OnLattice as OnLattice
+from maneuver_automaton.models.model import OnlyTranslated as OnlyTranslated
 from maneuver_automaton.models.omnidirectional import Omnidirectional as Omnidirectional
 from maneuver_automaton.models.rollout import rollout as rollout
 from maneuver_automaton.models.second_order_car import SecondOrderCar as SecondOrderCar

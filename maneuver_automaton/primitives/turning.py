@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.models import Model, OnlyTranslated
@@ -116,9 +117,9 @@ def _chosen(
     """Positions of source and target, and the turn [rad] from one to the other."""
     assert isinstance(model, OnlyTranslated)
     headings = np.array([model.heading(trim.reduced_state) for trim in trims])
-    if pairs not in ("neighbours", "all"):
+    if not isinstance(pairs, str):
         for a, b in pairs:
-            yield from ((a, b, turn) for turn in _turns(headings[a], headings[b]))
+            yield from ((a, b, turn) for turn in _turns(float(headings[a]), float(headings[b])))
         return
     levels = _distinct(headings)
     if len(levels) < 2:
@@ -135,7 +136,7 @@ def _chosen(
             yield from ((a, b, turn) for turn in _turns(here, there))
 
 
-def _match(trims: Sequence[Trim], there: Array, source: Trim, rate: int) -> int:
+def _match(trims: Sequence[Trim], there: NDArray[np.bool_], source: Trim, rate: int) -> int:
     """The trim among those `there` whose other controls are those of the source, or the first."""
     candidates = np.flatnonzero(there).tolist()
     kept = np.arange(source.control.size) != rate
