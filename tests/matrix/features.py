@@ -335,7 +335,11 @@ def midway(vehicle: Vehicle, share: float = 0.5) -> np.ndarray:
 
 
 def heading_midway(vehicle: Vehicle) -> float:
-    return float(outside.flat(midway(vehicle))[2])
+    """Its heading there; where it never turns, the direction in which it drives."""
+    if vehicle.has_heading:
+        return float(outside.flat(midway(vehicle))[2])
+    way = midway(vehicle, 0.501) - midway(vehicle)
+    return math.atan2(way[1], way[0])
 
 
 def pillar(vehicle: Vehicle) -> Disc:
