@@ -117,7 +117,8 @@ def uses_lattice(problem: Problem) -> bool:
     velocities = problem.automaton.body_velocities
     moving = velocities[velocities.any(axis=1)]
     turns = bool(moving[:, 2].any())
-    keeps_heading = isinstance(problem.automaton.model, OnlyTranslated)
+    only_translated = isinstance(problem.automaton.model, OnlyTranslated)
+    keeps_heading = only_translated and not has_inertia(problem)
     sides = turns or (keeps_heading and np.linalg.matrix_rank(moving[:, :2]) == 2)
     steers = len(moving) > 1 and sides and velocities.shape[1] == 3
     if not steers or (problem.horizon.time is not None and len(moving) == len(velocities)):
