@@ -246,9 +246,10 @@ class Problem:
         model = self.automaton.model
         assert isinstance(model, OnlyTranslated)
         start = as_array("start", self.start)
-        ((pose, trim),) = posed(self.automaton, start, "start", trim=self.start_trim)
-        object.__setattr__(self, "start", pose)
-        object.__setattr__(self, "start_trim", trim)
+        if self.start_trim is None or start.shape != (model.group.dof,):
+            ((pose, trim),) = posed(self.automaton, start, "start", trim=self.start_trim)
+            object.__setattr__(self, "start", pose)
+            object.__setattr__(self, "start_trim", trim)
         goals = tuple(
             replace(goal, pose=pose, trim=trim, free_heading=False)
             for goal in self.goals
@@ -276,8 +277,11 @@ class Problem:
     def first_trim(self) -> Trim:
         """The trim in which the vehicle starts; rest unless one is named.
 
-        On a lattice that is the rest at the heading next to that of the start.
+        On a lattice that is the rest at the heading next to that of the start. Where the heading
+        belongs to the trim, the start must have it: within a maneuver there is no first trim.
         """
+        if self.start_trim is not None and isinstance(self.automaton.model, OnlyTranslated):
+            posed(self.automaton, self.start, "start", trim=self.start_trim)
         if self.start_trim is None and isinstance(self.automaton.model, OnLattice):
             return self._rest_facing(self.automaton.model, float(self.start[2]))
         return self._trim_or_rest(self.start_trim)

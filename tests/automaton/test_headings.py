@@ -114,8 +114,11 @@ def test_a_heading_that_no_trim_has_is_refused_with_the_nearest(boat, start, goa
 
 
 def test_a_trim_of_another_heading_is_refused(boat):
+    problem = Problem(boat, [0, 0, 0], [3, 1], start_trim=boat.trim_names[1])
     with pytest.raises(ValueError, match=r"start: has the heading 0 rad, but trim 'heading 1\.57"):
-        Problem(boat, [0, 0, 0], [3, 1], start_trim=boat.trim_names[1])
+        _ = problem.first_trim
+    with pytest.raises(ValueError, match=r"goal: has the heading 0 rad, but trim 'heading 1\.57"):
+        Problem(boat, [0, 0, 0], Goal(pose=[3, 1, 0], trim=boat.trim_names[1]))
 
 
 def test_a_problem_is_moved_by_translations_alone(boat):
