@@ -52,7 +52,7 @@ FAULTS: dict[str, dict[str, str]] = {
     "a step off the plan takes far longer than its time limit": {
         "loop_noise": "glider",
     },
-    "a plan of a step does not last what is left of a fixed time": {
+    "a closed loop of fixed time plans for what is left of it where no trim stands still": {
         "loop_fixed_time": "boat_in_current",
     },
     "a vehicle whose heading is a reduced state is not polished": {
