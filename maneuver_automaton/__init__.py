@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.formats.plan_json import save_plan as save_plan
     from maneuver_automaton.groups import SE2 as SE2
     from maneuver_automaton.groups import SE2xR as SE2xR
+    from maneuver_automaton.groups import translations as translations
     from maneuver_automaton.models import Car as Car
     from maneuver_automaton.models import CarWithTrailer as CarWithTrailer
     from maneuver_automaton.models import Helicopter as Helicopter
@@ -110,6 +111,7 @@ _HOMES = {
     "save_library": "automaton.library",
     "save_plan": "formats.plan_json",
     "simulate": "receding_horizon",
+    "translations": "groups",
 }
 
 __all__ = [*_HOMES, "plotting"]

@@ -6,13 +6,14 @@ import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, freeze
 from maneuver_automaton.automaton import Automaton, Plan, Primitive
+from maneuver_automaton.automaton.headings import motion_of, posed
 from maneuver_automaton.collision import (
     AnyObstacle,
     Obstacle,
@@ -22,10 +23,11 @@ from maneuver_automaton.collision import (
     as_obstacles,
 )
 from maneuver_automaton.costs import Cost, StageCost
-from maneuver_automaton.groups import SE2, LieGroup, SE2xR
-from maneuver_automaton.models import Model, OnLattice
+from maneuver_automaton.groups import SE2, LieGroup, SE2xR, Translations
+from maneuver_automaton.models import Model, OnLattice, OnlyTranslated
 from maneuver_automaton.primitives import Maneuver, Trim
 
+_Element: TypeAlias = SE2 | SE2xR | Translations
 STANDING = 1e-3  # [m/s] slower is no direction of travel
 SEARCH_METHODS = ("auto", "words", "insertion", "lattice")
 
@@ -34,7 +36,7 @@ SEARCH_METHODS = ("auto", "words", "insertion", "lattice")
 class Goal:
     """Where a plan ends: exactly at `pose`, or at any heading there."""
 
-    pose: Array  # (dof,) [m, m, rad(, m)]
+    pose: Array  # (dof,) [m, m, rad(, m)]; without heading if translations alone move the vehicle
     trim: str | None = None
     free_heading: bool = False
     tolerance_m: float = 0.0
@@ -53,7 +55,7 @@ class Goal:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        freeze(self, "pose", last=(3, 4))
+        freeze(self, "pose", last=(2, 3, 4))
         if self.pose.ndim != 1:
             raise ValueError(f"goal: pose has shape {self.pose.shape}, need one pose")
         for name in ("tolerance_m", "tolerance_rad"):
@@ -173,8 +175,8 @@ class Problem:
         def __init__(
             self,
             automaton: Automaton,
-            start: ArrayLike | SE2 | SE2xR,
-            goals: ArrayLike | SE2 | SE2xR | Goal | Sequence[Goal],
+            start: ArrayLike | _Element,
+            goals: ArrayLike | _Element | Goal | Sequence[Goal],
             *,
             cost: StageCost = ...,
             horizon: Horizon = ...,
@@ -192,17 +194,19 @@ class Problem:
 
     def __post_init__(self) -> None:
         dof = self.automaton.model.group.dof
-        if isinstance(self.start, SE2 | SE2xR):
+        if isinstance(self.start, _Element):
             object.__setattr__(self, "start", self.start.pose)
         if type(self.cost).__hash__ is None:
             raise ValueError(
                 f"cost: {type(self.cost).__name__} has no hash; need a value that does not change, "
                 "such as a frozen dataclass"
             )
+        object.__setattr__(self, "goals", _as_goals(self.goals))
+        if isinstance(self.automaton.model, OnlyTranslated):
+            self._give_headings()
         freeze(self, "start", last=dof)
         if self.start.ndim != 1:
             raise ValueError(f"start: pose has shape {self.start.shape}, need one pose")
-        object.__setattr__(self, "goals", _as_goals(self.goals))
         for goal in self.goals:
             if goal.pose.size != dof:
                 raise ValueError(
@@ -232,6 +236,31 @@ class Problem:
         if not self.automaton.is_kinematic:
             self._check_ends()
 
+    def _give_headings(self) -> None:
+        """Start and goals of a vehicle that translations alone move get headings of its trims.
+
+        A goal of any heading, or of none, becomes one goal for each heading.
+        """
+        model = self.automaton.model
+        assert isinstance(model, OnlyTranslated)
+        start = as_array("start", self.start)
+        if self.start_trim is None or start.shape != (model.group.dof,):
+            ((pose, trim),) = posed(self.automaton, start, "start", trim=self.start_trim)
+            object.__setattr__(self, "start", pose)
+            object.__setattr__(self, "start_trim", trim)
+        goals = tuple(
+            replace(goal, pose=pose, trim=trim, free_heading=False)
+            for goal in self.goals
+            for pose, trim in posed(
+                self.automaton,
+                goal.pose,
+                "goal",
+                trim=goal.trim,
+                free=goal.free_heading or goal.pose.size == model.stated.group.dof,
+            )
+        )
+        object.__setattr__(self, "goals", goals)
+
     def _check_ends(self) -> None:
         """A vehicle with inertia begins and ends in a trim."""
         named = [("start", self.start_trim), *(("goal", goal.trim) for goal in self.goals)]
@@ -246,8 +275,11 @@ class Problem:
     def first_trim(self) -> Trim:
         """The trim in which the vehicle starts; rest unless one is named.
 
-        On a lattice that is the rest at the heading next to that of the start.
+        On a lattice that is the rest at the heading next to that of the start. Where the heading
+        belongs to the trim, the start must have it: within a maneuver there is no first trim.
         """
+        if self.start_trim is not None and isinstance(self.automaton.model, OnlyTranslated):
+            posed(self.automaton, self.start, "start", trim=self.start_trim)
         if self.start_trim is None and isinstance(self.automaton.model, OnLattice):
             return self._rest_facing(self.automaton.model, float(self.start[2]))
         return self._trim_or_rest(self.start_trim)
@@ -349,7 +381,14 @@ class Problem:
         return np.asarray(rows[np.append(True, signs[1:] != signs[:-1])])
 
     def moved(self, by: LieGroup) -> Problem:
-        """The problem moved by the group element `by`, all around it too; bounds must be open."""
+        """The problem moved by the group element `by`, all around it too; bounds must be open.
+
+        Raises
+        ------
+        ValueError
+            If there are bounds, or the vehicle does not look the same after a rotation in `by`.
+        """
+        by = motion_of(self.automaton, by)
         if any(getattr(self.bounds, name) is not None for name in ("x", "y", "z")):
             raise ValueError("problem: bounds do not move with the symmetry")
         group = type(by)
@@ -402,9 +441,9 @@ def _as_parts(
 def _as_goals(value: Any) -> tuple[Goal, ...]:
     if isinstance(value, Goal):
         return (value,)
-    if isinstance(value, SE2 | SE2xR):
+    if isinstance(value, _Element):
         return tuple(Goal(pose=pose) for pose in np.atleast_2d(value.pose))
-    if isinstance(value, Sequence) and any(isinstance(v, Goal | SE2 | SE2xR) for v in value):
+    if isinstance(value, Sequence) and any(isinstance(v, Goal | _Element) for v in value):
         return tuple(goal for one in value for goal in _as_goals(one))
     poses = as_array("goal: pose", value)
     if poses.ndim not in (1, 2) or poses.size == 0:

@@ -194,7 +194,8 @@ def _cause_in(region: Region) -> Callable[[tuple[str, ...], tuple[int, ...]], st
         if any(motion.startswith("rotation") for motion in broken):
             what = "in a steady wind or current" if drifts else "under gravity on a slope"
             what = "with a compass needle" if turns else what
-            return f"it depends on a direction of the world, as {what}"
+            where = "" if turns else "the heading, so on "
+            return f"it depends on {where}a direction of the world, as {what}"
         return "it depends on the height, as with thinner air"
 
     return cause

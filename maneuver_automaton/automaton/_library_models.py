@@ -21,6 +21,7 @@ from maneuver_automaton.models import (
     SecondOrderUnicycle,
     SingleTrack,
     Unicycle,
+    in_world,
 )
 
 KINDS: Mapping[str, Any] = {
@@ -56,6 +57,7 @@ def model_of(entry: Any, *, own: Model | None) -> Model:
     if not isinstance(kind, str) or not isinstance(entry, dict):
         raise InvalidLibrary(f"model: got the kind {kind!r}, need one of {', '.join(KINDS)}")
     if own is not None:
+        own = in_world(own)
         stated = model_entry(own)
         if entry != stated:
             raise InvalidLibrary(

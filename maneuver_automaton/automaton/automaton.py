@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 from typing import TYPE_CHECKING
@@ -14,10 +14,12 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, IntArray, as_array, vector_text
 from maneuver_automaton.errors import InvalidAutomaton, UnknownTrim
-from maneuver_automaton.models import Model
+from maneuver_automaton.models import Model, OnlyTranslated, in_world
 from maneuver_automaton.primitives import Maneuver, Trim, trims_of
 from maneuver_automaton.primitives.bang_bang import Pairs, has_limited_rates
+from maneuver_automaton.primitives.in_world import maneuver_in_world, trim_in_world
 from maneuver_automaton.primitives.quickest import quickest_maneuvers
+from maneuver_automaton.primitives.turning import turns_between
 
 if TYPE_CHECKING:
     import networkx
@@ -32,6 +34,9 @@ class Automaton:
     Trims of equal reduced state form one class; a vehicle switches between them at will, by
     an *identity maneuver* that is not stored: a kinematic vehicle has one class. `maneuvers`
     hold what leads from class to class.
+
+    A vehicle that translations alone move is given the pose of the others (see `InWorld`), and
+    its trims and maneuvers, stated along the world's axes, are seen from its body.
 
     Examples
     --------
@@ -54,6 +59,9 @@ class Automaton:
         if not self.trims:
             raise InvalidAutomaton("automaton: got no trim, need at least one")
         _check_names(self.trim_names)
+        object.__setattr__(self, "model", in_world(self.model))
+        if isinstance(self.model, OnlyTranslated):
+            self._see_from_body(self.model)
         dof, n_controls = self.model.group.dof, len(self.model.control_names)
         n_states = len(self.model.reduced_names)
         for trim in self.trims:
@@ -70,6 +78,13 @@ class Automaton:
                 )
         for maneuver in self.maneuvers:
             _check_fit(maneuver, self[maneuver.source], self[maneuver.target])
+
+    def _see_from_body(self, model: OnlyTranslated) -> None:
+        """Trims and maneuvers that are stated along the world's axes get headings."""
+        trims = tuple(trim_in_world(model, trim) for trim in self.trims)
+        maneuvers = tuple(maneuver_in_world(model, one) for one in self.maneuvers)
+        object.__setattr__(self, "trims", trims)
+        object.__setattr__(self, "maneuvers", maneuvers)
 
     @classmethod
     def of_controls(cls, model: Model, controls: Mapping[str, ArrayLike]) -> Automaton:
@@ -118,7 +133,8 @@ class Automaton:
         """Automaton of the trims that a model has on a grid, joined where that needs no solver.
 
         A vehicle whose control is the rate of its reduced state, such as the second-order car,
-        gets bang-bang maneuvers; any other one, trims alone.
+        gets bang-bang maneuvers; one that translations alone move, turns between its headings at
+        the greatest turn rate (see `turns_between`); any other one, trims alone.
 
         Parameters
         ----------
@@ -165,6 +181,9 @@ class Automaton:
                 f"grid: {len(found.missing)} of {n} points have no trim, such as "
                 f"{first.name!r}: {first.reason}"
             )
+        if isinstance(in_world(model), OnlyTranslated):
+            alone = cls(model, found.trims)
+            return replace(alone, maneuvers=turns_between(alone.model, alone.trims, pairs=pairs))
         if not has_limited_rates(model):
             return cls(model, found.trims)
         maneuvers = quickest_maneuvers(

@@ -22,7 +22,7 @@ from maneuver_automaton.cli.guard import FOUND, NO_PLAN
 from maneuver_automaton.cli.inputs import Parts, scenario_of
 from maneuver_automaton.cli.progress import waiting
 from maneuver_automaton.cli.tables import console, table
-from maneuver_automaton.models import Model, rollout, vector_field
+from maneuver_automaton.models import Model, as_stated, rollout, vector_field
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.planning.blocked import where_touched
 from maneuver_automaton.problem import Bounds, Problem
@@ -67,15 +67,16 @@ def check_file(path: Path, *, parts: Parts) -> int:
 
 
 def _symmetry(problem: Problem) -> Iterator[Finding]:
-    model = problem.automaton.model
+    model = as_stated(problem.automaton.model)
     region = analysis.Region.of_model(model)
     yield _found("vector field", analysis.check_vector_field(model))
     yield _found("flow", analysis.check_flow(model))
     yield _found("stage cost", analysis.check_stage_cost(_stage_cost(problem), region=region))
-    if constraint := _constraint(problem.bounds):
+    if constraint := _constraint(problem.bounds, model):
         report = analysis.check_constraint(constraint, region=region)
         yield _told("bounds", report, hint="they do not move with the problem")
-    start, goal = problem.start, problem.goals[0].pose
+    stated = np.isin(problem.automaton.model.group.coordinates, model.group.coordinates)
+    start, goal = problem.start[stated], problem.goals[0].pose[stated]
 
     def ends(first: Array, last: Array) -> Array:
         return np.concatenate([first[: start.size] - start, last[: goal.size] - goal])
@@ -110,7 +111,7 @@ def _told(what: str, report: SymmetryReport, *, hint: str) -> Finding:
 
 def _stage_cost(problem: Problem) -> Callable[[Array, Array], float]:
     """The cost as a function of state and control, the body velocity taken from the dynamics."""
-    model = problem.automaton.model
+    model = as_stated(problem.automaton.model)
     field = vector_field(model)
 
     def cost(state: Array, control: Array) -> float:
@@ -121,9 +122,10 @@ def _stage_cost(problem: Problem) -> Callable[[Array, Array], float]:
     return cost
 
 
-def _constraint(bounds: Bounds) -> Callable[[Array, Array], Array] | None:
+def _constraint(bounds: Bounds, model: Model) -> Callable[[Array, Array], Array] | None:
     """Bounds as ``g(x, u) <= 0``; None where there are none."""
-    pairs = [(k, pair) for k, pair in ((0, bounds.x), (1, bounds.y), (3, bounds.z)) if pair]
+    named = (("x", bounds.x), ("y", bounds.y), ("z", bounds.z))
+    pairs = [(model.group.coordinates.index(name), pair) for name, pair in named if pair]
     if not pairs:
         return None
 

@@ -5,4 +5,5 @@ from maneuver_automaton.groups.products import product as product
 from maneuver_automaton.groups.se2 import SE2 as SE2
 from maneuver_automaton.groups.se2_x_r import SE2xR as SE2xR
 from maneuver_automaton.groups.se2_x_r import group_of as group_of
+from maneuver_automaton.groups.translations import Translations as Translations
 from maneuver_automaton.groups.translations import translations as translations

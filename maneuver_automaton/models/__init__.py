@@ -5,9 +5,13 @@ from maneuver_automaton.models.car import Car as Car
 from maneuver_automaton.models.car_with_trailer import CarWithTrailer as CarWithTrailer
 from maneuver_automaton.models.helicopter import Helicopter as Helicopter
 from maneuver_automaton.models.hovercraft import Hovercraft as Hovercraft
+from maneuver_automaton.models.in_world import InWorld as InWorld
+from maneuver_automaton.models.in_world import as_stated as as_stated
+from maneuver_automaton.models.in_world import in_world as in_world
 from maneuver_automaton.models.lattice_body import LatticeBody as LatticeBody
 from maneuver_automaton.models.model import Model as Model
 from maneuver_automaton.models.model import OnLattice as OnLattice
+from maneuver_automaton.models.model import OnlyTranslated as OnlyTranslated
 from maneuver_automaton.models.omnidirectional import Omnidirectional as Omnidirectional
 from maneuver_automaton.models.rollout import rollout as rollout
 from maneuver_automaton.models.second_order_car import SecondOrderCar as SecondOrderCar

@@ -102,3 +102,21 @@ class OnLattice(Protocol):
     def heading(self, reduced_state: Array) -> float:
         """Heading of the lattice [rad] in a reduced state (n_z,)."""
         ...
+
+
+@runtime_checkable
+class OnlyTranslated(Model, Protocol):
+    """What a vehicle has besides that translations alone move: its heading is a reduced state."""
+
+    @property
+    def stated(self) -> Model:
+        """The vehicle on its group of translations."""
+        ...
+
+    def heading(self, reduced_state: Array) -> float:
+        """Heading [rad] of the body in a reduced state (n_z,)."""
+        ...
+
+    def seen(self, reduced_state: Array) -> Array:
+        """Reduced states (..., n_z) of those of `stated`."""
+        ...

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import time
 
+import numpy as np
+
+from maneuver_automaton.models import OnlyTranslated
 from maneuver_automaton.planning.among_obstacles import (
     library_table,
     plan_on_lattice,
@@ -129,12 +132,17 @@ def has_inertia(problem: Problem) -> bool:
 def uses_lattice(problem: Problem) -> bool:
     """Whether the lattice is what plans: it was asked for, or there is something in the way.
 
-    It needs trims in the plane of which one turns, and a rest where the time is fixed; otherwise
-    words are searched, and what is in the way sorts them out.
+    It needs trims in the plane of which one turns, or two that lead to different sides where none
+    does and the heading never changes; and a rest where the time is fixed. Otherwise words are
+    searched, and what is in the way sorts them out.
     """
     velocities = problem.automaton.body_velocities
     moving = velocities[velocities.any(axis=1)]
-    steers = len(moving) > 1 and bool(moving[:, 2].any()) and velocities.shape[1] == 3
+    turns = bool(moving[:, 2].any())
+    only_translated = isinstance(problem.automaton.model, OnlyTranslated)
+    keeps_heading = only_translated and not has_inertia(problem)
+    sides = turns or (keeps_heading and np.linalg.matrix_rank(moving[:, :2]) == 2)
+    steers = len(moving) > 1 and sides and velocities.shape[1] == 3
     if not steers or (problem.horizon.time is not None and len(moving) == len(velocities)):
         return False
     method = problem.search.method

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.automaton.headings import origin_of
 from maneuver_automaton.collision import AnyObstacle, Shape, Zone, as_footprint, as_obstacles
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.planning.plan import plan, prepare
@@ -73,12 +74,11 @@ class Planner:
         object.__setattr__(self, "footprint", as_footprint(self.footprint))
         object.__setattr__(self, "zones", tuple(self.zones))
         automaton = self.automaton
-        dof = automaton.model.group.dof
         # A vehicle without a rest has to be given a trim to end in; any will do here.
         last = None if automaton.rest is not None else automaton.trim_names[0]
-        first = self.start_trim or last
-        aim = Goal(pose=np.ones(dof), trim=last)
-        prepare(self.problem(np.zeros(dof), aim, start_trim=first))
+        here = origin_of(automaton, automaton.trims[0])
+        aim = Goal(pose=np.where(np.arange(here.size) == 2, here, 1.0), trim=last)
+        prepare(self.problem(here, aim, start_trim=self.start_trim or last))
 
     def problem(
         self,

@@ -14,6 +14,7 @@ from maneuver_automaton.models import Model
 from maneuver_automaton.primitives.trim import Trim
 
 TWIST_NAMES = ("speed", "lateral_speed", "turn_rate", "climb")
+WORLD_NAMES = ("v_x", "v_y", "v_z")  # of a vehicle that translations alone move
 BALANCED = 1e-11  # rates of an equilibrium and misses of what is asked for, over the scale
 SAME = 1e-12  # numbers closer than this are taken for the simpler one
 MOST_STEPS = 60
@@ -60,7 +61,8 @@ def trims_of(
         The vehicle.
     grid : mapping of str to (n,) arrays
         Values of components of the reduced state or the control, by name; or of the body
-        velocity: speed [m/s], lateral_speed [m/s], turn_rate [rad/s], climb [m/s].
+        velocity: speed [m/s], lateral_speed [m/s], turn_rate [rad/s], climb [m/s]; v_x, v_y, v_z
+        [m/s] of a vehicle that translations alone move.
     max_lateral_acceleration : float, optional
         Greatest speed times turn rate [m/s^2]: a tyre's grip, which is no limit of a state; no
         limit if None.
@@ -104,13 +106,18 @@ def trims_of(
 
 
 def _check_names(model: Model, axes: Mapping[str, Array]) -> None:
-    twist = TWIST_NAMES[: model.group.dof]
-    known = dict.fromkeys((*model.reduced_names, *model.control_names, *twist))
+    known = dict.fromkeys((*model.reduced_names, *model.control_names, *_twist_names(model)))
     if not axes:
         raise ValueError(f"grid: got no axis, need some of {', '.join(known)}")
     for name in axes:
         if name not in known:
             raise ValueError(f"grid: the {model.name} has no {name!r}, need {', '.join(known)}")
+
+
+def _twist_names(model: Model) -> tuple[str, ...]:
+    """Names of the components of a twist."""
+    turns = "heading" in model.group.coordinates
+    return (TWIST_NAMES if turns else WORLD_NAMES)[: model.group.dof]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -132,7 +139,7 @@ class _Balance:
     @property
     def equations(self) -> tuple[str, ...]:
         rates = (f"the rate of {name}" for name in self.model.reduced_names)
-        return (*rates, *(TWIST_NAMES[k] for k in self.twist))
+        return (*rates, *(_twist_names(self.model)[k] for k in self.twist))
 
     def completed(self, unknown: Array) -> Array:
         """Reduced state and control (n_z + n_u,)."""
@@ -152,9 +159,11 @@ class _Balance:
 
 def _balance(model: Model, asked: Mapping[str, float]) -> _Balance:
     names = (*model.reduced_names, *model.control_names)
-    twist = {TWIST_NAMES.index(k): value for k, value in asked.items() if k not in names}
+    components = _twist_names(model)
+    twist = {components.index(k): value for k, value in asked.items() if k not in names}
     free = len(names) - (len(asked) - len(twist))
-    if free > len(model.reduced_names) + len(twist) and "lateral_speed" not in asked:
+    open_ = free > len(model.reduced_names) + len(twist)
+    if open_ and "lateral_speed" in components and "lateral_speed" not in asked:
         twist[1] = 0.0
     given = np.array([asked.get(name, np.nan) for name in names], dtype=np.float64)
     return _Balance(model=model, given=given, twist=twist)
@@ -176,7 +185,8 @@ def _trim_at(
     inside = np.clip(everything, *balance.limits.T) + 0.0
     state, control = np.split(inside, [len(model.reduced_names)])
     twist = _as_asked(model.body_velocity(state, control), balance)
-    lateral = float(np.hypot(twist[0], twist[1]) * abs(twist[2]))
+    turn_rate = float(np.abs(twist[2:3]).sum()) if "turn_rate" in _twist_names(model) else 0.0
+    lateral = float(np.hypot(twist[0], twist[1]) * turn_rate)
     if max_lateral_acceleration is not None and lateral > max_lateral_acceleration * (1.0 + SLACK):
         more = lateral - max_lateral_acceleration
         reason = (

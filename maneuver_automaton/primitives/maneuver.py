@@ -39,7 +39,7 @@ class Maneuver:
     cost_multiplier: float = 1.0
 
     def __post_init__(self) -> None:
-        freeze(self, "displacement", last=(3, 4))
+        freeze(self, "displacement", last=(2, 3, 4))
         if not self.duration >= 0.0:
             raise ValueError(
                 f"maneuver {self.name!r}: duration must not be negative, got {self.duration} s"

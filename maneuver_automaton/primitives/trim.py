@@ -30,13 +30,13 @@ class Trim:
     """
 
     name: str
-    body_velocity: Array  # (dof,) [m/s, m/s, rad/s(, m/s)]
+    body_velocity: Array  # (dof,) [m/s, m/s, rad/s(, m/s)]; [m/s, m/s] where nothing turns
     control: Array  # (n_u,), the model's units
     reduced_state: Array = field(default_factory=lambda: np.zeros(0))  # (n_z,), the model's units
     max_duration: float = math.inf  # [s]
 
     def __post_init__(self) -> None:
-        freeze(self, "body_velocity", last=(3, 4))
+        freeze(self, "body_velocity", last=(2, 3, 4))
         freeze(self, "control")
         freeze(self, "reduced_state")
         if not self.name or not self.name.strip():

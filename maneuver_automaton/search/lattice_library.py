@@ -111,7 +111,7 @@ def _library(
         library=library_arrays(
             four_columns(twists), rates, transitions_of(automaton, np.zeros(0)), trims=trims
         )._replace(
-            words=_triples(moving),
+            words=_words(moving, twists),
             free_words=np.array(
                 [(i, j, m) for i, j in itertools.permutations(moving.tolist(), 2)]
                 or [(int(i), int(i), m) for i in moving],
@@ -146,9 +146,17 @@ def moves_of(twists: Array, durations: Array) -> Array:
     return SE2.exp(durations[..., None] * twists[:, None, :]).pose
 
 
-def _triples(moving: IntArray) -> IntArray:
-    """Words of three trims whose neighbours differ; of fewer where there are fewer trims."""
+def _words(moving: IntArray, twists: Array) -> IntArray:
+    """Words of three trims whose neighbours differ; of fewer where there are fewer trims.
+
+    Where no trim turns, three times are more than a place asks for, and the times of a triple are
+    not determined: two trims that lead to different sides are enough. They are followed by none.
+    """
     every = moving.tolist()
+    if len(every) > 1 and not twists[:, 2].any():
+        return np.array(
+            [(i, j, NO_TRIM) for i, j in itertools.permutations(every, 2)], dtype=np.int64
+        )
     words = [(i, j, k) for i, j, k in itertools.product(every, repeat=3) if i != j and j != k] or [
         (i, i, i) for i in every
     ]

@@ -10,6 +10,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.between import part_between
+from maneuver_automaton.automaton.headings import origin_of
 from maneuver_automaton.collision import Shape
 from maneuver_automaton.costs import StageCost
 from maneuver_automaton.problem import Goal, Problem
@@ -87,7 +88,7 @@ def _poses(problem: Problem, goal: Goal) -> Array:
 @functools.lru_cache(maxsize=8)
 def priced_transfers(automaton: Automaton, cost: StageCost) -> Library:
     """The transfers of an automaton under a cost, made once."""
-    origin = np.zeros(automaton.model.group.dof)
+    origin = origin_of(automaton, automaton.trims[0])
     rest = automaton.trims[0].name
     known = Problem(automaton, origin, Goal(pose=origin, trim=rest), start_trim=rest, cost=cost)
     return library_of(

@@ -14,6 +14,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.between import trims_between
+from maneuver_automaton.automaton.headings import origin_of
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.groups import LieGroup, group_of
 from maneuver_automaton.primitives import Maneuver, Trim
@@ -275,7 +276,7 @@ def word_setup(
 @functools.lru_cache(maxsize=16)
 def maneuver_prices(automaton: Automaton, cost: StageCost) -> Array:
     """What every maneuver costs (M,) without the prices of switches."""
-    name, still = automaton.trim_names[0], np.zeros(automaton.model.group.dof)
+    name, still = automaton.trim_names[0], origin_of(automaton, automaton.trims[0])
     any_problem = Problem(automaton, still, Goal(pose=still, trim=name), cost=cost, start_trim=name)
     return np.array([any_problem.maneuver_cost(one) for one in automaton.maneuvers])
 

@@ -49,12 +49,19 @@ FAULTS: dict[str, dict[str, str]] = {
     "a step off the plan takes far longer than its time limit": {
         "loop_noise": "glider",
     },
+    "a closed loop of fixed time plans for what is left of it where no trim stands still": {
+        "loop_fixed_time": "boat_in_current",
+    },
+    "a vehicle whose heading is a reduced state is not polished": {
+        "polishing": "boat_in_current",
+    },
     "alternatives repeat the best motion": {
         "alternatives": "car",
         "alternatives_among_obstacles": "car boat omni",
     },
     "closed loops with inertia know static obstacles only": {
-        "loop_moving_obstacles": "inertia",
+        "loop_moving_obstacles": "second_order_unicycle second_order_car car_with_trailer "
+        "hovercraft single_track helicopter user",
     },
     "conditions of the horizon only sort out finished plans of vehicles with inertia": {
         "max_time": "second_order_unicycle helicopter",
@@ -94,7 +101,7 @@ FAULTS: dict[str, dict[str, str]] = {
         "certificate": "inertia",
     },
     "no lower bound above zero with maneuvers": {
-        "lower_bound": "car_with_trailer hovercraft single_track helicopter user",
+        "lower_bound": "boat_in_current car_with_trailer hovercraft single_track helicopter user",
     },
     "no plan past a disc is found": {
         "discs": "single_track",
@@ -187,6 +194,9 @@ ONE_BY_ONE = {  # so that every feature is tried with a few vehicles
     ("boat", "max_time_among_obstacles"),
     ("boat", "moved_problem_among_obstacles"),
     ("grid", "zones_crossed"),
+    *(("stage", feature) for feature in ("discs", "moving_obstacles", "loop_obstacles")),
+    ("stage", "moved_problem_among_obstacles"),
+    ("boat_in_current", "loop"),
     ("glider", "heights"),
     ("boat", "pictures"),
     ("car_with_trailer", "carried_parts"),

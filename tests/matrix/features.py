@@ -335,7 +335,11 @@ def midway(vehicle: Vehicle, share: float = 0.5) -> np.ndarray:
 
 
 def heading_midway(vehicle: Vehicle) -> float:
-    return float(outside.flat(midway(vehicle))[2])
+    """Its heading there; where it never turns, the direction in which it drives."""
+    if vehicle.has_heading:
+        return float(outside.flat(midway(vehicle))[2])
+    way = midway(vehicle, 0.501) - midway(vehicle)
+    return math.atan2(way[1], way[0])
 
 
 def pillar(vehicle: Vehicle) -> Disc:
@@ -973,7 +977,7 @@ def _still(problem: Problem, **options: Any) -> PlanResult:
 
 def _moves(vehicle: Vehicle, engine: Engine, **changes: object) -> None:
     """The moved problem has the moved plan, at the same cost."""
-    by = np.array([31.4, -12.3, 2.1, 5.0][: len(vehicle.goal)])
+    by = np.array([31.4, -12.3, 2.1 if vehicle.rotates else 0.0, 5.0][: len(vehicle.goal)])
     problem = vehicle.problem(**changes)
     here = engine.plan(problem, time_limit=TIME_LIMIT)
     there = engine.plan(problem.moved(group_of(len(by))(by)), time_limit=TIME_LIMIT)
@@ -1073,7 +1077,8 @@ def _undisturbed(problem: Problem, **options: Any) -> ClosedLoop:
 def loop_noise(vehicle: Vehicle, engine: Engine) -> None:
     """Pushed a little after every step, it still gets there, to within the goal's tolerance."""
     goal = vehicle.target(tolerance_m=0.02 * vehicle.reach, tolerance_rad=0.1)
-    upset = Disturbance(position_m=0.001 * vehicle.reach, heading_rad=0.003, seed=1)
+    turned = 0.003 if vehicle.rotates else 0.0
+    upset = Disturbance(position_m=0.001 * vehicle.reach, heading_rad=turned, seed=1)
     ended = driven(vehicle, engine, goals=goal, options={"disturbance": upset})
     pushed = [
         float(np.abs(piece.end - after).max())

@@ -15,7 +15,7 @@ import numpy as np
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.stock import load_stock_library
 from maneuver_automaton.collision import Box, Disc, Shape
-from maneuver_automaton.groups import SE2, SE2xR
+from maneuver_automaton.groups import SE2, SE2xR, translations
 from maneuver_automaton.models import Car, Unicycle, UserModel
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.driving import drive_all
@@ -46,16 +46,13 @@ class Vehicle:
     inertia: bool = False
     reverses: bool = True
     flies: bool = False
+    rotates: bool = True  # whether its dynamics look the same after a rotation
+    has_heading: bool = True  # whether it can turn
 
     @property
     def automaton(self) -> Automaton:
         """Its library, loaded once."""
         return _library(self.library)
-
-    @property
-    def has_heading(self) -> bool:
-        """Whether its poses have a heading."""
-        return len(self.goal) > 2
 
     @property
     def reach(self) -> float:
@@ -191,6 +188,39 @@ def _omni() -> Automaton:
     return Automaton.of_controls(model, controls)
 
 
+def _stage() -> Automaton:
+    """It moves along x and y and between, and never turns."""
+    model = UserModel(
+        name="stage",
+        group=translations(2),
+        control_names=("v_x", "v_y"),
+        velocity=lambda z, u: [u[0], u[1]],
+    )
+    controls = {
+        "rest": (0.0, 0.0),
+        "right": (1.0, 0.0),
+        "left": (-1.0, 0.0),
+        "up": (0.0, 1.0),
+        "down": (0.0, -1.0),
+        "slant": (0.6, 0.6),
+    }
+    return Automaton.of_controls(model, controls)
+
+
+def _boat_in_current() -> Automaton:
+    """A current along x breaks the symmetry of rotations: eight headings, and turns between."""
+    model = UserModel(
+        name="boat in a current",
+        group=translations(2),
+        control_names=("speed", "turn_rate"),
+        reduced_names=("heading",),
+        velocity=lambda z, u: [u[0] * np.cos(z[0]) + 0.3, u[0] * np.sin(z[0])],
+        dynamics=lambda z, u: [u[1]],
+        control_limits=np.array([[0.0, 1.0], [-0.8, 0.8]]),
+    )
+    return Automaton.of_model(model, {"heading": np.pi / 4 * np.arange(8), "speed": [1.0, 0.5]})
+
+
 def _user() -> Automaton:
     """A user's sled with inertia: it slides outwards in turns; ramps join every two trims."""
     rates = np.array([1.0, 2.0])  # [m/s^2, rad/s^2]
@@ -266,6 +296,23 @@ ALL = (
         flies=True,
     ),
     Vehicle(name="omni", library=_omni, footprint=(Box([0.6, 0.4]),), goal=(4.0, 1.5, 0.5)),
+    Vehicle(
+        name="stage",
+        library=_stage,
+        footprint=(Box([0.5, 0.3]),),
+        goal=(4.0, 1.5, 0.0),
+        rotates=False,
+        has_heading=False,
+    ),
+    Vehicle(
+        name="boat_in_current",
+        library=_boat_in_current,
+        footprint=(Box([0.8, 0.4]),),
+        goal=(6.0, 2.0, np.pi / 4),
+        inertia=True,
+        reverses=False,
+        rotates=False,
+    ),
     Vehicle(
         name="second_order_unicycle",
         library=_stock("second_order_unicycle"),

@@ -1,0 +1,79 @@
+"""Plans for vehicles that translations alone move, measured from outside."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.collision import Box
+from maneuver_automaton.groups import translations
+from maneuver_automaton.models import UserModel
+from maneuver_automaton.planning import plan
+from maneuver_automaton.problem import Problem, SearchSettings
+from tests.search.cases import compiled_only
+
+pytestmark = compiled_only
+STAGE = UserModel(
+    name="stage",
+    group=translations(2),
+    control_names=("v_x", "v_y"),
+    velocity=lambda z, u: [u[0], u[1]],
+)
+AXES = {"rest": (0, 0), "right": (1, 0), "left": (-1, 0), "up": (0, 1), "down": (0, -1)}
+BODY = Box([0.5, 0.3])
+SEARCH = SearchSettings(max_expansions=2000)
+
+
+def test_a_stage_takes_the_shortest_way_along_its_axes():
+    """By hand: the sum of both ways at 1 m/s; by a trim between the axes, less."""
+    result = plan(Problem(Automaton.of_controls(STAGE, AXES), [0, 0], [3, 1]), time_limit=20.0)
+    assert result.cost == pytest.approx(4.0, abs=1e-9)
+    np.testing.assert_allclose(result.plan.end, [3.0, 1.0, 0.0], atol=1e-9)
+    slanted = Automaton.of_controls(STAGE, AXES | {"slant": (0.6, 0.6)})
+    result = plan(Problem(slanted, [0, 0], [3, 1]), time_limit=20.0)
+    assert result.cost == pytest.approx(1.0 / 0.6 + 2.0, abs=1e-9)
+
+
+def test_a_stage_goes_around_what_is_in_its_way():
+    """Every two-trim way meets the wall: it is passed above or below, at 1 m/s along the axes."""
+    wall = Box([0.4, 3.0], [1.5, 0.5])
+    problem = Problem(
+        Automaton.of_controls(STAGE, AXES),
+        [0, 0],
+        [3, 0],
+        obstacles=[wall],
+        footprint=[BODY],
+        search=SEARCH,
+    )
+    result = plan(problem, time_limit=20.0)
+    least = 3.0 + 2 * (1.0 + 0.15)  # down by what the wall and half of the body reach, and up
+    assert least <= result.cost <= least * 1.02
+    poses = result.plan.sample(max_step_m=0.005).pose
+    solid = shapely.Polygon(wall.corners)
+    assert min(shapely.Polygon(BODY.corners + p[:2]).distance(solid) for p in poses) > 0.0
+    assert not poses[:, 2].any()
+
+
+def test_a_boat_heads_up_against_the_current_to_go_across():
+    """The current carries it along x as fast as it can go back: it crosses at 90 degrees to it."""
+    boat = UserModel(
+        name="boat",
+        group=translations(2),
+        control_names=("speed", "turn_rate"),
+        reduced_names=("heading",),
+        velocity=lambda z, u: [u[0] * np.cos(z[0]) + 0.5, u[0] * np.sin(z[0])],
+        dynamics=lambda z, u: [u[1]],
+        control_limits=np.array([[0.0, 1.0], [-1.0, 1.0]]),
+    )
+    headings = np.pi / 3 * np.arange(6)
+    library = Automaton.of_model(boat, {"heading": headings, "speed": [1.0]})
+    across = headings[2]
+    problem = Problem(library, [0, 0, across], [0, 5, across], search=SEARCH)
+    result = plan(problem, time_limit=20.0)
+    assert result.cost == pytest.approx(5.0 / np.sin(across), abs=1e-9)
+    course = result.plan.sample()
+    np.testing.assert_allclose(course.pose[:, 0], 0.0, atol=1e-9)
+    np.testing.assert_allclose(course.pose[:, 2], across, atol=1e-12)
+    assert result.audit.passed
