@@ -20,11 +20,13 @@ from maneuver_automaton.groups.chain import chained
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.library_arrays import library_arrays
 from maneuver_automaton.search.setup import search_setup
+from maneuver_automaton.search.time_limit import within_time
 from maneuver_automaton.words.conjugation import conjugated, conjugated_turn
 from maneuver_automaton.words.library import FULL_TURN, four_columns
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word, displacements_of
 
+BINDING = 1e-9  # share of a greatest time [s] that may be left where it binds
 CUTS = 60  # rounds of the linear program where multipliers are not unique
 NEGLIGIBLE = 1e-9  # relative: reduced costs above minus this count as none
 
@@ -154,6 +156,8 @@ def _without_maneuvers(problem: Problem, goal: Goal, word: Word) -> PricedWord |
     """A word of trims alone: every trim of the library can be inserted anywhere."""
     setup = search_setup(problem, goal)
     library = library_arrays(problem, setup)
+    if _time_binds(problem, word):  # then time has a price
+        library = within_time(library, problem.horizon.max_time or 0.0)
     used = (word.durations > 0.0) & (library.number_of[word.trims] >= 0)
     if not used.any():
         return None
@@ -190,7 +194,7 @@ def _with_maneuvers(problem: Problem, goal: Goal, word: Word) -> PricedWord | No
     before = chained(np.zeros(own.shape[1]), steps)
     twists, product = conjugated(own[word.trims], steps)
     times, rates = np.array(word.durations), all_rates[word.trims]
-    fixed = problem.horizon.time is not None
+    fixed = problem.horizon.time is not None or _time_binds(problem, word)
     stretches = []
     for first, last in _stretches(word):
         chosen = np.flatnonzero(automaton.trim_classes == automaton.trim_classes[word.trims[first]])
@@ -210,6 +214,12 @@ def _with_maneuvers(problem: Problem, goal: Goal, word: Word) -> PricedWord | No
         stretches=tuple(stretches),
         scale=max(1.0, float(np.abs(all_rates).max())),
     )
+
+
+def _time_binds(problem: Problem, word: Word) -> bool:
+    """Whether a word lasts as long as it may at most."""
+    most = problem.horizon.max_time
+    return most is not None and word.duration > most - BINDING * (1.0 + most)
 
 
 def _stretches(word: Word) -> Iterator[tuple[int, int]]:

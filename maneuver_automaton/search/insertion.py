@@ -263,10 +263,13 @@ def _with_fewer_switches(library: LibraryArrays, works: list[_Work]) -> Iterator
 
 
 def _as_seed(asked: _Asked, known: Plan) -> Iterator[tuple[IntArray, Array]]:
-    """A plan in the library's numbers, rest and free turn appended; none if a trim is not there."""
+    """A plan in the library's numbers, rest and free turn appended.
+
+    None if a trim is not in the library, or the word is longer than those that are searched.
+    """
     automaton, library = asked.problem.automaton, asked.library
     names = set(automaton.trim_names)
-    if all(trim.name in names for trim in known.trims):
+    if len(known.trims) <= LONGEST and all(trim.name in names for trim in known.trims):
         word = np.array([automaton.index_of(trim.name) for trim in known.trims], dtype=np.int64)
         if not word.size or (library.number_of[word] >= 0).all():
             yield _in_library(asked, word, known.durations)

@@ -268,7 +268,7 @@ def test_a_fixed_time_that_ends_in_motion_is_what_is_left_of_it():
         start_trim="1, 0",
         horizon=Horizon(time=9.0),
         cost=Cost(effort=1.0),
-        search=SearchSettings(max_expansions=400),
+        search=SearchSettings(max_expansions=4000),
     )
     loop = simulate(problem, step=0.5, time_limit=30.0, steps=40)
     assert loop.reached, loop.reason

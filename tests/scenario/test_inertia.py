@@ -131,7 +131,7 @@ def test_every_model_is_read_and_written(vehicle, automaton, model):
 def test_every_parameter_has_a_key_with_its_unit(name, part):
     fields = {field.name for field in dataclasses.fields(KINDS[name])}
     assert KEYS[name].keys() == fields
-    bodies = {"model", "footprint", "trailer"}
+    bodies = {"model", "footprint", "footprint_height_m", "trailer"}
     assert set(KEYS[name].values()) == part.model_fields.keys() - bodies
 
 
