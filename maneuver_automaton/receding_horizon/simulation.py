@@ -14,6 +14,7 @@ from maneuver_automaton.automaton.cutting import NOTHING, tail_of
 from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.collision.blocked import too_close
 from maneuver_automaton.groups import group_of
+from maneuver_automaton.planning.in_space import climbs_among_obstacles
 from maneuver_automaton.planning.plan import has_inertia
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.candidates import within
@@ -102,9 +103,11 @@ def simulate(
     upset = checked(upset, problem.start.size)
     random = draws(upset, problem.start.size)
     controller: RecedingHorizon | ManeuverHorizon
-    # a fixed time that no rest prolongs is what is left of it, which that controller knows
+    # a fixed time that no rest prolongs is what is left of it, which that controller knows, and
+    # heights of obstacles too
     shrinks = problem.horizon.time is not None and problem.automaton.rest is None
-    inertia = has_inertia(problem) or bool(problem.zones) or shrinks
+    climbs = climbs_among_obstacles(problem)
+    inertia = has_inertia(problem) or bool(problem.zones) or shrinks or climbs
     if inertia:
         _check_inertia(upset, stay=stay, retimed=retimed)
         controller = ManeuverHorizon(

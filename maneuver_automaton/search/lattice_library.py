@@ -24,7 +24,7 @@ from maneuver_automaton.words.library import (
     library_arrays,
     moving_trims,
 )
-from maneuver_automaton.words.transitions import transitions_of
+from maneuver_automaton.words.transitions import identities
 
 MOST_TRIMS = 10  # of a larger library the most useful ones
 QUANTA = (0.17, 0.5)  # lengths of the edges, in turning radii
@@ -109,7 +109,7 @@ def _library(
     prices = (getattr(cost, "switch", 0.0), getattr(cost, "direction_change", 0.0))
     arrays = LatticeArrays(
         library=library_arrays(
-            four_columns(twists), rates, transitions_of(automaton, np.zeros(0)), trims=trims
+            four_columns(twists), rates, identities(automaton), trims=trims
         )._replace(
             words=_words(moving, twists),
             free_words=np.array(

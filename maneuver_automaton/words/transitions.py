@@ -96,6 +96,28 @@ def transitions_of(automaton: Automaton, prices: Array) -> Transitions:
     )
 
 
+def identities(automaton: Automaton) -> Transitions:
+    """The transitions of a vehicle that switches at will between all trims of an automaton.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
+    >>> identities(robot).displacement.tolist()
+    [[[0.0, 0.0, 0.0, 0.0]]]
+    """
+    none = np.zeros(0, dtype=np.int64)
+    return Transitions(
+        class_of=np.zeros(len(automaton), dtype=np.int64),
+        displacement=np.zeros((1, 1, 4)),
+        cost=np.zeros((1, 1)),
+        time=np.zeros((1, 1)),
+        first=np.full((1, 1), SWITCH, dtype=np.int64),
+        sources=none,
+        targets=none,
+    )
+
+
 def _predecessors(n: int, sources: IntArray, targets: IntArray, prices: Array) -> IntArray:
     """Last maneuver (n, n) of the cheapest chain from class to class; -1 for none."""
     from scipy.sparse import csr_array
