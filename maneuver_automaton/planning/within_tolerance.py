@@ -17,6 +17,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, wrapped
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.headings import trim_headings
 from maneuver_automaton.automaton.same_motion import is_new
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.checking import check_plan
@@ -153,6 +154,8 @@ def _aims(problem: Problem) -> Iterator[Goal]:
         poses = list(_poses_within(goal, problem.start, AROUND, RINGS[:1]))
         if blocked:
             poses += _poses_within(goal, problem.start, DENSE, RINGS)
+        if trim_headings(problem.automaton) is not None:  # a trim keeps its heading
+            poses = [pose for pose in poses if pose[2] == goal.pose[2]]
         aims = [replace(goal, pose=pose, tolerance_m=0.0, tolerance_rad=0.0) for pose in poses]
         if blocked:
             aims = [aim for aim in aims if not why_goal_blocked(problem, aim)][:MOST_AIMS]
