@@ -237,7 +237,9 @@ def _polish(found: _Incumbents) -> None:
     """Polish kinematic plans of different gears, and what has been found; keep what is cheaper."""
     problem = found.problem
     known = [(one.plan, one.goal_index) for one in found.accepted[:1]]
-    if not known and problem.horizon.max_time is not None:  # what is late may be made quicker
+    horizon = problem.horizon
+    if not known and (horizon.max_time is not None or horizon.max_trims is not None):
+        # what is late may be made quicker, and of too many trims one maneuver
         known = sorted(found.late, key=lambda one: one[0].duration)[:1]
     if not known or found.left <= 0.0 or why_not_polished(problem):
         return

@@ -353,6 +353,7 @@ ALL = (
     ),
     Vehicle(
         name="single_track",
+        max_expansions=60_000,  # its tightest turn is 50 m wide: the way past a box is long
         library=_stock("single_track"),
         footprint=(Box([4.5, 1.6]),),
         goal=(120.0, 12.0, 0.1),
