@@ -198,7 +198,8 @@ class _Incumbents:
             return PlanStatus.UNREACHABLE, self.enclosed
         if self.refused:
             return PlanStatus.NO_PLAN, f"every plan found was refused: {self.refused}"
-        return PlanStatus.OUT_OF_BUDGET, f"no plan within {time_limit:g} s and the expansions allowed{self.reason}"
+        reason = f"no plan within {time_limit:g} s and the expansions allowed{self.reason}"
+        return PlanStatus.OUT_OF_BUDGET, reason
 
 
 def _same_motion(one: Plan, other: Plan) -> bool:
