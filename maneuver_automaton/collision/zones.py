@@ -21,8 +21,8 @@ EXCEEDED = 1e-9  # relative, by which a limit may be exceeded
 class Zone:
     """Where the vehicle moves under a guard: slowly, forwards only, with less grip, by some trims.
 
-    It holds wherever any part of the body is in the zone, its border included. To stand still is
-    always admitted by a limit.
+    It holds wherever any part of the body, or of what it carries, is in the zone, its border
+    included. To stand still is always admitted by a limit.
 
     Examples
     --------

@@ -6,6 +6,7 @@ from itertools import groupby
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.collision import Obstacle, Zone
 from maneuver_automaton.collision.fcl_checker import FclChecker
 from maneuver_automaton.models import Model
@@ -17,28 +18,36 @@ from maneuver_automaton.search.admission import admitted_stretches, piece_is_adm
 def what_zone_forbids(problem: Problem, plan: Plan, origin: tuple[float, float]) -> str:
     """The first motion of a plan that a zone does not admit where it is driven; empty if none.
 
-    A trim that a zone does not admit must not touch it; of a maneuver, what it does not admit of
-    its course. Zones are counted from `origin` [m], so that no digit is lost.
+    A trim that a zone does not admit must not touch it, neither with the body nor with what is
+    carried; of a maneuver, what it does not admit of its course. Zones are counted from `origin`
+    [m], so that no digit is lost.
     """
+    model = problem.automaton.model
+    bodies = [(plan, problem.footprint)]
+    bodies += [(carried(plan, model, name), shapes) for name, shapes in problem.parts.items()]
     for zone in problem.zones:
-        checker = FclChecker(problem.footprint, (Obstacle(zone.shape),), origin=origin)
-        for k, piece in enumerate(plan.primitives):
-            start, duration = plan.switching_poses[k], float(plan.primitive_durations[k])
-            if isinstance(piece, Trim):
-                if not piece_is_admitted(zone, piece):
-                    hit = checker.motion_hit(start[:3], piece.body_velocity[:3], duration)
-                    if hit is not None:
-                        return f"{zone.words} does not admit trim {k}, {piece.name!r}"
-            elif _course_enters(zone, checker, piece, start, problem.automaton.model):
-                return f"{zone.words} does not admit maneuver {k}, {piece.name!r}"
+        for moving, shapes in bodies:
+            checker = FclChecker(shapes, (Obstacle(zone.shape),), origin=origin)
+            for k, (own, seen) in enumerate(zip(plan.primitives, moving.primitives, strict=True)):
+                start, duration = moving.switching_poses[k], float(plan.primitive_durations[k])
+                if isinstance(own, Trim):
+                    if not piece_is_admitted(zone, own):
+                        assert isinstance(seen, Trim)
+                        hit = checker.motion_hit(start[:3], seen.body_velocity[:3], duration)
+                        if hit is not None:
+                            return f"{zone.words} does not admit trim {k}, {own.name!r}"
+                else:
+                    assert isinstance(seen, Maneuver)
+                    if _course_enters(zone, checker, own, seen, start, model):
+                        return f"{zone.words} does not admit maneuver {k}, {own.name!r}"
     return ""
 
 
 def _course_enters(
-    zone: Zone, checker: FclChecker, maneuver: Maneuver, start: Array, model: Model
+    zone: Zone, checker: FclChecker, maneuver: Maneuver, seen: Maneuver, start: Array, model: Model
 ) -> bool:
-    """Whether a maneuver touches a zone on a stretch that it does not admit."""
-    course = maneuver.course
+    """Whether a maneuver, `seen` at one part, touches a zone where it is not admitted."""
+    course = seen.course
     if course is None:
         return True
     forbidden = ~admitted_stretches(zone, maneuver, model)

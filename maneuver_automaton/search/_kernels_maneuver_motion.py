@@ -76,23 +76,32 @@ def trim_proven(task, lib, layers, trim, x, y, heading, z, t, clock):
         if not task.zone_trims[k, trim]:
             # the body keeps out of zones that do not admit the trim; their distance is not part of
             # the clearance, since the next motion may be admitted
-            proven, _ = free_time(
-                layer_world(task.zones, k),
-                part_body(lib.bodies, 0),
-                x,
-                y,
-                heading,
-                lib.part_twists[0, trim, 0],
-                lib.part_twists[0, trim, 1],
-                lib.part_twists[0, trim, 2],
-                lib.speeds[0, trim],
-                t,
-                0.0,
-                task.margin,
-                clock,
-            )
-            if proven < t:
-                return -1.0
+            for p in range(lib.n_parts):
+                p_x, p_y, p_heading = compose(
+                    x,
+                    y,
+                    heading,
+                    lib.offsets[p, trim, 0],
+                    lib.offsets[p, trim, 1],
+                    lib.offsets[p, trim, 2],
+                )
+                proven, _ = free_time(
+                    layer_world(task.zones, k),
+                    part_body(lib.bodies, p),
+                    p_x,
+                    p_y,
+                    p_heading,
+                    lib.part_twists[p, trim, 0],
+                    lib.part_twists[p, trim, 1],
+                    lib.part_twists[p, trim, 2],
+                    lib.speeds[p, trim],
+                    t,
+                    0.0,
+                    task.margin,
+                    clock,
+                )
+                if proven < t:
+                    return -1.0
     return nearest
 
 
@@ -155,29 +164,31 @@ def edge_proven(task, lib, layers, edge, x, y, heading, z, clock):
                 if k == end - 1:
                     nearest = min(nearest, gap)
     for n in range(task.zone_trims.shape[0]):
-        for k in range(lib.first_piece[edge], lib.first_piece[edge + 1]):  # of the vehicle itself
-            if task.zone_pieces[n, k]:
-                continue
-            p_x, p_y, p_heading = compose(
-                x, y, heading, lib.piece_pose[k, 0], lib.piece_pose[k, 1], lib.piece_pose[k, 2]
-            )
-            proven, _ = free_time(
-                layer_world(task.zones, n),
-                part_body(lib.bodies, 0),
-                p_x,
-                p_y,
-                p_heading,
-                lib.piece_twist[k, 0],
-                lib.piece_twist[k, 1],
-                lib.piece_twist[k, 2],
-                lib.piece_speed[k],
-                lib.piece_time[k],
-                lib.piece_error[k],
-                task.margin,
-                clock,
-            )
-            if proven < lib.piece_time[k]:
-                return -1.0
+        for p in range(lib.n_parts):
+            group = p * n_edges + edge
+            for k in range(lib.first_piece[group], lib.first_piece[group + 1]):
+                if task.zone_pieces[n, k]:
+                    continue
+                p_x, p_y, p_heading = compose(
+                    x, y, heading, lib.piece_pose[k, 0], lib.piece_pose[k, 1], lib.piece_pose[k, 2]
+                )
+                proven, _ = free_time(
+                    layer_world(task.zones, n),
+                    part_body(lib.bodies, p),
+                    p_x,
+                    p_y,
+                    p_heading,
+                    lib.piece_twist[k, 0],
+                    lib.piece_twist[k, 1],
+                    lib.piece_twist[k, 2],
+                    lib.piece_speed[k],
+                    lib.piece_time[k],
+                    lib.piece_error[k],
+                    task.margin,
+                    clock,
+                )
+                if proven < lib.piece_time[k]:
+                    return -1.0
     return nearest
 
 

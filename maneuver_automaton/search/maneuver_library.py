@@ -82,7 +82,7 @@ class ManeuverLibrary(NamedTuple):
     per_climb: float  # least cost per metre of altitude
     lag: Array  # (C, C) least cost of maneuvers between classes beyond that of their way
     worst_error: float  # [m] of the pose along any piece
-    spans: IntArray  # (N, 2) samples of its course between which each piece of the vehicle lies
+    spans: IntArray  # (N, 2) samples of its course between which each piece of a part lies
 
 
 @functools.lru_cache(maxsize=16)
@@ -213,7 +213,7 @@ def _motion(
     climbs = automaton.body_velocities[:, 3:].sum(axis=1)
     ends = np.stack([climbs[sources], climbs[targets]], axis=1)
     found, counts, speeds, heights = [], [np.zeros(1, dtype=np.int64)], [], []
-    spans = np.zeros((0, 2), dtype=np.int64)
+    spans: list[IntArray] = []
     for p in range(len(parts) + 1):
         body = bodies[p] if p < len(parts) else None
         table = own if body is None else twists[p]
@@ -229,10 +229,10 @@ def _motion(
             close=close,
             timed=timed,
         )
-        if p == 0:
+        if body is not None:
             sizes = np.array([len(times) for _, times in courses], dtype=np.int64)
             begins = np.repeat(np.cumsum(sizes) - sizes, np.diff(pieces.first))
-            spans = np.stack([pieces.begin - begins, pieces.end - begins], axis=1)
+            spans.append(np.stack([pieces.begin - begins, pieces.end - begins], axis=1))
         count = np.zeros(len(edges.source), dtype=np.int64)
         count[driven] = np.diff(pieces.first)
         counts.append(count)
@@ -256,7 +256,7 @@ def _motion(
         edge_low=low,
         edge_high=high,
     )
-    return motion, spans
+    return motion, np.concatenate(spans)
 
 
 def _via_edges(transfer: Library, edges: _Edges) -> IntArray:

@@ -163,9 +163,10 @@ class ManeuverQuery:
 
     @cached_property
     def zone_pieces(self) -> NDArray[np.bool_]:
-        """Which pieces of the vehicle's own motion along edges each zone admits, (Z, N)."""
+        """Which pieces of the motion of each part along edges each zone admits, (Z, N)."""
         library = self.library
-        first, spans = library.arrays.first_piece, library.spans
+        first, spans, n_parts = library.arrays.first_piece, library.spans, library.arrays.n_parts
+        n_edges = len(library.edge_maneuver)
         admitted = np.zeros((len(self.zones), len(spans)), dtype=np.bool_)
         for z, zone in enumerate(self.zones):
             for edge, k in enumerate(library.edge_maneuver.tolist()):
@@ -173,8 +174,9 @@ class ManeuverQuery:
                 if maneuver is None or maneuver.course is None:
                     continue
                 good = admitted_stretches(zone, maneuver, self.automaton.model)
-                for n in range(first[edge], first[edge + 1]):
-                    admitted[z, n] = good[spans[n, 0] : spans[n, 1]].all()
+                for group in range(edge, n_parts * n_edges, n_edges):  # one of every part
+                    for n in range(first[group], first[group + 1]):
+                        admitted[z, n] = good[spans[n, 0] : spans[n, 1]].all()
         return admitted
 
     @property

@@ -57,10 +57,6 @@ FAULTS: dict[str, dict[str, str]] = {
     "zones are entered for the whole way or not at all": {
         "zones_crossed": "hovercraft",
     },
-    "zones do not see what a vehicle carries": {
-        "loop_zones": "car_with_trailer",
-        "planner_with_all": "car_with_trailer",
-    },
 }
 GROUPS = {
     "all": list(VEHICLES),
