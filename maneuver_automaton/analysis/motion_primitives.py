@@ -62,10 +62,10 @@ def same_motion_primitive(
     Examples
     --------
     >>> from maneuver_automaton.groups import SE2
-    >>> from maneuver_automaton.models.unicycle import flow
     >>> times = np.linspace(0.0, 2.0, 5)
-    >>> a = flow([0.0, 1.0, 0.0], [1.0, 0.5], duration=times)
-    >>> b = flow([4.0, 0.0, np.pi], [1.0, 0.5], duration=times)
+    >>> coast = SE2.exp(times[:, None] * [1.0, 0.0, 0.5])
+    >>> a = (SE2([0.0, 1.0, 0.0]) @ coast).pose
+    >>> b = (SE2([4.0, 0.0, np.pi]) @ coast).pose
     >>> same = same_motion_primitive(a, b, times=times, group=SE2)
     >>> same.equivalent, same.group_element.pose.round(3).tolist()
     (True, [4.0, 1.0, -3.142])

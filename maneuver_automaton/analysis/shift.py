@@ -85,21 +85,20 @@ def shifted_problem(problem: ControlProblem, by: LieGroup) -> ControlProblem:
     Driving straight ahead for T seconds solves the first problem, and the shifted one.
 
     >>> from maneuver_automaton.groups import SE2
-    >>> from maneuver_automaton.models.unicycle import flow
     >>> T = 4.0
-    >>> ahead = [1 / T, 0.0]
+    >>> ahead = SE2.exp(T * np.array([1 / T, 0.0, 0.0]))
     >>> problem = ControlProblem(start=[-1.0, 0.0, 0.0], goal=[0.0, 0.0, 0.0])
-    >>> bool(np.all(flow(problem.start, ahead, duration=T) == problem.goal))
+    >>> bool(np.all((SE2(problem.start) @ ahead).pose == problem.goal))
     True
     >>> shifted = shifted_problem(problem, SE2([1.0, 1.0, 0.0]))
     >>> shifted.start.tolist(), shifted.goal.tolist()
     ([0.0, 1.0, 0.0], [1.0, 1.0, 0.0])
-    >>> bool(np.all(flow(shifted.start, ahead, duration=T) == shifted.goal))
+    >>> bool(np.all((SE2(shifted.start) @ ahead).pose == shifted.goal))
     True
 
     With only the start shifted it does not: that is a parallel parking problem.
 
-    >>> bool(np.all(flow(shifted.start, ahead, duration=T) == problem.goal))
+    >>> bool(np.all((SE2(shifted.start) @ ahead).pose == problem.goal))
     False
     """
     return ControlProblem(
