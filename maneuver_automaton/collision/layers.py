@@ -89,6 +89,13 @@ def always(bands: Sequence[Layer], *, low: float, high: float) -> tuple[AnyObsta
 def layer_arrays(worlds: Sequence[World], *, low: Array, high: Array, plane: World) -> LayerArrays:
     """Worlds as the kernels see them, each for poses between the altitudes `low` and `high`."""
     arrays = [world.arrays for world in worlds]
+    if len(worlds) == 1:
+        return single_layer(worlds[0])._replace(
+            low=np.array(low, dtype=np.float64),
+            high=np.array(high, dtype=np.float64),
+            plane=plane.arrays.field,
+            flat=bool(np.isinf(low).all() and np.isinf(high).all()),
+        )
     solids, still, moving = _joined([(one.solids, one.movers.solids) for one in arrays])
     shapes = np.array([one.field.distance.shape for one in arrays])
     distance = np.zeros((len(arrays), *shapes.max(axis=0)))
@@ -126,6 +133,32 @@ def layer_arrays(worlds: Sequence[World], *, low: Array, high: Array, plane: Wor
         first_mover=np.cumsum([0, *(len(one.movers.speed) for one in arrays)]),
         plane=plane.arrays.field,
         flat=bool(np.isinf(low).all() and np.isinf(high).all()),
+    )
+
+
+def single_layer(world: World) -> LayerArrays:
+    """One world at all altitudes: kernels take it as it is, so that nothing is copied."""
+    only = world.arrays
+    buckets, field = only.buckets, only.field
+    sizes = (
+        *(buckets.origin_x, buckets.origin_y, buckets.cell, buckets.reach),
+        *(field.origin_x, field.origin_y, field.cell, field.outside),
+    )
+    everywhere = np.full(1, math.inf)
+    return LayerArrays(
+        low=-everywhere,
+        high=everywhere,
+        first=only,
+        solids=only.solids,
+        start=buckets.start[None],
+        items=buckets.items,
+        sizes=np.array([sizes], dtype=np.float64),
+        counts=np.array([(buckets.columns, buckets.rows)], dtype=np.int64),
+        distance=field.distance[None],
+        movers=only.movers,
+        first_mover=np.array([0, len(only.movers.speed)]),
+        plane=field,
+        flat=True,
     )
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.collision._kernels_advancement import free_time
 from maneuver_automaton.groups._kernels import coast, compose
-from maneuver_automaton.search._kernels_connect import inside_window
 from maneuver_automaton.search._kernels_distance import pop, push
+from maneuver_automaton.search._kernels_motion import inside_window
 
 FULL_TURN = 2.0 * math.pi
 N_NODES, HEAP, FOUND, BEST, EXPANSIONS = range(5)
@@ -39,7 +39,7 @@ class EscapeTask(NamedTuple):
     tick: float  # [s]
     longest: float  # [s] that a trim which moves is held, if the vehicle can rest
     impatience: float  # seconds of safety that a second on the way is worth
-    window: np.ndarray  # as in `_kernels_connect.inside_window`
+    window: np.ndarray  # as in `_kernels_motion.inside_window`
 
 
 class EscapeArrays(NamedTuple):
@@ -161,13 +161,13 @@ def expand(task, lib, world, body, search, n):
                     v_x,
                     v_y,
                     turn,
-                    lib.speeds[trim],
+                    lib.fastest[trim],
                     most,
                     task.keep,
                     task.margin,
                     clock,
                 )
-            t = lib.quanta[trim, 0]
+            t = lib.edge_durations[trim, 0]
             if task.rest < 0 and proven >= left:
                 t = left
             while t > 0.0 and t <= proven and t <= left:

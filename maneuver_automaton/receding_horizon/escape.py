@@ -95,7 +95,7 @@ def escape(
 
 def _task(query: LatticeQuery, rest: int, until: float) -> kernels.EscapeTask:
     library = query.library
-    quantum = float(library.arrays.quanta[:, 0].min())
+    quantum = float(library.arrays.edge_durations[:, 0].min())
     open_ = query.problem.bounds.x is None and query.problem.bounds.y is None
     window = np.array(query.window)
     if open_:

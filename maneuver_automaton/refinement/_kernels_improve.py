@@ -19,11 +19,11 @@ from maneuver_automaton.refinement._kernels_word import (
     unroll,
     word_cost,
 )
-from maneuver_automaton.search._kernels_connect import (
-    driven,
+from maneuver_automaton.search._kernels_motion import (
+    coast_free,
+    coasted,
     free_candidate,
     may_stay,
-    trim_free,
 )
 from maneuver_automaton.words._kernels_candidates import NO_TRIM, candidates
 
@@ -48,19 +48,19 @@ def spliced(lib, work, n, begin, end, first, last, m):
 
 
 @bare_inner_kernel
-def still_free(lib, task, world, body, work, size, begin):
+def still_free(lib, task, scene, work, size, begin):
     """Whether the word in `work.new_*` is free after `begin` [s], where obstacles move."""
-    x, y, heading = work.start[0], work.start[1], work.start[2]
+    pose = (work.start[0], work.start[1], work.start[2], 0.0)
     time = 0.0
     for k in range(size):
         trim, t = work.new_trims[k], work.new_durations[k]
         begun = time + t > begin
-        clock = task.clock + time
-        if begun and not trim_free(lib, task, world, body, trim, x, y, heading, t, clock):
+        if begun and not coast_free(scene, lib, trim, pose, t, task.clock + time):
             return False
-        x, y, heading = driven(lib, trim, x, y, heading, t)
+        pose = coasted(lib, trim, pose, t)
         time += t
-    return may_stay(task, world, body, x, y, heading, task.clock + time)
+    last = work.new_trims[max(size - 1, 0)]
+    return may_stay(scene, lib, last, pose, task.clock + time, task.stay_until)
 
 
 @inlined_kernel
@@ -82,8 +82,8 @@ class Section(NamedTuple):
     end: float
     first: int  # place of the trim that is driven at its begin
     last: int  # and at its end
-    start: tuple[float, float, float]  # poses [m, m, rad]
-    goal: tuple[float, float, float]
+    start: tuple[float, float, float, float]  # poses [m, m, rad, m]
+    goal: tuple[float, float, float, float]
     entry: tuple[int, int]  # trim and gear before
     leave: tuple[int, int]  # and after
     free_heading: bool
@@ -151,27 +151,27 @@ def cheapest_of(scratch, n):
 
 
 @bare_inner_kernel
-def put_free(lib, task, world, body, work, words, pose, n, most_cost, most_time, clock, scratch, m):
+def put_free(lib, task, scene, work, words, pose, n, most_cost, most_time, clock, scratch, m):
     """Append to the new middle, of `m` trims, the cheapest free one of `n` candidates.
 
     Returns its number and the middle's new length; -1 and -1 if there is none.
     """
-    which = free_candidate(
-        lib, task, world, body, words, pose, n, most_cost, most_time, clock, scratch
-    )
+    limits = (task.tries, most_cost, most_time)
+    ends = (pose, NO_TRIM, NO_TRIM)
+    which = free_candidate(scene, lib, words, ends, n, limits, clock, scratch)
     if which < 0:
         return -1, -1
     return which, put_middle(lib, work, words, scratch, which, m)
 
 
 @bare_inner_kernel
-def direct_middle(lib, task, world, body, work, section):
+def direct_middle(lib, task, scene, work, section):
     """Write into the new middle three trims that join the ends of a section.
 
     Returns its length, -1 if there is none that is free and cheap enough; so does `via_middle`.
     """
-    x, y, heading = section.start
-    e_x, e_y, e_heading = section.goal
+    x, y, _, _ = section.start
+    e_x, e_y, _, _ = section.goal
     if math.hypot(e_x - x, e_y - y) * task.per_metre >= section.budget:
         return -1
     words = lib.library.free_words if section.free_heading else lib.library.words
@@ -179,9 +179,9 @@ def direct_middle(lib, task, world, body, work, section):
         lib.library,
         words,
         words.shape[0],
-        (x, y, heading, 0.0),
+        section.start,
         section.entry,
-        (e_x, e_y, e_heading, 0.0),
+        section.goal,
         section.leave,
         section.budget,
         work.one,
@@ -189,8 +189,7 @@ def direct_middle(lib, task, world, body, work, section):
     _, m = put_free(
         lib,
         task,
-        world,
-        body,
+        scene,
         work,
         words,
         section.start,
@@ -209,19 +208,19 @@ def via_pose(lib, task, work, n, section, size, shift):
     """A pose near the middle of a section, shifted by normal numbers times the spread of `size`."""
     spread = task.spread * (1.0 / 33.0) ** size
     half = 0.5 * (section.begin + section.end)
-    x, y, heading = pose_at(lib, work, owner(work, n, half), half)
+    x, y, heading, z = pose_at(lib, work, owner(work, n, half), half)
     x += spread * shift[0]
     y += spread * shift[1]
     heading += 0.5 * spread / task.radius * shift[2]
-    return x, y, heading
+    return x, y, heading, z
 
 
 @bare_inner_kernel
-def via_middle(lib, task, world, body, work, section, via):
+def via_middle(lib, task, scene, work, section, via):
     """Write into the new middle three trims to the pose `via`, and three from there on."""
-    x, y, heading = section.start
-    v_x, v_y, v_heading = via
-    e_x, e_y, e_heading = section.goal
+    x, y, _, _ = section.start
+    v_x, v_y, _, _ = via
+    e_x, e_y, _, _ = section.goal
     one, two, budget = work.one, work.two, section.budget
     way = math.hypot(v_x - x, v_y - y) + math.hypot(e_x - v_x, e_y - v_y)
     if way * task.per_metre >= budget:
@@ -231,9 +230,9 @@ def via_middle(lib, task, world, body, work, section, via):
         lib.library,
         lib.library.words,
         lib.library.words.shape[0],
-        (x, y, heading, 0.0),
+        section.start,
         section.entry,
-        (v_x, v_y, v_heading, 0.0),
+        via,
         nowhere,
         budget,
         one,
@@ -246,9 +245,9 @@ def via_middle(lib, task, world, body, work, section, via):
         lib.library,
         words,
         words.shape[0],
-        (v_x, v_y, v_heading, 0.0),
+        via,
         nowhere,
-        (e_x, e_y, e_heading, 0.0),
+        section.goal,
         section.leave,
         budget - cheapest,
         two,
@@ -259,8 +258,7 @@ def via_middle(lib, task, world, body, work, section, via):
     which, m = put_free(
         lib,
         task,
-        world,
-        body,
+        scene,
         work,
         lib.library.words,
         section.start,
@@ -277,8 +275,7 @@ def via_middle(lib, task, world, body, work, section, via):
     _, m = put_free(
         lib,
         task,
-        world,
-        body,
+        scene,
         work,
         words,
         via,
@@ -293,7 +290,7 @@ def via_middle(lib, task, world, body, work, section, via):
 
 
 @bare_kernel
-def attempt_all(lib, task, world, body, work, state, uniform, normal):
+def attempt_all(lib, task, scene, work, state, uniform, normal):
     """Try one shortcut or via-point per row of the draws; the length in `state`; returns the cost.
 
     `uniform` (k, 6): kind, middle, span, two chances to snap to a switch, spread of the via-point;
@@ -302,7 +299,7 @@ def attempt_all(lib, task, world, body, work, state, uniform, normal):
     n = state[LENGTH]
     cost = word_cost(lib, work.trims, work.durations, n)
     unroll(lib, work, n)
-    changes = world.movers.speed.shape[0] > 0  # what comes after is driven at other times
+    changes = scene.layers.movers.speed.shape[0] > 0  # what comes after is driven at other times
     for row in range(uniform.shape[0]):
         if n == 0 or not work.times[n] > 0.0:
             return cost
@@ -310,9 +307,9 @@ def attempt_all(lib, task, world, body, work, state, uniform, normal):
         section = drawn_section(lib, task, work, n, cost, draw)
         if draw[0] < task.via:
             via = via_pose(lib, task, work, n, section, draw[5], normal[row])
-            m = via_middle(lib, task, world, body, work, section, via)
+            m = via_middle(lib, task, scene, work, section, via)
         else:
-            m = direct_middle(lib, task, world, body, work, section)
+            m = direct_middle(lib, task, scene, work, section)
         if m < 0:
             continue
         begin, end = section.begin, section.end
@@ -322,7 +319,7 @@ def attempt_all(lib, task, world, body, work, state, uniform, normal):
         new_cost = word_cost(lib, work.new_trims, work.new_durations, size)
         if not new_cost < cost - GAIN * cost:
             continue
-        if changes and not still_free(lib, task, world, body, work, size, begin):
+        if changes and not still_free(lib, task, scene, work, size, begin):
             continue
         take(work, state, size)
         n, cost = size, new_cost

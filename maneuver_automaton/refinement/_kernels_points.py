@@ -16,7 +16,7 @@ from maneuver_automaton.refinement._kernels_word import (
     unroll,
     word_cost,
 )
-from maneuver_automaton.search._kernels_connect import free_candidate
+from maneuver_automaton.search._kernels_motion import free_candidate
 from maneuver_automaton.words._kernels_candidates import NO_TRIM, candidates
 
 
@@ -27,7 +27,7 @@ def put_points(lib, work, n, points):
     for j in range(points):
         time = total * j / (points - 1)
         k = owner(work, n, time)
-        x, y, heading = pose_at(lib, work, k, min(time, work.times[k + 1]))
+        x, y, heading, _ = pose_at(lib, work, k, min(time, work.times[k + 1]))
         work.at[j, 0], work.at[j, 1], work.at[j, 2], work.at[j, 3] = x, y, heading, time
         work.best[j] = math.inf
         work.back[j] = -1
@@ -51,7 +51,7 @@ def price_along(lib, work, n, j):
 
 
 @bare_inner_kernel
-def join(lib, task, world, body, work, words, i, j, gain):
+def join(lib, task, scene, work, words, i, j, gain):
     """Reach point `j` from point `i` by three trims, if that is cheaper by `gain`, and free."""
     x, y, heading = work.at[i, 0], work.at[i, 1], work.at[i, 2]
     e_x, e_y, e_heading = work.at[j, 0], work.at[j, 1], work.at[j, 2]
@@ -71,15 +71,12 @@ def join(lib, task, world, body, work, words, i, j, gain):
         work.one,
     )
     which = free_candidate(
+        scene,
         lib,
-        task,
-        world,
-        body,
         words,
-        (x, y, heading),
+        ((x, y, heading, 0.0), NO_TRIM, NO_TRIM),
         count,
-        budget - gain,
-        task.most_time,
+        (task.tries, budget - gain, task.most_time),
         task.clock + work.at[i, 3],
         work.one,
     )
@@ -118,7 +115,7 @@ def unwound(lib, work, n, points):
 
 
 @bare_kernel
-def dynamic_programming(lib, task, world, body, work, state, points):
+def dynamic_programming(lib, task, scene, work, state, points):
     """Best way over `points` poses of the word, joined by words where that is cheaper.
 
     Returns the cost. The word changes only if it gains; nothing may move.
@@ -134,7 +131,7 @@ def dynamic_programming(lib, task, world, body, work, state, points):
         free_heading = task.free_heading and j == points - 1
         words = lib.library.free_words if free_heading else lib.library.words
         for i in range(j - 1):
-            join(lib, task, world, body, work, words, i, j, GAIN * cost)
+            join(lib, task, scene, work, words, i, j, GAIN * cost)
     size = unwound(lib, work, n, points)
     if not admitted(lib, task, work, size):
         return cost

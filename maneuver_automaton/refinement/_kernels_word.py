@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
-from maneuver_automaton.search._kernels_connect import driven
+from maneuver_automaton.search._kernels_motion import coasted
 
 GAIN = 1e-9  # share of the cost that counts as a gain
 LENGTH = 0  # place of the word's length in `state`
@@ -34,7 +34,7 @@ def unroll(lib, work, n):
         work.poses[k, 0], work.poses[k, 1], work.poses[k, 2] = x, y, heading
         work.times[k] = time
         trim, t = work.trims[k], work.durations[k]
-        x, y, heading = driven(lib, trim, x, y, heading, t)
+        x, y, heading, _ = coasted(lib, trim, (x, y, heading, 0.0), t)
         time += t
     work.poses[n, 0], work.poses[n, 1], work.poses[n, 2] = x, y, heading
     work.times[n] = time
@@ -55,9 +55,10 @@ def owner(work, n, time):
 
 @inlined_kernel
 def pose_at(lib, work, k, time):
-    """Pose at a time within trim `k`."""
+    """Pose (x, y, heading, z) at a time within trim `k`."""
     t = time - work.times[k]
-    return driven(lib, work.trims[k], work.poses[k, 0], work.poses[k, 1], work.poses[k, 2], t)
+    begin = (work.poses[k, 0], work.poses[k, 1], work.poses[k, 2], 0.0)
+    return coasted(lib, work.trims[k], begin, t)
 
 
 @inlined_kernel

@@ -23,8 +23,9 @@ from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.distance_grid import DistanceGrid
 from maneuver_automaton.search.lattice import distance_grids
 from maneuver_automaton.search.lattice_memory import SearchArrays, search_arrays
-from maneuver_automaton.search.lattice_pass import Rung, both_ends, with_cost
+from maneuver_automaton.search.lattice_pass import both_ends, with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
+from maneuver_automaton.search.lattice_task import TRIES, Resolution
 from maneuver_automaton.words.library import Scratch, scratch_of
 from maneuver_automaton.words.word import Word
 
@@ -70,10 +71,7 @@ class Work(NamedTuple):
 class ImproveTask(NamedTuple):
     """Limits and sizes, as the kernels see them."""
 
-    keep: float
-    margin: float
     tries: int
-    window: Array
     clock: float
     most_time: float
     stay_until: float
@@ -214,25 +212,25 @@ class _Improvement:
         memory: list[SearchArrays],
     ) -> Word | None:
         """A connection found by a new search with other settings; None if there is none."""
-        scale, quanta = 1.0, 1.0
+        scale, durations = 1.0, 1.0
         weight = WEIGHTS[step // 2] if step < 2 * len(WEIGHTS) else float(rng.uniform(1.0, 2.0))
         if step >= 2:
-            scale, quanta = (float(value) for value in rng.uniform(0.5, 1.4, 2))
+            scale, durations = (float(value) for value in rng.uniform(0.5, 1.4, 2))
         cap = min(int(FIRST_CAP * CAP_GROWTH ** (step // 2)), MOST_CAP)
         if self.max_expansions is not None:
             cap = min(cap, self.max_expansions - self.expansions)
         tight = bool(step % 5 == 4)
-        rung = Rung(
+        resolution = Resolution(
             scale=scale,
-            quanta=quanta,
+            durations=durations,
             weight=weight,
-            contact=tight,
+            truncated=tight,
             stop=step % 3 == 1,
             layered=step % 4 >= 2,
         )
         sign = -1.0 if step % 2 and not self.query.problem.moves else 1.0
         (one,) = both_ends(
-            self.query, rung, grids=grids, table=self.table, arrays=memory[0], ends=(sign,)
+            self.query, resolution, grids=grids, table=self.table, arrays=memory[0], ends=(sign,)
         )
         word = one.run(cap, PRUNE * self.best.cost, deadline=self.deadline)
         memory[0] = one.arrays
@@ -249,8 +247,7 @@ class _Improvement:
             dynamic_programming(
                 query.library.arrays,
                 improve_task(query, word),
-                query.world.arrays,
-                query.world.body,
+                query.scene(),
                 work,
                 state,
                 POINTS,
@@ -261,7 +258,7 @@ class _Improvement:
         """The word after random shortcuts and via-points."""
         query = self.query
         work, state = work_of(query, word)
-        task = improve_task(query, word)
+        task, scene = improve_task(query, word), query.scene()
         done = 0
         while done < attempts:
             n = min(TIMELY, attempts - done)
@@ -270,8 +267,7 @@ class _Improvement:
                 attempt_all(
                     query.library.arrays,
                     task,
-                    query.world.arrays,
-                    query.world.body,
+                    scene,
                     work,
                     state,
                     uniform,
@@ -326,10 +322,7 @@ def improve_task(query: LatticeQuery, word: Word) -> ImproveTask:
     twists = library.arrays.library.twists
     speed = np.hypot(twists[:, 0], twists[:, 1]).max()
     return ImproveTask(
-        keep=float(query.keep),
-        margin=float(query.margin),
-        tries=6,
-        window=query.window,
+        tries=TRIES,
         clock=float(query.problem.start_time),
         most_time=float(query.most_time),
         stay_until=query.stay_until,

@@ -1,8 +1,25 @@
-"""A* over lattice cells that each hold one exact pose.
+"""A* over lattice cells that each hold one exact pose, for every vehicle.
 
-A node is a row of two arrays. `nodes`: x, y, heading, cost so far, time so far, duration of the
-edge that leads here, time in its trim, clearance. `links`: parent, trim, gear, number of trims,
-root, whether expanded.
+The state is a pose and a class of trims, those that the vehicle changes between at will. An edge is
+a transition and a coast: within the class a coast of one of its trims, to another class a maneuver,
+after which coasts begin. A kinematic vehicle has one class and no maneuvers; a vehicle whose every
+trim is a class of its own has one trim to coast in. Nothing else tells them apart here.
+
+A node is a row of two arrays, filled in by `add_node`. Columns of `nodes` (n, 9):
+
+    X, Y, HEADING, Z   the pose, exact: composed edge by edge, never rounded to the cell
+    COST, TIME         from the root to here
+    COAST              [s] of the coast that leads here, 0 after a maneuver
+    RUN                [s] that its trim lasts already, over several coasts
+    CLEARANCE          [m] proven here: a motion shorter than that needs no test
+
+and of `links` (n, 7): PARENT (-1 for a root), TRIM (NO_TRIM where any will do), GEAR (sign of the
+last forward speed), COUNT (of trims), ROOT, EDGE (the maneuver that leads here, COASTED for none),
+and CLOSED (1 once it was expanded, or replaced by a cheaper node of its cell).
+
+The hash table holds the cheapest node of each cell. Its rows carry the number of the search they
+belong to, so that a new search need not clear it. The heap may hold a node that was replaced; it is
+closed then, and passed over when it is popped.
 """
 
 from __future__ import annotations
@@ -10,33 +27,65 @@ from __future__ import annotations
 import math
 
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
-from maneuver_automaton.collision._kernels_advancement import free_time
-from maneuver_automaton.groups._kernels import coast, compose
-from maneuver_automaton.search._kernels_connect import (
+from maneuver_automaton.search._kernels_distance import distance_at, pop, push
+from maneuver_automaton.search._kernels_motion import (
+    coast_inside,
+    coast_proven,
+    coasted,
+    edge_end,
+    edge_inside,
+    edge_proven,
     free_candidate,
-    inside_window,
+    is_still,
     may_stay,
 )
-from maneuver_automaton.search._kernels_distance import distance_at, pop, push
-from maneuver_automaton.words._kernels_candidates import NO_TRIM, candidates, price_of_switch
+from maneuver_automaton.words._kernels_candidates import (
+    NO_TRIM,
+    candidates,
+    class_of,
+    price_of_switch,
+)
 
 FULL_TURN = 2.0 * math.pi
-N_NODES, HEAP, GENERATION, EXPANSIONS, PATIENCE, FOUND, NODE, GOAL, ROW, FREE, QUERIES = range(11)
+COASTED, ROOTED = -1, -2  # in place of the maneuver that leads to a node
+X, Y, HEADING, Z, COST, TIME, COAST, RUN, CLEARANCE = range(9)
+PARENT, TRIM, GEAR, COUNT, ROOT, EDGE, CLOSED = range(7)
+(
+    N_NODES,
+    HEAP,
+    GENERATION,
+    EXPANSIONS,
+    PATIENCE,  # expansions until the next analytic expansion
+    FOUND,
+    NODE,  # from which the best connection leads, ...
+    GOAL,  # to which aim, ...
+    ROW,  # by which of the words, ...
+    CLIMB,  # the trim at its end that climbs, ...
+    FREE,  # and whether its words are those of a free heading
+    QUERIES,
+) = range(12)
 
 
 @inlined_kernel
-def cell_key(task, x, y, heading, layer, time, fine):
-    """Number of the lattice cell a pose is in, seen from the task's own frame."""
+def cell_key(task, x, y, heading, z, layer, time, fine):
+    """Number of the lattice cell a pose is in, seen from the task's own frame.
+
+    `task.radix` is the number of cells along a side of the window, a power of two, of headings,
+    levels of altitude and ticks of the clock; the last two are 1 where they make no difference.
+    """
     d_x, d_y = x - task.frame_x, y - task.frame_y
     c, s = task.frame_cos, task.frame_sin
     cell = task.fine_cell if fine else task.cell
     n_headings = task.fine_headings if fine else task.headings
-    i = math.floor((c * d_x + s * d_y) / cell + 0.5) & 0x7FFF
-    j = math.floor((c * d_y - s * d_x) / cell + 0.5) & 0x7FFF
+    sides, turns, levels, ticks = task.radix
+    i = math.floor((c * d_x + s * d_y) / cell + 0.5) & (sides - 1)
+    j = math.floor((c * d_y - s * d_x) / cell + 0.5) & (sides - 1)
     turn = (heading - task.frame_heading) / FULL_TURN
     k = math.floor((turn - math.floor(turn)) * n_headings + 0.5) % n_headings
-    tick = math.floor(time / task.tick) & 0x7FF if task.tick > 0.0 else 0
-    return ((((layer * 2 + fine) * 2048 + tick) * 512 + k) * 32768 + j) * 32768 + i
+    level = math.floor(z / task.rise + 0.5) & (levels - 1)
+    tick = math.floor(time / task.tick) & (ticks - 1) if task.tick > 0.0 else 0
+    above = ((layer * 2 + fine) * ticks + tick) * levels + level
+    return ((above * turns + k) * sides + j) * sides + i
 
 
 @inlined_kernel
@@ -98,27 +147,36 @@ def table_to_go(table, task, x, y, heading):
 
 
 @inlined_kernel
-def cost_to_go(task, grid, table, world, x, y, heading):
-    """Estimate of the cost from here to the other end; inf if the plane alone forbids it."""
+def cost_to_go(task, grid, table, field, pose, trim):
+    """Estimate of the cost from here to the other end; inf if the plane alone forbids it.
+
+    The path in the plane or the climb at the least price, or the table made without obstacles; and
+    the maneuvers to the class at the other end, as far as the path does not pay for them.
+    """
+    x, y, heading, z = pose
+    way, rise = math.inf, math.inf
+    for g in range(task.aims.shape[0]):
+        rise = min(rise, abs(task.aims[g, 3] - z))
     if grid.columns > 0:
-        way = distance_at(grid, world.field, x, y)
+        way = distance_at(grid, field, x, y)
     else:
-        way = math.inf
         for g in range(task.aims.shape[0]):
             e_x, e_y = task.aims[g, 0] - x, task.aims[g, 1] - y
             way = min(way, math.sqrt(e_x * e_x + e_y * e_y))
     estimate = way * task.per_metre
     if estimate < math.inf:
         estimate = max(estimate, table_to_go(table, task, x, y, heading))
-    return estimate
+    if rise > 0.0:
+        estimate = max(estimate, rise * task.per_climb)
+    return estimate + task.lag[trim]  # of no trim, -1, the last
 
 
 @inlined_kernel
 def layer_of(task, lib, trim, gear, n_trims):
-    """What beside the pose makes two nodes different."""
-    layer = 0
+    """What beside the pose makes two nodes different: the class, and what prices and limits ask."""
+    layer = class_of(lib.library, trim)
     if task.by_gear:
-        layer = gear + 1
+        layer = layer * 3 + gear + 1
     if task.by_trim:
         layer = layer * (lib.library.n_trims + 1) + trim + 1
     if task.by_count:
@@ -127,95 +185,114 @@ def layer_of(task, lib, trim, gear, n_trims):
 
 
 @bare_inner_kernel
-def connect_ends(search, task, lib, world, body, node, ceiling, estimate):
-    """Try to reach the other end from a node by three trims; keeps the cheapest plan found."""
+def connect_ends(search, task, lib, scene, node, upper_bound, estimate):
+    """Analytic expansion: reach the other end by a word; keeps the cheapest plan found.
+
+    Only words that cost not much more than the estimate are tried. From a root all words of the
+    library are, from other nodes those of its few trims.
+    """
     nodes, links, state, found = search.nodes, search.links, search.state, search.found
     scratch = search.scratch
-    x, y, heading = nodes[node, 0], nodes[node, 1], nodes[node, 2]
-    done, spent = nodes[node, 3], nodes[node, 4]
-    here = (links[node, 1], links[node, 2])
-    nowhere = (NO_TRIM, 0)
+    pose = (nodes[node, X], nodes[node, Y], nodes[node, HEADING], nodes[node, Z])
+    done, spent = nodes[node, COST], nodes[node, TIME]
+    here = (links[node, TRIM], links[node, GEAR])
     for g in range(task.aims.shape[0]):
         free_heading = task.sign > 0.0 and task.aim_free[g]
         words = lib.library.free_words if free_heading else lib.library.words
-        aim = (task.aims[g, 0], task.aims[g, 1], task.aims[g, 2], 0.0)
-        most = min(ceiling, found[0]) - done
+        n_words = words.shape[0]
+        if not free_heading and links[node, PARENT] >= 0:
+            n_words = lib.library.n_few
+        aim = (task.aims[g, 0], task.aims[g, 1], task.aims[g, 2], task.aims[g, 3])
+        most = min(upper_bound, found[0]) - done
         if estimate < math.inf:
             most = min(most, task.patience * estimate + task.slack)
-        begin, end, first, last, clock = (
-            (x, y, heading, 0.0),
-            aim,
-            here,
-            nowhere,
-            task.clock + spent,
-        )
+        begin, first, end, last = pose, here, aim, (task.aim_trims[g], 0)
+        clock = task.clock + spent
         if task.sign < 0.0:  # the node is nearer to the goal: the word leads from the start to it
-            begin, end, first, last, clock = aim, begin, nowhere, here, task.clock
-        n = candidates(lib.library, words, words.shape[0], begin, first, end, last, most, scratch)
-        if task.most_trims > 0 or lib.library.min_coast > 0.0:
+            begin, first, end, last = aim, (task.aim_trims[g], 0), pose, here
+            clock = task.clock
+        n = candidates(lib.library, words, n_words, begin, first, end, last, most, scratch)
+        if task.checks_words:
             for k in range(n):
                 if not word_admitted(search, task, lib, words, node, k):
                     scratch.costs[k] = math.inf
-        left = task.most_time - spent
-        pose = (begin[0], begin[1], begin[2])
-        which = free_candidate(lib, task, world, body, words, pose, n, most, left, clock, scratch)
+        ends = (begin, int(first[0]), int(last[0]))
+        limits = (task.tries, most, task.most_time - spent)
+        which = free_candidate(scene, lib, words, ends, n, limits, clock, scratch)
         state[QUERIES] += 1
         if which >= 0 and task.sign > 0.0:
+            trim = max(ends[2], 0)
             arrival = clock + scratch.durations[which]
-            if not may_stay(task, world, body, aim[0], aim[1], aim[2], arrival):
+            if not may_stay(scene, lib, trim, aim, arrival, task.stay_until):
                 which = -1
         if which >= 0:
             found[0] = done + scratch.costs[which]
-            for n_th in range(3):
+            for n_th in range(4):
                 found[1 + n_th] = scratch.times[which, n_th]
-            found[4] = spent + scratch.durations[which]
             state[FOUND], state[NODE], state[GOAL] = 1, node, g
-            state[ROW], state[FREE] = scratch.rows[which], 1 if free_heading else 0
+            state[ROW], state[CLIMB] = scratch.rows[which], scratch.climbs[which]
+            state[FREE] = 1 if free_heading else 0
 
 
 @bare_inner_kernel
 def word_admitted(search, task, lib, words, node, k):
-    """Whether the word through a node and one candidate keeps the limits of single words."""
+    """Whether the word through a node and one candidate keeps the limits of single words.
+
+    They are the number of trims, the least time of a trim that moves, and the longest of any. The
+    candidate is read away from the node, whose own trim may go on.
+    """
     scratch, links, nodes = search.scratch, search.links, search.nodes
     row = scratch.rows[k]
-    count = links[node, 3]
-    trim, run = links[node, 1], nodes[node, 6]
+    count = links[node, COUNT]
+    trim, run = links[node, TRIM], nodes[node, RUN]
     forward = task.sign > 0.0
-    for step in range(3):
-        n_th = step if forward else 2 - step  # away from the node
-        this, t = words[row, n_th], scratch.times[k, n_th]
-        if t == 0.0 or this >= lib.library.n_trims:
+    for step in range(4):
+        n_th = step if forward else 3 - step
+        this, t = scratch.climbs[k], scratch.times[k, 3]
+        if n_th < 3:
+            this, t = words[row, n_th], scratch.times[k, n_th]
+        if t == 0.0 or this < 0 or this >= lib.library.n_trims:
             continue
         if this == trim:
             run += t
-            continue
-        if trim != NO_TRIM and run < lib.library.min_coast:
+        else:
+            if too_short(task, lib, trim, run):
+                return False
+            count += 1
+            trim, run = this, t
+        if run > lib.library.longest[trim]:
             return False
-        count += 1
-        trim, run = this, t
-    if trim != NO_TRIM and run < lib.library.min_coast:
+    if too_short(task, lib, trim, run):
         return False
     return task.most_trims == 0 or count <= task.most_trims
 
 
+@inlined_kernel
+def too_short(task, lib, trim, run):
+    """Whether a trim that moves has begun, and does not yet last as long as it must."""
+    return trim != NO_TRIM and 0.0 < run < task.least_coast and not is_still(lib, trim)
+
+
 @bare_inner_kernel
-def add_node(search, task, lib, key_slot, key, row, link, estimate):
-    """Append a node and queue it."""
+def add_node(search, task, slot, key, row, link, estimate):
+    """Append a node, make it the one of its cell, and queue it."""
     nodes, links, state = search.nodes, search.links, search.state
     node = state[N_NODES]
-    for k in range(8):
+    for k in range(9):
         nodes[node, k] = row[k]
-    links[node, 0], links[node, 1], links[node, 2] = link[0], link[1], link[2]
-    links[node, 3], links[node, 4], links[node, 5] = link[3], link[4], 0
+    parent, trim, gear, count, root, edge = link
+    links[node, PARENT], links[node, TRIM], links[node, GEAR] = parent, trim, gear
+    links[node, COUNT], links[node, ROOT], links[node, EDGE] = count, root, edge
+    links[node, CLOSED] = 0
     state[N_NODES] = node + 1
-    search.table[key_slot, 0] = key
-    search.table[key_slot, 1] = (state[GENERATION] << 31) | node
-    push(search.heap_key, search.heap_node, state[HEAP], row[3] + task.weight * estimate, node)
+    search.table[slot, 0] = key
+    search.table[slot, 1] = (state[GENERATION] << 31) | node
+    push(search.heap_key, search.heap_node, state[HEAP], row[COST] + task.weight * estimate, node)
     state[HEAP] += 1
 
 
 @bare_kernel
-def begin(search, task, lib, world, grid, table):
+def begin(search, task, lib, scene, grid, table):
     """Queue the roots of a search; what was searched before is forgotten."""
     state, found = search.state, search.found
     generation = state[GENERATION] + 1
@@ -224,138 +301,197 @@ def begin(search, task, lib, world, grid, table):
     state[GENERATION] = generation
     found[0] = math.inf
     for r in range(task.roots.shape[0]):
-        x, y, heading = task.roots[r, 0], task.roots[r, 1], task.roots[r, 2]
-        estimate = cost_to_go(task, grid, table, world, x, y, heading)
-        key = cell_key(task, x, y, heading, layer_of(task, lib, NO_TRIM, 0, 0), 0.0, 0)
+        pose = (task.roots[r, 0], task.roots[r, 1], task.roots[r, 2], task.roots[r, 3])
+        x, y, heading, z = pose
+        trim = task.root_trims[r]
+        estimate = cost_to_go(task, grid, table, scene.layers.plane, pose, trim)
+        key = cell_key(task, x, y, heading, z, layer_of(task, lib, trim, 0, 0), 0.0, 0)
         slot = slot_of(search.table, generation, key)
         if estimate == math.inf or node_in(search.table, generation, slot) >= 0:
             continue
-        row = (x, y, heading, 0.0, 0.0, 0.0, 0.0, 0.0)
-        add_node(search, task, lib, slot, key, row, (-1, NO_TRIM, 0, 0, r), estimate)
+        row = (x, y, heading, z, 0.0, 0.0, 0.0, 0.0, 0.0)
+        add_node(search, task, slot, key, row, (-1, trim, 0, 0, r, ROOTED), estimate)
+
+
+@bare_inner_kernel
+def open_node(search, task, upper_bound):
+    """The most promising node that is open, taken from the heap; -1 if there is none."""
+    links, state = search.links, search.state
+    while state[HEAP] > 0:
+        if task.ends_early and search.heap_key[0] >= min(upper_bound, search.found[0]):
+            return -1
+        node = pop(search.heap_key, search.heap_node, state[HEAP])
+        state[HEAP] -= 1
+        if links[node, CLOSED] == 0:
+            return node
+    return -1
+
+
+@inlined_kernel
+def relax_coasts(search, task, lib, scene, grid, table, node, upper_bound):
+    """Children of a node by coasts of the trims of its class, shorter ones first.
+
+    Tests come in the order of their price: limits and bound, duplicates in the cell, the estimate,
+    the clearance known from before, and only then the proof that the motion is free. A truncated
+    edge keeps what was driven before a contact: it ends in a finer cell of its own, so duplicates
+    and estimate are asked for again, and rule out nothing before.
+    """
+    nodes, links, state = search.nodes, search.links, search.state
+    generation = state[GENERATION]
+    pose = (nodes[node, X], nodes[node, Y], nodes[node, HEADING], nodes[node, Z])
+    x, y, heading, z = pose
+    done, spent, run = nodes[node, COST], nodes[node, TIME], nodes[node, RUN]
+    # Of 32 bits in the array: the numbers of cells need more.
+    before, gear = int(links[node, TRIM]), int(links[node, GEAR])
+    limit = min(upper_bound, search.found[0])
+    # Clearance known from before spares a test, unless obstacles move or zones are in the way.
+    known = scene.layers.movers.speed.shape[0] == 0 and scene.zone_trims.shape[0] == 0
+    cos, sin = math.cos(heading), math.sin(heading)
+    held = class_of(lib.library, before)
+    for place in range(lib.first_trim[held], lib.first_trim[held + 1]):
+        trim = lib.trims_of[place]
+        if before != trim and too_short(task, lib, before, run):
+            continue
+        count = int(links[node, COUNT]) + (0 if trim == before else 1)
+        if task.most_trims > 0 and count > task.most_trims:
+            continue
+        price = price_of_switch(lib.library, before, gear, trim)
+        new_gear = lib.library.gears[trim] if lib.library.gears[trim] != 0 else gear
+        layer = layer_of(task, lib, trim, new_gear, count)
+        lasted = run if trim == before else 0.0
+        climbs = lib.library.twists[trim, 3] != 0.0 and not scene.layers.flat
+        for q in range(lib.edge_durations.shape[1]):
+            t = lib.edge_durations[trim, q]
+            if not t > 0.0 or lasted + t > lib.library.longest[trim]:
+                continue
+            cost, time = done + price + t * lib.library.rates[trim], spent + t
+            if cost >= limit or time > task.most_time:
+                break
+            d_x, d_y = lib.moves[trim, q, 0], lib.moves[trim, q, 1]
+            n_x, n_y = x + cos * d_x - sin * d_y, y + sin * d_x + cos * d_y
+            n_heading, n_z = heading + lib.moves[trim, q, 2], z + lib.moves[trim, q, 3]
+            fine = 0
+            key = cell_key(task, n_x, n_y, n_heading, n_z, layer, time, 0)
+            slot = slot_of(search.table, generation, key)
+            old = node_in(search.table, generation, slot)
+            if old >= 0 and nodes[old, COST] <= cost and not task.contact:
+                continue
+            child = (n_x, n_y, n_heading, n_z)
+            ahead = cost_to_go(task, grid, table, scene.layers.plane, child, trim)
+            if cost + ahead >= limit and not task.contact:
+                continue
+            gap, free = nodes[node, CLEARANCE] - lib.fastest[trim] * t, t
+            if gap <= scene.margin or climbs or not known:
+                state[QUERIES] += 1
+                clock = task.clock + task.sign * spent
+                free, gap = coast_proven(scene, lib, trim, pose, task.sign * t, clock)
+            if free < t:
+                if not task.contact or not lib.fastest[trim] > 0.0:
+                    break
+                t = free - task.back_off / lib.fastest[trim]
+                if t * lib.fastest[trim] < task.shortest_contact:
+                    break
+                fine, gap = 1, 0.0
+                cost, time = done + price + t * lib.library.rates[trim], spent + t
+                child = coasted(lib, trim, pose, task.sign * t)
+                n_x, n_y, n_heading, n_z = child
+                key = cell_key(task, n_x, n_y, n_heading, n_z, layer, time, 1)
+                slot = slot_of(search.table, generation, key)
+                old = node_in(search.table, generation, slot)
+                ahead = cost_to_go(task, grid, table, scene.layers.plane, child, trim)
+            fits = cost + ahead < limit and (old < 0 or nodes[old, COST] > cost)
+            if fits and coast_inside(scene, lib, trim, pose, task.sign * t):
+                if old >= 0:
+                    links[old, CLOSED] = 1
+                row = (n_x, n_y, n_heading, n_z, cost, time, t, lasted + t, max(gap, 0.0))
+                link = (node, trim, new_gear, count, links[node, ROOT], COASTED)
+                add_node(search, task, slot, key, row, link, ahead)
+            if fine:
+                break
+
+
+@bare_inner_kernel
+def relax_maneuvers(search, task, lib, scene, grid, table, node, upper_bound):
+    """Children of a node by the maneuvers that lead out of its class.
+
+    Coasts begin at the child, so a maneuver is an edge with a coast of no time. The order of the
+    tests is that of `relax_coasts`.
+    """
+    nodes, links, state = search.nodes, search.links, search.state
+    generation = state[GENERATION]
+    pose = (nodes[node, X], nodes[node, Y], nodes[node, HEADING], nodes[node, Z])
+    done, spent = nodes[node, COST], nodes[node, TIME]
+    before, gear, count = int(links[node, TRIM]), int(links[node, GEAR]), int(links[node, COUNT])
+    if too_short(task, lib, before, nodes[node, RUN]):
+        return
+    limit = min(upper_bound, search.found[0])
+    known = scene.layers.movers.speed.shape[0] == 0 and scene.zone_trims.shape[0] == 0
+    held = class_of(lib.library, before)
+    for edge in range(lib.first_edge[held], lib.first_edge[held + 1]):
+        target = lib.edge_target[edge]
+        cost, time = done + lib.edge_cost[edge], spent + lib.edge_time[edge]
+        if cost >= limit or time > task.most_time:
+            continue
+        child = edge_end(lib, edge, pose)
+        n_x, n_y, n_heading, n_z = child
+        layer = layer_of(task, lib, target, gear, count + 1)
+        key = cell_key(task, n_x, n_y, n_heading, n_z, layer, time, 0)
+        slot = slot_of(search.table, generation, key)
+        old = node_in(search.table, generation, slot)
+        if old >= 0 and nodes[old, COST] <= cost:
+            continue
+        ahead = cost_to_go(task, grid, table, scene.layers.plane, child, target)
+        if not cost + ahead < limit or not edge_inside(scene, lib, edge, pose):
+            continue
+        gap = nodes[node, CLEARANCE] - lib.edge_reach[edge]
+        climbs = lib.edge_high[edge] > lib.edge_low[edge] and not scene.layers.flat
+        if gap <= scene.margin or climbs or not known:
+            state[QUERIES] += 1
+            gap = edge_proven(scene, lib, edge, pose, task.clock + spent)
+            if not gap >= 0.0:
+                continue
+        if old >= 0:
+            links[old, CLOSED] = 1
+        row = (n_x, n_y, n_heading, n_z, cost, time, 0.0, 0.0, gap)
+        link = (node, target, gear, count + 1, links[node, ROOT], edge)
+        add_node(search, task, slot, key, row, link, ahead)
 
 
 @bare_kernel
-def expand(search, task, lib, world, body, grid, table, n, ceiling):
+def expand(search, task, lib, scene, grid, table, n, upper_bound):
     """Expand up to `n` nodes; stops at the first connection if the task says so.
 
-    Children that cannot lead to less than `ceiling` are left out. Returns whether it may go on:
-    1, or 0 when nothing is left to expand, or no room for more nodes.
+    Children that cannot lead to less than `upper_bound` are left out. Returns whether it may go on:
+    1, or 0 when nothing is left to expand.
     """
     nodes, links, state = search.nodes, search.links, search.state
-    room = nodes.shape[0] - lib.library.n_trims * lib.quanta.shape[1] - 1
-    generation = state[GENERATION]
+    room = nodes.shape[0] - lib.most_children - 1
     for _ in range(n):
-        node = -1
-        while state[HEAP] > 0:
-            node = pop(search.heap_key, search.heap_node, state[HEAP])
-            state[HEAP] -= 1
-            if links[node, 5] == 0:
-                break
-            node = -1
+        node = open_node(search, task, upper_bound)
         if node < 0:
             return 0
-        if state[N_NODES] > room:
+        if state[N_NODES] > room:  # the caller widens the arrays, and comes back
             push(search.heap_key, search.heap_node, state[HEAP], -1.0, node)
             state[HEAP] += 1
             return 1
-        links[node, 5] = 1
+        links[node, CLOSED] = 1
         state[EXPANSIONS] += 1
-        x, y, heading = nodes[node, 0], nodes[node, 1], nodes[node, 2]
-        done, spent, run = nodes[node, 3], nodes[node, 4], nodes[node, 6]
-        clearance = nodes[node, 7]
-        here = cost_to_go(task, grid, table, world, x, y, heading)
+        pose = (nodes[node, X], nodes[node, Y], nodes[node, HEADING], nodes[node, Z])
+        plane = scene.layers.plane
+        here = cost_to_go(task, grid, table, plane, pose, links[node, TRIM])
         if here == math.inf:
             continue
+        # Analytic expansions cost as much as many nodes: the nearer the goal, the more often.
         state[PATIENCE] -= 1
         if state[PATIENCE] < 0:
-            state[PATIENCE] = int(here / task.per_shot)
-            connect_ends(search, task, lib, world, body, node, ceiling, here)
+            wait = min(here / task.per_shot, task.most_patience)
+            state[PATIENCE] = int(max(wait, task.least_patience))
+            connect_ends(search, task, lib, scene, node, upper_bound, here)
             if state[FOUND] == 1 and task.stop_at_first:
                 return 1
-        limit = min(ceiling, search.found[0])
-        cos, sin = math.cos(heading), math.sin(heading)
-        before, gear = int(links[node, 1]), int(links[node, 2])  # of 32 bits: keys need more
-        for trim in range(lib.library.n_trims):
-            if before != NO_TRIM and before != trim and run < lib.library.min_coast:
-                continue
-            count = int(links[node, 3]) + (0 if trim == before else 1)
-            if task.most_trims > 0 and count > task.most_trims:
-                continue
-            v_x, v_y, turn = (
-                lib.library.twists[trim, 0],
-                lib.library.twists[trim, 1],
-                lib.library.twists[trim, 2],
-            )
-            price = price_of_switch(lib.library, before, gear, trim)
-            new_gear = lib.library.gears[trim] if lib.library.gears[trim] != 0 else gear
-            layer = layer_of(task, lib, trim, new_gear, count)
-            for q in range(lib.quanta.shape[1]):
-                t = lib.quanta[trim, q]
-                if not t > 0.0:
-                    continue
-                cost = done + price + t * lib.library.rates[trim]
-                time = spent + t
-                if cost >= limit or time > task.most_time:
-                    break
-                d_x, d_y = lib.moves[trim, q, 0], lib.moves[trim, q, 1]
-                n_x, n_y = x + cos * d_x - sin * d_y, y + sin * d_x + cos * d_y
-                n_heading = heading + lib.moves[trim, q, 2]
-                fine = 0
-                key = cell_key(task, n_x, n_y, n_heading, layer, time, 0)
-                slot = slot_of(search.table, generation, key)
-                old = node_in(search.table, generation, slot)
-                if old >= 0 and nodes[old, 3] <= cost and not task.contact:
-                    continue
-                ahead = cost_to_go(task, grid, table, world, n_x, n_y, n_heading)
-                if (cost + ahead >= limit) and not task.contact:
-                    continue
-                gap = clearance - lib.speeds[trim] * t
-                if gap <= task.margin or world.movers.speed.shape[0] > 0:
-                    state[QUERIES] += 1
-                    proven, gap = free_time(
-                        world,
-                        body,
-                        x,
-                        y,
-                        heading,
-                        v_x,
-                        v_y,
-                        turn,
-                        lib.speeds[trim],
-                        task.sign * t,
-                        task.keep,
-                        task.margin,
-                        task.clock + task.sign * spent,
-                    )
-                else:
-                    proven = t
-                if proven < t:
-                    if not task.contact or not lib.speeds[trim] > 0.0:
-                        break
-                    t = proven - task.back_off / lib.speeds[trim]
-                    if t * lib.speeds[trim] < task.shortest_contact:
-                        break
-                    fine = 1
-                    cost, time = done + price + t * lib.library.rates[trim], spent + t
-                    d_x, d_y, angle = coast(v_x, v_y, turn, task.sign * t)
-                    n_x, n_y, n_heading = compose(x, y, heading, d_x, d_y, angle)
-                    key = cell_key(task, n_x, n_y, n_heading, layer, time, 1)
-                    slot = slot_of(search.table, generation, key)
-                    old = node_in(search.table, generation, slot)
-                    ahead = cost_to_go(task, grid, table, world, n_x, n_y, n_heading)
-                    gap = 0.0
-                fits = cost + ahead < limit and (old < 0 or nodes[old, 3] > cost)
-                if fits and inside_window(
-                    task.window, x, y, heading, v_x, v_y, turn, task.sign * t
-                ):
-                    if old >= 0:
-                        links[old, 5] = 1
-                    so_far = t + (run if trim == before else 0.0)
-                    row = (n_x, n_y, n_heading, cost, time, t, so_far, max(gap, 0.0))
-                    link = (node, trim, new_gear, count, links[node, 4])
-                    add_node(search, task, lib, slot, key, row, link, ahead)
-                if fine:
-                    break
+        relax_coasts(search, task, lib, scene, grid, table, node, upper_bound)
+        if lib.edge_cost.shape[0] > 0:
+            relax_maneuvers(search, task, lib, scene, grid, table, node, upper_bound)
     return 1
 
 

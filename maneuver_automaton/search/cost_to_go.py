@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from maneuver_automaton._compile import user_cache_folder
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_table
-from maneuver_automaton.search.lattice_library import LatticeLibrary, lattice_library
+from maneuver_automaton.search.lattice_arrays import LatticeLibrary
+from maneuver_automaton.search.lattice_library import lattice_library
 
 HALF = 48  # cells from the middle to the rim
 HEADINGS = 72
@@ -88,7 +89,7 @@ def _table(library: LatticeLibrary, reach: float, folder: Path | None) -> CostTa
     m = arrays.n_trims
     moving = arrays.twists[:m].any(axis=1)
     twists, rates = arrays.twists[:m][moving, :3].copy(), arrays.rates[:m][moving].copy()
-    longest = library.arrays.quanta[moving].max(axis=1)
+    longest = library.arrays.edge_durations[moving].max(axis=1)
     quanta = np.multiply.outer(longest, SCALES)
     cell = reach / HALF
     smallest = np.where(arrays.twists[:m][moving, :2].any(axis=1), cell, 0.0)

@@ -1,10 +1,12 @@
-"""A* over lattice cells with exact poses: from both ends in turn, on a ladder of resolutions."""
+"""A* over lattice cells with exact poses: from both ends in turn, at several resolutions."""
 
 from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,41 +15,122 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.search import _kernels_lattice as kernels
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.distance_grid import DistanceGrid, distance_grid
-from maneuver_automaton.search.lattice_pass import WEIGHT, Pass, Rung, both_ends
+from maneuver_automaton.search.lattice_pass import Pass, both_ends
 from maneuver_automaton.search.lattice_query import LatticeQuery
+from maneuver_automaton.search.lattice_task import WEIGHT, Resolution
 from maneuver_automaton.words.word import Word
 
-MOST_CHUNK = 8192  # expansions of one pass before it is the next one's turn
-LADDER: tuple[tuple[int, tuple[Rung, ...]], ...] = (
-    # after so many expansions of all passes together, or when all are exhausted
+
+class Schedule(NamedTuple):
+    """Which resolutions begin after so many expansions of all together, or when none is left.
+
+    They run in turn, each twice as many expansions as in its turn before.
+    """
+
+    stages: tuple[tuple[int, tuple[Resolution, ...]], ...]
+    first_chunk: int
+    most_chunk: int
+
+
+SCHEDULE = Schedule(
     (
-        300,
+        (0, (Resolution(),)),
         (
-            Rung(contact=True, guided=True),
-            Rung(scale=0.5, quanta=0.5, contact=True, guided=True),
+            300,
+            (
+                Resolution(truncated=True, guided=True),
+                Resolution(scale=0.5, durations=0.5, truncated=True, guided=True),
+            ),
+        ),
+        (1500, (Resolution(scale=0.24, durations=0.25, truncated=True, guided=True),)),
+        (
+            8000,
+            (
+                Resolution(scale=0.5, durations=0.5, truncated=True, fine=0.2, guided=True),
+                Resolution(scale=0.5, durations=0.5, truncated=True),
+                Resolution(scale=0.12, durations=0.17),
+            ),
+        ),
+        (
+            2**62,
+            (Resolution(scale=0.24, durations=0.25, truncated=True, margin=0.1, guided=True),),
         ),
     ),
-    (1500, (Rung(scale=0.24, quanta=0.25, contact=True, guided=True),)),
-    (
-        8000,
-        (
-            Rung(scale=0.5, quanta=0.5, contact=True, fine=0.2, guided=True),
-            Rung(scale=0.5, quanta=0.5, contact=True),
-            Rung(scale=0.12, quanta=0.17),
-        ),
-    ),
-    (2**62, (Rung(scale=0.24, quanta=0.25, contact=True, margin=0.1, guided=True),)),
+    first_chunk=64,
+    most_chunk=8192,
 )
+
+
+class FirstWord(NamedTuple):
+    """What a schedule of searches came to."""
+
+    word: Word | None
+    passes: list[Pass]
+    expansions: int
+    exhausted: bool  # every resolution was tried to its end
+    enclosed: str = ""  # why no plan can exist, where that is proven
+    by: Pass | None = None  # which search found it
+
+
+def first_word(
+    schedule: Schedule,
+    passes_of: Callable[[Resolution], list[Pass]],
+    *,
+    room: int,
+    deadline: float,
+    enclosed: Callable[[], str] = lambda: "",
+) -> FirstWord:
+    """The first connection from start to a goal, at the first resolution that has one.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    passes_of : callable
+        The searches at a resolution, ready to run.
+    room : int
+        Expansions of all searches together.
+    deadline : float
+        Of `time.monotonic()` [s].
+    enclosed : callable
+        Why no plan can exist; asked where no search has anything left to expand.
+    """
+    stages = list(schedule.stages)
+    passes: list[Pass] = []
+    total = 0
+
+    def begin() -> None:
+        begun = [one for each in stages.pop(0)[1] for one in passes_of(each)]
+        passes.extend(replace(one, chunk=schedule.first_chunk) for one in begun)
+
+    begin()
+    while True:
+        for one in passes:
+            if not one.alive or total >= room or time.monotonic() >= deadline:
+                continue
+            before = one.expansions
+            word = one.run(min(one.chunk, room - total), math.inf, deadline=deadline)
+            total += one.expansions - before
+            one.chunk = min(2 * one.chunk, schedule.most_chunk)
+            if word is not None:
+                return FirstWord(word, passes, total, exhausted=False, by=one)
+        alive = any(one.alive for one in passes)
+        proof = "" if alive else enclosed()
+        if total >= room or time.monotonic() >= deadline or proof:
+            return FirstWord(None, passes, total, exhausted=not alive, enclosed=proof)
+        if stages and (not alive or total >= stages[0][0]):
+            begin()
+        elif not alive:
+            return FirstWord(None, passes, total, exhausted=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class FirstPlan:
-    """What the ladder came to."""
+    """What the schedule of resolutions came to."""
 
     word: Word | None
     expansions: int
     queries: int  # collision queries
-    exhausted: bool  # every rung was tried to its end
+    exhausted: bool  # every resolution was tried to its end
     enclosed: str  # why no plan can exist, if the plane alone proves it
     nearest: float  # [m] least distance to the goal that was reached
     nodes: Array | None = None  # (n, 4) x, y, heading, cost of what was expanded, if asked for
@@ -60,33 +143,27 @@ def first_plan(
     max_expansions: int | None = None,
     table: CostTable = NO_TABLE,
 ) -> FirstPlan:
-    """The first connection from start to a goal, by the first rung that has one."""
-    settings = query.problem.search
+    """The first connection from start to a goal, at the first resolution that has one."""
     grids = distance_grids(query)
-    room = max_expansions or 2**62
-    base = Rung(weight=settings.weight or WEIGHT)
-    passes = both_ends(query, base, grids=grids)
-    total, ladder = 0, list(LADDER)
-    while True:
-        for one in passes:
-            if not one.alive or total >= room or time.monotonic() >= deadline:
-                continue
-            before = one.expansions
-            word = one.run(min(one.chunk, room - total), math.inf, deadline=deadline)
-            total += one.expansions - before
-            one.chunk = min(2 * one.chunk, MOST_CHUNK)
-            if word is not None:
-                return _outcome(query, passes, total, word, exhausted=False)
-        alive = any(one.alive for one in passes)
-        enclosed = "" if alive else _enclosed(query, grids)
-        if total >= room or time.monotonic() >= deadline or enclosed:
-            return _outcome(query, passes, total, None, exhausted=not alive, enclosed=enclosed)
-        if ladder and (not alive or total >= ladder[0][0]):
-            for rung in ladder.pop(0)[1]:
-                guide = table if rung.guided else NO_TABLE
-                passes += both_ends(query, rung, grids=grids, table=guide)
-        elif not alive:
-            return _outcome(query, passes, total, None, exhausted=True)
+    base = Resolution(weight=query.settings.weight or WEIGHT)
+    schedule = SCHEDULE._replace(stages=((0, (base,)), *SCHEDULE.stages[1:]))
+    found = first_word(
+        schedule,
+        lambda one: both_ends(query, one, grids=grids, table=table if one.guided else NO_TABLE),
+        room=max_expansions or 2**62,
+        deadline=deadline,
+        enclosed=lambda: _enclosed(query, grids),
+    )
+    missed = found.word is None
+    return FirstPlan(
+        word=found.word,
+        expansions=found.expansions,
+        queries=sum(one.queries for one in found.passes),
+        exhausted=found.exhausted,
+        enclosed=found.enclosed,
+        nearest=min(one.nearest for one in found.passes) if missed else math.inf,
+        nodes=_expanded(query, found.passes) if query.settings.show_nodes else None,
+    )
 
 
 def distance_grids(query: LatticeQuery) -> tuple[DistanceGrid, DistanceGrid]:
@@ -112,40 +189,14 @@ def _enclosed(query: LatticeQuery, grids: tuple[DistanceGrid, DistanceGrid]) -> 
     return ""
 
 
-def _outcome(
-    query: LatticeQuery,
-    passes: list[Pass],
-    expansions: int,
-    word: Word | None,
-    *,
-    exhausted: bool,
-    enclosed: str = "",
-) -> FirstPlan:
-    nearest = math.inf
-    if word is None:
-        for one in passes:
-            poses = one.arrays.nodes[: int(one.arrays.state[kernels.N_NODES]), :2]
-            for aim in one.task.aims:
-                if len(poses):
-                    nearest = min(nearest, float(np.hypot(*(poses - aim[:2]).T).min()))
-    return FirstPlan(
-        word=word,
-        expansions=expansions,
-        queries=sum(one.queries for one in passes),
-        exhausted=exhausted,
-        enclosed=enclosed,
-        nearest=nearest,
-        nodes=_expanded(query, passes) if query.problem.search.show_nodes else None,
-    )
-
-
 def _expanded(query: LatticeQuery, passes: list[Pass]) -> Array:
     """Poses (n, 4) of the nodes that were expanded, in the problem's frame, and their costs."""
     rows = []
     for one in passes:
         n = int(one.arrays.state[kernels.N_NODES])
-        which = one.arrays.links[:n, 5] == 1
-        rows.append(one.arrays.nodes[:n][which][:, :4])
+        closed = one.arrays.links[:n, kernels.CLOSED] == 1
+        shown = [kernels.X, kernels.Y, kernels.HEADING, kernels.COST]
+        rows.append(one.arrays.nodes[:n][closed][:, shown])
     nodes = np.concatenate(rows)
     turned = SE2(np.array([0.0, 0.0, query.world.frame[2]])) @ SE2(nodes[:, :3])
     poses = turned.pose.copy()

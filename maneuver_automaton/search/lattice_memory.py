@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,13 +17,13 @@ SMALLEST = 2048  # nodes
 class SearchArrays(NamedTuple):
     """Nodes, their hash table, the heap, and a few numbers, as in `_kernels_lattice`."""
 
-    nodes: Array  # (n, 8)
-    links: NDArray[np.int32]  # (n, 6)
+    nodes: Array  # (n, 9)
+    links: NDArray[np.int32]  # (n, 7)
     table: IntArray  # (4 n, 2) key, generation and node
     heap_key: Array
     heap_node: IntArray
-    state: IntArray  # (11,)
-    found: Array  # (5,) cost, three durations, time
+    state: IntArray  # (12,)
+    found: Array  # (5,) cost, three durations and that of a climb
     scratch: Scratch
 
 
@@ -31,12 +31,12 @@ def search_arrays(library: LibraryArrays) -> SearchArrays:
     """Room for a small search."""
     n = SMALLEST
     return SearchArrays(
-        nodes=np.empty((n, 8)),
-        links=np.empty((n, 6), dtype=np.int32),
+        nodes=np.empty((n, 9)),
+        links=np.empty((n, 7), dtype=np.int32),
         table=np.zeros((4 * n, 2), dtype=np.int64),
         heap_key=np.empty(n),
         heap_node=np.empty(n, dtype=np.int64),
-        state=np.zeros(11, dtype=np.int64),
+        state=np.zeros(12, dtype=np.int64),
         found=np.zeros(5),
         scratch=scratch_of(library),
     )
@@ -44,11 +44,6 @@ def search_arrays(library: LibraryArrays) -> SearchArrays:
 
 def with_room(search: SearchArrays, nodes: int) -> SearchArrays:
     """The same search in arrays that hold at least so many nodes."""
-    return cast(SearchArrays, widened(search, nodes))
-
-
-def widened(search: Any, nodes: int) -> Any:
-    """Arrays of any search with nodes, links, a hash table and a heap, with room for `nodes`."""
     n = len(search.nodes)
     if nodes <= n:
         return search

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.advancement import clearances
+from maneuver_automaton.collision.layers import LayerArrays, single_layer
 from maneuver_automaton.collision.world import World, own_frame, world_of
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.problem import Bounds, Problem
-from maneuver_automaton.search.lattice_library import LatticeLibrary, lattice_library
+from maneuver_automaton.problem import Bounds, Problem, SearchSettings
+from maneuver_automaton.search.lattice_arrays import LatticeLibrary
+from maneuver_automaton.search.lattice_library import lattice_library
+from maneuver_automaton.search.scene import Scene, planar_scene
+from maneuver_automaton.words.library import NO_TRIM
+from maneuver_automaton.words.word import Word, word_of_steps
 
 MARGIN = 0.005  # proven clearance of every pose looked at, in half widths of the body
 LEAST_MARGIN = 1e-7  # [m]
@@ -26,15 +32,85 @@ class LatticeQuery:
     problem: Problem
     library: LatticeLibrary
     world: World
+    layers: LayerArrays  # the world as the only layer there is
     start: Array  # (3,) in the world's frame
     goals: Array  # (n, 3) those that can be reached at all
     goal_index: tuple[int, ...]  # which of the problem's goals they are
     free_heading: NDArray[np.bool_]  # (n,)
-    window: Array  # (9,) as in `_kernels_connect.inside_window`
+    window: Array  # (9,) as in `_kernels_motion.inside_window`
     box: Array  # (4,) of the window in the world's frame
     bounded: bool  # whether the window's rim is a wall on every side
     margin: float  # [m] proven clearance beyond the problem's own margin
     most_time: float  # [s] inf if free
+
+    @property
+    def settings(self) -> SearchSettings:
+        """Cells, headings and weight of the lattice."""
+        return self.problem.search
+
+    @property
+    def seen_start(self) -> Array:
+        """Start (4,) in the world's frame, at no altitude."""
+        return np.append(self.start, 0.0)
+
+    @property
+    def seen_goals(self) -> Array:
+        """Goals (n, 4) in the world's frame, at no altitude."""
+        return np.hstack([self.goals, np.zeros((len(self.goals), 1))])
+
+    @property
+    def start_trim(self) -> int:
+        """The vehicle begins in any trim."""
+        return NO_TRIM
+
+    @property
+    def goal_trims(self) -> IntArray:
+        """It ends in any trim (n,)."""
+        return np.full(len(self.goals), NO_TRIM)
+
+    @property
+    def half_width(self) -> float:
+        """Half the width of the body [m]."""
+        return self.world.body.half_width
+
+    @property
+    def start_time(self) -> float:
+        """Time of the world at the start [s]."""
+        return self.problem.start_time
+
+    @property
+    def searched_time(self) -> float:
+        """Longest duration that is looked at [s]."""
+        return self.most_time
+
+    @property
+    def least_coast(self) -> float:
+        """Least time of a trim that moves [s]."""
+        return self.problem.horizon.min_coast
+
+    @property
+    def moves(self) -> bool:
+        """Whether an obstacle moves."""
+        return self.problem.moves
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Expansions between two connections: as many as the estimate says."""
+        return 0.0, math.inf
+
+    def scene(self, margin: float | None = None) -> Scene:
+        """What motions are tested against, with a proven clearance [m], by default the usual."""
+        return planar_scene(
+            self.layers,
+            self.window,
+            keep=self.keep,
+            margin=self.margin if margin is None else margin,
+            n_trims=len(self.library.trims),
+        )
+
+    def word_of(self, steps: Iterable[tuple[int, int, float]], goal: int) -> Word:
+        """A word of steps in the automaton's numbers, as yet without its cost."""
+        return word_of_steps(steps, goal=goal)
 
     @property
     def padding(self) -> float:
@@ -80,6 +156,7 @@ def lattice_query(problem: Problem, goal_index: tuple[int, ...]) -> LatticeQuery
         problem=problem,
         library=library,
         world=world,
+        layers=single_layer(world),
         start=start,
         goals=goals,
         goal_index=goal_index,
@@ -120,7 +197,7 @@ def window_of(
 ) -> tuple[Array, Array, bool]:
     """Where to search: the bounds, and where there are none, some way around everything.
 
-    A box (4,) in the world's frame, a window as in `_kernels_connect.inside_window`, and whether
+    A box (4,) in the world's frame, a window as in `_kernels_motion.inside_window`, and whether
     the window's rim is a wall on every side. `poses` (n, 3 or more) lie inside.
     """
     pad = 4.0 * radius + 4.0 * world.body.reach

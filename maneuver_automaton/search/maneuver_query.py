@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -29,14 +29,18 @@ from maneuver_automaton.collision.world import World, own_frame, world_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds, SearchSettings
 from maneuver_automaton.search.admission import admitted_stretches, piece_is_admitted
+from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.search.lattice_query import window_of
-from maneuver_automaton.search.maneuver_library import ManeuverLibrary, maneuver_library
+from maneuver_automaton.search.maneuver_library import maneuver_library
 from maneuver_automaton.search.maneuver_motion import Part
+from maneuver_automaton.search.scene import Scene
 from maneuver_automaton.words.library import Library
-from maneuver_automaton.words.word import Word
+from maneuver_automaton.words.word import Word, with_price, word_of_steps
 
 MARGIN = 0.005  # proven clearance of every pose looked at, in half widths of the body
 LEAST_MARGIN = 1e-7  # [m]
+MOST_PATIENCE = 400.0  # expansions between two connections that are tried
+WORDS_AN_EXPANSION = 150.0  # words of a connection that take as long as an expansion
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -135,24 +139,20 @@ class ManeuverQuery:
 
     @cached_property
     def layers(self) -> LayerArrays:
-        """The obstacles between neighbouring heights, as the kernels see them."""
+        """The obstacles between neighbouring heights, then the zones, as the kernels see them."""
         (below, above), pad = self.body_height, self.keep + self.margin + ROUNDED
-        low = np.array([band.low - above - pad - self.level for band in self.bands])
-        high = np.array([band.high - below + pad - self.level for band in self.bands])
+        low = [band.low - above - pad - self.level for band in self.bands]
+        high = [band.high - below + pad - self.level for band in self.bands]
+        everywhere = [math.inf] * len(self.zones)
         return layer_arrays(
-            [self._world_of(band.obstacles) for band in self.bands],
-            low=np.round(low, DIGITS),
-            high=np.round(high, DIGITS),
+            [
+                *(self._world_of(band.obstacles) for band in self.bands),
+                *(self._world_of((Obstacle(zone.shape),)) for zone in self.zones),
+            ],
+            low=np.append(np.round(low, DIGITS), np.negative(everywhere)),
+            high=np.append(np.round(high, DIGITS), everywhere),
             plane=self.plane,
         )
-
-    @cached_property
-    def zone_layers(self) -> LayerArrays:
-        """The zones, a world each, as the kernels see them; one empty world if there are none."""
-        worlds = [self._world_of((Obstacle(zone.shape),)) for zone in self.zones]
-        worlds = worlds or [self._world_of(())]
-        low, high = np.full(len(worlds), -math.inf), np.full(len(worlds), math.inf)
-        return layer_arrays(worlds, low=low, high=high, plane=worlds[0])
 
     @cached_property
     def zone_trims(self) -> NDArray[np.bool_]:
@@ -170,8 +170,8 @@ class ManeuverQuery:
         admitted = np.zeros((len(self.zones), len(spans)), dtype=np.bool_)
         for z, zone in enumerate(self.zones):
             for edge, k in enumerate(library.edge_maneuver.tolist()):
-                maneuver = self.automaton.maneuvers[k] if k >= 0 else None
-                if maneuver is None or maneuver.course is None:
+                maneuver = self.automaton.maneuvers[k]
+                if maneuver.course is None:
                     continue
                 good = admitted_stretches(zone, maneuver, self.automaton.model)
                 for group in range(edge, n_parts * n_edges, n_edges):  # one of every part
@@ -222,8 +222,56 @@ class ManeuverQuery:
         close = functools.partial(np.allclose, rtol=1e-9, atol=1e-12)
         return bool(close(rates, price) and close(self.transfer.maneuver_costs, price * lasting))
 
+    @property
+    def free_heading(self) -> NDArray[np.bool_]:
+        """No goal has a free heading (n,): several goals stand for one."""
+        return np.zeros(len(self.goals), dtype=np.bool_)
+
+    @property
+    def box(self) -> Array:
+        """Where to search (4,), in the world's frame."""
+        return self.window[0]
+
+    @property
+    def stay_until(self) -> float:
+        """A plan ends at its arrival."""
+        return -math.inf
+
+    @property
+    def most_trims(self) -> int:
+        """Words have any number of trims."""
+        return 0
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Least and most expansions between two connections: one takes as long as some of these."""
+        words = len(self.goal_trims) * self.transfer.arrays.n_few
+        return words / WORDS_AN_EXPANSION, MOST_PATIENCE
+
+    def scene(self, margin: float | None = None) -> Scene:
+        """What motions are tested against, with a proven clearance [m], by default the usual."""
+        window = self.window[1]
+        edge_window = window.copy()
+        edge_window[8] -= self.library.worst_error
+        return Scene(
+            layers=self.layers,
+            keep=float(self.keep),
+            margin=float(self.margin if margin is None else margin),
+            far=float(self.world.arrays.field.outside),
+            window=window,
+            edge_window=edge_window,
+            lowest=self.altitudes[0],
+            highest=self.altitudes[1],
+            zone_trims=self.zone_trims,
+            zone_pieces=self.zone_pieces,
+        )
+
+    def word_of(self, steps: Iterable[tuple[int, int, float]], goal: int) -> Word:
+        """A word of steps, with its cost."""
+        return with_price(self.transfer, word_of_steps(steps, goal=goal))
+
     @cached_property
-    def library(self) -> ManeuverLibrary:
+    def library(self) -> LatticeLibrary:
         """Edges and pieces of motion of the automaton."""
         return maneuver_library(self.transfer, self.parts, timed=self.moves, waits=self.moves)
 
@@ -275,7 +323,7 @@ class ManeuverQuery:
 
     @cached_property
     def window(self) -> tuple[Array, Array, bool]:
-        """Box in the world's frame, window as in `_kernels_connect.inside_window`, if bounded."""
+        """Box in the world's frame, window as in `_kernels_motion.inside_window`, if bounded."""
         ends = np.vstack([self.seen_start[None], self.seen_goals])
         around = tuple(Obstacle(zone.shape) for zone in self.zones)  # so that ways lead round them
         world = self._world_of((*self.obstacles, *around)) if around else self.world

@@ -11,11 +11,13 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.groups import SE2xR
-from maneuver_automaton.search import _kernels_maneuver_motion as motion
 from maneuver_automaton.search import _kernels_maneuver_shortcuts as kernels
+from maneuver_automaton.search import _kernels_motion as motion
+from maneuver_automaton.search.lattice_task import TRIES
 from maneuver_automaton.search.maneuver_query import ManeuverQuery
-from maneuver_automaton.search.maneuver_task import Rung, task_of, transfer_steps
-from maneuver_automaton.words.word import MANEUVER, TRIM, Word, word_of_steps
+from maneuver_automaton.words.library import Library
+from maneuver_automaton.words.transitions import SWITCH
+from maneuver_automaton.words.word import Word
 
 MOST_POINTS = 32
 LEAST = 1e-5  # share of the cost that a shortcut has to save
@@ -38,10 +40,9 @@ class ShortcutPlan(NamedTuple):
 class _Steps(NamedTuple):
     """A word cut at its points: step k leads from point k to point k + 1."""
 
-    kinds: IntArray
-    numbers: IntArray  # trim, or maneuver
-    times: Array  # [s] of trims
-    targets: IntArray  # trim after the step
+    transitions: IntArray  # maneuver, or SWITCH where the step coasts or changes trims at will
+    trims: IntArray  # trim after the step
+    times: Array  # [s] of coasts
     points: Array  # (n + 1, 4) in the world's frame
     costs: Array  # (n + 1,)
     spent: Array  # (n + 1,) [s]
@@ -79,29 +80,14 @@ def word_is_free(query: ManeuverQuery, word: Word) -> bool:
     """Whether a word is proven free all the way, at the times when it is where."""
     steps = _steps(query, word, cut=0.0, most=0)
     library = query.library
-    sources = np.repeat(
-        np.arange(library.transfer.arrays.n_trims), np.diff(library.arrays.first_edge)
-    )
-    keys = zip(
-        sources.tolist(),
-        library.edge_maneuver.tolist(),
-        library.arrays.edge_target.tolist(),
-        strict=True,
-    )
-    edges = {key: e for e, key in enumerate(keys)}
-    at = int(word.trims[0])
-    numbers = steps.numbers.copy()
-    for k, kind in enumerate(steps.kinds):
-        if kind == MANEUVER:
-            numbers[k] = edges[at, int(steps.numbers[k]), int(steps.targets[k])]
-        at = int(steps.targets[k])
+    edge_of = np.full(len(query.automaton.maneuvers) + 1, SWITCH)
+    edge_of[library.edge_maneuver] = np.arange(len(library.edge_maneuver))
     free = motion.word_free(
-        task_of(query, Rung()),
+        query.scene(),
         library.arrays,
-        query.layers,
         np.array(query.seen_start),
-        steps.kinds,
-        numbers,
+        edge_of[steps.transitions],
+        steps.trims,
         steps.times,
         float(query.start_time),
     )
@@ -123,16 +109,16 @@ def _once(
         times=np.zeros((n, 4)),
     )
     least = LEAST * max(word.cost, 1e-12)
-    trims = np.concatenate([[word.trims[0]], steps.targets]).astype(np.int64)
-    task, scratch = task_of(query, Rung()), query.transfer.scratch()
+    trims = np.concatenate([[word.trims[0]], steps.trims]).astype(np.int64)
+    scene, scratch = query.scene(), query.transfer.scratch()
     for j in range(1, n):
         if time.monotonic() >= deadline:
             return None
         kernels.shorten_to(
-            task,
+            scene,
             query.library.arrays,
             n_words,
-            query.layers,
+            (TRIES, float(query.start_time)),
             j,
             steps.points,
             trims,
@@ -144,8 +130,7 @@ def _once(
         )
     if not plan.costs[-1] < word.cost - 0.5 * least:
         return None
-    found: list[tuple[int, int, float]] = []
-    targets: list[int] = []
+    found = [(SWITCH, int(word.trims[0]), 0.0)]
     j = n - 1
     links = []
     while j > 0:
@@ -154,20 +139,14 @@ def _once(
     for j in reversed(links):
         i = int(plan.before[j])
         if plan.rows[j] == kernels.AS_BEFORE:
-            found.append((int(steps.kinds[i]), int(steps.numbers[i]), float(steps.times[i])))
-            if steps.kinds[i] == MANEUVER:
-                targets.append(int(steps.targets[i]))
+            step = (int(steps.transitions[i]), int(steps.trims[i]), float(steps.times[i]))
+            found.append(step)
             continue
-        tail = [int(k) for k in query.transfer.arrays.words[plan.rows[j]]]
-        tail += [int(plan.climbs[j]), int(trims[j])]
-        ahead, beyond = transfer_steps(
-            query.transfer, int(trims[i]), tail, [*plan.times[j].tolist(), 0.0]
-        )
-        found += ahead
-        targets += beyond
-    better = word_of_steps(
-        query.transfer, start_trim=int(word.trims[0]), steps=found, targets=targets, goal=word.goal
-    )
+        row = query.transfer.arrays.words[plan.rows[j]].tolist()
+        through = [*row, int(plan.climbs[j]), int(trims[j])]
+        times = [*plan.times[j].tolist(), 0.0]
+        found += connection_steps(query.transfer, int(trims[i]), through, times)
+    better = query.word_of(found, word.goal)
     late = better.duration > query.searched_time
     if late or (query.moves and not word_is_free(query, better)):
         return None
@@ -186,29 +165,27 @@ def _steps(query: ManeuverQuery, word: Word, *, cut: float, most: int) -> _Steps
     durations = np.asarray(word.durations)
     room = max(0, most - 2 * len(word.trims))
     total = float(durations.sum())
-    rows: list[tuple[int, int, float, int]] = []
+    rows: list[tuple[int, int, float]] = []
     for k, trim in enumerate(word.trims.tolist()):
         if durations[k] > 0.0:
             parts = 1 + int(room * durations[k] / total)
             inner = (np.arange(1, parts) - cut) / parts if parts > 1 else np.zeros(0)
             ends = np.concatenate([[0.0], inner[inner > 0.0], [1.0]]) * durations[k]
-            rows += [(TRIM, trim, t, trim) for t in np.diff(ends).tolist()]
+            rows += [(SWITCH, trim, t) for t in np.diff(ends).tolist()]
         if k < len(word.transitions):
-            rows.append((MANEUVER, int(word.transitions[k]), 0.0, int(word.trims[k + 1])))
+            rows.append((int(word.transitions[k]), int(word.trims[k + 1]), 0.0))
     pose = SE2xR(query.seen_start)
     points, costs, spent = [pose.pose], [0.0], [0.0]
-    for kind, number, t, _ in rows:
-        if kind == TRIM:
-            move, cost = SE2xR.exp(t * transfer.arrays.twists[number]), t
-            cost *= float(transfer.arrays.rates[number])
-        elif number < 0:
-            move, cost = SE2xR.identity(), 0.0
+    for transition, trim, t in rows:
+        if transition == SWITCH:
+            move = SE2xR.exp(t * transfer.arrays.twists[trim])
+            cost = t * float(transfer.arrays.rates[trim])
         else:
-            maneuver = automaton.maneuvers[number]
+            maneuver = automaton.maneuvers[transition]
             shift = np.zeros(4)
             shift[: maneuver.displacement.size] = maneuver.displacement
             move, t = SE2xR(shift), maneuver.duration
-            cost = float(transfer.maneuver_costs[number])
+            cost = float(transfer.maneuver_costs[transition])
         pose = pose @ move
         points.append(pose.pose)
         costs.append(costs[-1] + cost)
@@ -216,11 +193,25 @@ def _steps(query: ManeuverQuery, word: Word, *, cut: float, most: int) -> _Steps
     if rows:
         points[-1] = query.seen_goals[word.goal]
     return _Steps(
-        kinds=np.array([row[0] for row in rows], dtype=np.int64),
-        numbers=np.array([row[1] for row in rows], dtype=np.int64),
+        transitions=np.array([row[0] for row in rows], dtype=np.int64),
+        trims=np.array([row[1] for row in rows], dtype=np.int64),
         times=np.array([row[2] for row in rows], dtype=np.float64),
-        targets=np.array([row[3] for row in rows], dtype=np.int64),
         points=np.array(points),
         costs=np.array(costs),
         spent=np.array(spent),
     )
+
+
+def connection_steps(
+    library: Library, start_trim: int, trims: list[int], times: list[float]
+) -> list[tuple[int, int, float]]:
+    """Steps (transition, trim, time) of a connection through trims, -1 for none."""
+    steps: list[tuple[int, int, float]] = []
+    at = start_trim
+    for trim, t in zip(trims, times, strict=True):
+        if trim < 0:
+            continue
+        steps += [(maneuver, target, 0.0) for maneuver, target in library.chain(at, trim)]
+        steps.append((SWITCH, trim, t))
+        at = trim
+    return steps

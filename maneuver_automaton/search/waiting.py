@@ -12,8 +12,9 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.groups.chain import chained
 from maneuver_automaton.search import _kernels_waiting as kernels
-from maneuver_automaton.search.lattice_pass import Rung, joined, task_of, with_cost
+from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
+from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word
 
 MOST_PIECES = 60  # joints at which it may wait
@@ -56,16 +57,17 @@ def with_waits(query: LatticeQuery, word: Word) -> Word | None:
     )
     joint, at, _ = kernels.earliest_arrival(
         library,
-        task_of(query, Rung(), 1.0),
-        query.world.arrays,
-        query.world.body,
+        query.scene(),
+        (float(query.start_time), float(query.most_time), float(query.stay_until)),
         way,
         rest,
         tick,
     )
     if joint < 0:
         return None
-    return with_cost(joined(_driven(way, joint, at, rest, tick), query, goal=word.goal), query)
+    parts = _driven(way, joint, at, rest, tick)
+    driven = [(SWITCH, int(query.library.trims[trim]), t) for trim, t in parts]
+    return with_cost(query.word_of(driven, word.goal), query)
 
 
 def _pieces(word: Word, query: LatticeQuery) -> tuple[IntArray, Array]:

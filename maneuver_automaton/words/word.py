@@ -15,8 +15,6 @@ from maneuver_automaton.words.closing import closed_at
 from maneuver_automaton.words.library import Library
 from maneuver_automaton.words.transitions import SWITCH
 
-TRIM, MANEUVER = 0, 1  # kinds of steps
-
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Word:
@@ -57,43 +55,34 @@ class Word:
         return bool((self.transitions != SWITCH).any())
 
 
-def word_of_steps(
-    library: Library,
-    *,
-    start_trim: int,
-    steps: Iterable[tuple[int, int, float]],
-    targets: Iterable[int],
-    goal: int,
-) -> Word:
-    """A word from its steps: (TRIM, trim, time) or (MANEUVER, maneuver, 0), each with its target.
+def word_of_steps(steps: Iterable[tuple[int, int, float]], *, goal: int) -> Word:
+    """A word from its steps: the transition that leads to a trim, the trim, and its time [s].
+
+    A trim that goes on is one trim; one that lasts no time stands only beside a maneuver, or at an
+    end. The transition of the first step is none.
 
     Examples
     --------
-    >>> from maneuver_automaton.models import Unicycle
-    >>> from maneuver_automaton.words.library import library_of
-    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
-    >>> steps = [(TRIM, 0, 1.0), (TRIM, 0, 0.5), (MANEUVER, SWITCH, 0.0), (TRIM, 1, 2.0)]
-    >>> word = word_of_steps(library_of(robot), start_trim=0, steps=steps, targets=[1], goal=0)
-    >>> word.trims.tolist(), word.durations.tolist(), word.cost
-    ([0, 1], [1.5, 2.0], 3.5)
+    >>> word = word_of_steps([(SWITCH, 0, 1.0), (SWITCH, 0, 0.5), (SWITCH, 1, 2.0)], goal=0)
+    >>> word.trims.tolist(), word.durations.tolist()
+    ([0, 1], [1.5, 2.0])
     """
-    trims, durations, transitions = [start_trim], [0.0], list[int]()
-    following = iter(targets)
-    for kind, number, time in steps:
-        if kind == TRIM:
+    trims, durations, transitions = list[int](), list[float](), list[int]()
+    for transition, trim, time in steps:
+        if trims and transition == SWITCH and trims[-1] == trim:
             durations[-1] += time
-        else:
-            transitions.append(number)
-            trims.append(next(following))
-            durations.append(0.0)
+            continue
+        if trims:
+            transitions.append(transition)
+        trims.append(trim)
+        durations.append(time)
     _drop_idle_switches(trims, durations, transitions)
-    word = Word(
-        trims=np.array(trims),
-        durations=np.array(durations),
+    return Word(
+        trims=np.array(trims, dtype=np.int64),
+        durations=np.array(durations, dtype=np.float64),
         transitions=np.array(transitions, dtype=np.int64),
         goal=goal,
     )
-    return with_price(library, word)
 
 
 def with_price(library: Library, word: Word) -> Word:

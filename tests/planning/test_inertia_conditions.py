@@ -14,10 +14,12 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
+from maneuver_automaton.search import maneuver_lattice
+from maneuver_automaton.search.lattice_pass import pass_of
+from maneuver_automaton.search.lattice_task import Resolution, task_of
 from maneuver_automaton.search.maneuver_lattice import maneuver_words, plan_of
 from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
 from maneuver_automaton.search.maneuver_reversal import forward_word, reversed_query
-from maneuver_automaton.search.maneuver_task import Rung, task_of
 from tests.inertia import unicycle_automaton
 from tests.search.cases import compiled_only
 
@@ -109,13 +111,18 @@ def test_no_trim_lasts_less_than_it_must_among_obstacles():
     assert_free(result.plan)
 
 
-def test_settings_of_the_lattice_are_read():
+def test_settings_of_the_lattice_are_read(monkeypatch):
     settings = SearchSettings(cell=0.31, headings=36, weight=1.3)
     query = maneuver_problem_query(posed(search=settings), (0,))
-    first = task_of(query, Rung(stop=True))
-    assert (first.cell, first.headings, first.weight) == (0.31, 36, 1.3)
-    finer = task_of(query, Rung(scale=0.5, weight=1.0))
-    assert (finer.cell, finer.weight) == (0.155, 1.0)
+    first = task_of(query, Resolution())
+    assert (first.cell, first.headings) == (0.31, 36)
+    assert task_of(query, Resolution(scale=0.5)).cell == 0.155
+    weights = []
+    monkeypatch.setattr(
+        maneuver_lattice, "pass_of", lambda *a, **k: weights.append(a[1].weight) or pass_of(*a, **k)
+    )
+    next(maneuver_words(query, max_expansions=200))
+    assert weights[0] == 1.3
 
 
 def test_a_search_from_the_goal_finds_plans_from_the_start():

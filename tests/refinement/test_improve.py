@@ -18,8 +18,9 @@ from maneuver_automaton.refinement import improve as improvement
 from maneuver_automaton.refinement.improve import Patience, improve
 from maneuver_automaton.search import lattice_pass
 from maneuver_automaton.search.lattice import first_plan
-from maneuver_automaton.search.lattice_pass import joined, with_cost
+from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import lattice_query
+from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word
 from tests import scenes
 from tests.reference import plain_end
@@ -181,9 +182,7 @@ def test_no_time_at_all():
 
 def test_the_empty_word_stays_empty():
     query = query_of(replace(BASE, goals=(Goal(pose=BASE.start),)))
-    ended = improve(
-        query, joined([], query, goal=0), deadline=math.inf, patience=Patience(), floor=0.0
-    )
+    ended = improve(query, query.word_of([], 0), deadline=math.inf, patience=Patience(), floor=0.0)
     assert (len(ended.word.trims), ended.word.cost) == (0, 0.0)
 
 
@@ -198,7 +197,7 @@ def test_a_detour_round_nothing_is_cut_short():
     quarter = 0.5 * math.pi
     there = [(left, quarter), (ahead, 1.0), (right, 2 * quarter), (ahead, 1.0), (left, quarter),
              (ahead, 2.0)]  # fmt: skip
-    word = joined(there, query, goal=0)
+    word = query.word_of([(SWITCH, int(query.library.trims[k]), t) for k, t in there], 0)
     assert_admitted(query, with_cost(word, query))
     ended = improve(query, word, deadline=math.inf, patience=Patience(attempts=2000, passes=1))
     assert ended.word.trims.tolist() == query.library.trims[[ahead]].tolist()

@@ -18,10 +18,12 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.search import _kernels_lattice as kernels
-from maneuver_automaton.search.lattice import LADDER, distance_grids, first_plan
+from maneuver_automaton.search.lattice import SCHEDULE, distance_grids, first_plan
 from maneuver_automaton.search.lattice_memory import search_arrays, with_room
-from maneuver_automaton.search.lattice_pass import Rung, both_ends, joined, with_cost
+from maneuver_automaton.search.lattice_pass import both_ends, with_cost
 from maneuver_automaton.search.lattice_query import lattice_query
+from maneuver_automaton.search.lattice_task import Resolution
+from maneuver_automaton.words.transitions import SWITCH
 from tests import scenes
 from tests.collision.scenes import random_map
 from tests.reference import plain_end
@@ -31,8 +33,8 @@ from tests.solids import World, outside
 ROOT = Path(__file__).parents[2]
 COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 EXPANSIONS = 1200 if COMPILED else 12
-X, Y, HEADING, COST, TIME, EDGE, RUN, CLEARANCE = range(8)
-PARENT, TRIM, GEAR, COUNT, ROOT_OF, CLOSED = range(6)
+COST, TIME, COAST, RUN, CLEARANCE = range(4, 9)
+PARENT, TRIM, GEAR, COUNT = range(4)
 
 ROBOT, CAR, DUBINS = scenes.differential_robot(), scenes.reeds_shepp(1.0), scenes.dubins(0.8)
 BODY = (Box([0.8, 0.5], [0.1, 0.0]),)
@@ -66,11 +68,11 @@ def query_of(problem):
     return lattice_query(problem, tuple(range(len(problem.goals))))
 
 
-def grown(problem, *, sign=1.0, rung=None, n=EXPANSIONS):
+def grown(problem, *, sign=1.0, one=None, n=EXPANSIONS):
     """A pass that does not stop at a connection, its nodes and links."""
     query = query_of(problem)
-    rung = Rung(stop=False) if rung is None else rung
-    (one,) = both_ends(query, rung, grids=distance_grids(query), ends=(sign,))
+    resolution = Resolution(stop=False) if one is None else one
+    (one,) = both_ends(query, resolution, grids=distance_grids(query), ends=(sign,))
     one.run(n, math.inf)
     used = int(one.arrays.state[kernels.N_NODES])
     return one, one.arrays.nodes[:used], one.arrays.links[:used]
@@ -83,17 +85,17 @@ def in_the_problem(query, nodes):
     return poses
 
 
-TIGHT = Rung(contact=True, scale=0.5, quanta=0.5, stop=False)
+TIGHT = Resolution(truncated=True, scale=0.5, durations=0.5, stop=False)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize("rung", [Rung(stop=False), TIGHT])
+@pytest.mark.parametrize("resolution", [Resolution(stop=False), TIGHT])
 @pytest.mark.parametrize("name", PROBLEMS)
-def test_nodes_are_ends_of_free_ways(name, rung, sign):
+def test_nodes_are_ends_of_free_ways(name, resolution, sign):
     problem = PROBLEMS[name]
     if sign < 0.0 and problem.moves:
         pytest.skip("no search from a goal where something moves")
-    one, nodes, links = grown(problem, sign=sign, rung=rung)
+    one, nodes, links = grown(problem, sign=sign, one=resolution)
     library, query = one.query.library.arrays.library, one.query
     children = np.flatnonzero(links[:, PARENT] >= 0)
     if not (
@@ -103,7 +105,7 @@ def test_nodes_are_ends_of_free_ways(name, rung, sign):
     elif not len(children):
         return
     parents = links[children, PARENT]
-    trims, times = links[children, TRIM], nodes[children, EDGE]
+    trims, times = links[children, TRIM], nodes[children, COAST]
     # exact poses: those of the edge done from the parent's
     steps = [
         plain_end([library.twists[k, :3]], [sign * t]) for k, t in zip(trims, times, strict=True)
@@ -194,7 +196,7 @@ for name in ("car", "moving", "prices"):
     print(name, found.expansions, found.queries, found.nearest.hex(), found.exhausted,
           word and ([int(k) for k in word.trims], [float(t).hex() for t in word.durations]))
 for name in ("robot", "prices", "map"):
-    _, nodes, links = grown(PROBLEMS[name], rung=TIGHT, n=15)
+    _, nodes, links = grown(PROBLEMS[name], one=TIGHT, n=15)
     print(name, len(nodes), hashlib.sha256(nodes.tobytes() + links.tobytes()).hexdigest())
 """
 
@@ -213,7 +215,7 @@ def test_compiled_and_not_the_first_plan_is_the_same_to_the_last_bit():
 
 
 def test_who_waits_until_contact_is_still_somewhere():
-    order = "from tests.search.test_lattice import *; grown(PROBLEMS['moving'], rung=TIGHT, n=15)"
+    order = "from tests.search.test_lattice import *; grown(PROBLEMS['moving'], one=TIGHT, n=15)"
     done = subprocess.run(
         [sys.executable, "-c", order], cwd=ROOT, capture_output=True, text=True, check=False,
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
@@ -223,11 +225,11 @@ def test_who_waits_until_contact_is_still_somewhere():
 
 def test_the_same_at_every_call_and_from_used_memory():
     query = query_of(PROBLEMS["car"])
-    rung, grids = Rung(), distance_grids(query)
+    resolution, grids = Resolution(), distance_grids(query)
     memory = search_arrays(query.library.arrays.library)
     said = []
     for arrays in (None, memory, memory):
-        (one,) = both_ends(query, rung, grids=grids, arrays=arrays, ends=(1.0,))
+        (one,) = both_ends(query, resolution, grids=grids, arrays=arrays, ends=(1.0,))
         word = one.run(EXPANSIONS, math.inf)
         said.append((one.expansions, None if word is None else word.durations.tobytes()))
     assert said[0] == said[1] == said[2]
@@ -237,7 +239,7 @@ def test_in_chunks_it_is_the_same_as_at_once():
     nodes = []
     for chunks in ([EXPANSIONS], [1, 7, EXPANSIONS - 8]):
         query = query_of(PROBLEMS["car"])
-        (one,) = both_ends(query, Rung(stop=False), grids=distance_grids(query), ends=(1.0,))
+        (one,) = both_ends(query, Resolution(stop=False), grids=distance_grids(query), ends=(1.0,))
         for n in chunks:
             one.run(n, math.inf)
         nodes.append(one.arrays.nodes[: int(one.arrays.state[kernels.N_NODES])])
@@ -264,11 +266,12 @@ def test_joined_and_priced_by_hand():
     gears = query.library.arrays.library.gears
     ahead = int(np.flatnonzero(gears > 0)[0])
     back = int(np.flatnonzero(gears < 0)[0])
-    word = joined([(ahead, 1.0), (ahead, 0.5), (back, 2.0), (ahead, 1.0)], query, goal=0)
+    steps = [(ahead, 1.0), (ahead, 0.5), (back, 2.0), (ahead, 1.0)]
+    word = query.word_of([(SWITCH, int(query.library.trims[k]), t) for k, t in steps], 0)
     assert word.trims.tolist() == query.library.trims[[ahead, back, ahead]].tolist()
     assert word.durations.tolist() == [1.5, 2.0, 1.0]
     assert with_cost(word, query).cost == pytest.approx(4.5 + 2 * 0.2 + 2 * 0.7)
-    assert with_cost(joined([], query, goal=0), query).cost == 0.0
+    assert with_cost(query.word_of([], 0), query).cost == 0.0
 
 
 def test_a_lattice_without_a_way_out_is_exhausted():
@@ -282,8 +285,9 @@ def test_a_lattice_without_a_way_out_is_exhausted():
         assert found.enclosed == "obstacles enclose the start"
 
 
-def test_the_ladder_is_climbed_one_rung_after_the_other():
-    assert [row[0] for row in LADDER] == sorted(row[0] for row in LADDER)
+def test_finer_resolutions_begin_one_after_the_other():
+    begun = [after for after, _ in SCHEDULE.stages]
+    assert begun == sorted(begun)
     query = query_of(scenes.bay(2.1, 4.3))
     if not COMPILED:
         return

@@ -6,9 +6,9 @@ import os
 
 import pytest
 
-from maneuver_automaton.search import _kernels_maneuver_lattice as lattice
-from maneuver_automaton.search import _kernels_maneuver_motion as motion
+from maneuver_automaton.search import _kernels_lattice as lattice
 from maneuver_automaton.search import _kernels_maneuver_shortcuts as shortcuts
+from maneuver_automaton.search import _kernels_motion as motion
 from maneuver_automaton.search.maneuver_ready import load_maneuver_kernels
 from tests.search.maneuver_searches import search_maneuvers
 from tests.search.test_maneuver_lattice import query

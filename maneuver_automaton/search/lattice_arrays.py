@@ -1,0 +1,230 @@
+"""Trims and maneuvers as the kernels of the lattice see them, whatever the vehicle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.collision.body import Body
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.search.maneuver_motion import (
+    BodyArrays,
+    Part,
+    bodies_of,
+    body_arrays,
+    carried_twists,
+    fastest_of,
+)
+from maneuver_automaton.words.library import LibraryArrays
+
+DURATIONS = (0.17, 0.5)  # of the coasts of edges, in the time a length scale takes
+SPINS = (math.pi / 12.0, math.pi / 4.0)  # [rad] of turns on the spot
+CELL = 0.122  # side of a cell at the first resolution, in length scales
+
+
+class LatticeArrays(NamedTuple):
+    """What the kernels see of m trims in C classes, E maneuvers between these, and P parts.
+
+    Edges are maneuvers, those out of one class next to each other. A vehicle that changes between
+    all its trims at will has one class and no edges.
+    """
+
+    library: LibraryArrays  # numbered as `LatticeLibrary.trims` lists them
+    n_parts: int
+    body: Body  # of the first part
+    bodies: BodyArrays
+    offsets: Array  # (P, m, 3) of the parts in the trims
+    part_twists: Array  # (P, m, 3)
+    speeds: Array  # (P, m) [m/s] of the fastest point
+    fastest: Array  # (m,) [m/s] over the parts
+    edge_durations: Array  # (m, 2) [s] of coasts, 0 for none
+    moves: Array  # (m, 2, 4) poses they lead to, forwards or backwards
+    first_trim: IntArray  # (C + 1,) where the trims of each class begin ...
+    trims_of: IntArray  # (m,) ... in this list
+    first_edge: IntArray  # (C + 1,)
+    edge_source: IntArray  # (E,) trims
+    edge_target: IntArray  # (E,)
+    edge_displacement: Array  # (E, 4)
+    edge_cost: Array  # (E,)
+    edge_time: Array  # (E,) [s]
+    edge_reach: Array  # (E,) [m] that any point of the vehicle moves
+    first_piece: IntArray  # ((P + 1) E + 1,) of each part and edge; the last part is the pose
+    piece_pose: Array  # (N, 3)
+    piece_twist: Array  # (N, 3)
+    piece_time: Array  # (N,) [s]
+    piece_error: Array  # (N,) [m]
+    piece_speed: Array  # (N,) [m/s]
+    piece_low: Array  # (N,) [m] altitudes above where the edge begins
+    piece_high: Array  # (N,)
+    edge_low: Array  # (E,) of all pieces of an edge
+    edge_high: Array  # (E,)
+    via_edge: IntArray  # (C, C) first edge of a transition between classes, -1 for none
+    most_children: int
+
+
+class LatticeLibrary(NamedTuple):
+    """The arrays with what the wrapper needs beside them."""
+
+    arrays: LatticeArrays
+    trims: IntArray  # (m,) their indices in the automaton
+    number_of: IntArray  # from the indices in the automaton to these, -1 for none
+    edge_maneuver: IntArray  # (E,) index in the automaton
+    radius: float  # [m] length scale: the tightest turn, or the size of the body
+    cell: float  # [m] side of a cell at the first resolution
+    turns: float  # radius of the tightest turn, in length scales; 1 for none
+    per_metre: float  # least cost per metre
+    per_climb: float  # least cost per metre of altitude
+    per_turn: float  # cost of the cheapest full turn
+    lag: Array  # (C, C) least cost of maneuvers between classes beyond that of their path
+    worst_error: float  # [m] of the pose along any piece
+    spans: IntArray  # (N, 2) samples of its course between which each piece of a part lies
+    rest: int | None  # index in the automaton of the rest that pads
+    rest_rate: float
+    mirrored: bool  # whether the mirror image of every trim is a trim of the same cost
+
+
+class EdgeArrays(NamedTuple):
+    """Maneuvers between classes of trims, those out of one class next to each other."""
+
+    source: IntArray  # (E,) trims
+    target: IntArray
+    maneuver: IntArray  # (E,) index in the automaton
+    displacement: Array  # (E, 4)
+    cost: Array
+    time: Array
+
+
+class MotionArrays(NamedTuple):
+    """Pieces of constant twist of every part, then of the pose alone, along every edge."""
+
+    first_piece: IntArray
+    piece_pose: Array
+    piece_twist: Array
+    piece_time: Array
+    piece_error: Array
+    piece_speed: Array
+    piece_low: Array
+    piece_high: Array
+    edge_low: Array
+    edge_high: Array
+
+
+def no_edges(n_parts: int) -> tuple[EdgeArrays, MotionArrays]:
+    """What a vehicle has that changes between all its trims at will: no maneuver."""
+    numbers, values = np.zeros(0, dtype=np.int64), np.zeros(0)
+    edges = EdgeArrays(numbers, numbers, numbers, np.zeros((0, 4)), values, values)
+    rows, first = np.zeros((0, 3)), np.zeros(1, dtype=np.int64)
+    motion = MotionArrays(first, rows, rows, values, values, values, values, values, values, values)
+    return edges, motion
+
+
+def lattice_arrays(
+    library: LibraryArrays,
+    parts: Sequence[Part],
+    edges: EdgeArrays,
+    motion: MotionArrays,
+    *,
+    edge_durations: Array,
+    via_edge: IntArray,
+) -> LatticeArrays:
+    """The arrays of trims (m) with the maneuvers between their classes.
+
+    `edge_durations` (m, 2) [s] of the coasts of each trim, `via_edge` (C, C) the first edge of the
+    transition between two classes; the parts are those of the trims of the library, in its order.
+    """
+    m, n_classes = library.n_trims, len(library.cost)
+    classes = library.class_of[:m]
+    twists = library.twists[:m]
+    bodies = bodies_of(parts)
+    offsets = np.array([part.trim_poses for part in parts])
+    part_twists = np.array([carried_twists(twists, poses) for poses in offsets])
+    speeds = np.array([fastest_of(b, t) for b, t in zip(bodies, part_twists, strict=True)])
+    edges_of = np.bincount(classes[edges.source], minlength=n_classes)
+    coasts = np.bincount(classes, minlength=n_classes)
+    children = coasts * edge_durations.shape[1] + edges_of
+    return LatticeArrays(
+        library=library,
+        n_parts=len(parts),
+        body=bodies[0],
+        bodies=body_arrays(bodies),
+        offsets=offsets,
+        part_twists=part_twists,
+        speeds=speeds,
+        fastest=speeds.max(axis=0),
+        edge_durations=edge_durations,
+        moves=moves_of(twists, edge_durations),
+        first_trim=np.concatenate([[0], np.cumsum(coasts)]),
+        trims_of=np.argsort(classes, kind="stable"),
+        first_edge=np.concatenate([[0], np.cumsum(edges_of)]),
+        edge_source=edges.source,
+        edge_target=edges.target,
+        edge_displacement=edges.displacement,
+        edge_cost=edges.cost,
+        edge_time=edges.time,
+        edge_reach=_reaches(motion, len(parts)),
+        **motion._asdict(),
+        via_edge=via_edge,
+        most_children=int(children.max(initial=0)),
+    )
+
+
+def moves_of(twists: Array, durations: Array) -> Array:
+    """Poses (m, k, 4) reached from the identity by twists (m, 4) after durations (m, k) [s]."""
+    steps = durations[..., None] * twists[:, None, :]
+    return np.concatenate([SE2.exp(steps[..., :3]).pose, steps[..., 3:]], axis=-1)
+
+
+def edge_durations_of(twists: Array, radius: float, *, waits: bool) -> Array:
+    """Coasting times (m, 2) of edges [s]; none for rest unless it waits.
+
+    A trim that moves makes a share of the length scale, one that turns on the spot a share of a
+    turn; one that only climbs, or rests, goes on for as long as the fastest takes for its share.
+    """
+    speed, turn = np.hypot(twists[:, 0], twists[:, 1]), np.abs(twists[:, 2])
+    fastest = max(float(speed.max(initial=0.0)), 1e-9)
+    columns = []
+    for share, angle in zip(DURATIONS, SPINS, strict=True):
+        with np.errstate(divide="ignore"):
+            straight = np.where(speed > 0.0, share * radius / speed, np.inf)
+            turning = np.where(turn > 0.0, angle / turn, np.inf)
+        t = np.where(speed > 0.1 * turn * radius, straight, turning)
+        waiting = share * radius / fastest if waits else 0.0
+        still = (speed == 0.0) & (turn == 0.0)
+        climbing = share * radius / np.maximum(np.abs(twists[:, 3]), 1e-9)
+        columns.append(np.where(still, np.where(twists[:, 3] != 0.0, climbing, waiting), t))
+    return np.stack(columns, axis=1)
+
+
+def tightest_turn(twists: Array) -> float:
+    """Radius of the tightest turn that drives [m]; 0 if none does."""
+    speed, turn = np.hypot(twists[:, 0], twists[:, 1]), np.abs(twists[:, 2])
+    turns = (turn > 0.0) & (speed > 0.0)
+    return float((speed[turns] / turn[turns]).min()) if turns.any() else 0.0
+
+
+def length_scale(twists: Array, body: Body, *, wide: bool) -> float:
+    """Radius of the tightest turn that drives; a few widths of the body where there is none.
+
+    Unless turns may be `wide`, it is at most that: a vehicle that has other ways to turn than to
+    drive a circle decides on the scale of its body.
+    """
+    radius, size = tightest_turn(twists), 4.0 * body.half_width or 4.0 * body.reach
+    if radius == 0.0:
+        return size or 1.0
+    radius = max(radius, 0.5 * size)
+    return min(radius, 2.0 * size) if size and not wide else radius
+
+
+def _reaches(motion: MotionArrays, n_parts: int) -> Array:
+    """How far any point of the vehicle moves along each edge (E,) [m]."""
+    reach = motion.piece_speed * motion.piece_time + 2.0 * motion.piece_error
+    groups = np.diff(motion.first_piece)
+    if not groups.size:
+        return np.zeros(0)
+    sums = np.add.reduceat(np.append(reach, 0.0), motion.first_piece[:-1])
+    sums = np.where(groups > 0, sums, 0.0)
+    return np.asarray(sums.reshape(n_parts + 1, -1)[:-1].max(axis=0))

@@ -1,0 +1,310 @@
+"""One search of the lattice: its resolution, and its limits as the kernels see them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.problem import SearchSettings
+from maneuver_automaton.search.lattice_arrays import LatticeLibrary
+from maneuver_automaton.search.scene import Scene
+from maneuver_automaton.words.word import Word
+
+HEADINGS = 72
+FINE_HEADINGS = 250
+WEIGHT = 2.0
+TRIES = 6  # candidates of one connection that are tried
+PATIENCE = 1.5  # a connection may cost so much more than the estimate ...
+SLACK = 2.0  # ... and so many length scales, and a full turn, and the prices of its joints
+MOST_JOINTS = 4  # of a connection of three trims, those with what is before and after it included
+INTERVAL = 0.25  # of a length scale's cost between two connections that are tried, times the rest
+RISE = 0.25  # [length scales] of altitude that make another cell
+BACK_OFF = 0.01  # [half widths of the body] kept before contact
+SHORTEST_CONTACT = 0.03  # [half widths] of an edge that ends there
+SAMPLED_HEADINGS = 16  # roots at a goal whose heading is free
+ROUNDING = 1e-12  # relative, by which a coast may fall short of the least one
+MOST_SIDES, MOST_LEVELS, MOST_TICKS = 1 << 15, 1 << 8, 1 << 11  # cells that have numbers of theirs
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Resolution:
+    """One resolution and weight of the lattice."""
+
+    scale: float = 1.0  # of the cells
+    durations: float = 1.0  # of the edges
+    weight: float = WEIGHT
+    truncated: bool = False  # keep what was driven before a contact
+    fine: float = 0.4  # cells of such edges, in cells of this resolution
+    margin: float = 1.0  # of the proven clearance
+    guided: bool = False  # by the table of the cost to go
+    stop: bool = True  # at the first connection
+    layered: bool = False  # whether cells know the gear and the trim that prices ask for
+    most: int = 2**62  # expansions
+    backwards: bool = False  # from the goal
+    ends_early: bool = False  # when the most promising node is no better than what is known
+
+
+class Ends(Protocol):
+    """What a search is asked, seen from the world's frame: a query for any vehicle."""
+
+    @property
+    def library(self) -> LatticeLibrary:
+        """Trims and maneuvers."""
+
+    @property
+    def settings(self) -> SearchSettings:
+        """What the problem says of cells and headings."""
+
+    @property
+    def seen_start(self) -> Array:
+        """Pose (4,) at the start."""
+
+    @property
+    def seen_goals(self) -> Array:
+        """Poses (n, 4) at the goals."""
+
+    @property
+    def start_trim(self) -> int:
+        """Trim before the start, -1 if any will do."""
+
+    @property
+    def goal_trims(self) -> IntArray:
+        """Trims (n,) after the goals, -1 where any will do."""
+
+    @property
+    def free_heading(self) -> NDArray[np.bool_]:
+        """Whether any heading will do at each goal (n,)."""
+
+    @property
+    def box(self) -> Array:
+        """Low and high corner (4,) of where to search."""
+
+    @property
+    def half_width(self) -> float:
+        """Half the width of the narrowest part [m]."""
+
+    @property
+    def start_time(self) -> float:
+        """Time of the world at the start [s]."""
+
+    @property
+    def searched_time(self) -> float:
+        """Longest duration that is looked at [s]."""
+
+    @property
+    def stay_until(self) -> float:
+        """Time of the world until which the goal is kept [s], -inf for none."""
+
+    @property
+    def most_trims(self) -> int:
+        """Trims that a word may have, 0 for any number."""
+
+    @property
+    def least_coast(self) -> float:
+        """Least time of a trim that moves [s]."""
+
+    @property
+    def moves(self) -> bool:
+        """Whether an obstacle moves."""
+
+    @property
+    def margin(self) -> float:
+        """Proven clearance [m]."""
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Least and most expansions between two connections that are tried."""
+
+    def scene(self, margin: float | None = None) -> Scene:
+        """What motions are tested against, with a proven clearance [m], by default the usual."""
+
+    def word_of(self, steps: Iterable[tuple[int, int, float]], goal: int) -> Word:
+        """A word of steps (transition, trim, time) in the automaton's numbers."""
+
+
+class Task(NamedTuple):
+    """One search from one end, as the kernels see it."""
+
+    sign: float  # 1: along time, -1: against it
+    roots: Array  # (R, 4)
+    root_trims: IntArray  # (R,) -1 where any will do
+    aims: Array  # (A, 4)
+    aim_trims: IntArray  # (A,)
+    aim_free: NDArray[np.bool_]  # (A,) whether any heading will do
+    lag: Array  # (m + 1,) least surplus of maneuvers from a trim to an aim's; the last of no trim
+    frame_x: float
+    frame_y: float
+    frame_heading: float
+    frame_cos: float
+    frame_sin: float
+    cell: float  # [m]
+    headings: int
+    fine_cell: float  # of truncated edges
+    fine_headings: int
+    rise: float  # [m] of altitude that makes another cell
+    tick: float  # [s] of the clock that makes another cell, 0 where it makes none
+    radix: tuple[int, int, int, int]  # cells along a side, headings, levels, ticks
+    weight: float
+    per_metre: float
+    per_climb: float
+    per_shot: float  # cost to go for each expansion between two connections that are tried
+    least_patience: float  # expansions
+    most_patience: float
+    patience: float
+    slack: float
+    tries: int
+    stop_at_first: bool
+    ends_early: bool
+    contact: bool
+    back_off: float  # [m]
+    shortest_contact: float  # [m]
+    clock: float
+    most_time: float
+    stay_until: float
+    most_trims: int
+    least_coast: float
+    checks_words: bool  # whether connections have limits of single words to keep
+    by_gear: bool
+    by_trim: bool
+    by_count: bool
+
+
+def task_of(query: Ends, resolution: Resolution, *, sign: float = 1.0) -> Task:
+    """Limits and sizes of a search, as the kernels see them."""
+    library, settings = query.library, query.settings
+    arrays, numbered = library.arrays, library.arrays.library
+    frame = query.seen_goals[0]
+    cell = resolution.scale * (settings.cell or library.cell)
+    headings = settings.headings or HEADINGS
+    size = query.half_width or library.radius * 0.1
+    sharp = INTERVAL * library.radius * library.per_metre
+    tick = _tick(query, resolution)
+    longest = bool(np.isfinite(numbered.longest[: numbered.n_trims]).any())
+    start, goals = _ends(query)
+    aims, aim_trims, aim_free = goals if sign > 0.0 else start
+    roots, root_trims = start[:2] if sign > 0.0 else goal_roots(query)
+    return Task(
+        sign=sign,
+        roots=roots,
+        root_trims=root_trims,
+        aims=aims,
+        aim_trims=aim_trims,
+        aim_free=aim_free,
+        lag=_lag(library, aim_trims),
+        frame_x=float(frame[0]),
+        frame_y=float(frame[1]),
+        frame_heading=float(frame[2]),
+        frame_cos=math.cos(float(frame[2])),
+        frame_sin=math.sin(float(frame[2])),
+        cell=float(cell),
+        headings=int(headings),
+        fine_cell=float(resolution.fine * cell),
+        fine_headings=FINE_HEADINGS,
+        rise=float(resolution.scale * RISE * library.radius),
+        tick=tick,
+        radix=_radix(query, resolution.fine * cell, max(headings, FINE_HEADINGS), tick),
+        weight=float(resolution.weight),
+        per_metre=float(library.per_metre),
+        per_climb=float(library.per_climb),
+        # The path to the goal says how long to wait, unless no trim moves: then nothing is solved
+        # for, and the node that ends at the goal must not be missed.
+        per_shot=(float(sharp) or 1.0) if numbered.twists[: numbered.n_trims].any() else math.inf,
+        least_patience=query.interval[0],
+        most_patience=query.interval[1],
+        patience=PATIENCE,
+        slack=_slack(library),
+        tries=TRIES,
+        stop_at_first=bool(resolution.stop),
+        ends_early=bool(resolution.ends_early),
+        contact=resolution.truncated,
+        back_off=float(max(BACK_OFF * size, 2.0 * query.margin)),
+        shortest_contact=float(SHORTEST_CONTACT * size),
+        clock=float(query.start_time),
+        most_time=float(query.searched_time),
+        stay_until=float(query.stay_until),
+        most_trims=int(query.most_trims),
+        least_coast=float(query.least_coast * (1.0 - ROUNDING)),
+        checks_words=bool(query.most_trims > 0 or query.least_coast > 0.0 or longest),
+        by_gear=bool(resolution.layered and numbered.direction_change > 0.0),
+        by_trim=bool(
+            len(arrays.trims_of) > len(numbered.cost)
+            and (query.least_coast > 0.0 or longest or (resolution.layered and numbered.switch > 0))
+        ),
+        by_count=query.most_trims > 0,
+    )
+
+
+def goal_roots(query: Ends) -> tuple[Array, IntArray]:
+    """Poses (R, 4) at the goals, a few headings where any will do, and their trims."""
+    rows, trims = [], []
+    for goal, free, trim in zip(
+        query.seen_goals, query.free_heading, query.goal_trims, strict=True
+    ):
+        turns = np.arange(SAMPLED_HEADINGS if free else 1) * (2.0 * np.pi / SAMPLED_HEADINGS)
+        rows += [goal + np.array([0.0, 0.0, turn, 0.0]) for turn in turns]
+        trims += [int(trim)] * len(turns)
+    return np.array(rows), np.array(trims, dtype=np.int64)
+
+
+def goal_of_root(query: Ends, root: int) -> int:
+    """Which goal a root at the goals belongs to."""
+    counts = np.where(query.free_heading, SAMPLED_HEADINGS, 1)
+    return int(np.searchsorted(np.cumsum(counts), root, side="right"))
+
+
+_End = tuple[Array, IntArray, NDArray[np.bool_]]
+
+
+def _ends(query: Ends) -> tuple[_End, _End]:
+    """Poses, trims, and whether any heading will do, at the start and at the goals."""
+    start = np.array(query.seen_start)[None], np.array([query.start_trim], dtype=np.int64)
+    goals = np.array(query.seen_goals), np.array(query.goal_trims, dtype=np.int64)
+    return (*start, np.zeros(1, dtype=np.bool_)), (*goals, np.array(query.free_heading))
+
+
+def _lag(library: LatticeLibrary, aim_trims: IntArray) -> Array:
+    """Least surplus (m + 1,) of maneuvers from each trim, and from none, to an aim's trim."""
+    numbered = library.arrays.library
+    classes = numbered.class_of
+    to_aims = library.lag[:, classes[aim_trims]].min(axis=1)
+    return np.append(to_aims[classes[: numbered.n_trims]], to_aims[0])
+
+
+def _slack(library: LatticeLibrary) -> float:
+    """What a connection may cost beyond a multiple of the estimate, which knows no prices.
+
+    Two length scales and a full turn, and the switches and changes of direction of three trims and
+    of the joints at both their ends.
+    """
+    numbered = library.arrays.library
+    path = SLACK * library.radius * library.per_metre + library.per_turn
+    prices = MOST_JOINTS * (numbered.switch + numbered.direction_change)
+    return float(path + prices) if path > 0.0 else math.inf
+
+
+def _tick(query: Ends, resolution: Resolution) -> float:
+    """Length in time of a cell [s]; 0 where a dearer node is never the one that is in time."""
+    if not (query.moves or math.isfinite(query.searched_time)):
+        return 0.0
+    durations = query.library.arrays.edge_durations
+    lasting = durations[durations > 0.0]
+    return resolution.durations * float(lasting.min()) if lasting.size else 1.0
+
+
+def _radix(query: Ends, cell: float, headings: int, tick: float) -> tuple[int, int, int, int]:
+    """How many numbers each coordinate of a cell needs; more cells than that share numbers."""
+    low, high = np.array(query.box[:2]), np.array(query.box[2:])
+    far = float((high - low).max())  # no pose of the window is farther from the frame along x or y
+    sides = 2
+    while sides < MOST_SIDES and sides * cell < 4.0 * far:
+        sides *= 2
+    climbs = bool(query.library.arrays.library.twists[:, 3].any()) or bool(
+        query.library.arrays.edge_displacement[:, 3].any()
+    )
+    return sides, int(headings) + 1, MOST_LEVELS if climbs else 1, MOST_TICKS if tick > 0.0 else 1
