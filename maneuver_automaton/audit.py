@@ -154,6 +154,48 @@ def audit_plan(
     )
 
 
+def closest_to(
+    plan: Plan,
+    obstacles: tuple[AnyObstacle, ...],
+    *,
+    footprint: tuple[Shape, ...],
+    within: tuple[float, float] = (-math.inf, math.inf),
+) -> Approach:
+    """When a plan comes closest to obstacles, and their distance then [m], measured by shapely.
+
+    Parameters
+    ----------
+    plan : Plan
+    obstacles : tuple of Obstacle or OccupancyMap
+    footprint : tuple of Shape
+        Parts of the body; empty for a point.
+    within : (float, float)
+        First and last time that counts, on the plan's clock [s].
+
+    Returns
+    -------
+    Approach
+        An infinite distance if there is no obstacle, or the plan has no such time.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.collision import Disc
+    >>> ahead = Trim(name="ahead", body_velocity=[1.0, 0.0, 0.0], control=[1.0, 0.0])
+    >>> plan = Plan([0.0, 0.0, 0.0], (ahead,), durations=[4.0])
+    >>> post = (Obstacle(Disc(0.5, [3.0, 2.0])),)
+    >>> closest_to(plan, post, footprint=(Disc(0.5),), within=(0.0, 3.0))
+    Approach(time=3.0, distance=1.0)
+    """
+    goal, clock = Goal(pose=plan.end), plan.start_time
+    first, last = max(within[0] - clock, 0.0), min(within[1] - clock, plan.duration)
+    if not obstacles or first > last:
+        return Approach(clock, math.inf)
+    near, place = _seen_from(plan, goal), goal.pose
+    scene = _Scene(footprint, obstacles, 0.0, origin_near(place), place, clock, (0.0, 0.0))
+    least = _closest(near, scene, (first, last))
+    return least._replace(time=clock + least.time)
+
+
 class _Pieces(NamedTuple):
     """Stretches between samples of a plan, each under one control."""
 
@@ -305,8 +347,8 @@ def _wrong_ends(plan: Plan, states: tuple[Array, Array]) -> list[str]:
     return reasons
 
 
-def _closest(plan: Plan, scene: _Scene) -> Approach:
-    """When the plan is closest to an obstacle."""
+def _closest(plan: Plan, scene: _Scene, within: tuple[float, float] = (0.0, math.inf)) -> Approach:
+    """When the plan is closest to an obstacle, between two times since its start [s]."""
     layers = scene.layers(plan)
     around = [surroundings_of(layer.obstacles, scene.origin) for layer in layers]
     body = parts_of(scene.footprint)
@@ -323,6 +365,11 @@ def _closest(plan: Plan, scene: _Scene) -> Approach:
     times, twists = _constant_twists(plan)
     rates = fastest_point(body, twists[:, :3]) + max(one.speed for one in around)
     rates = np.hypot(rates, twists[:, 3:].sum(axis=1))
+    first, last = max(within[0], times[0]), min(within[1], times[-1])
+    inner = times[(times > first) & (times < last)]
+    cut = np.concatenate([[first], inner, [last]])
+    rates = rates[np.clip(np.searchsorted(times, cut[:-1], "right") - 1, 0, len(rates) - 1)]
+    times = cut
     return closest_approach(
         distances,
         times,

@@ -1,4 +1,4 @@
-"""One step of driving: the last plan's rest, a search for a better one, the choice."""
+"""One step of driving: the tail of the last plan, a search for a better one, the choice."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads import _kernels_free, _kernels_horizon, _kernels_library
 from maneuver_automaton.roads._kernels_horizon import (
@@ -21,9 +22,11 @@ from maneuver_automaton.roads._kernels_horizon import (
     Weights,
 )
 from maneuver_automaton.roads.clearing import clearing_of
+from maneuver_automaton.roads.decision import RoadDecision, RoadSettings
 from maneuver_automaton.roads.goal_region import GoalRegion, outlines_of
 from maneuver_automaton.roads.lanelets import drivable_area
 from maneuver_automaton.roads.library import RoadLibrary, road_library, tick_of
+from maneuver_automaton.roads.plans import plan_of_controls
 from maneuver_automaton.roads.route import SPACING, Route, extent_on, route_of
 from maneuver_automaton.roads.scene import RoadScene
 from maneuver_automaton.roads.vehicle import RoadVehicle
@@ -35,57 +38,7 @@ SHARE = 0.25  # of the nodes of a level that one strip along the route may hold
 STRIPS = 17
 LONGEST_STOP = 12.0  # [s]
 FAR_TICK = 1 << 40
-AT_REST = 1e-9  # [m/s]
 DIGITS = 9  # of the numbers of a scene [m, rad]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RoadSettings:
-    """How a drive is planned."""
-
-    horizon_s: float = 6.0  # how far a plan looks ahead at most, its stop apart
-    width: int = 80  # nodes of a level that the search goes on from
-    narrow: int = 40  # the same where the last plan leads to a goal and is only to be improved
-    off_edge_m: float = 0.04  # distances kept from the edge of the area
-    off_traffic_m: float = 0.15  # and from everybody
-    top_speed: float = 36.0  # [m/s] of the trims, if the start is not faster still
-    greed: float = 1.0  # weight of the cost-to-go
-    gain: float = 0.02  # share of the cost by which a new plan has to be better than the old one
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class RoadPlan:
-    """Controls tick by tick, and how the vehicle would stop after them."""
-
-    tick: int  # at which it begins
-    states: Array  # (n + 1, 5) x, y, heading of the rear axle, speed, steering, the stop included
-    controls: Array  # (n, 2) acceleration [m/s^2], steering rate [rad/s], the stop included
-    lasting: int  # ticks before the stop begins
-    reaches: bool  # whether it reaches a goal there
-
-    def __post_init__(self) -> None:
-        freeze(self, "states", last=5)
-        freeze(self, "controls", last=2)
-
-    @property
-    def stops(self) -> bool:
-        """Whether it ends at rest."""
-        return bool(self.states[-1, 3] <= AT_REST)
-
-    @property
-    def stands(self) -> bool:
-        """Whether it is to stay at rest, as there is no way on."""
-        return not self.lasting and not self.reaches and bool(self.states[0, 3] <= AT_REST)
-
-    def rest(self) -> RoadPlan:
-        """What remains of it a tick later."""
-        return RoadPlan(
-            tick=self.tick + 1,
-            states=self.states[1:],
-            controls=self.controls[1:],
-            lasting=max(self.lasting - 1, 0),
-            reaches=self.reaches,
-        )
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -151,16 +104,29 @@ class RoadPlanner:
 
     def warm(self) -> None:
         """Compile, and touch the memory, before time counts."""
-        plan, _ = self.plan(self.start_state, tick=0, rest=None)
-        self.plan(plan.states[1], tick=1, rest=plan.rest())
+        first, _ = self.decide(self.start_state, tick=0, tail=None)
+        self.decide(first.states[1], tick=1, tail=first.tail())
 
-    def plan(self, state: Array, *, tick: int, rest: RoadPlan | None) -> tuple[RoadPlan, bool]:
-        """The plan from a state (5,) at a tick, and whether it is not the rest of the last one.
+    def plan_of(self, state: Array, controls: Array, *, tick: int = 0) -> Plan:
+        """The plan from a state (5,) at a tick under controls (n, 2), as the scene was given."""
+        placed = np.concatenate([self.world(state[:3]), state[3:]])
+        return plan_of_controls(
+            self.vehicle.model,
+            placed,
+            controls,
+            tick=self.tick,
+            start_time=self.time_of(tick),
+        )
 
-        The `rest` of the last plan is proven again from where the vehicle is, and kept unless a
-        new one is better. A plan that is not free is driven only where none is: then braking.
+    def decide(
+        self, state: Array, *, tick: int, tail: RoadDecision | None
+    ) -> tuple[RoadDecision, bool]:
+        """What to do from a state (5,) at a tick, and whether it is not the tail of the last plan.
+
+        The `tail` of the last plan is proven again from where the vehicle is, and kept unless a
+        new plan is better. A motion that is not free is driven only where none is: then braking.
         """
-        old = None if rest is None else self._again(state, rest)
+        old = None if tail is None else self._again(state, tail)
         settled = old is not None and old.reaches
         new = self.search(state, tick=tick, narrow=settled)
         if old is None:
@@ -169,7 +135,7 @@ class RoadPlanner:
             return old, False
         return new, True
 
-    def search(self, state: Array, *, tick: int, narrow: bool = False) -> RoadPlan | None:
+    def search(self, state: Array, *, tick: int, narrow: bool = False) -> RoadDecision | None:
         """A new plan from a state (5,); None if none with a way to stop was found.
 
         A vehicle at rest that has no way on stands, as long as that is free.
@@ -207,34 +173,34 @@ class RoadPlanner:
             controls,
         )
         if whole == 0:
-            rest = self._standing(state, tick)
-            free = _kernels_free.free_ticks(self.horizon.clearing, np.array(rest.states), tick)
-            return rest if free else None
+            standing = self._standing(state, tick)
+            free = _kernels_free.free_ticks(self.horizon.clearing, np.array(standing.states), tick)
+            return standing if free else None
         if whole < 0:
             return None
         return self._of_controls(state, tick, controls[:whole], n, reaches=reaches)
 
-    def _standing(self, state: Array, tick: int) -> RoadPlan:
+    def _standing(self, state: Array, tick: int) -> RoadDecision:
         """A tick of rest."""
         return self._of_controls(state, tick, np.zeros((1, 2)), 0, reaches=False)
 
     def _of_controls(
         self, state: Array, tick: int, controls: Array, lasting: int, *, reaches: bool
-    ) -> RoadPlan:
+    ) -> RoadDecision:
         model = self.vehicle.model
         states = _kernels_free.driven(
             model.wheelbase, self.tick, np.array(state), np.array(controls)
         )
-        return RoadPlan(
+        return RoadDecision(
             tick=tick, states=states, controls=controls, lasting=lasting, reaches=reaches
         )
 
-    def _again(self, state: Array, rest: RoadPlan) -> RoadPlan | None:
-        """The rest of a plan from where the vehicle is; None if it is not free any more."""
-        if not len(rest.controls):
+    def _again(self, state: Array, tail: RoadDecision) -> RoadDecision | None:
+        """The tail of a plan from where the vehicle is; None if it is not free any more."""
+        if not len(tail.controls):
             return None
         plan = self._of_controls(
-            state, rest.tick, rest.controls, rest.lasting, reaches=rest.reaches
+            state, tail.tick, tail.controls, tail.lasting, reaches=tail.reaches
         )
         free = _kernels_free.free_ticks(self.horizon.clearing, np.array(plan.states), plan.tick)
         if free < len(plan.controls):
@@ -245,7 +211,7 @@ class RoadPlanner:
                 return None
         return plan
 
-    def _better(self, new: RoadPlan, old: RoadPlan) -> bool:
+    def _better(self, new: RoadDecision, old: RoadDecision) -> bool:
         """Whether a new plan is worth leaving the old one for."""
         if new.reaches != old.reaches:
             return new.reaches
@@ -256,7 +222,7 @@ class RoadPlanner:
             return new.lasting > 0 or not old.lasting
         return self.price(new) < (1.0 - self.settings.gain) * self.price(old)
 
-    def price(self, plan: RoadPlan, *, ticks: int | None = None) -> float:
+    def price(self, plan: RoadDecision, *, ticks: int | None = None) -> float:
         """Cost of a plan, or of its first ticks, its stop left out."""
         n = plan.lasting if ticks is None else ticks
         return float(
@@ -265,7 +231,7 @@ class RoadPlanner:
             )
         )
 
-    def _emergency(self, state: Array, tick: int) -> RoadPlan:
+    def _emergency(self, state: Array, tick: int) -> RoadDecision:
         """Full braking straight on, free or not."""
         braking, speeds = self.vehicle.model.max_acceleration, [float(state[3])]
         while speeds[-1] > 0.0:

@@ -14,6 +14,8 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads.goal_region import GoalRegion
 from maneuver_automaton.roads.lanelets import Lanelet
 
+SAME_TIME = 1e-9  # [s] times closer than this are one
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RoadStart:
@@ -72,7 +74,12 @@ class RoadScene:
 
     def present(self, time: float) -> list[Obstacle]:
         """Who is on the road at `time` [s]."""
-        return [one for one in self.traffic if is_present(one, time)]
+        times = [presence_of(one) for one in self.traffic]
+        return [
+            one
+            for one, (first, last) in zip(self.traffic, times, strict=True)
+            if first - SAME_TIME <= time <= last + SAME_TIME
+        ]
 
     def moved(self, by: SE2, *, digits: int | None = None) -> RoadScene:
         """The scene moved by a planar pose; its numbers rounded to `digits` if given.
@@ -125,12 +132,18 @@ def _near_obstacle(one: Obstacle, digits: int | None) -> Obstacle:
     return replace(one, motion=Motion(one.motion.time, _near(one.motion.pose, digits)))
 
 
-def is_present(one: Obstacle, time: float, *, tolerance: float = 1e-9) -> bool:
-    """Whether a road user is there at `time` [s]: always, or within its recorded times."""
+def presence_of(one: Obstacle) -> tuple[float, float]:
+    """First and last time [s] at which a road user is there: its recorded times, or always.
+
+    Examples
+    --------
+    >>> presence_of(Obstacle(Box([4.0, 2.0])))
+    (-inf, inf)
+    """
     if one.motion is None:
-        return True
+        return -math.inf, math.inf
     first, last = one.motion.time[[0, -1]].tolist()
-    return bool(first - tolerance <= time <= last + tolerance)
+    return first, last
 
 
 def unwrapped(headings: Sequence[float]) -> Array:
