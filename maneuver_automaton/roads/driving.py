@@ -14,9 +14,9 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.primitives.driving import drive
 from maneuver_automaton.roads.decision import RoadDecision
-from maneuver_automaton.roads.horizon import RoadPlanner
 from maneuver_automaton.roads.judge import RoadVerdict, judged
 from maneuver_automaton.roads.missed import nearest_miss
+from maneuver_automaton.roads.planner import RoadPlanner
 
 LONGEST = 60.0  # [s] of a drive whose goal has no last time
 

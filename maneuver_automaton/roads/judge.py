@@ -10,20 +10,17 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from maneuver_automaton.audit import Audit, audit_plan, closest_to
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.collision import Obstacle, Polygon
+from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.collision.blocked import too_close
 from maneuver_automaton.problem import Goal
+from maneuver_automaton.roads.land import obstacles_in
 from maneuver_automaton.roads.lanelets import Lanelet, drivable_area
 from maneuver_automaton.roads.scene import RoadScene, presence_of
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
 BESIDE = 30.0  # [m] from the path: the edge of the road is not looked for further away
-TILE = 20.0  # [m] of the pieces that land beside the road is cut into, for a quick search tree
-SLIVER = 1e-6  # [m^2] pieces of land that are smaller are what rounding left between lanelets
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,19 +82,4 @@ def land_beside(lanelets: Sequence[Lanelet], plan: Plan) -> tuple[Obstacle, ...]
     places = plan.sample().pose[:, :2]
     path = shapely.LineString(places) if len(places) > 1 else shapely.Point(places[0])
     near = shapely.buffer(path, BESIDE)
-    shapely.prepare(near)
-    low_x, low_y, high_x, high_y = near.bounds
-    x, y = np.meshgrid(np.arange(low_x, high_x, TILE), np.arange(low_y, high_y, TILE))
-    tiles = shapely.box(x.ravel(), y.ravel(), x.ravel() + TILE, y.ravel() + TILE)
-    area = shapely.intersection(drivable_area(lanelets), shapely.box(*near.bounds))
-    land = shapely.difference(tiles[shapely.intersects(near, tiles)], area)
-    return tuple(
-        Obstacle(
-            Polygon(
-                shapely.get_coordinates(piece.exterior)[:-1],
-                [shapely.get_coordinates(hole)[:-1] for hole in piece.interiors],
-            )
-        )
-        for piece in shapely.get_parts(land)
-        if piece.geom_type == "Polygon" and piece.area > SLIVER
-    )
+    return obstacles_in(shapely.difference(near, drivable_area(lanelets)))

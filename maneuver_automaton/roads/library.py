@@ -85,9 +85,9 @@ def road_library(
         power_speed=vehicle.power_speed,
         left_out=LEFT_OUT,
         fastest_change=FASTEST,
-        mind_braking=0.05,
-        mind_lateral=0.05,
-        mind_jerk=0.002,
+        weight_along=0.05,
+        weight_across=0.05,
+        weight_jerk=0.002,
     )
     trims = Trims(
         speed=np.repeat(speeds, counts),

@@ -30,7 +30,7 @@ class Route:
     points: Array  # (n, 2) equally spaced [m]
     heading: Array  # (n,) direction of travel, not wrapped [rad]
     limit: Array  # (n,) speed limit [m/s], inf where there is none
-    ways: Array  # (goals, 4) least and greatest station of each goal, and least and greatest offset
+    extents: Array  # (goals, 4) least and greatest station, least and greatest offset of each
 
 
 def route_of(scene: RoadScene) -> Route:
@@ -56,8 +56,8 @@ def route_of(scene: RoadScene) -> Route:
     points, heading, limit = _spaced(line, limits)
     # A route that returns to where it starts passes a goal there at its end.
     here = int(np.argmin(np.hypot(*(points - scene.start.middle[:2]).T)))
-    ways = np.array([_way(goal, points, heading, here) for goal in scene.goals])
-    return Route(lanelets=tuple(path), points=points, heading=heading, limit=limit, ways=ways)
+    extents = np.array([_extent_of(goal, points, heading, here) for goal in scene.goals])
+    return Route(lanelets=tuple(path), points=points, heading=heading, limit=limit, extents=extents)
 
 
 def lanelets_at(lanelets: Sequence[Lanelet], middle: Array) -> list[int]:
@@ -188,7 +188,7 @@ def _spaced(line: Array, limits: Array) -> tuple[Array, Array, Array]:
     return points, heading, limits[after]
 
 
-def _way(goal: GoalRegion, points: Array, heading: Array, here: int) -> Array:
+def _extent_of(goal: GoalRegion, points: Array, heading: Array, here: int) -> Array:
     """Stations and offsets between which a goal lies; all of them if it is no place.
 
     It is looked for from the point `here` on, where the vehicle starts.

@@ -11,10 +11,10 @@ import numpy as np
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.roads.decision import RoadDecision, RoadSettings
 from maneuver_automaton.roads.driving import RoadDrive, drive_scene
-from maneuver_automaton.roads.horizon import RoadPlanner, road_planner
 from maneuver_automaton.roads.judge import RoadVerdict, judged
 from maneuver_automaton.roads.library import tick_of
 from maneuver_automaton.roads.missed import nearest_miss
+from maneuver_automaton.roads.planner import RoadPlanner, road_planner
 from maneuver_automaton.roads.scene import RoadScene
 from maneuver_automaton.roads.vehicle import RoadVehicle
 

@@ -11,33 +11,34 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.roads import _kernels_free, _kernels_horizon, _kernels_library
-from maneuver_automaton.roads._kernels_horizon import (
-    Blocks,
-    GoalArrays,
-    Horizon,
-    HorizonArrays,
-    HorizonTask,
-    RouteArrays,
-    Weights,
+from maneuver_automaton.roads import (
+    _kernels_beam,
+    _kernels_costs,
+    _kernels_free,
+    _kernels_goals,
+    _kernels_library,
+    _kernels_motion,
 )
+from maneuver_automaton.roads._kernels_beam import BeamArrays, Horizon, HorizonTask
 from maneuver_automaton.roads.clearing import clearing_of
 from maneuver_automaton.roads.decision import RoadDecision, RoadSettings
-from maneuver_automaton.roads.goal_region import GoalRegion, outlines_of
-from maneuver_automaton.roads.lanelets import drivable_area
 from maneuver_automaton.roads.library import RoadLibrary, road_library, tick_of
 from maneuver_automaton.roads.plans import plan_of_controls
-from maneuver_automaton.roads.route import SPACING, Route, extent_on, route_of
+from maneuver_automaton.roads.route import Route, route_of
 from maneuver_automaton.roads.scene import RoadScene
+from maneuver_automaton.roads.search_arrays import (
+    beam_arrays,
+    goal_arrays,
+    route_arrays,
+    static_obstacles,
+    weights_of,
+)
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
-CHILDREN = 64  # rows for the children of a node
 CELL, TURN_CELL, SPEED_CELL = 0.5, 0.06, 2.0  # [m], [rad], [m/s] of equal nodes
 SHARES = (math.nan, 0.0, 0.2, -0.2, 0.5, -0.5, 1.0, -1.0)  # of steering while it stops; nan: held
 SHARE = 0.25  # of the nodes of a level that one strip along the route may hold
-STRIPS = 17
 LONGEST_STOP = 12.0  # [s]
-FAR_TICK = 1 << 40
 DIGITS = 9  # of the numbers of a scene [m, rad]
 
 
@@ -57,7 +58,7 @@ class RoadPlanner:
     route: Route
     library: RoadLibrary
     horizon: Horizon
-    memory: HorizonArrays = field(repr=False)
+    room: BeamArrays = field(repr=False)
 
     @property
     def tick(self) -> float:
@@ -100,7 +101,7 @@ class RoadPlanner:
     def wider(self, width: int) -> RoadPlanner:
         """The same planner with another width of its search."""
         settings = replace(self.settings, width=width)
-        return replace(self, settings=settings, memory=_memory(settings, self.library))
+        return replace(self, settings=settings, room=beam_arrays(settings, self.library))
 
     def warm(self) -> None:
         """Compile, and touch the memory, before time counts."""
@@ -164,11 +165,11 @@ class RoadPlanner:
         first = _kernels_library.maneuvers_from(library.limits, library.trims, speed, steering)
         stop = math.ceil(LONGEST_STOP / self.tick)
         controls = np.zeros((until - tick + library.limits.ticks + stop, 2))
-        reaches, n, whole = _kernels_horizon.search_horizon(
+        reaches, n, whole = _kernels_beam.search_beam(
             task,
             self.horizon,
             first,
-            self.memory,
+            self.room,
             np.array(SHARES),
             controls,
         )
@@ -188,7 +189,7 @@ class RoadPlanner:
         self, state: Array, tick: int, controls: Array, lasting: int, *, reaches: bool
     ) -> RoadDecision:
         model = self.vehicle.model
-        states = _kernels_free.driven(
+        states = _kernels_motion.driven(
             model.wheelbase, self.tick, np.array(state), np.array(controls)
         )
         return RoadDecision(
@@ -207,7 +208,7 @@ class RoadPlanner:
             return None
         if plan.reaches:
             until = np.array(plan.states[: plan.lasting + 1])
-            if _kernels_horizon.first_goal(self.horizon, until, plan.tick) < 0:
+            if _kernels_goals.first_goal(self.horizon, until, plan.tick) < 0:
                 return None
         return plan
 
@@ -226,8 +227,8 @@ class RoadPlanner:
         """Cost of a plan, or of its first ticks, its stop left out."""
         n = plan.lasting if ticks is None else ticks
         return float(
-            _kernels_horizon.price(
-                self.horizon, np.array(plan.states[: n + 1]), np.array(plan.controls[:n]), plan.tick
+            _kernels_costs.price(
+                self.horizon, np.array(plan.states[: n + 1]), np.array(plan.controls[:n])
             )
         )
 
@@ -246,13 +247,7 @@ class RoadPlanner:
 def road_planner(
     scene: RoadScene, vehicle: RoadVehicle | None = None, settings: RoadSettings | None = None
 ) -> RoadPlanner:
-    """Everything for driving on a scene, made once.
-
-    Raises
-    ------
-    ValueError
-        If the area is too large.
-    """
+    """Everything for driving on a scene, made once."""
     vehicle, settings = vehicle or RoadVehicle(), settings or RoadSettings()
     top = min(max(settings.top_speed, math.ceil(scene.start.speed)), vehicle.model.max_speed)
     tick = tick_of(scene.step)
@@ -269,23 +264,16 @@ def road_planner(
         last_tick=math.ceil(lasting / tick),
         off_edge=settings.off_edge_m,
         off_traffic=settings.off_traffic_m,
-        braking=vehicle.model.max_acceleration,
     )
     horizon = Horizon(
         clearing=clearing,
         limits=library.limits,
         trims=library.trims,
         maneuvers=library.maneuvers,
-        route=RouteArrays(
-            np.array(route.points),
-            np.array(route.heading),
-            np.stack([np.cos(route.heading), np.sin(route.heading)], axis=-1),
-            np.array(route.limit),
-            SPACING,
-        ),
+        route=route_arrays(route),
         goals=goal_arrays(local, route, tick=tick),
-        blocks=block_arrays(local, route, vehicle),
-        weights=_weights(scene, vehicle),
+        obstacles=static_obstacles(local, route, vehicle),
+        weights=weights_of(scene, vehicle),
     )
     return RoadPlanner(
         scene=scene,
@@ -296,108 +284,5 @@ def road_planner(
         route=route,
         library=library,
         horizon=horizon,
-        memory=_memory(settings, library),
-    )
-
-
-def goal_arrays(scene: RoadScene, route: Route, *, tick: float) -> GoalArrays:
-    """Goals for the kernels; times as ticks [s] from the start of the scene."""
-    rings = [outlines_of(goal.places or ()) for goal in scene.goals]
-    flat = [ring for group in rings for ring in group]
-    start = scene.start.time
-    ticks, headings, speeds = [], [], []
-    for goal in scene.goals:
-        end = (goal.time[1] - start) / tick
-        ticks.append(
-            (
-                max(math.ceil((goal.time[0] - start) / tick - 1e-6), 0),
-                math.floor(end + 1e-6) if math.isfinite(end) else FAR_TICK,
-            )
-        )
-        low, high = goal.heading or (0.0, 2.0 * math.pi)
-        headings.append((low, min(high - low, 2.0 * math.pi)))
-        speeds.append(goal.speed or (-math.inf, math.inf))
-    return GoalArrays(
-        corner=np.concatenate(flat) if flat else np.zeros((0, 2)),
-        ring=np.cumsum([0, *(len(ring) for ring in flat)]).astype(np.int64),
-        place=np.cumsum([0, *(len(group) for group in rings)]).astype(np.int64),
-        anywhere=np.array([goal.places is None for goal in scene.goals]),
-        heading=np.array(headings),
-        speed=np.array(speeds),
-        tick=np.array(ticks, dtype=np.int64),
-        every=round(scene.step / tick),
-        way=np.array(route.ways),
-        turned=np.array(
-            [_turned(goal, way, route) for goal, way in zip(scene.goals, route.ways, strict=True)]
-        ),
-    )
-
-
-def block_arrays(scene: RoadScene, route: Route, vehicle: RoadVehicle) -> Blocks:
-    """What stands on the route, grown by the vehicle's half length and half width."""
-    import shapely
-
-    area = drivable_area(scene.lanelets)
-    ways, passable = [], []
-    for one in scene.traffic:
-        if one.motion is not None:
-            continue
-        low_s, high_s, low_d, high_d = extent_on(outlines_of((one.shape,)), route)
-        way = np.array([low_s, high_s, low_d, high_d]) + np.array(
-            [-0.5 * vehicle.length, 0.5 * vehicle.length, -0.5 * vehicle.width, 0.5 * vehicle.width]
-        )
-        middle = min(max(round(0.5 * (low_s + high_s) / SPACING), 0), len(route.points) - 1)
-        aside = np.array([-np.sin(route.heading[middle]), np.cos(route.heading[middle])])
-        ways.append(way)
-        beside = [
-            shapely.Point(route.points[middle] + offset * aside).buffer(0.5 * vehicle.width)
-            for offset in way[2:]
-        ]
-        passable.append([bool(area.covers(place)) for place in beside])
-    return Blocks(
-        way=np.array(ways).reshape(-1, 4), passable=np.array(passable, dtype=bool).reshape(-1, 2)
-    )
-
-
-def _turned(goal: GoalRegion, way: Array, route: Route) -> tuple[float, float]:
-    """Headings of a goal, seen from the route's direction in the middle of the goal."""
-    if goal.heading is None or not np.isfinite(way).all():
-        return -math.inf, math.inf
-    low, high = goal.heading
-    middle = round(0.5 * (way[0] + way[1]) / SPACING)
-    ahead = float(route.heading[min(max(middle, 0), len(route.heading) - 1)])
-    center = math.remainder(0.5 * (low + high) - ahead, 2.0 * math.pi)
-    return center - 0.5 * (high - low), center + 0.5 * (high - low)
-
-
-def _weights(scene: RoadScene, vehicle: RoadVehicle) -> Weights:
-    placed = any(goal.places is not None for goal in scene.goals)
-    return Weights(
-        offset=0.05,
-        turned=1.0,
-        hurry=0.2,
-        pace=0.02,
-        progress=math.nan if placed else scene.start.speed,
-        ahead=0.05,
-        aside=0.05,
-        lateral=vehicle.lateral,
-        braking=vehicle.model.max_acceleration,
-        gain=vehicle.engine,
-    )
-
-
-def _memory(settings: RoadSettings, library: RoadLibrary) -> HorizonArrays:
-    limits = library.limits
-    levels = round(settings.horizon_s / limits.tick) // limits.ticks + 1
-    nodes = CHILDREN * settings.width * levels + 1024
-    return HorizonArrays(
-        pose=np.empty((nodes, 4)),
-        links=np.empty((nodes, 4), dtype=np.int64),
-        kept=np.empty((levels, settings.width), dtype=np.int64),
-        counts=np.zeros(levels, dtype=np.int64),
-        strips=np.zeros(STRIPS, dtype=np.int64),
-        cells=np.empty(1 << (64 * settings.width).bit_length(), dtype=np.int64),
-        heap_key=np.empty(nodes),
-        heap_node=np.empty(nodes, dtype=np.int64),
-        state=np.zeros(4, dtype=np.int64),
+        room=beam_arrays(settings, library),
     )
