@@ -45,7 +45,7 @@ class Limits(NamedTuple):
     engine: float  # [m/s^2] up to `power_speed`, less beyond it
     power_speed: float  # [m/s]
     left_out: tuple[float, float]  # [m/s] between these, changes of speed are left out
-    fastest_change: int  # steps of the speed grid that a maneuver spans at most
+    most_steps: int  # of the speed grid that a maneuver spans
     weight_along: float  # per (m/s^2)^2 s
     weight_across: float  # per (m/s^2)^2 s
     weight_jerk: float  # per (m/s^3)^2 s, across
@@ -133,8 +133,8 @@ def maneuvers_between(limits, trims, most):
     for source in range(count):
         while source >= trims.first[step + 1]:
             step += 1
-        low = trims.first[max(0, step - limits.fastest_change)]
-        high = trims.first[min(speeds, step + limits.fastest_change + 1)]
+        low = trims.first[max(0, step - limits.most_steps)]
+        high = trims.first[min(speeds, step + limits.most_steps + 1)]
         speed, steering = trims.speed[source], trims.steering[source]
         if n + high - low > most:
             break

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from maneuver_automaton._arrays import Array
@@ -32,51 +34,77 @@ def plan_of_controls(
     # Equal to the last bit: controls that nearly are may change little by little over a long drive.
     new = (np.diff(controls, axis=0) != 0.0).any(axis=1)
     begins = np.flatnonzero(np.append(True, new)) if len(controls) else np.zeros(0, dtype=np.intp)
-    ticks = np.diff(np.append(begins, len(controls)))
-    held = controls[begins]
-    gained = tick * np.cumsum(ticks[:, None] * held, axis=0)
-    states = state[3:] + np.concatenate([np.zeros((1, 2)), gained])
-    trims = [_trim(model, one) for one in states]
-    word, durations, maneuvers = [trims[0]], [0.0], list[Maneuver]()
-    courses = (
-        drive_all(
-            model, states[:-1], control=held[:, None], durations=tick * ticks[:, None].astype(float)
-        )
-        if len(held)
-        else ()
-    )
-    for control, lasts, target, course in zip(held, tick * ticks, trims[1:], courses, strict=True):
-        if not control.any():
-            durations[-1] += float(lasts)
-            continue
-        maneuvers.append(
-            Maneuver(
-                name=f"acceleration {control[0]:.4g}, steering rate {control[1]:.3g}",
-                source=word[-1].name,
-                target=target.name,
-                displacement=course.pose[-1],
-                duration=float(course.time[-1]),
-                course=course,
-            )
-        )
-        word.append(target)
-        durations.append(0.0)
+    held, durations = controls[begins], tick * np.diff(np.append(begins, len(controls)))
+    gained = np.cumsum(durations[:, None] * held, axis=0)
+    trims = [trim_of(model, one) for one in state[3:] + np.concatenate([np.zeros((1, 2)), gained])]
+    changing = (held != 0.0).any(axis=1)
+    word, coasting = [trims[0]], [0.0]
+    for target, duration, changes in zip(
+        trims[1:], durations.tolist(), changing.tolist(), strict=True
+    ):
+        if changes:
+            word.append(target)
+            coasting.append(0.0)
+        else:
+            coasting[-1] += duration
     return Plan(
-        state[:3], word, durations=durations, maneuvers=tuple(maneuvers), start_time=start_time
+        state[:3],
+        word,
+        durations=coasting,
+        maneuvers=ramps(
+            model, word[:-1], word[1:], control=held[changing], durations=durations[changing]
+        ),
+        start_time=start_time,
     )
 
 
-def _trim(model: SecondOrderCar, reduced_state: Array) -> Trim:
-    """The trim of a car that holds a speed and a steering angle (2,)."""
+def ramps(
+    model: SecondOrderCar,
+    sources: Sequence[Trim],
+    targets: Sequence[Trim],
+    *,
+    control: Array,
+    durations: Array,
+    max_step_m: float = 0.05,
+) -> tuple[Maneuver, ...]:
+    """Maneuvers from trim to trim (n,) under controls (n, 2) that are held for durations (n,) [s].
+
+    Samples of their courses are exact, as `drive_all` says, and at most `max_step_m` [m] apart.
+    """
+    if not len(sources):
+        return ()
+    courses = drive_all(
+        model,
+        [source.reduced_state for source in sources],
+        control=control[:, None],
+        durations=durations[:, None],
+        max_step_m=max_step_m,
+    )
+    return tuple(
+        Maneuver(
+            name=f"acceleration {along:.4g}, steering rate {rate:.3g}",
+            source=source.name,
+            target=target.name,
+            displacement=course.pose[-1],
+            duration=float(course.time[-1]),
+            course=course,
+        )
+        for (along, rate), source, target, course in zip(
+            control.tolist(), sources, targets, courses, strict=True
+        )
+    )
+
+
+def trim_of(model: SecondOrderCar, reduced_state: Array) -> Trim:
+    """The trim that holds a speed [m/s] and a steering angle [rad] (2,).
+
+    Its name says both; what rounding left of a zero is none.
+    """
+    speed, steering = (np.round(reduced_state, 9) + 0.0).tolist()
     control = np.zeros(2)
     return Trim(
-        name=trim_name(*reduced_state.tolist()),
+        name=f"speed {speed:.4g}, steering {steering:.3g}",
         body_velocity=model.body_velocity(reduced_state, control),
         control=control,
         reduced_state=reduced_state,
     )
-
-
-def trim_name(speed: float, steering: float) -> str:
-    """Name of the trim of a speed [m/s] and a steering angle [rad]; 0 is 0 in spite of rounding."""
-    return f"speed {round(speed, 9) + 0.0:.4g}, steering {round(steering, 9) + 0.0:.3g}"
