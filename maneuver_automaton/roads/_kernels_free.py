@@ -1,9 +1,9 @@
 """Proof that a motion on the road is free, tick by tick.
 
-Land beside the road is a `World` of static obstacles, and the proof along a tick that of the
-collision room, `free_time`, for the constant twist between its ends. The car leaves that twist by
-at most an eighth of its acceleration times the square of the tick (9 m/s^2 and 0.1 s: 11 mm),
-which is less than the distance that is kept. Other road users: see `_kernels_traffic`.
+Land beside the road and static obstacles on it are a `World`, and the proof along a tick that of
+the collision room, `free_time`, for the constant twist between its ends. The car leaves that twist
+by at most an eighth of its acceleration times the square of the tick (9 m/s^2 and 0.1 s: 11 mm),
+which is less than the distance that is kept. Moving obstacles: see `_kernels_traffic`.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ class Clearing(NamedTuple):
     """All that a motion has to stay clear of, and the body that moves."""
 
     car: CarArrays
-    body: Body  # the same rectangle, for `land`
-    land: WorldArrays  # what is no road, as static obstacles
-    keep: float  # [m] kept from the land all the way
+    body: Body  # the same rectangle, for `static`
+    static: WorldArrays  # land beside the road, and static obstacles on it
+    keep: float  # [m] kept from them all the way
     margin: float  # [m] besides, where the motion is looked at: its edge is simplified by as much
     traffic: TrafficArrays
     tick: float  # [s]
 
 
 @bare_inner_kernel
-def on_road(clearing, x_0, y_0, h_0, x_1, y_1, h_1):
-    """Whether the body stays on the road along the constant twist between two poses."""
+def clear_of_static(clearing, x_0, y_0, h_0, x_1, y_1, h_1):
+    """Whether the body meets no static obstacle along the constant twist between two poses."""
     car, tick = clearing.car, clearing.tick
     c, s = math.cos(h_0), math.sin(h_0)
     d_x, d_y = c * (x_1 - x_0) + s * (y_1 - y_0), c * (y_1 - y_0) - s * (x_1 - x_0)
@@ -59,7 +59,7 @@ def on_road(clearing, x_0, y_0, h_0, x_1, y_1, h_1):
         abs(v_x) + abs(turn_rate) * car.half_width, abs(v_y) + abs(turn_rate) * front
     )
     lasts, _ = free_time(
-        clearing.land,
+        clearing.static,
         clearing.body,
         x_0,
         y_0,
@@ -79,8 +79,8 @@ def on_road(clearing, x_0, y_0, h_0, x_1, y_1, h_1):
 @bare_inner_kernel
 def free_tick(clearing, x_0, y_0, h_0, x_1, y_1, h_1, tick):
     """Whether the motion between two poses of the rear axle, from `tick` to the next, is free."""
-    # The road first: its proof costs the same however many drive on it.
-    if not on_road(clearing, x_0, y_0, h_0, x_1, y_1, h_1):
+    # Static obstacles first: their proof costs the same however much moves on the road.
+    if not clear_of_static(clearing, x_0, y_0, h_0, x_1, y_1, h_1):
         return False
     car = clearing.car
     m_0x, m_0y = x_0 + car.ahead * math.cos(h_0), y_0 + car.ahead * math.sin(h_0)

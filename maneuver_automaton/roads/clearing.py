@@ -1,4 +1,4 @@
-"""What a drive has to stay clear of, laid out once for the kernels: land, traffic, body."""
+"""What a drive has to stay clear of, laid out once for the kernels: a world, and traffic."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.collision import Box, Disc, Obstacle, Shape
+from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Shape
 from maneuver_automaton.collision.convex import convex_pieces
+from maneuver_automaton.collision.outline import outlines
 from maneuver_automaton.collision.world import world_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads._kernels_free import CarArrays, Clearing
@@ -25,7 +26,6 @@ STRIP = 6.0  # [m] of land along the edge: more than the car is wide or moves in
 SNUG = 0.1  # [m] by which a rectangle may reach beyond a piece of a polygon
 TINY = 1e-9  # [m] of an edge that has no direction
 SHORTEST = 0.4  # [m] of a piece that is not cut any more
-ALWAYS = 1 << 40  # a tick that never comes
 
 
 def clearing_of(
@@ -51,8 +51,16 @@ def clearing_of(
     """
     # Where the vehicle can be until the end, and nothing of a map beyond.
     far = vehicle.model.max_speed * tick * last_tick + vehicle.length
+    # A world keeps one distance to all, so static obstacles are grown by what they need besides.
+    more = max(off_traffic - off_edge, 0.0)
+    still = [
+        grown for one in scene.traffic if one.motion is None for grown in _grown(one.shape, more)
+    ]
     world = world_of(
-        land_around(scene, far=far), (vehicle.footprint,), (0.0, 0.0, 0.0), keep=off_edge
+        (*land_around(scene, far=far), *still),
+        (vehicle.footprint,),
+        (0.0, 0.0, 0.0),
+        keep=off_edge,
     )
     return Clearing(
         car=CarArrays(
@@ -64,7 +72,7 @@ def clearing_of(
             braking=vehicle.model.max_acceleration,
         ),
         body=world.body,
-        land=world.arrays,
+        static=world.arrays,
         keep=off_edge,
         margin=SIMPLER,
         traffic=traffic_arrays(
@@ -93,6 +101,17 @@ def land_around(scene: RoadScene, *, far: float) -> tuple[Obstacle, ...]:
     return obstacles_in(strip)
 
 
+def _grown(shape: Shape, by: float) -> tuple[Obstacle, ...]:
+    """Static obstacles that hold all within a distance [m] of a shape."""
+    import shapely
+
+    if isinstance(shape, Disc):
+        return (Obstacle(Disc(shape.radius + by, shape.center)),)
+    outline = shapely.union_all(outlines(shape))
+    # Corners become four chords of a quarter circle each, which is that much too small in between.
+    return obstacles_in(shapely.buffer(outline, by / math.cos(math.pi / 16.0), quad_segs=4))
+
+
 def _meets(lanelet: Lanelet, box: Any) -> bool:
     low_x, low_y, high_x, high_y = box.bounds
     low, high = lanelet.ring.min(axis=0), lanelet.ring.max(axis=0)
@@ -102,29 +121,29 @@ def _meets(lanelet: Lanelet, box: Any) -> bool:
 def traffic_arrays(
     users: Sequence[Obstacle], *, start: float, tick: float, last_tick: int, margin: float
 ) -> TrafficArrays:
-    """Road users as rectangles at the ticks from `start` [s] on.
+    """Moving obstacles as rectangles at the ticks from `start` [s] on; those without motion apart.
 
     A rectangle is as much larger as its owner leaves the straight motion between two ticks.
     """
     times: Array = start + tick * np.arange(last_tick + 2, dtype=np.float64)
-    pieces = [(user, place) for user in users for place in rectangles_around(user.shape)]
+    pieces = [
+        (motion, place)
+        for user in users
+        if (motion := user.motion) is not None
+        for place in rectangles_around(user.shape)
+    ]
     poses = np.zeros((len(pieces), len(times), 3))
-    first = np.zeros(len(pieces), dtype=np.int64)
-    last = np.full(len(pieces), ALWAYS, dtype=np.int64)
+    first, last = np.zeros((2, len(pieces)), dtype=np.int64)
     half = np.zeros((len(pieces), 2))
-    for m, (user, (center, turn, size)) in enumerate(pieces):
-        half[m] = 0.5 * size
+    for m, (motion, (center, turn, size)) in enumerate(pieces):
         middle = SE2(np.append(center, turn))
-        if user.motion is None:
-            poses[m] = middle.pose
-            continue
         # First and last tick at which it is there: it counts from the tick before to that after.
-        first[m] = math.ceil((user.motion.time[0] - start) / tick - 1e-6)
-        last[m] = math.floor((user.motion.time[-1] - start) / tick + 1e-6)
-        recorded = (SE2(user.motion.at(times)) @ middle).pose
+        first[m] = math.ceil((motion.time[0] - start) / tick - 1e-6)
+        last[m] = math.floor((motion.time[-1] - start) / tick + 1e-6)
+        recorded = (SE2(motion.at(times)) @ middle).pose
         poses[m] = recorded
         poses[m, :, 2] = unwrapped(recorded[:, 2].tolist())
-        half[m] += _off_line(user, middle, times, poses[m], float(np.hypot(*size)))
+        half[m] = 0.5 * size + _off_line(motion, middle, times, poses[m], float(np.hypot(*size)))
     return TrafficArrays(
         pose=poses,
         first=first,
@@ -194,14 +213,12 @@ def _smallest(ring: Array) -> Rectangle:
     return center, math.atan2(long[1], long[0]), np.sort(sizes[k])[::-1].copy()
 
 
-def _off_line(user: Obstacle, middle: SE2, times: Array, poses: Array, size: float) -> float:
-    """How far a user's recorded motion leaves that through its poses at the ticks [m]."""
-    assert user.motion is not None
-    between = (user.motion.time > times[0]) & (user.motion.time < times[-1])
-    at = user.motion.time[between]
+def _off_line(motion: Motion, middle: SE2, times: Array, poses: Array, size: float) -> float:
+    """How far a recorded motion leaves that through its poses at the ticks [m]."""
+    at = motion.time[(motion.time > times[0]) & (motion.time < times[-1])]
     if not at.size:
         return 0.0
-    true = (SE2(user.motion.at(at)) @ middle).pose
+    true = (SE2(motion.at(at)) @ middle).pose
     line = np.stack([np.interp(at, times, poses[:, k]) for k in range(3)], axis=-1)
     turned = np.remainder(true[:, 2] - line[:, 2] + np.pi, 2 * np.pi) - np.pi
     return float((np.hypot(*(true[:, :2] - line[:, :2]).T) + 0.5 * size * np.abs(turned)).max())

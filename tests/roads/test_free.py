@@ -139,7 +139,8 @@ def test_motion_of_a_tick_is_that_of_the_model(control):
     ],
 )
 def test_rectangles_cover_a_polygon_and_little_more(corners):
-    scene = replace(SCENE, traffic=(Obstacle(Polygon(corners), name="one"),))
+    there = Motion([0.0, 0.5], np.zeros((2, 3)))
+    scene = replace(SCENE, traffic=(Obstacle(Polygon(corners), motion=there, name="one"),))
     found = clearing_of(
         scene, VEHICLE, tick=TICK, last_tick=5, off_edge=0.03, off_traffic=0.05
     ).traffic
@@ -153,11 +154,33 @@ def test_rectangles_cover_a_polygon_and_little_more(corners):
     assert shapely.distance(outline, shape).max() < 0.35
 
 
+@pytest.mark.parametrize(
+    "shape",
+    [Disc(0.5, [9.0, 0.0]), Box([2.0, 1.0], [9.0, 0.0], 0.4), Polygon([[8, 0], [9, -1], [9, 1]])],
+)
+@pytest.mark.parametrize("off_traffic", [0.05, 0.4])
+def test_static_obstacles_are_kept_away_from(shape, off_traffic):
+    scene = replace(SCENE, traffic=(Obstacle(shape, name="one"),))
+    found = clearing_of(
+        scene, VEHICLE, tick=TICK, last_tick=5, off_edge=0.03, off_traffic=off_traffic
+    )
+    assert not found.traffic.first.size
+    outline = shapely.Polygon(shape.corners) if not isinstance(shape, Disc) else (
+        shapely.Point(shape.center).buffer(shape.radius, quad_segs=64)
+    )  # fmt: skip
+    for x in np.linspace(1.0, 6.0, 51):
+        states = np.array([[x, 0.0, 0.0, 0.0, 0.0]] * 2)
+        body = shapely.Polygon(SE2(states[0, :3]).act(VEHICLE.footprint.corners))
+        apart = body.distance(outline)
+        free = _kernels_free.free_ticks(found, states, 0)
+        assert free == (apart > off_traffic) or abs(apart - off_traffic) < 0.02
+
+
 def land_of(*lanelets, last_tick=60):
     scene = replace(SCENE, lanelets=lanelets, traffic=())
     return clearing_of(
         scene, VEHICLE, tick=TICK, last_tick=last_tick, off_edge=0.03, off_traffic=0.05
-    ).land
+    ).static
 
 
 def test_the_land_is_as_large_as_the_road_in_use():
