@@ -140,12 +140,11 @@ def _draw(
         return
     from maneuver_automaton import plotting
 
-    driven = plan.sample()
     if plot:
-        plotting.save_road_figure(scene, vehicle, driven, files[0])
+        plotting.save_road_figure(scene, vehicle, plan, files[0])
     if animate:
         for file in files[1]:
-            plotting.save_road_animation(scene, vehicle, driven, file)
+            plotting.save_road_animation(scene, vehicle, plan, file)
 
 
 def _written(write: Callable[[], None], out: Path) -> None:

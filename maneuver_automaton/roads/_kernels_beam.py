@@ -4,7 +4,7 @@ All maneuvers last equally long, so the nodes of a level share a time, and a tab
 and strips serves a whole level. From each level only the best go on, by cost and cost-to-go, no two
 of them in one cell of place, heading and speed. Maneuvers of the first level start at the vehicle's
 own state, which need not be a trim. An edge is proven free when its node is about to be kept, not
-when it is made: of some sixty children of a node one or two are ever looked at.
+when it is made: of some sixty children of a node one or two are ever popped.
 """
 
 from __future__ import annotations
@@ -73,8 +73,9 @@ class BeamArrays(NamedTuple):
     # reached, the plan is to one of the last of them.
     kept: np.ndarray  # (levels, W) nodes
     counts: np.ndarray  # (levels,) how many of them
-    # Of the level at hand. Strips keep the beam from driving all abreast of one obstacle's side;
-    # cells are a hash table with open addresses, a power of two so that a mask finds the slot.
+    # Of the level at hand. Strips keep nodes on either side of an obstacle in the beam, where the
+    # cheaper side alone would fill it. Cells are a hash table with open addressing, its size a
+    # power of two, so that a mask finds the slot.
     strips: np.ndarray  # (n,) how many in each strip, the first and last without an end
     cells: np.ndarray  # (4 W,) keys of cells that are taken, EMPTY for none
     # A binary heap of the level at hand: cost plus weighted cost-to-go, and the node.
@@ -86,7 +87,7 @@ class BeamArrays(NamedTuple):
 
 
 class Horizon(NamedTuple):
-    """All that stays the same from step to step."""
+    """Everything that stays the same from step to step."""
 
     clearing: Clearing
     limits: Limits
@@ -147,7 +148,7 @@ def add_children(task, horizon, search, node, maneuvers, low, high, tick):
         m_x, m_y = n_x + ahead * math.cos(n_heading), n_y + ahead * math.sin(n_heading)
         trim = maneuvers.target[e]
         speed = horizon.trims.speed[trim]
-        # The parent's nearest point and the way driven: the search downhill takes a step or two.
+        # The parent's nearest point and the distance driven: the descent takes a step or two.
         guess = links[node, NEAR] + int(d_x / horizon.route.spacing)
         near = nearest_point(horizon.route, m_x, m_y, guess)
         station, offset = on_route(horizon.route, m_x, m_y, near)
@@ -331,7 +332,7 @@ def search_beam(task, horizon, first, search, shares, controls):
                 kept += 1
         search.counts[level] = kept
         state[KEPT] += kept
-        state[HEAP] = 0  # what is left of the level is dropped: a beam
+        state[HEAP] = 0  # a beam: the other nodes of the level are dropped
         if level + 1 == levels:
             break
         for k in range(kept):

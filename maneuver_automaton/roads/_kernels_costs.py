@@ -1,4 +1,4 @@
-"""What a drive costs, and an estimate of what the rest of it will cost.
+"""Cost of a drive, and an estimate of the cost-to-go.
 
 Stage cost: offset and heading from the route, speed beyond the limit, pace, comfort. Cost-to-go:
 constant accelerations along the route and across it that lead to the goal in the time left. It is
@@ -16,7 +16,7 @@ from maneuver_automaton._compile import bare_inner_kernel, kernel
 from maneuver_automaton.groups._kernels import nearest_turn
 from maneuver_automaton.roads._kernels_route import nearest_of_all, nearest_point, on_route
 
-IMPOSSIBLE = 1e4  # cost of what the car's limits do not allow any more, far above any stage cost
+IMPOSSIBLE = 1e4  # cost beyond the car's limits, far above any stage cost
 
 
 class Weights(NamedTuple):
@@ -27,11 +27,12 @@ class Weights(NamedTuple):
     hurry: float  # per (m/s)^2 beyond the speed limit
     pace: float  # per (m/s)^2 from the pace
     progress: float  # [m/s] the pace, nan where the goal sets it
-    ahead: float  # per (m/s^2)^2 s, what is still to be sped up or slowed down
-    aside: float  # per (m/s^2)^2 s, what is still to be moved sideways
-    lateral: float  # [m/s^2] that may be counted on
-    braking: float  # [m/s^2]
-    gain: float  # [m/s^2]
+    # Of the cost-to-go: prices of the accelerations that are still needed, and their limits.
+    ahead: float  # per (m/s^2)^2 s, along the route
+    aside: float  # per (m/s^2)^2 s, across it
+    lateral: float  # [m/s^2] limit across
+    braking: float  # [m/s^2] limit of slowing down
+    gain: float  # [m/s^2] limit of speeding up
 
 
 class StaticObstacles(NamedTuple):
@@ -78,7 +79,7 @@ def along_to_goal(weights, goals, g, station, speed, least, most):
         if needed < 0.0 and speed + needed * time < 0.0:
             needed = -0.5 * speed * speed / max(distance, 1e-3)  # it has to stop before
         cost += weights.ahead * needed * needed * time
-        # The small share keeps a step between what is just possible and what is not.
+        # The small share keeps a step between the last possible value and the first impossible one.
         if needed > weights.gain:
             cost += IMPOSSIBLE * (needed / weights.gain - 1.0 + 0.01)
         elif needed < -weights.braking:
@@ -100,7 +101,7 @@ def sideways(weights, acceleration, time):
 
 @bare_inner_kernel
 def cost_to_goal(weights, goals, g, station, offset, turned, speed, least, most):
-    """Estimate of what it costs to be at goal `g` between two times from now [s].
+    """Estimate of the cost to be at goal `g` between two times from now [s].
 
     Constant accelerations along the route and across it that lead there in the time that suits.
     """
@@ -126,10 +127,10 @@ def cost_to_goal(weights, goals, g, station, offset, turned, speed, least, most)
 
 @bare_inner_kernel
 def cost_past_obstacles(weights, obstacles, station, offset, turned, speed, goal, most):
-    """Estimate of what it costs to get past static obstacles on the way to a station.
+    """Estimate of the cost to get past static obstacles before a station.
 
     Each is taken alone: the vehicle is beside it when it gets there, on the nearer side with road,
-    and has to be back at the goal's offsets in what time is left then. `goal` is a row (4,) of
+    and has to be back at the goal's offsets in the time left then. `goal` is a row (4,) of
     `GoalArrays.extent`.
     """
     cost = 0.0
@@ -163,7 +164,7 @@ def cost_past_obstacles(weights, obstacles, station, offset, turned, speed, goal
 
 @bare_inner_kernel
 def cost_to_go(horizon, station, offset, turned, speed, tick):
-    """Estimate of what the rest costs, to the goal that is cheapest to reach."""
+    """Estimate of the cost-to-go, to the goal that is cheapest to reach."""
     goals, weights = horizon.goals, horizon.weights
     best = math.inf
     for g in range(goals.tick.shape[0]):

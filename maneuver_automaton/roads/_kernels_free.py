@@ -30,7 +30,7 @@ class CarArrays(NamedTuple):
 
 
 class Clearing(NamedTuple):
-    """All that a motion has to stay clear of, and the body that moves."""
+    """All obstacles, the distances kept from them, and the body that moves."""
 
     car: CarArrays
     body: Body  # the same rectangle, for `static`

@@ -104,7 +104,7 @@ def clear_of_traffic(car, traffic, x_0, y_0, h_0, x_1, y_1, h_1, tick):
             continue
         d_0x, d_0y = traffic.pose[m, k_0, 0] - x_0, traffic.pose[m, k_0, 1] - y_0
         d_1x, d_1y = traffic.pose[m, k_1, 0] - x_1, traffic.pose[m, k_1, 1] - y_1
-        # Discs around both, from their distance half way: what is far away costs no cosine.
+        # Discs around both, from their distance half way: an obstacle far away costs no cosine.
         swing = 0.5 * math.hypot(d_1x - d_0x, d_1y - d_0y)
         away = math.hypot(0.5 * (d_0x + d_1x), 0.5 * (d_0y + d_1y)) - swing
         if away > car.reach + traffic.reach[m] + traffic.margin:

@@ -71,7 +71,7 @@ def drive_scene(
 ) -> RoadDrive:
     """Close the loop until a goal is reached, or its time is over.
 
-    What the planner knows of the others is their recorded motion, before it happens.
+    The planner knows the recorded motion of all moving obstacles before it happens.
 
     Parameters
     ----------
@@ -91,22 +91,8 @@ def drive_scene(
     done: list[RoadStep] = []
     tick = 0
     while not planner.at_goal(state, tick=tick) and tick < limit:
-        wall, cpu = time.perf_counter(), time.thread_time()
-        decision, replanned = planner.decide(state, tick=tick, tail=tail)
-        wall, cpu = time.perf_counter() - wall, time.thread_time() - cpu
-        done.append(
-            RoadStep(
-                number=tick,
-                time=planner.time_of(tick),
-                state=state,
-                decision=decision,
-                value=planner.price(decision),
-                applied_cost=planner.price(decision, ticks=1),
-                replanned=replanned,
-                solve_s=wall,
-                cpu_s=cpu,
-            )
-        )
+        done.append(_step(planner, state, tick=tick, tail=tail))
+        decision = done[-1].decision
         state = _driven(planner, state, decision.controls[0])
         tick, tail = tick + 1, decision.tail()
         if progress is not None:
@@ -127,6 +113,24 @@ def drive_scene(
     )
 
 
+def _step(planner: RoadPlanner, state: Array, *, tick: int, tail: RoadDecision | None) -> RoadStep:
+    """Decide once, and measure how long that takes."""
+    wall, cpu = time.perf_counter(), time.thread_time()
+    decision, replanned = planner.decide(state, tick=tick, tail=tail)
+    wall, cpu = time.perf_counter() - wall, time.thread_time() - cpu
+    return RoadStep(
+        number=tick,
+        time=planner.time_of(tick),
+        state=state,
+        decision=decision,
+        value=planner.price(decision),
+        applied_cost=planner.price(decision, ticks=1),
+        replanned=replanned,
+        solve_s=wall,
+        cpu_s=cpu,
+    )
+
+
 def _driven(planner: RoadPlanner, state: Array, control: Array) -> Array:
     """The state (5,) that a control (2,) leads to in a tick, by the model's own equations."""
     course = drive(
@@ -138,7 +142,7 @@ def _driven(planner: RoadPlanner, state: Array, control: Array) -> Array:
 
 
 def _stood(steps: Sequence[RoadStep]) -> tuple[float, float] | None:
-    """First and last time at which the vehicle stood, as there was no way on [s]."""
+    """First and last time at which the vehicle stood, as no motion was free [s]."""
     times = [step.time for step in steps if step.decision.stands]
     return (times[0], times[-1]) if times else None
 

@@ -29,7 +29,7 @@ class RoadVerdict:
 
     audit: Audit  # of the vehicle's equations and limits
     hit: tuple[str, ...]  # road users that the body touches
-    clearance_m: float  # least distance to any of them; inf if nobody was there
+    clearance_m: float  # least distance to any of them; inf without any
     edge_m: float  # least distance of the body to the edge of the road, 0 outside
 
     @property
@@ -44,7 +44,7 @@ class RoadVerdict:
 
     @property
     def clean(self) -> bool:
-        """Whether nobody was touched, the road not left, and the car could drive like this."""
+        """Whether no road user was touched, the road not left, and the model obeyed."""
         return self.audit.passed and not self.collisions and not self.off_road
 
 

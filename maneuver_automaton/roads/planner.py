@@ -86,7 +86,7 @@ class RoadPlanner:
         return self.scene.start.time + self.tick * tick
 
     def at_goal(self, state: Array, *, tick: int) -> bool:
-        """Whether a state (5,) at a tick is within a goal, by the goal's own words.
+        """Whether a state (5,) at a tick is within a goal, as `GoalRegion` says.
 
         Goals are looked at only when the scene's own clock ticks.
         """
@@ -104,7 +104,7 @@ class RoadPlanner:
         return replace(self, settings=settings, room=beam_arrays(settings, self.library))
 
     def warm(self) -> None:
-        """Compile, and touch the memory, before time counts."""
+        """Compile the kernels and touch the room, before time counts."""
         first, _ = self.decide(self.start_state, tick=0, tail=None)
         self.decide(first.states[1], tick=1, tail=first.tail())
 
@@ -137,9 +137,9 @@ class RoadPlanner:
         return new, True
 
     def search(self, state: Array, *, tick: int, narrow: bool = False) -> RoadDecision | None:
-        """A new plan from a state (5,); None if none with a way to stop was found.
+        """A new plan from a state (5,) with a fail-safe stop after it; None if none was found.
 
-        A vehicle at rest that has no way on stands, as long as that is free.
+        A vehicle at rest from which no motion is free stands, as long as standing is free.
         """
         library, settings = self.library, self.settings
         until = min(tick + round(settings.horizon_s / self.tick), self.last_tick)

@@ -1,4 +1,4 @@
-"""A scene on roads: lanelets, those who use them, and what one vehicle is to do."""
+"""A scene on roads: lanelets, road users, and the start and goals of one vehicle."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ class RoadStart:
 class RoadScene:
     """One problem of driving on roads.
 
-    Who moves is there only as long as its motion was recorded: before the first of its times and
-    after the last one it is not on the road. What has no motion stays.
+    A moving obstacle is there only as long as its motion was recorded: before the first of its
+    times and after the last one it is not on the road. A static obstacle, without motion, stays.
 
     Examples
     --------
@@ -54,7 +54,7 @@ class RoadScene:
     start: RoadStart
     goals: tuple[GoalRegion, ...]  # one of them
     traffic: tuple[Obstacle, ...] = ()
-    source: str = ""  # who made and measured it, for pictures
+    source: str = ""  # author and place of the recording, for pictures
     step: float = 0.1  # [s] of the clock that the scene was recorded with
 
     def __post_init__(self) -> None:
@@ -73,7 +73,7 @@ class RoadScene:
         return max(goal.time[1] for goal in self.goals)
 
     def present(self, time: float) -> list[Obstacle]:
-        """Who is on the road at `time` [s]."""
+        """Obstacles that are on the road at `time` [s]."""
         times = [presence_of(one) for one in self.traffic]
         return [
             one

@@ -52,6 +52,18 @@ def test_a_lane_is_changed_to_reach_the_goal(tmp_path):
     assert drive.driven.duration == pytest.approx(0.1 * len(drive.steps))
 
 
+def test_what_was_driven_passes_the_states_of_all_steps(tmp_path):
+    drive = driven(scene_of(tmp_path))
+    times = np.array([step.time for step in drive.steps])
+    states = np.array([step.state for step in drive.steps])
+    poses = drive.planner.world(states[:, :3])
+    np.testing.assert_allclose(drive.driven.pose_at(times), poses, atol=1e-4)
+    begins = drive.driven.switching_times[:-1]
+    np.testing.assert_allclose(
+        drive.driven.switching_poses[:-1], poses[np.searchsorted(times, begins - 1e-6)], atol=1e-9
+    )
+
+
 def test_it_stops_behind_what_blocks_the_road(tmp_path):
     wall = parked(3, x=40.0, y=4.0, size=(2.0, 8.0))
     drive = driven(scene_of(tmp_path, *LANES, wall, problem(goal=ANY, speed=10.0)))
