@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from maneuver_automaton._compile import bare_inner_kernel, kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.groups._kernels import compose, nearest_turn
 from maneuver_automaton.roads._kernels_costs import (
     StaticObstacles,
@@ -292,7 +292,7 @@ def note_goal(task, horizon, search, first, node, tick, shares, controls):
         search.reached[row, TICK] = tick
 
 
-@kernel
+@bare_kernel
 def search_beam(task, horizon, first, search, shares, controls):
     """Search, level by level, for the cheapest plan to a goal with a stop after it.
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from maneuver_automaton._compile import bare_inner_kernel, kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.groups._kernels import nearest_turn
 from maneuver_automaton.roads._kernels_route import nearest_of_all, nearest_point, on_route
 
@@ -181,7 +181,7 @@ def cost_to_go(horizon, station, offset, turned, speed, tick):
     return best
 
 
-@kernel
+@bare_kernel
 def price(horizon, states, controls):
     """Cost (stage and effort) of a motion with states (n + 1, 5) and controls (n, 2)."""
     limits, ahead = horizon.limits, horizon.clearing.car.ahead

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from maneuver_automaton._compile import bare_inner_kernel, kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.collision._kernels_advancement import free_time
 from maneuver_automaton.collision.body import Body
 from maneuver_automaton.collision.world import WorldArrays
@@ -88,7 +88,7 @@ def free_tick(clearing, x_0, y_0, h_0, x_1, y_1, h_1, tick):
     return clear_of_traffic(car, clearing.traffic, m_0x, m_0y, h_0, m_1x, m_1y, h_1, tick)
 
 
-@kernel
+@bare_kernel
 def free_ticks(clearing, states, tick):
     """How many ticks of a motion with states (n + 1, 5) at ticks from `tick` on are free."""
     for k in range(states.shape[0] - 1):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from maneuver_automaton._compile import bare_inner_kernel, kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 
 
 class GoalArrays(NamedTuple):
@@ -65,7 +65,7 @@ def goal_at(horizon, x, y, heading, speed, tick):
     return -1
 
 
-@kernel
+@bare_kernel
 def first_goal(horizon, states, tick):
     """First of the states (n, 5) at ticks from `tick` on that meets a goal, -1 if none does."""
     for k in range(states.shape[0]):
