@@ -10,10 +10,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.same_motion import is_new
+from maneuver_automaton.automaton.same_motion import UNFINISHED, is_new
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.checking import check_plan, load_checks
@@ -41,8 +39,6 @@ FOR_THE_BEST = 0.6  # share of what is left that the best plan gets where altern
 FREE_WORDS = 4  # words of free space that are looked at for every alternative
 FREE_WORDS_SHARE = 0.3  # of the time that is left for alternatives
 MOST_DETOURS = 8  # known ways beside which others are looked for
-UNFINISHED_M = 0.02  # [m] per metre of way that plans of one motion differ by: none is converged
-UNFINISHED_RAD = 0.3  # [rad] the same for headings
 CHEAPER = 1e-7  # share of a cost that closing the end of a plan may change it by
 REJECTED = 8  # plans in a row that the checks may refuse before it is given up
 
@@ -274,15 +270,9 @@ def _detours(progress: _Progress, best: Word, most: int) -> Iterator[_Candidate]
                     max_expansions=left,
                 ).word
             plan = plan_of_word(query, word)
-            if _differs(plan, known):
+            if is_new(plan, known, UNFINISHED):
                 known.append(plan)
                 yield _candidate(query, word)
-
-
-def _differs(plan: Plan, known: list[Plan]) -> bool:
-    """Whether a plan is another motion than those known, which need not be converged either."""
-    way = float(np.hypot(*np.diff(plan.switching_poses[:, :2], axis=0).T).sum())
-    return is_new(plan, known, tolerance_m=UNFINISHED_M * way, tolerance_rad=UNFINISHED_RAD)
 
 
 def _checked(progress: _Progress, candidates: list[_Candidate], alternatives: int) -> _Chosen:
@@ -296,7 +286,7 @@ def _checked(progress: _Progress, candidates: list[_Candidate], alternatives: in
         if chosen.rejected >= REJECTED and not chosen.plans:
             break
         plan, index = candidate.plan(), candidate.goal_index
-        if not _differs(plan, [one.plan for one in chosen.plans]):
+        if not is_new(plan, (one.plan for one in chosen.plans), UNFINISHED):
             continue
         checked = check_plan(problem, plan, problem.goals[index])
         if checked.audit is not None and checked.passed:

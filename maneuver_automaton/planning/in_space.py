@@ -16,7 +16,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.same_motion import is_new
+from maneuver_automaton.automaton.same_motion import UNFINISHED, is_new
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.checking import check_plan, load_checks
 from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
@@ -35,8 +35,6 @@ WORDS = 24  # of free space that are looked at, for all goals together
 FEWEST_WORDS = 2  # for each goal
 WORDS_SHARE = 0.2  # of the time that they may take
 HEADINGS = 16  # that are aimed at where the goal's heading is free
-DIFFERENT_M = 0.02  # [m] per metre of way by which alternatives differ at least
-DIFFERENT_RAD = 0.3  # [rad] the same for headings
 
 
 def climbs_among_obstacles(problem: Problem) -> bool:
@@ -83,10 +81,7 @@ def plan_in_space(
     kept: list[Accepted] = []
     for one in sorted(work.accepted, key=lambda one: one.cost):
         known = [other.plan for other in kept]
-        way = float(np.hypot(*np.diff(one.plan.switching_poses[:, :2], axis=0).T).sum())
-        if len(kept) <= alternatives and is_new(
-            one.plan, known, tolerance_m=DIFFERENT_M * way, tolerance_rad=DIFFERENT_RAD
-        ):
+        if len(kept) <= alternatives and is_new(one.plan, known, UNFINISHED):
             kept.append(one)
     return found_plans(
         problem,

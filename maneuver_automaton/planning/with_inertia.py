@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.same_motion import POLISHED, same_motion
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.among_obstacles import library_table
@@ -58,8 +59,6 @@ AT_ONCE = Patience(attempts=0, passes=0)
 EXPANSIONS_AN_ITERATION = 4  # of the lattice, in place of one iteration of polishing
 WAITS = 9  # at rest, before a path is followed among obstacles that move
 OTHERS = 6  # dearer words that are looked at where bounds or obstacles may refuse the cheapest
-SAME_MOTION = 0.01  # share of their size, and of a turn, by which like motions differ at most
-INSTANTS = 33  # at which two motions are compared
 
 
 def plan_with_inertia(
@@ -185,7 +184,7 @@ class _Incumbents:
 
     def _insert(self, one: Accepted) -> None:
         """Keep a plan by its cost; of plans of the same motion only the cheapest."""
-        same = [other for other in self.accepted if _same_motion(one.plan, other.plan)]
+        same = [other for other in self.accepted if same_motion(one.plan, other.plan, POLISHED)]
         if any(other.cost <= one.cost for other in same):
             return
         self.accepted = [other for other in self.accepted if other not in same]
@@ -200,20 +199,6 @@ class _Incumbents:
             return PlanStatus.NO_PLAN, f"every plan found was refused: {self.refused}"
         reason = f"no plan within {time_limit:g} s and the expansions allowed{self.reason}"
         return PlanStatus.OUT_OF_BUDGET, reason
-
-
-def _same_motion(one: Plan, other: Plan) -> bool:
-    """Whether two plans from one start are the same motion but for trifles, of whatever pieces."""
-    longer = max(one.duration, other.duration)
-    if abs(one.duration - other.duration) > SAME_MOTION * longer:
-        return False
-    shares = np.linspace(0.0, 1.0, INSTANTS)
-    mine, theirs = (plan.pose_at(plan.start_time + shares * plan.duration) for plan in (one, other))
-    off = np.abs(mine - theirs)
-    off[:, 2] = np.abs(np.remainder(mine[:, 2] - theirs[:, 2] + np.pi, 2.0 * np.pi) - np.pi)
-    size = np.abs(mine - mine[0]).max(axis=0)
-    size[:2], size[2] = size[:2].max(), 2.0 * np.pi
-    return bool((off <= SAME_MOTION * size).all())
 
 
 def _candidates(found: _Incumbents) -> Iterator[tuple[Plan, int]]:
