@@ -103,8 +103,7 @@ class _Chosen:
 
 def _search_goals(problem: Problem, alternatives: int, began: float, deadline: float) -> _Found:
     """Search for every goal that is inside the bounds; all candidates, cheapest first."""
-    bounded = any(getattr(problem.bounds, name) is not None for name in ("x", "y", "z"))
-    sorted_out = bounded or bool(problem.obstacles or problem.zones)
+    sorted_out = not problem.bounds.are_open or bool(problem.obstacles or problem.zones)
     counts: dict[str, int] = {}
     candidates: list[_Candidate] = []
     exhausted = proven = True

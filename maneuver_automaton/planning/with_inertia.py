@@ -320,7 +320,7 @@ def _suits_words(problem: Problem) -> bool:
 def _by_words(found: _Incumbents) -> Iterator[tuple[Plan, int]]:
     """Words of trims and maneuvers that look at no obstacle: short ones, then insertion."""
     problem = found.problem
-    guarded = bool(problem.obstacles) or _is_bounded(problem)
+    guarded = bool(problem.obstacles) or not problem.bounds.are_open
     others = max(found.alternatives, OTHERS if guarded else 0)
     seen: list[Plan] = []
     for index, goal in enumerate(problem.goals):
@@ -381,10 +381,6 @@ def _stopping(problem: Problem, path: Plan, goal_index: int) -> Iterator[tuple[P
         if not what_is_hit(problem, later, goal):
             yield later, goal_index
             return
-
-
-def _is_bounded(problem: Problem) -> bool:
-    return any(getattr(problem.bounds, name) is not None for name in ("x", "y", "z"))
 
 
 def load_inertia(problem: Problem) -> None:

@@ -228,8 +228,7 @@ def _with_loose_ends(problem: Problem, plan: Plan, goal: Goal) -> list[Plan]:
 
     Where nothing is in the way the times of the whole word are the best there are.
     """
-    bounded = any(getattr(problem.bounds, name) is not None for name in ("x", "y", "z"))
-    guarded = bool(problem.obstacles or problem.zones or bounded)
+    guarded = bool(problem.obstacles or problem.zones or not problem.bounds.are_open)
     n = len(plan.trims)
     firsts = sorted({0, *range(max(0, n - MOST_LAST), n)}) if guarded else [0]
     loose = [
