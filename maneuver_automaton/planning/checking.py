@@ -20,10 +20,10 @@ from maneuver_automaton.collision.heights import Layer, layers_of
 from maneuver_automaton.collision.surroundings import surroundings_of
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Unicycle
-from maneuver_automaton.planning.conditions import broken_condition
 from maneuver_automaton.planning.zones import what_zone_forbids
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.refinement.conditions import broken_condition
 from maneuver_automaton.search.inside import stays_inside
 
 PROVEN = (1e-3, 2e-5)  # [m] a hit counts if it is one for the finer cover of round shapes too

@@ -21,7 +21,8 @@ from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.checking import check_plan, load_checks
 from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.refinement.relaxed_end import with_relaxed_end, without_nothing
+from maneuver_automaton.refinement.fitting import without_nothing
+from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
 from maneuver_automaton.search.choose import load_search, search_goal
 from maneuver_automaton.search.limits import closed_bound, why_impossible
 from maneuver_automaton.search.maneuver_lattice import maneuver_words

@@ -30,10 +30,10 @@ from maneuver_automaton.planning.polishing import (
 from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
 from maneuver_automaton.planning.tracking import Tracked, track
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.refinement.conditions import broken_condition
 from maneuver_automaton.refinement.fitting import (
     fitted_plans,
     padded,
-    why_not_fitted,
     with_best_times,
 )
 from maneuver_automaton.refinement.improve import Patience
@@ -149,7 +149,7 @@ class _Incumbents:
     def offer(self, plan: Plan, goal_index: int) -> bool:
         """Keep a plan, or one of the same word that meets the horizon, if it passes the checks."""
         goal = self.problem.goals[goal_index]
-        against = why_not_fitted(self.problem, padded(self.problem, plan))
+        against = broken_condition(self.problem, padded(self.problem, plan))
         kept = False
         for fitted in fitted_plans(self.problem, plan, goal):
             against = ""

@@ -12,9 +12,9 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.planning.checking import check_plan
-from maneuver_automaton.planning.conditions import broken_condition
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Horizon, Problem
+from maneuver_automaton.refinement.conditions import broken_condition
 from tests import scenes
 
 LIMIT = 60.0  # [s] a limit that a busy machine does not reach
