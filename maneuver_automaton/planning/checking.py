@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import functools
 import math
 from dataclasses import dataclass
@@ -29,32 +30,39 @@ from maneuver_automaton.search.inside import stays_inside
 PROVEN = (1e-3, 2e-5)  # [m] a hit counts if it is one for the finer cover of round shapes too
 
 
+class Condition(enum.Enum):
+    """What a plan may break, in the order in which it is checked."""
+
+    WORD = "word"  # the horizon, the number of trims, and how long each of them lasts
+    BOUNDS = "bounds"
+    COLLISION = "collision"  # with an obstacle, or with a zone that does not admit the motion
+    AUDIT = "audit"
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Checked:
     """What the checks of one plan found."""
 
-    inside: bool  # the bounds
-    free: bool  # FCL on every edge
     audit: Audit | None  # None if an earlier check failed
+    broken: Condition | None = None  # the first that is broken
     reason: str = ""
-    admitted: bool = True  # the horizon and the limits of its trims
 
     @property
     def passed(self) -> bool:
         """Whether the plan may be returned."""
-        return self.audit is not None and self.audit.passed
+        return self.broken is None
 
 
 def check_plan(problem: Problem, plan: Plan, goal: Goal) -> Checked:
     """Horizon and limits, bounds, FCL, audit, in this order; the first that fails ends it."""
-    broken = broken_condition(problem, plan)
-    if broken:
-        return Checked(inside=True, free=True, audit=None, reason=broken, admitted=False)
+    reason = broken_condition(problem, plan)
+    if reason:
+        return Checked(audit=None, broken=Condition.WORD, reason=reason)
     if not stays_inside(plan, problem.bounds):
-        return Checked(inside=False, free=True, audit=None, reason="it leaves the bounds")
-    hit = what_is_hit(problem, plan, goal)
-    if hit:
-        return Checked(inside=True, free=False, audit=None, reason=hit)
+        return Checked(audit=None, broken=Condition.BOUNDS, reason="it leaves the bounds")
+    reason = what_is_hit(problem, plan, goal)
+    if reason:
+        return Checked(audit=None, broken=Condition.COLLISION, reason=reason)
     audit = audit_plan(
         plan,
         goal,
@@ -67,7 +75,8 @@ def check_plan(problem: Problem, plan: Plan, goal: Goal) -> Checked:
         states=_end_states(problem, goal),
         zones=problem.zones,
     )
-    return Checked(inside=True, free=True, audit=audit, reason=audit.reason)
+    broken = None if audit.passed else Condition.AUDIT
+    return Checked(audit=audit, broken=broken, reason=audit.reason)
 
 
 def load_checks(problem: Problem) -> None:

@@ -92,6 +92,8 @@ def without_nothing(plan: Plan) -> Plan:
         else:
             word.append(k)
             lasting.append(time)
+    if len(word) == len(plan.trims):
+        return plan
     trims = tuple(plan.trims[k] for k in word)
     return replace(plan, trims=trims, durations=np.array(lasting), maneuvers=())
 
