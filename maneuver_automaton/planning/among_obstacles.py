@@ -15,6 +15,7 @@ from maneuver_automaton.planning.checking import Condition, load_checks
 from maneuver_automaton.planning.detours import with_stones
 from maneuver_automaton.planning.incumbents import Candidate, Incumbents
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
+from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem, moves
 from maneuver_automaton.refinement.improve import Improved, Patience, improve
 from maneuver_automaton.search.budget import Budget
@@ -98,11 +99,13 @@ class _Progress:
         return found
 
 
-def plan_on_lattice(problem: Problem, budget: Budget, /, *, alternatives: int) -> PlanResult:
+def plan_on_lattice(
+    problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
+) -> PlanResult:
     """The cheapest free plan found."""
     goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
     query = lattice_query(problem, goals)
-    found = Incumbents(problem, budget, alternatives, UNFINISHED)
+    found = Incumbents(problem, budget, workspace.on(problem.obstacles), alternatives, UNFINISHED)
     progress = _Progress(query, library_table(problem), found)
     first = _first(progress)
     if not progress.words:
@@ -174,7 +177,7 @@ def _candidates(progress: _Progress, bound: float) -> list[Candidate]:
         patience=Patience(),
         floor=bound - query.padding,
         better=progress.heard,
-        meanwhile=lambda: load_checks(query.problem),
+        meanwhile=lambda: load_checks(query.problem, progress.found.workspace),
     )
     candidates = [_candidate(query, word) for word in (*progress.words, *better.others)]
     if alternatives:
@@ -183,10 +186,10 @@ def _candidates(progress: _Progress, bound: float) -> list[Candidate]:
     return candidates
 
 
-def prepare_map(problem: Problem) -> None:
+def prepare_map(problem: Problem, workspace: Workspace) -> None:
     """The map as the search, FCL and the audit see it."""
     lattice_query(problem, tuple(range(len(problem.goals))))
-    load_checks(problem)
+    load_checks(problem, workspace)
 
 
 def library_table(problem: Problem) -> CostTable:

@@ -25,6 +25,7 @@ from maneuver_automaton.models import Model
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.incumbents import Incumbents
 from maneuver_automaton.planning.result import Answer, PlanResult, PlanStatus
+from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.admission import admitted_stretches, piece_is_admitted
@@ -37,14 +38,14 @@ PARALLEL = 1e-12  # of twists, relative
 
 
 def plan_among_zones(
-    problem: Problem, search: Answer, budget: Budget, *, alternatives: int
+    problem: Problem, search: Answer, budget: Budget, workspace: Workspace, *, alternatives: int
 ) -> PlanResult:
     """The cheapest plan found that keeps to the zones of a problem.
 
     The answer need not be the best: only where the plan that knows of no zones keeps to them, it is
     as good as that one.
     """
-    found = Incumbents(problem, budget, alternatives)
+    found = Incumbents(problem, budget, workspace, alternatives)
     free = replace(problem, zones=())
     # vehicles with inertia are searched with the zones themselves: crossed slowly, left fast
     itself = [] if problem.automaton.is_kinematic else [problem]
@@ -54,7 +55,7 @@ def plan_among_zones(
         if budget.is_over and found.plans:
             break
         part = budget.part(1.0 / (len(questions) - k), at_least=LEAST_TIME)
-        result = search(question, part, alternatives=alternatives)
+        result = search(question, part, workspace, alternatives=alternatives)
         first = first or result
         found.counts.update(result.counts)
         for plan, goal_index in _plans(problem, result):

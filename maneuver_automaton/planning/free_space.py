@@ -9,6 +9,7 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.checking import Condition
 from maneuver_automaton.planning.incumbents import Candidate, Incumbents
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
+from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search import SearchStatus
 from maneuver_automaton.search.budget import Budget
@@ -23,9 +24,11 @@ SPARE = 2  # solutions for every alternative, as some may be one motion
 LEAST_TIME = 1e-3  # [s] for each goal, also where the time is over
 
 
-def plan_by_words(problem: Problem, budget: Budget, /, *, alternatives: int) -> PlanResult:
+def plan_by_words(
+    problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
+) -> PlanResult:
     """The cheapest word, by exhaustive search or insertion, that stays free and inside."""
-    found = Incumbents(problem, budget, alternatives)
+    found = Incumbents(problem, budget, workspace.on(problem.obstacles), alternatives)
     listed = _search_goals(found)
     searched = budget.elapsed
     found.offer_in_turn(listed.candidates)

@@ -21,6 +21,7 @@ from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.checking import load_checks
 from maneuver_automaton.planning.incumbents import Incumbents
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
+from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.fitting import without_nothing
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
@@ -60,11 +61,13 @@ def load_in_space(problem: Problem) -> None:
     load_maneuver_kernels()
 
 
-def plan_in_space(problem: Problem, budget: Budget, /, *, alternatives: int) -> PlanResult:
+def plan_in_space(
+    problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
+) -> PlanResult:
     """The cheapest plan found that no obstacle of its heights is in the way of."""
-    found = Incumbents(problem, budget, alternatives, UNFINISHED)
+    found = Incumbents(problem, budget, workspace.on(problem.obstacles), alternatives, UNFINISHED)
     found.counts.update(expansions=0)
-    load_checks(problem)
+    load_checks(problem, found.workspace)
     goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
     lattice = _Lattice(found, goals)
     for plan, index in itertools.chain(_words(found, goals), lattice.plans()):

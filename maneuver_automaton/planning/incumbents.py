@@ -14,6 +14,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.same_motion import CONVERGED, Likeness, is_new, same_motion
 from maneuver_automaton.planning.checking import Condition, check_plan
 from maneuver_automaton.planning.result import Alternative, PlanResult, PlanStatus
+from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.conditions import broken_condition
 from maneuver_automaton.refinement.fitting import fitted_plans, padded
@@ -58,6 +59,7 @@ class Incumbents:
 
     problem: Problem
     budget: Budget
+    workspace: Workspace
     alternatives: int = 0  # that are asked for beside the cheapest plan
     likeness: Likeness = CONVERGED  # of plans that count as one motion
     plans: list[Accepted] = field(default_factory=list)
@@ -124,7 +126,8 @@ class Incumbents:
     def _keep(self, plan: Plan, goal_index: int, *, proven: bool) -> bool:
         """Keep a plan if it passes the checks; of one motion only the cheapest plan stays."""
         begin = time.monotonic()
-        checked = check_plan(self.problem, plan, self.problem.goals[goal_index])
+        goal = self.problem.goals[goal_index]
+        checked = check_plan(self.problem, plan, goal, self.workspace)
         self.checking += time.monotonic() - begin
         if checked.broken is not None or checked.audit is None:
             if proven:

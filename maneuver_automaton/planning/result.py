@@ -9,6 +9,7 @@ from typing import Protocol
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.audit import Audit, TerminalError
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.budget import Budget
 
@@ -59,6 +60,8 @@ class PlanResult:
 class Answer(Protocol):
     """A planner, of all problems or of simpler ones."""
 
-    def __call__(self, problem: Problem, budget: Budget, /, *, alternatives: int) -> PlanResult:
+    def __call__(
+        self, problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
+    ) -> PlanResult:
         """The cheapest plan found, and so many dearer ones."""
         ...

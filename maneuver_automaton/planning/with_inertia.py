@@ -30,6 +30,7 @@ from maneuver_automaton.planning.polishing import (
 )
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.planning.tracking import Tracked, track
+from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.fitting import with_best_times
 from maneuver_automaton.refinement.improve import Patience
@@ -58,13 +59,15 @@ WAITS = 9  # at rest, before a path is followed among obstacles that move
 OTHERS = 6  # dearer words that are looked at where bounds or obstacles may refuse the cheapest
 
 
-def plan_with_inertia(problem: Problem, budget: Budget, /, *, alternatives: int) -> PlanResult:
+def plan_with_inertia(
+    problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
+) -> PlanResult:
     """The cheapest plan found for a vehicle with inertia.
 
     Where the problem limits its expansions, all stages count their work: the plan is then the same
     at every call, unless the time is over before.
     """
-    found = Incumbents(problem, budget, alternatives, POLISHED)
+    found = Incumbents(problem, budget, workspace.on(problem.obstacles), alternatives, POLISHED)
     found.counts.update(expansions=0, collision_queries=0)
     search = _Search(found)
     for plan, goal_index in _candidates(search):
@@ -115,7 +118,7 @@ def _candidates(search: _Search) -> Iterator[tuple[Plan, int]]:
     every condition of the horizon. Among obstacles the lattice alone finds its way round.
     """
     problem, method = search.found.problem, search.found.problem.search.method
-    load_checks(problem)
+    load_checks(problem, search.found.workspace)
     if method in ("auto", "lattice") and follows_paths(problem.automaton.model) and _rests(problem):
         yield from _along_paths(search)
     if not problem.automaton.maneuvers:
@@ -254,22 +257,22 @@ def _along_paths(search: _Search) -> Iterator[tuple[Plan, int]]:
         search.enclosed = first.reason if first.enclosed else ""
         search.reason = f" ({first.reason})" if first.reason else ""
         return
-    yield from _stopping(problem, first.plan, first.goal_index)
+    yield from _stopping(found, first.plan, first.goal_index)
     if first.plan.duration > 0.0:
         search.paths.append(guess_along(problem, first.plan))
     soon = found.budget.stage(IMPROVED_SHARE)
     better = search.track(kinematic_problem(problem), soon, known=first.plan)
     if better.plan is not None and better.goal_index is not None:
-        yield from _stopping(problem, better.plan, better.goal_index)
+        yield from _stopping(found, better.plan, better.goal_index)
 
 
-def _stopping(problem: Problem, path: Plan, goal_index: int) -> Iterator[tuple[Plan, int]]:
+def _stopping(found: Incumbents, path: Plan, goal_index: int) -> Iterator[tuple[Plan, int]]:
     """Stop and steer along a path, once obstacles that move let it.
 
     The path was free at the pace of the kinematic vehicle. This one is slower, so that it meets
     what moves elsewhere: it waits before it starts, as long as it takes, or it does not go.
     """
-    goal = problem.goals[goal_index]
+    problem, goal = found.problem, found.problem.goals[goal_index]
     plan = stop_and_steer(
         problem.automaton.model,  # type: ignore[arg-type]
         path,
@@ -288,7 +291,7 @@ def _stopping(problem: Problem, path: Plan, goal_index: int) -> Iterator[tuple[P
         durations = plan.durations.copy()
         durations[0] += wait
         later = replace(plan, durations=durations)
-        if not what_is_hit(problem, later, goal):
+        if not what_is_hit(problem, later, goal, found.workspace):
             yield later, goal_index
             return
 

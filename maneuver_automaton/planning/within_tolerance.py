@@ -19,6 +19,7 @@ from maneuver_automaton.automaton.headings import trim_headings
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.incumbents import Incumbents
 from maneuver_automaton.planning.result import Answer, PlanResult, PlanStatus
+from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
 from maneuver_automaton.search.budget import Budget
@@ -42,16 +43,16 @@ def has_tolerance(problem: Problem) -> bool:
 
 
 def plan_within_tolerance(
-    problem: Problem, answer: Answer, budget: Budget, *, alternatives: int
+    problem: Problem, answer: Answer, budget: Budget, workspace: Workspace, *, alternatives: int
 ) -> PlanResult:
     """The cheapest plan found that ends within the tolerance of a goal."""
-    found = Incumbents(problem, budget, alternatives)
+    found = Incumbents(problem, budget, workspace, alternatives)
     asked = list(_questions(problem))
     results: list[PlanResult] = []
     for k, question in enumerate(asked):
         part = budget.part(1.0 if k == len(asked) - 1 else LATER[k], at_least=LEAST_TIME)
         part = replace(part, expansions=question.search.max_expansions)
-        result = answer(question, part, alternatives=SPARE * alternatives)
+        result = answer(question, part, workspace, alternatives=SPARE * alternatives)
         for at, cost in result.improvements:
             found.hear(cost, at=part.began - budget.began + at)
         found.counts.update(result.counts)

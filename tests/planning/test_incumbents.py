@@ -14,6 +14,7 @@ from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning.checking import Condition
 from maneuver_automaton.planning.incumbents import LATE, Candidate, Incumbents
 from maneuver_automaton.planning.result import PlanStatus
+from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
 from maneuver_automaton.search.budget import Budget
 
@@ -54,7 +55,7 @@ BROKEN = {  # a problem, a plan that breaks a condition of it and has no times t
 
 
 def incumbents(problem, *, seconds=600.0, **more):
-    return Incumbents(problem, Budget.from_now(seconds), **more)
+    return Incumbents(problem, Budget.from_now(seconds), Workspace(problem.obstacles), **more)
 
 
 @pytest.mark.parametrize("name", BROKEN)
@@ -119,7 +120,7 @@ def test_checks_ask_the_clock_too():
     """A few plans may be refused once the time is over; then the others are left alone."""
     problem = replace(FREE, obstacles=(WALL,))
     over = Budget(began=time.monotonic() - 1.0, deadline=time.monotonic())
-    found = Incumbents(problem, over)
+    found = Incumbents(problem, over, Workspace(problem.obstacles))
     hits = [
         Candidate(1.0 + k, 0, functools.partial(driven, "ahead", durations=[3.5 + 0.01 * k]))
         for k in range(3 * LATE)
