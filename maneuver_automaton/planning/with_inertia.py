@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -22,10 +21,9 @@ from maneuver_automaton.planning.incumbents import Accepted, Incumbents
 from maneuver_automaton.planning.polishing import (
     Aimed,
     guess_along,
-    guess_of_plan,
-    guesses_along_paths,
     load_polishing,
-    polish_plans,
+    polish_found,
+    rests_at_both_ends,
     why_not_polished,
 )
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
@@ -54,7 +52,6 @@ IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
 WORDS_SHARE = 0.4  # of what is left, for words in free space where there is no plan yet
 MANEUVER_SHARE = 0.2  # of what is left, for words of maneuvers where there is a plan already
 AT_ONCE = Patience(attempts=0, passes=0)
-EXPANSIONS_AN_ITERATION = 4  # of the lattice, in place of one iteration of polishing
 WAITS = 9  # at rest, before a path is followed among obstacles that move
 OTHERS = 6  # dearer words that are looked at where bounds or obstacles may refuse the cheapest
 
@@ -74,7 +71,7 @@ def plan_with_inertia(
         found.offer(plan, goal_index)
         if budget.is_over:
             break
-    _polish(search)
+    polish_found(found, search.paths)
     found.counts["rejected"] = found.rejected
     if not found.plans:
         return found.none(*_why_none(search))
@@ -119,7 +116,11 @@ def _candidates(search: _Search) -> Iterator[tuple[Plan, int]]:
     """
     problem, method = search.found.problem, search.found.problem.search.method
     load_checks(problem, search.found.workspace)
-    if method in ("auto", "lattice") and follows_paths(problem.automaton.model) and _rests(problem):
+    if (
+        method in ("auto", "lattice")
+        and follows_paths(problem.automaton.model)
+        and rests_at_both_ends(problem)
+    ):
         yield from _along_paths(search)
     if not problem.automaton.maneuvers:
         return
@@ -127,44 +128,6 @@ def _candidates(search: _Search) -> Iterator[tuple[Plan, int]]:
         yield from _by_words(search.found)
     if method in ("auto", "lattice"):
         yield from _over_maneuvers(search)
-
-
-def _polish(search: _Search) -> None:
-    """Polish kinematic plans of different gears, and what has been found; keep what is cheaper."""
-    found, problem, budget = search.found, search.found.problem, search.found.budget
-    known = [(one.plan, one.goal_index) for one in found.plans[:1]]
-    horizon = problem.horizon
-    if not known and (horizon.max_time is not None or horizon.max_trims is not None):
-        # what is late may be made quicker, and of too many trims one maneuver
-        known = sorted(found.misfits, key=lambda one: one[0].duration)[:1]
-    if not known or budget.is_over or why_not_polished(problem):
-        return
-    if not known[0][0].duration > 0.0:
-        return  # it is there already
-    aimed = [Aimed(guess_of_plan(plan), goal_index) for plan, goal_index in known]
-    if _rests(problem):
-        along = list(guesses_along_paths(problem, time_limit=budget.left))
-        aimed = along or [*search.paths, *aimed]
-    most = budget.expansions
-    work = None if most is None else 1 + most // EXPANSIONS_AN_ITERATION
-    for goal_index in dict.fromkeys(one.goal_index for one in aimed):
-        if budget.is_over or (work is not None and work <= 0):
-            return
-        try:
-            polished = polish_plans(
-                problem,
-                [one.guess for one in aimed if one.goal_index == goal_index],
-                goal_index,
-                time_limit=budget.left,
-                most_iterations=work,
-                accepts=functools.partial(found.offer, goal_index=goal_index),
-            )
-        except RuntimeError:  # the solver gave up on a number; the plan in hand stays
-            found.counts.update(solver_errors=1)
-            continue
-        found.counts.update(polished=len(polished.attempts))
-        if work is not None:
-            work -= sum(attempt.iterations for attempt in polished.attempts)
 
 
 def _over_maneuvers(search: _Search) -> Iterator[tuple[Plan, int]]:
@@ -300,7 +263,7 @@ def load_inertia(problem: Problem) -> None:
     """Compile or load what `plan_with_inertia` needs, before the clock runs."""
     load_lattice()
     load_checking()
-    if follows_paths(problem.automaton.model) and _rests(problem):
+    if follows_paths(problem.automaton.model) and rests_at_both_ends(problem):
         library_table(kinematic_problem(problem, switch=0.0))
         if not why_not_polished(problem):
             load_polishing(problem)
@@ -308,13 +271,6 @@ def load_inertia(problem: Problem) -> None:
         load_maneuver_kernels()
         if _suits_words(problem) or problem.search.method in ("words", "insertion"):
             load_maneuver_words()
-
-
-def _rests(problem: Problem) -> bool:
-    """Whether the vehicle starts and ends at rest."""
-    return problem.first_trim.is_rest and all(
-        problem.last_trim(goal).is_rest for goal in problem.goals
-    )
 
 
 def _certificate(problem: Problem, best: Accepted) -> float | None:
@@ -333,7 +289,7 @@ def _lower_bound(problem: Problem) -> float:
     known = speed_bound(problem)
     if why_not_polished(problem) and not follows_paths(model):  # all plans are words
         known = max(known, word_bound(problem))
-    if not (follows_paths(model) and _rests(problem) and isinstance(cost, Cost)):
+    if not (follows_paths(model) and rests_at_both_ends(problem) and isinstance(cost, Cost)):
         return known
     simpler = kinematic_problem(problem, switch=0.0)
     least = lattice_bound(lattice_query(simpler, tuple(range(len(problem.goals)))))
