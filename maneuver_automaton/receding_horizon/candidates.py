@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.log import Origin, first_part
 from maneuver_automaton.receding_horizon.pace import at_best_pace, base_name
 from maneuver_automaton.receding_horizon.settings import EXACT, Settings
-from maneuver_automaton.receding_horizon.shifting import costliest_first, rest_of
+from maneuver_automaton.receding_horizon.shifting import costliest_first, moving_pieces, rest_of
 from maneuver_automaton.search.inside import outside, stays_inside
 from maneuver_automaton.search.words import TIE
 
@@ -58,7 +56,7 @@ def candidate(
         cost=cost,
         goal_index=goal_index,
         origin=origin,
-        at_first=float(here.rates_of(piece) @ piece.durations),
+        at_first=here.cost_of(piece),
     )
 
 
@@ -69,10 +67,7 @@ def allowed(here: Problem, plan: Plan) -> bool:
 
 def cost_until(problem: Problem, plan: Plan, until: float) -> float:
     """What the first `until` seconds of a plan cost, the switches in them included."""
-    piece = first_part(plan, until)
-    left = rest_of(plan, until, start=plan.start)
-    switches = problem.cost.switching(_twists(plan)) - problem.cost.switching(_twists(left))
-    return float(problem.rates_of(piece) @ piece.durations) + switches
+    return problem.cost_of(plan) - problem.cost_of(rest_of(plan, until))
 
 
 def is_rest_of(plan: Plan, rest: Plan | None) -> bool:
@@ -87,8 +82,4 @@ def within(pose: Array, goal: Goal) -> bool:
 
 
 def _moving(plan: Plan) -> list[str]:
-    return [base_name(trim.name) for trim in plan.trims if trim.body_velocity.any()]
-
-
-def _twists(plan: Plan) -> Array:
-    return np.array([trim.body_velocity for trim in plan.trims]).reshape(-1, plan.start.size)
+    return [base_name(piece.name) for piece in moving_pieces(plan)]

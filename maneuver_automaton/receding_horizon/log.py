@@ -185,13 +185,4 @@ def first_part(plan: Plan, until: float) -> Plan:
     >>> first_part(Plan([0, 0, 0], (ahead,), durations=[2.0]), 0.5).end.tolist()
     [0.5, 0.0, 0.0]
     """
-    if any(plan.maneuvers):
-        return head_of(plan, until)
-    kept, durations, left = [], [], until
-    for trim, duration in zip(plan.trims, plan.durations.tolist(), strict=True):
-        if left <= 0.0:
-            break
-        kept.append(trim)
-        durations.append(min(duration, left))
-        left -= duration
-    return Plan(plan.start, tuple(kept), durations=durations, start_time=plan.start_time)
+    return head_of(plan, until) if plan.trims else plan

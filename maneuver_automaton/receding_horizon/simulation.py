@@ -26,7 +26,8 @@ from maneuver_automaton.receding_horizon.disturbance import (
     draws,
 )
 from maneuver_automaton.receding_horizon.log import ClosedLoop, Guarantee, Step, Violation
-from maneuver_automaton.receding_horizon.with_maneuvers import ManeuverHorizon, moves_on
+from maneuver_automaton.receding_horizon.shifting import moves_on
+from maneuver_automaton.receding_horizon.with_maneuvers import ManeuverHorizon
 
 Seen = Callable[[int], Sequence[AnyObstacle | Shape]]
 

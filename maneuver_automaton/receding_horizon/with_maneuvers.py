@@ -30,13 +30,14 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning import plan as planned
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.checking import what_is_hit
-from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Horizon, Problem
-from maneuver_automaton.receding_horizon.candidates import within
+from maneuver_automaton.receding_horizon.candidates import cost_until, within
 from maneuver_automaton.receding_horizon.guarantees import broken, promises
 from maneuver_automaton.receding_horizon.log import Deed, Guarantee, Origin, Step, Violation
-from maneuver_automaton.receding_horizon.reanchoring import distance, missed
+from maneuver_automaton.receding_horizon.reanchoring import distance, missed, reanchored
 from maneuver_automaton.receding_horizon.settings import EXACT
+from maneuver_automaton.receding_horizon.shifting import moves_on
 from maneuver_automaton.refinement.fitting import fitted_plans
 from maneuver_automaton.search.inside import outside, stays_inside
 from maneuver_automaton.search.maneuver_lattice import maneuver_words, plan_of
@@ -45,10 +46,8 @@ from maneuver_automaton.search.maneuver_ready import load_maneuver_kernels
 from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
 from maneuver_automaton.search.maneuver_words import load_maneuver_words
 from maneuver_automaton.search.words import TIE
-from maneuver_automaton.words import TimesStatus, solve_switching_times
 
 FIRST_SHARE = 0.5  # of a step's time limit, for the words of the first step
-EASED = 0.5  # share of a goal's tolerance that may be given up before the end
 DETOUR = 0.1  # share of its cost that a plan which ends within the goal's tolerance may rise by
 STAND = 2.0  # [s] that the goal must stay free after arrival, where obstacles move
 OTHERS = 3  # dearer words that are tried where the cheapest ones are not free
@@ -178,7 +177,7 @@ class ManeuverHorizon:
         plan = with_samples_at(last.plan, [last.time + passed], self.problem.automaton.model)
         if passed == last.applied:
             return replace(last, plan=plan)
-        spent = self.problem.cost_of(plan) - self.problem.cost_of(tail_of(plan, passed))
+        spent = cost_until(self.problem, plan, passed)
         return replace(last, plan=plan, applied=passed, applied_cost=spent)
 
     def _logged(
@@ -200,7 +199,7 @@ class ManeuverHorizon:
             goal_index=chosen.goal_index,
             value=value,
             applied=applied,
-            applied_cost=value - here.cost_of(tail_of(plan, applied)),
+            applied_cost=cost_until(here, plan, applied),
             accumulated_cost=0.0 if last is None else last.accumulated_cost + last.applied_cost,
             origin=chosen.origin,
             replanned=last is not None and not kept,
@@ -444,9 +443,8 @@ class _Decision:
             return rest, Origin.SHIFTED
         most = (1.0 + DETOUR) * self.here.cost_of(rest)
         found: list[Plan] = []
-        for target in _targets(goal, rest.end):
-            again = same_maneuvers(self.here, rest, target, under_way=self.busy > 0.0)
-            if again is not None and self._is_free(again, goal):
+        for again in reanchored(self.here, rest, goal, pad=None, under_way=self.busy > 0.0):
+            if self._is_free(again, goal):
                 if self.here.cost_of(again) <= most:
                     return again, Origin.REANCHORED
                 found.append(again)
@@ -545,80 +543,6 @@ def with_trims_at_ends(problem: Problem) -> Problem:
         problem,
         start_trim=problem.start_trim or name,
         goals=tuple(replace(goal, trim=goal.trim or name) for goal in problem.goals),
-    )
-
-
-def same_maneuvers(here: Problem, plan: Plan, goal: Goal, *, under_way: bool) -> Plan | None:
-    """The word of `plan` with the best times that lead from where it starts to the goal.
-
-    Parameters
-    ----------
-    here : Problem
-        Its horizon counts from the start of `plan`.
-    plan : Plan
-        Starts where the vehicle was measured, and misses the goal.
-    goal : Goal
-    under_way : bool
-        Whether it begins within a maneuver: the trim before that is over.
-
-    Returns
-    -------
-    Plan or None
-        None if no times lead to the goal, or in time.
-    """
-    group = here.automaton.model.group
-    still = np.zeros(plan.start.size)
-    steps = [still if one is None else one.displacement for one in plan.maneuvers]
-    steps = steps or [still] * (len(plan.trims) - 1)
-    lasting = sum(one.duration for one in plan.maneuvers if one)
-    longest = np.array([trim.max_duration for trim in plan.trims])
-    if math.isfinite(longest[0]):
-        longest[0] = plan.durations[0]  # how long it has lasted already is not known
-    if under_way:
-        longest[0] = 0.0
-    horizon = here.horizon
-    total = None if horizon.time is None else horizon.time - lasting
-    if total is not None and total < 0.0:
-        return None
-    solved = solve_switching_times(
-        np.array([trim.body_velocity for trim in plan.trims]),
-        here.rates_of(plan),
-        (group(plan.start).inverse() @ group(goal.pose)).pose,
-        displacements=np.array(steps).reshape(-1, plan.start.size),  # none beside one trim
-        total=total,
-        free_heading=goal.free_heading,
-        longest=longest,
-        guesses=[plan.durations],
-        restarts=2,
-    )
-    if solved.status is TimesStatus.FAILED:
-        return None
-    again = replace(plan, durations=solved.durations)
-    limit = horizon.max_time
-    if limit is not None and again.duration > limit * (1.0 + EXACT):
-        return None
-    return again if missed(again, goal) <= EXACT * _size(again) else None
-
-
-def _targets(goal: Goal, end: Array) -> list[Goal]:
-    """The goal itself, then what is within its tolerance and nearest to where a plan ends."""
-    if not (goal.tolerance_m or goal.tolerance_rad):
-        return [goal]
-    places = [0, 1, *range(3, end.size)]
-    off = end - goal.pose
-    off[2] = 0.0 if goal.free_heading else math.remainder(float(off[2]), 2.0 * math.pi)
-    way, turn = float(np.linalg.norm(off[places])), abs(float(off[2]))
-    pose = np.array(goal.pose)
-    pose[places] += off[places] * min(1.0, EASED * goal.tolerance_m / max(way, EXACT))
-    pose[2] += off[2] * min(1.0, EASED * goal.tolerance_rad / max(turn, EXACT))
-    return [goal, replace(goal, pose=pose)]
-
-
-def moves_on(plan: Plan) -> bool:
-    """Whether a plan is more than to stand still."""
-    return any(
-        isinstance(piece, Maneuver) or (duration > NOTHING and not piece.is_rest)
-        for piece, duration in zip(plan.primitives, plan.primitive_durations, strict=True)
     )
 
 
