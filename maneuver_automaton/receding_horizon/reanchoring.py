@@ -11,6 +11,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.costs import Cost
+from maneuver_automaton.planning.plan import has_inertia
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Horizon, Problem
 from maneuver_automaton.receding_horizon.shifting import merged, without_nothing
@@ -55,7 +56,7 @@ def reanchored(
     same = same_word(problem, plan, goal, pad=pad, under_way=under_way)
     if same is not None:
         yield same
-    if problem.automaton.is_kinematic:
+    if not has_inertia(problem):
         yield from rejoining(problem, plan, goal, pad=pad)
     elif goal.tolerance_m or goal.tolerance_rad:
         from_here = replace(plan, start=problem.start)
@@ -121,9 +122,9 @@ def _eased(goal: Goal, end: Array) -> Goal:
     places = [0, 1, *range(3, end.size)]
     off = end - goal.pose
     off[2] = 0.0 if goal.free_heading else math.remainder(float(off[2]), 2.0 * math.pi)
-    way, turn = float(np.linalg.norm(off[places])), abs(float(off[2]))
+    distance_m, turn = float(np.linalg.norm(off[places])), abs(float(off[2]))
     pose = np.array(goal.pose)
-    pose[places] += off[places] * min(1.0, EASED * goal.tolerance_m / max(way, NEAR))
+    pose[places] += off[places] * min(1.0, EASED * goal.tolerance_m / max(distance_m, NEAR))
     pose[2] += off[2] * min(1.0, EASED * goal.tolerance_rad / max(turn, NEAR))
     return replace(goal, pose=pose)
 
@@ -139,9 +140,9 @@ def rejoining(problem: Problem, plan: Plan, goal: Goal, *, pad: Trim | None) -> 
         ahead = plan.switching_poses[joint]
         last = joint == end
         target = goal if last else Goal(pose=ahead)
-        for way in (hurry, quickest(hurry)):
+        for variant in (hurry, quickest(hurry)):
             found = False
-            for first in _connections(replace(way, goals=(target,)), target):
+            for first in _connections(replace(variant, goals=(target,)), target):
                 trims = (*first.trims, *(() if last else plan.trims[joint:end]))
                 times = [*first.durations.tolist(), *(() if last else plan.durations[joint:end])]
                 padded = _in_time(problem, trims, times, pad)

@@ -54,10 +54,15 @@ def rested(plan: Plan, pad: Trim, duration: float) -> Plan:
     """The plan with `duration` more seconds of rest: of the one it ends in, otherwise of `pad`."""
     if not duration > NOTHING:
         return plan
-    if not plan.trims:
-        return replace(plan, trims=(pad,), durations=np.array([duration]))
-    rest = plan.trims[-1] if plan.trims[-1].is_rest else pad
-    return joined(plan, Plan(plan.end, (rest,), durations=[duration]))
+    rest = plan.trims[-1] if plan.trims and plan.trims[-1].is_rest else pad
+    return followed_by(plan, Plan(plan.end, (rest,), durations=[duration]))
+
+
+def followed_by(first: Plan, second: Plan) -> Plan:
+    """One plan, then another that begins where the first one ends."""
+    if not first.trims:
+        return replace(second, start=first.start, start_time=first.start_time)
+    return without_nothing(joined(first, second)) if second.trims else first
 
 
 def without_nothing(plan: Plan) -> Plan:

@@ -172,13 +172,50 @@ def test_a_loop_that_was_stopped_goes_on_from_its_file(tmp_path):
     assert rest.cost == pytest.approx(whole.cost, abs=1e-9)
 
 
-def test_what_is_not_known_is_refused():
+@pytest.mark.parametrize(
+    ("changed", "asked", "message"),
+    [
+        ({}, {"retimed": True}, "receding horizon: retimed is for vehicles without inertia"),
+        (
+            {},
+            {"disturbance": Disturbance(twist_scale=(0.9, 1.0, 1.0))},
+            "receding horizon: disturbance: twist_scale is for vehicles without inertia",
+        ),
+        ({}, {"step": 0.0}, "receding horizon: step must be positive, got 0.0 s"),
+        (
+            {"horizon": Horizon(time=8.0)},
+            {"step": 9.0},
+            "receding horizon: step is 9 s, need at most the horizon, 8 s",
+        ),
+    ],
+)
+def test_what_makes_no_sense_is_refused(changed, asked, message):
     with pytest.raises(ValueError) as error:
-        simulate(posed(), step=0.5, stay=True)
-    assert str(error.value).startswith("receding horizon: stay is for vehicles without inertia")
-    with pytest.raises(ValueError) as error:
-        ManeuverHorizon(posed(), step=0.0)
-    assert str(error.value) == "receding horizon: step must be positive, got 0.0 s"
+        simulate(posed(**changed), **({"step": 0.5} | asked))
+    assert str(error.value).startswith(message)
+
+
+def test_told_to_stay_it_comes_back_when_it_is_pushed_out():
+    push = Disturbance(pushes={12: (0.2, 0.0, 0.0)})
+    loop = simulate(posed(NEAR), step=0.5, steps=30, time_limit=5.0, stay=True, disturbance=push)
+    assert loop.reached
+    assert len(loop.steps) == 30
+    assert (loop.inside[12], loop.inside[13], loop.inside[-1]) == (True, False, True)
+
+
+def test_the_goal_must_stay_free_for_as_long_as_is_asked():
+    """A disc comes over the goal eight seconds after the start, three after the arrival."""
+    coming = Obstacle(Disc(0.4), motion=Motion([4.0, 10.0], [[3.0, 4.0, 0.0], [3.0, -2.0, 0.0]]))
+    problem = posed(
+        [3.0, 0.0, 0.0],
+        obstacles=[coming],
+        footprint=Disc(0.2),
+        search=SearchSettings(max_expansions=2000),
+    )
+    for stand, deed in ((0.5, Deed.PLANNED), (6.0, Deed.STOPPED)):
+        _, step = ManeuverHorizon(problem, step=0.5, stand=stand, time_limit=30.0).step([0, 0, 0])
+        assert step.plan.duration < 7.0
+        assert step.deed is deed, stand
 
 
 @pytest.mark.parametrize("robot", ["stops and steers", "polished"])
