@@ -226,8 +226,8 @@ class RecedingHorizon:
         here, last, delta = now.here, now.last, self.settings.step
         instants = here.start_time + delta * np.arange(1, 2 + chosen.plan.duration / delta)
         plan = with_samples_at(chosen.plan, instants, here.automaton.model)
-        deed = _deed(chosen, last)
-        bound = self._bound(chosen, search, here)
+        deed = _deed(chosen, now)
+        bound = self._bound(chosen, search, now)
         value = chosen.value if deed.leads or search.knows_all else bound
         applied = min(delta, plan.duration) if plan.duration > NOTHING else delta
         step = Step(
@@ -240,11 +240,11 @@ class RecedingHorizon:
             applied_cost=cost_until(here, plan, applied),
             accumulated_cost=0.0 if last is None else last.accumulated_cost + last.applied_cost,
             origin=chosen.origin,
-            replanned=last is not None and not is_rest_of(plan, chosen.rest),
+            replanned=last is not None and not is_rest_of(plan, now.rest),
             shifted_value=chosen.shifted_value,
-            off_plan=chosen.off_plan,
+            off_plan=now.off_plan,
             lower_bound=min(value, bound),
-            exhaustive=chosen.exhaustive,
+            exhaustive=now.exhaustive,
             solve_s=time.monotonic() - now.began,
             number=0 if last is None else last.number + 1,
             arrived=chosen.arrived,
@@ -252,7 +252,7 @@ class RecedingHorizon:
             free_until=chosen.free_until,
         )
         self._count(step, now)
-        broken = (*chosen.violations, *self._broken(step, now))
+        broken = (*now.violations, *self._broken(step, now))
         return replace(step, violations=broken)
 
     def _count(self, step: Step, now: Situation) -> None:
@@ -280,26 +280,25 @@ class RecedingHorizon:
         if steady and step.deed.leads and not step.arrived:
             yield from too_cheap(self.promises, step)
 
-    def _bound(self, chosen: Chosen, search: StepSearch, here: Problem) -> float:
+    def _bound(self, chosen: Chosen, search: StepSearch, now: Situation) -> float:
         """No plan to any goal costs less."""
-        if chosen.exhaustive:
+        if now.exhaustive:
             return chosen.value
         if self.settings.retimed:  # trims at another pace may cost less than those of the library
+            here = now.here
             return min(self.promises.effort_bound(here.start, goal) for goal in here.goals)
         return search.lower_bound()
 
 
-def _deed(chosen: Chosen, last: Step | None) -> Deed:
+def _deed(chosen: Chosen, now: Situation) -> Deed:
     """What a step does, where the decision does not say it."""
     if chosen.deed is not None:
         return chosen.deed
-    if math.isinf(chosen.value):
-        return Deed.STOPPED
-    if last is None:
+    if now.last is None:
         return Deed.PLANNED
     if chosen.origin is not Origin.SEARCHED:
         return Deed.KEPT
-    same = last.deed.leads and is_rest_of(chosen.plan, chosen.rest)
+    same = now.last.deed.leads and is_rest_of(chosen.plan, now.rest)
     return Deed.IMPROVED if same else Deed.REPLANNED
 
 

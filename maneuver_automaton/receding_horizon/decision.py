@@ -61,8 +61,7 @@ def decide(now: Situation, search: StepSearch) -> Chosen:
     """The plan to apply."""
     there = _there(now, search)
     if there is not None:
-        violations = (*now.violations, *there.violations)
-        return replace(there, violations=violations, free_until=search.free_until)
+        return replace(there, free_until=search.free_until)
     first = now.settings.first
     if now.last is None and first is not None:
         chosen = now.given(first)
@@ -88,7 +87,7 @@ def _there(now: Situation, search: StepSearch) -> Chosen | None:
     if index is None and inside is not None:
         held = None if has_inertia(now.here) else holding(now.here, now.settings, inside)
         if held is not None and search.is_safe(held.plan):
-            return now.held(held)
+            return replace(now.as_chosen(held, held.cost), arrived=True)
         index = inside
     index = now.ended_within() if index is None else index
     if index is None:

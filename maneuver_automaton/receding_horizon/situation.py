@@ -35,12 +35,8 @@ class Chosen:
     goal_index: int
     value: float
     origin: Origin
-    rest: Plan | None  # of the last plan
     shifted_value: float | None
-    off_plan: float | None
-    exhaustive: bool
-    arrived: bool
-    violations: tuple[Violation, ...]
+    arrived: bool = False
     deed: Deed | None = None  # None: told by the plan
     free_until: float | None = None  # [s]
 
@@ -186,12 +182,7 @@ class Situation:
             goal_index=best.goal_index,
             value=best.cost,
             origin=best.origin,
-            rest=self.rest,
             shifted_value=shifted_value,
-            off_plan=self.off_plan,
-            exhaustive=self.exhaustive,
-            arrived=False,
-            violations=tuple(self.violations),
         )
 
     def exactly_at(self) -> int | None:
@@ -221,17 +212,14 @@ class Situation:
             plan = rested(plan, pad, self.settings.step)
         value = here.cost_of(plan)
         shifted = None if self.rest is None else min(value, here.cost_of(self.rest))
+        self.exhaustive = True
         return Chosen(
             plan=plan,
             goal_index=index,
             value=value,
             origin=Origin.FIRST if self.last is None else Origin.SHIFTED,
-            rest=plan if self.rest is None else self.rest,
             shifted_value=shifted,
-            off_plan=self.off_plan,
-            exhaustive=True,
             arrived=True,
-            violations=(),
         )
 
     def planned(self) -> Plan:
@@ -284,11 +272,6 @@ class Situation:
     def candidate(self, plan: Plan, index: int, origin: Origin) -> Candidate:
         """A plan from here, with what it is compared by."""
         return candidate(self.here, self.settings, plan, goal_index=index, origin=origin)
-
-    def held(self, one: Candidate) -> Chosen:
-        """A plan that stays within the goal: nothing else is left to be done."""
-        chosen = self.as_chosen(one, one.cost)
-        return replace(chosen, arrived=True, violations=())
 
     def flag(self, guarantee: Guarantee, reason: str) -> None:
         """Say that a guarantee is broken."""
