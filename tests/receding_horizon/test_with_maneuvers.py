@@ -218,6 +218,42 @@ def test_the_goal_must_stay_free_for_as_long_as_is_asked():
         assert step.deed is deed, stand
 
 
+def test_what_cannot_be_evaded_is_flagged_with_the_time_of_contact():
+    wall = Motion([0.0, 2.0], [[-4.0, 0.0, 0.0], [4.0, 0.0, 0.0]])  # at 4 m/s, contact after 0.95 s
+    problem = posed(
+        [3.0, 0.0, 0.0],
+        obstacles=[Obstacle(Box([0.2, 40.0]), motion=wall)],
+        footprint=Disc(0.2),
+        search=SearchSettings(max_expansions=200),
+    )
+    _, step = ManeuverHorizon(problem, step=1.0, time_limit=30.0).step([0.0, 0.0, 0.0])
+    assert step.deed is Deed.HARMFUL
+    assert [one.guarantee for one in step.violations] == [Guarantee.SAFETY]
+    assert step.free_until == pytest.approx(0.925, abs=0.01)
+
+
+@pytest.mark.parametrize(("look_ahead", "stops_at"), [(1.0, 1.0), (60.0, 5.0)])
+def test_the_fail_safe_trajectory_looks_ahead_as_far_as_is_asked(look_ahead, stops_at):
+    """Where it could brake a disc passes later; farther on, where the last plan ends, none does."""
+    _, begun = ManeuverHorizon(posed([5.0, 0.0, 0.0]), step=0.5).step([0.0, 0.0, 0.0])
+    cage = [Box([0.2, 4.2], [12.0 + side, 0.0]) for side in (2.0, -2.0)]
+    cage += [Box([4.2, 0.2], [12.0, side]) for side in (2.0, -2.0)]
+    passing = Obstacle(Disc(0.4), motion=Motion([12.0, 16.0], [[1.0, 6.0, 0.0], [1.0, -6.0, 0.0]]))
+    problem = posed(
+        [12.0, 0.0, 0.0],
+        obstacles=[*cage, passing],
+        footprint=Disc(0.2),
+        search=SearchSettings(max_expansions=200),
+    )
+    controller = ManeuverHorizon(
+        problem, step=0.5, look_ahead=look_ahead, last=replace(begun, deed=Deed.APPROACHED)
+    )
+    _, step = controller.step(begun.predicted)
+    assert step.deed is Deed.APPROACHED
+    assert step.plan.end[0] == pytest.approx(stops_at)
+    assert step.plan.primitives[0].name == begun.plan.primitives[0].name  # is finished
+
+
 @pytest.mark.parametrize("robot", ["stops and steers", "polished"])
 def test_a_loop_with_motions_of_its_own_goes_on_from_its_file(robot, tmp_path):
     """Neither strokes nor what polishing finds is in the library: the log tells their courses."""
