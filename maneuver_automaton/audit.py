@@ -8,9 +8,9 @@ distance to the obstacles is measured by another library than the one that check
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,12 @@ from maneuver_automaton.collision.approach import Approach, closest_approach
 from maneuver_automaton.collision.blocked import too_close, touched_near
 from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.collision.heights import Layer, layers_of
-from maneuver_automaton.collision.surroundings import fastest_point, parts_of, surroundings_of
+from maneuver_automaton.collision.surroundings import (
+    Surroundings,
+    fastest_point,
+    parts_of,
+    surroundings_of,
+)
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.state import vector_field
@@ -35,6 +40,8 @@ LIMIT_TOLERANCE = 1e-9  # relative to the limit, at least to 1, by which a value
 TERMINAL_TOLERANCE = 1e-9  # [m, rad] of the last pose, beyond the goal's own tolerance
 CLEARANCE_TOLERANCE = 1e-3  # [m] no overlap between poses is deeper
 FIRST_POSES = 8  # of every trim, to measure distances at
+
+Around: TypeAlias = Callable[[tuple[AnyObstacle, ...], tuple[float, float]], Surroundings]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,6 +87,7 @@ def audit_plan(
     margin: float = 0.0,
     states: tuple[Array, Array] | None = None,
     zones: tuple[Zone, ...] = (),
+    around: Around = surroundings_of,
 ) -> Audit:
     """Drive a finished plan again with an ODE solver, and measure its distance to the obstacles.
 
@@ -105,6 +113,8 @@ def audit_plan(
         Reduced states in which it must begin and end.
     zones : tuple of Zone
         Where not every motion is admitted.
+    around : callable
+        The surroundings of some obstacles, say from a store of those of the map.
 
     Returns
     -------
@@ -137,7 +147,7 @@ def audit_plan(
         bodies += [(name, carried(near, model, name), shapes) for name, shapes in parts.items()]
     for name, moving, shapes in bodies:
         scene = _Scene(shapes, obstacles, margin, origin_near(place), place, clock, body_height)
-        least = _closest(moving, scene)
+        least = _closest(moving, scene, around)
         if math.isfinite(least.distance):
             clearance = min(least.distance, math.inf if clearance is None else clearance)
         if not least.distance > too_close(margin):
@@ -152,6 +162,48 @@ def audit_plan(
         terminal_heading_rad=missed.heading_rad,
         reason="; ".join(reasons),
     )
+
+
+def closest_to(
+    plan: Plan,
+    obstacles: tuple[AnyObstacle, ...],
+    *,
+    footprint: tuple[Shape, ...],
+    within: tuple[float, float] = (-math.inf, math.inf),
+) -> Approach:
+    """When a plan comes closest to obstacles, and their distance then [m], measured by shapely.
+
+    Parameters
+    ----------
+    plan : Plan
+    obstacles : tuple of Obstacle or OccupancyMap
+    footprint : tuple of Shape
+        Parts of the body; empty for a point.
+    within : (float, float)
+        First and last time that counts, on the plan's clock [s].
+
+    Returns
+    -------
+    Approach
+        An infinite distance if there is no obstacle, or the plan has no such time.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.collision import Disc
+    >>> ahead = Trim(name="ahead", body_velocity=[1.0, 0.0, 0.0], control=[1.0, 0.0])
+    >>> plan = Plan([0.0, 0.0, 0.0], (ahead,), durations=[4.0])
+    >>> post = (Obstacle(Disc(0.5, [3.0, 2.0])),)
+    >>> closest_to(plan, post, footprint=(Disc(0.5),), within=(0.0, 3.0))
+    Approach(time=3.0, distance=1.0)
+    """
+    goal, clock = Goal(pose=plan.end), plan.start_time
+    first, last = max(within[0] - clock, 0.0), min(within[1] - clock, plan.duration)
+    if not obstacles or first > last:
+        return Approach(clock, math.inf)
+    near, place = _seen_from(plan, goal), goal.pose
+    scene = _Scene(footprint, obstacles, 0.0, origin_near(place), place, clock, (0.0, 0.0))
+    least = _closest(near, scene, surroundings_of, (first, last))
+    return least._replace(time=clock + least.time)
 
 
 class _Pieces(NamedTuple):
@@ -305,15 +357,20 @@ def _wrong_ends(plan: Plan, states: tuple[Array, Array]) -> list[str]:
     return reasons
 
 
-def _closest(plan: Plan, scene: _Scene) -> Approach:
-    """When the plan is closest to an obstacle."""
+def _closest(
+    plan: Plan,
+    scene: _Scene,
+    around: Around,
+    within: tuple[float, float] = (0.0, math.inf),
+) -> Approach:
+    """When the plan is closest to an obstacle, between two times since its start [s]."""
     layers = scene.layers(plan)
-    around = [surroundings_of(layer.obstacles, scene.origin) for layer in layers]
+    near = [around(layer.obstacles, scene.origin) for layer in layers]
     body = parts_of(scene.footprint)
 
     def distances(times: Array) -> Array:
         poses, clock = scene.seen(plan, times), scene.clock + times
-        apart = [one.nearest(body, poses, clock).distance for one in around]
+        apart = [one.nearest(body, poses, clock).distance for one in near]
         altitudes = scene.altitudes(plan, times)
         over = [layer.gap(altitudes, scene.height) for layer in layers]
         return np.asarray(np.min(np.hypot(apart, over), axis=0))
@@ -321,8 +378,13 @@ def _closest(plan: Plan, scene: _Scene) -> Approach:
     if not plan.primitives:
         return Approach(0.0, float(distances(np.zeros(1))[0]))
     times, twists = _constant_twists(plan)
-    rates = fastest_point(body, twists[:, :3]) + max(one.speed for one in around)
+    rates = fastest_point(body, twists[:, :3]) + max(one.speed for one in near)
     rates = np.hypot(rates, twists[:, 3:].sum(axis=1))
+    first, last = max(within[0], times[0]), min(within[1], times[-1])
+    inner = times[(times > first) & (times < last)]
+    cut = np.concatenate([[first], inner, [last]])
+    rates = rates[np.clip(np.searchsorted(times, cut[:-1], "right") - 1, 0, len(rates) - 1)]
+    times = cut
     return closest_approach(
         distances,
         times,

@@ -113,6 +113,17 @@ class Bounds:
             if pair is not None and not (len(pair) == 2 and pair[0] < pair[1]):
                 raise ValueError(f"bounds: {name} must be [low, high] with low < high, got {pair}")
 
+    @property
+    def are_open(self) -> bool:
+        """Whether there is no limit in any direction.
+
+        Examples
+        --------
+        >>> Bounds().are_open, Bounds(x=(0.0, 5.0)).are_open
+        (True, False)
+        """
+        return self.x is None and self.y is None and self.z is None
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SearchSettings:
@@ -389,7 +400,7 @@ class Problem:
             If there are bounds, or the vehicle does not look the same after a rotation in `by`.
         """
         by = motion_of(self.automaton, by)
-        if any(getattr(self.bounds, name) is not None for name in ("x", "y", "z")):
+        if not self.bounds.are_open:
             raise ValueError("problem: bounds do not move with the symmetry")
         group = type(by)
         return replace(

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from maneuver_automaton.audit import audit_plan, terminal_error
+from maneuver_automaton.audit import audit_plan, closest_to, terminal_error
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap, Polygon
 from maneuver_automaton.groups import SE2, SE2xR
@@ -396,6 +396,24 @@ def test_where_an_empty_plan_stands_counts():
     assert audited(resting, coming, automaton=ROBOT).min_clearance_m == pytest.approx(0.1, abs=1e-3)
     nearer = Obstacle(Disc(0.5), motion=Motion([0.0, 10.0], [[9.0, 0.0, 0.0], [1.9, 0.0, 0.0]]))
     assert not audited(resting, nearer, automaton=ROBOT).passed
+
+
+@pytest.mark.parametrize(
+    ("within", "time", "distance"),
+    [
+        ((-math.inf, math.inf), 7.0, 0.5),
+        ((6.5, 6.9), 6.9, math.hypot(0.15, 1.5) - 1.0),
+        ((-3.0, 6.0), 6.0, math.hypot(1.5, 1.5) - 1.0),
+        ((8.0, 99.0), 8.0, math.hypot(1.5, 1.5) - 1.0),
+        ((9.5, 99.0), 5.0, math.inf),
+    ],
+)
+def test_only_the_time_that_is_asked_for_counts(within, time, distance):
+    plan = Plan([0.0, 0.0, 0.0], (ROBOT["straight"],), durations=[4.0], start_time=5.0)
+    post = (Obstacle(Disc(0.5, [3.0, 1.5])),)
+    least = closest_to(plan, post, footprint=(Disc(0.5),), within=within)
+    assert least.distance == pytest.approx(distance, abs=1e-3)
+    assert least.time == pytest.approx(time, abs=0.05)
 
 
 def test_all_that_is_wrong_is_said():

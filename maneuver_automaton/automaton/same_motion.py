@@ -2,35 +2,53 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, wrapped
 from maneuver_automaton.automaton.plan import Plan
 
-SAME = 1e-3  # [m, rad] that poses of one motion differ by at most; less for ways below a metre
 ROUNDING = 1e-9  # [m] that two turns on the spot may differ by
+INSTANTS = 33  # at which motions are compared beside their switching times
 
 
-def same_motion(
-    one: Plan, other: Plan, *, tolerance_m: float = SAME, tolerance_rad: float = SAME
-) -> bool:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Likeness:
+    """By how much two plans may differ and still count as one motion."""
+
+    per_metre: float  # [m] between poses at equal times, per metre of the longer path
+    most_metres: float = math.inf  # [m] of a path that count; a longer one counts as this long
+    heading: float  # [rad] between headings at equal times
+
+    def __post_init__(self) -> None:
+        for name in ("per_metre", "most_metres", "heading"):
+            if not getattr(self, name) >= 0.0:
+                raise ValueError(f"likeness: {name} must be at least 0, got {getattr(self, name)}")
+
+
+CONVERGED = Likeness(per_metre=1e-3, most_metres=1.0, heading=1e-3)  # times solved to the end
+POLISHED = Likeness(per_metre=0.01, heading=0.02 * math.pi)  # ends of a local optimisation
+UNFINISHED = Likeness(per_metre=0.02, heading=0.3)  # improved for as long as there was time
+
+
+def same_motion(one: Plan, other: Plan, likeness: Likeness = CONVERGED) -> bool:
     """Whether two plans have the same pose at equal times, to within a tolerance.
 
     Parameters
     ----------
     one, other : Plan
-        Each is taken to stand at its end once it has arrived.
-    tolerance_m : float
-        Distance [m] that counts as none; for plans of less than a metre, as a share of their way.
-    tolerance_rad : float
-        Difference of headings [rad] that counts as none.
+        Each is taken to stand at its start before it begins, and at its end once it has arrived.
+    likeness : Likeness
+        What counts as the same.
 
     Returns
     -------
     bool
-        Poses are compared at all switching times of both plans and halfway between.
+        Poses are compared at all switching times of both plans, halfway between them, and at
+        instants spread evenly, which see what a maneuver does between its ends.
 
     Examples
     --------
@@ -43,32 +61,24 @@ def same_motion(
     >>> same_motion(straight, with_a_trace), same_motion(straight, turning)
     (True, False)
     """
-    times = np.unique(np.concatenate([one.switching_times, other.switching_times]))
-    times = np.sort(np.concatenate([times, 0.5 * (times[1:] + times[:-1])]))
-    here = one.pose_at(np.minimum(times, one.duration))
-    there = other.pose_at(np.minimum(times, other.duration))
+    switches = np.unique(np.concatenate([one.switching_times, other.switching_times]))
+    middles = 0.5 * (switches[1:] + switches[:-1])
+    spread = np.linspace(switches[0], switches[-1], INSTANTS)
+    times = np.sort(np.concatenate([switches, middles, spread]))
+    here, there = one.pose_at(times), other.pose_at(times)  # a plan stands before and after it
     places = [0, 1, *range(3, here.shape[-1])]
     off = np.linalg.norm((here - there)[:, places], axis=1).max()
     turned = np.abs(wrapped(here[:, 2] - there[:, 2])).max()
-    size = min(1.0, max(_way(here), _way(there)))
-    return bool(off <= tolerance_m * size + ROUNDING and turned <= tolerance_rad)
+    size = min(likeness.most_metres, max(_path_length(here), _path_length(there)))
+    return bool(off <= likeness.per_metre * size + ROUNDING and turned <= likeness.heading)
 
 
-def is_new(
-    plan: Plan,
-    known: Iterable[Plan],
-    *,
-    tolerance_m: float = SAME,
-    tolerance_rad: float = SAME,
-) -> bool:
-    """Whether a plan is another motion than all that are known, to within tolerances."""
-    return not any(
-        same_motion(plan, other, tolerance_m=tolerance_m, tolerance_rad=tolerance_rad)
-        for other in known
-    )
+def is_new(plan: Plan, known: Iterable[Plan], likeness: Likeness = CONVERGED) -> bool:
+    """Whether a plan is another motion than all that are known."""
+    return not any(same_motion(plan, other, likeness) for other in known)
 
 
-def _way(poses: Array) -> float:
-    """Length of the way through poses (n, dof) [m]."""
+def _path_length(poses: Array) -> float:
+    """Length of the path through poses (n, dof) [m]."""
     places = [0, 1, *range(3, poses.shape[-1])]
     return float(np.linalg.norm(np.diff(poses[:, places], axis=0), axis=1).sum())

@@ -177,8 +177,8 @@ def _road_row(path: Path, parts: Parts, out: Path, settings: Settings) -> Row:
         name=path.name,
         code=FOUND,
         status="found",
-        cost=result.planner.price(result.plan),
-        duration=result.planner.tick * result.plan.lasting,
+        cost=result.cost,
+        duration=result.plan.duration,
         clearance=result.verdict.clearance_m,
         first_plan=result.search_s,
     )

@@ -17,8 +17,8 @@ from maneuver_automaton.errors import InvalidScenario
 if TYPE_CHECKING:
     from rich.text import Text
 
+    from maneuver_automaton.automaton import Plan
     from maneuver_automaton.cli import mpc_command, plan_command
-    from maneuver_automaton.primitives import Trajectory
     from maneuver_automaton.roads import RoadDrive, RoadPlanResult, RoadScene, RoadVehicle
 
 TIME_LIMIT = 10.0  # [s] of one plan
@@ -34,7 +34,8 @@ def plan_file(
     path: Path, out: Path, *, settings: plan_command.Settings, parts: Parts
 ) -> RoadPlanResult:
     """Plan one drive into the folder `out`, and print the plan; the result."""
-    from maneuver_automaton.formats.road_json import road_plan_to_dict, save_road_document
+    from maneuver_automaton.formats.plan_json import write_document
+    from maneuver_automaton.formats.road_json import road_plan_to_dict
     from maneuver_automaton.roads import plan_road
 
     scene, vehicle = _road(path, parts)
@@ -51,12 +52,12 @@ def plan_file(
     document = road_plan_to_dict(result)
 
     def write() -> None:
-        save_road_document(document, out / "plan.json")
+        write_document(document, out / "plan.json")
         for name in ("plan.png", "plan.gif"):
             (out / name).unlink(missing_ok=True)  # of an earlier plan
-        if result.driven is not None:
+        if result.plan is not None:
             named = (out / "plan.png", [out / "plan.gif"])
-            _draw(scene, vehicle, result.driven, named, settings.plot, settings.animate)
+            _draw(scene, vehicle, result.plan, named, settings.plot, settings.animate)
 
     _written(write, out)
     if result.plan is not None and not settings.quiet:
@@ -70,7 +71,8 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
     Where the search of one step finds no plan to a goal from the start, a wider one is made before
     the vehicle sets off, and told apart from the steps.
     """
-    from maneuver_automaton.formats.road_json import road_drive_to_dict, save_road_document
+    from maneuver_automaton.formats.plan_json import write_document
+    from maneuver_automaton.formats.road_json import road_drive_to_dict
     from maneuver_automaton.roads import drive_scene, plan_before, road_planner
 
     for name, value in (("--seeds", settings.seeds), ("--resume", settings.resume)):
@@ -91,13 +93,13 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
             drive = drive_scene(
                 planner,
                 steps=settings.steps,
-                first=None if before is None else before.plan,
+                first=None if before is None else before.decision,
                 progress=lambda _: advance(),
             )
     document = road_drive_to_dict(drive, before=before)
 
     def write() -> None:
-        save_road_document(document, out / "closed_loop.json")
+        write_document(document, out / "closed_loop.json")
         films = [out / "closed_loop.gif", out / "closed_loop.html"]
         for file in (out / "closed_loop.png", *films):
             file.unlink(missing_ok=True)  # of an earlier loop
@@ -110,7 +112,7 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
     for name in drive.verdict.hit:
         complain(f"{path}: collision with {name}")
     if drive.verdict.off_road:
-        complain(f"{path}: off the road at {drive.verdict.off_road} of {drive.verdict.poses} poses")
+        complain(f"{path}: off the road: a part of the body was outside the lanelets")
     if not drive.reached:
         complain(f"{path}: {drive.status}: {drive.reason}")
     return FOUND if drive.reached else NO_PLAN
@@ -129,7 +131,7 @@ def _road(path: Path, parts: Parts) -> tuple[RoadScene, RoadVehicle]:
 def _draw(
     scene: RoadScene,
     vehicle: RoadVehicle,
-    driven: Trajectory,
+    plan: Plan,
     files: tuple[Path, Iterable[Path]],
     plot: bool,
     animate: bool,
@@ -139,10 +141,10 @@ def _draw(
     from maneuver_automaton import plotting
 
     if plot:
-        plotting.save_road_figure(scene, vehicle, driven, files[0])
+        plotting.save_road_figure(scene, vehicle, plan, files[0])
     if animate:
         for file in files[1]:
-            plotting.save_road_animation(scene, vehicle, driven, file)
+            plotting.save_road_animation(scene, vehicle, plan, file)
 
 
 def _written(write: Callable[[], None], out: Path) -> None:
@@ -153,15 +155,15 @@ def _written(write: Callable[[], None], out: Path) -> None:
 
 
 def _plan_facts(result: RoadPlanResult, out: Path) -> dict[str, str]:
-    plan, verdict, driven = result.plan, result.verdict, result.driven
+    plan, verdict, decision = result.plan, result.verdict, result.decision
     assert plan is not None
     assert verdict is not None
-    assert driven is not None
+    assert decision is not None
     return {
-        "goal": f"reached at {driven.time[-1]:.6g} s",
-        "cost": f"{result.planner.price(plan):.6g}",
+        "goal": f"reached at {plan.switching_times[-1]:.6g} s",
+        "cost": f"{result.cost:.6g}",
         "clearance": f"{verdict.clearance_m:.3g} m, to the edge of the road {verdict.edge_m:.3g} m",
-        "stop after it": "free" if plan.stops else "none was found",
+        "stop after it": "free" if decision.stops else "none was found",
         "searched": f"{result.search_s:.3g} s",
         "written to": str(out),
     }
@@ -169,9 +171,9 @@ def _plan_facts(result: RoadPlanResult, out: Path) -> dict[str, str]:
 
 def _drive_facts(drive: RoadDrive, before: RoadPlanResult | None, out: Path) -> dict[str, str]:
     verdict = drive.verdict
-    milliseconds = 1e3 * drive.solve_s
+    milliseconds, end = 1e3 * drive.solve_s, drive.driven.switching_times[-1]
     facts = {
-        "goal": f"reached at {drive.driven.time[-1]:.6g} s" if drive.reached else drive.reason,
+        "goal": f"reached at {end:.6g} s" if drive.reached else drive.reason,
         "steps": f"{len(drive.steps)}, {sum(step.replanned for step in drive.steps)} replanned",
         "collisions": str(len(verdict.hit)),
         "clearance": f"{verdict.clearance_m:.3g} m, to the edge of the road {verdict.edge_m:.3g} m",

@@ -121,6 +121,13 @@ class Surroundings:
 def surroundings_of(
     obstacles: tuple[AnyObstacle, ...], origin: tuple[float, float]
 ) -> Surroundings:
+    """As `surroundings_around`; those of the last maps are kept."""
+    return surroundings_around(obstacles, origin)
+
+
+def surroundings_around(
+    obstacles: tuple[AnyObstacle, ...], origin: tuple[float, float]
+) -> Surroundings:
     """Obstacles counted from an origin [m].
 
     Raises

@@ -6,7 +6,6 @@ not been. One entry per step applied, and a last one where the vehicle ended.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,13 +14,12 @@ from typing import Any
 import numpy as np
 
 from maneuver_automaton._arrays import Array, as_array
-from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.automaton import Automaton, Plan, Primitive
 from maneuver_automaton.automaton.courses import samples_entry
 from maneuver_automaton.automaton.cutting import tail_of, with_samples_at
 from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.plan_json import package_version, read_json
+from maneuver_automaton.formats.plan_json import package_version, read_json, write_document
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 from maneuver_automaton.receding_horizon import (
     ClosedLoop,
@@ -92,9 +90,7 @@ def save_closed_loop(loop: ClosedLoop, path: Path | str) -> None:
     OSError
         If the file cannot be written.
     """
-    document = closed_loop_to_dict(loop)
-    lines = [f"  {json.dumps(key)}: {_json(key, value)}" for key, value in document.items()]
-    write_text_atomically(Path(path), "{\n" + ",\n".join(lines) + "\n}\n")
+    write_document(closed_loop_to_dict(loop), path)
 
 
 def load_steps(path: Path | str, automaton: Automaton) -> tuple[tuple[Step, ...], Array]:
@@ -351,11 +347,3 @@ def _trim(entry: Mapping[str, Any], automaton: Automaton) -> Trim:
         if trim.control.tolist() == control:
             return trim
     return Automaton.of_controls(automaton.model, {name: control}).trims[0]
-
-
-def _json(key: str, value: Any) -> str:
-    """A value of the file in one line, but a list of objects one object a line."""
-    if key in ("steps", "broken_guarantees") and value:
-        rows = ",\n".join(f"    {_json('', row)}" for row in value)
-        return f"[\n{rows}\n  ]"
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)

@@ -173,10 +173,10 @@ def _traffic(root: Element, step: float) -> Iterator[Obstacle]:
 
 
 def _occupancies(predicted: Element, step: float, name: str) -> Iterator[Obstacle]:
-    """Where somebody may be, set by set.
+    """Predicted occupancies of a road user, set by set, as obstacles.
 
     A set of an interval holds there. A set of one instant holds from the instant before to the one
-    after, so that whoever is between two instants is in one of their sets.
+    after, so that a road user between two instants is in one of their sets.
     """
     for element in predicted.all("occupancy"):
         time = element.need("time")
@@ -190,7 +190,7 @@ def _occupancies(predicted: Element, step: float, name: str) -> Iterator[Obstacl
 
 
 def _there(shape: Shape, time: tuple[float, float], step: float, name: str) -> Obstacle:
-    """Somebody who stands in a place between two times, which themselves do not belong to it."""
+    """An obstacle in one place between two times, which themselves do not belong to it."""
     times = [time[0] + OPEN * step, time[1] - OPEN * step]
     return Obstacle(shape, motion=Motion(times, np.zeros((2, 3))), name=name)
 

@@ -32,6 +32,7 @@ FAR = 1e6  # [m] from here on poses are written relative to the start
 TIMINGS = ("load", "automaton", "search", "first_plan", "refine", "audit")
 COUNTS = ("expansions", "collision_queries")
 TRAJECTORY = ("origin", "time_s", "pose", "reduced_state", "control")
+LISTS = ("primitives", "stop", "alternatives", "steps", "broken_guarantees")  # of objects
 SAME_TIME = 1e-9  # [s], relative to the duration, between a switch and its sample
 
 
@@ -67,10 +68,10 @@ def plan_to_dict(result: PlanResult) -> dict[str, Any]:
         "lower_bound": _number(result.lower_bound),
         "gap": _number(result.gap),
         "certificate": _number(result.certificate),
-        "primitives": [] if plan is None else _primitives(plan),
+        "primitives": primitive_entries(plan),
         "terminal_error": _terminal_error(result.terminal_error),
         "clearance_m": _number(result.clearance_m),
-        "trajectory": {key: [] for key in TRAJECTORY} if plan is None else _trajectory(plan),
+        "trajectory": trajectory_entry(plan),
         "audit": _audit(result.audit),
         "alternatives": [_alternative(one) for one in result.alternatives],
         "timing_s": {**dict.fromkeys(TIMINGS), **_floats(result.timing_s)},
@@ -86,7 +87,17 @@ def save_plan(result: PlanResult, path: Path | str) -> None:
     OSError
         If the file cannot be written.
     """
-    document = plan_to_dict(result)
+    write_document(plan_to_dict(result), path)
+
+
+def write_document(document: Mapping[str, Any], path: Path | str) -> None:
+    """Write a plan.json or closed_loop.json in one step: strict JSON, long lists entry by entry.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
     lines = [f"  {json.dumps(key)}: {_json(key, value)}" for key, value in document.items()]
     write_text_atomically(Path(path), "{\n" + ",\n".join(lines) + "\n}\n")
 
@@ -163,8 +174,10 @@ def package_version() -> str:
         return "0"
 
 
-def _trajectory(plan: Plan) -> dict[str, Any]:
+def trajectory_entry(plan: Plan | None) -> dict[str, Any]:
     """Samples of a plan; far from the origin sampled from (0, 0), so that no digit is lost."""
+    if plan is None:
+        return {key: [] for key in TRAJECTORY}
     origin = np.zeros(2)
     samples = plan.sample()
     if np.abs(samples.pose[:, :2]).max() > FAR:
@@ -180,9 +193,11 @@ def _trajectory(plan: Plan) -> dict[str, Any]:
     }
 
 
-def _primitives(plan: Plan) -> list[dict[str, Any]]:
+def primitive_entries(plan: Plan | None) -> list[dict[str, Any]]:
     """Trims and maneuvers in order; a maneuver has no control of its own, but two ends."""
     entries: list[dict[str, Any]] = []
+    if plan is None:
+        return entries
     for primitive, duration in zip(plan.primitives, plan.primitive_durations, strict=True):
         trim = primitive if isinstance(primitive, Trim) else None
         entry: dict[str, Any] = {
@@ -202,7 +217,7 @@ def _alternative(one: Alternative) -> dict[str, Any]:
         "cost": float(one.cost),
         "duration_s": one.plan.duration,
         "word": list(one.plan.word),
-        "primitives": _primitives(one.plan),
+        "primitives": primitive_entries(one.plan),
         "terminal_error": _terminal_error(one.terminal_error),
     }
 
@@ -238,7 +253,7 @@ def _floats(values: Mapping[str, float]) -> dict[str, float]:
 
 def _json(key: str, value: Any) -> str:
     """A value of the file in one line, but lists of objects one object a line."""
-    if key in ("primitives", "alternatives") and value:
+    if key in LISTS and value:
         rows = ",\n".join(f"    {_json('', row)}" for row in value)
         return f"[\n{rows}\n  ]"
     if key == "trajectory":

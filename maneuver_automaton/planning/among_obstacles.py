@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import functools
 import math
-import time
-from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-
-from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.same_motion import is_new
+from maneuver_automaton.automaton.same_motion import UNFINISHED, is_new
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import lattice_bound
-from maneuver_automaton.planning.checking import check_plan, load_checks
+from maneuver_automaton.planning.checking import Condition, load_checks
 from maneuver_automaton.planning.detours import with_stones
-from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
+from maneuver_automaton.planning.incumbents import Candidate, Incumbents
+from maneuver_automaton.planning.result import PlanResult, PlanStatus
+from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem, moves
 from maneuver_automaton.refinement.improve import Improved, Patience, improve
+from maneuver_automaton.search.budget import Budget
 from maneuver_automaton.search.choose import search_goal
 from maneuver_automaton.search.cost_to_go import CostTable, cost_to_go_table
 from maneuver_automaton.search.lattice import FirstPlan, first_plan
@@ -37,136 +35,107 @@ SOME = Patience(attempts=400, passes=0)  # of a plan beside a stone
 BRIEF = Patience(attempts=1000, passes=3)  # of the way among what stands still
 MOST_WAYS = 4  # that are tried with rests
 QUICK = 1500  # expansions in space and time before a way with rests is tried
+PASSING_SHARE = 0.3  # of the time that is left, for ways that let pass what moves
 FOR_THE_BEST = 0.6  # share of what is left that the best plan gets where alternatives are asked for
 FREE_WORDS = 4  # words of free space that are looked at for every alternative
 FREE_WORDS_SHARE = 0.3  # of the time that is left for alternatives
 MOST_DETOURS = 8  # known ways beside which others are looked for
-UNFINISHED_M = 0.02  # [m] per metre of way that plans of one motion differ by: none is converged
-UNFINISHED_RAD = 0.3  # [rad] the same for headings
-CHEAPER = 1e-7  # share of a cost that closing the end of a plan may change it by
-REJECTED = 8  # plans in a row that the checks may refuse before it is given up
 
 
 @dataclass(slots=True, eq=False)
 class _Progress:
-    """What was found so far, the cheapest last, and what it took."""
+    """The words found so far, the cheapest last, and the table that guides the search."""
 
     query: LatticeQuery
     table: CostTable
-    began: float  # as `time.monotonic` counts
-    deadline: float
+    found: Incumbents
     words: list[Word] = field(default_factory=list)
-    improvements: list[tuple[float, float]] = field(default_factory=list)
-    counts: Counter[str] = field(default_factory=Counter)
+
+    @property
+    def budget(self) -> Budget:
+        """What is left."""
+        return self.found.budget.less(self.found.counts["expansions"])
 
     def heard(self, word: Word) -> None:
         """A better word was found."""
         self.words.append(word)
-        self.improvements.append((time.monotonic() - self.began, word.cost + self.query.padding))
+        self.found.hear(word.cost + self.query.padding)
 
     def first_plan(
-        self, query: LatticeQuery, *, most: int | None, deadline: float | None = None
+        self, query: LatticeQuery, budget: Budget, *, most: int | None = None
     ) -> FirstPlan:
         """A first plan for a query, its expansions counted."""
-        limit = self.deadline if deadline is None else deadline
-        found = first_plan(query, deadline=limit, max_expansions=most, table=self.table)
-        self.counts["expansions"] += found.expansions
-        self.counts["collision_queries"] += found.queries
-        self.counts["searches"] += 1
+        limits = [one for one in (most, budget.expansions) if one is not None]
+        found = first_plan(
+            query,
+            deadline=budget.deadline,
+            max_expansions=min(limits, default=None),
+            table=self.table,
+        )
+        self.found.counts.update(
+            expansions=found.expansions, collision_queries=found.queries, searches=1
+        )
         return found
 
     def improve(
-        self, query: LatticeQuery, word: Word, *, deadline: float, patience: Patience, **more: Any
+        self, query: LatticeQuery, word: Word, budget: Budget, *, patience: Patience, **more: Any
     ) -> Improved:
         """A better word for a query, its attempts and expansions counted."""
-        found = improve(query, word, deadline=deadline, patience=patience, table=self.table, **more)
-        self.counts["expansions"] += found.expansions
-        self.counts["collision_queries"] += found.queries
-        self.counts["searches"] += found.passes
-        self.counts["attempts"] += found.attempts
+        found = improve(
+            query,
+            word,
+            deadline=budget.deadline,
+            max_expansions=budget.expansions,
+            patience=patience,
+            table=self.table,
+            **more,
+        )
+        self.found.counts.update(
+            expansions=found.expansions,
+            collision_queries=found.queries,
+            searches=found.passes,
+            attempts=found.attempts,
+        )
         return found
 
 
 def plan_on_lattice(
-    problem: Problem, *, began: float, time_limit: float, alternatives: int
+    problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
 ) -> PlanResult:
-    """The cheapest free plan found within the time limit [s], counted from `began`."""
+    """The cheapest free plan found."""
     goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
     query = lattice_query(problem, goals)
-    progress = _Progress(query, library_table(problem), began, began + time_limit)
+    found = Incumbents(problem, budget, workspace.on(problem.obstacles), alternatives, UNFINISHED)
+    progress = _Progress(query, library_table(problem), found)
     first = _first(progress)
-    found = time.monotonic()
-    timing = {"search": found - began, "first_plan": found - began, "refine": 0.0, "audit": 0.0}
     if not progress.words:
-        del timing["first_plan"]
-        status, reason = _why_none(query, first, time_limit)
-        return PlanResult(
-            problem=problem,
-            status=status,
-            reason=reason,
-            timing_s=timing,
-            counts=dict(progress.counts),
-            nodes=first.nodes,
-        )
+        return found.none(*_why_none(query, first, budget), nodes=first.nodes)
+    searched = budget.elapsed
     if problem.moves:
         _let_pass(progress)
     bound = lattice_bound(query)
-    share = FOR_THE_BEST if alternatives else 1.0
-    left = _left(progress)
-    better = progress.improve(
-        query,
-        progress.words[-1],
-        deadline=found + share * (progress.deadline - found),
-        patience=Patience(),
-        floor=bound - query.padding,
-        max_expansions=None if left is None else int(share * left),
-        better=progress.heard,
-        meanwhile=lambda: load_checks(problem),
-    )
-    candidates = [_candidate(query, word) for word in (*progress.words, *better.others)]
-    if alternatives:
-        candidates += [*_free_words(progress, alternatives)]
-        candidates += _detours(progress, better.word, 2 * alternatives)
-    refined = time.monotonic()
-    chosen = _checked(progress, candidates, alternatives)
-    if chosen.plans and chosen.plans[0].cost < progress.improvements[-1][1] * (1.0 - CHEAPER):
-        progress.improvements.append((refined - began, chosen.plans[0].cost))
-    timing["first_plan"] = progress.improvements[0][0]
-    timing["refine"], timing["audit"] = refined - found, time.monotonic() - refined
-    if not chosen.plans:
-        return PlanResult(
-            problem=problem,
-            status=PlanStatus.NO_PLAN,
-            reason=f"every plan found was refused: {chosen.reason}",
-            timing_s=timing,
-            counts=dict(progress.counts),
-        )
-    return found_plans(
-        problem,
-        chosen.plans,
-        bound=bound,
-        timing_s=timing,
-        counts=dict(progress.counts),
-        improvements=tuple(progress.improvements),
-        nodes=first.nodes,
-    )
+    found.offer_in_turn(_candidates(progress, bound))
+    found.counts["rejected_by_audit"] = found.refused[Condition.AUDIT]
+    found.counts["rejected_by_fcl"] = found.rejected - found.refused[Condition.AUDIT]
+    if not found.plans:
+        return found.none(PlanStatus.NO_PLAN, f"every plan found was refused: {found.why_refused}")
+    return found.found(bound=bound, searched=searched, nodes=first.nodes)
 
 
 def _first(progress: _Progress) -> FirstPlan:
     """The first plan; where something moves, a way that lets it pass if a quick look finds none."""
-    query = progress.query
-    most = query.problem.search.max_expansions
+    query, budget = progress.query, progress.found.budget
     if query.problem.moves:
-        first = progress.first_plan(query, most=min(most or QUICK, QUICK))
+        first = progress.first_plan(query, budget, most=QUICK)
         if first.word is not None:
             progress.heard(with_cost(first.word, query))
             return first
-        way = progress.first_plan(_among_what_stands(query), most=most)
+        way = progress.first_plan(_among_what_stands(query), budget)
         timed = None if way.word is None else with_waits(query, way.word)
         if timed is not None:
             progress.heard(timed)
             return first
-    first = progress.first_plan(query, most=most)
+    first = progress.first_plan(query, budget)
     if first.word is not None:
         progress.heard(with_cost(first.word, query))
     return first
@@ -174,15 +143,12 @@ def _first(progress: _Progress) -> FirstPlan:
 
 def _let_pass(progress: _Progress) -> None:
     """Hear of the cheapest way among what stands still, with rests that let pass what moves."""
-    query = progress.query
-    calm = _among_what_stands(query)
-    begin = time.monotonic()
-    soon = begin + 0.3 * (progress.deadline - begin)
-    most = query.problem.search.max_expansions
-    found = progress.first_plan(calm, most=most, deadline=soon)
+    query, calm = progress.query, _among_what_stands(progress.query)
+    soon = progress.found.budget.part(PASSING_SHARE)
+    found = progress.first_plan(calm, soon)
     if found.word is None:
         return
-    better = progress.improve(calm, found.word, deadline=soon, patience=BRIEF)
+    better = progress.improve(calm, found.word, replace(soon, expansions=None), patience=BRIEF)
     ways = sorted([found.word, better.word, *better.others], key=lambda one: one.cost)
     distinct = {tuple(way.trims.tolist()): way for way in reversed(ways)}
     for way in list(distinct.values())[::-1][:MOST_WAYS]:
@@ -198,10 +164,32 @@ def _among_what_stands(query: LatticeQuery) -> LatticeQuery:
     return lattice_query(replace(problem, obstacles=still), query.goal_index)
 
 
-def prepare_map(problem: Problem) -> None:
+def _candidates(progress: _Progress, bound: float) -> list[Candidate]:
+    """Plans to be checked: the first and what is made of it, and others if they are asked for."""
+    query, alternatives = progress.query, progress.found.alternatives
+    share = FOR_THE_BEST if alternatives else 1.0
+    left = progress.budget
+    most = None if left.expansions is None else int(share * left.expansions)
+    better = progress.improve(
+        query,
+        progress.words[-1],
+        replace(left.part(share), expansions=most),
+        patience=Patience(),
+        floor=bound - query.padding,
+        better=progress.heard,
+        meanwhile=lambda: load_checks(query.problem, progress.found.workspace),
+    )
+    candidates = [_candidate(query, word) for word in (*progress.words, *better.others)]
+    if alternatives:
+        candidates += _free_words(progress, alternatives)
+        candidates += _detours(progress, better.word, 2 * alternatives)
+    return candidates
+
+
+def prepare_map(problem: Problem, workspace: Workspace) -> None:
     """The map as the search, FCL and the audit see it."""
     lattice_query(problem, tuple(range(len(problem.goals))))
-    load_checks(problem)
+    load_checks(problem, workspace)
 
 
 def library_table(problem: Problem) -> CostTable:
@@ -209,35 +197,16 @@ def library_table(problem: Problem) -> CostTable:
     return cost_to_go_table(problem)
 
 
-@dataclass(slots=True, eq=False)
-class _Chosen:
-    """What the checks left, cheapest first."""
-
-    plans: list[Accepted] = field(default_factory=list)
-    rejected: int = 0
-    reason: str = ""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Candidate:
-    """A plan that has still to be checked; it is made when it is its turn."""
-
-    cost: float
-    goal_index: int
-    plan: Callable[[], Plan]
-    proven: bool = True  # the search took it to be free
-
-
-def _candidate(query: LatticeQuery, word: Word) -> _Candidate:
+def _candidate(query: LatticeQuery, word: Word) -> Candidate:
     make = functools.partial(plan_of_word, query, word)
-    return _Candidate(word.cost + query.padding, query.goal_index[word.goal], make)
+    return Candidate(word.cost + query.padding, query.goal_index[word.goal], make)
 
 
-def _free_words(progress: _Progress, alternatives: int) -> Iterator[_Candidate]:
+def _free_words(progress: _Progress, alternatives: int) -> Iterator[Candidate]:
     """Words that are locally optimal in free space: those that hit nothing are so here, too."""
     problem = progress.query.problem
     for index in progress.query.goal_index:
-        left = FREE_WORDS_SHARE * (progress.deadline - time.monotonic())
+        left = FREE_WORDS_SHARE * progress.budget.left
         if left <= 0.0:
             return
         found = search_goal(
@@ -245,10 +214,10 @@ def _free_words(progress: _Progress, alternatives: int) -> Iterator[_Candidate]:
         )
         for solution in (one for result in found for one in result.solutions):
             make = functools.partial(plan_of, problem, solution)
-            yield _Candidate(solution.cost, index, make, proven=False)
+            yield Candidate(solution.cost, index, make, proven=False)
 
 
-def _detours(progress: _Progress, best: Word, most: int) -> Iterator[_Candidate]:
+def _detours(progress: _Progress, best: Word, most: int) -> Iterator[Candidate]:
     """Up to `most` plans on other ways round the obstacles: a stone closes each known way."""
     query = progress.query
     known = [plan_of_word(query, best)]
@@ -256,72 +225,23 @@ def _detours(progress: _Progress, best: Word, most: int) -> Iterator[_Candidate]
         if n_th >= len(known) or len(known) > most:
             return
         for problem in with_stones(query, known[n_th]):
-            left = _left(progress)
-            if time.monotonic() >= progress.deadline or left == 0:
+            if progress.budget.is_over or progress.budget.expansions == 0:
                 return
             closed = lattice_query(problem, query.goal_index)
-            first = progress.first_plan(closed, most=left)
+            first = progress.first_plan(closed, progress.budget)
             if first.word is None:
                 continue
             word = with_cost(first.word, closed)
             for where in (closed, query):  # away from the stone, then without it
-                left = _left(progress)
-                word = progress.improve(
-                    where,
-                    word,
-                    deadline=progress.deadline,
-                    patience=SOME if where is closed else AT_ONCE,
-                    max_expansions=left,
-                ).word
+                patience = SOME if where is closed else AT_ONCE
+                word = progress.improve(where, word, progress.budget, patience=patience).word
             plan = plan_of_word(query, word)
-            if _differs(plan, known):
+            if is_new(plan, known, UNFINISHED):
                 known.append(plan)
                 yield _candidate(query, word)
 
 
-def _differs(plan: Plan, known: list[Plan]) -> bool:
-    """Whether a plan is another motion than those known, which need not be converged either."""
-    way = float(np.hypot(*np.diff(plan.switching_poses[:, :2], axis=0).T).sum())
-    return is_new(plan, known, tolerance_m=UNFINISHED_M * way, tolerance_rad=UNFINISHED_RAD)
-
-
-def _checked(progress: _Progress, candidates: list[_Candidate], alternatives: int) -> _Chosen:
-    """The cheapest plans that pass; of plans that are one motion, the cheapest."""
-    problem = progress.query.problem
-    progress.counts["rejected_by_fcl"] = progress.counts["rejected_by_audit"] = 0
-    chosen = _Chosen()
-    for candidate in sorted(candidates, key=lambda one: one.cost):
-        if len(chosen.plans) > alternatives:
-            break
-        if chosen.rejected >= REJECTED and not chosen.plans:
-            break
-        plan, index = candidate.plan(), candidate.goal_index
-        if not _differs(plan, [one.plan for one in chosen.plans]):
-            continue
-        checked = check_plan(problem, plan, problem.goals[index])
-        if checked.audit is not None and checked.passed:
-            cost = problem.cost_of(plan)
-            chosen.plans.append(
-                Accepted(plan=plan, goal_index=index, cost=cost, audit=checked.audit)
-            )
-            continue
-        if not (candidate.proven and checked.admitted):
-            continue
-        by = "fcl" if checked.audit is None else "audit"
-        progress.counts[f"rejected_by_{by}"] += 1
-        chosen.rejected += 1
-        chosen.reason = chosen.reason or checked.reason
-    chosen.plans.sort(key=lambda one: one.cost)
-    return chosen
-
-
-def _left(progress: _Progress) -> int | None:
-    """Expansions that may still be spent."""
-    most = progress.query.problem.search.max_expansions
-    return None if most is None else max(0, most - progress.counts["expansions"])
-
-
-def _why_none(query: LatticeQuery, first: FirstPlan, time_limit: float) -> tuple[PlanStatus, str]:
+def _why_none(query: LatticeQuery, first: FirstPlan, budget: Budget) -> tuple[PlanStatus, str]:
     if first.enclosed:
         return PlanStatus.UNREACHABLE, first.enclosed
     impossible = why_impossible(query.problem)
@@ -333,5 +253,5 @@ def _why_none(query: LatticeQuery, first: FirstPlan, time_limit: float) -> tuple
     if first.exhausted:
         return PlanStatus.NO_PLAN, (f"none at any resolution tried, which proves nothing{nearest}")
     return PlanStatus.OUT_OF_BUDGET, (
-        f"no plan within {time_limit:g} s and {first.expansions} expansions{nearest}"
+        f"no plan within {budget.seconds:g} s and {first.expansions} expansions{nearest}"
     )

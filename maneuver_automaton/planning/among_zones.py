@@ -9,121 +9,72 @@ The first question is the one without zones: if its answer keeps to them, none i
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass, replace
 from itertools import product
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton, Plan
-from maneuver_automaton.automaton.same_motion import is_new
 from maneuver_automaton.collision import Obstacle, Zone
 from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.collision.surroundings import fastest_point, parts_of, surroundings_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.planning.blocked import blocked_ends
-from maneuver_automaton.planning.checking import check_plan
-from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
+from maneuver_automaton.planning.incumbents import Incumbents
+from maneuver_automaton.planning.result import Answer, PlanResult, PlanStatus
+from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.admission import admitted_stretches, piece_is_admitted
+from maneuver_automaton.search.budget import Budget
 
 MOST_QUESTIONS = 8  # ways to enter some zones and go around others
+LEAST_TIME = 1e-3  # [s] for each question, also where the time is over
 STEP = 0.02  # [m, rad] between places where a trim may be replaced by a faster one
 PARALLEL = 1e-12  # of twists, relative
 
 
-class Search(Protocol):
-    """A planner of problems without zones."""
-
-    def __call__(
-        self, problem: Problem, /, *, began: float, time_limit: float, alternatives: int
-    ) -> PlanResult:
-        """The cheapest plan found."""
-        ...
-
-
 def plan_among_zones(
-    problem: Problem, search: Search, *, began: float, time_limit: float, alternatives: int
+    problem: Problem, search: Answer, budget: Budget, workspace: Workspace, *, alternatives: int
 ) -> PlanResult:
-    """The cheapest plan found that keeps to the zones of a problem; every one was audited.
+    """The cheapest plan found that keeps to the zones of a problem.
 
-    The time limit [s] counts from `began`, as `time.monotonic` does. The answer need not be the
-    best: only where the plan that knows of no zones keeps to them, it is as good as that one.
+    The answer need not be the best: only where the plan that knows of no zones keeps to them, it is
+    as good as that one.
     """
-    deadline = began + time_limit
+    found = Incumbents(problem, budget, workspace, alternatives)
     free = replace(problem, zones=())
     # vehicles with inertia are searched with the zones themselves: crossed slowly, left fast
     itself = [] if problem.automaton.is_kinematic else [problem]
     questions = [free, *itself, *(one for one in _questions(problem) if blocked_ends(one) is None)]
-    accepted: list[Accepted] = []
-    counts: dict[str, int] = {}
-    improvements: list[tuple[float, float]] = []
-    best: PlanResult | None = None
+    first: PlanResult | None = None
     for k, question in enumerate(questions):
-        left = deadline - time.monotonic()
-        if left <= 0.0 and accepted:
+        if budget.is_over and found.plans:
             break
-        share = max(left, 1e-3) / (len(questions) - k)
-        result = search(
-            question, began=time.monotonic(), time_limit=share, alternatives=alternatives
-        )
-        best = result if best is None else best
-        for name, value in result.counts.items():
-            counts[name] = counts.get(name, 0) + value
+        part = budget.part(1.0 / (len(questions) - k), at_least=LEAST_TIME)
+        result = search(question, part, workspace, alternatives=alternatives)
+        first = first or result
+        found.counts.update(result.counts)
         for plan, goal_index in _plans(problem, result):
-            one = _checked(problem, plan, goal_index)
-            if one is not None:
-                if one.cost < min((other.cost for other in accepted), default=math.inf):
-                    improvements.append((time.monotonic() - began, one.cost))
-                accepted.append(one)
-        if k == 0 and accepted and result.plan is accepted[0].plan and not alternatives:
+            found.offer(plan, goal_index)
+        if k == 0 and found.plans and result.plan is found.plans[0].plan and not alternatives:
             return replace(result, problem=problem)
-    timing = {"search": time.monotonic() - began, "refine": 0.0, "audit": 0.0}
-    if not accepted:
-        assert best is not None
-        reason = best.reason or (
-            "no plan was found that keeps to the zones, by going around them, or through them with "
-            "what they admit"
-        )
-        status = PlanStatus.NO_PLAN if best.plan is not None else best.status
-        return PlanResult(
-            problem=problem, status=status, reason=reason, timing_s=timing, counts=counts
-        )
-    accepted.sort(key=lambda one: one.cost)
-    kept: list[Accepted] = []
-    for one in accepted:
-        if len(kept) <= alternatives and is_new(one.plan, (other.plan for other in kept)):
-            kept.append(one)
-    timing["first_plan"] = improvements[0][0]
-    bound = 0.0 if best is None or best.lower_bound is None else best.lower_bound
-    return found_plans(
-        problem,
-        kept,
-        bound=bound,
-        timing_s=timing,
-        counts=counts,
-        improvements=tuple(improvements),
+    assert first is not None
+    if found.plans:
+        return found.found(bound=first.lower_bound or 0.0)
+    reason = first.reason or (
+        "no plan was found that keeps to the zones, by going around them, or through them with "
+        "what they admit"
     )
+    return found.none(PlanStatus.NO_PLAN if first.plan is not None else first.status, reason)
 
 
-def _checked(problem: Problem, plan: Plan, goal_index: int | None) -> Accepted | None:
-    """A plan that keeps to the zones and passes every other check; None if it does not."""
-    if goal_index is None:
-        return None
-    checked = check_plan(problem, plan, problem.goals[goal_index])
-    if checked.audit is None or not checked.passed:
-        return None
-    cost = problem.cost_of(plan)
-    return Accepted(plan=plan, goal_index=goal_index, cost=cost, audit=checked.audit)
-
-
-def _plans(problem: Problem, result: PlanResult) -> Iterator[tuple[Plan, int | None]]:
+def _plans(problem: Problem, result: PlanResult) -> Iterator[tuple[Plan, int]]:
     """What a search found, the best first, and the same quickened outside of the zones."""
-    if result.plan is None:
+    if result.plan is None or result.goal_index is None:
         return
     found = [result.plan, *(other.plan for other in result.alternatives)]
     for plan in found:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import functools
 import math
 from dataclasses import dataclass
@@ -13,48 +14,58 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.audit import Audit, audit_plan
 from maneuver_automaton.automaton import Automaton, Plan, Primitive
 from maneuver_automaton.automaton.carried import carried
-from maneuver_automaton.collision import AnyObstacle, Box, Shape
+from maneuver_automaton.collision import Box
 from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.collision.fcl_checker import FclChecker
 from maneuver_automaton.collision.heights import Layer, layers_of
-from maneuver_automaton.collision.surroundings import surroundings_of
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Unicycle
-from maneuver_automaton.planning.conditions import broken_condition
+from maneuver_automaton.planning.workspace import Workspace, workspace_of
 from maneuver_automaton.planning.zones import what_zone_forbids
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.refinement.conditions import broken_condition
 from maneuver_automaton.search.inside import stays_inside
 
 PROVEN = (1e-3, 2e-5)  # [m] a hit counts if it is one for the finer cover of round shapes too
+
+
+class Condition(enum.Enum):
+    """What a plan may break, in the order in which it is checked."""
+
+    WORD = "word"  # the horizon, the number of trims, and how long each of them lasts
+    BOUNDS = "bounds"
+    COLLISION = "collision"  # with an obstacle, or with a zone that does not admit the motion
+    AUDIT = "audit"
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Checked:
     """What the checks of one plan found."""
 
-    inside: bool  # the bounds
-    free: bool  # FCL on every edge
     audit: Audit | None  # None if an earlier check failed
+    broken: Condition | None = None  # the first that is broken
     reason: str = ""
-    admitted: bool = True  # the horizon and the limits of its trims
 
     @property
     def passed(self) -> bool:
         """Whether the plan may be returned."""
-        return self.audit is not None and self.audit.passed
+        return self.broken is None
 
 
-def check_plan(problem: Problem, plan: Plan, goal: Goal) -> Checked:
+def check_plan(
+    problem: Problem, plan: Plan, goal: Goal, workspace: Workspace | None = None
+) -> Checked:
     """Horizon and limits, bounds, FCL, audit, in this order; the first that fails ends it."""
-    broken = broken_condition(problem, plan)
-    if broken:
-        return Checked(inside=True, free=True, audit=None, reason=broken, admitted=False)
+    workspace = workspace or workspace_of(problem.obstacles)
+    reason = broken_condition(problem, plan)
+    if reason:
+        return Checked(audit=None, broken=Condition.WORD, reason=reason)
     if not stays_inside(plan, problem.bounds):
-        return Checked(inside=False, free=True, audit=None, reason="it leaves the bounds")
-    hit = what_is_hit(problem, plan, goal)
-    if hit:
-        return Checked(inside=True, free=False, audit=None, reason=hit)
+        return Checked(audit=None, broken=Condition.BOUNDS, reason="it leaves the bounds")
+    reason = what_is_hit(problem, plan, goal, workspace)
+    if reason:
+        return Checked(audit=None, broken=Condition.COLLISION, reason=reason)
     audit = audit_plan(
         plan,
         goal,
@@ -66,16 +77,20 @@ def check_plan(problem: Problem, plan: Plan, goal: Goal) -> Checked:
         margin=problem.margin,
         states=_end_states(problem, goal),
         zones=problem.zones,
+        around=workspace.surroundings,
     )
-    return Checked(inside=True, free=True, audit=audit, reason=audit.reason)
+    broken = None if audit.passed else Condition.AUDIT
+    return Checked(audit=audit, broken=broken, reason=audit.reason)
 
 
-def load_checks(problem: Problem) -> None:
-    """Prepare what FCL and the audit compare with, once for a map."""
+def load_checks(problem: Problem, workspace: Workspace) -> None:
+    """Prepare what FCL and the audit compare with."""
     origin = _origin(problem.goals[0])
     for layer in layers_of(problem.obstacles, in_space=problem.start.size > 3):
-        checker_of(problem.footprint, layer.obstacles, problem.margin, origin)
-        surroundings_of(layer.obstacles, origin)
+        workspace.checker(
+            problem.footprint, layer.obstacles, problem.margin, origin, proven=PROVEN[0]
+        )
+        workspace.surroundings(layer.obstacles, origin)
 
 
 @functools.cache
@@ -87,21 +102,11 @@ def load_checking() -> None:
     check_plan(problem, Plan([0, 0, 0], ahead.trims, durations=[1.0]), problem.goals[0])
 
 
-@functools.lru_cache(maxsize=8)
-def checker_of(
-    footprint: tuple[Shape, ...],
-    obstacles: tuple[AnyObstacle, ...],
-    margin: float,
-    origin: tuple[float, float],
-    *,
-    proven: float = PROVEN[0],
-) -> FclChecker:
-    """FCL's view of a map; what it reports as hit comes closer than ``margin + proven`` [m]."""
-    return FclChecker(footprint, obstacles, margin=margin, origin=origin, proven=proven)
-
-
-def what_is_hit(problem: Problem, plan: Plan, goal: Goal) -> str:
+def what_is_hit(
+    problem: Problem, plan: Plan, goal: Goal, workspace: Workspace | None = None
+) -> str:
     """Which edge hits what, or what a zone does not admit, by FCL; empty if none does."""
+    workspace = workspace or workspace_of(problem.obstacles)
     forbidden = what_zone_forbids(problem, plan, _origin(goal)) if problem.zones else ""
     if forbidden or not problem.obstacles:
         return forbidden
@@ -112,7 +117,7 @@ def what_is_hit(problem: Problem, plan: Plan, goal: Goal) -> str:
     for what, moving, shapes in bodies:
         for layer in layers:
             for proven in PROVEN:
-                checker = checker_of(
+                checker = workspace.checker(
                     shapes, layer.obstacles, problem.margin, _origin(goal), proven=proven
                 )
                 hit = _what_hits(checker, moving, layer, problem)

@@ -2,194 +2,110 @@
 
 from __future__ import annotations
 
-import math
-import time
-from collections.abc import Sequence
+import functools
 from dataclasses import dataclass, replace
 
-from maneuver_automaton.audit import Audit
-from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.same_motion import is_new
-from maneuver_automaton.planning.checking import check_plan
-from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.planning.checking import Condition
+from maneuver_automaton.planning.incumbents import Candidate, Incumbents
+from maneuver_automaton.planning.result import PlanResult, PlanStatus
+from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search import SearchStatus
+from maneuver_automaton.search.budget import Budget
 from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.choose import search_goal
 from maneuver_automaton.search.inside import outside
 from maneuver_automaton.search.limits import closed_bound, why_impossible
 from maneuver_automaton.search.result import plan_of
-from maneuver_automaton.words.word import Word
+from maneuver_automaton.words.word import Word, word_of_plan
 
 SPARE = 2  # solutions for every alternative, as some may be one motion
+LEAST_TIME = 1e-3  # [s] for each goal, also where the time is over
 
 
 def plan_by_words(
-    problem: Problem, *, began: float, time_limit: float, alternatives: int
+    problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
 ) -> PlanResult:
-    """The cheapest word, by exhaustive search or insertion, that stays free and inside.
-
-    The time limit [s] counts from `began`, as `time.monotonic` does.
-    """
-    found = _search_goals(problem, alternatives, began, began + time_limit)
-    searched = time.monotonic()
-    chosen = _audited(problem, found.candidates, alternatives)
-    audited = time.monotonic()
-    timing = {
-        "search": searched - began,
-        "first_plan": found.first_plan,
-        "refine": 0.0,
-        "audit": audited - searched,
-    }
-    counts = dict(found.counts) | {"rejected_by_audit": chosen.rejected}
+    """The cheapest word, by exhaustive search or insertion, that stays free and inside."""
+    found = Incumbents(problem, budget, workspace.on(problem.obstacles), alternatives)
+    listed = _search_goals(found)
+    searched = budget.elapsed
+    found.offer_in_turn(listed.candidates)
+    found.counts["rejected_by_audit"] = found.refused[Condition.AUDIT]
     if problem.obstacles:
-        counts["words_that_hit"] = chosen.hit
-    if not chosen.plans:
-        del timing["first_plan"]
-        status, reason = _why_none(problem, found, chosen, time_limit)
-        return PlanResult(
-            problem=problem, status=status, reason=reason, timing_s=timing, counts=counts
-        )
-    best = chosen.plans[0]
+        found.counts["words_that_hit"] = found.refused[Condition.COLLISION]
+    if not found.plans:
+        return found.none(*_why_none(found, listed))
+    best = found.plans[0]
     exact = not any(goal.tolerance_m or goal.tolerance_rad for goal in problem.goals)
-    free = found.candidates[0].cost if found.proven and exact else None
-    goal = problem.goals[best.goal_index]
-    return found_plans(
-        problem,
-        [_accepted(candidate) for candidate in chosen.plans],
+    free = listed.candidates[0].cost if listed.proven and exact else None
+    word = word_of_plan(problem.automaton, best.plan)
+    return found.found(
         bound=_lower_bound(problem, free),
-        certificate=certificate(problem, goal, best.solution),
-        timing_s=timing,
-        counts=counts,
+        searched=searched,
+        certificate=None
+        if word is None
+        else certificate(problem, problem.goals[best.goal_index], word),
     )
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _Candidate:
-    """A solution as a plan."""
-
-    goal_index: int
-    solution: Word
-    plan: Plan
-    audit: Audit | None = None
-
-    @property
-    def cost(self) -> float:
-        return self.solution.cost
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _Found:
+class _Listed:
     """What the searches for all goals came to."""
 
-    candidates: list[_Candidate]
-    counts: dict[str, int]
-    first_plan: float
+    candidates: list[Candidate]  # cheapest first, of equals the shortest
     exhausted: bool  # no search was cut short
     proven: bool  # every admitted word was searched
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _Chosen:
-    """What bounds and audit left."""
-
-    plans: list[_Candidate]
-    outside: int
-    hit: int  # an obstacle
-    broken: int  # conditions on the word and its times
-    rejected: int
-    complaint: str
-
-
-def _search_goals(problem: Problem, alternatives: int, began: float, deadline: float) -> _Found:
-    """Search for every goal that is inside the bounds; all candidates, cheapest first."""
-    bounded = any(getattr(problem.bounds, name) is not None for name in ("x", "y", "z"))
-    sorted_out = bounded or bool(problem.obstacles or problem.zones)
-    counts: dict[str, int] = {}
-    candidates: list[_Candidate] = []
+def _search_goals(found: Incumbents) -> _Listed:
+    """Search for every goal that is inside the bounds."""
+    problem = found.problem
+    sorted_out = not problem.bounds.are_open or bool(problem.obstacles or problem.zones)
+    rows: list[tuple[tuple[float, int, tuple[int, ...]], Candidate]] = []
     exhausted = proven = True
-    first_plan = math.nan
     for index, goal in enumerate(problem.goals):
         if outside(goal.pose, problem.bounds):
             continue
-        left = max(deadline - time.monotonic(), 1e-3)
-        asked = None if sorted_out else SPARE * alternatives
-        results = search_goal(problem, goal, alternatives=asked, time_limit=left)
-        if math.isnan(first_plan) and any(result.solutions for result in results):
-            first_plan = time.monotonic() - began
+        results = search_goal(
+            problem,
+            goal,
+            alternatives=None if sorted_out else SPARE * found.alternatives,
+            time_limit=max(found.budget.left, LEAST_TIME),
+        )
         proven = proven and any(result.exhaustive for result in results)
         for result in results:
             exhausted = exhausted and result.status is not SearchStatus.OUT_OF_BUDGET
-            for name, value in result.counts.items():
-                counts[name] = counts.get(name, 0) + value
-            candidates += [
-                _Candidate(goal_index=index, solution=solution, plan=plan_of(problem, solution))
-                for solution in result.solutions
-            ]
-    order = sorted(candidates, key=_order)
-    return _Found(
-        candidates=order,
-        counts=counts,
-        first_plan=first_plan if math.isfinite(first_plan) else time.monotonic() - began,
-        exhausted=exhausted,
-        proven=proven,
-    )
+            found.counts.update(result.counts)
+            for word in result.solutions:
+                make = functools.partial(plan_of, problem, word)
+                rows.append((_order(word), Candidate(word.cost, index, make)))
+    rows.sort(key=lambda row: row[0])
+    return _Listed(candidates=[one for _, one in rows], exhausted=exhausted, proven=proven)
 
 
-def _order(candidate: _Candidate) -> tuple[float, int, tuple[int, ...]]:
-    word = candidate.solution.trims
-    return float(f"{candidate.cost:.9g}"), len(word), tuple(word.tolist())
+def _order(word: Word) -> tuple[float, int, tuple[int, ...]]:
+    return float(f"{word.cost:.9g}"), len(word.trims), tuple(word.trims.tolist())
 
 
-def _audited(problem: Problem, candidates: Sequence[_Candidate], alternatives: int) -> _Chosen:
-    """The cheapest candidates that stay inside the bounds, are free, and pass the audit."""
-    plans: list[_Candidate] = []
-    outside = hit = broken = rejected = 0
-    complaint = ""
-    for candidate in candidates:
-        if len(plans) > alternatives:
-            break
-        if not is_new(candidate.plan, (other.plan for other in plans)):
-            continue
-        checked = check_plan(problem, candidate.plan, problem.goals[candidate.goal_index])
-        if checked.passed:
-            plans.append(replace(candidate, audit=checked.audit))
-        elif not checked.admitted:
-            broken += 1
-        elif not checked.inside:
-            outside += 1
-        elif not checked.free:
-            hit += 1
-        else:
-            rejected += 1
-            complaint = complaint or checked.reason
-    return _Chosen(
-        plans=plans,
-        outside=outside,
-        hit=hit,
-        broken=broken,
-        rejected=rejected,
-        complaint=complaint,
-    )
-
-
-def _why_none(
-    problem: Problem, found: _Found, chosen: _Chosen, time_limit: float
-) -> tuple[PlanStatus, str]:
-    if chosen.rejected:
+def _why_none(found: Incumbents, listed: _Listed) -> tuple[PlanStatus, str]:
+    problem, refused = found.problem, found.refused
+    if refused[Condition.AUDIT]:
         return PlanStatus.NO_PLAN, (
-            f"the audit rejected {chosen.rejected} plans: {chosen.complaint}; "
-            "do the trims belong to the model?"
+            f"the audit rejected {refused[Condition.AUDIT]} plans: "
+            f"{found.reasons[Condition.AUDIT]}; do the trims belong to the model?"
         )
-    if not found.exhausted:
+    if not listed.exhausted:
         return PlanStatus.OUT_OF_BUDGET, (
-            f"no plan within {time_limit:g} s and the expansions allowed"
+            f"no plan within {found.budget.seconds:g} s and the expansions allowed"
         )
-    if chosen.outside and not chosen.hit:
-        return PlanStatus.NO_PLAN, (f"all {chosen.outside} plans found leave the bounds")
-    if chosen.hit:
+    beyond, hit = refused[Condition.BOUNDS], refused[Condition.COLLISION]
+    if beyond and not hit:
+        return PlanStatus.NO_PLAN, f"all {beyond} plans found leave the bounds"
+    if hit:
         return PlanStatus.NO_PLAN, (
-            f"all {chosen.outside + chosen.hit} words found hit an obstacle or leave the bounds; "
+            f"all {beyond + hit} words found hit an obstacle or leave the bounds; "
             "the method lattice knows the obstacles"
         )
     impossible = why_impossible(problem)
@@ -201,7 +117,7 @@ def _why_none(
     if too_short is not None:
         return too_short
     limit = problem.horizon.max_trims
-    if found.proven and limit is not None:
+    if listed.proven and limit is not None:
         return PlanStatus.UNREACHABLE, (
             f"no word of at most {limit} trims of this library ends at the goal"
         )
@@ -210,8 +126,6 @@ def _why_none(
 
 def _least_time(problem: Problem) -> tuple[PlanStatus, str] | None:
     """Verdict where the time is what stands in the way: the least time to any goal is named."""
-    from maneuver_automaton.costs import Cost
-
     limit = problem.horizon.time or problem.horizon.max_time
     if limit is None:
         return None
@@ -238,13 +152,3 @@ def _lower_bound(problem: Problem, free: float | None) -> float:
     if free is not None:
         return free
     return min(closed_bound(problem, goal) for goal in problem.goals)
-
-
-def _accepted(candidate: _Candidate) -> Accepted:
-    assert candidate.audit is not None
-    return Accepted(
-        plan=candidate.plan,
-        goal_index=candidate.goal_index,
-        cost=candidate.cost,
-        audit=candidate.audit,
-    )

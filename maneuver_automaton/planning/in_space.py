@@ -7,21 +7,25 @@ time. Beside what it finds, words of free space that hit nothing are looked at.
 
 from __future__ import annotations
 
+import itertools
 import math
-import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.same_motion import is_new
+from maneuver_automaton.automaton.same_motion import UNFINISHED
 from maneuver_automaton.planning.blocked import why_goal_blocked
-from maneuver_automaton.planning.checking import check_plan, load_checks
-from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
+from maneuver_automaton.planning.checking import load_checks
+from maneuver_automaton.planning.incumbents import Incumbents
+from maneuver_automaton.planning.result import PlanResult, PlanStatus
+from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.refinement.relaxed_end import with_relaxed_end, without_nothing
+from maneuver_automaton.refinement.fitting import without_nothing
+from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
+from maneuver_automaton.search.budget import Budget
 from maneuver_automaton.search.choose import load_search, search_goal
 from maneuver_automaton.search.limits import closed_bound, why_impossible
 from maneuver_automaton.search.maneuver_lattice import maneuver_words
@@ -35,8 +39,6 @@ WORDS = 24  # of free space that are looked at, for all goals together
 FEWEST_WORDS = 2  # for each goal
 WORDS_SHARE = 0.2  # of the time that they may take
 HEADINGS = 16  # that are aimed at where the goal's heading is free
-DIFFERENT_M = 0.02  # [m] per metre of way by which alternatives differ at least
-DIFFERENT_RAD = 0.3  # [rad] the same for headings
 
 
 def climbs_among_obstacles(problem: Problem) -> bool:
@@ -60,130 +62,88 @@ def load_in_space(problem: Problem) -> None:
 
 
 def plan_in_space(
-    problem: Problem, *, began: float, time_limit: float, alternatives: int
+    problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
 ) -> PlanResult:
-    """The cheapest plan found that no obstacle of its heights is in the way of; all were audited.
-
-    The time limit [s] counts from `began`, as `time.monotonic` does.
-    """
-    work = _Work(problem, began, began + time_limit)
-    load_checks(problem)
-    for plan, index in work.candidates():
-        work.check(plan, index)
-        if work.accepted and time.monotonic() > work.deadline:
+    """The cheapest plan found that no obstacle of its heights is in the way of."""
+    found = Incumbents(problem, budget, workspace.on(problem.obstacles), alternatives, UNFINISHED)
+    found.counts.update(expansions=0)
+    load_checks(problem, found.workspace)
+    goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
+    lattice = _Lattice(found, goals)
+    for plan, index in itertools.chain(_words(found, goals), lattice.plans()):
+        found.offer(plan, index)
+        if found.plans and budget.is_over:
             break
-    done = time.monotonic()
-    timing = {"search": done - began - work.checking, "refine": 0.0, "audit": work.checking}
-    if not work.accepted:
-        status, reason = work.why_none(time_limit)
-        return PlanResult(
-            problem=problem, status=status, reason=reason, timing_s=timing, counts=work.counts
-        )
-    timing["first_plan"] = work.improvements[0][0]
-    kept: list[Accepted] = []
-    for one in sorted(work.accepted, key=lambda one: one.cost):
-        known = [other.plan for other in kept]
-        way = float(np.hypot(*np.diff(one.plan.switching_poses[:, :2], axis=0).T).sum())
-        if len(kept) <= alternatives and is_new(
-            one.plan, known, tolerance_m=DIFFERENT_M * way, tolerance_rad=DIFFERENT_RAD
+    found.counts["rejected"] = found.rejected
+    if not found.plans:
+        return found.none(*_why_none(found, exhausted=lattice.exhausted))
+    return found.found(bound=min(closed_bound(problem, goal) for goal in problem.goals))
+
+
+def _words(found: Incumbents, goals: tuple[int, ...]) -> Iterator[tuple[Plan, int]]:
+    """Words of free space, and the goals they reach."""
+    problem = found.problem
+    words = max(FEWEST_WORDS, WORDS // max(1, len(goals)))
+    for index in goals:
+        for result in search_goal(
+            problem,
+            problem.goals[index],
+            alternatives=words - 1,
+            time_limit=WORDS_SHARE * found.budget.left / len(goals),
         ):
-            kept.append(one)
-    return found_plans(
-        problem,
-        kept,
-        bound=min(closed_bound(problem, goal) for goal in problem.goals),
-        timing_s=timing,
-        counts=work.counts,
-        improvements=tuple(work.improvements),
-    )
+            for word in result.solutions[:words]:
+                yield plan_of(problem, word), index
 
 
 @dataclass(slots=True, eq=False)
-class _Work:
-    """What was found so far, and what it took."""
+class _Lattice:
+    """The search over trims and maneuvers, and whether it came to an end."""
 
-    problem: Problem
-    began: float
-    deadline: float
-    accepted: list[Accepted] = field(default_factory=list)
-    improvements: list[tuple[float, float]] = field(default_factory=list)
-    counts: dict[str, int] = field(default_factory=lambda: {"expansions": 0, "rejected": 0})
-    checking: float = 0.0
-    refused: str = ""
+    found: Incumbents
+    goals: tuple[int, ...]
     exhausted: bool = False
 
-    def candidates(self) -> Iterator[tuple[Plan, int]]:
-        """Plans as they are found, and the goals they reach."""
-        goals = tuple(
-            k
-            for k, goal in enumerate(self.problem.goals)
-            if not why_goal_blocked(self.problem, goal)
-        )
-        words = max(FEWEST_WORDS, WORDS // max(1, len(goals)))
-        for index in goals:
-            left = WORDS_SHARE * (self.deadline - time.monotonic()) / len(goals)
-            for found in search_goal(
-                self.problem, self.problem.goals[index], alternatives=words - 1, time_limit=left
-            ):
-                for solution in found.solutions[:words]:
-                    yield plan_of(self.problem, solution), index
-        yield from self._on_lattice(goals)
-
-    def _on_lattice(self, goals: tuple[int, ...]) -> Iterator[tuple[Plan, int]]:
-        problem = self.problem
-        query, numbers = _query(problem, goals)
-        most = problem.search.max_expansions
-        before = self.counts["expansions"]
-        for found in maneuver_words(query, deadline=self.deadline, max_expansions=most):
-            self.counts["expansions"] = before + found.expansions
-            if found.word is None:
-                self.exhausted = found.status is SearchStatus.EXHAUSTED
+    def plans(self) -> Iterator[tuple[Plan, int]]:
+        """Plans as they are found, each also with its best times, and the goals they reach."""
+        found, problem = self.found, self.found.problem
+        query, numbers = _query(problem, self.goals)
+        before = found.counts["expansions"]
+        for heard in maneuver_words(
+            query, deadline=found.budget.deadline, max_expansions=found.budget.expansions
+        ):
+            found.counts["expansions"] = before + heard.expansions
+            if heard.word is None:
+                self.exhausted = heard.status is SearchStatus.EXHAUSTED
                 continue
-            index = numbers[found.word.goal]
-            plan = without_nothing(replace(plan_of_maneuvers(query, found.word), maneuvers=()))
-            yield from self._in_time(plan, index)
+            index = numbers[heard.word.goal]
+            plan = without_nothing(replace(plan_of_maneuvers(query, heard.word), maneuvers=()))
+            better = with_relaxed_end(problem, plan, problem.goals[index])
+            if better is not None:
+                yield better, index
+            yield _in_time(problem, plan), index
 
-    def _in_time(self, plan: Plan, index: int) -> Iterator[tuple[Plan, int]]:
-        """A plan, and the same word with its best times, which last as long as is asked for."""
-        goal = self.problem.goals[index]
-        better = with_relaxed_end(self.problem, plan, goal)
-        if better is not None:
-            yield better, index
-        fixed, rest = self.problem.horizon.time, self.problem.automaton.rest
-        if fixed is not None and rest is not None and plan.duration < fixed:
-            trims = (*plan.trims, self.problem.automaton.trims[rest])
-            padded = np.append(plan.durations, fixed - plan.duration)
-            plan = replace(plan, trims=trims, durations=padded)
-        yield plan, index
 
-    def check(self, plan: Plan, index: int) -> None:
-        """Keep a plan if it passes every check."""
-        begin = time.monotonic()
-        checked = check_plan(self.problem, plan, self.problem.goals[index])
-        now = time.monotonic()
-        self.checking += now - begin
-        if checked.audit is None or not checked.passed:
-            self.counts["rejected"] += 1
-            self.refused = self.refused or checked.reason
-            return
-        cost = self.problem.cost_of(plan)
-        if cost < min((one.cost for one in self.accepted), default=math.inf):
-            self.improvements.append((now - self.began, cost))
-        self.accepted.append(Accepted(plan=plan, goal_index=index, cost=cost, audit=checked.audit))
+def _in_time(problem: Problem, plan: Plan) -> Plan:
+    """The plan with a rest at its end that fills a fixed time."""
+    fixed, rest = problem.horizon.time, problem.automaton.rest
+    if fixed is None or rest is None or plan.duration >= fixed:
+        return plan
+    trims = (*plan.trims, problem.automaton.trims[rest])
+    return replace(plan, trims=trims, durations=np.append(plan.durations, fixed - plan.duration))
 
-    def why_none(self, time_limit: float) -> tuple[PlanStatus, str]:
-        """The verdict where nothing was accepted."""
-        impossible = why_impossible(self.problem)
-        if impossible:
-            return PlanStatus.UNREACHABLE, impossible
-        refused = f"; plans were refused: {self.refused}" if self.refused else ""
-        if self.exhausted:
-            return PlanStatus.NO_PLAN, (
-                f"none at any resolution tried, which proves nothing{refused}"
-            )
-        return PlanStatus.OUT_OF_BUDGET, (
-            f"no plan within {time_limit:g} s and {self.counts['expansions']} expansions{refused}"
-        )
+
+def _why_none(found: Incumbents, *, exhausted: bool) -> tuple[PlanStatus, str]:
+    """The verdict where nothing was accepted."""
+    impossible = why_impossible(found.problem)
+    if impossible:
+        return PlanStatus.UNREACHABLE, impossible
+    refused = f"; plans were refused: {found.why_refused}" if found.why_refused else ""
+    if exhausted:
+        return PlanStatus.NO_PLAN, f"none at any resolution tried, which proves nothing{refused}"
+    return PlanStatus.OUT_OF_BUDGET, (
+        f"no plan within {found.budget.seconds:g} s and {found.counts['expansions']} "
+        f"expansions{refused}"
+    )
 
 
 def _query(problem: Problem, goals: tuple[int, ...]) -> tuple[ManeuverQuery, list[int]]:

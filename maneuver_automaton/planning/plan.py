@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 
 from maneuver_automaton.models import OnlyTranslated
@@ -24,8 +22,10 @@ from maneuver_automaton.planning.off_lattice import goals_off_lattice
 from maneuver_automaton.planning.result import PlanResult
 from maneuver_automaton.planning.with_inertia import load_inertia, plan_with_inertia
 from maneuver_automaton.planning.within_tolerance import has_tolerance, plan_within_tolerance
+from maneuver_automaton.planning.workspace import Workspace, workspace_of
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.ready import load_lattice
+from maneuver_automaton.search.budget import Budget
 from maneuver_automaton.search.choose import load_search
 
 
@@ -60,6 +60,14 @@ def plan(problem: Problem, *, time_limit: float = 5.0, alternatives: int = 0) ->
     >>> result.plan.word, round(result.cost, 4), result.audit.passed
     (('spin', 'ahead', 'spin'), 7.6974, True)
     """
+    workspace = workspace_of(problem.obstacles)
+    return plan_in(workspace, problem, time_limit=time_limit, alternatives=alternatives)
+
+
+def plan_in(
+    workspace: Workspace, problem: Problem, *, time_limit: float, alternatives: int
+) -> PlanResult:
+    """As `plan`, with what was prepared for the problem's map."""
     if not time_limit > 0.0:
         raise ValueError(f"time_limit must be positive, got {time_limit} s")
     if alternatives < 0:
@@ -67,44 +75,42 @@ def plan(problem: Problem, *, time_limit: float = 5.0, alternatives: int = 0) ->
     _load(problem)
     if alternatives and uses_lattice(problem):
         load_search(problem)
-    began = time.monotonic()
+    budget = Budget.from_now(time_limit, expansions=problem.search.max_expansions)
     if has_tolerance(problem):
         return plan_within_tolerance(
-            problem, _answered, began=began, time_limit=time_limit, alternatives=alternatives
+            problem, _answered, budget, workspace, alternatives=alternatives
         )
-    return _answered(problem, began=began, time_limit=time_limit, alternatives=alternatives)
+    return _answered(problem, budget, workspace, alternatives=alternatives)
 
 
 def _answered(
-    problem: Problem, /, *, began: float, time_limit: float, alternatives: int
+    problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
 ) -> PlanResult:
     """The answer to a problem whose goals are met exactly."""
     blocked = blocked_ends(problem) or goals_off_lattice(problem)
     if blocked is not None:
         return blocked
     if problem.zones:
-        return plan_among_zones(
-            problem, _searched, began=began, time_limit=time_limit, alternatives=alternatives
-        )
-    return _searched(problem, began=began, time_limit=time_limit, alternatives=alternatives)
+        return plan_among_zones(problem, _searched, budget, workspace, alternatives=alternatives)
+    return _searched(problem, budget, workspace, alternatives=alternatives)
 
 
 def _searched(
-    problem: Problem, /, *, began: float, time_limit: float, alternatives: int
+    problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
 ) -> PlanResult:
     """The answer of the search that suits a problem without zones."""
     kinematic = plan_on_lattice if uses_lattice(problem) else plan_by_words
     if climbs_among_obstacles(problem):
         kinematic = plan_in_space
     how = plan_with_inertia if has_inertia(problem) else kinematic
-    return how(problem, began=began, time_limit=time_limit, alternatives=alternatives)
+    return how(problem, budget, workspace, alternatives=alternatives)
 
 
-def prepare(problem: Problem) -> None:
+def prepare(problem: Problem, workspace: Workspace | None = None) -> None:
     """Have ready what every problem on the map of this one needs."""
     _load(problem)
     if uses_lattice(problem):
-        prepare_map(problem)
+        prepare_map(problem, workspace or workspace_of(problem.obstacles))
 
 
 def _load(problem: Problem) -> None:

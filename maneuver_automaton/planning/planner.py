@@ -13,8 +13,9 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.headings import origin_of
 from maneuver_automaton.collision import AnyObstacle, Shape, Zone, as_footprint, as_obstacles
 from maneuver_automaton.costs import Cost, StageCost
-from maneuver_automaton.planning.plan import plan, prepare
+from maneuver_automaton.planning.plan import plan_in, prepare
 from maneuver_automaton.planning.result import PlanResult
+from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
 
 
@@ -49,6 +50,7 @@ class Planner:
     margin: float = field(default=0.0, kw_only=True)  # [m]
     zones: tuple[Zone, ...] = field(default=(), kw_only=True)
     start_trim: str | None = field(default=None, kw_only=True)  # of queries that name none
+    workspace: Workspace = field(init=False)  # what its queries share
 
     if TYPE_CHECKING:
 
@@ -73,12 +75,13 @@ class Planner:
         object.__setattr__(self, "obstacles", as_obstacles(self.obstacles))
         object.__setattr__(self, "footprint", as_footprint(self.footprint))
         object.__setattr__(self, "zones", tuple(self.zones))
+        object.__setattr__(self, "workspace", Workspace(self.obstacles))
         automaton = self.automaton
         # A vehicle without a rest has to be given a trim to end in; any will do here.
         last = None if automaton.rest is not None else automaton.trim_names[0]
         here = origin_of(automaton, automaton.trims[0])
         aim = Goal(pose=np.where(np.arange(here.size) == 2, here, 1.0), trim=last)
-        prepare(self.problem(here, aim, start_trim=self.start_trim or last))
+        prepare(self.problem(here, aim, start_trim=self.start_trim or last), self.workspace)
 
     def problem(
         self,
@@ -122,7 +125,7 @@ class Planner:
         It starts in `start_trim`, or else in the planner's own; a `Goal` names the last trim.
         """
         problem = self.problem(start, goals, start_time=start_time, start_trim=start_trim)
-        return plan(problem, time_limit=time_limit, alternatives=alternatives)
+        return plan_in(self.workspace, problem, time_limit=time_limit, alternatives=alternatives)
 
     def with_obstacles(
         self, obstacles: AnyObstacle | Shape | Sequence[AnyObstacle | Shape]

@@ -18,6 +18,7 @@ from maneuver_automaton.optimal_control import Guess, PolishSettings, has_casadi
 from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.problem import Components, RunningCost
 from maneuver_automaton.optimal_control.separation import BodyPart
+from maneuver_automaton.planning.incumbents import Incumbents
 from maneuver_automaton.problem import Problem, moves
 from maneuver_automaton.refinement.gear_sequences import (
     car_library,
@@ -43,6 +44,7 @@ from maneuver_automaton.refinement.polish import (
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
 
 POINT = ((np.zeros((1, 2)), 0.0),)  # the body of a vehicle without a footprint
+EXPANSIONS_AN_ITERATION = 4  # of the lattice, in place of one iteration of polishing
 TURNS = (1.0, 0.8)  # of the greatest curvature, with which they turn
 
 
@@ -78,6 +80,54 @@ def load_polishing(problem: Problem) -> None:
     load_casadi()
     for library in _libraries_of(problem.automaton.model)[0]:
         cost_to_go_table(replace(kinematic_problem(problem, switch=0.0), automaton=library))
+
+
+def polish_found(found: Incumbents, paths: Sequence[Aimed]) -> None:
+    """Polish kinematic plans of different gears, and what has been found; keep what is cheaper.
+
+    `paths` are guesses along kinematic plans that are known already.
+    """
+    problem, budget = found.problem, found.budget
+    known = [(one.plan, one.goal_index) for one in found.plans[:1]]
+    horizon = problem.horizon
+    if not known and (horizon.max_time is not None or horizon.max_trims is not None):
+        # what is late may be made quicker, and of too many trims one maneuver
+        known = sorted(found.misfits, key=lambda one: one[0].duration)[:1]
+    if not known or budget.is_over or why_not_polished(problem):
+        return
+    if not known[0][0].duration > 0.0:
+        return  # it is there already
+    aimed = [Aimed(guess_of_plan(plan), goal_index) for plan, goal_index in known]
+    if rests_at_both_ends(problem):
+        along = list(guesses_along_paths(problem, time_limit=budget.left))
+        aimed = along or [*paths, *aimed]
+    most = budget.expansions
+    work = None if most is None else 1 + most // EXPANSIONS_AN_ITERATION
+    for goal_index in dict.fromkeys(one.goal_index for one in aimed):
+        if budget.is_over or (work is not None and work <= 0):
+            return
+        try:
+            polished = polish_plans(
+                problem,
+                [one.guess for one in aimed if one.goal_index == goal_index],
+                goal_index,
+                time_limit=budget.left,
+                most_iterations=work,
+                accepts=functools.partial(found.offer, goal_index=goal_index),
+            )
+        except RuntimeError:  # the solver gave up on a number; the plan in hand stays
+            found.counts.update(solver_errors=1)
+            continue
+        found.counts.update(polished=len(polished.attempts))
+        if work is not None:
+            work -= sum(attempt.iterations for attempt in polished.attempts)
+
+
+def rests_at_both_ends(problem: Problem) -> bool:
+    """Whether the vehicle starts and ends at rest."""
+    return problem.first_trim.is_rest and all(
+        problem.last_trim(goal).is_rest for goal in problem.goals
+    )
 
 
 def guesses_along_paths(problem: Problem, *, time_limit: float) -> Iterator[Aimed]:

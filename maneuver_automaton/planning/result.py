@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.audit import Audit, TerminalError, terminal_error
+from maneuver_automaton.audit import Audit, TerminalError
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.search.budget import Budget
 
 
 class PlanStatus(enum.Enum):
@@ -55,55 +57,11 @@ class PlanResult:
     nodes: Array | None = None  # (n, 4) x, y, heading, cost of what was expanded, if asked for
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Accepted:
-    """A plan that passed every check."""
+class Answer(Protocol):
+    """A planner, of all problems or of simpler ones."""
 
-    plan: Plan
-    goal_index: int
-    cost: float
-    audit: Audit
-
-    def terminal_error(self, problem: Problem) -> TerminalError:
-        """How far its last pose is from its goal."""
-        return terminal_error(self.plan, problem.goals[self.goal_index])
-
-
-def found_plans(
-    problem: Problem,
-    plans: Sequence[Accepted],
-    *,
-    bound: float,
-    timing_s: dict[str, float],
-    counts: dict[str, int],
-    certificate: float | None = None,
-    improvements: tuple[tuple[float, float], ...] = (),
-    nodes: Array | None = None,
-) -> PlanResult:
-    """The answer where plans were found, the cheapest first; no plan at all is below `bound`."""
-    best, *others = plans
-    bound = min(best.cost, bound)
-    return PlanResult(
-        problem=problem,
-        status=PlanStatus.FOUND,
-        reason="",
-        plan=best.plan,
-        goal_index=best.goal_index,
-        cost=best.cost,
-        lower_bound=bound,
-        gap=(best.cost - bound) / best.cost if bound < best.cost else 0.0,
-        certificate=certificate,
-        terminal_error=best.terminal_error(problem),
-        clearance_m=best.audit.min_clearance_m,
-        audit=best.audit,
-        alternatives=tuple(
-            Alternative(
-                plan=other.plan, cost=other.cost, terminal_error=other.terminal_error(problem)
-            )
-            for other in others
-        ),
-        timing_s=timing_s,
-        counts=counts,
-        improvements=improvements,
-        nodes=nodes,
-    )
+    def __call__(
+        self, problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
+    ) -> PlanResult:
+        """The cheapest plan found, and so many dearer ones."""
+        ...

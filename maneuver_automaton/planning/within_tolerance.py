@@ -8,22 +8,21 @@ coasting times of its word are solved for once more, and the end must be within 
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Protocol, TypeVar
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, wrapped
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.headings import trim_headings
-from maneuver_automaton.automaton.same_motion import is_new
 from maneuver_automaton.planning.blocked import why_goal_blocked
-from maneuver_automaton.planning.checking import check_plan
-from maneuver_automaton.planning.result import Accepted, PlanResult, PlanStatus, found_plans
+from maneuver_automaton.planning.incumbents import Incumbents
+from maneuver_automaton.planning.result import Answer, PlanResult, PlanStatus
+from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
+from maneuver_automaton.search.budget import Budget
 from maneuver_automaton.search.limits import closed_bound, why_impossible
 
 INSIDE = 1e-6  # share of a tolerance by which poses that are aimed at stay within it
@@ -34,20 +33,8 @@ MOST_AIMS = 12  # poses that are aimed at where the goal itself is blocked
 SHARES = (1.0, 0.5, 0.25)  # of the tolerance that an end may use, until it is free
 LATER = (0.45, 0.8)  # shares of the time left for the first question, and for the second of three
 MOST_LAST = 4  # trims at the end whose times alone are changed where all of them hit something
+LEAST_TIME = 1e-3  # [s] for each question, also where the time is over
 SPARE = 3  # plans asked for each alternative: with loose ends some are one motion
-
-
-T = TypeVar("T", int, float)
-
-
-class Answer(Protocol):
-    """A planner of problems whose goals are met exactly."""
-
-    def __call__(
-        self, problem: Problem, /, *, began: float, time_limit: float, alternatives: int
-    ) -> PlanResult:
-        """The cheapest plan found."""
-        ...
 
 
 def has_tolerance(problem: Problem) -> bool:
@@ -56,61 +43,27 @@ def has_tolerance(problem: Problem) -> bool:
 
 
 def plan_within_tolerance(
-    problem: Problem, answer: Answer, *, began: float, time_limit: float, alternatives: int
+    problem: Problem, answer: Answer, budget: Budget, workspace: Workspace, *, alternatives: int
 ) -> PlanResult:
-    """The cheapest plan found that ends within the tolerance of a goal; every one was audited.
-
-    The time limit [s] counts from `began`, as `time.monotonic` does.
-    """
+    """The cheapest plan found that ends within the tolerance of a goal."""
+    found = Incumbents(problem, budget, workspace, alternatives)
     asked = list(_questions(problem))
     results: list[PlanResult] = []
-    improvements: list[tuple[float, float]] = []
     for k, question in enumerate(asked):
-        now = time.monotonic()
-        share = 1.0 if k == len(asked) - 1 else LATER[k]
-        left = share * max(began + time_limit - now, 1e-3)
-        result = answer(question, began=now, time_limit=left, alternatives=SPARE * alternatives)
+        part = budget.part(1.0 if k == len(asked) - 1 else LATER[k], at_least=LEAST_TIME)
+        part = replace(part, expansions=question.search.max_expansions)
+        result = answer(question, part, workspace, alternatives=SPARE * alternatives)
+        for at, cost in result.improvements:
+            found.hear(cost, at=part.began - budget.began + at)
+        found.counts.update(result.counts)
         results.append(result)
-        best = improvements[-1][1] if improvements else math.inf
-        found = [(now - began + at, cost) for at, cost in result.improvements if cost < best]
-        improvements += found
-    counts = _sums(result.counts for result in results)
-    timing = _sums(result.timing_s for result in results)
-    begin = time.monotonic()
-    accepted: list[Accepted] = []
-    reason = ""
     for result in results:
-        if result.plan is None:
-            continue
-        for plan in (result.plan, *(other.plan for other in result.alternatives)):
-            one, why = _loosened(problem, plan)
-            reason = reason or why
-            if one is not None:
-                accepted.append(one)
-    if not accepted:
-        timing.pop("first_plan", None)
-        return _none(problem, results[0], reason, timing, counts)
-    accepted.sort(key=lambda one: one.cost)
-    kept: list[Accepted] = []
-    for one in accepted:
-        if len(kept) <= alternatives and is_new(one.plan, (other.plan for other in kept)):
-            kept.append(one)
-    done = time.monotonic()
-    timing["refine"] = timing.get("refine", 0.0) + done - begin
-    timing["first_plan"] = next(
-        result.timing_s["first_plan"] for result in results if "first_plan" in result.timing_s
-    )
-    if improvements and kept[0].cost < improvements[-1][1]:
-        improvements.append((done - began, kept[0].cost))
-    return found_plans(
-        problem,
-        kept,
-        bound=_lower_bound(problem, results[0]),
-        timing_s=timing,
-        counts=counts,
-        improvements=tuple(improvements),
-        nodes=results[0].nodes,
-    )
+        if result.plan is not None:
+            for plan in (result.plan, *(other.plan for other in result.alternatives)):
+                _offer_loosened(found, plan)
+    if not found.plans:
+        return found.none(*_why_none(problem, results[0], found.why_refused))
+    return found.found(bound=_lower_bound(problem, results[0]), nodes=results[0].nodes)
 
 
 def _questions(problem: Problem) -> Iterator[Problem]:
@@ -135,15 +88,6 @@ def _lower_bound(problem: Problem, exact: PlanResult) -> float:
     if exact.lower_bound is not None and exact.problem.goals == problem.goals:
         return exact.lower_bound
     return min(closed_bound(problem, goal) for goal in problem.goals)
-
-
-def _sums(rows: Iterable[dict[str, T]]) -> dict[str, T]:
-    """Sums by name."""
-    sums: dict[str, T] = {}
-    for row in rows:
-        for name, value in row.items():
-            sums[name] = sums[name] + value if name in sums else value
-    return sums
 
 
 def _aims(problem: Problem) -> Iterator[Goal]:
@@ -203,24 +147,15 @@ def _poses_within(
                 yield pose
 
 
-def _loosened(problem: Problem, plan: Plan) -> tuple[Accepted | None, str]:
-    """The plan with the cheapest end within the tolerance that passes the checks; why not if none.
+def _offer_loosened(found: Incumbents, plan: Plan) -> None:
+    """Offer the plan with the cheapest end within the tolerance that passes the checks.
 
     Its own end, where no other is better.
     """
-    reason = ""
-    for index in _goals_met(problem, plan):
-        goal = problem.goals[index]
-        for candidate in _with_loose_ends(problem, plan, goal):
-            checked = check_plan(problem, candidate, goal)
-            if checked.audit is not None and checked.passed:
-                cost = problem.cost_of(candidate)
-                return (
-                    Accepted(plan=candidate, goal_index=index, cost=cost, audit=checked.audit),
-                    "",
-                )
-            reason = reason or checked.reason
-    return None, reason
+    for index in _goals_met(found.problem, plan):
+        for candidate in _with_loose_ends(found.problem, plan, found.problem.goals[index]):
+            if found.offer(candidate, index):
+                return
 
 
 def _with_loose_ends(problem: Problem, plan: Plan, goal: Goal) -> list[Plan]:
@@ -228,8 +163,7 @@ def _with_loose_ends(problem: Problem, plan: Plan, goal: Goal) -> list[Plan]:
 
     Where nothing is in the way the times of the whole word are the best there are.
     """
-    bounded = any(getattr(problem.bounds, name) is not None for name in ("x", "y", "z"))
-    guarded = bool(problem.obstacles or problem.zones or bounded)
+    guarded = bool(problem.obstacles or problem.zones or not problem.bounds.are_open)
     n = len(plan.trims)
     firsts = sorted({0, *range(max(0, n - MOST_LAST), n)}) if guarded else [0]
     loose = [
@@ -250,17 +184,10 @@ def _goals_met(problem: Problem, plan: Plan) -> Iterator[int]:
             yield index
 
 
-def _none(
-    problem: Problem,
-    result: PlanResult,
-    refused: str,
-    timing: dict[str, float],
-    counts: dict[str, int],
-) -> PlanResult:
+def _why_none(problem: Problem, exact: PlanResult, refused: str) -> tuple[PlanStatus, str]:
     """The verdict on the poses that were aimed at, as far as it holds for all within tolerance."""
-    status, reason = result.status, result.reason
     if refused:
-        status, reason = PlanStatus.NO_PLAN, f"every plan found was refused: {refused}"
-    elif status is PlanStatus.UNREACHABLE and not why_impossible(problem):
-        status = PlanStatus.NO_PLAN  # proven for these poses alone
-    return PlanResult(problem=problem, status=status, reason=reason, timing_s=timing, counts=counts)
+        return PlanStatus.NO_PLAN, f"every plan found was refused: {refused}"
+    if exact.status is PlanStatus.UNREACHABLE and not why_impossible(problem):
+        return PlanStatus.NO_PLAN, exact.reason  # proven for these poses alone
+    return exact.status, exact.reason

@@ -1,4 +1,4 @@
-"""Drives on roads: lanelets, everybody at several times, the way of one vehicle, its speed."""
+"""Drives on roads: lanelets, road users at several times, the path of one vehicle, its speed."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE, shaded
 from maneuver_automaton.plotting.film import Film, picture_times, write_film
@@ -20,7 +21,6 @@ from maneuver_automaton.plotting.obstacles import MOVER, SOLID
 from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
 from maneuver_automaton.plotting.regions import shape_path
 from maneuver_automaton.plotting.style import tidy
-from maneuver_automaton.primitives import Trajectory
 from maneuver_automaton.roads import GoalRegion, RoadScene, RoadVehicle
 
 LANE = (0.91, 0.91, 0.92)
@@ -42,14 +42,14 @@ class RoadArtists:
     goals: PathCollection
     traffic: PathCollection
     bodies: PolyCollection
-    way: LineCollection
+    path: LineCollection
 
 
 def draw_road(
     ax: Axes,
     scene: RoadScene,
     vehicle: RoadVehicle,
-    driven: Trajectory,
+    plan: Plan,
     *,
     times: Sequence[float] | None = None,
 ) -> RoadArtists:
@@ -60,12 +60,12 @@ def draw_road(
     ax : Axes
     scene : RoadScene
     vehicle : RoadVehicle
-    driven : Trajectory
-        Of the rear axle; its times are those of the scene.
+    plan : Plan
+        Of the rear axle, in the coordinates and on the clock of the scene.
     times : sequence of float, optional
         Five times from the beginning to the end if left out.
     """
-    begin, end = driven.time[[0, -1]].tolist()
+    begin, end = plan.switching_times[[0, -1]].tolist()
     moments = list(np.linspace(begin, end, MOMENTS) if times is None else times)
     lanes = PolyCollection(
         [lanelet.ring for lanelet in scene.lanelets],
@@ -83,30 +83,30 @@ def draw_road(
     traffic = PathCollection(paths, facecolors=colors, edgecolors=["white"], linewidths=0.5)
     traffic.set_zorder(2.0)
     bodies = PolyCollection(
-        _bodies(vehicle, driven.pose_at(moments)),
+        _bodies(vehicle, plan.pose_at(moments)),
         facecolors=[shaded(EGO, _haze(k, len(moments))) for k in range(len(moments))],
         edgecolors=["white"],
         linewidths=0.6,
         zorder=3.0,
     )
-    way = LineCollection(
-        [vehicle.middle_of(driven.pose)[:, :2]], colors=[EGO], linewidths=1.4, zorder=2.5
+    path = LineCollection(
+        [vehicle.middle_of(plan.sample().pose)[:, :2]], colors=[EGO], linewidths=1.4, zorder=2.5
     )
-    for artist in (lanes, goals, traffic, bodies, way):
+    for artist in (lanes, goals, traffic, bodies, path):
         ax.add_collection(artist, autolim=False)
-    low, high = _box(scene, vehicle, driven)
+    low, high = _box(scene, vehicle, plan)
     ax.set_xlim(low[0], high[0])
     ax.set_ylim(low[1], high[1])
     ax.set_aspect("equal")
     tidy(ax, x="x [m]", y="y [m]")
     ax.grid(visible=False)
-    return RoadArtists(lanes=lanes, goals=goals, traffic=traffic, bodies=bodies, way=way)
+    return RoadArtists(lanes=lanes, goals=goals, traffic=traffic, bodies=bodies, path=path)
 
 
 def save_road_figure(
     scene: RoadScene,
     vehicle: RoadVehicle,
-    driven: Trajectory,
+    plan: Plan,
     path: str | Path,
     *,
     said: str = "",
@@ -120,8 +120,9 @@ def save_road_figure(
     OSError
         If the file cannot be written.
     """
-    figure, ax = _page(scene, vehicle, driven, panels=2, said=said)
-    draw_road(ax, scene, vehicle, driven)
+    driven = plan.sample()
+    figure, ax = _page(scene, vehicle, plan, panels=2, said=said)
+    draw_road(ax, scene, vehicle, plan)
     speed = axes_at(figure, left=LEFT, bottom=BOTTOM + PANEL + GAP, width=INNER, height=PANEL)
     speed.plot(driven.time, driven.reduced_state[:, 0], color=EGO, linewidth=1.4)
     tidy(speed, x="", y="speed [m/s]")
@@ -143,7 +144,7 @@ def save_road_figure(
 
 
 def save_road_animation(
-    scene: RoadScene, vehicle: RoadVehicle, driven: Trajectory, path: str | Path
+    scene: RoadScene, vehicle: RoadVehicle, plan: Plan, path: str | Path
 ) -> None:
     """Write a moving picture of a drive, by its ending .gif, .html or .mp4.
 
@@ -154,9 +155,9 @@ def save_road_animation(
     OSError
         If the file cannot be written.
     """
-    begin, end = driven.time[[0, -1]].tolist()
-    figure, ax = _page(scene, vehicle, driven, panels=0, said="")
-    drawn = draw_road(ax, scene, vehicle, driven, times=[])
+    begin, end = plan.switching_times[[0, -1]].tolist()
+    figure, ax = _page(scene, vehicle, plan, panels=0, said="")
+    drawn = draw_road(ax, scene, vehicle, plan, times=[])
     clock: Text = ax.text(
         0.01, 0.98, "", transform=ax.transAxes, va="top", fontsize=9.0, color=INK, zorder=9.0
     )
@@ -165,7 +166,7 @@ def save_road_animation(
         here = scene.present(time)
         drawn.traffic.set_paths([shape_path(one.at(time)) for one in here])
         drawn.traffic.set_facecolor([SOLID if one.motion is None else MOVER for one in here])
-        drawn.bodies.set_verts(_bodies(vehicle, driven.pose_at([time])))
+        drawn.bodies.set_verts(_bodies(vehicle, plan.pose_at([time])))
         drawn.bodies.set_facecolor([EGO])
         clock.set_text(f"{time:.1f} s")
 
@@ -175,9 +176,9 @@ def save_road_animation(
 
 
 def _page(
-    scene: RoadScene, vehicle: RoadVehicle, driven: Trajectory, *, panels: int, said: str
+    scene: RoadScene, vehicle: RoadVehicle, plan: Plan, *, panels: int, said: str
 ) -> tuple[Figure, Axes]:
-    low, high = _box(scene, vehicle, driven)
+    low, high = _box(scene, vehicle, plan)
     plane = float(np.clip(INNER * (high - low)[1] / (high - low)[0], FLATTEST, HIGHEST))
     under = BOTTOM + panels * (PANEL + GAP)
     figure = new_figure(WIDTH, TOP + plane + under)
@@ -186,10 +187,10 @@ def _page(
     return figure, axes_at(figure, left=LEFT, bottom=under, width=INNER, height=plane)
 
 
-def _box(scene: RoadScene, vehicle: RoadVehicle, driven: Trajectory) -> tuple[Array, Array]:
-    """Lower left and upper right corner around all that drives, and around the goals."""
-    begin, end = driven.time[[0, -1]].tolist()
-    places = [vehicle.middle_of(driven.pose)[:, :2]]
+def _box(scene: RoadScene, vehicle: RoadVehicle, plan: Plan) -> tuple[Array, Array]:
+    """Lower left and upper right corner around the drive, the road users beside it, the goals."""
+    begin, end = plan.switching_times[[0, -1]].tolist()
+    places = [vehicle.middle_of(plan.sample().pose)[:, :2]]
     for goal in scene.goals:
         if goal.places is not None and not goal.lanelets:
             places += [np.asarray(shape_path(place).vertices) for place in goal.places]

@@ -1,10 +1,13 @@
 """Receding horizon: plan, drive a little, and plan again."""
 
 from maneuver_automaton.receding_horizon.candidates import within as within
+from maneuver_automaton.receding_horizon.controller import ManeuverHorizon as ManeuverHorizon
 from maneuver_automaton.receding_horizon.controller import RecedingHorizon as RecedingHorizon
 from maneuver_automaton.receding_horizon.disturbance import Disturbance as Disturbance
-from maneuver_automaton.receding_horizon.escape import Escape as Escape
-from maneuver_automaton.receding_horizon.escape import escape as escape
+from maneuver_automaton.receding_horizon.failsafe_search import FailSafe as FailSafe
+from maneuver_automaton.receding_horizon.failsafe_search import (
+    search_fail_safe as search_fail_safe,
+)
 from maneuver_automaton.receding_horizon.guarantees import Promises as Promises
 from maneuver_automaton.receding_horizon.guarantees import promises as promises
 from maneuver_automaton.receding_horizon.log import ClosedLoop as ClosedLoop
@@ -31,4 +34,3 @@ from maneuver_automaton.receding_horizon.unconstrained_loop import (
 from maneuver_automaton.receding_horizon.unconstrained_loop import (
     simulate_unconstrained as simulate_unconstrained,
 )
-from maneuver_automaton.receding_horizon.with_maneuvers import ManeuverHorizon as ManeuverHorizon

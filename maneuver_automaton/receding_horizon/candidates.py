@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.planning.plan import has_inertia
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.log import Origin, first_part
 from maneuver_automaton.receding_horizon.pace import at_best_pace, base_name
 from maneuver_automaton.receding_horizon.settings import EXACT, Settings
-from maneuver_automaton.receding_horizon.shifting import costliest_first, rest_of
+from maneuver_automaton.receding_horizon.shifting import costliest_first, moving_pieces, rest_of
 from maneuver_automaton.search.inside import outside, stays_inside
 from maneuver_automaton.search.words import TIE
 
@@ -42,12 +41,14 @@ def candidate(
 ) -> Candidate:
     """A plan at its best pace, if that is asked for, and in the order that costs most at first.
 
-    Among obstacles the order stays: another one drives elsewhere.
+    The order stays where another one drives elsewhere and something is in the way, or where trims
+    are not switched at will.
     """
     if settings.retimed:
         plan = at_best_pace(here, plan)
     cost = here.cost_of(plan)
-    ordered = plan if here.obstacles else costliest_first(plan, here.rates_of(plan))
+    fixed = bool(here.obstacles or here.zones) or has_inertia(here)
+    ordered = plan if fixed else costliest_first(plan, here.rates_of(plan))
     if ordered is not plan:
         dearer = here.cost_of(ordered)
         if dearer <= cost + TIE * (1.0 + abs(cost)) and allowed(here, ordered):
@@ -58,7 +59,7 @@ def candidate(
         cost=cost,
         goal_index=goal_index,
         origin=origin,
-        at_first=float(here.rates_of(piece) @ piece.durations),
+        at_first=here.cost_of(piece),
     )
 
 
@@ -67,12 +68,14 @@ def allowed(here: Problem, plan: Plan) -> bool:
     return bool(outside(here.start, here.bounds)) or stays_inside(plan, here.bounds)
 
 
+def bounded(problem: Problem) -> bool:
+    """Whether a problem bounds the places its vehicle may go to."""
+    return any(getattr(problem.bounds, name) is not None for name in ("x", "y", "z"))
+
+
 def cost_until(problem: Problem, plan: Plan, until: float) -> float:
     """What the first `until` seconds of a plan cost, the switches in them included."""
-    piece = first_part(plan, until)
-    left = rest_of(plan, until, start=plan.start)
-    switches = problem.cost.switching(_twists(plan)) - problem.cost.switching(_twists(left))
-    return float(problem.rates_of(piece) @ piece.durations) + switches
+    return problem.cost_of(plan) - problem.cost_of(rest_of(plan, until))
 
 
 def is_rest_of(plan: Plan, rest: Plan | None) -> bool:
@@ -82,13 +85,9 @@ def is_rest_of(plan: Plan, rest: Plan | None) -> bool:
 
 def within(pose: Array, goal: Goal) -> bool:
     """Whether a pose is a goal, to within its tolerances (1e-9 where they are 0)."""
-    way, turn = goal.off(pose)
-    return way <= goal.tolerance_m + EXACT and turn <= goal.tolerance_rad + EXACT
+    distance, turn = goal.off(pose)
+    return distance <= goal.tolerance_m + EXACT and turn <= goal.tolerance_rad + EXACT
 
 
 def _moving(plan: Plan) -> list[str]:
-    return [base_name(trim.name) for trim in plan.trims if trim.body_velocity.any()]
-
-
-def _twists(plan: Plan) -> Array:
-    return np.array([trim.body_velocity for trim in plan.trims]).reshape(-1, plan.start.size)
+    return [base_name(piece.name) for piece in moving_pieces(plan)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,22 +12,18 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.cutting import NOTHING, with_samples_at
 from maneuver_automaton.collision import AnyObstacle, Shape, as_obstacles
-from maneuver_automaton.planning.among_obstacles import library_table
-from maneuver_automaton.problem import Problem
-from maneuver_automaton.receding_horizon.among_obstacles import decide_among_obstacles
+from maneuver_automaton.planning.plan import has_inertia
+from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.receding_horizon.candidates import cost_until, is_rest_of
-from maneuver_automaton.receding_horizon.decision import Decision
-from maneuver_automaton.receding_horizon.escape import load_escape
+from maneuver_automaton.receding_horizon.decision import StepSearch, decide
 from maneuver_automaton.receding_horizon.guarantees import broken, promises, too_cheap
-from maneuver_automaton.receding_horizon.log import Deed, Origin, Step
+from maneuver_automaton.receding_horizon.log import Deed, Origin, Step, Violation
 from maneuver_automaton.receding_horizon.pace import is_uniform
-from maneuver_automaton.receding_horizon.settings import Settings, cheapest_rest
+from maneuver_automaton.receding_horizon.searches import load_search, started
+from maneuver_automaton.receding_horizon.settings import Settings, filling_rest
 from maneuver_automaton.receding_horizon.situation import Chosen, Situation
-from maneuver_automaton.refinement.ready import load_lattice
-from maneuver_automaton.search.choose import load_search
-from maneuver_automaton.search.limits import closed_bound
-from maneuver_automaton.search.ready import load_times_kernels
 
 
 class RecedingHorizon:
@@ -36,18 +32,22 @@ class RecedingHorizon:
     Every step shifts the last plan, which always leads to the goal, looks for a cheaper one, and
     checks what the paper proves of the loop; what is broken stands in the log with the reason.
 
+    What is committed is driven in any case: nothing where trims are switched at will, otherwise the
+    maneuver under way to its end. A step decides what comes after it. Off the plan, the last word
+    gets new times from where the vehicle was measured.
+
     Among obstacles the last plan is checked against where they are predicted now. Nothing is driven
     that is not free, and followed by a free motion: a plan to the goal and time to stand there, or
-    a way out, which waits or evades. Where there is none, what does the least harm is driven, and
-    flagged.
+    a fail-safe trajectory, which waits, evades or brakes. Where there is none, the motion that
+    collides last is driven, and flagged.
 
     Source: the paper, Algorithm 14, Theorem 17, Sec. 4.2 and 4.3.
 
     Parameters
     ----------
     problem : Problem
-        Its start is the first state, its horizon fixed (then a rest must be in the library) or
-        free.
+        From a trim to a trim, rest if none is named; its horizon is fixed or free. A fixed time is
+        prolonged by rest at every step; where no plan may end in a rest, it is what is left of it.
     step : float
         delta [s]: the loop closes every so often.
     margin : float
@@ -61,20 +61,21 @@ class RecedingHorizon:
         What the first step applies, instead of searching: a plan from there to the goal.
     retimed : bool
         Drive every plan at the pace that makes its effort uniform: the controls are then
-        continuous, multiples of those of the library. Needs a fixed horizon, a cost with effort,
-        and a vehicle whose body velocity scales with its control.
+        continuous, multiples of those of the library. Needs a fixed horizon, a cost with effort, a
+        vehicle without inertia whose body velocity scales with its control, and no zones.
     hold : bool
         Within the goal's tolerance, correct what is left within a few steps, along plans that stay
-        within it if there are such; otherwise rest.
+        within it if there are such; otherwise, and with inertia, rest.
     look_ahead : float
-        [s] that a way out, or standing still, must be free; less where nothing moves any more.
+        [s] that a fail-safe trajectory, or standing still, must be free; less where nothing moves
+        any more. With inertia one that is free for `stand` will do where none is for so long.
     stand : float
         [s] that the goal must stay free after arrival, and a step at least.
 
     Raises
     ------
     ValueError
-        If a number is out of range, or a fixed horizon has no rest to be prolonged by.
+        If a number is out of range, or plans cannot be retimed.
 
     Examples
     --------
@@ -110,10 +111,6 @@ class RecedingHorizon:
         look_ahead: float = 60.0,
         stand: float = 2.0,
     ) -> None:
-        if problem.zones:
-            raise ValueError(
-                "receding horizon: this controller knows no zones; ManeuverHorizon does"
-            )
         settings = Settings(
             step=step,
             margin=margin,
@@ -121,11 +118,11 @@ class RecedingHorizon:
             first=first,
             hold=hold,
             retimed=retimed,
-            pad=cheapest_rest(problem),
+            pad=filling_rest(problem),
             look_ahead=look_ahead,
             stand=stand,
         )
-        settings.check_horizon(problem)
+        settings.check(problem)
         if last is not None and not 0 <= last.goal_index < len(problem.goals):
             raise ValueError(
                 f"receding horizon: the last step leads to goal {last.goal_index}, need one of "
@@ -134,28 +131,15 @@ class RecedingHorizon:
         self.problem = problem
         self.settings = settings
         self.last = last
+        total = problem.horizon.time
+        # a fixed time that no rest fills cannot be prolonged: it ends then [s]
+        self.arrival = None if total is None or settings.pad else problem.start_time + total
         self.promises = promises(problem, step=step)
         self.most_steps: int | None = None
         if last is not None and not retimed:  # the bound counts from the first step
             bound = self.promises.most_steps(last.value)
             self.most_steps = None if bound is None else bound + last.number
-        load_times_kernels()
-        self._see(problem.obstacles)
-
-    def _see(self, obstacles: tuple[AnyObstacle, ...]) -> None:
-        """Take these obstacles for the ones there are, and have ready what decides among them."""
-        if self.settings.retimed and any(getattr(one, "motion", None) for one in obstacles):
-            raise ValueError(
-                "receding horizon: retimed plans meet what moves at other times; need obstacles "
-                "that stand still"
-            )
-        self.problem = replace(self.problem, obstacles=obstacles)
-        if not obstacles:
-            load_search(self.problem)
-            return
-        load_lattice()
-        load_escape()
-        library_table(self.problem)
+        load_search(problem)
 
     def step(
         self,
@@ -200,46 +184,53 @@ class RecedingHorizon:
             raise ValueError(f"measured_state: got shape {pose.shape}, need ({dof},)")
         changed = obstacles is not None and as_obstacles(obstacles) != self.problem.obstacles
         if obstacles is not None and changed:
-            self._see(as_obstacles(obstacles))
+            self.problem = replace(self.problem, obstacles=as_obstacles(obstacles))
+            self.settings.check(self.problem)
+            load_search(self.problem)
         began = time.monotonic()
         last = self.last
         passed = 0.0 if last is None else (last.applied if elapsed is None else elapsed)
         if not 0.0 <= passed < math.inf:
             raise ValueError(f"elapsed must be at least 0, got {passed} s")
-        if last is not None and passed != last.applied:
+        if last is not None:
             last = self._cut(last, passed)
         at = self.problem.start_time if last is None else last.time + passed
-        here = replace(self.problem, start=pose, start_time=at)
-        if here.obstacles:
-            chosen = decide_among_obstacles(self.settings, here, last, passed, began)
-        else:
-            chosen = Decision(Situation(self.settings, here, last, passed, began)).chosen()
-        now = self._logged(chosen, here, last, began, changed=changed)
-        self.last = now
-        control = now.control
+        here = replace(self.problem, start=pose, start_time=at, horizon=self._horizon(at))
+        now, search = started(
+            self.settings, here, last, passed=passed, began=began, changed=changed
+        )
+        self.last = self._logged(decide(now, search), search, now)
+        control = self.last.control
         if control is None and self.settings.pad is not None:
             control = self.settings.pad.control
-        return control, now
+        return control, self.last
+
+    def _horizon(self, at: float) -> Horizon:
+        """The horizon of a step at a time [s] of the world's clock."""
+        horizon = self.problem.horizon
+        if self.arrival is None:
+            return horizon
+        return replace(horizon, time=max(self.arrival - at, NOTHING))
 
     def _cut(self, last: Step, passed: float) -> Step:
         """The last step as it was driven, for `passed` seconds; one cut short is not counted."""
         if passed < last.applied and self.most_steps is not None:
             self.most_steps += 1
-        return replace(
-            last, applied=passed, applied_cost=cost_until(self.problem, last.plan, passed)
-        )
+        plan = with_samples_at(last.plan, [last.time + passed], self.problem.automaton.model)
+        if passed == last.applied:
+            return replace(last, plan=plan)
+        spent = cost_until(self.problem, plan, passed)
+        return replace(last, plan=plan, applied=passed, applied_cost=spent)
 
-    def _logged(
-        self, chosen: Chosen, here: Problem, last: Step | None, began: float, *, changed: bool
-    ) -> Step:
-        plan, goal = chosen.plan, here.goals[chosen.goal_index]
-        retimed = self.settings.retimed
-        deed = _deed(chosen, last)
-        bound = self._bound(chosen, here)
-        nowhere = not deed.leads and bool(here.obstacles)
-        value = bound if nowhere else chosen.value
-        applied = min(self.settings.step, plan.duration) if plan.trims else self.settings.step
-        now = Step(
+    def _logged(self, chosen: Chosen, search: StepSearch, now: Situation) -> Step:
+        here, last, delta = now.here, now.last, self.settings.step
+        instants = here.start_time + delta * np.arange(1, 2 + chosen.plan.duration / delta)
+        plan = with_samples_at(chosen.plan, instants, here.automaton.model)
+        deed = _deed(chosen, now)
+        bound = self._bound(chosen, search, now)
+        value = chosen.value if deed.leads or search.knows_all else bound
+        applied = min(delta, plan.duration) if plan.duration > NOTHING else delta
+        step = Step(
             time=here.start_time,
             pose=here.start,
             plan=plan,
@@ -249,55 +240,66 @@ class RecedingHorizon:
             applied_cost=cost_until(here, plan, applied),
             accumulated_cost=0.0 if last is None else last.accumulated_cost + last.applied_cost,
             origin=chosen.origin,
-            replanned=last is not None and not is_rest_of(plan, chosen.rest),
+            replanned=last is not None and not is_rest_of(plan, now.rest),
             shifted_value=chosen.shifted_value,
-            off_plan=chosen.off_plan,
+            off_plan=now.off_plan,
             lower_bound=min(value, bound),
-            exhaustive=chosen.exhaustive,
-            solve_s=time.monotonic() - began,
+            exhaustive=now.exhaustive,
+            solve_s=time.monotonic() - now.began,
             number=0 if last is None else last.number + 1,
             arrived=chosen.arrived,
             deed=deed,
             free_until=chosen.free_until,
         )
-        if (last is None or now.off_plan) and not retimed:  # from here on, undisturbed
-            most = None if here.moves or nowhere else self.promises.most_steps(now.value)
-            self.most_steps = None if most is None else most + now.number
-        if here.moves:
-            self.most_steps = None  # to wait may cost nothing
-        found = list(chosen.violations)
-        if last is not None and deed.leads and last.deed.leads:
-            found += broken(
-                self.promises,
-                goal,
-                last,
-                now,
-                most_steps=None if retimed else self.most_steps,
-                uniform=retimed and is_uniform(now.plan, here.cost),
-                moved=here.moves or changed,
-            )
-        if deed.leads and not (now.arrived or retimed or here.moves):
-            found += too_cheap(self.promises, now)
-        return replace(now, violations=tuple(found))
+        self._count(step, now)
+        broken = (*now.violations, *self._broken(step, now))
+        return replace(step, violations=broken)
 
-    def _bound(self, chosen: Chosen, here: Problem) -> float:
+    def _count(self, step: Step, now: Situation) -> None:
+        """Bound the number of steps, from here on if something disturbed."""
+        if (now.last is None or step.off_plan or now.changed) and not self.settings.retimed:
+            most = self.promises.most_steps(step.value) if step.deed.leads else None
+            self.most_steps = None if most is None else most + step.number
+        if now.here.moves:
+            self.most_steps = None  # to wait may cost nothing
+
+    def _broken(self, step: Step, now: Situation) -> Iterator[Violation]:
+        """The guarantees that a step breaks."""
+        here, last, retimed = now.here, now.last, self.settings.retimed
+        if last is not None and step.deed.leads and last.deed.leads:
+            yield from broken(
+                self.promises,
+                here.goals[step.goal_index],
+                last,
+                step,
+                most_steps=None if retimed else self.most_steps,
+                uniform=retimed and is_uniform(step.plan, here.cost),
+                moved=here.moves or now.changed,
+            )
+        steady = not (here.moves or retimed or has_inertia(here) or here.zones)
+        if steady and step.deed.leads and not step.arrived:
+            yield from too_cheap(self.promises, step)
+
+    def _bound(self, chosen: Chosen, search: StepSearch, now: Situation) -> float:
         """No plan to any goal costs less."""
-        if chosen.exhaustive:
+        if now.exhaustive:
             return chosen.value
         if self.settings.retimed:  # trims at another pace may cost less than those of the library
+            here = now.here
             return min(self.promises.effort_bound(here.start, goal) for goal in here.goals)
-        return min(closed_bound(here, goal) for goal in here.goals)
+        return search.lower_bound()
 
 
-def _deed(chosen: Chosen, last: Step | None) -> Deed:
+def _deed(chosen: Chosen, now: Situation) -> Deed:
     """What a step does, where the decision does not say it."""
     if chosen.deed is not None:
         return chosen.deed
-    if math.isinf(chosen.value):
-        return Deed.STOPPED
-    if last is None:
+    if now.last is None:
         return Deed.PLANNED
     if chosen.origin is not Origin.SEARCHED:
         return Deed.KEPT
-    same = last.deed.leads and is_rest_of(chosen.plan, chosen.rest)
+    same = now.last.deed.leads and is_rest_of(chosen.plan, now.rest)
     return Deed.IMPROVED if same else Deed.REPLANNED
+
+
+ManeuverHorizon = RecedingHorizon  # the name it has had for vehicles with inertia

@@ -1,146 +1,129 @@
-"""What a step decides: the rest of the last plan, or a cheaper one."""
+"""What a step decides: the rest of the last plan, a cheaper one, or a fail-safe trajectory.
+
+This is the one sequence for every vehicle and every world. What differs is where plans come from,
+and what it takes for one to be safe: that is a `StepSearch`.
+"""
 
 from __future__ import annotations
 
 import math
-import time
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Protocol
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.receding_horizon.candidates import Candidate, allowed
+from maneuver_automaton.planning.plan import has_inertia
+from maneuver_automaton.receding_horizon.candidates import Candidate
 from maneuver_automaton.receding_horizon.holding import holding
-from maneuver_automaton.receding_horizon.log import Guarantee, Origin, Violation
-from maneuver_automaton.receding_horizon.reanchoring import quickest, rejoining
+from maneuver_automaton.receding_horizon.log import Deed, Guarantee, Origin
+from maneuver_automaton.receding_horizon.mitigation import Mitigation
 from maneuver_automaton.receding_horizon.situation import Chosen, Situation
-from maneuver_automaton.search.choose import search_goal
-from maneuver_automaton.search.result import SearchStatus, plan_of
-
-SECOND_OPINION = 0.02  # [s] for short words beside insertion
-PACES = 5  # dearer plans, which may be cheaper at another pace
 
 
-class Decision:
-    """What a step decides where nothing is in the way."""
+class StepSearch(Protocol):
+    """Where the plans of a step come from. All start with what is committed of the last one."""
 
-    def __init__(self, now: Situation) -> None:
-        self.now = now
-        self.settings = now.settings
-        self.here = now.here
+    @property
+    def free_until(self) -> float | None:
+        """Time [s] until which plans are proven collision-free; None if nothing is in the way."""
 
-    def chosen(self) -> Chosen:
-        """The plan to apply."""
-        arrived = self.now.arrived()
-        if arrived is not None:
-            return arrived
-        inside = self.now.goal_within(self.here.start) if self.settings.hold else None
-        if inside is not None:
-            held = holding(self.here, self.settings, inside)
-            return self.now.resting(inside) if held is None else self.now.held(held)
-        if self.now.last is None and self.settings.first is not None:
-            return self.now.given(self.settings.first)
-        kept = self._kept()
-        searched = self._searched(None if kept is None else kept.plan)
-        best = self.now.best(kept, searched) or self._late()
-        if best is None:
-            return self._helpless()
-        self.now.flag_late(best.plan)
-        return self.now.as_chosen(best, None if kept is None else kept.cost)
+    @property
+    def knows_all(self) -> bool:
+        """Whether there is no plan, in whatever time, where none is found."""
 
-    def _kept(self) -> Candidate | None:
-        """The cheapest rest of the last plan that is allowed; others only where it is a detour."""
-        here, last, rest = self.here, self.now.last, self.now.rest
-        candidates: list[Candidate] = []
-        if last is None or rest is None:
-            return None
-        for k, (plan, origin) in enumerate(self.now.rests()):
-            if allowed(here, plan):
-                candidates.append(self.now.candidate(plan, last.goal_index, origin))
-            same = [trim.name for trim in plan.trims] == [trim.name for trim in rest.trims]
-            detour = not same or here.cost_of(plan) > last.value
-            if k == 0 and origin is Origin.REANCHORED and not detour:
-                break
-        return min(candidates, key=lambda one: one.cost, default=None)
+    @property
+    def improves(self) -> bool:
+        """Whether it starts from the plan that is kept, so that any safe one will do."""
 
-    def _searched(self, known: Plan | None) -> list[Candidate]:
-        """What a search from here finds."""
-        here = self.here
-        found: list[Candidate] = []
-        self.now.exhaustive = True
-        bounded = any(getattr(here.bounds, name) is not None for name in ("x", "y", "z"))
-        alternatives = None if bounded else PACES if self.settings.retimed else 0
-        for index, goal in enumerate(here.goals):
-            left = self.now.began + self.settings.time_limit - time.monotonic()
-            to_known = known if self.now.last is None or index == self.now.last.goal_index else None
-            if left <= 0.0 and (known is not None or found):
-                self.now.exhaustive = False
-                self._over_budget()
-                break
-            results = search_goal(
-                here,
-                goal,
-                alternatives=alternatives,
-                time_limit=max(left, 1e-6),
-                known=None if self.settings.retimed else to_known,
-                ties=True,
-                second_opinion=SECOND_OPINION,
+    def is_safe(self, plan: Plan) -> bool:
+        """Whether a plan keeps to the bounds, is collision-free, and may end where it does."""
+
+    def cheaper(self, kept: Candidate | None) -> list[Candidate]:
+        """Safe plans, which may cost less than the one that is kept."""
+
+    def otherwise(self) -> Candidate | None:
+        """A safe plan where none is kept and none was found: late, or from a longer search."""
+
+    def why_none(self) -> str:
+        """Why there is no plan to the goal."""
+
+    def fail_safe(self) -> Iterator[tuple[Plan, Deed]]:
+        """Safe motions that do not lead to the goal, and what they are; the first is driven."""
+
+    def mitigation(self) -> Mitigation:
+        """The motion that collides last, where none is safe."""
+
+    def lower_bound(self) -> float:
+        """No plan to any goal costs less."""
+
+
+def decide(now: Situation, search: StepSearch) -> Chosen:
+    """The plan to apply."""
+    there = _there(now, search)
+    if there is not None:
+        return replace(there, free_until=search.free_until)
+    first = now.settings.first
+    if now.last is None and first is not None:
+        chosen = now.given(first)
+        if not search.is_safe(chosen.plan):
+            raise ValueError(
+                "receding horizon: first hits an obstacle, or ends where one comes; need a plan "
+                "that is free"
             )
-            proven = any(one.exhaustive for one in results)
-            decisive = not (self.settings.retimed or bounded)
-            self.now.exhaustive = self.now.exhaustive and proven and decisive
-            if any(one.status is SearchStatus.OUT_OF_BUDGET for one in results):
-                self._over_budget()
-            for result in results:
-                for solution in result.solutions:
-                    plan = plan_of(here, solution)
-                    if allowed(here, plan):
-                        found.append(self.now.candidate(plan, index, Origin.SEARCHED))
-        return found
+        return replace(chosen, free_until=search.free_until)
+    kept = _kept(now, search)
+    best = now.best(kept, search.cheaper(kept)) or search.otherwise()
+    if best is None:
+        return _without_plan(now, search)
+    now.flag_late(best.plan)
+    shifted = None if kept is None else kept.cost
+    return replace(now.as_chosen(best, shifted), free_until=search.free_until)
 
-    def _over_budget(self) -> None:
-        if any(one.guarantee is Guarantee.BUDGET for one in self.now.violations):
-            return
-        limit = self.settings.time_limit
-        self.now.violations.append(
-            Violation(
-                guarantee=Guarantee.BUDGET,
-                reason=f"the search was cut short after {limit:g} s; the best plan so far is kept",
-            )
-        )
 
-    def _helpless(self) -> Chosen:
-        """Nothing leads to the goal: rest, and say so."""
-        here, pad = self.here, self.settings.pad
-        trims = () if pad is None else (pad,)
-        lasting = [self.settings.step] * len(trims)
-        rest = Plan(here.start, trims, durations=lasting, start_time=here.start_time)
-        self.now.violations.append(
-            Violation(
-                guarantee=Guarantee.FEASIBILITY,
-                reason=f"no plan leads from {here.start.tolist()} to the goal, in whatever time",
-            )
-        )
-        nowhere = Candidate(
-            plan=rest, cost=math.inf, goal_index=0, origin=Origin.SEARCHED, at_first=0.0
-        )
-        return self.now.as_chosen(nowhere, None)
+def _there(now: Situation, search: StepSearch) -> Chosen | None:
+    """At the goal, or within it if that is to be held: rest, if that is safe."""
+    index = now.exactly_at()
+    inside = now.goal_within(now.here.start) if now.settings.hold and now.may_rest else None
+    if index is None and inside is not None:
+        held = None if has_inertia(now.here) else holding(now.here, now.settings, inside)
+        if held is not None and search.is_safe(held.plan):
+            return replace(now.as_chosen(held, held.cost), arrived=True)
+        index = inside
+    index = now.ended_within() if index is None else index
+    if index is None:
+        return None
+    there = now.resting(index)
+    return there if search.is_safe(there.plan) else None
 
-    def _late(self) -> Candidate | None:
-        """No plan arrives in time: the quickest there is, flagged; None if there is none."""
-        here = self.here
-        hurry = quickest(here)
-        found: list[Candidate] = []
-        for index, goal in enumerate(here.goals):
-            plans = list(rejoining(hurry, self.now.planned(), goal, pad=None))
-            for result in search_goal(
-                hurry, goal, alternatives=0, time_limit=self.settings.time_limit
-            ):
-                plans += [plan_of(here, solution) for solution in result.solutions]
-            found += [
-                self.now.candidate(self.now.padded(plan), index, Origin.SEARCHED)
-                for plan in plans
-                if allowed(here, plan)
-            ]
-        if not found:
-            return None
-        best = min(found, key=lambda one: one.plan.duration)
-        self.now.exhaustive = False
-        return best
+
+def _kept(now: Situation, search: StepSearch) -> Candidate | None:
+    """The first safe rest of the last plan that is no detour; else the cheapest that is safe."""
+    last = now.last
+    if last is None or (now.here.moves and not last.deed.leads):
+        return None
+    safe: list[Candidate] = []
+    for plan, origin in now.rests():
+        if not search.is_safe(plan):
+            continue
+        safe.append(now.candidate(plan, last.goal_index, origin))
+        if search.improves or not now.is_detour(plan):
+            return safe[-1]
+    return min(safe, key=lambda one: one.cost, default=None)
+
+
+def _without_plan(now: Situation, search: StepSearch) -> Chosen:
+    """No safe plan leads to the goal from here, now."""
+    if not now.here.moves or (now.last is not None and now.last.deed.leads):
+        now.flag(Guarantee.FEASIBILITY, search.why_none())
+    for plan, deed in search.fail_safe():
+        return _leading_nowhere(now, plan, deed, search.free_until)
+    least = search.mitigation()
+    now.flag(Guarantee.SAFETY, least.reason)
+    return _leading_nowhere(now, least.plan, Deed.HARMFUL, least.contact)
+
+
+def _leading_nowhere(now: Situation, plan: Plan, deed: Deed, free_until: float | None) -> Chosen:
+    index = 0 if now.last is None else now.last.goal_index
+    origin = Origin.SHIFTED if plan is now.rest else Origin.SEARCHED
+    one = Candidate(plan=plan, cost=math.inf, goal_index=index, origin=origin, at_first=0.0)
+    return replace(now.as_chosen(one, None), deed=deed, free_until=free_until)

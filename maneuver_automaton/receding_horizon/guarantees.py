@@ -10,6 +10,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.costs import Cost
+from maneuver_automaton.planning.plan import has_inertia
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.log import Guarantee, Step, Violation
 from maneuver_automaton.search.limits import rest_rate
@@ -51,8 +52,8 @@ class Promises:
         """
         if self.horizon is None:
             return 0.0
-        way, turn = goal.off(pose)
-        return self.effort * (way**2 + turn**2) / self.horizon
+        distance, turn = goal.off(pose)
+        return self.effort * (distance**2 + turn**2) / self.horizon
 
     def effort_decrease(self, pose: Array, goal: Goal) -> float:
         """lambda_R c1 delta |x|^2 / T^2: what continuous controls decrease the value by.
@@ -64,6 +65,9 @@ class Promises:
 
 def promises(problem: Problem, *, step: float) -> Promises:
     """The constants of a problem whose loop closes every `step` seconds.
+
+    Along a maneuver a vehicle may stand nearly still, and a zone may slow it down, so that no least
+    rate is promised then.
 
     Examples
     --------
@@ -79,7 +83,8 @@ def promises(problem: Problem, *, step: float) -> Promises:
     moving = problem.automaton.body_velocities.any(axis=1)
     rates = problem.rates
     rest = rest_rate(problem) or 0.0
-    least = float(rates[moving].min()) - rest if moving.any() else 0.0
+    steady = moving.any() and not (has_inertia(problem) or problem.zones)
+    least = float(rates[moving].min()) - rest if steady else 0.0
     cost = problem.cost
     fixed = problem.horizon.time is not None
     effort = 0.0

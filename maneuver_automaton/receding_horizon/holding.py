@@ -64,8 +64,8 @@ def holding(here: Problem, settings: Settings, goal_index: int) -> Candidate | N
 
 def _share(plan: Plan, goal: Goal, step: float) -> float:
     """How much of the tolerance is used up at the next step, 1 at the edge of the set."""
-    way, turn = goal.off(plan.pose_at(plan.start_time + step))
-    return max(way / max(goal.tolerance_m, EXACT), turn / max(goal.tolerance_rad, EXACT))
+    distance, turn = goal.off(plan.pose_at(plan.start_time + step))
+    return max(distance / max(goal.tolerance_m, EXACT), turn / max(goal.tolerance_rad, EXACT))
 
 
 def _stays(plan: Plan, goal: Goal) -> bool:

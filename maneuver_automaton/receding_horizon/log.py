@@ -45,7 +45,7 @@ class Violation:
 class Origin(enum.Enum):
     """Where the plan of a step comes from."""
 
-    FIRST = "first"  # there was no plan before
+    FIRST = "first"  # told to the first step, or nothing to be done at it
     SHIFTED = "shifted"  # the rest of the last plan
     REANCHORED = "reanchored"  # the rest of the last plan, made to meet the goal from elsewhere
     SEARCHED = "searched"  # found anew
@@ -58,10 +58,10 @@ class Deed(enum.Enum):
     KEPT = "kept"  # the last plan
     IMPROVED = "improved"  # the last plan's word with better times
     REPLANNED = "replanned"  # another word to the goal
-    APPROACHED = "approached"  # towards the goal, as far as there is a way out
+    APPROACHED = "approached"  # towards the goal, then a fail-safe trajectory
     STOPPED = "stopped"  # it waits at rest
-    EVADED = "evaded"  # out of the way of something
-    HARMFUL = "harmful"  # nothing is free: what is hit last, or least
+    EVADED = "evaded"  # a fail-safe trajectory that does not wait
+    HARMFUL = "harmful"  # nothing is free: collision mitigation
 
     @property
     def leads(self) -> bool:
@@ -75,7 +75,7 @@ class Step:
 
     time: float  # [s]
     pose: Array  # (dof,) the plan starts here [m, m, rad(, m)]
-    plan: Plan  # from `pose` to the goal, or, if its deed does not lead there, out of the way
+    plan: Plan  # from `pose` to the goal, or, if its deed does not lead there, fail-safe
     goal_index: int  # which of the problem's goals it reaches
     value: float  # cost of the whole plan; of one that does not lead to the goal, a lower bound
     applied: float  # [s] until the next step
@@ -185,13 +185,4 @@ def first_part(plan: Plan, until: float) -> Plan:
     >>> first_part(Plan([0, 0, 0], (ahead,), durations=[2.0]), 0.5).end.tolist()
     [0.5, 0.0, 0.0]
     """
-    if any(plan.maneuvers):
-        return head_of(plan, until)
-    kept, durations, left = [], [], until
-    for trim, duration in zip(plan.trims, plan.durations.tolist(), strict=True):
-        if left <= 0.0:
-            break
-        kept.append(trim)
-        durations.append(min(duration, left))
-        left -= duration
-    return Plan(plan.start, tuple(kept), durations=durations, start_time=plan.start_time)
+    return head_of(plan, until) if plan.trims else plan

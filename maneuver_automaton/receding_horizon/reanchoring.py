@@ -11,9 +11,10 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.costs import Cost
+from maneuver_automaton.planning.plan import has_inertia
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Horizon, Problem
-from maneuver_automaton.receding_horizon.shifting import merged
+from maneuver_automaton.receding_horizon.shifting import merged, without_nothing
 from maneuver_automaton.search.insertion import sub_library
 from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.setup import search_setup
@@ -23,14 +24,18 @@ from maneuver_automaton.words import TimesStatus, solve_switching_times
 LOOK_AHEAD = 3  # joints of a plan that steering tries to rejoin
 NEAR = 1e-9  # [m, rad] a plan that ends so close to the goal leads there
 FIRST = 1  # of the cheapest connections to each
+EASED = 0.5  # share of a goal's tolerance that may be given up before the end
 
 
-def reanchored(problem: Problem, plan: Plan, goal: Goal, *, pad: Trim | None) -> Iterator[Plan]:
+def reanchored(
+    problem: Problem, plan: Plan, goal: Goal, *, pad: Trim | None, under_way: bool = False
+) -> Iterator[Plan]:
     """Plans from the problem's start that go on with `plan` as far as they can, and end at `goal`.
 
-    First the same word with other times. Then the steering function: three trims that rejoin the
-    plan at one of its next joints, or lead to the goal. Each ends exactly at the goal; with a
-    fixed time, in it.
+    First the same word with other times. Then, where trims are switched at will, the steering
+    function: three trims that rejoin the plan at one of its next joints, or lead to the goal. Each
+    ends exactly at the goal; with a fixed time, in it. A vehicle that does not switch at will may
+    not get there exactly: its word with times that lead to within the goal's tolerance comes last.
 
     Parameters
     ----------
@@ -41,43 +46,87 @@ def reanchored(problem: Problem, plan: Plan, goal: Goal, *, pad: Trim | None) ->
     goal : Goal
     pad : Trim, optional
         The rest that makes up for what is left of a fixed time.
+    under_way : bool
+        Whether `plan` begins within a maneuver.
 
     Yields
     ------
     Plan
     """
-    same = same_word(problem, plan, goal, pad=pad)
+    same = same_word(problem, plan, goal, pad=pad, under_way=under_way)
     if same is not None:
         yield same
-    yield from rejoining(problem, plan, goal, pad=pad)
+    if not has_inertia(problem):
+        yield from rejoining(problem, plan, goal, pad=pad)
+    elif goal.tolerance_m or goal.tolerance_rad:
+        from_here = replace(plan, start=problem.start)
+        eased = _eased(goal, from_here.end)
+        near = same_word(problem, plan, eased, pad=pad, under_way=under_way)
+        if near is not None:
+            yield near
 
 
-def same_word(problem: Problem, plan: Plan, goal: Goal, *, pad: Trim | None) -> Plan | None:
-    """The word of `plan` with the best times that lead from the problem's start to the goal."""
-    if goal.free_heading or not plan.trims:
+def same_word(
+    problem: Problem, plan: Plan, goal: Goal, *, pad: Trim | None, under_way: bool = False
+) -> Plan | None:
+    """The word of `plan` with the best times that lead from the problem's start to the goal.
+
+    The maneuvers of the word stay. `under_way`: it begins within one, the trim before that is over.
+    """
+    if not plan.trims:
         return None
-    setup = search_setup(problem, goal)
-    total = problem.horizon.time
-    trims, guess = plan.trims, plan.durations.tolist()
-    if total is not None and pad is not None and trims[-1].body_velocity.any():
-        trims, guess = (*trims, pad), [*guess, 0.0]
-    controls = np.array([trim.control for trim in trims])
-    twists = np.array([trim.body_velocity for trim in trims])
+    total, limit = problem.horizon.time, problem.horizon.max_time
+    if total is not None and pad is not None and not plan.trims[-1].is_rest:
+        between = (*plan.maneuvers, None) if plan.maneuvers else ()
+        lasting = np.append(plan.durations, 0.0)
+        plan = replace(plan, trims=(*plan.trims, pad), durations=lasting, maneuvers=between)
+    maneuvers = sum(one.duration for one in plan.maneuvers if one)
+    if total is not None and total < maneuvers:
+        return None
+    size = problem.start.size
+    still = np.zeros(size)
+    between = plan.maneuvers or (None,) * (len(plan.trims) - 1)
+    displacements = [still if one is None else one.displacement for one in between]
+    longest = np.array([trim.max_duration for trim in plan.trims])
+    if total is None:  # rest may cost nothing, and then last for ever
+        longest = np.where([one.is_rest for one in plan.trims], plan.durations, longest)
+    if math.isfinite(longest[0]):
+        longest[0] = plan.durations[0]  # how long it has lasted already is not known
+    if under_way:
+        longest[0] = 0.0
     solved = solve_switching_times(
-        twists,
-        problem.cost.rates(controls, twists),
-        setup.goal[: twists.shape[1]],
-        total=total,
-        guesses=[guess],
+        np.array([trim.body_velocity for trim in plan.trims]),
+        problem.rates_of(plan),
+        search_setup(problem, goal).goal[:size],
+        displacements=np.array(displacements).reshape(-1, size),  # none beside one trim
+        total=None if total is None else total - maneuvers,
+        free_heading=goal.free_heading,
+        longest=longest,
+        guesses=[plan.durations],
         restarts=2,
     )
     if solved.status is TimesStatus.FAILED or not math.isfinite(solved.cost):
         return None
-    limit = problem.horizon.max_time
-    if limit is not None and float(solved.durations.sum()) > limit * (1.0 + 1e-9):
+    again = replace(
+        plan, start=problem.start, durations=solved.durations, start_time=problem.start_time
+    )
+    if limit is not None and again.duration > limit * (1.0 + NEAR):
         return None
-    word, times = merged(trims, solved.durations.tolist())
-    return Plan(problem.start, word, durations=times, start_time=problem.start_time)
+    if missed(again, goal) > NEAR * (1.0 + float(np.abs(again.start).max())):
+        return None
+    return without_nothing(again)
+
+
+def _eased(goal: Goal, end: Array) -> Goal:
+    """The goal moved, within its tolerance, towards where a plan ends."""
+    places = [0, 1, *range(3, end.size)]
+    off = end - goal.pose
+    off[2] = 0.0 if goal.free_heading else math.remainder(float(off[2]), 2.0 * math.pi)
+    distance_m, turn = float(np.linalg.norm(off[places])), abs(float(off[2]))
+    pose = np.array(goal.pose)
+    pose[places] += off[places] * min(1.0, EASED * goal.tolerance_m / max(distance_m, NEAR))
+    pose[2] += off[2] * min(1.0, EASED * goal.tolerance_rad / max(turn, NEAR))
+    return replace(goal, pose=pose)
 
 
 def rejoining(problem: Problem, plan: Plan, goal: Goal, *, pad: Trim | None) -> Iterator[Plan]:
@@ -91,9 +140,9 @@ def rejoining(problem: Problem, plan: Plan, goal: Goal, *, pad: Trim | None) -> 
         ahead = plan.switching_poses[joint]
         last = joint == end
         target = goal if last else Goal(pose=ahead)
-        for way in (hurry, quickest(hurry)):
+        for variant in (hurry, quickest(hurry)):
             found = False
-            for first in _connections(replace(way, goals=(target,)), target):
+            for first in _connections(replace(variant, goals=(target,)), target):
                 trims = (*first.trims, *(() if last else plan.trims[joint:end]))
                 times = [*first.durations.tolist(), *(() if last else plan.durations[joint:end])]
                 padded = _in_time(problem, trims, times, pad)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.planning.in_space import climbs_among_obstacles
+from maneuver_automaton.planning.plan import has_inertia
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
 
@@ -24,7 +26,7 @@ class Settings:
     hold: bool = False
     retimed: bool = False
     pad: Trim | None = None  # the rest that prolongs a plan
-    look_ahead: float = 60.0  # [s] that a way out must be free
+    look_ahead: float = 60.0  # [s] that a fail-safe trajectory must be free
     stand: float = 2.0  # [s] that the goal must stay free after arrival
 
     def __post_init__(self) -> None:
@@ -41,28 +43,45 @@ class Settings:
         """The rest that fills a fixed time; None where time is free."""
         return None if problem.horizon.time is None else self.pad
 
-    def check_horizon(self, problem: Problem) -> None:
-        """Raise ValueError if a loop with these settings cannot keep the horizon of a problem."""
+    def check(self, problem: Problem) -> None:
+        """Raise ValueError if a loop with these settings cannot keep to a problem."""
         horizon = problem.horizon.time
-        if horizon is not None:
-            if self.pad is None:
-                raise ValueError(
-                    "receding horizon: a fixed time needs a rest trim, which prolongs the last "
-                    "plan; the library has none"
-                )
-            if self.step > horizon * (1.0 + EXACT):
-                raise ValueError(
-                    f"receding horizon: step is {self.step:g} s, need at most the horizon, "
-                    f"{horizon:g} s"
-                )
-        if self.retimed and (horizon is None or not getattr(problem.cost, "effort", 0.0) > 0.0):
+        if horizon is not None and self.step > horizon * (1.0 + EXACT):
+            raise ValueError(
+                f"receding horizon: step is {self.step:g} s, need at most the horizon, "
+                f"{horizon:g} s"
+            )
+        if not self.retimed:
+            return
+        if has_inertia(problem) or problem.zones or climbs_among_obstacles(problem):
+            raise ValueError(
+                "receding horizon: retimed is for vehicles without inertia, and no zones or "
+                "heights: at another pace a maneuver leads elsewhere, and a zone may forbid it"
+            )
+        if horizon is None or not getattr(problem.cost, "effort", 0.0) > 0.0:
             raise ValueError(
                 "receding horizon: retimed plans need a fixed horizon and a cost with effort"
             )
+        if self.pad is None:
+            raise ValueError(
+                "receding horizon: retimed plans need a rest trim, which fills the time they "
+                "gain; the library has none"
+            )
+        if problem.moves:
+            raise ValueError(
+                "receding horizon: retimed plans meet what moves at other times; need obstacles "
+                "that stand still"
+            )
 
 
-def cheapest_rest(problem: Problem) -> Trim | None:
-    """The cheapest rest of the library."""
+def filling_rest(problem: Problem) -> Trim | None:
+    """The cheapest rest of the library, which fills a fixed time; None if no plan may end in it.
+
+    Where trims are not switched at will, a plan ends in the goal's trim.
+    """
+    moving = [not problem.last_trim(goal).is_rest for goal in problem.goals if goal.trim]
+    if has_inertia(problem) and any(moving):
+        return None
     still = np.flatnonzero(~problem.automaton.body_velocities.any(axis=1))
     if not still.size:
         return None

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.automaton import Plan
-from maneuver_automaton.primitives import Trim
-
-NOTHING = 1e-9  # [s] a trim that lasts no longer leaves the word
+from maneuver_automaton.automaton import Plan, Primitive
+from maneuver_automaton.automaton.cutting import NOTHING, joined, tail_of
+from maneuver_automaton.primitives import Maneuver, Trim
 
 
 def rest_of(
@@ -18,8 +18,9 @@ def rest_of(
 ) -> Plan:
     """What remains of a plan `after` seconds, from `start`; `pad` makes it last as long again.
 
-    This is the plan that makes the loop recursively feasible: where the goal was to be met after
-    T, it is met after T - `after`, and the vehicle rests there.
+    Of a maneuver under way its end remains. This is the plan that makes the loop recursively
+    feasible: where the goal was to be met after T, it is met after T - `after`, and the vehicle
+    rests there.
 
     Source: the paper, Sec. 4, after Algorithm 14.
 
@@ -31,7 +32,7 @@ def rest_of(
     start : (dof,) array, optional
         Where the vehicle is [m, m, rad(, m)]; if omitted, where the plan says.
     pad : Trim, optional
-        A rest, appended for as long as has passed.
+        A rest, appended for as long as has passed; a plan that ends in a rest stays in that.
 
     Returns
     -------
@@ -45,22 +46,43 @@ def rest_of(
     >>> left.word, left.durations.tolist(), left.end.tolist()
     (('ahead', 'rest'), [1.5, 0.5], [2.0, 0.0, 0.0])
     """
-    trims: list[Trim] = []
-    durations: list[float] = []
-    passed = after
-    for trim, duration in zip(plan.trims, plan.durations.tolist(), strict=True):
-        left = duration - passed
-        passed = max(0.0, -left)
-        if left > NOTHING:
-            trims.append(trim)
-            durations.append(min(left, duration))
-    if pad is not None:
-        trims.append(pad)
-        durations.append(after)
-    word, times = merged(trims, durations)
-    at = plan.start_time + after
-    begin = plan.pose_at(at) if start is None else start
-    return Plan(begin, word, durations=times, start_time=at)
+    left = without_nothing(tail_of(plan, after, start=start))
+    return left if pad is None else rested(left, pad, after)
+
+
+def rested(plan: Plan, pad: Trim, duration: float) -> Plan:
+    """The plan with `duration` more seconds of rest: of the one it ends in, otherwise of `pad`."""
+    if not duration > NOTHING:
+        return plan
+    rest = plan.trims[-1] if plan.trims and plan.trims[-1].is_rest else pad
+    return followed_by(plan, Plan(plan.end, (rest,), durations=[duration]))
+
+
+def followed_by(first: Plan, second: Plan) -> Plan:
+    """One plan, then another that begins where the first one ends."""
+    if not first.trims:
+        return replace(second, start=first.start, start_time=first.start_time)
+    return without_nothing(joined(first, second)) if second.trims else first
+
+
+def without_nothing(plan: Plan) -> Plan:
+    """The plan without trims that last no time; beside maneuvers they stay."""
+    if plan.maneuvers:
+        return plan
+    word, times = merged(plan.trims, plan.durations.tolist())
+    return replace(plan, trims=word, durations=np.array(times))
+
+
+def moving_pieces(plan: Plan) -> Iterator[Primitive]:
+    """The trims and maneuvers of a plan that last, without those that stand still."""
+    for piece, duration in zip(plan.primitives, plan.primitive_durations.tolist(), strict=True):
+        if isinstance(piece, Maneuver) or (duration > NOTHING and not piece.is_rest):
+            yield piece
+
+
+def moves_on(plan: Plan) -> bool:
+    """Whether a plan is more than to stand still."""
+    return any(True for _ in moving_pieces(plan))
 
 
 def merged(

@@ -14,7 +14,6 @@ from maneuver_automaton.automaton.cutting import NOTHING, tail_of
 from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.collision.blocked import too_close
 from maneuver_automaton.groups import group_of
-from maneuver_automaton.planning.in_space import climbs_among_obstacles
 from maneuver_automaton.planning.plan import has_inertia
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.candidates import within
@@ -26,7 +25,7 @@ from maneuver_automaton.receding_horizon.disturbance import (
     draws,
 )
 from maneuver_automaton.receding_horizon.log import ClosedLoop, Guarantee, Step, Violation
-from maneuver_automaton.receding_horizon.with_maneuvers import ManeuverHorizon, moves_on
+from maneuver_automaton.receding_horizon.shifting import moves_on
 
 Seen = Callable[[int], Sequence[AnyObstacle | Shape]]
 
@@ -102,30 +101,23 @@ def simulate(
     upset = Disturbance() if disturbance is None else disturbance
     upset = checked(upset, problem.start.size)
     random = draws(upset, problem.start.size)
-    controller: RecedingHorizon | ManeuverHorizon
-    # a fixed time that no rest prolongs is what is left of it, which that controller knows, and
-    # heights of obstacles too
-    shrinks = problem.horizon.time is not None and problem.automaton.rest is None
-    climbs = climbs_among_obstacles(problem)
-    inertia = has_inertia(problem) or bool(problem.zones) or shrinks or climbs
-    if inertia:
-        _check_inertia(upset, stay=stay, retimed=retimed)
-        controller = ManeuverHorizon(
-            problem, step=step, margin=margin, time_limit=time_limit, last=last, first=first
+    if upset.twist_scale is not None and has_inertia(problem):
+        raise ValueError(
+            "receding horizon: disturbance: twist_scale is for vehicles without inertia: "
+            "a maneuver is driven as its model says"
         )
-    else:
-        controller = RecedingHorizon(
-            problem,
-            step=step,
-            margin=margin,
-            time_limit=time_limit,
-            last=last,
-            first=first,
-            hold=stay,
-            retimed=retimed,
-            look_ahead=look_ahead,
-            stand=stand,
-        )
+    controller = RecedingHorizon(
+        problem,
+        step=step,
+        margin=margin,
+        time_limit=time_limit,
+        last=last,
+        first=first,
+        hold=stay,
+        retimed=retimed,
+        look_ahead=look_ahead,
+        stand=stand,
+    )
     begin = 0 if last is None else last.number + 1
     for _ in range(begin):  # the numbers that the steps before have used
         next(random)
@@ -136,10 +128,9 @@ def simulate(
     log: list[Step] = []
     poses, times, driven, audits = [where], [_begin(problem, last)], [], []
     inside: list[bool] = [_inside(problem, where)]
-    arrived = inside[-1] and (last is None or last.deed.leads)
-    if inertia:  # it may pass the goal before it gets there
-        stands = problem.automaton.is_kinematic or problem.first_trim.is_rest
-        arrived = inside[-1] and (stands if last is None else _stands(last))
+    stops = controller.arrival is None and not has_inertia(problem)  # where it likes
+    stands = not has_inertia(problem) or problem.first_trim.is_rest
+    arrived = inside[-1] and (stands if last is None else _arrives(last, stops=stops))
     for number in range(begin, begin + steps):
         if arrived and not stay:
             break
@@ -155,7 +146,7 @@ def simulate(
         before = now
         log.append(now)
         stuck = not (now.deed.leads or problem.moves or obstacles is not None)
-        stuck = stuck and not (inertia and moves_on(now.plan))  # nothing stops at once
+        stuck = stuck and (stops or not moves_on(now.plan))
         if stuck:
             break
         piece = replace(now.piece, start=where)
@@ -174,9 +165,7 @@ def simulate(
         poses.append(where)
         times.append(now.time + now.applied)
         inside.append(_inside(problem, where))
-        arrived = inside[-1] and now.deed.leads  # not on the way past it
-        if inertia:
-            arrived = inside[-1] and _stands(now)
+        arrived = inside[-1] and _arrives(now, stops=stops)
     return _closed_loop(
         problem,
         controller,
@@ -194,7 +183,7 @@ def simulate(
 
 def _closed_loop(
     problem: Problem,
-    controller: RecedingHorizon | ManeuverHorizon,
+    controller: RecedingHorizon,
     log: list[Step],
     poses: list[Array],
     times: list[float],
@@ -240,24 +229,15 @@ def _closed_loop(
     )
 
 
-def _stands(step: Step) -> bool:
-    """Whether a vehicle with inertia is at the end of its plan once a step is driven."""
+def _arrives(step: Step, *, stops: bool) -> bool:
+    """Whether a vehicle that is at the goal after a step stays there, and does not drive past it.
+
+    If it `stops` where it likes, it does so on a plan to the goal; otherwise at the end of a plan.
+    """
+    if stops:
+        return step.deed.leads
     left = tail_of(step.plan, step.applied)
     return left.duration <= NOTHING or not moves_on(left)
-
-
-def _check_inertia(upset: Disturbance, *, stay: bool, retimed: bool) -> None:
-    """Refuse what loops of vehicles with inertia do not know."""
-    asked = {
-        "stay": stay,
-        "retimed": retimed,
-        "disturbance: twist_scale": upset.twist_scale is not None,
-    }
-    for name, given in asked.items():
-        if given:
-            raise ValueError(
-                f"receding horizon: {name} is for vehicles without inertia, and no zones"
-            )
 
 
 def _spent(last: Step | None) -> float:

@@ -1,14 +1,18 @@
-"""Where a step stands: the state, the last plan, and what both kinds of decision need of them."""
+"""Where a step stands: the state, the last plan, what of it is committed, and the problem after."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.cutting import NOTHING, committed, head_of, joined
+from maneuver_automaton.planning.plan import has_inertia
+from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.candidates import Candidate, candidate, within
 from maneuver_automaton.receding_horizon.log import Deed, Guarantee, Origin, Step, Violation
@@ -19,7 +23,7 @@ from maneuver_automaton.receding_horizon.reanchoring import (
     same_word,
 )
 from maneuver_automaton.receding_horizon.settings import EXACT, Settings
-from maneuver_automaton.receding_horizon.shifting import merged, rest_of
+from maneuver_automaton.receding_horizon.shifting import moves_on, rest_of, rested
 from maneuver_automaton.search.words import TIE
 
 
@@ -31,49 +35,118 @@ class Chosen:
     goal_index: int
     value: float
     origin: Origin
-    rest: Plan | None  # of the last plan
     shifted_value: float | None
-    off_plan: float | None
-    exhaustive: bool
-    arrived: bool
-    violations: tuple[Violation, ...]
+    arrived: bool = False
     deed: Deed | None = None  # None: told by the plan
     free_until: float | None = None  # [s]
 
 
 class Situation:
-    """One step under way: what is known before anything is searched."""
+    """One step under way: what is known before anything is searched.
+
+    Parameters
+    ----------
+    settings : Settings
+    here : Problem
+        From where the vehicle was measured, at that time.
+    last : Step or None
+        The last step, as it was driven.
+    passed : float
+        [s] since the last step.
+    began : float
+        [s] when this step began, as `time.monotonic` counts.
+    changed : bool
+        Whether other obstacles are seen than at the last step.
+    """
 
     def __init__(
         self,
         settings: Settings,
         here: Problem,
         last: Step | None,
+        *,
         passed: float,
         began: float,
+        changed: bool,
     ) -> None:
         self.settings = settings
         self.here = here
         self.last = last
         self.began = began
+        self.passed = passed
+        self.changed = changed
         self.violations: list[Violation] = []
         self.exhaustive = False
         self.off_plan: float | None = None
         self.rest: Plan | None = None
-        self.passed = passed
+        self.busy = 0.0  # [s] that are committed: until the maneuver under way ends
         if last is not None:
-            goal = Goal(pose=last.plan.pose_at(last.time + passed))
-            off = distance(here.start, goal)
-            self.off_plan = 0.0 if off <= EXACT * (1.0 + float(np.abs(here.start).max())) else off
-            pad = settings.pad_of(here)
-            self.rest = rest_of(last.plan, passed, start=here.start, pad=pad)
+            off = distance(here.start, Goal(pose=last.plan.pose_at(last.time + passed)))
+            self.off_plan = 0.0 if off <= EXACT * self.size else off
+            self.rest = rest_of(last.plan, passed, start=here.start, pad=settings.pad_of(here))
+            self.busy = committed(last.plan, passed)
+
+    @property
+    def size(self) -> float:
+        """What errors of rounding grow with [m or rad]."""
+        return 1.0 + float(np.abs(self.here.start).max())
+
+    @property
+    def deadline(self) -> float:
+        """When the time for this step is over [s], as `time.monotonic` counts."""
+        return self.began + self.settings.time_limit
+
+    @cached_property
+    def head(self) -> Plan | None:
+        """What is driven whatever is found: to the end of the maneuver under way; None if none."""
+        return head_of(self.rest, self.busy) if self.rest is not None and self.busy else None
+
+    @property
+    def trim(self) -> Trim:
+        """The trim in which the vehicle is, or will be at the end of what is committed."""
+        if self.head is not None:
+            return self.head.trims[-1]
+        if self.rest is not None and self.rest.trims:
+            return self.rest.trims[0]
+        if self.last is not None and self.last.plan.trims:
+            return self.last.plan.trims[-1]
+        return self.here.first_trim
+
+    @property
+    def onward(self) -> Problem | None:
+        """The problem from the end of what is committed; None if no time is left then."""
+        head, horizon = self.head, self.here.horizon
+        if head is None:
+            return self.here
+        total = None if horizon.time is None else horizon.time - self.busy
+        longest = None if horizon.max_time is None else horizon.max_time - self.busy
+        if any(left is not None and left <= NOTHING for left in (total, longest)):
+            return None
+        return replace(
+            self.here,
+            start=head.end,
+            start_time=self.here.start_time + self.busy,
+            horizon=replace(horizon, time=total, max_time=longest),
+        )
+
+    def whole(self, plan: Plan) -> Plan:
+        """What is committed, then `plan`, which starts at its end."""
+        return plan if self.head is None else joined(self.head, plan)
+
+    @property
+    def may_rest(self) -> bool:
+        """Whether the vehicle may end its drive here: it switches at will, or its plan is over."""
+        if self.rest is not None and not moves_on(self.rest):
+            return True
+        fixed = self.here.horizon.time is not None and self.settings.pad is None
+        return not (has_inertia(self.here) or fixed)
 
     def given(self, first: Plan) -> Chosen:
         """The plan that the first step was told to apply."""
         here = self.here
         plan = self.filled(replace(first, start=here.start, start_time=here.start_time))
         for index, goal in enumerate(here.goals):
-            if missed(plan, goal) <= EXACT * (1.0 + float(np.abs(here.start).max())):
+            if missed(plan, goal) <= EXACT * self.size:
                 return self.as_chosen(self.candidate(plan, index, Origin.FIRST), None)
         raise ValueError(
             f"receding horizon: first ends at {plan.end.round(9).tolist()}, need a plan that ends "
@@ -82,22 +155,25 @@ class Situation:
 
     def filled(self, plan: Plan) -> Plan:
         """A plan that takes no longer than it may, with rest for what is left of a fixed time."""
-        horizon = self.here.horizon
-        limit = horizon.time if horizon.time is not None else horizon.max_time
+        limit = self.longest
         if limit is not None and plan.duration > limit * (1.0 + EXACT):
             raise ValueError(
                 f"receding horizon: first takes {plan.duration:g} s, need at most {limit:g} s"
             )
         return self.padded(plan)
 
+    @property
+    def longest(self) -> float | None:
+        """How long a plan may take [s]; None if as long as it likes."""
+        horizon = self.here.horizon
+        return horizon.time if horizon.time is not None else horizon.max_time
+
     def padded(self, plan: Plan) -> Plan:
         """The plan, then rest for what is left of a fixed time."""
-        horizon, pad = self.here.horizon, self.settings.pad
-        if horizon.time is None or pad is None:
+        total, pad = self.here.horizon.time, self.settings.pad
+        if total is None or pad is None:
             return plan
-        left = max(0.0, horizon.time - plan.duration)
-        word, times = merged((*plan.trims, pad), [*plan.durations.tolist(), left])
-        return replace(plan, trims=word, durations=np.array(times))
+        return rested(plan, pad, total - plan.duration)
 
     def as_chosen(self, best: Candidate, shifted_value: float | None) -> Chosen:
         """A candidate as what the step came to."""
@@ -106,45 +182,44 @@ class Situation:
             goal_index=best.goal_index,
             value=best.cost,
             origin=best.origin,
-            rest=self.rest,
             shifted_value=shifted_value,
-            off_plan=self.off_plan,
-            exhaustive=self.exhaustive,
-            arrived=False,
-            violations=tuple(self.violations),
         )
 
-    def arrived(self) -> Chosen | None:
-        """At a goal there is nothing to do but to rest."""
-        for index, goal in enumerate(self.here.goals):
+    def exactly_at(self) -> int | None:
+        """Number of the goal at which the vehicle is, and may rest; None if at none."""
+        for index, goal in enumerate(self.here.goals if self.may_rest else ()):
             if distance(self.here.start, goal) <= EXACT:
-                return self.resting(index)
+                return index
         return None
+
+    def ended_within(self) -> int | None:
+        """Number of the goal within whose tolerance the last plan is over; None if none is."""
+        if self.last is None or self.rest is None or moves_on(self.rest):
+            return None
+        index = self.last.goal_index
+        return index if within(self.here.start, self.here.goals[index]) else None
 
     def resting(self, index: int) -> Chosen:
         """To rest at a goal."""
         here, pad = self.here, self.settings.pad
         total = here.horizon.time
-        at = here.start_time
-        if total is not None and pad is not None:
-            plan = Plan(here.start, (pad,), durations=[total], start_time=at)
+        plan = Plan(here.start, (), durations=[], start_time=here.start_time)
+        if self.rest is not None and self.rest.trims and not moves_on(self.rest):
+            plan = self.rest
+        elif total is not None and pad is not None:
+            plan = rested(plan, pad, total)
         elif pad is not None and distance(here.start, here.goals[index]) > EXACT:
-            plan = Plan(here.start, (pad,), durations=[self.settings.step], start_time=at)
-        else:
-            plan = Plan(here.start, (), durations=[], start_time=at)
+            plan = rested(plan, pad, self.settings.step)
         value = here.cost_of(plan)
         shifted = None if self.rest is None else min(value, here.cost_of(self.rest))
+        self.exhaustive = True
         return Chosen(
             plan=plan,
             goal_index=index,
             value=value,
             origin=Origin.FIRST if self.last is None else Origin.SHIFTED,
-            rest=plan if self.rest is None else self.rest,
             shifted_value=shifted,
-            off_plan=self.off_plan,
-            exhaustive=True,
             arrived=True,
-            violations=(),
         )
 
     def planned(self) -> Plan:
@@ -158,15 +233,25 @@ class Situation:
         if self.rest is None or self.last is None:
             return
         here, goal = self.here, self.here.goals[self.last.goal_index]
-        pad = self.settings.pad_of(here)
-        if self.off_plan == 0.0 and missed(self.rest, goal) <= EXACT:
+        pad, under_way = self.settings.pad_of(here), self.busy > 0.0
+        if self.off_plan == 0.0 and missed(self.rest, goal) <= EXACT * self.size:
+            if self.settings.margin:
+                again = same_word(here, self.rest, goal, pad=pad, under_way=under_way)
+                if again is not None and here.cost_of(again) < here.cost_of(self.rest):
+                    yield again, Origin.REANCHORED
             yield self.rest, Origin.SHIFTED
-            solved = same_word(here, self.rest, goal, pad=pad) if self.settings.margin else None
-            if solved is not None:
-                yield solved, Origin.REANCHORED
             return
-        for plan in reanchored(here, self.planned(), goal, pad=pad):
+        for plan in reanchored(here, self.planned(), goal, pad=pad, under_way=under_way):
             yield plan, Origin.REANCHORED
+        if has_inertia(here) and within(self.rest.end, goal):  # others correct it at once
+            yield self.rest, Origin.SHIFTED
+
+    def is_detour(self, plan: Plan) -> bool:
+        """Whether a plan drives other trims than the last one, or costs more."""
+        if self.last is None or self.rest is None:
+            return False
+        same = [trim.name for trim in plan.trims] == [trim.name for trim in self.rest.trims]
+        return not same or self.here.cost_of(plan) > self.last.value
 
     def best(self, kept: Candidate | None, found: Iterable[Candidate]) -> Candidate | None:
         """The cheapest; of equal ones, what costs most at first; of these, the known word."""
@@ -188,21 +273,18 @@ class Situation:
         """A plan from here, with what it is compared by."""
         return candidate(self.here, self.settings, plan, goal_index=index, origin=origin)
 
-    def held(self, one: Candidate) -> Chosen:
-        """A plan that stays within the goal: nothing else is left to be done."""
-        chosen = self.as_chosen(one, one.cost)
-        return replace(chosen, arrived=True, violations=())
+    def flag(self, guarantee: Guarantee, reason: str) -> None:
+        """Say that a guarantee is broken."""
+        self.violations.append(Violation(guarantee=guarantee, reason=reason))
 
     def flag_late(self, plan: Plan) -> None:
         """Say so if a plan takes longer than it may."""
-        limit = self.here.horizon.time or self.here.horizon.max_time
+        limit = self.longest
         if limit is not None and plan.duration > limit * (1.0 + EXACT):
-            self.violations.append(
-                Violation(
-                    guarantee=Guarantee.HORIZON,
-                    reason=f"no plan was found that takes at most {limit:g} s; the one applied "
-                    f"takes {plan.duration:.6g} s",
-                )
+            self.flag(
+                Guarantee.HORIZON,
+                f"no plan was found that takes at most {limit:g} s; the one applied takes "
+                f"{plan.duration:.6g} s",
             )
 
     def goal_within(self, pose: Array) -> int | None:

@@ -16,9 +16,9 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.refinement.conditions import broken_condition
 from maneuver_automaton.words import TimesStatus, solve_switching_times
 
-LATE = 1e-12  # relative, by which a plan may exceed a limit of time
 CHANGED = 2  # trims at most that are left out, or no longer so, to meet a least coasting time
 RESTARTS = 2
 
@@ -37,7 +37,7 @@ def fitted_plans(problem: Problem, plan: Plan, goal: Goal) -> Iterator[Plan]:
     [[2.0, 3.0]]
     """
     plan = padded(problem, plan)
-    if not why_not_fitted(problem, plan):
+    if not broken_condition(problem, plan):
         yield plan
         return
     if not plan.trims:
@@ -45,7 +45,7 @@ def fitted_plans(problem: Problem, plan: Plan, goal: Goal) -> Iterator[Plan]:
     found: list[Plan] = []
     for least, longest in _coasting_limits(problem, plan):
         again = _solved(problem, plan, goal, least, longest)
-        if again is None or why_not_fitted(problem, again):
+        if again is None or broken_condition(problem, again):
             continue
         if not any(np.allclose(again.durations, one.durations, atol=1e-9) for one in found):
             found.append(again)
@@ -63,7 +63,7 @@ def padded(problem: Problem, plan: Plan) -> Plan:
     """The plan with a rest that fills a fixed time, at its end or else at its begin."""
     total = problem.horizon.time
     if total is None or not plan.trims or plan.duration >= total:
-        return _without_nothing(plan)
+        return plan if plan.duration > 0.0 else without_nothing(plan)
     durations = plan.durations.copy()
     for place in (-1, 0):
         if plan.trims[place].is_rest:
@@ -72,30 +72,30 @@ def padded(problem: Problem, plan: Plan) -> Plan:
     return plan
 
 
-def why_not_fitted(problem: Problem, plan: Plan) -> str:
-    """Which condition of the horizon a plan breaks; empty if none."""
-    horizon = problem.horizon
-    limit = horizon.max_time if horizon.time is None else horizon.time
-    if limit is not None and plan.duration > limit * (1.0 + LATE):
-        return f"it takes {plan.duration:.6g} s, {limit:g} s are left"
-    if horizon.time is not None and plan.duration < horizon.time * (1.0 - LATE):
-        return f"it takes {plan.duration:.6g} s and ends in motion, {horizon.time:g} s are asked"
-    lasting = [
-        (trim, time) for trim, time in zip(plan.trims, plan.durations, strict=True) if time > 0.0
-    ]
-    if horizon.max_trims is not None and len(lasting) > horizon.max_trims:
-        return f"it has {len(lasting)} trims, {horizon.max_trims} are admitted"
-    shortest = horizon.min_coast * (1.0 - LATE)
-    if any(time < shortest for trim, time in lasting if not trim.is_rest):
-        return f"a trim lasts less than {horizon.min_coast:g} s"
-    return ""
+def without_nothing(plan: Plan) -> Plan:
+    """The plan without trims that last no time, and neighbours that are one trim joined.
 
-
-def _without_nothing(plan: Plan) -> Plan:
-    """An empty word where a plan lasts no time."""
-    if plan.duration == 0.0 and plan.trims:
-        return Plan(plan.start, (), durations=[], start_time=plan.start_time)
-    return plan
+    Beside maneuvers such trims stay: they are what a maneuver begins and ends in. A plan that lasts
+    no time and stays where it is becomes an empty word.
+    """
+    if any(one and one.displacement.any() for one in plan.maneuvers) or (
+        plan.maneuvers and plan.duration > 0.0
+    ):
+        return plan
+    word: list[int] = []
+    lasting: list[float] = []
+    for k, time in enumerate(plan.durations.tolist()):
+        if time == 0.0:
+            continue
+        if word and plan.trims[word[-1]] is plan.trims[k]:
+            lasting[-1] += time
+        else:
+            word.append(k)
+            lasting.append(time)
+    if len(word) == len(plan.trims):
+        return plan
+    trims = tuple(plan.trims[k] for k in word)
+    return replace(plan, trims=trims, durations=np.array(lasting), maneuvers=())
 
 
 def _coasting_limits(problem: Problem, plan: Plan) -> Iterator[tuple[Array, Array]]:
@@ -152,6 +152,6 @@ def _solved(problem: Problem, plan: Plan, goal: Goal, least: Array, longest: Arr
         if solved.status is TimesStatus.FAILED:
             continue
         again = replace(plan, durations=solved.durations)
-        if not why_not_fitted(problem, again):
+        if not broken_condition(problem, again):
             return again
     return None

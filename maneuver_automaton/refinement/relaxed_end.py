@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, IntArray, wrapped
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import group_of
-from maneuver_automaton.groups.chain import chained
 from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.refinement.fitting import without_nothing
+from maneuver_automaton.words.closing import EndConditions
+from maneuver_automaton.words.conjugation import conjugated
 
 INSIDE = 1e-7  # share of a tolerance that is left to rounding
 ITERATIONS = 100
@@ -63,7 +66,7 @@ def with_relaxed_end(
     return relaxed if problem.cost_of(relaxed) < problem.cost_of(plan) else None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class _Relaxation:
     """A word, and where it may end."""
 
@@ -99,31 +102,29 @@ class _Relaxation:
     def _under_way(self) -> float:
         return sum(one.duration for one in self.plan.maneuvers if one)
 
-    def off(self, times: Array) -> tuple[Array, Array]:
-        """The last pose seen from the goal's place (dof,), and how it follows the times (dof, n).
+    @cached_property
+    def _ending(self) -> EndConditions:
+        """What the times must meet to end at the goal, seen from its place.
 
-        Source: product rule, as in `switching_times.closing`.
+        The twists are seen from after all displacements, so that the last pose is the plan's own.
         """
-        plan, goal = self.plan, self.goal
-        dof, n = plan.start.size, len(plan.trims)
+        plan, group = self.plan, group_of(self.plan.start.size)
+        goal, start = np.array(self.goal.pose), np.array(plan.start)
+        places = [0, 1, *range(3, start.size)]
+        start[places] -= goal[places]  # places first, so that no digit is lost
+        goal[places] = 0.0
         twists = np.array([trim.body_velocity for trim in plan.trims])
-        start = np.array(plan.start)
-        places = [0, 1, *range(3, dof)]
-        start[places] -= goal.pose[places]  # places first, so that no digit is lost
-        steps = np.zeros((2 * n - 1, dof))
-        steps[::2] = group_of(dof).exp(times[:, None] * twists).pose
-        for k, maneuver in enumerate(plan.maneuvers):
-            if maneuver:
-                steps[2 * k + 1] = maneuver.displacement
-        poses = chained(start, steps)
-        after, end = poses[1::2], poses[-1].copy()
-        c, s = np.cos(after[:, 2]), np.sin(after[:, 2])
-        arm = end[:2] - after[:, :2]
-        columns = np.array(twists.T)
-        columns[0] = c * twists[:, 0] - s * twists[:, 1] - twists[:, 2] * arm[:, 1]
-        columns[1] = s * twists[:, 0] + c * twists[:, 1] + twists[:, 2] * arm[:, 0]
-        end[2] = wrapped(end[2] - goal.pose[2])
-        return end, columns
+        if any(plan.maneuvers):
+            steps = [one.displacement if one else np.zeros(start.size) for one in plan.maneuvers]
+            twists, product = conjugated(twists, np.array(steps))
+            twists = twists @ group(product).inverse().adjoint().T
+            start = (group(start) @ group(product)).pose
+        return EndConditions(start=start, twists=twists, goal=goal)
+
+    def off(self, times: Array) -> tuple[Array, Array]:
+        """Last pose (dof,) seen from the place of the goal; how it follows the times (dof, n)."""
+        missing, columns = self._ending.missing(times)
+        return -missing, columns
 
     def exact(self, times: Array) -> tuple[Array, Array]:
         """What must be zero (m,), and how it follows the times (m, n)."""
@@ -220,20 +221,3 @@ def _closed(task: _Relaxation, times: Array) -> Array | None:
     room = task.room(times)[0]
     fine = (times >= 0.0).all() and (not room.size or bool((room >= -math.sqrt(ACCURACY)).all()))
     return times if fine else None
-
-
-def without_nothing(plan: Plan) -> Plan:
-    """The plan without trims that last no time, and neighbours that are one trim joined."""
-    if plan.maneuvers:
-        return plan
-    word: list[int] = []
-    lasting: list[float] = []
-    for k, time in enumerate(plan.durations.tolist()):
-        if time == 0.0:
-            continue
-        if word and plan.trims[word[-1]] is plan.trims[k]:
-            lasting[-1] += time
-        else:
-            word.append(k)
-            lasting.append(time)
-    return replace(plan, trims=tuple(plan.trims[k] for k in word), durations=np.array(lasting))

@@ -1,17 +1,17 @@
 """Driving on roads: lanelets, recorded traffic, goals with a time window."""
 
+from maneuver_automaton.roads.decision import RoadDecision as RoadDecision
+from maneuver_automaton.roads.decision import RoadSettings as RoadSettings
 from maneuver_automaton.roads.driving import RoadDrive as RoadDrive
 from maneuver_automaton.roads.driving import RoadStep as RoadStep
 from maneuver_automaton.roads.driving import drive_scene as drive_scene
 from maneuver_automaton.roads.goal_region import GoalRegion as GoalRegion
-from maneuver_automaton.roads.horizon import RoadPlan as RoadPlan
-from maneuver_automaton.roads.horizon import RoadPlanner as RoadPlanner
-from maneuver_automaton.roads.horizon import RoadSettings as RoadSettings
-from maneuver_automaton.roads.horizon import road_planner as road_planner
 from maneuver_automaton.roads.judge import RoadVerdict as RoadVerdict
 from maneuver_automaton.roads.judge import judged as judged
 from maneuver_automaton.roads.lanelets import Lanelet as Lanelet
 from maneuver_automaton.roads.lanelets import drivable_area as drivable_area
+from maneuver_automaton.roads.planner import RoadPlanner as RoadPlanner
+from maneuver_automaton.roads.planner import road_planner as road_planner
 from maneuver_automaton.roads.scene import RoadScene as RoadScene
 from maneuver_automaton.roads.scene import RoadStart as RoadStart
 from maneuver_automaton.roads.single_plan import RoadPlanResult as RoadPlanResult

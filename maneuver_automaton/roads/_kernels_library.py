@@ -7,22 +7,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from maneuver_automaton._compile import inner_kernel, kernel
-from maneuver_automaton.roads._kernels_free import one_tick
+from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
+from maneuver_automaton.roads._kernels_motion import one_tick
 
 
 class Maneuvers(NamedTuple):
-    """Maneuvers from the identity pose, all of the same number of ticks."""
+    """E maneuvers from the identity pose, all of the same number of ticks."""
 
-    first: np.ndarray  # (S + 1,) those of each trim; (2,) of a single state
+    # Sorted by the trim they leave, so that the edges of a node are one range.
+    first: np.ndarray  # (S + 1,) where those of each trim begin; (2,) of a single state
     target: np.ndarray  # (E,) trim that is reached
     control: np.ndarray  # (E, 2) acceleration [m/s^2], steering rate [rad/s]
+    # Poses at all ticks: an edge is proven tick by tick, as others are known at the ticks.
     pose: np.ndarray  # (E, ticks, 3) at the end of each tick
     effort: np.ndarray  # (E,) cost of comfort
 
 
 class Trims(NamedTuple):
-    """Trims: pairs of a speed and a steering angle, speed by speed."""
+    """S trims: pairs of a speed and a steering angle, speed by speed."""
 
     speed: np.ndarray  # (S,) [m/s]
     steering: np.ndarray  # (S,) [rad]
@@ -30,7 +32,7 @@ class Trims(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """What the vehicle can, and what it minds."""
+    """Limits of the vehicle and of the library, and the weights of comfort."""
 
     wheelbase: float
     tick: float  # [s]
@@ -43,13 +45,13 @@ class Limits(NamedTuple):
     engine: float  # [m/s^2] up to `power_speed`, less beyond it
     power_speed: float  # [m/s]
     left_out: tuple[float, float]  # [m/s] between these, changes of speed are left out
-    fastest_change: int  # steps of the speed grid that a maneuver spans at most
-    mind_braking: float  # per (m/s^2)^2 s
-    mind_lateral: float  # per (m/s^2)^2 s
-    mind_jerk: float  # per (m/s^3)^2 s, across
+    most_steps: int  # of the speed grid that a maneuver spans
+    weight_along: float  # per (m/s^2)^2 s
+    weight_across: float  # per (m/s^2)^2 s
+    weight_jerk: float  # per (m/s^3)^2 s, across
 
 
-@inner_kernel
+@bare_inner_kernel
 def admitted(limits, speed, steering, target_speed, target_steering):
     """Whether a ramp between two states keeps the limits; acceleration, steering rate, effort."""
     duration = limits.tick * limits.ticks
@@ -70,14 +72,14 @@ def admitted(limits, speed, steering, target_speed, target_steering):
     if math.hypot(acceleration, across) > max(limits.friction, abs(begin)) + 1e-6:
         return False, 0.0, 0.0, 0.0
     jerk = (end - begin) / duration
-    effort = limits.mind_braking * acceleration * acceleration
-    effort += limits.mind_lateral * (begin * begin + begin * end + end * end) / 3.0
-    effort += limits.mind_jerk * jerk * jerk
+    effort = limits.weight_along * acceleration * acceleration
+    effort += limits.weight_across * (begin * begin + begin * end + end * end) / 3.0
+    effort += limits.weight_jerk * jerk * jerk
     return True, acceleration, rate, effort * duration
 
 
 @inner_kernel
-def course(limits, speed, steering, acceleration, rate, out):
+def write_course(limits, speed, steering, acceleration, rate, out):
     """Poses at the ends of the ticks (ticks, 3) of a ramp from the identity."""
     x, y, heading = 0.0, 0.0, 0.0
     for k in range(limits.ticks):
@@ -113,7 +115,7 @@ def maneuvers_from(limits, trims, speed, steering):
     n = leading_from(limits, trims, speed, steering, 0, most, found, control, effort)
     pose = np.empty((n, limits.ticks, 3))
     for e in range(n):
-        course(limits, speed, steering, control[e, 0], control[e, 1], pose[e])
+        write_course(limits, speed, steering, control[e, 0], control[e, 1], pose[e])
     first = np.array([0, n])
     return Maneuvers(first, found[:n].copy(), control[:n].copy(), pose, effort[:n].copy())
 
@@ -131,8 +133,8 @@ def maneuvers_between(limits, trims, most):
     for source in range(count):
         while source >= trims.first[step + 1]:
             step += 1
-        low = trims.first[max(0, step - limits.fastest_change)]
-        high = trims.first[min(speeds, step + limits.fastest_change + 1)]
+        low = trims.first[max(0, step - limits.most_steps)]
+        high = trims.first[min(speeds, step + limits.most_steps + 1)]
         speed, steering = trims.speed[source], trims.steering[source]
         if n + high - low > most:
             break
@@ -140,7 +142,7 @@ def maneuvers_between(limits, trims, most):
             limits, trims, speed, steering, low, high, found[n:], control[n:], effort[n:]
         )
         for e in range(n, n + added):
-            course(limits, speed, steering, control[e, 0], control[e, 1], pose[e])
+            write_course(limits, speed, steering, control[e, 0], control[e, 1], pose[e])
         n += added
         first[source + 1] = n
     return Maneuvers(

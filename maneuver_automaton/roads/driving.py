@@ -5,33 +5,33 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.primitives import Trajectory
 from maneuver_automaton.primitives.driving import drive
-from maneuver_automaton.roads.horizon import RoadPlan, RoadPlanner
+from maneuver_automaton.roads.decision import RoadDecision
 from maneuver_automaton.roads.judge import RoadVerdict, judged
 from maneuver_automaton.roads.missed import nearest_miss
+from maneuver_automaton.roads.planner import RoadPlanner
 
-FINE = 5  # samples of a tick at least
 LONGEST = 60.0  # [s] of a drive whose goal has no last time
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RoadStep:
-    """One step: the state before it, the plan from there, and the control applied."""
+    """One step: the state before it, what was decided there, and the control applied."""
 
     number: int
     time: float  # [s]
     state: Array  # (5,) x, y, heading of the rear axle, speed, steering, in the planner's frame
-    plan: RoadPlan
-    value: float  # cost of the plan
+    decision: RoadDecision
+    value: float  # cost of the plan that was decided for
     applied_cost: float  # of its first step
-    replanned: bool  # the plan is not the rest of the last one
+    replanned: bool  # the plan is not the tail of the last one
     solve_s: float  # [s] to decide
     cpu_s: float  # [s] of it that the processor spent on this thread
 
@@ -41,16 +41,16 @@ class RoadStep:
     @property
     def control(self) -> Array:
         """Acceleration [m/s^2] and steering rate [rad/s] (2,) until the next step."""
-        return np.asarray(self.plan.controls[0])
+        return np.asarray(self.decision.controls[0])
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RoadDrive:
-    """A drive from its start to where it ended, and what another library says of it."""
+    """A drive from its start to where it ended, and what the audit says of it."""
 
     planner: RoadPlanner
     steps: tuple[RoadStep, ...]
-    driven: Trajectory  # all that was driven; times are those of the scene
+    driven: Plan  # all that was driven, in the coordinates and on the clock of the scene
     reached: bool
     status: str  # reached | missed | steps_spent
     reason: str  # one line; empty if reached
@@ -66,20 +66,20 @@ def drive_scene(
     planner: RoadPlanner,
     *,
     steps: int | None = None,
-    first: RoadPlan | None = None,
+    first: RoadDecision | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> RoadDrive:
     """Close the loop until a goal is reached, or its time is over.
 
-    What the planner knows of the others is their recorded motion, before it happens.
+    The planner knows the recorded motion of all moving obstacles before it happens.
 
     Parameters
     ----------
     planner : RoadPlanner
     steps : int, optional
         Steps at most.
-    first : RoadPlan, optional
-        A plan from the start that was made before, such as that of `plan_road`.
+    first : RoadDecision, optional
+        What was decided before the start, such as the decision of `plan_road`.
     progress : callable, optional
         Called with the number of each step that is done.
     """
@@ -87,38 +87,21 @@ def drive_scene(
     last = planner.last_tick
     longest = math.ceil(LONGEST / planner.tick) if math.isinf(planner.scene.last_time) else last
     limit = min(longest if steps is None else steps, last)
-    state, rest = planner.start_state, first
+    state, tail = planner.start_state, first
     done: list[RoadStep] = []
-    pieces: list[Trajectory] = []
     tick = 0
     while not planner.at_goal(state, tick=tick) and tick < limit:
-        wall, cpu = time.perf_counter(), time.thread_time()
-        plan, replanned = planner.plan(state, tick=tick, rest=rest)
-        wall, cpu = time.perf_counter() - wall, time.thread_time() - cpu
-        done.append(
-            RoadStep(
-                number=tick,
-                time=planner.time_of(tick),
-                state=state,
-                plan=plan,
-                value=planner.price(plan),
-                applied_cost=planner.price(plan, ticks=1),
-                replanned=replanned,
-                solve_s=wall,
-                cpu_s=cpu,
-            )
-        )
-        pieces.append(driven_from(planner, state, plan.controls[:1], tick=tick))
-        state = np.concatenate([pieces[-1].pose[-1], pieces[-1].reduced_state[-1]])
-        state[3] = max(state[3], 0.0)  # rounding at rest
-        tick, rest = tick + 1, plan.rest()
+        done.append(_step(planner, state, tick=tick, tail=tail))
+        decision = done[-1].decision
+        state = _driven(planner, state, decision.controls[0])
+        tick, tail = tick + 1, decision.tail()
         if progress is not None:
             progress(tick)
     reached = planner.at_goal(state, tick=tick)
     states = np.array([*(step.state for step in done), state])
     status, reason = _ending(planner, states, stood=_stood(done), reached=reached)
-    local = joined(pieces) if pieces else standing(planner, state, tick=tick)
-    driven = replace(local, pose=planner.world(local.pose))
+    applied = np.array([step.control for step in done]).reshape(-1, 2)
+    driven = planner.plan_of(planner.start_state, applied)
     return RoadDrive(
         planner=planner,
         steps=tuple(done),
@@ -130,53 +113,37 @@ def drive_scene(
     )
 
 
-def driven_from(planner: RoadPlanner, state: Array, controls: Array, *, tick: int) -> Trajectory:
-    """What controls (n, 2), a tick each, make of a state (5,): exact, and finely sampled.
+def _step(planner: RoadPlanner, state: Array, *, tick: int, tail: RoadDecision | None) -> RoadStep:
+    """Decide once, and measure how long that takes."""
+    wall, cpu = time.perf_counter(), time.thread_time()
+    decision, replanned = planner.decide(state, tick=tick, tail=tail)
+    wall, cpu = time.perf_counter() - wall, time.thread_time() - cpu
+    return RoadStep(
+        number=tick,
+        time=planner.time_of(tick),
+        state=state,
+        decision=decision,
+        value=planner.price(decision),
+        applied_cost=planner.price(decision, ticks=1),
+        replanned=replanned,
+        solve_s=wall,
+        cpu_s=cpu,
+    )
 
-    The trajectory is in the coordinates of the planner's frame.
-    """
+
+def _driven(planner: RoadPlanner, state: Array, control: Array) -> Array:
+    """The state (5,) that a control (2,) leads to in a tick, by the model's own equations."""
     course = drive(
-        planner.vehicle.model,
-        state[3:],
-        control=np.repeat(controls, FINE, axis=0),
-        durations=np.full(FINE * len(controls), planner.tick / FINE),
+        planner.vehicle.model, state[3:], control=control[None], durations=[planner.tick]
     )
-    return Trajectory(
-        time=planner.time_of(tick) + course.time,
-        pose=(SE2(state[:3]) @ SE2(course.pose)).pose,
-        reduced_state=course.reduced_state,
-        control=course.control,
-    )
-
-
-def joined(pieces: Sequence[Trajectory]) -> Trajectory:
-    """One trajectory of several that follow another; where they meet, the later one counts."""
-    return Trajectory(
-        **{
-            name: np.concatenate(
-                [
-                    *(getattr(piece, name)[:-1] for piece in pieces[:-1]),
-                    getattr(pieces[-1], name),
-                ]
-            )
-            for name in ("time", "pose", "reduced_state", "control")
-        }
-    )
-
-
-def standing(planner: RoadPlanner, state: Array, *, tick: int) -> Trajectory:
-    """A trajectory of one sample."""
-    return Trajectory(
-        time=np.array([planner.time_of(tick)]),
-        pose=state[None, :3],
-        reduced_state=state[None, 3:],
-        control=np.zeros((1, 2)),
-    )
+    pose = (SE2(state[:3]) @ SE2(course.pose[-1])).pose
+    speed, steering = course.reduced_state[-1].tolist()
+    return np.array([*pose, max(speed, 0.0), steering])  # rounding at rest
 
 
 def _stood(steps: Sequence[RoadStep]) -> tuple[float, float] | None:
-    """First and last time at which the vehicle stood, as there was no way on [s]."""
-    times = [step.time for step in steps if step.plan.stands]
+    """First and last time at which the vehicle stood, as no motion was free [s]."""
+    times = [step.time for step in steps if step.decision.stands]
     return (times[0], times[-1]) if times else None
 
 

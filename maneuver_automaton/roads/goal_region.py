@@ -18,7 +18,7 @@ Interval: TypeAlias = tuple[float, float]
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class GoalRegion:
-    """What has to hold at one instant; None where anything will do.
+    """Conditions that have to hold at one instant; None where any value will do.
 
     The position is that of the middle of the vehicle.
 
@@ -51,7 +51,7 @@ class GoalRegion:
     ) -> bool:
         """Whether a pose (3,) of the middle, a speed [m/s] and a time [s] are within it.
 
-        The ends belong to it; `tolerance` [m/s, s, rad] is for what was rounded on the way.
+        The ends belong to it; `tolerance` [m/s, s, rad] is for values that were rounded.
         """
         x, y, heading = np.asarray(middle, dtype=np.float64).tolist()
         if not self.time[0] - tolerance <= time <= self.time[1] + tolerance:

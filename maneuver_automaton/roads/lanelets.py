@@ -101,9 +101,9 @@ def resampled(line: Array, n: int) -> Array:
     >>> resampled(np.array([[0.0, 0.0], [1.0, 0.0], [4.0, 0.0]]), 3).tolist()
     [[0.0, 0.0], [2.0, 0.0], [4.0, 0.0]]
     """
-    way = along(line)
-    at = np.linspace(0.0, way[-1], n)
-    return np.stack([np.interp(at, way, line[:, k]) for k in range(2)], axis=-1)
+    station = along(line)
+    at = np.linspace(0.0, station[-1], n)
+    return np.stack([np.interp(at, station, line[:, k]) for k in range(2)], axis=-1)
 
 
 def along(line: Array) -> Array:
@@ -143,7 +143,7 @@ def drivable_area(lanelets: Sequence[Lanelet]) -> Any:
 
 
 def _between(one: Lanelet, other: Lanelet, *, opposite: bool = False) -> Array:
-    """Outline (n, 2) of what is between two neighbours: the bounds that face each other."""
+    """Outline (n, 2) of the gap between two neighbours: the bounds that face each other."""
     if opposite:  # the bounds run against each other
         pairs = [(one.left, other.left), (one.right, other.right)]
     else:

@@ -1,4 +1,4 @@
-"""Why no goal was reached: the sample that came nearest, and what was wrong with it."""
+"""Why no goal was reached: the sample that came nearest, and which of its values were wrong."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def nearest_miss(
             if badness <= 0.0:
                 met.append(time)
             elif within[k] and badness < best[0]:
-                best = badness, f"nearest to it at {time:.6g} s: {_what(away, turned, faster)}"
+                best = badness, f"nearest to it at {time:.6g} s: {_off_by(away, turned, faster)}"
         if met:
             window = f"{goal.time[0]:.6g} s to {goal.time[1]:.6g} s"
             best = 0.0, f"everything but the time was right at {met[0]:.6g} s, need {window}"
@@ -55,12 +55,12 @@ def nearest_miss(
     return f"its time begins at {min(goal.time[0] for goal in goals):.6g} s"
 
 
-def _what(away: float, turned: float, faster: float) -> str:
-    said = []
+def _off_by(away: float, turned: float, faster: float) -> str:
+    parts = []
     if away > 0.0:
-        said.append(f"{away:.3g} m away")
+        parts.append(f"{away:.3g} m away")
     if turned > 0.0:
-        said.append(f"heading {turned:.3g} rad off")
+        parts.append(f"heading {turned:.3g} rad off")
     if faster:
-        said.append(f"{abs(faster):.3g} m/s too {'fast' if faster > 0.0 else 'slow'}")
-    return ", ".join(said)
+        parts.append(f"{abs(faster):.3g} m/s too {'fast' if faster > 0.0 else 'slow'}")
+    return ", ".join(parts)

@@ -1,4 +1,4 @@
-"""The way through the lanelets to a goal: the line to follow, and where the goal lies on it."""
+"""The route through the lanelets to a goal: the line to follow, and where the goal lies on it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 SPACING = 1.0  # [m] of the points of the line
 BEFORE, BEYOND = 60.0, 300.0  # [m] the line goes on straight before its first point, after its last
-LANE_CHANGE = 10.0  # [m] that a lane change is worth when ways are compared
+LANE_CHANGE = 10.0  # [m] that a lane change counts when routes are compared
 SHARE = 0.3  # of the smaller of two areas, common to a lanelet and a goal in it
 
 
@@ -30,14 +30,14 @@ class Route:
     points: Array  # (n, 2) equally spaced [m]
     heading: Array  # (n,) direction of travel, not wrapped [rad]
     limit: Array  # (n,) speed limit [m/s], inf where there is none
-    ways: Array  # (goals, 4) least and greatest station of each goal, and least and greatest offset
+    extents: Array  # (goals, 4) least and greatest station, least and greatest offset of each
 
 
 def route_of(scene: RoadScene) -> Route:
-    """The cheapest way through the lanelets from the start to a goal.
+    """The cheapest route through the lanelets from the start to a goal.
 
     Where lanes are changed, the line is that of the lane that is changed to, so that the offset
-    from the line falls to zero. Without a goal that is a place, the way goes straight on.
+    from the line falls to zero. Without a goal that is a place, the route goes straight on.
 
     Examples
     --------
@@ -56,12 +56,12 @@ def route_of(scene: RoadScene) -> Route:
     points, heading, limit = _spaced(line, limits)
     # A route that returns to where it starts passes a goal there at its end.
     here = int(np.argmin(np.hypot(*(points - scene.start.middle[:2]).T)))
-    ways = np.array([_way(goal, points, heading, here) for goal in scene.goals])
-    return Route(lanelets=tuple(path), points=points, heading=heading, limit=limit, ways=ways)
+    extents = np.array([_extent_of(goal, points, heading, here) for goal in scene.goals])
+    return Route(lanelets=tuple(path), points=points, heading=heading, limit=limit, extents=extents)
 
 
 def lanelets_at(lanelets: Sequence[Lanelet], middle: Array) -> list[int]:
-    """Numbers of the lanelets around a pose (3,) that lead its way; else of the nearest."""
+    """Numbers of the lanelets around a pose (3,) with its direction; else of the nearest."""
     import shapely
 
     place = shapely.Point(middle[:2])
@@ -179,24 +179,24 @@ def _spaced(line: Array, limits: Array) -> tuple[Array, Array, Array]:
             [line[-1] + BEYOND * last / np.hypot(*last)],
         ]
     )
-    way = along(longer)
-    at = SPACING * np.arange(int(way[-1] / SPACING) + 1)
-    points = np.stack([np.interp(at, way, longer[:, k]) for k in range(2)], axis=-1)
+    station = along(longer)
+    at = SPACING * np.arange(int(station[-1] / SPACING) + 1)
+    points = np.stack([np.interp(at, station, longer[:, k]) for k in range(2)], axis=-1)
     steps = np.gradient(points, axis=0)
     heading = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
-    after = np.searchsorted(way[1:-1], at).clip(0, len(limits) - 1)
+    after = np.searchsorted(station[1:-1], at).clip(0, len(limits) - 1)
     return points, heading, limits[after]
 
 
-def _way(goal: GoalRegion, points: Array, heading: Array, here: int) -> Array:
+def _extent_of(goal: GoalRegion, points: Array, heading: Array, here: int) -> Array:
     """Stations and offsets between which a goal lies; all of them if it is no place.
 
     It is looked for from the point `here` on, where the vehicle starts.
     """
     if goal.places is None:
         return np.array([-np.inf, np.inf, -np.inf, np.inf])
-    way = _extent(outlines_of(goal.places), points[here:], heading[here:])
-    return np.asarray(way + np.array([SPACING * here, SPACING * here, 0.0, 0.0]))
+    extent = _extent(outlines_of(goal.places), points[here:], heading[here:])
+    return np.asarray(extent + np.array([SPACING * here, SPACING * here, 0.0, 0.0]))
 
 
 def extent_on(rings: Sequence[Array], route: Route) -> Array:

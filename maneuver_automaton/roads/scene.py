@@ -1,4 +1,4 @@
-"""A scene on roads: lanelets, those who use them, and what one vehicle is to do."""
+"""A scene on roads: lanelets, road users, and the start and goals of one vehicle."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Polygon, S
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads.goal_region import GoalRegion
 from maneuver_automaton.roads.lanelets import Lanelet
+
+SAME_TIME = 1e-9  # [s] times closer than this are one
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -35,8 +37,8 @@ class RoadStart:
 class RoadScene:
     """One problem of driving on roads.
 
-    Who moves is there only as long as its motion was recorded: before the first of its times and
-    after the last one it is not on the road. What has no motion stays.
+    A moving obstacle is there only as long as its motion was recorded: before the first of its
+    times and after the last one it is not on the road. A static obstacle, without motion, stays.
 
     Examples
     --------
@@ -52,7 +54,7 @@ class RoadScene:
     start: RoadStart
     goals: tuple[GoalRegion, ...]  # one of them
     traffic: tuple[Obstacle, ...] = ()
-    source: str = ""  # who made and measured it, for pictures
+    source: str = ""  # author and place of the recording, for pictures
     step: float = 0.1  # [s] of the clock that the scene was recorded with
 
     def __post_init__(self) -> None:
@@ -71,8 +73,13 @@ class RoadScene:
         return max(goal.time[1] for goal in self.goals)
 
     def present(self, time: float) -> list[Obstacle]:
-        """Who is on the road at `time` [s]."""
-        return [one for one in self.traffic if is_present(one, time)]
+        """Obstacles that are on the road at `time` [s]."""
+        times = [presence_of(one) for one in self.traffic]
+        return [
+            one
+            for one, (first, last) in zip(self.traffic, times, strict=True)
+            if first - SAME_TIME <= time <= last + SAME_TIME
+        ]
 
     def moved(self, by: SE2, *, digits: int | None = None) -> RoadScene:
         """The scene moved by a planar pose; its numbers rounded to `digits` if given.
@@ -125,12 +132,18 @@ def _near_obstacle(one: Obstacle, digits: int | None) -> Obstacle:
     return replace(one, motion=Motion(one.motion.time, _near(one.motion.pose, digits)))
 
 
-def is_present(one: Obstacle, time: float, *, tolerance: float = 1e-9) -> bool:
-    """Whether a road user is there at `time` [s]: always, or within its recorded times."""
+def presence_of(one: Obstacle) -> tuple[float, float]:
+    """First and last time [s] at which a road user is there: its recorded times, or always.
+
+    Examples
+    --------
+    >>> presence_of(Obstacle(Box([4.0, 2.0])))
+    (-inf, inf)
+    """
     if one.motion is None:
-        return True
+        return -math.inf, math.inf
     first, last = one.motion.time[[0, -1]].tolist()
-    return bool(first - tolerance <= time <= last + tolerance)
+    return first, last
 
 
 def unwrapped(headings: Sequence[float]) -> Array:

@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from maneuver_automaton.primitives import Trajectory
-from maneuver_automaton.roads.driving import RoadDrive, drive_scene, driven_from
-from maneuver_automaton.roads.horizon import RoadPlan, RoadPlanner, RoadSettings, road_planner
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.roads.decision import RoadDecision, RoadSettings
+from maneuver_automaton.roads.driving import RoadDrive, drive_scene
 from maneuver_automaton.roads.judge import RoadVerdict, judged
 from maneuver_automaton.roads.library import tick_of
 from maneuver_automaton.roads.missed import nearest_miss
+from maneuver_automaton.roads.planner import RoadPlanner, road_planner
 from maneuver_automaton.roads.scene import RoadScene
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
@@ -26,11 +27,24 @@ class RoadPlanResult:
     """A plan to a goal and the verdict on it, or why there is none."""
 
     planner: RoadPlanner
-    plan: RoadPlan | None
-    driven: Trajectory | None  # to the goal, in the coordinates of the scene
+    decision: RoadDecision | None  # for `drive_scene` to begin with
+    plan: Plan | None  # to the goal, in the coordinates and on the clock of the scene
     verdict: RoadVerdict | None
     reason: str  # empty if there is a plan
     search_s: float  # [s]
+
+    @property
+    def cost(self) -> float | None:
+        """Cost of the plan, its stop left out."""
+        return None if self.decision is None else self.planner.price(self.decision)
+
+    @property
+    def stop(self) -> Plan | None:
+        """The fail-safe stop after the plan, of no duration where none was found."""
+        if self.decision is None:
+            return None
+        n, decision = self.decision.lasting, self.decision
+        return self.planner.plan_of(decision.states[n], decision.controls[n:], tick=n)
 
 
 def plan_road(
@@ -55,45 +69,44 @@ def plan_road(
         if n and time.perf_counter() - begin > time_limit:
             break
         planner, n = planner.wider(width), n + 1
-        plan = planner.search(planner.start_state, tick=0)
-        if plan is None or not plan.reaches:
+        found = planner.search(planner.start_state, tick=0)
+        if found is None or not found.reaches:
             reason = (
                 f"no goal is reached until {min(scene.last_time, scene.start.time + horizon):.6g} s"
-                f" by any of the words searched, {width} at a time{_how_near(planner, plan)}"
+                f" by any of the words searched, {width} at a time{_how_near(planner, found)}"
             )
             continue
-        local = driven_from(planner, planner.start_state, plan.controls[: plan.lasting], tick=0)
-        driven = replace(local, pose=planner.world(local.pose))
-        verdict = judged(scene, planner.vehicle, driven)
+        plan = planner.plan_of(planner.start_state, found.controls[: found.lasting])
+        verdict = judged(scene, planner.vehicle, plan)
         if not verdict.clean:
             reason = "the plan that was found fails the judge"
             continue
         return RoadPlanResult(
             planner=planner,
+            decision=found,
             plan=plan,
-            driven=driven,
             verdict=verdict,
             reason="",
             search_s=time.perf_counter() - begin,
         )
     return RoadPlanResult(
         planner=planner,
+        decision=None,
         plan=None,
-        driven=None,
         verdict=None,
         reason=reason,
         search_s=time.perf_counter() - begin,
     )
 
 
-def _how_near(planner: RoadPlanner, plan: RoadPlan | None) -> str:
+def _how_near(planner: RoadPlanner, found: RoadDecision | None) -> str:
     """How near the plan that leads furthest comes to a goal."""
-    if plan is None or not plan.lasting:
+    if found is None or not found.lasting:
         return "; there is no way on from the start"
-    ticks = np.arange(0, plan.lasting + 1, planner.horizon.goals.every)
+    ticks = np.arange(0, found.lasting + 1, planner.horizon.goals.every)
     times = np.array([planner.time_of(k) for k in ticks.tolist()])
-    why = nearest_miss(planner.local.goals, planner.vehicle, times, plan.states[ticks])
-    lasts = planner.time_of(plan.lasting)
+    why = nearest_miss(planner.local.goals, planner.vehicle, times, found.states[ticks])
+    lasts = planner.time_of(found.lasting)
     return f"; the one that leads furthest, until {lasts:.6g} s, was {why}"
 
 
@@ -134,4 +147,4 @@ def drive_road(
     """
     planner = road_planner(scene, vehicle, settings)
     before = plan_before(planner, time_limit=time_limit)
-    return drive_scene(planner, steps=steps, first=None if before is None else before.plan)
+    return drive_scene(planner, steps=steps, first=None if before is None else before.decision)

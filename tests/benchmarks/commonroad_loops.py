@@ -5,7 +5,7 @@ a goal can be reached at all is asked of one open-loop plan with the same automa
 of a level at a time. Where it can and the loop alone does not reach it, a second row drives the
 loop with that plan made before the start. Where it cannot, the question is asked again without
 traffic, without the condition on headings, and with tyres of 11.5 m/s^2. Clearance is the least
-distance to anybody, edge that to the edge of the lanelets, at poses every 0.02 s; defect is the
+distance to anybody, edge that to the edge of the lanelets, both by the audit; defect is the
 difference from an ODE solver; cpu is the processor's time of a step, which a busy machine does not
 stretch. A search proves nothing where it finds nothing.
 """
@@ -24,8 +24,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.commonroad import read_commonroad
 from maneuver_automaton.roads import (
+    RoadDecision,
     RoadDrive,
-    RoadPlan,
     RoadScene,
     RoadSettings,
     RoadVehicle,
@@ -101,20 +101,20 @@ def _row(name: str, drive: RoadDrive, *, reachable: bool) -> list[object]:
         name,
         reachable,
         drive.reached,
-        float(drive.driven.time[-1]),
+        float(drive.driven.switching_times[-1]),
         len(drive.steps),
         verdict.collisions,
         verdict.off_road,
         verdict.clearance_m,
         verdict.edge_m,
-        f"{verdict.defect:.0e}",
+        f"{verdict.audit.max_dynamics_defect:.0e}",
         float(np.median(wall)),
         float(np.percentile(wall, 99)),
         float(np.percentile(cpu, 99)),
     ]
 
 
-def _plan(scene: RoadScene, vehicle: RoadVehicle, wide: int) -> RoadPlan | None:
+def _plan(scene: RoadScene, vehicle: RoadVehicle, wide: int) -> RoadDecision | None:
     """A plan to a goal, or None if the search finds none."""
     lasting = scene.last_time - scene.start.time
     planner = road_planner(

@@ -11,10 +11,10 @@ from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning import PlanStatus, plan
-from maneuver_automaton.planning.checking import check_plan
-from maneuver_automaton.planning.conditions import broken_condition
+from maneuver_automaton.planning.checking import Condition, check_plan
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Horizon, Problem
+from maneuver_automaton.refinement.conditions import broken_condition
 from tests import scenes
 
 LIMIT = 60.0  # [s] a limit that a busy machine does not reach
@@ -40,7 +40,8 @@ def test_each_condition_of_the_horizon_is_checked(horizon, reason):
     problem = replace(TO_FIVE, horizon=horizon)
     assert broken_condition(problem, TRIP) == reason
     checked = check_plan(problem, TRIP, problem.goals[0])
-    assert (checked.passed, checked.admitted, checked.reason) == (not reason, not reason, reason)
+    assert (checked.passed, checked.reason) == (not reason, reason)
+    assert checked.broken is (Condition.WORD if reason else None)
 
 
 def test_trims_of_no_time_are_not_counted():

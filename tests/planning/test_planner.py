@@ -7,9 +7,9 @@ from dataclasses import fields
 import numpy as np
 
 from maneuver_automaton.collision import Box, Disc, Zone
-from maneuver_automaton.planning import Planner, plan
-from maneuver_automaton.problem import Goal, Problem
-from tests import inertia
+from maneuver_automaton.planning import Planner, plan, workspace
+from maneuver_automaton.problem import Goal, Problem, SearchSettings
+from tests import inertia, scenes
 from tests.search.cases import TABLE_2, robot
 
 QUERY = {"start", "goals", "start_time"}
@@ -17,7 +17,7 @@ QUERY = {"start", "goals", "start_time"}
 
 def test_every_field_of_a_problem_is_stated_once():
     of_problem = {one.name for one in fields(Problem)} - QUERY
-    assert {one.name for one in fields(Planner)} == of_problem
+    assert {one.name for one in fields(Planner)} == of_problem | {"workspace"}
 
 
 def test_zones_hold_in_every_query():
@@ -43,3 +43,43 @@ def test_parts_heights_and_trims_reach_the_problem():
     assert problem.start_trim == name
     again = Planner(trailer, parts=part).problem([0, 0, 0], [1, 0, 0], start_trim=name)
     assert again.start_trim == name
+
+
+def test_planners_used_in_turn_keep_what_they_prepared(monkeypatch):
+    """Five of them, each with its own map and body: none makes anything twice."""
+    made = []
+
+    def counted(name):
+        make = getattr(workspace, name)
+
+        def counting(*args, **more):
+            made.append(name)
+            return make(*args, **more)
+
+        monkeypatch.setattr(workspace, name, counting)
+
+    counted("FclChecker")
+    counted("surroundings_around")
+    vehicle = scenes.differential_robot(1.0, 1.5)
+    planners = [
+        Planner(
+            vehicle,
+            obstacles=[Box([1.0, 4.0], [3.0, 0.1 * k]), Disc(0.5, [6.0, 2.0])],
+            footprint=Box([0.4, 0.4 + 0.01 * k]),
+            search=SearchSettings(max_expansions=2000),
+        )
+        for k in range(5)
+    ]
+    assert sorted(made) == 5 * ["FclChecker"] + 5 * ["surroundings_around"]  # when they are made
+    for goal in ([8.0, 0.5, 0.2], [7.0, -0.5, 0.0]):
+        for planner in planners:
+            assert planner.plan([0, 0, 0], goal, time_limit=60.0).audit.passed
+    assert len(made) == 10
+
+
+def test_another_map_has_another_workspace():
+    planner = Planner(robot(TABLE_2), obstacles=[Disc(0.5, [2.0, 0.0])], footprint=Disc(0.1))
+    other = planner.with_obstacles([Disc(0.5, [2.0, 1.0])])
+    assert other.workspace is not planner.workspace
+    assert planner.workspace.on(planner.obstacles) is planner.workspace
+    assert planner.workspace.on(other.obstacles) is not planner.workspace

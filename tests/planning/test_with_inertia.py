@@ -110,7 +110,7 @@ def test_a_fixed_time_is_filled_with_rest():
     assert result.plan.word[-1] == "rest"
     short = plan(parking(horizon=Horizon(max_time=5.0)), time_limit=2.0)
     assert short.status is not PlanStatus.FOUND
-    assert "5 s are left" in short.reason
+    assert "at most 5 s are admitted" in short.reason
 
 
 def test_words_of_maneuvers_from_trim_to_trim():

@@ -174,11 +174,11 @@ class TestWrongInput:
         with pytest.raises(ValueError, match=rf"^receding horizon: {message}$"):
             controller(**settings)
 
-    def test_a_fixed_time_needs_a_rest(self):
+    def test_retiming_needs_a_rest(self):
         problem = parking_loop(without_rest(TABLE_2))
-        with pytest.raises(ValueError, match="a fixed time needs a rest trim"):
-            controller(problem)
-        controller(replace(problem, horizon=FREE))  # a free one does not
+        with pytest.raises(ValueError, match="retimed plans need a rest trim"):
+            controller(problem, retimed=True)
+        controller(problem)
 
     @pytest.mark.parametrize(
         "problem", [straight(horizon=Horizon()), straight(cost=Cost(time=1.0))]

@@ -172,13 +172,86 @@ def test_a_loop_that_was_stopped_goes_on_from_its_file(tmp_path):
     assert rest.cost == pytest.approx(whole.cost, abs=1e-9)
 
 
-def test_what_is_not_known_is_refused():
+@pytest.mark.parametrize(
+    ("changed", "asked", "message"),
+    [
+        ({}, {"retimed": True}, "receding horizon: retimed is for vehicles without inertia"),
+        (
+            {},
+            {"disturbance": Disturbance(twist_scale=(0.9, 1.0, 1.0))},
+            "receding horizon: disturbance: twist_scale is for vehicles without inertia",
+        ),
+        ({}, {"step": 0.0}, "receding horizon: step must be positive, got 0.0 s"),
+        (
+            {"horizon": Horizon(time=8.0)},
+            {"step": 9.0},
+            "receding horizon: step is 9 s, need at most the horizon, 8 s",
+        ),
+    ],
+)
+def test_what_makes_no_sense_is_refused(changed, asked, message):
     with pytest.raises(ValueError) as error:
-        simulate(posed(), step=0.5, stay=True)
-    assert str(error.value).startswith("receding horizon: stay is for vehicles without inertia")
-    with pytest.raises(ValueError) as error:
-        ManeuverHorizon(posed(), step=0.0)
-    assert str(error.value) == "receding horizon: step must be positive, got 0.0 s"
+        simulate(posed(**changed), **({"step": 0.5} | asked))
+    assert str(error.value).startswith(message)
+
+
+def test_told_to_stay_it_comes_back_when_it_is_pushed_out():
+    push = Disturbance(pushes={12: (0.2, 0.0, 0.0)})
+    loop = simulate(posed(NEAR), step=0.5, steps=30, time_limit=5.0, stay=True, disturbance=push)
+    assert loop.reached
+    assert len(loop.steps) == 30
+    assert (loop.inside[12], loop.inside[13], loop.inside[-1]) == (True, False, True)
+
+
+def test_the_goal_must_stay_free_for_as_long_as_is_asked():
+    """A disc comes over the goal eight seconds after the start, three after the arrival."""
+    coming = Obstacle(Disc(0.4), motion=Motion([4.0, 10.0], [[3.0, 4.0, 0.0], [3.0, -2.0, 0.0]]))
+    problem = posed(
+        [3.0, 0.0, 0.0],
+        obstacles=[coming],
+        footprint=Disc(0.2),
+        search=SearchSettings(max_expansions=2000),
+    )
+    for stand, deed in ((0.5, Deed.PLANNED), (6.0, Deed.STOPPED)):
+        _, step = ManeuverHorizon(problem, step=0.5, stand=stand, time_limit=30.0).step([0, 0, 0])
+        assert step.plan.duration < 7.0
+        assert step.deed is deed, stand
+
+
+def test_what_cannot_be_evaded_is_flagged_with_the_time_of_contact():
+    wall = Motion([0.0, 2.0], [[-4.0, 0.0, 0.0], [4.0, 0.0, 0.0]])  # at 4 m/s, contact after 0.95 s
+    problem = posed(
+        [3.0, 0.0, 0.0],
+        obstacles=[Obstacle(Box([0.2, 40.0]), motion=wall)],
+        footprint=Disc(0.2),
+        search=SearchSettings(max_expansions=200),
+    )
+    _, step = ManeuverHorizon(problem, step=1.0, time_limit=30.0).step([0.0, 0.0, 0.0])
+    assert step.deed is Deed.HARMFUL
+    assert [one.guarantee for one in step.violations] == [Guarantee.SAFETY]
+    assert step.free_until == pytest.approx(0.925, abs=0.01)
+
+
+@pytest.mark.parametrize(("look_ahead", "stops_at"), [(1.0, 1.0), (60.0, 5.0)])
+def test_the_fail_safe_trajectory_looks_ahead_as_far_as_is_asked(look_ahead, stops_at):
+    """Where it could brake a disc passes later; farther on, where the last plan ends, none does."""
+    _, begun = ManeuverHorizon(posed([5.0, 0.0, 0.0]), step=0.5).step([0.0, 0.0, 0.0])
+    cage = [Box([0.2, 4.2], [12.0 + side, 0.0]) for side in (2.0, -2.0)]
+    cage += [Box([4.2, 0.2], [12.0, side]) for side in (2.0, -2.0)]
+    passing = Obstacle(Disc(0.4), motion=Motion([12.0, 16.0], [[1.0, 6.0, 0.0], [1.0, -6.0, 0.0]]))
+    problem = posed(
+        [12.0, 0.0, 0.0],
+        obstacles=[*cage, passing],
+        footprint=Disc(0.2),
+        search=SearchSettings(max_expansions=200),
+    )
+    controller = ManeuverHorizon(
+        problem, step=0.5, look_ahead=look_ahead, last=replace(begun, deed=Deed.APPROACHED)
+    )
+    _, step = controller.step(begun.predicted)
+    assert step.deed is Deed.APPROACHED
+    assert step.plan.end[0] == pytest.approx(stops_at)
+    assert step.plan.primitives[0].name == begun.plan.primitives[0].name  # is finished
 
 
 @pytest.mark.parametrize("robot", ["stops and steers", "polished"])

@@ -7,7 +7,8 @@ import pytest
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.problem import Goal, Horizon, Problem
-from maneuver_automaton.refinement.fitting import fitted_plans, why_not_fitted
+from maneuver_automaton.refinement.conditions import broken_condition
+from maneuver_automaton.refinement.fitting import fitted_plans
 from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
 from tests.inertia import unicycle_automaton
 
@@ -20,7 +21,7 @@ def test_trims_that_are_too_short_are_prolonged_or_left_out():
     for plan in found.plans:
         least = 1.05 * float(plan.durations[plan.durations > 0.0].min())
         problem = Problem(robot, [0.0, 0.0, 0.0], pose, horizon=Horizon(min_coast=least))
-        assert "lasts less than" in why_not_fitted(problem, plan)
+        assert f"less than {least:g} s" in broken_condition(problem, plan)
         fitted = list(fitted_plans(problem, plan, problem.goals[0]))
         mended += bool(fitted)
         for one in fitted:

@@ -48,8 +48,20 @@ def test_a_lane_is_changed_to_reach_the_goal(tmp_path):
     assert drive.status == "reached"
     assert drive.verdict.clean
     assert drive.verdict.clearance_m > 0.0
-    assert drive.verdict.defect < 1e-8
-    assert drive.driven.time[-1] == pytest.approx(0.1 * len(drive.steps))
+    assert drive.verdict.audit.max_dynamics_defect < 1e-8
+    assert drive.driven.duration == pytest.approx(0.1 * len(drive.steps))
+
+
+def test_what_was_driven_passes_the_states_of_all_steps(tmp_path):
+    drive = driven(scene_of(tmp_path))
+    times = np.array([step.time for step in drive.steps])
+    states = np.array([step.state for step in drive.steps])
+    poses = drive.planner.world(states[:, :3])
+    np.testing.assert_allclose(drive.driven.pose_at(times), poses, atol=1e-4)
+    begins = drive.driven.switching_times[:-1]
+    np.testing.assert_allclose(
+        drive.driven.switching_poses[:-1], poses[np.searchsorted(times, begins - 1e-6)], atol=1e-9
+    )
 
 
 def test_it_stops_behind_what_blocks_the_road(tmp_path):
@@ -57,7 +69,7 @@ def test_it_stops_behind_what_blocks_the_road(tmp_path):
     drive = driven(scene_of(tmp_path, *LANES, wall, problem(goal=ANY, speed=10.0)))
     assert drive.reached
     assert drive.verdict.clean
-    assert drive.driven.pose[-1, 0] < 39.0
+    assert drive.driven.end[0] < 39.0
 
 
 def test_a_goal_out_of_reach_is_missed_without_harm(tmp_path):
@@ -81,7 +93,7 @@ def test_a_car_at_rest_with_no_way_on_stands_and_says_so(tmp_path):
     start = problem(goal=goal, x=30.0, speed=0.0)
     drive = driven(scene_of(tmp_path, *LANES, *walls, behind, start))
     assert drive.status == "missed"
-    stood = [step for step in drive.steps if step.plan.stands]
+    stood = [step for step in drive.steps if step.decision.stands]
     assert stood
     assert all(step.control.tolist() == [0.0, 0.0] for step in stood)
     assert "; no way on was found from " in drive.reason
@@ -105,7 +117,7 @@ def test_a_goal_behind_the_start_is_reached_around_a_loop(tmp_path):
     drive = driven(scene)
     assert drive.reached
     assert drive.verdict.clean
-    turned = drive.driven.pose[-1, 2] - drive.driven.pose[0, 2]
+    turned = drive.driven.end[2] - drive.driven.start[2]
     assert turned > 1.7 * np.pi
 
 
@@ -137,10 +149,10 @@ def test_goals_are_reached_when_the_clock_of_the_scene_ticks(tmp_path, step):
     drive = driven(scene_of(tmp_path, *LANES, other, problem(goal=goal), step=step))
     assert drive.reached
     assert drive.verdict.clean
-    ticks = drive.driven.time[-1] / step
+    ticks = drive.driven.duration / step
     assert ticks == pytest.approx(round(ticks), abs=1e-9)
     assert drive.planner.tick <= 0.1
-    assert len(drive.steps) * drive.planner.tick == pytest.approx(drive.driven.time[-1])
+    assert len(drive.steps) * drive.planner.tick == pytest.approx(drive.driven.duration)
 
 
 def test_sets_of_occupancies_are_driven_around(tmp_path):
@@ -188,11 +200,11 @@ def test_every_plan_is_free_and_ends_at_rest_or_a_goal(tmp_path):
     drive = driven(scene_of(tmp_path))
     planner = drive.planner
     for step in drive.steps:
-        assert step.plan.stops
-        assert step.state.tolist() == step.plan.states[0].tolist()
+        assert step.decision.stops
+        assert step.state.tolist() == step.decision.states[0].tolist()
         limits = planner.vehicle.model.control_limits
-        assert (step.plan.controls >= limits[:, 0] - 1e-9).all()
-        assert (step.plan.controls <= limits[:, 1] + 1e-9).all()
+        assert (step.decision.controls >= limits[:, 0] - 1e-9).all()
+        assert (step.decision.controls <= limits[:, 1] + 1e-9).all()
 
 
 def test_a_moved_scene_has_the_moved_drive(tmp_path):
@@ -202,8 +214,8 @@ def test_a_moved_scene_has_the_moved_drive(tmp_path):
     assert [step.control.tolist() for step in here.steps] == [
         step.control.tolist() for step in there.steps
     ]
-    moved = (by @ SE2(here.driven.pose)).pose
-    difference = moved - there.driven.pose
+    moved = here.driven.moved(by).switching_poses
+    difference = moved - there.driven.switching_poses
     difference[:, 2] = np.remainder(difference[:, 2] + np.pi, 2 * np.pi) - np.pi
     assert np.abs(difference).max() < 1e-7
 
@@ -211,21 +223,21 @@ def test_a_moved_scene_has_the_moved_drive(tmp_path):
 def test_one_plan(tmp_path):
     result = plan_road(scene_of(tmp_path))
     assert result.plan is not None
-    assert result.plan.reaches
+    assert result.decision.reaches
     assert result.verdict.clean
-    end = result.planner.vehicle.middle_of(result.driven.pose[-1])
+    end = result.planner.vehicle.middle_of(result.plan.end)
     (goal,) = result.planner.scene.goals
-    speed, time = result.driven.reduced_state[-1, 0], result.driven.time[-1]
+    speed, time = result.plan.trims[-1].reduced_state[0], result.plan.duration
     assert goal.contains(end, speed=speed, time=time)
 
 
 def test_a_plan_made_before_is_driven(tmp_path):
     result = plan_road(scene_of(tmp_path))
-    drive = drive_scene(road_planner(result.planner.scene, settings=QUICK), first=result.plan)
+    drive = drive_scene(road_planner(result.planner.scene, settings=QUICK), first=result.decision)
     assert drive.reached
     assert drive.verdict.clean
     kept = [step for step in drive.steps if not step.replanned]
-    assert kept[0].plan.controls[0].tolist() == result.plan.controls[0].tolist()
+    assert kept[0].decision.controls[0].tolist() == result.decision.controls[0].tolist()
 
 
 def test_no_plan_says_why(tmp_path):
@@ -250,7 +262,7 @@ def test_the_judge_sees_contacts_and_the_edge(tmp_path):
         tmp_path, LANES[1], car(7, x=90.0, y=6.0, speed=6.0, steps=40), problem(goal=ANY)
     )
     off = judged(narrow, drive.planner.vehicle, drive.driven)
-    assert (off.off_road, off.edge_m) == (off.poses, 0.0)
+    assert (off.off_road, off.edge_m) == (True, 0.0)
 
 
 @needs_data
@@ -259,7 +271,7 @@ def test_a_tight_junction_is_driven_with_the_steering_that_the_car_has():
     result = plan_road(ma.load_scenario(file).scene)
     assert result.plan is not None
     assert result.verdict.clean
-    steering = np.abs(result.plan.states[:, 4]).max()
+    steering = np.abs(result.decision.states[:, 4]).max()
     assert 0.6 < steering <= result.planner.vehicle.model.max_steering
 
 
@@ -282,4 +294,4 @@ def test_given_scenarios_are_driven_without_contact(name):
     drive = drive_scene(road_planner(read_commonroad(file)[0].road))
     assert drive.reached
     assert drive.verdict.collisions == 0
-    assert drive.verdict.off_road == 0
+    assert not drive.verdict.off_road

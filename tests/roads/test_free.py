@@ -19,9 +19,10 @@ from maneuver_automaton.roads import (
     RoadScene,
     RoadStart,
     RoadVehicle,
+    _kernels_free,
+    _kernels_motion,
     drivable_area,
 )
-from maneuver_automaton.roads import _kernels_free as kernels
 from maneuver_automaton.roads.clearing import clearing_of
 
 TICK = 0.1
@@ -53,16 +54,12 @@ def clearing():
         last_tick=60,
         off_edge=OFF_EDGE,
         off_traffic=OFF_TRAFFIC,
-        braking=8.0,
     )
-
-
-FIELD = clearing().area
 
 
 def states_of(x, y, heading, speed, steering, controls):
     state = np.array([x, y, heading, speed, steering])
-    return kernels.driven(VEHICLE.model.wheelbase, TICK, state, np.array(controls))
+    return _kernels_motion.driven(VEHICLE.model.wheelbase, TICK, state, np.array(controls))
 
 
 def slow_gap(states, control, tick):
@@ -98,6 +95,9 @@ drives = st.tuples(
 )
 
 
+CLEARING = clearing()
+
+
 @settings(max_examples=150)
 @given(drive=drives)
 def test_what_is_proven_free_is_free_and_what_is_not_is_near_something(drive):
@@ -108,7 +108,7 @@ def test_what_is_proven_free_is_free_and_what_is_not_is_near_something(drive):
     gap, edge = slow_gap(states[0], control, tick)
     if edge < 0.0 and slow_gap(states[0], np.zeros(2), tick)[1] < 0.0:
         return  # begins outside, which is never asked
-    if kernels.free_ticks(clearing(), states, tick):
+    if _kernels_free.free_ticks(CLEARING, states, tick):
         assert gap > 0.0
         assert edge > 0.0
     else:
@@ -118,14 +118,14 @@ def test_what_is_proven_free_is_free_and_what_is_not_is_near_something(drive):
 def test_who_is_gone_is_not_hit():
     states = states_of(36.0, 4.0, 0.4, 0.0, 0.0, [[0.0, 0.0]])
     assert slow_gap(states[0], np.zeros(2), 20)[0] < 0.05
-    assert kernels.free_ticks(clearing(), states, 18) == 0
-    assert kernels.free_ticks(clearing(), states, 22) == 1
+    assert _kernels_free.free_ticks(CLEARING, states, 18) == 0
+    assert _kernels_free.free_ticks(CLEARING, states, 22) == 1
 
 
 @pytest.mark.parametrize("control", [(-8.0, 0.4), (2.0, -0.4), (0.0, 0.0)])
 def test_motion_of_a_tick_is_that_of_the_model(control):
     begin = np.array([1.0, 2.0, 0.3, 12.0, 0.1])
-    states = kernels.driven(VEHICLE.model.wheelbase, TICK, begin, np.array([control] * 5))
+    states = _kernels_motion.driven(VEHICLE.model.wheelbase, TICK, begin, np.array([control] * 5))
     exact = rollout(VEHICLE.model, begin, control=control, times=[0.0, 0.5], rtol=1e-12)[-1]
     np.testing.assert_allclose(states[-1], exact, atol=1e-6)
 
@@ -139,9 +139,10 @@ def test_motion_of_a_tick_is_that_of_the_model(control):
     ],
 )
 def test_rectangles_cover_a_polygon_and_little_more(corners):
-    scene = replace(SCENE, traffic=(Obstacle(Polygon(corners), name="one"),))
+    there = Motion([0.0, 0.5], np.zeros((2, 3)))
+    scene = replace(SCENE, traffic=(Obstacle(Polygon(corners), motion=there, name="one"),))
     found = clearing_of(
-        scene, VEHICLE, tick=TICK, last_tick=5, off_edge=0.03, off_traffic=0.05, braking=8.0
+        scene, VEHICLE, tick=TICK, last_tick=5, off_edge=0.03, off_traffic=0.05
     ).traffic
     boxes = [
         shapely.Polygon(Box(2.0 * half, pose[0, :2], pose[0, 2]).corners)
@@ -153,32 +154,47 @@ def test_rectangles_cover_a_polygon_and_little_more(corners):
     assert shapely.distance(outline, shape).max() < 0.35
 
 
-def area_of(*lanelets, last_tick=60):
+@pytest.mark.parametrize(
+    "shape",
+    [Disc(0.5, [9.0, 0.0]), Box([2.0, 1.0], [9.0, 0.0], 0.4), Polygon([[8, 0], [9, -1], [9, 1]])],
+)
+@pytest.mark.parametrize("off_traffic", [0.05, 0.4])
+def test_static_obstacles_are_kept_away_from(shape, off_traffic):
+    scene = replace(SCENE, traffic=(Obstacle(shape, name="one"),))
+    found = clearing_of(
+        scene, VEHICLE, tick=TICK, last_tick=5, off_edge=0.03, off_traffic=off_traffic
+    )
+    assert not found.traffic.first.size
+    outline = shapely.Polygon(shape.corners) if not isinstance(shape, Disc) else (
+        shapely.Point(shape.center).buffer(shape.radius, quad_segs=64)
+    )  # fmt: skip
+    for x in np.linspace(1.0, 6.0, 51):
+        states = np.array([[x, 0.0, 0.0, 0.0, 0.0]] * 2)
+        body = shapely.Polygon(SE2(states[0, :3]).act(VEHICLE.footprint.corners))
+        apart = body.distance(outline)
+        free = _kernels_free.free_ticks(found, states, 0)
+        assert free == (apart > off_traffic) or abs(apart - off_traffic) < 0.02
+
+
+def land_of(*lanelets, last_tick=60):
     scene = replace(SCENE, lanelets=lanelets, traffic=())
     return clearing_of(
-        scene, VEHICLE, tick=TICK, last_tick=last_tick, off_edge=0.03, off_traffic=0.05, braking=8.0
-    ).area
+        scene, VEHICLE, tick=TICK, last_tick=last_tick, off_edge=0.03, off_traffic=0.05
+    ).static
 
 
-def test_the_field_is_as_large_as_the_road_in_use():
-    here = area_of(LANE)
+def test_the_land_is_as_large_as_the_road_in_use():
+    here = land_of(LANE)
     far = Lanelet(2, LEFT + 20_000.0, RIGHT + 20_000.0)
-    assert area_of(LANE, far).distance.shape == here.distance.shape
-    corner = [[0, 0], [700, 0], [700, 3], [3, 3], [3, 700], [0, 700]]
+    assert len(land_of(LANE, far).solids.plates) == len(here.solids.plates)
+    assert land_of(LANE, far).field.distance.shape == here.field.distance.shape
+
+
+def test_a_wide_area_has_land_along_its_edge_only():
     legs = [
         Lanelet(3, [[0, 3], [700, 3]], [[0, 0], [700, 0]]),
         Lanelet(4, [[0, 0], [0, 700]], [[3, 0], [3, 700]]),
     ]
-    wide = area_of(*legs, last_tick=400)
-    tiles = shapely.Polygon(corner).length / 2.0 / (wide.cell * (1 << wide.bits))
-    assert len(wide.distance) < 3.0 * tiles
-    assert wide.distance.nbytes < 0.05 * 700.0 * 700.0 / wide.cell**2 * 8
-
-
-@settings(max_examples=100)
-@given(x=st.floats(-5.0, 70.0), y=st.floats(-10.0, 45.0))
-def test_the_field_is_the_distance_to_the_edge(x, y):
-    place = shapely.Point(x, y)
-    true = AREA.boundary.distance(place) if AREA.covers(place) else 0.0
-    room = getattr(kernels.room, "py_func", kernels.room)  # compiled, only kernels may call it
-    assert abs(room(FIELD, x, y) - true) < 0.15
+    plates = land_of(*legs, last_tick=400).solids.plates
+    area = (plates[:, 2] - plates[:, 0]) * (plates[:, 3] - plates[:, 1])
+    assert area.sum() < 4.0 * 1400.0 * 6.0  # two strips along two legs, and their overlap

@@ -10,6 +10,7 @@ import pytest
 from maneuver_automaton.primitives.driving import drive
 from maneuver_automaton.roads import RoadVehicle, _kernels_library
 from maneuver_automaton.roads.library import road_library, tick_of
+from maneuver_automaton.roads.plans import plan_of_controls
 
 VEHICLE = RoadVehicle()
 LIBRARY = road_library(VEHICLE, top_speed=14.0)
@@ -56,6 +57,30 @@ def test_displacements_are_those_of_the_model():
         np.testing.assert_allclose(
             course.pose_at(TICK * np.arange(1, TICKS + 1)), maneuvers.pose[e], atol=1e-6
         )
+
+
+def test_the_automaton_says_what_the_arrays_do():
+    small = road_library(VEHICLE, top_speed=3.0)
+    automaton = small.automaton(VEHICLE.model)
+    states = np.array([trim.reduced_state for trim in automaton.trims])
+    np.testing.assert_array_equal(states, np.stack([small.trims.speed, small.trims.steering], -1))
+    source = np.repeat(np.arange(len(states)), np.diff(small.maneuvers.first))
+    changing = np.flatnonzero(small.maneuvers.target != source)
+    assert len(automaton.maneuvers) == len(changing)
+    for one, e in zip(automaton.maneuvers, changing, strict=True):
+        target = small.maneuvers.target[e]
+        assert automaton.index_of(one.source) == source[e]
+        assert automaton.index_of(one.target) == target
+        np.testing.assert_allclose(one.course.pose_at(one.duration), one.displacement)
+        np.testing.assert_allclose(one.displacement, small.maneuvers.pose[e, -1], atol=1e-6)
+
+
+def test_words_name_the_trims_of_the_automaton():
+    names = road_library(VEHICLE, top_speed=3.0).automaton(VEHICLE.model).trim_names
+    state, controls = np.array([0, 0, 0, 2.0, 0.0]), np.array([[2.0, 0.0]] * 5)
+    ramp = plan_of_controls(VEHICLE.model, state, controls, tick=TICK)
+    assert {trim.name for trim in ramp.trims} == {"speed 2, steering 0", "speed 3, steering 0"}
+    assert {trim.name for trim in ramp.trims} <= set(names)
 
 
 def test_a_state_beside_the_grid_has_maneuvers_too():

@@ -112,7 +112,7 @@ def test_the_route_is_that_of_the_lane_that_is_changed_to():
     assert route.lanelets == (2, 3)
     assert_allclose(route.points[:, 1], 4.0)
     assert lanelets_of_goal(lanes, goal) == [3]
-    (low, high, right, left) = route.ways[0]
+    (low, high, right, left) = route.extents[0]
     assert_allclose([high - low, left, right], [10.0, 1.5, -1.5])
 
 

@@ -1,8 +1,13 @@
-"""A search in space and time for a motion that stays free, wherever it leads.
+"""A search in space and time for a fail-safe trajectory: collision-free, wherever it leads.
 
 A node is a row of two arrays. `nodes`: x, y, heading, clock, duration of the edge that leads here,
-time until which it is safe. `links`: parent, trim. Safe is a vehicle that can rest as long as rest
+time until which it is safe. `links`: parent, trim. A vehicle that can rest is safe as long as rest
 is free there; one that cannot, as long as the trim that led there stays free.
+
+The open list is ordered by safety lost and time spent: the node that is safe for longest comes
+first, and of equal ones the one that gets there soonest. The search ends at the first node that is
+safe for as long as was asked, because any will do. A cell of space, heading and time is entered
+once: what comes there later is as good to go on from, to within the cell.
 """
 
 from __future__ import annotations
@@ -19,11 +24,13 @@ from maneuver_automaton.search._kernels_distance import pop, push
 from maneuver_automaton.search._kernels_motion import inside_window
 
 FULL_TURN = 2.0 * math.pi
+# rows of `state`: nodes in use, nodes in the open list, 1 once a node is safe for long enough, the
+# node that is safe for longest, nodes expanded
 N_NODES, HEAP, FOUND, BEST, EXPANSIONS = range(5)
 EMPTY = -1
 
 
-class EscapeTask(NamedTuple):
+class FailSafeTask(NamedTuple):
     """Where to begin and what is asked for."""
 
     x: float
@@ -32,17 +39,17 @@ class EscapeTask(NamedTuple):
     clock: float  # [s]
     until: float  # [s] to be free until then
     rest: int  # number of the trim that rests, -1 for none
-    keep: float  # [m]
-    margin: float  # [m]
-    cell: float  # [m]
-    headings: int
-    tick: float  # [s]
+    keep: float  # [m] clearance that is kept
+    margin: float  # [m] of the proof: what comes nearer counts as hit
+    cell: float  # [m] size of a cell in space
+    headings: int  # cells of a full turn
+    tick: float  # [s] size of a cell in time
     longest: float  # [s] that a trim which moves is held, if the vehicle can rest
-    impatience: float  # seconds of safety that a second on the way is worth
+    impatience: float  # seconds of safety that a second of driving is worth
     window: np.ndarray  # as in `_kernels_motion.inside_window`
 
 
-class EscapeArrays(NamedTuple):
+class FailSafeArrays(NamedTuple):
     """Room for the nodes, the cells they are in, and the queue."""
 
     nodes: np.ndarray  # (n, 6)
@@ -56,6 +63,8 @@ class EscapeArrays(NamedTuple):
 @bare_inner_kernel
 def is_new(task, cells, x, y, heading, clock):
     """Mark the cell of a pose and a time; whether it was free."""
+    # 16 bits for each place, 9 for the heading, the rest for the time: places 65,536 cells apart
+    # share a key, which drops a node and never a proof
     i = math.floor((x - task.x) / task.cell + 0.5) & 0xFFFF
     j = math.floor((y - task.y) / task.cell + 0.5) & 0xFFFF
     turn = (heading - task.heading) / FULL_TURN
@@ -149,7 +158,7 @@ def expand(task, lib, world, body, search, n):
                 lib.library.twists[trim, 2],
             )
             if trim == task.rest:
-                proven = nodes[node, 5] - clock
+                proven = nodes[node, 5] - clock  # proven when the node was made
             else:
                 most = left if task.rest < 0 else min(left, task.longest)
                 proven, _ = free_time(
@@ -169,7 +178,7 @@ def expand(task, lib, world, body, search, n):
                 )
             t = lib.edge_durations[trim, 0]
             if task.rest < 0 and proven >= left:
-                t = left
+                t = left  # one that cannot rest is done where a trim is free to the end
             while t > 0.0 and t <= proven and t <= left:
                 if not inside_window(task.window, x, y, heading, v_x, v_y, turn, t):
                     break

@@ -1,4 +1,4 @@
-"""Where no motion is free: the one that is hit last, and of these the one that keeps furthest."""
+"""Collision mitigation: where no motion is free, the one whose first contact is latest."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon.candidates import allowed
 from maneuver_automaton.receding_horizon.log import first_part
-from maneuver_automaton.receding_horizon.outlook import joined
+from maneuver_automaton.receding_horizon.shifting import followed_by
 
 SHARES = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # of a step, after which a motion may stop
 SAMPLES = 64  # at which the clearance is looked at
@@ -21,17 +21,18 @@ ALIKE = 1e-3  # [s] between contacts that come at the same time
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Harm:
+class Mitigation:
     """A motion that is hit, or comes closer than it should."""
 
     plan: Plan
     contact: float  # [s] of the world's clock, when it is hit first; the time asked for if never
-    clearance: float  # [m] least one until then, as far as looked for
+    clearance: float  # [m] least one until then, as far as looked for; inf if not measured
+    reason: str  # what is predicted
 
 
-def least_harmful(
+def mitigate(
     here: Problem, *, step: float, until: float, known: tuple[Plan, ...] = ()
-) -> Harm:
+) -> Mitigation:
     """The motion whose first contact is latest; of those alike, the one with most clearance.
 
     Tried are to stand still, the `known` plans, these stopped at several moments, and every trim of
@@ -41,7 +42,7 @@ def least_harmful(
     Parameters
     ----------
     here : Problem
-        Its margin does not count: contact alone does harm.
+        Its margin does not count: contact alone does.
     step : float
         [s] of the loop.
     until : float
@@ -55,15 +56,15 @@ def least_harmful(
     >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "back": (-0.5, 0)})
     >>> chasing = Obstacle(Disc(1.0), motion=Motion([0, 9], [[4, 0, 0], [-5, 0, 0]]))
     >>> problem = Problem(robot, [0, 0, 0], [9, 9, 0], obstacles=chasing)
-    >>> found = least_harmful(problem, step=1.0, until=8.0)
+    >>> found = mitigate(problem, step=1.0, until=8.0)
     >>> found.plan.word[0], 5.9 < found.contact <= 6.0
     ('back', True)
     """
     bare = replace(here, margin=0.0)
     length = until - here.start_time
-    harms = [_harm(bare, plan, until) for plan in _motions(bare, step, length, known)]
-    latest = max(one.contact for one in harms)
-    alike = [one for one in harms if one.contact >= latest - ALIKE]
+    tried = [_contact(bare, plan, until) for plan in _motions(bare, step, length, known)]
+    latest = max(one.contact for one in tried)
+    alike = [one for one in tried if one.contact >= latest - ALIKE]
     return max(alike, key=lambda one: one.clearance)
 
 
@@ -89,14 +90,22 @@ def _stopped(plan: Plan, after: float, length: float, rests: list[Trim]) -> Plan
     if left <= 0.0 or not begun.trims:
         return begun
     last = rests[0] if rests else begun.trims[-1]
-    return joined(begun, Plan(begun.end, (last,), durations=[left], start_time=plan.start_time))
+    return followed_by(
+        begun, Plan(begun.end, (last,), durations=[left], start_time=plan.start_time)
+    )
 
 
-def _harm(here: Problem, plan: Plan, until: float) -> Harm:
+def _contact(here: Problem, plan: Plan, until: float) -> Mitigation:
     free = free_until(here, plan)
     contact = plan.start_time + free
     if free >= plan.duration and contact < until:
         contact += stands_free(here, plan.end, time=contact, duration=until - contact)
     times = np.linspace(plan.start_time, contact, SAMPLES)
     clearance = float(clearance_at(here, plan.pose_at(times), times).min())
-    return Harm(plan=plan, contact=contact, clearance=clearance)
+    said = (
+        f"contact is predicted at {contact:.6g} s"
+        if contact < until
+        else f"the clearance is predicted to fall to {clearance:.3g} m"
+    )
+    reason = f"no motion is free until {until:.6g} s; {said}"
+    return Mitigation(plan=plan, contact=contact, clearance=clearance, reason=reason)

@@ -8,8 +8,8 @@ import pytest
 from maneuver_automaton.collision import Box, Obstacle
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds
-from maneuver_automaton.receding_horizon import escape
-from maneuver_automaton.receding_horizon.harm import least_harmful
+from maneuver_automaton.receding_horizon import search_fail_safe
+from maneuver_automaton.receding_horizon.mitigation import mitigate
 from tests.receding_horizon.scenes import among, cannot_stop, crossing, mover
 from tests.scenes import moving_scene
 from tests.solids import World, driven, outside
@@ -27,7 +27,7 @@ def clearance(problem, plan) -> float:
 
 
 def test_where_standing_is_free_it_stands():
-    found = escape(among(crossing()), until=30.0)
+    found = search_fail_safe(among(crossing()), until=30.0)
     assert (found.complete, found.plan.word, found.plan.duration) == (True, ("rest",), 30.0)
     assert found.expansions == 0
 
@@ -36,7 +36,7 @@ def test_where_standing_is_free_it_stands():
 @pytest.mark.parametrize("margin", [0.0, 0.2])
 def test_it_goes_out_of_the_way(robot, margin):
     problem = among(COMING, robot=robot, margin=margin)
-    found = escape(problem, until=12.0)
+    found = search_fail_safe(problem, until=12.0)
     assert found.complete
     assert found.plan.duration == pytest.approx(12.0)
     assert clearance(problem, found.plan) >= margin
@@ -52,7 +52,7 @@ def test_anywhere_and_at_any_time_in_a_moving_scene(seed):
         if world.clearance(pose[None] - np.append(world.origin, 0.0), np.array([time]))[0] < 0.1:
             continue
         here = replace(problem, start=pose, start_time=time)
-        found = escape(here, until=time + 30.0)
+        found = search_fail_safe(here, until=time + 30.0)
         assert found.complete
         assert found.free_until >= time + 30.0
         assert clearance(here, found.plan) > 0.0
@@ -63,49 +63,49 @@ def test_anywhere_and_at_any_time_in_a_moving_scene(seed):
 def test_the_best_there_is_where_nothing_is_free_for_long_enough():
     squeezed = [mover([0.0, 9.0], [(0.0, side * 4.0), (0.0, -side * 5.0)], Box([40.0, 1.0]))
                 for side in (1, -1)]  # fmt: skip
-    found = escape(among(*squeezed), until=9.0)
+    found = search_fail_safe(among(*squeezed), until=9.0)
     assert not found.complete
     assert found.free_until == pytest.approx(3.2, abs=0.05)  # where it stands
 
 
-def test_inside_bounds_there_may_be_no_way_out():
-    assert not escape(among(COMING, bounds=LANE), until=40.0).complete
-    assert escape(among(COMING), until=40.0).complete
+def test_inside_bounds_there_may_be_none():
+    assert not search_fail_safe(among(COMING, bounds=LANE), until=40.0).complete
+    assert search_fail_safe(among(COMING), until=40.0).complete
 
 
 def test_the_number_of_expansions_is_limited():
-    found = escape(among(COMING, bounds=LANE), until=40.0, max_expansions=3)
+    found = search_fail_safe(among(COMING, bounds=LANE), until=40.0, max_expansions=3)
     assert found.expansions == 3
 
 
-def test_a_moved_scene_has_the_moved_way_out():
+def test_a_moved_scene_has_the_moved_trajectory():
     move = SE2(np.array([30.0, -4.0, 2.0]))
-    one, two = (escape(p, until=12.0) for p in (among(COMING), among(COMING).moved(move)))
+    one, two = (search_fail_safe(p, until=12.0) for p in (among(COMING), among(COMING).moved(move)))
     assert one.plan.word == two.plan.word
     assert two.plan.durations == pytest.approx(one.plan.durations, abs=1e-6)
 
 
-class TestLeastHarm:
+class TestMitigation:
     def test_the_contact_that_comes_last(self):
         # a wall 40 m wide at 2 m/s: driving away at 1 m/s gains as long as it lasts
         wall = mover([0.0, 9.0], [(-4.0, 0.0), (14.0, 0.0)], Box([0.2, 40.0]))
-        found = least_harmful(among(wall), step=0.5, until=9.0)
+        found = mitigate(among(wall), step=0.5, until=9.0)
         assert set(found.plan.word) == {"ahead"}
         assert found.contact == pytest.approx(3.6, abs=1e-2)
 
     def test_of_those_without_contact_the_one_that_keeps_furthest(self):
         near = Obstacle(Box([1.0, 1.0], [0.0, 0.9]))
-        found = least_harmful(among(near, margin=0.5), step=0.5, until=2.0)
+        found = mitigate(among(near, margin=0.5), step=0.5, until=2.0)
         assert found.contact == 2.0
         assert found.clearance >= 0.09  # measured from below
 
     def test_a_known_plan_may_be_the_best(self):
-        way = escape(among(COMING), until=12.0).plan
-        found = least_harmful(among(COMING), step=0.5, until=12.0, known=(way,))
+        known = search_fail_safe(among(COMING), until=12.0).plan
+        found = mitigate(among(COMING), step=0.5, until=12.0, known=(known,))
         assert found.contact == 12.0
 
     def test_what_cannot_stop_goes_on(self):
         wall = Obstacle(Box([0.2, 40.0], [5.0, 0.0]))
-        found = least_harmful(among(wall, robot=cannot_stop()), step=0.5, until=6.0)
+        found = mitigate(among(wall, robot=cannot_stop()), step=0.5, until=6.0)
         assert "rest" not in found.plan.word
         assert found.contact == 6.0

@@ -1,27 +1,25 @@
-"""What follows a plan: whether the vehicle can stand at its end, and leave again in time."""
+"""Safe plans: collision-free, and followed by standing still or by a fail-safe trajectory."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.planning.tracking import free_until, stands_free
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.receding_horizon.escape import Escape, escape
+from maneuver_automaton.receding_horizon.failsafe_search import FailSafe, search_fail_safe
 from maneuver_automaton.receding_horizon.log import first_part
 from maneuver_automaton.receding_horizon.settings import Settings
-from maneuver_automaton.receding_horizon.shifting import merged
+from maneuver_automaton.receding_horizon.shifting import followed_by
 
 SAME = 1e-9  # [s]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Outlook:
+class Prediction:
     """The obstacles as they are predicted now, and how far ahead that is looked at."""
 
     here: Problem
@@ -34,7 +32,7 @@ class Outlook:
         return free_until(self.here, plan) >= plan.duration
 
     def is_safe(self, plan: Plan) -> bool:
-        """Whether a plan is free, the vehicle may stand at its end, and there is a way out later.
+        """Whether a plan is free, and the vehicle may stand at its end or leave it safely.
 
         Where nothing moves, the end of a free plan is free for ever.
         """
@@ -51,28 +49,28 @@ class Outlook:
             return False
         if self.here.automaton.body_velocities.any(axis=1).all():
             return True  # without rest the end of the plan is the end
-        return self.way_out(plan.end, arrival + self.stand).complete
+        return self.fail_safe(plan.end, arrival + self.stand).complete
 
-    def way_out(self, pose: Array, time: float) -> Escape:
+    def fail_safe(self, pose: Array, time: float) -> FailSafe:
         """A motion from a pose and a time that is free for as long as is looked ahead."""
         there = replace(self.here, start=pose, start_time=time)
-        return escape(there, until=max(self.until, time + SAME), deadline=self.deadline)
+        return search_fail_safe(there, until=max(self.until, time + SAME), deadline=self.deadline)
 
     def continued(self, plan: Plan, after: float) -> Plan | None:
-        """The first seconds of a plan, then a way out; None if either is not free."""
+        """The first seconds of a plan, then a fail-safe trajectory; None if either is not free."""
         piece = first_part(plan, after)
         if not self.is_free(piece):
             return None
-        out = self.way_out(piece.end, piece.start_time + piece.duration)
-        return joined(piece, out.plan) if out.complete else None
+        then = self.fail_safe(piece.end, piece.start_time + piece.duration)
+        return followed_by(piece, then.plan) if then.complete else None
 
 
-def outlook(here: Problem, settings: Settings, *, deadline: float) -> Outlook:
+def predicted(here: Problem, settings: Settings, *, deadline: float) -> Prediction:
     """How far to look ahead: as far as is asked for, or until nothing moves any more."""
     until = here.start_time + settings.look_ahead
     if here.moves and settings.pad is not None:
         until = min(until, last_event(here))
-    return Outlook(
+    return Prediction(
         here=here,
         stand=max(settings.stand, settings.step),
         until=max(until, here.start_time + settings.step),
@@ -93,11 +91,3 @@ def last_event(problem: Problem) -> float:
     """
     motions = [one.motion for one in problem.obstacles if isinstance(one, Obstacle)]
     return max((float(m.time[-1]) for m in motions if m is not None), default=-math.inf)
-
-
-def joined(first: Plan, second: Plan) -> Plan:
-    """One plan, then another that begins where and when it ends."""
-    word, durations = merged(
-        (*first.trims, *second.trims), [*first.durations.tolist(), *second.durations.tolist()]
-    )
-    return replace(first, trims=word, durations=np.array(durations))

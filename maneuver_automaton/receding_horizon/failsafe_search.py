@@ -1,4 +1,4 @@
-"""A way out: any motion that stays free for a while, where no plan to the goal does."""
+"""Fail-safe trajectories: any motion that stays free for a while, where no plan does."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ import numpy as np
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.planning.tracking import stands_free
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.receding_horizon import _kernels_escape as kernels
+from maneuver_automaton.receding_horizon import _kernels_failsafe as kernels
 from maneuver_automaton.receding_horizon.shifting import merged
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 
 CELL = 0.25  # of the search, in turning radii
 HEADINGS = 24
-LONGEST = 32  # quanta that a trim is held
-IMPATIENCE = 0.1  # seconds of safety that a second on the way is worth
+LONGEST = 32  # shortest edge durations that a trim is held
+IMPATIENCE = 0.1  # seconds of safety that a second of driving is worth
 MOST_NODES = 2**16
 TIMELY = 16  # expansions between two looks at the clock
 MOST_EXPANSIONS = 4000
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Escape:
+class FailSafe:
     """A motion that stays free as long as was found possible."""
 
     plan: Plan
@@ -35,13 +35,13 @@ class Escape:
     expansions: int
 
 
-def escape(
+def search_fail_safe(
     problem: Problem,
     *,
     until: float,
     deadline: float = math.inf,
     max_expansions: int = MOST_EXPANSIONS,
-) -> Escape:
+) -> FailSafe:
     """A motion from the problem's start that is free of its obstacles until a time, if possible.
 
     A vehicle that can rest ends at rest. What is returned is the best there is: the motion that is
@@ -64,7 +64,7 @@ def escape(
     >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "on": (1, 0), "back": (-1, 0)})
     >>> passing = Obstacle(Disc(1.0), motion=Motion([0, 4], [[2, -4, 0], [2, 4, 0]]))
     >>> problem = Problem(robot, [2, 0, 0], [9, 0, 0], obstacles=passing)
-    >>> found = escape(problem, until=4.0)
+    >>> found = search_fail_safe(problem, until=4.0)
     >>> found.complete, found.plan.word[-1], bool(abs(found.plan.end[0] - 2.0) > 1.0)
     (True, 'rest', True)
     """
@@ -85,7 +85,7 @@ def escape(
     state = search.state
     node = int(state[kernels.BEST])
     free_until = float(search.nodes[node, 5])
-    return Escape(
+    return FailSafe(
         plan=_plan(query, search, node, rest),
         free_until=free_until,
         complete=bool(state[kernels.FOUND]),
@@ -93,14 +93,14 @@ def escape(
     )
 
 
-def _task(query: LatticeQuery, rest: int, until: float) -> kernels.EscapeTask:
+def _task(query: LatticeQuery, rest: int, until: float) -> kernels.FailSafeTask:
     library = query.library
-    quantum = float(library.arrays.edge_durations[:, 0].min())
+    shortest = float(library.arrays.edge_durations[:, 0].min())
     open_ = query.problem.bounds.x is None and query.problem.bounds.y is None
     window = np.array(query.window)
     if open_:
         window[:4] = [-math.inf, -math.inf, math.inf, math.inf]
-    return kernels.EscapeTask(
+    return kernels.FailSafeTask(
         x=float(query.start[0]),
         y=float(query.start[1]),
         heading=float(query.start[2]),
@@ -111,16 +111,16 @@ def _task(query: LatticeQuery, rest: int, until: float) -> kernels.EscapeTask:
         margin=float(query.margin),
         cell=CELL * library.radius,
         headings=HEADINGS,
-        tick=quantum,
-        longest=LONGEST * quantum,
+        tick=shortest,
+        longest=LONGEST * shortest,
         impatience=IMPATIENCE,
         window=window,
     )
 
 
-def _arrays(n: int) -> kernels.EscapeArrays:
+def _arrays(n: int) -> kernels.FailSafeArrays:
     """Room for `n` nodes, a power of two."""
-    return kernels.EscapeArrays(
+    return kernels.FailSafeArrays(
         nodes=np.empty((n, 6)),
         links=np.empty((n, 2), dtype=np.int64),
         cells=np.full(4 * n, kernels.EMPTY),
@@ -130,8 +130,8 @@ def _arrays(n: int) -> kernels.EscapeArrays:
     )
 
 
-def _plan(query: LatticeQuery, search: kernels.EscapeArrays, node: int, rest: int) -> Plan:
-    """The way to a node, and rest there as long as it is free."""
+def _plan(query: LatticeQuery, search: kernels.FailSafeArrays, node: int, rest: int) -> Plan:
+    """The path to a node, and rest there as long as it is free."""
     problem = query.problem
     edges: list[tuple[int, float]] = []
     if rest >= 0:
@@ -145,9 +145,9 @@ def _plan(query: LatticeQuery, search: kernels.EscapeArrays, node: int, rest: in
 
 
 @functools.cache
-def load_escape() -> None:
+def load_fail_safe() -> None:
     """Have the kernels ready before the clock runs."""
     from maneuver_automaton.search.ready import smallest_lattice_query
 
     problem = smallest_lattice_query().problem
-    stands_free(problem, escape(problem, until=1.0).plan.end, time=1.0, duration=1.0)
+    stands_free(problem, search_fail_safe(problem, until=1.0).plan.end, time=1.0, duration=1.0)

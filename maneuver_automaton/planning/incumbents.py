@@ -1,0 +1,207 @@
+"""Plans that were found and passed every check, and the answer that is made of them."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.audit import Audit, TerminalError, terminal_error
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.same_motion import CONVERGED, Likeness, is_new, same_motion
+from maneuver_automaton.planning.checking import Condition, check_plan
+from maneuver_automaton.planning.result import Alternative, PlanResult, PlanStatus
+from maneuver_automaton.planning.workspace import Workspace
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.refinement.conditions import broken_condition
+from maneuver_automaton.refinement.fitting import fitted_plans, padded
+from maneuver_automaton.search.budget import Budget
+
+CHEAPER = 1e-7  # share of a cost that closing the end of a plan may change it by
+LATE = 8  # plans that may be refused once the time is over, before no other is checked
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Accepted:
+    """A plan that passed every check."""
+
+    plan: Plan
+    goal_index: int
+    cost: float
+    audit: Audit
+
+    @property
+    def rank(self) -> tuple[float, int]:
+        """Its place among others: by cost, then by the number of its trims."""
+        return float(f"{self.cost:.9g}"), len(self.plan.trims)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidate:
+    """A plan that has still to be checked; it is made when it is its turn."""
+
+    cost: float
+    goal_index: int
+    plan: Callable[[], Plan]
+    proven: bool = True  # the search took it to be free
+
+
+@dataclass(slots=True, eq=False)
+class Incumbents:
+    """What was found for a problem, cheapest first: checked, each motion once, with its cost.
+
+    This is the one place where a plan is refused, and a plan that breaks any condition of the
+    problem is: horizon, limits of its trims, bounds, obstacles, zones, goal and dynamics.
+    """
+
+    problem: Problem
+    budget: Budget
+    workspace: Workspace
+    alternatives: int = 0  # that are asked for beside the cheapest plan
+    likeness: Likeness = CONVERGED  # of plans that count as one motion
+    plans: list[Accepted] = field(default_factory=list)
+    improvements: list[tuple[float, float]] = field(default_factory=list)  # seconds, cost
+    counts: Counter[str] = field(default_factory=Counter)
+    refused: Counter[Condition] = field(default_factory=Counter)
+    reasons: dict[Condition, str] = field(default_factory=dict)  # the first of each kind
+    misfits: list[tuple[Plan, int]] = field(default_factory=list)  # of no times that would do
+    heard: float = math.inf  # cost of the cheapest plan that a search took to be free
+    checking: float = 0.0  # [s] that the checks took
+
+    @property
+    def cost(self) -> float:
+        """Cost of the cheapest plan, an upper bound; inf if there is none."""
+        return self.plans[0].cost if self.plans else math.inf
+
+    @property
+    def why_refused(self) -> str:
+        """Why the first plan was refused; empty if none was."""
+        return next(iter(self.reasons.values()), "")
+
+    @property
+    def rejected(self) -> int:
+        """How many plans were refused for more than their times."""
+        return self.refused.total() - self.refused[Condition.WORD]
+
+    def hear(self, cost: float, *, at: float | None = None) -> None:
+        """Note what a search has found `at` a time [s], now if omitted; it is checked later."""
+        if cost < self.heard:
+            self.heard = cost
+            self.improvements.append((self.budget.elapsed if at is None else at, cost))
+
+    def offer(self, plan: Plan, goal_index: int, *, proven: bool = True) -> bool:
+        """Keep a plan, or one of the same word that meets the horizon, if it passes the checks.
+
+        Whether one passed them; what was not `proven` free may hit something without a word.
+        """
+        none_fits = True
+        for fitted in fitted_plans(self.problem, plan, self.problem.goals[goal_index]):
+            none_fits = False
+            if self._keep(fitted, goal_index, proven=proven):
+                return True
+        if none_fits and proven:
+            self._refuse(Condition.WORD, broken_condition(self.problem, padded(self.problem, plan)))
+            self.misfits.append((plan, goal_index))
+        return False
+
+    def offer_in_turn(self, candidates: Iterable[Candidate]) -> None:
+        """Check candidates, the cheapest first, until there are as many plans as are asked for.
+
+        The checks of an answer come after the time limit, so they go on once the time is over; but
+        only a few plans may then be refused.
+        """
+        late = 0
+        for one in sorted(candidates, key=lambda one: float(f"{one.cost:.9g}")):
+            if len(self.plans) > self.alternatives or late == LATE:
+                return
+            plan = one.plan()
+            if not is_new(plan, (other.plan for other in self.plans), self.likeness):
+                continue
+            if not self.offer(plan, one.goal_index, proven=one.proven):
+                late += one.proven and self.budget.is_over
+
+    def _keep(self, plan: Plan, goal_index: int, *, proven: bool) -> bool:
+        """Keep a plan if it passes the checks; of one motion only the cheapest plan stays."""
+        begin = time.monotonic()
+        goal = self.problem.goals[goal_index]
+        checked = check_plan(self.problem, plan, goal, self.workspace)
+        self.checking += time.monotonic() - begin
+        if checked.broken is not None or checked.audit is None:
+            if proven:
+                self._refuse(checked.broken or Condition.AUDIT, checked.reason)
+            return False
+        cost = self.problem.cost_of(plan)
+        one = Accepted(plan=plan, goal_index=goal_index, cost=cost, audit=checked.audit)
+        same = [other for other in self.plans if same_motion(plan, other.plan, self.likeness)]
+        if not any(other.rank <= one.rank for other in same):
+            others = [other for other in self.plans if other not in same]
+            self.plans = sorted([*others, one], key=lambda other: other.rank)
+            if self.plans[0] is one and cost < self.heard * (1.0 - CHEAPER):
+                self.improvements.append((self.budget.elapsed, cost))
+        return True
+
+    def _refuse(self, broken: Condition, reason: str) -> None:
+        self.refused[broken] += 1
+        self.reasons.setdefault(broken, reason)
+
+    def found(
+        self,
+        *,
+        bound: float,
+        searched: float | None = None,
+        certificate: float | None = None,
+        nodes: Array | None = None,
+    ) -> PlanResult:
+        """The answer where there are plans; no plan at all costs less than `bound`.
+
+        The search lasted until `searched` [s], or until the first plan.
+        """
+        best, *others = self.plans[: self.alternatives + 1]
+        bound = min(best.cost, bound)
+        first = self.improvements[0][0]
+        return PlanResult(
+            problem=self.problem,
+            status=PlanStatus.FOUND,
+            reason="",
+            plan=best.plan,
+            goal_index=best.goal_index,
+            cost=best.cost,
+            lower_bound=bound,
+            gap=(best.cost - bound) / best.cost if bound < best.cost else 0.0,
+            certificate=certificate,
+            terminal_error=self._terminal_error(best),
+            clearance_m=best.audit.min_clearance_m,
+            audit=best.audit,
+            alternatives=tuple(
+                Alternative(
+                    plan=other.plan, cost=other.cost, terminal_error=self._terminal_error(other)
+                )
+                for other in others
+            ),
+            timing_s=self._timing(first if searched is None else searched) | {"first_plan": first},
+            counts=dict(self.counts),
+            improvements=tuple(self.improvements),
+            nodes=nodes,
+        )
+
+    def none(self, status: PlanStatus, reason: str, *, nodes: Array | None = None) -> PlanResult:
+        """The answer where there is no plan."""
+        return PlanResult(
+            problem=self.problem,
+            status=status,
+            reason=reason,
+            timing_s=self._timing(max(self.budget.elapsed - self.checking, 0.0)),
+            counts=dict(self.counts),
+            nodes=nodes,
+        )
+
+    def _terminal_error(self, one: Accepted) -> TerminalError:
+        """How far its last pose is from its goal."""
+        return terminal_error(one.plan, self.problem.goals[one.goal_index])
+
+    def _timing(self, searched: float) -> dict[str, float]:
+        refined = max(self.budget.elapsed - searched - self.checking, 0.0)
+        return {"search": searched, "refine": refined, "audit": self.checking}

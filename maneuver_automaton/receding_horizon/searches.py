@@ -1,0 +1,61 @@
+"""Which search a step uses: the one that knows the vehicle's trims and what is in their way."""
+
+from __future__ import annotations
+
+from maneuver_automaton.planning.among_obstacles import library_table
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.receding_horizon.among_obstacles import AmongObstacles, as_it_stands
+from maneuver_automaton.receding_horizon.decision import StepSearch
+from maneuver_automaton.receding_horizon.failsafe_search import load_fail_safe
+from maneuver_automaton.receding_horizon.in_free_space import InFreeSpace
+from maneuver_automaton.receding_horizon.log import Guarantee, Step
+from maneuver_automaton.receding_horizon.over_maneuvers import (
+    OverManeuvers,
+    needs_maneuvers,
+    with_trims_at_ends,
+)
+from maneuver_automaton.receding_horizon.settings import Settings
+from maneuver_automaton.receding_horizon.situation import Situation
+from maneuver_automaton.refinement.ready import load_lattice
+from maneuver_automaton.search.choose import load_search as load_words
+from maneuver_automaton.search.maneuver_ready import load_maneuver_kernels
+from maneuver_automaton.search.maneuver_words import load_maneuver_words
+from maneuver_automaton.search.ready import load_times_kernels
+
+
+def started(
+    settings: Settings,
+    here: Problem,
+    last: Step | None,
+    *,
+    passed: float,
+    began: float,
+    changed: bool,
+) -> tuple[Situation, StepSearch]:
+    """A step under way, and where its plans come from; the parameters are those of `Situation`."""
+    maneuvers, broken = needs_maneuvers(here), ""
+    if maneuvers:
+        here = with_trims_at_ends(here)
+    elif here.obstacles:
+        here, broken = as_it_stands(here)
+    now = Situation(settings, here, last, passed=passed, began=began, changed=changed)
+    if broken:
+        now.flag(Guarantee.SAFETY, broken)
+    if maneuvers:
+        return now, OverManeuvers(now)
+    return now, AmongObstacles(now) if here.obstacles else InFreeSpace(now)
+
+
+def load_search(problem: Problem) -> None:
+    """Have ready what a step needs for a problem, before its clock runs."""
+    load_times_kernels()
+    if needs_maneuvers(problem):
+        load_maneuver_words()
+        if problem.obstacles or problem.zones:
+            load_maneuver_kernels()
+    elif problem.obstacles:
+        load_lattice()
+        load_fail_safe()
+        library_table(problem)
+    else:
+        load_words(problem)

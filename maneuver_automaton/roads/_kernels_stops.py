@@ -1,0 +1,53 @@
+"""Fail-safe stops: full braking from a state, proven free tick by tick."""
+
+from __future__ import annotations
+
+import math
+
+from maneuver_automaton._compile import bare_inner_kernel
+from maneuver_automaton.roads._kernels_free import free_tick
+from maneuver_automaton.roads._kernels_motion import one_tick
+
+
+@bare_inner_kernel
+def stop_with(horizon, x, y, heading, speed, steering, share, tick, controls, begin):
+    """Try to stop from a state, steering to a share of the sharpest angle; ticks, or -1 if hit.
+
+    The share is of the angle that the speed at each moment admits, and the steering follows at its
+    rate; nan holds the angle. Rows of `controls` (n, 2) from `begin` on are written.
+    """
+    car, limits = horizon.clearing.car, horizon.limits
+    k = 0
+    while speed > 0.0:
+        if begin + k >= controls.shape[0]:
+            return -1
+        slower = max(speed - car.braking * limits.tick, 0.0)
+        square = max(speed * speed, 1.0)
+        sharpest = min(math.atan(limits.lateral * limits.wheelbase / square), limits.sharpest)
+        rate = (share * sharpest - steering) / limits.tick
+        if share != share:  # nan
+            rate = 0.0
+        rate = min(max(rate, -limits.rate), limits.rate)
+        acceleration = (slower - speed) / limits.tick
+        n_x, n_y, n_heading, _, n_steering = one_tick(
+            car.wheelbase, limits.tick, x, y, heading, speed, steering, acceleration, rate
+        )
+        if not free_tick(horizon.clearing, x, y, heading, n_x, n_y, n_heading, tick + k):
+            return -1
+        controls[begin + k, 0], controls[begin + k, 1] = acceleration, rate
+        x, y, heading, speed, steering = n_x, n_y, n_heading, slower, n_steering
+        k += 1
+    return k
+
+
+@bare_inner_kernel
+def first_free_stop(horizon, x, y, heading, speed, steering, tick, shares, controls, begin):
+    """Ticks of the first of the stops that is free, -1 if none is.
+
+    `shares` (n,) are in the order in which stops are tried, the gentle ones first.
+    """
+    for k in range(shares.shape[0]):
+        n = stop_with(horizon, x, y, heading, speed, steering, shares[k], tick, controls, begin)
+        if n >= 0:
+            return n
+    return -1

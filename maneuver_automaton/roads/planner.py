@@ -1,0 +1,288 @@
+"""One step of driving: the tail of the last plan, a search for a better one, the choice."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.roads import (
+    _kernels_beam,
+    _kernels_costs,
+    _kernels_free,
+    _kernels_goals,
+    _kernels_library,
+    _kernels_motion,
+)
+from maneuver_automaton.roads._kernels_beam import BeamArrays, Horizon, HorizonTask
+from maneuver_automaton.roads.clearing import clearing_of
+from maneuver_automaton.roads.decision import RoadDecision, RoadSettings
+from maneuver_automaton.roads.library import RoadLibrary, road_library, tick_of
+from maneuver_automaton.roads.plans import plan_of_controls
+from maneuver_automaton.roads.route import Route, route_of
+from maneuver_automaton.roads.scene import RoadScene
+from maneuver_automaton.roads.search_arrays import (
+    beam_arrays,
+    goal_arrays,
+    route_arrays,
+    static_obstacles,
+    weights_of,
+)
+from maneuver_automaton.roads.vehicle import RoadVehicle
+
+CELL, TURN_CELL, SPEED_CELL = 0.5, 0.06, 2.0  # [m], [rad], [m/s] of equal nodes
+SHARES = (math.nan, 0.0, 0.2, -0.2, 0.5, -0.5, 1.0, -1.0)  # of steering while it stops; nan: held
+SHARE = 0.25  # of the nodes of a level that one strip along the route may hold
+LONGEST_STOP = 12.0  # [s]
+DIGITS = 9  # of the numbers of a scene [m, rad]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RoadPlanner:
+    """All that planning needs on one scene, made once.
+
+    States and plans are seen from `frame`, the start of the rear axle, so that a moved scene has
+    the moved plans.
+    """
+
+    scene: RoadScene  # as it was given
+    frame: Array  # (3,) [m, m, rad]
+    local: RoadScene  # the scene seen from the frame
+    vehicle: RoadVehicle
+    settings: RoadSettings
+    route: Route
+    library: RoadLibrary
+    horizon: Horizon
+    room: BeamArrays = field(repr=False)
+
+    @property
+    def tick(self) -> float:
+        """Time between two plans [s]."""
+        return self.library.limits.tick
+
+    @property
+    def last_tick(self) -> int:
+        """Tick at which the last goal is over."""
+        return int(self.horizon.goals.tick[:, 1].max())
+
+    @property
+    def start_state(self) -> Array:
+        """State (5,) at the beginning: x, y, heading of the rear axle, speed, steering."""
+        start = self.local.start
+        steering = self.vehicle.steering_of(start.speed, start.turn_rate)
+        return np.array([*self.vehicle.rear_of(start.middle), start.speed, steering])
+
+    def world(self, poses: ArrayLike) -> Array:
+        """Poses (..., 3) in the coordinates of the scene as it was given."""
+        return (SE2(self.frame) @ SE2(np.asarray(poses))).pose
+
+    def time_of(self, tick: int) -> float:
+        """Time of a tick [s]."""
+        return self.scene.start.time + self.tick * tick
+
+    def at_goal(self, state: Array, *, tick: int) -> bool:
+        """Whether a state (5,) at a tick is within a goal, as `GoalRegion` says.
+
+        Goals are looked at only when the scene's own clock ticks.
+        """
+        if tick % self.horizon.goals.every:
+            return False
+        middle = self.vehicle.middle_of(state[:3])
+        return any(
+            goal.contains(middle, speed=float(state[3]), time=self.time_of(tick))
+            for goal in self.local.goals
+        )
+
+    def wider(self, width: int) -> RoadPlanner:
+        """The same planner with another width of its search."""
+        settings = replace(self.settings, width=width)
+        return replace(self, settings=settings, room=beam_arrays(settings, self.library))
+
+    def warm(self) -> None:
+        """Compile the kernels and touch the room, before time counts."""
+        first, _ = self.decide(self.start_state, tick=0, tail=None)
+        self.decide(first.states[1], tick=1, tail=first.tail())
+
+    def plan_of(self, state: Array, controls: Array, *, tick: int = 0) -> Plan:
+        """The plan from a state (5,) at a tick under controls (n, 2), as the scene was given."""
+        placed = np.concatenate([self.world(state[:3]), state[3:]])
+        return plan_of_controls(
+            self.vehicle.model,
+            placed,
+            controls,
+            tick=self.tick,
+            start_time=self.time_of(tick),
+        )
+
+    def decide(
+        self, state: Array, *, tick: int, tail: RoadDecision | None
+    ) -> tuple[RoadDecision, bool]:
+        """What to do from a state (5,) at a tick, and whether it is not the tail of the last plan.
+
+        The `tail` of the last plan is proven again from where the vehicle is, and kept unless a
+        new plan is better. A motion that is not free is driven only where none is: then braking.
+        """
+        old = None if tail is None else self._again(state, tail)
+        settled = old is not None and old.reaches
+        new = self.search(state, tick=tick, narrow=settled)
+        if old is None:
+            return (self._emergency(state, tick) if new is None else new), True
+        if new is None or not self._better(new, old):
+            return old, False
+        return new, True
+
+    def search(self, state: Array, *, tick: int, narrow: bool = False) -> RoadDecision | None:
+        """A new plan from a state (5,) with a fail-safe stop after it; None if none was found.
+
+        A vehicle at rest from which no motion is free stands, as long as standing is free.
+        """
+        library, settings = self.library, self.settings
+        until = min(tick + round(settings.horizon_s / self.tick), self.last_tick)
+        if until <= tick:
+            return None
+        x, y, heading, speed, steering = state.tolist()
+        width = min(settings.narrow, settings.width) if narrow else settings.width
+        task = HorizonTask(
+            x=x,
+            y=y,
+            heading=heading,
+            speed=speed,
+            steering=steering,
+            tick=tick,
+            until=until,
+            cell=CELL,
+            turn_cell=TURN_CELL,
+            speed_cell=SPEED_CELL,
+            width=width,
+            abreast=max(math.ceil(SHARE * width), 1),
+            greed=settings.greed,
+        )
+        first = _kernels_library.maneuvers_from(library.limits, library.trims, speed, steering)
+        stop = math.ceil(LONGEST_STOP / self.tick)
+        controls = np.zeros((until - tick + library.limits.ticks + stop, 2))
+        reaches, n, whole = _kernels_beam.search_beam(
+            task,
+            self.horizon,
+            first,
+            self.room,
+            np.array(SHARES),
+            controls,
+        )
+        if whole == 0:
+            standing = self._standing(state, tick)
+            free = _kernels_free.free_ticks(self.horizon.clearing, np.array(standing.states), tick)
+            return standing if free else None
+        if whole < 0:
+            return None
+        return self._of_controls(state, tick, controls[:whole], n, reaches=reaches)
+
+    def _standing(self, state: Array, tick: int) -> RoadDecision:
+        """A tick of rest."""
+        return self._of_controls(state, tick, np.zeros((1, 2)), 0, reaches=False)
+
+    def _of_controls(
+        self, state: Array, tick: int, controls: Array, lasting: int, *, reaches: bool
+    ) -> RoadDecision:
+        model = self.vehicle.model
+        states = _kernels_motion.driven(
+            model.wheelbase, self.tick, np.array(state), np.array(controls)
+        )
+        return RoadDecision(
+            tick=tick, states=states, controls=controls, lasting=lasting, reaches=reaches
+        )
+
+    def _again(self, state: Array, tail: RoadDecision) -> RoadDecision | None:
+        """The tail of a plan from where the vehicle is; None if it is not free any more."""
+        if not len(tail.controls):
+            return None
+        plan = self._of_controls(
+            state, tail.tick, tail.controls, tail.lasting, reaches=tail.reaches
+        )
+        free = _kernels_free.free_ticks(self.horizon.clearing, np.array(plan.states), plan.tick)
+        if free < len(plan.controls):
+            return None
+        if plan.reaches:
+            until = np.array(plan.states[: plan.lasting + 1])
+            if _kernels_goals.first_goal(self.horizon, until, plan.tick) < 0:
+                return None
+        return plan
+
+    def _better(self, new: RoadDecision, old: RoadDecision) -> bool:
+        """Whether a new plan is worth leaving the old one for."""
+        if new.reaches != old.reaches:
+            return new.reaches
+        if new.stops != old.stops:
+            return new.stops
+        if not new.reaches:
+            # It looks a tick further, unless nothing better than to stop at once was found.
+            return new.lasting > 0 or not old.lasting
+        return self.price(new) < (1.0 - self.settings.gain) * self.price(old)
+
+    def price(self, plan: RoadDecision, *, ticks: int | None = None) -> float:
+        """Cost of a plan, or of its first ticks, its stop left out."""
+        n = plan.lasting if ticks is None else ticks
+        return float(
+            _kernels_costs.price(
+                self.horizon, np.array(plan.states[: n + 1]), np.array(plan.controls[:n])
+            )
+        )
+
+    def _emergency(self, state: Array, tick: int) -> RoadDecision:
+        """Full braking straight on, free or not."""
+        braking, speeds = self.vehicle.model.max_acceleration, [float(state[3])]
+        while speeds[-1] > 0.0:
+            speeds.append(max(speeds[-1] - braking * self.tick, 0.0))
+        rates = np.diff(speeds) / self.tick
+        controls = np.stack([rates, np.zeros_like(rates)], axis=-1).reshape(-1, 2)
+        if not len(controls):
+            return self._standing(state, tick)
+        return self._of_controls(state, tick, controls, 0, reaches=False)
+
+
+def road_planner(
+    scene: RoadScene, vehicle: RoadVehicle | None = None, settings: RoadSettings | None = None
+) -> RoadPlanner:
+    """Everything for driving on a scene, made once."""
+    vehicle, settings = vehicle or RoadVehicle(), settings or RoadSettings()
+    top = min(max(settings.top_speed, math.ceil(scene.start.speed)), vehicle.model.max_speed)
+    tick = tick_of(scene.step)
+    library = road_library(vehicle, top_speed=top, tick=tick)
+    frame = vehicle.rear_of(scene.start.middle)
+    local = scene.moved(SE2(frame).inverse(), digits=DIGITS)
+    route = route_of(local)
+    last = scene.last_time if math.isfinite(scene.last_time) else scene.start.time + 60.0
+    lasting = last - scene.start.time + settings.horizon_s + LONGEST_STOP
+    clearing = clearing_of(
+        local,
+        vehicle,
+        tick=tick,
+        last_tick=math.ceil(lasting / tick),
+        off_edge=settings.off_edge_m,
+        off_traffic=settings.off_traffic_m,
+    )
+    horizon = Horizon(
+        clearing=clearing,
+        limits=library.limits,
+        trims=library.trims,
+        maneuvers=library.maneuvers,
+        route=route_arrays(route),
+        goals=goal_arrays(local, route, tick=tick),
+        obstacles=static_obstacles(local, route, vehicle),
+        weights=weights_of(scene, vehicle),
+    )
+    return RoadPlanner(
+        scene=scene,
+        frame=frame,
+        local=local,
+        vehicle=vehicle,
+        settings=settings,
+        route=route,
+        library=library,
+        horizon=horizon,
+        room=beam_arrays(settings, library),
+    )

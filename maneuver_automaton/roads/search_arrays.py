@@ -1,0 +1,140 @@
+"""What the beam search sees of a scene, laid out once: goals, static obstacles, weights, room."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.roads._kernels_beam import BeamArrays
+from maneuver_automaton.roads._kernels_costs import StaticObstacles, Weights
+from maneuver_automaton.roads._kernels_goals import GoalArrays
+from maneuver_automaton.roads._kernels_route import RouteArrays
+from maneuver_automaton.roads.decision import RoadSettings
+from maneuver_automaton.roads.goal_region import GoalRegion, outlines_of
+from maneuver_automaton.roads.lanelets import drivable_area
+from maneuver_automaton.roads.library import RoadLibrary
+from maneuver_automaton.roads.route import SPACING, Route, extent_on
+from maneuver_automaton.roads.scene import RoadScene
+from maneuver_automaton.roads.vehicle import RoadVehicle
+
+CHILDREN = 64  # rows for the children of a node
+STRIPS = 17  # along the route, side by side
+FAR_TICK = 1 << 40  # of a goal without a last time
+
+
+def route_arrays(route: Route) -> RouteArrays:
+    """The route for the kernels."""
+    return RouteArrays(
+        point=np.array(route.points),
+        heading=np.array(route.heading),
+        direction=np.stack([np.cos(route.heading), np.sin(route.heading)], axis=-1),
+        limit=np.array(route.limit),
+        spacing=SPACING,
+    )
+
+
+def goal_arrays(scene: RoadScene, route: Route, *, tick: float) -> GoalArrays:
+    """Goals for the kernels; times as ticks [s] from the start of the scene."""
+    rings = [outlines_of(goal.places or ()) for goal in scene.goals]
+    flat = [ring for group in rings for ring in group]
+    start = scene.start.time
+    ticks, headings, speeds = [], [], []
+    for goal in scene.goals:
+        end = (goal.time[1] - start) / tick
+        ticks.append(
+            (
+                max(math.ceil((goal.time[0] - start) / tick - 1e-6), 0),
+                math.floor(end + 1e-6) if math.isfinite(end) else FAR_TICK,
+            )
+        )
+        low, high = goal.heading or (0.0, 2.0 * math.pi)
+        headings.append((low, min(high - low, 2.0 * math.pi)))
+        speeds.append(goal.speed or (-math.inf, math.inf))
+    return GoalArrays(
+        corner=np.concatenate(flat) if flat else np.zeros((0, 2)),
+        ring=np.cumsum([0, *(len(ring) for ring in flat)]).astype(np.int64),
+        place=np.cumsum([0, *(len(group) for group in rings)]).astype(np.int64),
+        anywhere=np.array([goal.places is None for goal in scene.goals]),
+        heading=np.array(headings),
+        speed=np.array(speeds),
+        tick=np.array(ticks, dtype=np.int64),
+        every=round(scene.step / tick),
+        extent=np.array(route.extents),
+        turned=np.array(
+            [_turned(goal, at, route) for goal, at in zip(scene.goals, route.extents, strict=True)]
+        ),
+    )
+
+
+def static_obstacles(scene: RoadScene, route: Route, vehicle: RoadVehicle) -> StaticObstacles:
+    """Static obstacles on the route, grown by the vehicle's half length and half width."""
+    import shapely
+
+    area = drivable_area(scene.lanelets)
+    grown = 0.5 * np.array([-vehicle.length, vehicle.length, -vehicle.width, vehicle.width])
+    extents, passable = [], []
+    for one in scene.traffic:
+        if one.motion is not None:
+            continue
+        extent = extent_on(outlines_of((one.shape,)), route)
+        middle = min(max(round(0.5 * (extent[0] + extent[1]) / SPACING), 0), len(route.points) - 1)
+        aside = np.array([-np.sin(route.heading[middle]), np.cos(route.heading[middle])])
+        extents.append(extent + grown)
+        beside = [
+            shapely.Point(route.points[middle] + offset * aside).buffer(0.5 * vehicle.width)
+            for offset in extents[-1][2:]
+        ]
+        passable.append([bool(area.covers(place)) for place in beside])
+    return StaticObstacles(
+        extent=np.array(extents).reshape(-1, 4),
+        passable=np.array(passable, dtype=bool).reshape(-1, 2),
+    )
+
+
+def _turned(goal: GoalRegion, extent: Array, route: Route) -> tuple[float, float]:
+    """Headings of a goal, seen from the route's direction in the middle of the goal."""
+    if goal.heading is None or not np.isfinite(extent).all():
+        return -math.inf, math.inf
+    low, high = goal.heading
+    middle = round(0.5 * (extent[0] + extent[1]) / SPACING)
+    ahead = float(route.heading[min(max(middle, 0), len(route.heading) - 1)])
+    center = math.remainder(0.5 * (low + high) - ahead, 2.0 * math.pi)
+    return center - 0.5 * (high - low), center + 0.5 * (high - low)
+
+
+def weights_of(scene: RoadScene, vehicle: RoadVehicle) -> Weights:
+    """What the drive costs per second; without a place to go it keeps the speed it has."""
+    placed = any(goal.places is not None for goal in scene.goals)
+    return Weights(
+        offset=0.05,
+        turned=1.0,
+        hurry=0.2,
+        pace=0.02,
+        progress=math.nan if placed else scene.start.speed,
+        ahead=0.05,
+        aside=0.05,
+        lateral=vehicle.lateral,
+        braking=vehicle.model.max_acceleration,
+        gain=vehicle.engine,
+    )
+
+
+def beam_arrays(settings: RoadSettings, library: RoadLibrary) -> BeamArrays:
+    """Room for the nodes of one search."""
+    limits = library.limits
+    levels = round(settings.horizon_s / limits.tick) // limits.ticks + 1
+    nodes = CHILDREN * settings.width * levels + 1024
+    return BeamArrays(
+        pose=np.empty((nodes, 4)),
+        links=np.empty((nodes, 4), dtype=np.int64),
+        kept=np.empty((levels, settings.width), dtype=np.int64),
+        counts=np.zeros(levels, dtype=np.int64),
+        strips=np.zeros(STRIPS, dtype=np.int64),
+        cells=np.empty(1 << (64 * settings.width).bit_length(), dtype=np.int64),
+        heap_key=np.empty(nodes),
+        heap_node=np.empty(nodes, dtype=np.int64),
+        reached=np.zeros((2, 3)),
+        state=np.zeros(4, dtype=np.int64),
+    )

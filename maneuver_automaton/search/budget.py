@@ -1,0 +1,69 @@
+"""What may be spent on a search: time by one clock, and expansions."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Budget:
+    """Time until a deadline, and expansions, that a search and all its stages may take together.
+
+    Examples
+    --------
+    >>> budget = Budget.from_now(10.0, expansions=500)
+    >>> budget.is_over, budget.less(400).expansions, budget.less(600).expansions
+    (False, 100, 0)
+    >>> budget.part(0.5).deadline < budget.deadline == budget.stage(0.5).deadline
+    True
+    """
+
+    began: float  # as `time.monotonic` counts [s]
+    deadline: float  # the same clock
+    expansions: int | None = None  # that are left; None: only the time counts
+
+    @classmethod
+    def from_now(cls, seconds: float, *, expansions: int | None = None) -> Budget:
+        """So many seconds from now on."""
+        now = time.monotonic()
+        return cls(began=now, deadline=now + seconds, expansions=expansions)
+
+    @property
+    def seconds(self) -> float:
+        """All the time there was at the begin [s]."""
+        return self.deadline - self.began
+
+    @property
+    def elapsed(self) -> float:
+        """Time since the begin [s]."""
+        return time.monotonic() - self.began
+
+    @property
+    def left(self) -> float:
+        """Time that is left [s], at least 0."""
+        return max(self.deadline - time.monotonic(), 0.0)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether no time is left."""
+        return time.monotonic() >= self.deadline
+
+    def part(self, share: float, *, at_least: float = 0.0) -> Budget:
+        """A budget of its own from now on: a share of the time left, at least so many seconds."""
+        return Budget.from_now(max(share * self.left, at_least), expansions=self.expansions)
+
+    def stage(self, share: float) -> Budget:
+        """What one stage may take: a share of the time left, or all of it where work is counted.
+
+        Counted work ends every stage at the same place at every call, unless the time is over.
+        """
+        if self.expansions is not None:
+            return self
+        return replace(self, deadline=time.monotonic() + share * self.left)
+
+    def less(self, spent: int) -> Budget:
+        """What is left of it after so many expansions."""
+        if self.expansions is None:
+            return self
+        return replace(self, expansions=max(0, self.expansions - spent))

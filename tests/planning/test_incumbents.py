@@ -1,0 +1,141 @@
+"""Incumbents: no plan that breaks a condition of the problem is kept, and no motion twice."""
+
+from __future__ import annotations
+
+import functools
+import time
+from dataclasses import replace
+
+import pytest
+
+from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.collision import Box, Zone
+from maneuver_automaton.models import Unicycle
+from maneuver_automaton.planning.checking import Condition
+from maneuver_automaton.planning.incumbents import LATE, Candidate, Incumbents
+from maneuver_automaton.planning.result import PlanStatus
+from maneuver_automaton.planning.workspace import Workspace
+from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
+from maneuver_automaton.search.budget import Budget
+
+ROBOT = Automaton.of_controls(
+    Unicycle(),
+    {"rest": (0, 0), "ahead": (1, 0), "slow": (0.5, 0), "left": (0, 1), "right": (0, -1)},
+)
+FREE = Problem(ROBOT, [0, 0, 0], [4, 0, 0], footprint=Box([0.4, 0.4]))
+WALL = Box([1.0, 1.0], [2.0, 0.0])
+
+
+def driven(*trims, durations):
+    return Plan([0, 0, 0], tuple(ROBOT[name] for name in trims), durations=durations)
+
+
+AHEAD = driven("ahead", durations=[4.0])
+SLOWLY = driven("slow", durations=[8.0])
+TURNING = driven("left", "right", "ahead", durations=[0.5, 0.5, 4.0])
+
+
+TURNED = driven("ahead", "left", durations=[4.0, 1.0])
+BROKEN = {  # a problem, a plan that breaks a condition of it and has no times that would do, which
+    "horizon": (replace(FREE, horizon=Horizon(max_time=5.0)), SLOWLY, Condition.WORD),
+    "trims": (
+        replace(FREE, goals=Goal(pose=[4, 0, 1]), horizon=Horizon(max_trims=1)),
+        TURNED,
+        Condition.WORD,
+    ),
+    "bounds": (replace(FREE, bounds=Bounds(x=(-1.0, 3.0))), AHEAD, Condition.BOUNDS),
+    "obstacle": (replace(FREE, obstacles=(WALL,)), AHEAD, Condition.COLLISION),
+    "zone": (
+        replace(FREE, zones=(Zone(shape=WALL, trims=["rest"]),)),
+        AHEAD,
+        Condition.COLLISION,
+    ),
+    "goal": (replace(FREE, goals=Goal(pose=[4, 0, 1])), AHEAD, Condition.AUDIT),
+}
+
+
+def incumbents(problem, *, seconds=600.0, **more):
+    return Incumbents(problem, Budget.from_now(seconds), Workspace(problem.obstacles), **more)
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_what_breaks_a_condition_is_refused(name):
+    problem, plan, condition = BROKEN[name]
+    found = incumbents(problem)
+    assert not found.offer(plan, 0)
+    assert not found.plans
+    assert dict(found.refused) == {condition: 1}
+    assert found.why_refused == found.reasons[condition] != ""
+    assert found.rejected == (condition is not Condition.WORD)
+    assert found.misfits == ([(plan, 0)] if condition is Condition.WORD else [])
+    answer = found.none(PlanStatus.NO_PLAN, found.why_refused)
+    assert answer.plan is None
+    assert "first_plan" not in answer.timing_s
+
+
+def test_one_of_the_same_word_is_kept_if_it_meets_the_horizon():
+    problem = replace(FREE, horizon=Horizon(time=9.0))
+    found = incumbents(problem)
+    assert found.offer(driven("ahead", "rest", durations=[4.0, 0.0]), 0)
+    assert found.plans[0].plan.durations.tolist() == [4.0, 5.0]
+
+
+def test_plans_are_kept_by_cost_each_motion_once():
+    found = incumbents(FREE, alternatives=1)
+    for plan in (SLOWLY, TURNING, AHEAD, driven("ahead", "left", durations=[4.0, 1e-10])):
+        assert found.offer(plan, 0)
+    assert [one.plan for one in found.plans] == [AHEAD, TURNING, SLOWLY]
+    assert found.cost == 4.0
+    assert [cost for _, cost in found.improvements] == [8.0, 5.0, 4.0]
+    answer = found.found(bound=1.0)
+    assert (answer.plan, answer.cost, answer.gap) == (AHEAD, 4.0, 0.75)
+    assert [one.plan for one in answer.alternatives] == [TURNING]
+    assert answer.timing_s["first_plan"] == answer.timing_s["search"] == found.improvements[0][0]
+
+
+def test_candidates_are_checked_in_turn_until_there_are_enough():
+    made = []
+
+    def make(plan):
+        made.append(plan)
+        return plan
+
+    candidates = [
+        Candidate(FREE.cost_of(plan), 0, functools.partial(make, plan))
+        for plan in (SLOWLY, AHEAD, TURNING)
+    ]
+    found = incumbents(FREE, alternatives=1)
+    found.offer_in_turn(candidates)
+    assert made == [AHEAD, TURNING]
+    assert len(found.plans) == 2
+
+
+def test_what_is_not_proven_free_may_hit_something_without_a_word():
+    found = incumbents(replace(FREE, obstacles=(WALL,)))
+    assert not found.offer(AHEAD, 0, proven=False)
+    assert not found.refused
+
+
+def test_checks_ask_the_clock_too():
+    """A few plans may be refused once the time is over; then the others are left alone."""
+    problem = replace(FREE, obstacles=(WALL,))
+    over = Budget(began=time.monotonic() - 1.0, deadline=time.monotonic())
+    found = Incumbents(problem, over, Workspace(problem.obstacles))
+    hits = [
+        Candidate(1.0 + k, 0, functools.partial(driven, "ahead", durations=[3.5 + 0.01 * k]))
+        for k in range(3 * LATE)
+    ]
+    found.offer_in_turn(hits)
+    assert found.refused.total() == LATE
+    unhurried = incumbents(problem)
+    unhurried.offer_in_turn(hits)
+    assert unhurried.refused.total() == 3 * LATE
+
+
+def test_what_a_search_has_heard_of_is_an_improvement_once():
+    found = incumbents(FREE)
+    found.hear(9.0, at=0.5)
+    found.hear(9.5)
+    found.hear(4.0, at=1.5)
+    assert found.offer(AHEAD, 0)  # its end closed, it costs what the search said
+    assert found.improvements == [(0.5, 9.0), (1.5, 4.0)]

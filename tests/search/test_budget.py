@@ -1,0 +1,46 @@
+"""Time by one clock, and expansions: what is left of them, and shares of it."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from maneuver_automaton.search.budget import Budget
+
+DAY = 86400.0  # [s] no test takes as long
+
+
+def test_time_runs_from_the_begin_to_the_deadline():
+    budget = Budget.from_now(DAY)
+    assert budget.seconds == pytest.approx(DAY)
+    assert 0.0 <= budget.elapsed <= budget.seconds
+    assert 0.0 < budget.left <= DAY
+    assert not budget.is_over
+    over = Budget(began=time.monotonic() - 2.0, deadline=time.monotonic() - 1.0)
+    assert over.is_over
+    assert over.left == 0.0
+
+
+def test_a_part_has_its_own_begin_and_its_share_of_what_is_left():
+    budget = Budget.from_now(DAY, expansions=70)
+    part = budget.part(0.25)
+    assert budget.began <= part.began
+    assert part.seconds == pytest.approx(DAY / 4.0, rel=1e-2)
+    assert part.expansions == 70
+    over = Budget(began=0.0, deadline=0.0)
+    assert over.part(0.5, at_least=0.1).seconds == pytest.approx(0.1)
+
+
+def test_a_stage_takes_a_share_unless_work_is_counted():
+    timed, counted = Budget.from_now(DAY), Budget.from_now(DAY, expansions=70)
+    assert timed.stage(0.5).deadline < timed.deadline
+    assert timed.stage(0.5).began == timed.began
+    assert counted.stage(0.5) == counted
+
+
+def test_expansions_that_are_spent_are_gone():
+    budget = Budget.from_now(DAY, expansions=70)
+    assert budget.less(30).expansions == 40
+    assert budget.less(30).less(60).expansions == 0
+    assert Budget.from_now(DAY).less(10**9).expansions is None
