@@ -11,7 +11,7 @@ from maneuver_automaton.models import Unicycle
 from maneuver_automaton.words import Word
 from maneuver_automaton.words.library import library_of
 from maneuver_automaton.words.transitions import SWITCH
-from maneuver_automaton.words.word import MANEUVER, TRIM, plan_of, with_price, word_of_steps
+from maneuver_automaton.words.word import plan_of, with_price, word_of_steps
 from tests.search.automata import linked
 
 ROBOT = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "left": (1.0, 1.0)})
@@ -27,8 +27,8 @@ def test_a_kinematic_word_switches_everywhere():
 
 
 def test_trims_of_no_time_beside_switches_vanish_and_equal_neighbours_join():
-    steps = [(TRIM, 0, 1.0), (MANEUVER, SWITCH, 0.0), (MANEUVER, SWITCH, 0.0), (TRIM, 0, 2.0)]
-    word = word_of_steps(library_of(ROBOT), start_trim=0, steps=steps, targets=[1, 0], goal=0)
+    steps = [(SWITCH, 0, 1.0), (SWITCH, 1, 0.0), (SWITCH, 0, 0.0), (SWITCH, 0, 2.0)]
+    word = with_price(library_of(ROBOT), word_of_steps(steps, goal=0))
     assert (word.trims.tolist(), word.durations.tolist(), word.cost) == ([0], [3.0], 3.0)
 
 
@@ -36,8 +36,8 @@ def test_trims_of_no_time_between_maneuvers_stay():
     automaton = linked([[1.0, 0, 0], [1.0, 0, 1.0], [0.5, 0, 0]])
     library = library_of(automaton)
     (into, _), (out, _) = library.chain(0, 1)[0], library.chain(1, 2)[0]
-    steps = [(TRIM, 0, 1.0), (MANEUVER, into, 0.0), (MANEUVER, out, 0.0), (TRIM, 2, 2.0)]
-    word = word_of_steps(library, start_trim=0, steps=steps, targets=[1, 2], goal=0)
+    steps = [(SWITCH, 0, 1.0), (into, 1, 0.0), (out, 2, 0.0), (SWITCH, 2, 2.0)]
+    word = with_price(library, word_of_steps(steps, goal=0))
     assert word.trims.tolist() == [0, 1, 2]
     lasting = sum(automaton.maneuvers[k].duration for k in (into, out))
     assert word.maneuver_time == pytest.approx(lasting)
