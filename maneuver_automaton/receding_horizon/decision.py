@@ -97,7 +97,11 @@ def _there(now: Situation, search: StepSearch) -> Chosen | None:
 
 
 def _kept(now: Situation, search: StepSearch) -> Candidate | None:
-    """The first safe rest of the last plan that is no detour; else the cheapest that is safe."""
+    """The first safe rest of the last plan that is no detour; else the cheapest that is safe.
+
+    As it is, it may end within the goal's tolerance: that will do where no other is safe, and with
+    inertia before a detour.
+    """
     last = now.last
     if last is None or (now.here.moves and not last.deed.leads):
         return None
@@ -108,6 +112,9 @@ def _kept(now: Situation, search: StepSearch) -> Candidate | None:
         safe.append(now.candidate(plan, last.goal_index, origin))
         if search.improves or not now.is_detour(plan):
             return safe[-1]
+    rest = now.rest_within() if has_inertia(now.here) or not safe else None
+    if rest is not None and search.is_safe(rest):
+        return now.candidate(rest, last.goal_index, Origin.SHIFTED)
     return min(safe, key=lambda one: one.cost, default=None)
 
 

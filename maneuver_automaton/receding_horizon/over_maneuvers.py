@@ -117,10 +117,11 @@ class OverManeuvers:
         return replace(onward, start_trim=name)
 
     def otherwise(self) -> Candidate | None:
-        """What the lattice finds in what is left of the time; at first what a planner does."""
+        """What the lattice finds; where trims are switched at will, and at first, a planner."""
         first = self.now.last is None
         found = self._on_lattice() if self.anew or not first else None
-        return self._planned() if found is None and first else found
+        plans = first or not has_inertia(self.here)
+        return self._planned() if found is None and plans else found
 
     def _on_lattice(self) -> Candidate | None:
         problem = self._onward()
@@ -147,7 +148,7 @@ class OverManeuvers:
         return best
 
     def _planned(self) -> Candidate | None:
-        """The plan of a first step."""
+        """The plan that a planner finds from here."""
         now, limit = self.now, self.now.longest
         result = planned(now.here, time_limit=max(now.deadline - time.monotonic(), 1e-3))
         plan, index = result.plan, result.goal_index

@@ -234,7 +234,8 @@ class Situation:
             return
         here, goal = self.here, self.here.goals[self.last.goal_index]
         pad, under_way = self.settings.pad_of(here), self.busy > 0.0
-        if self.off_plan == 0.0 and missed(self.rest, goal) <= EXACT * self.size:
+        leads = missed(self.rest, goal) <= EXACT * self.size or within(self.rest.end, goal)
+        if self.off_plan == 0.0 and leads:
             if self.settings.margin:
                 again = same_word(here, self.rest, goal, pad=pad, under_way=under_way)
                 if again is not None and here.cost_of(again) < here.cost_of(self.rest):
@@ -243,8 +244,13 @@ class Situation:
             return
         for plan in reanchored(here, self.planned(), goal, pad=pad, under_way=under_way):
             yield plan, Origin.REANCHORED
-        if has_inertia(here) and within(self.rest.end, goal):  # others correct it at once
-            yield self.rest, Origin.SHIFTED
+
+    def rest_within(self) -> Plan | None:
+        """The rest of the last plan as it is, if it ends within the tolerance of its goal."""
+        if self.rest is None or self.last is None:
+            return None
+        goal = self.here.goals[self.last.goal_index]
+        return self.rest if within(self.rest.end, goal) else None
 
     def is_detour(self, plan: Plan) -> bool:
         """Whether a plan drives other trims than the last one, or costs more."""

@@ -195,6 +195,25 @@ def test_what_makes_no_sense_is_refused(changed, asked, message):
     assert str(error.value).startswith(message)
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.003])
+def test_a_plan_that_ends_within_the_tolerance_is_kept(noise):
+    """In a zone a vehicle without inertia ends where it likes within the goal's tolerance."""
+    robot = Automaton.of_controls(
+        Unicycle(),
+        {"rest": (0, 0), "ahead": (1, 0), "slow": (0.4, 0), "spin": (0, 1), "cw": (0, -1)},
+    )
+    goal = Goal(pose=[4.0, 1.0, 0.5], tolerance_m=0.08, tolerance_rad=0.1)
+    zone = Zone(shape=Box([1.0, 1.0], [2.0, 0.5]), max_speed=0.5)
+    problem = posed(goal, automaton=robot, zones=[zone])
+    upset = Disturbance(position_m=noise, heading_rad=noise, seed=1)
+    loop = simulate(problem, step=0.4, time_limit=3.0, steps=40, disturbance=upset)
+    assert loop.reached, loop.reason
+    assert all(audit.passed for audit in loop.audits)
+    assert goal.off(loop.steps[0].plan.end)[0] > 1e-3  # it is not the middle
+    if not noise:
+        assert [step.deed for step in loop.steps[1:]] == [Deed.KEPT] * (len(loop.steps) - 1)
+
+
 def test_told_to_stay_it_comes_back_when_it_is_pushed_out():
     push = Disturbance(pushes={12: (0.2, 0.0, 0.0)})
     loop = simulate(posed(NEAR), step=0.5, steps=30, time_limit=5.0, stay=True, disturbance=push)
