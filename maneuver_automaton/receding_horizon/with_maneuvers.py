@@ -38,13 +38,14 @@ from maneuver_automaton.receding_horizon.log import Deed, Guarantee, Origin, Ste
 from maneuver_automaton.receding_horizon.reanchoring import distance, missed
 from maneuver_automaton.receding_horizon.settings import EXACT
 from maneuver_automaton.refinement.fitting import fitted_plans
+from maneuver_automaton.search.alternatives import TIE
 from maneuver_automaton.search.inside import outside, stays_inside
 from maneuver_automaton.search.maneuver_lattice import maneuver_words, plan_of
 from maneuver_automaton.search.maneuver_problem import maneuver_problem_query, priced_transfers
 from maneuver_automaton.search.maneuver_ready import load_maneuver_kernels
 from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
 from maneuver_automaton.search.maneuver_words import load_maneuver_words
-from maneuver_automaton.search.words import TIE
+from maneuver_automaton.search.result import plan_of as plan_of_word
 from maneuver_automaton.words import TimesStatus, solve_switching_times
 
 FIRST_SHARE = 0.5  # of a step's time limit, for the words of the first step
@@ -480,7 +481,7 @@ class _Decision:
                 alternatives=OTHERS if guarded else 0,
                 ceiling=bar - driven,
             )
-            for plan in found.plans:
+            for plan in (plan_of_word(from_there, word) for word in found.solutions):
                 whole = plan if done is None or not self.busy else joined(done, plan)
                 cost = here.cost_of(whole)
                 if cost < bar and self._is_free(whole, goal):
