@@ -43,13 +43,13 @@ def same_motion(
     >>> same_motion(straight, with_a_trace), same_motion(straight, turning)
     (True, False)
     """
+    halfway = np.array([0.5 * max(one.duration, other.duration)])
+    off, turned, _, _ = _apart(one, other, halfway)
+    if off > tolerance_m + ROUNDING or turned > tolerance_rad:
+        return False  # most plans differ there, and one instant is quick to look at
     times = np.unique(np.concatenate([one.switching_times, other.switching_times]))
     times = np.sort(np.concatenate([times, 0.5 * (times[1:] + times[:-1])]))
-    here = one.pose_at(np.minimum(times, one.duration))
-    there = other.pose_at(np.minimum(times, other.duration))
-    places = [0, 1, *range(3, here.shape[-1])]
-    off = np.linalg.norm((here - there)[:, places], axis=1).max()
-    turned = np.abs(wrapped(here[:, 2] - there[:, 2])).max()
+    off, turned, here, there = _apart(one, other, times)
     size = min(1.0, max(_way(here), _way(there)))
     return bool(off <= tolerance_m * size + ROUNDING and turned <= tolerance_rad)
 
@@ -66,6 +66,15 @@ def is_new(
         same_motion(plan, other, tolerance_m=tolerance_m, tolerance_rad=tolerance_rad)
         for other in known
     )
+
+
+def _apart(one: Plan, other: Plan, times: Array) -> tuple[float, float, Array, Array]:
+    """Largest distance [m] and turn [rad] between two plans at these times, and both poses."""
+    here = one.pose_at(np.minimum(times, one.duration))
+    there = other.pose_at(np.minimum(times, other.duration))
+    places = [0, 1, *range(3, here.shape[-1])]
+    off = np.linalg.norm((here - there)[:, places], axis=1).max()
+    return float(off), float(np.abs(wrapped(here[:, 2] - there[:, 2])).max()), here, there
 
 
 def _way(poses: Array) -> float:

@@ -169,8 +169,9 @@ class _Job:
 
     def kept(self) -> list[Word]:
         """What was found and asked for, cheapest first."""
-        order = list(in_order(self.setup.word(one) for one in self.found))
-        return order if self.alternatives is None else order[: self.alternatives + 1]
+        order = sorted(self.found, key=lambda one: (one.cost, len(one.trims), one.trims))
+        asked = order if self.alternatives is None else order[: self.alternatives + 1]
+        return list(in_order(self.setup.word(one) for one in asked))
 
     def _over(self) -> bool:
         limit = self.problem.search.max_expansions
