@@ -47,7 +47,8 @@ def same_motion(
     off, turned, _, _ = _apart(one, other, halfway)
     if off > tolerance_m + ROUNDING or turned > tolerance_rad:
         return False  # most plans differ there, and one instant is quick to look at
-    times = np.unique(np.concatenate([one.switching_times, other.switching_times]))
+    switches = [plan.switching_times - plan.start_time for plan in (one, other)]
+    times = np.unique(np.concatenate(switches))
     times = np.sort(np.concatenate([times, 0.5 * (times[1:] + times[:-1])]))
     off, turned, here, there = _apart(one, other, times)
     size = min(1.0, max(_way(here), _way(there)))
@@ -69,9 +70,10 @@ def is_new(
 
 
 def _apart(one: Plan, other: Plan, times: Array) -> tuple[float, float, Array, Array]:
-    """Largest distance [m] and turn [rad] between two plans at these times, and both poses."""
-    here = one.pose_at(np.minimum(times, one.duration))
-    there = other.pose_at(np.minimum(times, other.duration))
+    """Largest distance [m] and turn [rad] between plans these times [s] after their start; poses."""
+    here, there = (
+        plan.pose_at(plan.start_time + np.minimum(times, plan.duration)) for plan in (one, other)
+    )
     places = [0, 1, *range(3, here.shape[-1])]
     off = np.linalg.norm((here - there)[:, places], axis=1).max()
     return float(off), float(np.abs(wrapped(here[:, 2] - there[:, 2])).max()), here, there
