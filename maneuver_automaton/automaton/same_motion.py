@@ -62,13 +62,14 @@ def same_motion(one: Plan, other: Plan, likeness: Likeness = CONVERGED) -> bool:
     (True, False)
     """
     switches = np.unique(np.concatenate([one.switching_times, other.switching_times]))
+    halfway = np.array([0.5 * (switches[0] + switches[-1])])
+    off, turned, _, _ = _apart(one, other, halfway)
+    if off > likeness.per_metre * likeness.most_metres + ROUNDING or turned > likeness.heading:
+        return False  # most plans differ there, and one instant is quick to look at
     middles = 0.5 * (switches[1:] + switches[:-1])
     spread = np.linspace(switches[0], switches[-1], INSTANTS)
     times = np.sort(np.concatenate([switches, middles, spread]))
-    here, there = one.pose_at(times), other.pose_at(times)  # a plan stands before and after it
-    places = [0, 1, *range(3, here.shape[-1])]
-    off = np.linalg.norm((here - there)[:, places], axis=1).max()
-    turned = np.abs(wrapped(here[:, 2] - there[:, 2])).max()
+    off, turned, here, there = _apart(one, other, times)
     size = min(likeness.most_metres, max(_path_length(here), _path_length(there)))
     return bool(off <= likeness.per_metre * size + ROUNDING and turned <= likeness.heading)
 
@@ -76,6 +77,17 @@ def same_motion(one: Plan, other: Plan, likeness: Likeness = CONVERGED) -> bool:
 def is_new(plan: Plan, known: Iterable[Plan], likeness: Likeness = CONVERGED) -> bool:
     """Whether a plan is another motion than all that are known."""
     return not any(same_motion(plan, other, likeness) for other in known)
+
+
+def _apart(one: Plan, other: Plan, times: Array) -> tuple[float, float, Array, Array]:
+    """Largest distance [m] and turn [rad] between two plans at times of the clock; their poses.
+
+    A plan stands before and after it.
+    """
+    here, there = one.pose_at(times), other.pose_at(times)
+    places = [0, 1, *range(3, here.shape[-1])]
+    off = np.linalg.norm((here - there)[:, places], axis=1).max()
+    return float(off), float(np.abs(wrapped(here[:, 2] - there[:, 2])).max()), here, there
 
 
 def _path_length(poses: Array) -> float:

@@ -45,6 +45,7 @@ from maneuver_automaton.search.maneuver_query import ManeuverQuery
 from maneuver_automaton.search.maneuver_ready import load_maneuver_kernels
 from maneuver_automaton.search.maneuver_search import maneuver_word_stages
 from maneuver_automaton.search.maneuver_words import load_maneuver_words
+from maneuver_automaton.search.result import plan_of as plan_of_word
 from maneuver_automaton.words.word import Word, word_of_plan
 
 FIRST_SHARE = 0.8  # of the time limit, for a first path
@@ -196,7 +197,7 @@ def _by_words(found: Incumbents) -> Iterator[tuple[Plan, int]]:
     problem = found.problem
     guarded = bool(problem.obstacles) or not problem.bounds.are_open
     others = max(found.alternatives, OTHERS if guarded else 0)
-    seen: list[Plan] = []
+    seen: list[Word] = []
     for index, goal in enumerate(problem.goals):
         for stage in maneuver_word_stages(
             problem,
@@ -205,10 +206,10 @@ def _by_words(found: Incumbents) -> Iterator[tuple[Plan, int]]:
             alternatives=others,
             ceiling=found.cost if others == 0 else math.inf,
         ):
-            for plan in stage.plans:
-                if not any(plan is one for one in seen):
-                    seen.append(plan)
-                    yield plan, index
+            for word in stage.solutions:
+                if not any(word is one for one in seen):
+                    seen.append(word)
+                    yield plan_of_word(problem, word), index
 
 
 def _along_paths(search: _Search) -> Iterator[tuple[Plan, int]]:

@@ -12,8 +12,8 @@ from maneuver_automaton.receding_horizon.log import Origin, first_part
 from maneuver_automaton.receding_horizon.pace import at_best_pace, base_name
 from maneuver_automaton.receding_horizon.settings import EXACT, Settings
 from maneuver_automaton.receding_horizon.shifting import costliest_first, moving_pieces, rest_of
+from maneuver_automaton.search.alternatives import TIE
 from maneuver_automaton.search.inside import outside, stays_inside
-from maneuver_automaton.search.words import TIE
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -28,10 +28,11 @@ from maneuver_automaton.receding_horizon.settings import EXACT
 from maneuver_automaton.receding_horizon.shifting import followed_by, moves_on, rested
 from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.refinement.fitting import fitted_plans
+from maneuver_automaton.search.alternatives import TIE
 from maneuver_automaton.search.maneuver_lattice import maneuver_words, plan_of
 from maneuver_automaton.search.maneuver_problem import maneuver_problem_query, priced_transfers
 from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
-from maneuver_automaton.search.words import TIE
+from maneuver_automaton.search.result import plan_of as plan_of_word
 
 FIRST_SHARE = 0.5  # of a step's time limit, for the words of the first step
 OTHERS = 3  # dearer words that are tried where the cheapest ones are not free
@@ -96,8 +97,8 @@ class OverManeuvers:
                 alternatives=OTHERS if guarded else 0,
                 ceiling=upper - committed,
             )
-            for plan in words.plans:
-                whole = now.whole(plan)
+            for word in words.solutions:
+                whole = now.whole(plan_of_word(problem, word))
                 cost = here.cost_of(whole)
                 if cost < upper and self.is_safe(whole):
                     found.append(now.candidate(whole, index, Origin.SEARCHED))

@@ -24,7 +24,7 @@ from maneuver_automaton.receding_horizon.reanchoring import (
 )
 from maneuver_automaton.receding_horizon.settings import EXACT, Settings
 from maneuver_automaton.receding_horizon.shifting import moves_on, rest_of, rested
-from maneuver_automaton.search.words import TIE
+from maneuver_automaton.search.alternatives import TIE
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -10,23 +10,24 @@ from __future__ import annotations
 import functools
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.same_motion import is_new
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.search.alternatives import distinct, in_order
 from maneuver_automaton.search.exact_end import corrected, with_fewer_digits
 from maneuver_automaton.search.library_arrays import LibraryArrays, library_arrays
-from maneuver_automaton.search.result import SearchResult, SearchStatus, plan_of
+from maneuver_automaton.search.result import SearchResult, SearchStatus
 from maneuver_automaton.search.setup import SearchSetup, search_setup
 from maneuver_automaton.search.shortening import shortened
 from maneuver_automaton.search.time_limit import UNUSED, within_time
-from maneuver_automaton.search.words import in_order, resting, search_setup_words
+from maneuver_automaton.search.timed_word import TimedWord
+from maneuver_automaton.search.words import resting, search_setup_words
 from maneuver_automaton.words.library import MovingTrims
 from maneuver_automaton.words.word import Word
 
@@ -111,7 +112,7 @@ def search_insertion(
             in_time += [one for one in more.solutions if one.duration <= most_time + LATE]
             found = more.after(found)
         found = replace(found, solutions=in_time)
-    solutions = tuple(_distinct(problem, in_order(found.solutions), most=alternatives + 1))
+    solutions = tuple(distinct(problem, found.solutions, most=alternatives + 1))
     return SearchResult(
         status=SearchStatus.FOUND if solutions else found.status,
         solutions=solutions,
@@ -169,74 +170,63 @@ def _improved(asked: _Asked, known: Plan | None) -> _Improved:
         begun = [*_as_seed(asked, known), *begun]
     counts = {"expansions": 0, "insertions": 0, "seeds": 0}
     limit = problem.search.max_expansions
-    works: list[_Work] = []
+    words: list[TimedWord] = []
     status = SearchStatus.EXHAUSTED
-    for word, times in begun:
-        if works and (time.monotonic() > deadline or (limit is not None and len(works) >= limit)):
+    rounds = FIRST_ROUNDS_OF_MANY if many else FIRST_ROUNDS
+    for seed in begun:
+        if words and (time.monotonic() > deadline or (limit is not None and len(words) >= limit)):
             status = SearchStatus.OUT_OF_BUDGET
             break
-        work = _Work(word, times)
-        work.improve(library, most, FIRST_ROUNDS_OF_MANY if many else FIRST_ROUNDS, counts)
-        works.append(work)
-    counts["expansions"] = counts["seeds"] = len(works)
-    works = sorted((work for work in works if math.isfinite(work.cost)), key=lambda w: w.cost)
-    for work in works[: max(FULL_OF_MANY if many else FULL, alternatives + 1)]:
-        if work.least < -ACCURACY * library.scale and time.monotonic() < deadline:
-            work.improve(library, most, ROUNDS, counts)
-    for work in works:
-        if work.size - library.tail >= CHATTER:
-            work.calm(library)
-    binding = not works or min(works, key=lambda w: w.cost).least < -ACCURACY * library.scale
+        words.append(_with_insertions(library, seed, most, rounds, counts))
+    counts["expansions"] = counts["seeds"] = len(words)
+    words = sorted((word for word in words if math.isfinite(word.cost)), key=_cost)
+    for k in range(min(len(words), max(FULL_OF_MANY if many else FULL, alternatives + 1))):
+        if words[k].certificate < -ACCURACY * library.scale and time.monotonic() < deadline:
+            words[k] = _with_insertions(library, words[k], most, ROUNDS, counts)
+    words = [_calmed(library, word) for word in words]
+    binding = not words or min(words, key=_cost).certificate < -ACCURACY * library.scale
     if most < LONGEST and binding and not library.free_heading and time.monotonic() < deadline:
-        works += _from_longer(library, begun, most, counts)
+        words += _from_longer(library, begun, most, counts)
     if _prices_switches(problem) and time.monotonic() < deadline:
-        works += _with_fewer_switches(library, works)
+        words += _with_fewer_switches(library, words)
     if alternatives > 0:  # the best times of a seed's own word are locally optimal, too
-        for word, times in begun:
-            work = _Work(word, times)
-            work.improve(library, most, 0, counts)
-            works.append(work)
+        words += [_with_insertions(library, seed, most, 0, counts) for seed in begun]
     if time.monotonic() > deadline:
         status = SearchStatus.OUT_OF_BUDGET
     improved = [
         solution
-        for work in works
-        if work.size - library.tail <= most
-        for solution in work.solutions(problem, library, asked.exact)
+        for word in words
+        if len(word.trims) - library.tail <= most
+        for solution in _solutions(asked, word)
         if solution.trims.size <= (problem.horizon.max_trims or LONGEST)
     ]
     return _Improved(list(in_order(improved)), status, counts)
 
 
+def _cost(word: TimedWord) -> float:
+    return word.cost
+
+
 def compile_calming(problem: Problem) -> None:
     """Have the kernel that shortens chattering words compiled, for any problem like this one."""
     library = library_arrays(problem, search_setup(problem, problem.goals[0]))
-    work = _Work(np.array([0]), np.array([1.0]))
-    work.cost = 1.0
-    work.calm(library)
+    _calmed(library, TimedWord((0,) * CHATTER, np.ones(CHATTER), cost=1.0))
 
 
 def _from_longer(
-    library: LibraryArrays,
-    begun: list[tuple[IntArray, Array]],
-    most: int,
-    counts: dict[str, int],
-) -> Iterator[_Work]:
+    library: LibraryArrays, begun: list[TimedWord], most: int, counts: dict[str, int]
+) -> Iterator[TimedWord]:
     """What becomes of the cheapest seed if it may grow first, and is shortened afterwards."""
-    grown = []
-    for word, times in begun[:GROWN]:
-        work = _Work(word, times)
-        work.improve(library, LONGEST, ROUNDS, counts)
-        if work.size >= CHATTER:
-            work.calm(library)
-        grown.append(work)
-    longer = [work for work in grown if math.isfinite(work.cost) and work.size > most]
-    for work in sorted(longer, key=lambda one: one.cost)[:1]:
-        short = shortened(library, work.word[: work.size], work.times[: work.size], most)
-        if short is not None and short.word.size <= most:
-            again = _Work(short.word, short.times)
-            again.improve(library, most, ROUNDS, counts)
-            if math.isfinite(again.cost) and again.size <= most:
+    grown = [
+        _calmed(library, _with_insertions(library, seed, LONGEST, ROUNDS, counts))
+        for seed in begun[:GROWN]
+    ]
+    longer = [word for word in grown if math.isfinite(word.cost) and len(word.trims) > most]
+    for word in sorted(longer, key=_cost)[:1]:
+        short = shortened(library, word, most)
+        if short is not None and len(short.trims) <= most:
+            again = _with_insertions(library, short, most, ROUNDS, counts)
+            if math.isfinite(again.cost) and len(again.trims) <= most:
                 yield again
 
 
@@ -246,23 +236,21 @@ def _prices_switches(problem: Problem) -> bool:
     return not isinstance(cost, Cost) or cost.switch > 0.0 or cost.direction_change > 0.0
 
 
-def _with_fewer_switches(library: LibraryArrays, works: list[_Work]) -> Iterator[_Work]:
+def _with_fewer_switches(library: LibraryArrays, words: Sequence[TimedWord]) -> Iterator[TimedWord]:
     """The words found with fewer and fewer trims: where switches cost, these may pay."""
     if library.free_heading:
         return
-    for work in works[:SHORTENED]:
-        word, times = work.word[: work.size], work.times[: work.size]
-        for most in range(work.size - 1, 0, -1):
-            short = shortened(library, word, times, most)
+    for word in words[:SHORTENED]:
+        longer = word
+        for most in range(len(word.trims) - 1, 0, -1):
+            short = shortened(library, longer, most)
             if short is None:
                 break
-            again = _Work(short.word, short.times)
-            again.cost = short.cost
-            yield again
-            word, times = short.word, short.times
+            yield short
+            longer = short
 
 
-def _as_seed(asked: _Asked, known: Plan) -> Iterator[tuple[IntArray, Array]]:
+def _as_seed(asked: _Asked, known: Plan) -> Iterator[TimedWord]:
     """A plan in the library's numbers, rest and free turn appended.
 
     None if a trim is not in the library, or the word is longer than those that are searched.
@@ -275,73 +263,79 @@ def _as_seed(asked: _Asked, known: Plan) -> Iterator[tuple[IntArray, Array]]:
             yield _in_library(asked, word, known.durations)
 
 
-class _Work:
-    """A word under way: the buffers that the kernel lengthens in place."""
+def _with_insertions(
+    library: LibraryArrays, word: TimedWord, most: int, rounds: int, counts: dict[str, int]
+) -> TimedWord:
+    """The word with its best times, after inserting what pays, at most `rounds` times."""
+    from maneuver_automaton.search import _kernels_insertion as kernels
 
-    def __init__(self, word: IntArray, times: Array) -> None:
-        self.word = np.zeros(LONGEST + 4, dtype=np.int64)
-        self.times = np.zeros(LONGEST + 4)
-        self.size = word.size
-        self.word[: self.size], self.times[: self.size] = word, times
-        self.cost, self.least = math.inf, -math.inf
+    trims, times = _with_room(word)
+    size, cost, least, used = kernels.improve_word(
+        library.twists,
+        library.rates,
+        library.goal,
+        library.rows,
+        library.targets,
+        library.n_priced,
+        library.tail,
+        trims,
+        times,
+        len(word.trims),
+        min(most, LONGEST),
+        ACCURACY * library.scale,
+        rounds,
+    )
+    counts["insertions"] += int(used)
+    return TimedWord(tuple(trims[:size].tolist()), times[:size], float(cost), float(least))
 
-    def improve(
-        self, library: LibraryArrays, most: int, rounds: int, counts: dict[str, int]
-    ) -> None:
-        """Insert what pays until nothing does, `rounds` times at most."""
-        from maneuver_automaton.search import _kernels_insertion as kernels
 
-        self.size, self.cost, self.least, used = kernels.improve_word(
-            library.twists,
-            library.rates,
-            library.goal,
-            library.rows,
-            library.targets,
-            library.n_priced,
-            library.tail,
-            self.word,
-            self.times,
-            self.size,
-            min(most, LONGEST),
-            ACCURACY * library.scale,
-            rounds,
-        )
-        counts["insertions"] += int(used)
+def _calmed(library: LibraryArrays, word: TimedWord) -> TimedWord:
+    """The word with its runs of trims that chatter shortened."""
+    from maneuver_automaton.search import _kernels_insertion as kernels
 
-    def calm(self, library: LibraryArrays) -> None:
-        """Shorten runs of trims that chatter."""
-        from maneuver_automaton.search import _kernels_insertion as kernels
+    if len(word.trims) - library.tail < CHATTER:
+        return word
+    trims, times = _with_room(word)
+    size, cost, least = kernels.calm_word(
+        library.twists,
+        library.rates,
+        library.goal,
+        library.rows,
+        library.targets,
+        library.n_priced,
+        library.tail,
+        trims,
+        times,
+        len(word.trims),
+        word.cost,
+    )
+    return TimedWord(tuple(trims[:size].tolist()), times[:size], float(cost), float(least))
 
-        self.size, self.cost, self.least = kernels.calm_word(
-            library.twists,
-            library.rates,
-            library.goal,
-            library.rows,
-            library.targets,
-            library.n_priced,
-            library.tail,
-            self.word,
-            self.times,
-            self.size,
-            self.cost,
-        )
 
-    def solutions(self, problem: Problem, library: LibraryArrays, goal: Array) -> Iterator[Word]:
-        """What it has come to, ending at `goal` itself; none if it cannot."""
-        word = self.word[: self.size]
-        times = corrected(library, word, self.times[: self.size], goal)
-        if times is None:
-            return
-        cost = float(self.cost) + float(library.rates[word] @ (times - self.times[: self.size]))
-        kept = slice(0, self.size - library.tail)
-        trims, lasting = _without_unused(library.trims[word[kept]], times[kept])
-        switching = problem.cost.switching(problem.automaton.body_velocities[trims])
-        yield Word(
-            trims=trims,
-            durations=lasting,
-            cost=cost + library.fixed_cost + switching,
-            certificate=float(self.least),
-        )
+def _with_room(word: TimedWord) -> tuple[IntArray, Array]:
+    """Trims and times in buffers that a kernel lengthens in place."""
+    trims, times = np.zeros(LONGEST + 4, dtype=np.int64), np.zeros(LONGEST + 4)
+    trims[: len(word.trims)], times[: len(word.trims)] = word.trims, word.durations
+    return trims, times
+
+
+def _solutions(asked: _Asked, word: TimedWord) -> Iterator[Word]:
+    """What a word under work has come to, ending at the goal itself; none if it cannot."""
+    problem, library = asked.problem, asked.library
+    numbers = word.numbers
+    times = corrected(library, numbers, word.durations, asked.exact)
+    if times is None:
+        return
+    cost = word.cost + float(library.rates[numbers] @ (times - word.durations))
+    kept = slice(0, numbers.size - library.tail)
+    trims, lasting = _without_unused(library.trims[numbers[kept]], times[kept])
+    switching = problem.cost.switching(problem.automaton.body_velocities[trims])
+    yield Word(
+        trims=trims,
+        durations=lasting,
+        cost=cost + library.fixed_cost + switching,
+        certificate=word.certificate,
+    )
 
 
 def _without_unused(trims: IntArray, times: Array) -> tuple[IntArray, Array]:
@@ -356,7 +350,7 @@ def _without_unused(trims: IntArray, times: Array) -> tuple[IntArray, Array]:
     return trims[begins], np.add.reduceat(times, begins)
 
 
-def _seeds(asked: _Asked) -> Iterator[tuple[IntArray, Array]]:
+def _seeds(asked: _Asked) -> Iterator[TimedWord]:
     """Cheapest words of the sub-library, in the library's numbers, rest and free turn appended."""
     found = _words_of_few(asked, asked.problem)
     if not found and asked.total is not None:
@@ -364,7 +358,7 @@ def _seeds(asked: _Asked) -> Iterator[tuple[IntArray, Array]]:
     yield from found
 
 
-def _words_of_few(asked: _Asked, problem: Problem) -> list[tuple[IntArray, Array]]:
+def _words_of_few(asked: _Asked, problem: Problem) -> list[TimedWord]:
     """Seeds of `problem` from the sub-library."""
     solutions = search_setup_words(
         problem,
@@ -376,7 +370,7 @@ def _words_of_few(asked: _Asked, problem: Problem) -> list[tuple[IntArray, Array
     return [_in_library(asked, solution.trims, solution.durations) for solution in solutions]
 
 
-def _fast_words(asked: _Asked) -> list[tuple[IntArray, Array]]:
+def _fast_words(asked: _Asked) -> list[TimedWord]:
     """For a time that no seed meets: first insert for least time, then fill up the time."""
     from maneuver_automaton.problem import Horizon
 
@@ -385,20 +379,21 @@ def _fast_words(asked: _Asked) -> list[tuple[IntArray, Array]]:
     setup = search_setup(hurry, hurry.goals[0])
     setup = replace(setup, goal=asked.setup.goal, free_heading=asked.setup.free_heading)
     library = library_arrays(hurry, setup)
-    least = replace(asked, problem=hurry, setup=setup, library=library, limit=None)
+    least = replace(
+        asked, problem=hurry, setup=setup, library=library, exact=library.goal, limit=None
+    )
     met = []
-    for word, times in _words_of_few(least, hurry):
-        work = _Work(word, times)
-        work.improve(library, LONGEST, ROUNDS, {"insertions": 0})
-        if not math.isfinite(work.cost):
+    for seed in _words_of_few(least, hurry):
+        word = _with_insertions(library, seed, LONGEST, ROUNDS, {"insertions": 0})
+        if not math.isfinite(word.cost):
             continue
-        quick = next(work.solutions(hurry, library, library.goal), None)
+        quick = next(_solutions(least, word), None)
         if quick is not None and limit is not None and quick.duration <= limit + LATE:
             met.append(_in_library(asked, quick.trims, quick.durations))
     return met
 
 
-def _in_library(asked: _Asked, trims: IntArray, durations: Array) -> tuple[IntArray, Array]:
+def _in_library(asked: _Asked, trims: IntArray, durations: Array) -> TimedWord:
     """A word of the automaton in the library's numbers, rest and free turn appended."""
     library, limit = asked.library, asked.total
     word = library.number_of[trims].tolist()
@@ -409,7 +404,7 @@ def _in_library(asked: _Asked, trims: IntArray, durations: Array) -> tuple[IntAr
     if library.free_heading:
         word.append(len(library.rates) - 1)
         times.append(_free_turn(library, word[:-1], times))
-    return np.array(word, dtype=np.int64), np.array(times)
+    return TimedWord(tuple(word), np.array(times))
 
 
 def _free_turn(library: LibraryArrays, word: list[int], times: list[float]) -> float:
@@ -461,15 +456,3 @@ def _far_reaching(library: MovingTrims) -> IntArray:
     for angle in np.arange(8) * np.pi / 4.0:
         choose(np.cos(angle) * scaled[:, 0] + np.sin(angle) * scaled[:, 2], everything)
     return np.array(list(dict.fromkeys(chosen)))
-
-
-def _distinct(problem: Problem, solutions: Iterator[Word], *, most: int) -> Iterator[Word]:
-    """The `most` cheapest motions, each with the word that comes first."""
-    known: list[Plan] = []
-    for solution in solutions:
-        if len(known) == most:
-            return
-        plan = plan_of(problem, solution)
-        if is_new(plan, known):
-            known.append(plan)
-            yield solution

@@ -20,14 +20,12 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.groups import LieGroup
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.maneuver_solution import (
-    ManeuverSearch,
-    TimedWord,
-    WordSetup,
-    word_setup,
-)
+from maneuver_automaton.search.alternatives import distinct
 from maneuver_automaton.search.maneuver_words import EXPANSIONS_A_WORD
-from maneuver_automaton.search.result import SearchStatus
+from maneuver_automaton.search.result import SearchResult, SearchStatus
+from maneuver_automaton.search.timed_word import TimedWord
+from maneuver_automaton.search.word_setup import WordSetup, word_setup
+from maneuver_automaton.words.word import Word
 
 GAIN = 1e-7  # relative: less is none
 AT_FIRST = 0.25  # [s] an inserted trim lasts before its times are solved for
@@ -40,19 +38,19 @@ FEW = 2  # trims of a word that may be taken out at once
 def improve_maneuver_words(
     problem: Problem,
     goal: Goal,
-    seeds: Sequence[tuple[Sequence[int], Array]],
+    seeds: Sequence[Word],
     *,
     time_limit: float = math.inf,
     most_tries: int = MOST_TRIES,
-) -> ManeuverSearch:
+) -> SearchResult:
     """Insert, replace, split and delete trims of words with maneuvers while that gains.
 
     Parameters
     ----------
     problem : Problem
     goal : Goal
-    seeds : sequence of (trims, durations)
-        Words that lead to the goal, by the indices of the trims between the first and the last.
+    seeds : sequence of Word
+        Words that lead from the problem's first trim to the goal and its last one.
     time_limit : float
         [s] after which the search ends with what it has; ``search.max_expansions`` of the problem
         limits it by the number of words that are solved for instead, the same at every call.
@@ -61,7 +59,7 @@ def improve_maneuver_words(
 
     Returns
     -------
-    ManeuverSearch
+    SearchResult
         One solution for each seed, cheapest first, each once. They are local optima: no single
         change that was tried is cheaper. With maneuvers of finite size no reduced cost certifies
         more than that.
@@ -74,26 +72,25 @@ def improve_maneuver_words(
     >>> robot = Automaton.of_controls(Unicycle(), controls)
     >>> goal = Goal(pose=[3.0, 0.0, 0.0], trim="slow")
     >>> problem = Problem(robot, [0, 0, 0], goal, start_trim="slow")
-    >>> found = improve_maneuver_words(problem, goal, [([0], np.array([6.0]))]).solutions[0]
-    >>> found.plan.word, found.cost
-    (('ahead',), 3.0)
+    >>> seed = Word(trims=[0], durations=[6.0])
+    >>> found = improve_maneuver_words(problem, goal, [seed]).solutions[0]
+    >>> [robot.trim_names[k] for k in found.trims], found.cost
+    (['ahead'], 3.0)
     """
     setup = word_setup(problem, goal, most_trims=MOST_TRIMS, also=_used(seeds), steers=False)
     deadline = time.monotonic() + time_limit
     climb = _Climb(setup, deadline, most_tries)
-    found: list[TimedWord] = []
-    for trims, times in seeds:
-        word = setup.solved(tuple(trims), [np.asarray(times)])
+    found: list[Word] = []
+    for seed in seeds:
+        timed = setup.timed(seed)
+        word = setup.solved(timed.trims, [timed.durations])
         if word is not None:
-            best = climb.top(word)
-            if not any(best.same_as(other) for other in found):
-                found.append(best)
+            found.append(setup.word(climb.top(word)))
         if climb.is_over():
             break
-    found.sort(key=lambda one: (float(f"{one.cost:.9g}"), len(one.trims), one.trims))
-    return ManeuverSearch(
+    return SearchResult(
         status=SearchStatus.FOUND if found else SearchStatus.EXHAUSTED,
-        solutions=tuple(setup.solution(word) for word in found),
+        solutions=tuple(distinct(problem, found, most=len(found))),
         counts={"solved": climb.solved, "changes": climb.changes},
     )
 
@@ -289,5 +286,5 @@ class _Prices:
         )
 
 
-def _used(seeds: Sequence[tuple[Sequence[int], Array]]) -> tuple[int, ...]:
-    return tuple(sorted({int(trim) for trims, _ in seeds for trim in trims}))
+def _used(seeds: Sequence[Word]) -> tuple[int, ...]:
+    return tuple(sorted({trim for seed in seeds for trim in seed.trims.tolist()}))

@@ -7,17 +7,17 @@ import time
 from collections.abc import Iterator
 
 from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.search.alternatives import distinct
 from maneuver_automaton.search.maneuver_insertion import improve_maneuver_words
-from maneuver_automaton.search.maneuver_solution import ManeuverSearch, ManeuverSolution
 from maneuver_automaton.search.maneuver_words import CLOSED_FORM, search_maneuver_words
-from maneuver_automaton.search.result import SearchStatus
+from maneuver_automaton.search.result import SearchResult, SearchStatus
+from maneuver_automaton.words.word import Word
 
 SCANNED_TRIMS = 14  # that words of four trims are made of
 SCANNED = 4  # trims of a scanned word
 SCAN_SHARE = 0.4  # of the time that is left, for scanning
 SEED_SLACK = 0.1  # share by which words may be dearer than a plan that is known, and yet be seeds
 SEEDS = 4  # words that insertion begins with
-SAME = 1e-6  # [s] durations that differ by less are the same
 
 
 def search_words_with_maneuvers(
@@ -27,7 +27,7 @@ def search_words_with_maneuvers(
     time_limit: float = math.inf,
     alternatives: int = 0,
     ceiling: float = math.inf,
-) -> ManeuverSearch:
+) -> SearchResult:
     """Plans to a goal in free space: words of up to four trims, and what insertion makes of them.
 
     Parameters
@@ -47,7 +47,7 @@ def search_words_with_maneuvers(
 
     Returns
     -------
-    ManeuverSearch
+    SearchResult
         Locally optimal words, cheapest first.
 
     Examples
@@ -58,8 +58,9 @@ def search_words_with_maneuvers(
     >>> robot = Automaton.of_controls(Unicycle(), controls)
     >>> goal = Goal(pose=[3.0, 1.0, 0.0], trim="ahead")
     >>> problem = Problem(robot, [0, 0, 0], goal, start_trim="ahead")
-    >>> search_words_with_maneuvers(problem, goal).plans[0].word
-    ('left', 'ahead', 'right')
+    >>> best = search_words_with_maneuvers(problem, goal).solutions[0]
+    >>> [robot.trim_names[k] for k in best.trims]
+    ['left', 'ahead', 'right']
     """
     *_, last = maneuver_word_stages(
         problem, goal, time_limit=time_limit, alternatives=alternatives, ceiling=ceiling
@@ -74,30 +75,31 @@ def maneuver_word_stages(
     time_limit: float = math.inf,
     alternatives: int = 0,
     ceiling: float = math.inf,
-) -> Iterator[ManeuverSearch]:
+) -> Iterator[SearchResult]:
     """What is found so far after each stage: short words, longer ones, and then insertion.
 
     The parameters are those of `search_words_with_maneuvers`; the last stage is its answer.
     """
     if not problem.automaton.body_velocities.any():  # nothing that words are made of
-        yield ManeuverSearch(status=SearchStatus.EXHAUSTED, solutions=())
+        yield SearchResult(status=SearchStatus.EXHAUSTED, solutions=())
         return
     deadline = time.monotonic() + time_limit
     counted = problem.search.max_expansions is not None
     asked = max(alternatives, SEEDS - 1)
     near = ceiling * (1.0 + SEED_SLACK)
-    found: list[ManeuverSolution] = []
+    found: list[Word] = []
     counts: dict[str, int] = {}
 
-    def stage(more: ManeuverSearch) -> ManeuverSearch:
+    def stage(more: SearchResult) -> SearchResult:
         nonlocal found
-        found = _distinct([*found, *more.solutions])
+        everything = [*found, *more.solutions]
+        found = list(distinct(problem, everything, most=len(everything)))
         _add(counts, more.counts)
         kept = tuple(one for one in found if one.cost < ceiling)[: alternatives + 1]
         out = time.monotonic() > deadline
         none = SearchStatus.OUT_OF_BUDGET if out else SearchStatus.EXHAUSTED
         status = SearchStatus.FOUND if kept else none
-        return ManeuverSearch(status=status, solutions=kept, counts=dict(counts))
+        return SearchResult(status=status, solutions=kept, counts=dict(counts))
 
     yield stage(
         search_maneuver_words(
@@ -125,23 +127,7 @@ def maneuver_word_stages(
     left = deadline - time.monotonic()
     most = problem.horizon.max_trims
     if left > 0.0 and found and (most is None or most > CLOSED_FORM):
-        seeds = [(one.trims, one.durations) for one in found[:SEEDS]]
-        yield stage(improve_maneuver_words(problem, goal, seeds, time_limit=left))
-
-
-def _distinct(solutions: list[ManeuverSolution]) -> list[ManeuverSolution]:
-    """Each motion once, by rising cost, then fewer trims, then word."""
-    order = sorted(solutions, key=lambda one: (float(f"{one.cost:.9g}"), len(one.trims), one.trims))
-    kept: list[ManeuverSolution] = []
-    for one in order:
-        same = (
-            abs(one.durations - other.durations).max(initial=0.0) <= SAME
-            for other in kept
-            if other.trims == one.trims
-        )
-        if not any(same):
-            kept.append(one)
-    return kept
+        yield stage(improve_maneuver_words(problem, goal, found[:SEEDS], time_limit=left))
 
 
 def _add(counts: dict[str, int], more: dict[str, int]) -> None:

@@ -18,16 +18,12 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.maneuver_solution import (
-    SAME,
-    ManeuverSearch,
-    TimedWord,
-    WordSetup,
-    word_setup,
-)
-from maneuver_automaton.search.result import SearchStatus
-from maneuver_automaton.search.words import TIE
+from maneuver_automaton.search.alternatives import TIE, in_order
+from maneuver_automaton.search.result import SearchResult, SearchStatus
+from maneuver_automaton.search.timed_word import TimedWord
+from maneuver_automaton.search.word_setup import WordSetup, word_setup
 from maneuver_automaton.words import _kernels_candidates as kernels
+from maneuver_automaton.words.word import Word
 
 MOST_TRIMS = 24  # of a larger library those that differ most
 MOST_LETTERS = 4  # trims of one word, unless more are asked for
@@ -36,6 +32,7 @@ NODES = (0, 16, 8, 5)  # grid nodes per scanned time, by how many times are scan
 HEADINGS = 24  # a free heading is tried at so many
 SLACK = 0.1  # share by which a grid value may be dearer than what is asked for, and yet be refined
 EXPANSIONS_A_WORD = 8  # steering calls, or expansions, in place of solving one word for its times
+NO_WAY = 1e-6  # [m] between the ends of a transition that is not priced by the metre
 LEAP = 0.35  # share of the grid's step by which times of one family change more, at most, per time
 
 
@@ -48,7 +45,7 @@ def search_maneuver_words(
     ceiling: float = math.inf,
     most_letters: int = MOST_LETTERS,
     most_trims: int = MOST_TRIMS,
-) -> ManeuverSearch:
+) -> SearchResult:
     """Words from the problem's first trim to the goal's last one, with maneuvers in between.
 
     Between two trims stands the cheapest chain of maneuvers, so a word of the library's graph with
@@ -74,7 +71,7 @@ def search_maneuver_words(
 
     Returns
     -------
-    ManeuverSearch
+    SearchResult
         ``complete`` if all words of up to three trims were searched, nothing pruned, and no longer
         ones were asked for: those are scanned on a grid, which may miss some.
 
@@ -88,20 +85,20 @@ def search_maneuver_words(
     >>> goal = Goal(pose=[3.0, 1.0, 0.0], trim="ahead")
     >>> problem = Problem(robot, [0, 0, 0], goal, start_trim="ahead")
     >>> best = search_maneuver_words(problem, goal).solutions[0]
-    >>> best.plan.word, round(best.cost, 4)
-    (('left', 'ahead', 'right'), 3.1754)
+    >>> [robot.trim_names[k] for k in best.trims], round(best.cost, 4)
+    (['left', 'ahead', 'right'], 3.1754)
     """
     setup = word_setup(problem, goal, most_trims=most_trims)
     job = _Job(setup, alternatives, ceiling, time.monotonic() + time_limit)
     letters = min(most_letters, problem.horizon.max_trims or most_letters)
     finished = job.run(letters)
-    found = tuple(setup.solution(word) for word in job.kept())
+    found = tuple(job.kept())
     if found:
         status = SearchStatus.FOUND
     else:
         status = SearchStatus.EXHAUSTED if finished else SearchStatus.OUT_OF_BUDGET
     everything = alternatives is None and ceiling == math.inf and finished
-    return ManeuverSearch(
+    return SearchResult(
         status=status,
         solutions=found,
         complete=everything and letters <= CLOSED_FORM and not goal.free_heading,
@@ -170,12 +167,11 @@ class _Job:
                     return False
         return not self._over()
 
-    def kept(self) -> list[TimedWord]:
-        """What was found and asked for, by rising cost, then fewer trims, then word."""
-        order = sorted(
-            self.found, key=lambda one: (float(f"{one.cost:.9g}"), len(one.trims), one.trims)
-        )
-        return order if self.alternatives is None else order[: self.alternatives + 1]
+    def kept(self) -> list[Word]:
+        """What was found and asked for, cheapest first."""
+        order = sorted(self.found, key=lambda one: (one.cost, len(one.trims), one.trims))
+        asked = order if self.alternatives is None else order[: self.alternatives + 1]
+        return list(in_order(self.setup.word(one) for one in asked))
 
     def _over(self) -> bool:
         limit = self.problem.search.max_expansions
@@ -368,7 +364,7 @@ def _least_price(setup: WordSetup) -> float:
     ways = arrays.length
     fast = speeds > 0.0
     prices = arrays.rates[fast] / speeds[fast]
-    joined = np.isfinite(arrays.cost) & (ways > SAME)
+    joined = np.isfinite(arrays.cost) & (ways > NO_WAY)
     links = arrays.cost[joined] / ways[joined]
     return float(np.concatenate([prices, links]).min(initial=math.inf)) if prices.size else 0.0
 

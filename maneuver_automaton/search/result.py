@@ -25,7 +25,7 @@ class SearchResult:
 
     status: SearchStatus
     solutions: tuple[Word, ...]
-    complete: bool  # every locally optimal solution within the limits is listed
+    complete: bool = False  # every locally optimal solution within the limits is listed
     exhaustive: bool = False  # every admitted word was searched, so the first solution is the best
     counts: dict[str, int] = field(default_factory=dict)
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.search.library_arrays import LibraryArrays
+from maneuver_automaton.search.timed_word import TimedWord
 from maneuver_automaton.words import TimesStatus, solve_switching_times
 
 AT_ONCE = 4  # of the shortest trims, how many are tried to be left out
@@ -24,16 +24,7 @@ SWEEPS = 3  # over all trims of a word, at most
 GAIN = 1e-9  # relative, what an exchange must gain
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Short:
-    """A word in the numbers of a library, with its times and cost."""
-
-    word: IntArray
-    times: Array
-    cost: float
-
-
-def shortened(library: LibraryArrays, word: IntArray, times: Array, most: int) -> Short | None:
+def shortened(library: LibraryArrays, word: TimedWord, most: int) -> TimedWord | None:
     """A word of at most `most` trims, made from a longer one; None if none is found.
 
     Trims are taken out one at a time, the one whose absence costs least, and the times are solved
@@ -42,46 +33,46 @@ def shortened(library: LibraryArrays, word: IntArray, times: Array, most: int) -
     """
     if library.free_heading:
         return None
-    best = _solved(library, word, times)
-    while best is not None and best.word.size > most:
+    best = _solved(library, word.numbers, word.durations)
+    while best is not None and len(best.trims) > most:
         fewer = _some_less(library, best, most)
         best = fewer if fewer is not None else _one_less(library, best, most)
     return None if best is None else _exchanged(library, best)
 
 
-def _some_less(library: LibraryArrays, now: Short, most: int) -> Short | None:
+def _some_less(library: LibraryArrays, now: TimedWord, most: int) -> TimedWord | None:
     """The word without a third of what is too much, the shortest trims; None near the end."""
-    many = (now.word.size - most) // 3
-    if now.word.size <= most + LAST or many < 2:
+    many = (len(now.trims) - most) // 3
+    if len(now.trims) <= most + LAST or many < 2:
         return None
-    kept = np.sort(_by_size(now.times)[many:])
-    left = float(now.times.sum() - now.times[kept].sum())
-    return _solved(library, now.word[kept], _spread(now.times[kept], left))
+    kept = np.sort(_by_size(now.durations)[many:])
+    left = float(now.durations.sum() - now.durations[kept].sum())
+    return _solved(library, now.numbers[kept], _spread(now.durations[kept], left))
 
 
-def _one_less(library: LibraryArrays, now: Short, most: int) -> Short | None:
+def _one_less(library: LibraryArrays, now: TimedWord, most: int) -> TimedWord | None:
     """The cheapest word with one trim less: one left out, or two neighbours made one."""
-    order = _by_size(now.times)
+    order = _by_size(now.durations)
     trials = [_without(library, now, k) for k in order[:AT_ONCE]]
-    if now.word.size <= most + LAST or all(one is None for one in trials):
+    if len(now.trims) <= most + LAST or all(one is None for one in trials):
         trials += [_without(library, now, k) for k in order[AT_ONCE:]]
-        for k in range(now.word.size - 1):
+        for k in range(len(now.trims) - 1):
             trials += list(_joined(library, now, k))
-    found = [one for one in trials if one is not None and one.word.size < now.word.size]
+    found = [one for one in trials if one is not None and len(one.trims) < len(now.trims)]
     return min(found, key=lambda one: float(f"{one.cost:.9g}"), default=None)
 
 
-def _without(library: LibraryArrays, now: Short, k: int) -> Short | None:
-    times = _spread(np.delete(now.times, k), now.times[k])
-    return _solved(library, np.delete(now.word, k), times)
+def _without(library: LibraryArrays, now: TimedWord, k: int) -> TimedWord | None:
+    times = _spread(np.delete(now.durations, k), now.durations[k])
+    return _solved(library, np.delete(now.numbers, k), times)
 
 
-def _joined(library: LibraryArrays, now: Short, k: int) -> Iterator[Short | None]:
+def _joined(library: LibraryArrays, now: TimedWord, k: int) -> Iterator[TimedWord | None]:
     """Trims `k` and `k + 1` as one of the library near their mean."""
     pair = slice(k, k + 2)
-    lasting = now.times[pair].sum()
-    mean = now.times[pair] @ library.twists[now.word[pair]] / lasting
-    word, times = np.delete(now.word, k), np.delete(now.times, k)
+    lasting = now.durations[pair].sum()
+    mean = now.durations[pair] @ library.twists[now.numbers[pair]] / lasting
+    word, times = np.delete(now.numbers, k), np.delete(now.durations, k)
     times[k] = lasting
     for other in _similar(library, mean)[:JOINED]:
         word[k] = other
@@ -105,17 +96,17 @@ def _spread(times: Array, left: float) -> Array:
     return np.asarray(times + left / max(times.size, 1))
 
 
-def _exchanged(library: LibraryArrays, now: Short) -> Short:
+def _exchanged(library: LibraryArrays, now: TimedWord) -> TimedWord:
     """Each trim exchanged for one of similar twist as long as that pays."""
     for _ in range(SWEEPS):
         before = now.cost
-        for k in range(now.word.size):
-            if k >= now.word.size:
+        for k in range(len(now.trims)):
+            if k >= len(now.trims):
                 break
-            for other in _similar(library, library.twists[now.word[k]])[1 : NEAR + 1]:
-                word = now.word.copy()
+            for other in _similar(library, library.twists[now.trims[k]])[1 : NEAR + 1]:
+                word = now.numbers
                 word[k] = other
-                trial = _solved(library, word, now.times)
+                trial = _solved(library, word, now.durations)
                 if trial is not None and trial.cost < now.cost - GAIN * (1.0 + abs(now.cost)):
                     now = trial
                     break
@@ -124,7 +115,7 @@ def _exchanged(library: LibraryArrays, now: Short) -> Short:
     return now
 
 
-def _solved(library: LibraryArrays, word: IntArray, times: Array) -> Short | None:
+def _solved(library: LibraryArrays, word: IntArray, times: Array) -> TimedWord | None:
     """The best times of a word; trims that last no time are left out."""
     if not word.size:
         return None
@@ -147,4 +138,4 @@ def _solved(library: LibraryArrays, word: IntArray, times: Array) -> Short | Non
     if same.any():
         starts = np.flatnonzero(~same)
         kept, lasting = kept[starts], np.add.reduceat(lasting, starts)
-    return Short(kept, lasting, solved.cost)
+    return TimedWord(tuple(kept.tolist()), lasting, solved.cost)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.search.alternatives import in_order, tied
 from maneuver_automaton.search.result import SearchResult, SearchStatus
 from maneuver_automaton.search.setup import SearchSetup, search_setup
 from maneuver_automaton.words.word import Word
@@ -23,7 +24,6 @@ NODES = 64  # per scanned time, bisected where the function bends
 SEED_NODES = 24  # where a rough answer will do
 NODES_2D = 32  # per scanned time where there are two
 TOLERANCE = 1e-12  # relative, for tangent circles and parallel lines
-TIE = 1e-9  # costs closer than this, relative, are equal
 CAPACITY = 4096
 
 BoolArray = NDArray[np.bool_]
@@ -113,7 +113,7 @@ def search_words(
     solutions = tuple(in_order(job.solutions()))
     if alternatives is not None and len(solutions) > alternatives + 1:
         asked = solutions[: alternatives + 1]
-        most_tied = _tied(asked[-1].cost) if ties else -math.inf
+        most_tied = tied(asked[-1].cost) if ties else -math.inf
         solutions = asked + tuple(
             one for one in solutions[alternatives + 1 :] if one.cost <= most_tied
         )
@@ -271,7 +271,7 @@ class _Job:
         tail = 1 if self.setup.free_heading else 0
         for n in range(1, self.most + 1):
             for mode in modes:
-                if n > mode.most_moving or mode.at_least > _tied(float(self.found.best[-1])):
+                if n > mode.most_moving or mode.at_least > tied(float(self.found.best[-1])):
                     continue
                 calls = self.n_steering
                 for scan, chunk in self._scans(n + tail, mode):
@@ -295,7 +295,7 @@ class _Job:
         number, last = 0, len(self.setup.trims) ** n
         while number < last:
             until = min(number + chunk, last)
-            ceiling = _tied(float(self.found.best[-1]))
+            ceiling = tied(float(self.found.best[-1]))
             number = scan(mode.kernel_problem, self.candidates, n + tail, number, until, ceiling)
             if self.candidates.counter[0]:
                 self.polish(mode.kernel_problem, self.candidates, self.found, self.most)
@@ -375,7 +375,7 @@ class _Job:
         n = self.n_found
         costs = self.found.costs[:n]
         rows = []
-        dearest = math.inf if self.own_prices else _tied(float(self.found.best[-1]))
+        dearest = math.inf if self.own_prices else tied(float(self.found.best[-1]))
         for k in np.argsort(costs, kind="stable"):
             if self.pruned and costs[k] > dearest:
                 break
@@ -448,23 +448,3 @@ def _parallel(twists: Array) -> BoolArray:
     minors = [np.outer(p, q) for p, q in ((a, b), (b, c), (c, a))]
     square = sum((minor - minor.T) ** 2 for minor in minors)
     return np.asarray(np.sqrt(square) < 1e-9)
-
-
-def _tied(cost: float) -> float:
-    """The largest cost that counts as equal."""
-    return cost + TIE * (1.0 + abs(cost))
-
-
-def in_order(solutions: Iterable[Word]) -> Iterator[Word]:
-    """Solutions by rising cost; among equal costs, fewer trims first, then by word."""
-    group: list[Word] = []
-    for row in sorted(solutions, key=lambda solution: solution.cost):
-        if group and row.cost - group[0].cost > TIE * (1.0 + abs(group[0].cost)):
-            yield from sorted(group, key=_simplicity)
-            group = []
-        group.append(row)
-    yield from sorted(group, key=_simplicity)
-
-
-def _simplicity(solution: Word) -> tuple[int, tuple[int, ...]]:
-    return len(solution.trims), tuple(solution.trims.tolist())

@@ -17,6 +17,7 @@ from maneuver_automaton.planning.result import PlanStatus
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.receding_horizon import RecedingHorizon, simulate
 from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
+from maneuver_automaton.search.result import plan_of
 from tests.inertia import unicycle_automaton
 from tests.search.cases import compiled_only
 
@@ -121,7 +122,7 @@ def test_maneuvers_keep_to_zones_too():
     automaton = unicycle_automaton()
     slow = Zone(shape=Box([0.6, 4.0], [0.0, 0.0]), max_speed=0.3)  # around the start
     problem = posed([4.0, 0.0, 0.0], slow, automaton=automaton)
-    found = search_words_with_maneuvers(problem, problem.goals[0]).plans[0]
+    found = plan_of(problem, search_words_with_maneuvers(problem, problem.goals[0]).solutions[0])
     checked = check_plan(problem, found, problem.goals[0])
     assert not checked.passed
     assert "does not admit" in checked.reason

@@ -179,7 +179,7 @@ def test_words_come_first_where_nothing_is_in_the_way(name, cost):
     words = search_words_with_maneuvers(problem, problem.goals[0], time_limit=60.0)
     result = plan(problem, time_limit=60.0)
     assert result.status is PlanStatus.FOUND
-    assert result.cost <= problem.cost_of(words.plans[0]) * (1.0 + 1e-9)
+    assert result.cost <= words.solutions[0].cost * (1.0 + 1e-9)
 
 
 @pytest.mark.parametrize("name", FREE)

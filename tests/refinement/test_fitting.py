@@ -10,6 +10,7 @@ from maneuver_automaton.problem import Goal, Horizon, Problem
 from maneuver_automaton.refinement.conditions import broken_condition
 from maneuver_automaton.refinement.fitting import fitted_plans
 from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
+from maneuver_automaton.search.result import plan_of
 from tests.inertia import unicycle_automaton
 
 
@@ -18,7 +19,7 @@ def test_trims_that_are_too_short_are_prolonged_or_left_out():
     free = Problem(robot, [0.0, 0.0, 0.0], pose)
     found = search_words_with_maneuvers(free, free.goals[0], time_limit=60.0, alternatives=6)
     mended = 0
-    for plan in found.plans:
+    for plan in (plan_of(free, word) for word in found.solutions):
         least = 1.05 * float(plan.durations[plan.durations > 0.0].min())
         problem = Problem(robot, [0.0, 0.0, 0.0], pose, horizon=Horizon(min_coast=least))
         assert f"less than {least:g} s" in broken_condition(problem, plan)
@@ -37,11 +38,12 @@ def test_a_fixed_time_is_met_without_a_rest():
     goal = Goal(pose=[4.0, 1.5, 0.7], trim="1, 0")
     known = Problem(unicycle_automaton(), [0, 0, 0], goal, start_trim="1, 0")
     found = search_words_with_maneuvers(known, goal, time_limit=60.0, alternatives=5)
-    total = max(one.duration for one in found.plans) + 0.1
+    plans = [plan_of(known, word) for word in found.solutions]
+    total = max(one.duration for one in plans) + 0.1
     problem = Problem(
         unicycle_automaton(), [0, 0, 0], goal, start_trim="1, 0", horizon=Horizon(time=total)
     )
-    fitted = [one for plan in found.plans for one in fitted_plans(problem, plan, goal)]
+    fitted = [one for plan in plans for one in fitted_plans(problem, plan, goal)]
     assert fitted
     for one in fitted:
         assert one.duration == pytest.approx(total, abs=1e-9)

@@ -80,6 +80,12 @@ def helicopter() -> Automaton:
     )
 
 
+def lasting(word):
+    """The trims of a word that last a while, with their times."""
+    used = word.durations > 0.0
+    return tuple(word.trims[used].tolist()), word.durations[used]
+
+
 def names(problem: Problem, solution: FoundWord) -> tuple[str, ...]:
     return tuple(problem.automaton.trim_names[k] for k in solution.trims)
 

@@ -22,6 +22,7 @@ from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.library_arrays import library_arrays
 from maneuver_automaton.search.setup import search_setup
 from maneuver_automaton.search.shortening import shortened
+from maneuver_automaton.search.timed_word import TimedWord
 from tests import reference
 from tests.search.cases import (
     DUBINS,
@@ -427,7 +428,7 @@ def test_only_a_fixed_time_fixes_the_time_of_a_shorter_word():
     setup = search_setup(problem, problem.goals[0])
     arrays = library_arrays(problem, setup)
     word = arrays.number_of[[1, 2, 0]]
-    short = shortened(arrays, word, np.array([0.5, 0.4, 1.0]), 3)
+    short = shortened(arrays, TimedWord(tuple(word.tolist()), np.array([0.5, 0.4, 1.0])), 3)
     assert short is not None
-    end = reference.plain_end(arrays.twists[short.word], short.times)
+    end = reference.plain_end(arrays.twists[short.numbers], short.durations)
     np.testing.assert_allclose(end, goal, atol=1e-9)

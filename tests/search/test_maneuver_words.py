@@ -15,11 +15,11 @@ from maneuver_automaton.audit import audit_plan
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.search.maneuver_solution import word_setup
 from maneuver_automaton.search.maneuver_words import search_maneuver_words
-from maneuver_automaton.search.result import SearchStatus
+from maneuver_automaton.search.result import SearchStatus, plan_of
+from maneuver_automaton.search.word_setup import word_setup
 from tests.inertia import car_automaton, unicycle_automaton
-from tests.search.cases import compiled_only
+from tests.search.cases import compiled_only, lasting
 
 pytestmark = compiled_only  # whole searches; their kernels have tests of their own
 
@@ -32,6 +32,10 @@ def problem(goal, *, automaton=None, **changed) -> Problem:
 
 def searched(one: Problem, **options):
     return search_maneuver_words(one, one.goals[0], **options)
+
+
+def first_plan(one: Problem, **options):
+    return plan_of(one, searched(one, **options).solutions[0])
 
 
 def by_brute_force(one: Problem, letters: int, starts: int):
@@ -66,7 +70,8 @@ def test_all_words_of_three_trims_are_listed():
     for word in itertools.product((1, 2, 3), repeat=3):
         if word[0] == word[1] or word[1] == word[2]:
             continue
-        mine = [s.durations for s in result.solutions if s.trims == word]
+        both = [lasting(s) for s in result.solutions]
+        mine = [times for trims, times in both if trims == word]
 
         def miss(t, word=word):
             gap = np.array(setup.plan(word, np.abs(t)).end - one.goals[0].pose)
@@ -90,7 +95,7 @@ def test_every_plan_passes_the_audit(make):
     assert costs == sorted(costs)
     rest = one.automaton["rest"].reduced_state
     for solution in result.solutions:
-        plan = solution.plan
+        plan = plan_of(one, solution)
         audit = audit_plan(plan, one.goals[0], one.automaton.model, states=(rest, rest))
         assert audit.passed, audit.reason
         assert solution.cost == pytest.approx(plan.duration, abs=1e-9)  # the cost is time
@@ -115,9 +120,10 @@ def test_a_moved_problem_has_the_moved_words(x, y, turn, by):
 def test_a_fixed_time_is_filled_by_rest_or_met():
     goal = [3.0, 0.5, 0.0]
     least = searched(problem(goal)).solutions[0].cost
-    padded = searched(problem(goal, horizon=Horizon(time=least + 4.0)), alternatives=2)
-    assert all(plan.duration == pytest.approx(least + 4.0) for plan in padded.plans)
-    assert padded.plans[0].trims[-1].is_rest
+    fixed = problem(goal, horizon=Horizon(time=least + 4.0))
+    padded = [plan_of(fixed, word) for word in searched(fixed, alternatives=2).solutions]
+    assert all(plan.duration == pytest.approx(least + 4.0) for plan in padded)
+    assert padded[0].trims[-1].is_rest
     late = searched(problem(goal, horizon=Horizon(max_time=0.9 * least)))
     assert late.solutions == ()
     assert late.status is SearchStatus.EXHAUSTED
@@ -126,9 +132,9 @@ def test_a_fixed_time_is_filled_by_rest_or_met():
 def test_without_a_rest_a_fixed_time_is_met_exactly():
     goal = Goal(pose=[6.0, 1.0, 0.0], trim="1, 0")
     free = problem(goal, start_trim="1, 0")
-    least = searched(free).solutions[0].plan.duration
+    least = first_plan(free).duration
     fixed = problem(goal, start_trim="1, 0", horizon=Horizon(time=least + 1.0))
-    plan = searched(fixed).plans[0]
+    plan = first_plan(fixed)
     assert plan.duration == pytest.approx(least + 1.0, abs=1e-8)
     assert plan.trims[0].name == plan.trims[-1].name == "1, 0"
 
@@ -136,23 +142,26 @@ def test_without_a_rest_a_fixed_time_is_met_exactly():
 def test_effort_prefers_slow_words():
     one = problem([4.0, 0.0, 0.0], cost=Cost(effort=1.0, time=0.1))
     best = searched(one).solutions[0]
-    assert best.cost == pytest.approx(one.cost_of(best.plan), rel=1e-9)
-    assert max(goal.off(best.plan.end)[0] for goal in one.goals) < 1e-9
+    plan = plan_of(one, best)
+    assert best.cost == pytest.approx(one.cost_of(plan), rel=1e-9)
+    assert max(goal.off(plan.end)[0] for goal in one.goals) < 1e-9
 
 
 def test_any_heading_costs_no_more_than_one():
     one = problem([2.0, 2.0, 0.3])
     fixed = searched(one).solutions[0].cost
-    either = searched(problem(Goal(pose=[2.0, 2.0, 0.3], free_heading=True))).solutions[0]
+    free = problem(Goal(pose=[2.0, 2.0, 0.3], free_heading=True))
+    either = searched(free).solutions[0]
     assert either.cost <= fixed + 1e-6
-    assert np.abs(either.plan.end[:2] - 2.0).max() < 1e-9
+    assert np.abs(plan_of(free, either).end[:2] - 2.0).max() < 1e-9
 
 
 def test_limits_on_trims_and_coasting_times_are_kept():
     one = problem([3.0, 2.0, 1.0], horizon=Horizon(max_trims=3, min_coast=0.3))
     for solution in searched(one, alternatives=5).solutions:
-        assert len(solution.trims) <= 3
-        assert (solution.durations >= 0.3 - 1e-12).all()
+        trims, times = lasting(solution)
+        assert 0 < len(trims) <= 3
+        assert (times >= 0.3 - 1e-12).all()
 
 
 def test_expansions_bound_the_search():

@@ -1,74 +1,36 @@
-"""One word of trims and maneuvers from a pose and trim to a goal and its trim."""
+"""The best times, the price and the plan of a given word, from start and trim to goal and trim.
+
+A word under work names the trims that a search chooses. What leads from one to the next, and from
+the first trim and to the last, is the cheapest chain of maneuvers, so it need not be named.
+"""
 
 from __future__ import annotations
 
 import functools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.between import trims_between
 from maneuver_automaton.automaton.headings import origin_of
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.groups import LieGroup, group_of
-from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.result import SearchStatus
+from maneuver_automaton.search.result import plan_of
+from maneuver_automaton.search.timed_word import TimedWord
 from maneuver_automaton.words import TimesStatus, solve_switching_times
 from maneuver_automaton.words.closing import closed_at
 from maneuver_automaton.words.library import Library, library_of, most_different, words_of
+from maneuver_automaton.words.transitions import SWITCH
+from maneuver_automaton.words.word import Word
 
 LATE = 1e-9  # relative, by which a plan may take longer than it is allowed
-SAME = 1e-6  # [s] times that differ by less are the same
 VANISHING = 1e-9  # [s] what lasts no longer lasts no time
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class ManeuverSolution:
-    """A word and its coasting times; the maneuvers between its trims follow from the library."""
-
-    trims: tuple[int, ...]  # between the first trim and the last, by their indices
-    durations: Array  # (n,) [s] of these
-    cost: float  # of trims, maneuvers, switches, and the rest that fills a fixed time
-    plan: Plan
-
-    def __post_init__(self) -> None:
-        freeze(self, "durations")
-
-
-class TimedWord(NamedTuple):
-    """A word with coasting times that lead to the goal, not yet a plan."""
-
-    trims: tuple[int, ...]
-    durations: Array  # (n,) [s]
-    cost: float
-
-    def same_as(self, other: TimedWord) -> bool:
-        """Whether both are the same motion."""
-        return self.trims == other.trims and bool(
-            np.abs(self.durations - other.durations).max(initial=0.0) <= SAME
-        )
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class ManeuverSearch:
-    """Words that were found, cheapest first."""
-
-    status: SearchStatus
-    solutions: tuple[ManeuverSolution, ...]
-    complete: bool = False  # every locally optimal word within the limits is listed
-    counts: dict[str, int] = field(default_factory=dict)
-
-    @property
-    def plans(self) -> tuple[Plan, ...]:
-        """The plans, cheapest first."""
-        return tuple(one.plan for one in self.solutions)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -170,27 +132,49 @@ class WordSetup:
         cost = self.problem.cost
         return not isinstance(cost, Cost) or cost.switch > 0.0 or cost.direction_change > 0.0
 
-    def solution(self, word: TimedWord) -> ManeuverSolution:
-        """A word as a plan."""
-        plan = self.plan(word.trims, word.durations)
-        cost = self.problem.cost_of(plan)
-        return ManeuverSolution(trims=word.trims, durations=word.durations, cost=cost, plan=plan)
-
     def plan(self, trims: Sequence[int], durations: Array) -> Plan:
         """The plan of a word from the problem's start, padded by rest where the time is fixed."""
-        automaton = self.problem.automaton
-        word, times, between = [self.start_trim], [0.0], list[Maneuver | None]()
+        return plan_of(self.problem, self._complete(trims, durations))
+
+    def word(self, timed: TimedWord) -> Word:
+        """A word under work with all its trims and transitions, and with its cost."""
+        word = self._complete(timed.trims, timed.durations)
+        return replace(word, cost=self.problem.cost_of(plan_of(self.problem, word)))
+
+    def _complete(self, trims: Sequence[int], durations: Array) -> Word:
+        """The word with the trims and transitions between those given, and with rest as padding."""
+        maneuvers = self.problem.automaton.maneuvers
+        chain, times, transitions = [self.start_trim], [0.0], list[int]()
         for trim, time in zip((*trims, self.goal_trim), (*durations.tolist(), 0.0), strict=True):
-            for maneuver, following in self.library.chain(word[-1], trim):
-                between.append(automaton.maneuvers[maneuver] if maneuver >= 0 else None)
-                word.append(following)
+            for maneuver, following in self.library.chain(chain[-1], trim):
+                transitions.append(maneuver)
+                chain.append(following)
                 times.append(0.0)
             times[-1] += time
+        lasting = sum(maneuvers[k].duration for k in transitions if k != SWITCH)
         total, pad = self.problem.horizon.time, self.pad
         if total is not None and pad is not None:
-            taken = sum(times) + sum(one.duration for one in between if one)
-            times[-1 if pad == self.goal_trim else 0] += max(0.0, total - taken)
-        return _plan_without_idle(self.problem, [automaton.trims[k] for k in word], times, between)
+            times[-1 if pad == self.goal_trim else 0] += max(0.0, total - (sum(times) + lasting))
+        return _without_idle(chain, times, transitions, maneuver_time=lasting)
+
+    def timed(self, word: Word) -> TimedWord:
+        """A word without what follows by itself: rest as padding, trims that chains pass through.
+
+        The first trim and the last are those of the problem.
+        """
+        trims = [self.start_trim, *word.trims.tolist(), self.goal_trim]
+        times = [0.0, *word.durations.tolist(), 0.0]
+        links = np.array([SWITCH, *word.transitions.tolist(), SWITCH])
+        if self.problem.horizon.time is not None and self.pad is not None and word.trims.size:
+            times[-2 if self.pad == self.goal_trim else 1] = 0.0
+        kept = [0]
+        for k in range(1, len(trims) - 1):
+            passed = links[kept[-1] : k + 1]
+            chain = self.library.transitions.chain(trims[kept[-1]], trims[k + 1])
+            known = [maneuver for maneuver, _ in chain if maneuver != SWITCH]
+            if times[k] > 0.0 or passed[passed != SWITCH].tolist() != known:
+                kept.append(k)
+        return TimedWord(tuple(trims[k] for k in kept[1:]), np.array([times[k] for k in kept[1:]]))
 
     def _times(
         self, trims: Sequence[int], guesses: Sequence[Array], total: float | None, restarts: int
@@ -321,27 +305,28 @@ def _transitions(automaton: Automaton, cost: StageCost, pads: bool) -> Library:
     return library_of(automaton, rates=rates, maneuver_costs=prices, trims=())
 
 
-def _plan_without_idle(
-    problem: Problem, word: list[Trim], times: list[float], between: list[Maneuver | None]
-) -> Plan:
-    """The plan without trims that last no time and stand between no maneuvers."""
+def _without_idle(
+    trims: Sequence[int],
+    durations: Sequence[float],
+    transitions: Sequence[int],
+    *,
+    maneuver_time: float,
+) -> Word:
+    """The word without trims that last no time and stand between no maneuvers."""
     kept = [
         k
-        for k in range(len(word))
-        if times[k] > 0.0
-        or (k > 0 and between[k - 1] is not None)
-        or (k < len(between) and between[k] is not None)
-    ]
-    if not kept:
-        kept = [0]
-    links = tuple(
-        between[a] if b == a + 1 else None  # what was left out had no maneuver on either side
+        for k in range(len(trims))
+        if durations[k] > 0.0
+        or (k > 0 and transitions[k - 1] != SWITCH)
+        or (k < len(transitions) and transitions[k] != SWITCH)
+    ] or [0]
+    links = [
+        transitions[a] if b == a + 1 else SWITCH  # what was left out had switches on either side
         for a, b in pairwise(kept)
-    )
-    return Plan(
-        problem.start,
-        [word[k] for k in kept],
-        durations=[times[k] for k in kept],
-        maneuvers=links if any(links) else (),
-        start_time=problem.start_time,
+    ]
+    return Word(
+        trims=np.array([trims[k] for k in kept]),
+        durations=np.array([durations[k] for k in kept]),
+        transitions=np.array(links, dtype=np.int64),
+        maneuver_time=maneuver_time,
     )
