@@ -165,7 +165,7 @@ def _among_what_stands(query: LatticeQuery) -> LatticeQuery:
 
 
 def _candidates(progress: _Progress, bound: float) -> list[Candidate]:
-    """Plans to be checked: the first and what is made of it, and others if they are asked for."""
+    """Plans to be checked, the cheapest first: what was found, and others if they are asked for."""
     query, alternatives = progress.query, progress.found.alternatives
     share = FOR_THE_BEST if alternatives else 1.0
     left = progress.budget
@@ -183,7 +183,7 @@ def _candidates(progress: _Progress, bound: float) -> list[Candidate]:
     if alternatives:
         candidates += _free_words(progress, alternatives)
         candidates += _detours(progress, better.word, 2 * alternatives)
-    return candidates
+    return sorted(candidates, key=lambda one: one.cost)
 
 
 def prepare_map(problem: Problem, workspace: Workspace) -> None:

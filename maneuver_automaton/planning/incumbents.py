@@ -35,8 +35,8 @@ class Accepted:
 
     @property
     def rank(self) -> tuple[float, int]:
-        """Its place among others: by cost, then by the number of its trims."""
-        return float(f"{self.cost:.9g}"), len(self.plan.trims)
+        """Its place among others: by cost but for rounding, then by the number of its trims."""
+        return float(f"{self.cost:.10g}"), len(self.plan.trims)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,13 +108,13 @@ class Incumbents:
         return False
 
     def offer_in_turn(self, candidates: Iterable[Candidate]) -> None:
-        """Check candidates, the cheapest first, until there are as many plans as are asked for.
+        """Check candidates, in the order given, until there are as many plans as are asked for.
 
         The checks of an answer come after the time limit, so they go on once the time is over; but
         only a few plans may then be refused.
         """
         late = 0
-        for one in sorted(candidates, key=lambda one: float(f"{one.cost:.9g}")):
+        for one in candidates:
             if len(self.plans) > self.alternatives or late == LATE:
                 return
             plan = one.plan()

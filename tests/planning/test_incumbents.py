@@ -102,11 +102,11 @@ def test_candidates_are_checked_in_turn_until_there_are_enough():
 
     candidates = [
         Candidate(FREE.cost_of(plan), 0, functools.partial(make, plan))
-        for plan in (SLOWLY, AHEAD, TURNING)
+        for plan in (AHEAD, AHEAD, TURNING, SLOWLY)
     ]
     found = incumbents(FREE, alternatives=1)
     found.offer_in_turn(candidates)
-    assert made == [AHEAD, TURNING]
+    assert made == [AHEAD, AHEAD, TURNING]
     assert len(found.plans) == 2
 
 
