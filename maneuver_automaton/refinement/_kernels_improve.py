@@ -25,7 +25,7 @@ from maneuver_automaton.search._kernels_motion import (
     free_candidate,
     may_stay,
 )
-from maneuver_automaton.words._kernels_candidates import NO_TRIM, candidates
+from maneuver_automaton.words._kernels_candidates import NO_TRIM, candidates, trim_and_gear
 
 
 @bare_inner_kernel
@@ -132,8 +132,8 @@ def drawn_section(lib, task, work, n, cost, draw):
         last,
         pose_at(lib, work, first, begin),
         pose_at(lib, work, last, end),
-        (before, 0 if before == NO_TRIM else gear_before(lib, work, entered)),
-        (after, 0 if after == NO_TRIM else gear_after(lib, work, n, last)),
+        trim_and_gear(before, 0 if before == NO_TRIM else gear_before(lib, work, entered)),
+        trim_and_gear(after, 0 if after == NO_TRIM else gear_after(lib, work, n, last)),
         task.free_heading and to_end,
         section_price(lib, work, begin, end, first, last) - GAIN * cost,
         task.most_time - total + (end - begin),
@@ -225,7 +225,7 @@ def via_middle(lib, task, scene, work, section, via):
     way = math.hypot(v_x - x, v_y - y) + math.hypot(e_x - v_x, e_y - v_y)
     if way * task.per_metre >= budget:
         return -1
-    nowhere = (NO_TRIM, 0)
+    nowhere = trim_and_gear(NO_TRIM, 0)
     n_1 = candidates(
         lib.library,
         lib.library.words,

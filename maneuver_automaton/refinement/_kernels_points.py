@@ -17,7 +17,7 @@ from maneuver_automaton.refinement._kernels_word import (
     word_cost,
 )
 from maneuver_automaton.search._kernels_motion import free_candidate
-from maneuver_automaton.words._kernels_candidates import NO_TRIM, candidates
+from maneuver_automaton.words._kernels_candidates import NO_TRIM, candidates, trim_and_gear
 
 
 @bare_inner_kernel
@@ -58,7 +58,7 @@ def join(lib, task, scene, work, words, i, j, gain):
     budget = work.best[j] - work.best[i]
     if math.hypot(e_x - x, e_y - y) * task.per_metre >= budget:
         return
-    nowhere = (NO_TRIM, 0)
+    nowhere = trim_and_gear(NO_TRIM, 0)
     count = candidates(
         lib.library,
         words,

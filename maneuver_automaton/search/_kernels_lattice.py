@@ -44,6 +44,7 @@ from maneuver_automaton.words._kernels_candidates import (
     candidates,
     class_of,
     price_of_switch,
+    trim_and_gear,
 )
 
 FULL_TURN = 2.0 * math.pi
@@ -195,7 +196,7 @@ def connect_ends(search, task, lib, scene, node, upper_bound, estimate):
     scratch = search.scratch
     pose = (nodes[node, X], nodes[node, Y], nodes[node, HEADING], nodes[node, Z])
     done, spent = nodes[node, COST], nodes[node, TIME]
-    here = (links[node, TRIM], links[node, GEAR])
+    here = trim_and_gear(int(links[node, TRIM]), int(links[node, GEAR]))
     for g in range(task.aims.shape[0]):
         free_heading = task.sign > 0.0 and task.aim_free[g]
         words = lib.library.free_words if free_heading else lib.library.words
@@ -206,10 +207,11 @@ def connect_ends(search, task, lib, scene, node, upper_bound, estimate):
         most = min(upper_bound, found[0]) - done
         if estimate < math.inf:
             most = min(most, task.patience * estimate + task.slack)
-        begin, first, end, last = pose, here, aim, (task.aim_trims[g], 0)
+        there = trim_and_gear(task.aim_trims[g], 0)
+        begin, first, end, last = pose, here, aim, there
         clock = task.clock + spent
         if task.sign < 0.0:  # the node is nearer to the goal: the word leads from the start to it
-            begin, first, end, last = aim, (task.aim_trims[g], 0), pose, here
+            begin, first, end, last = aim, there, pose, here
             clock = task.clock
         n = candidates(lib.library, words, n_words, begin, first, end, last, most, scratch)
         if task.checks_words:

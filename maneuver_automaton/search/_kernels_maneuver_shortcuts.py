@@ -6,7 +6,7 @@ import math
 
 from maneuver_automaton._compile import bare_kernel
 from maneuver_automaton.search._kernels_motion import free_candidate
-from maneuver_automaton.words._kernels_candidates import candidates
+from maneuver_automaton.words._kernels_candidates import candidates, trim_and_gear
 
 AS_BEFORE = -1
 
@@ -24,10 +24,16 @@ def shorten_to(scene, lib, n_words, limits, j, points, trims, costs, spent, leas
     plan.costs[j] = plan.costs[j - 1] + costs[j] - costs[j - 1]
     plan.spent[j] = plan.spent[j - 1] + spent[j] - spent[j - 1]
     plan.before[j], plan.rows[j] = j - 1, AS_BEFORE
-    goal, there = (points[j, 0], points[j, 1], points[j, 2], points[j, 3]), (trims[j], 0)
+    goal, there = (
+        (points[j, 0], points[j, 1], points[j, 2], points[j, 3]),
+        trim_and_gear(trims[j], 0),
+    )
     words = lib.library.words
     for i in range(j - 1):
-        start, here = (points[i, 0], points[i, 1], points[i, 2], points[i, 3]), (trims[i], 0)
+        start, here = (
+            (points[i, 0], points[i, 1], points[i, 2], points[i, 3]),
+            trim_and_gear(trims[i], 0),
+        )
         most = plan.costs[j] - plan.costs[i] - least
         n = candidates(lib.library, words, n_words, start, here, goal, there, most, scratch)
         which = free_candidate(

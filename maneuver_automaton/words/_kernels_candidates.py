@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel, inner_kernel, kernel
 from maneuver_automaton.groups._kernels import coast, compose, nearest_turn
 from maneuver_automaton.words._kernels_steering import phase, steer, turn_time, two_lines, unit
@@ -58,6 +60,16 @@ def cost_between(lib, before, after):
 def time_between(lib, before, after):
     """Duration of the transition between two trims."""
     return lib.time[class_of(lib, before), class_of(lib, after)]
+
+
+@inner_kernel
+def trim_and_gear(trim, gear):
+    """The trim and gear at an end of a word, as whole numbers of one type.
+
+    Numbers that are known when a kernel is compiled have types of their own, and every mixture of
+    them would compile `candidates` once more.
+    """
+    return np.int64(trim), np.int64(gear)
 
 
 @inner_kernel
@@ -405,9 +417,9 @@ def candidate_batch(lib, n_words, starts, start_trim, goals, goal_trim, upper_bo
             lib.words,
             n_words,
             start,
-            (start_trim, 0),
+            trim_and_gear(start_trim, 0),
             goal,
-            (goal_trim, 0),
+            trim_and_gear(goal_trim, 0),
             upper_bound,
             scratch,
         )
