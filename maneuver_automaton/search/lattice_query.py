@@ -35,6 +35,9 @@ class LatticeQuery:
     layers: LayerArrays  # the world as the only layer there is
     start: Array  # (3,) in the world's frame
     goals: Array  # (n, 3) those that can be reached at all
+    seen_start: Array  # (4,) the same at no altitude
+    seen_goals: Array  # (n, 4)
+    goal_trims: IntArray  # (n,) -1: the vehicle ends in any trim
     goal_index: tuple[int, ...]  # which of the problem's goals they are
     free_heading: NDArray[np.bool_]  # (n,)
     window: Array  # (9,) as in `_kernels_motion.inside_window`
@@ -49,24 +52,9 @@ class LatticeQuery:
         return self.problem.search
 
     @property
-    def seen_start(self) -> Array:
-        """Start (4,) in the world's frame, at no altitude."""
-        return np.append(self.start, 0.0)
-
-    @property
-    def seen_goals(self) -> Array:
-        """Goals (n, 4) in the world's frame, at no altitude."""
-        return np.hstack([self.goals, np.zeros((len(self.goals), 1))])
-
-    @property
     def start_trim(self) -> int:
         """The vehicle begins in any trim."""
         return NO_TRIM
-
-    @property
-    def goal_trims(self) -> IntArray:
-        """It ends in any trim (n,)."""
-        return np.full(len(self.goals), NO_TRIM)
 
     @property
     def half_width(self) -> float:
@@ -159,6 +147,9 @@ def lattice_query(problem: Problem, goal_index: tuple[int, ...]) -> LatticeQuery
         layers=single_layer(world),
         start=start,
         goals=goals,
+        seen_start=np.append(start, 0.0),
+        seen_goals=np.hstack([goals, np.zeros((len(goals), 1))]),
+        goal_trims=np.full(len(goals), NO_TRIM),
         goal_index=goal_index,
         free_heading=np.array([problem.goals[k].free_heading for k in goal_index]),
         window=window,
