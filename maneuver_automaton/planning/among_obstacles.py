@@ -115,8 +115,8 @@ def plan_on_lattice(
         _let_pass(progress)
     bound = lattice_bound(query)
     found.offer_in_turn(_candidates(progress, bound))
-    found.counts["rejected_by_audit"] = found.refused[Condition.AUDIT]
     found.counts["rejected_by_fcl"] = found.rejected - found.refused[Condition.AUDIT]
+    found.counts["rejected_by_audit"] = found.refused[Condition.AUDIT]
     if not found.plans:
         return found.none(PlanStatus.NO_PLAN, f"every plan found was refused: {found.why_refused}")
     return found.found(bound=bound, searched=searched, nodes=first.nodes)

@@ -169,31 +169,32 @@ def _word(one: Pass) -> Word:
     goal = int(state[kernels.GOAL])
     if one.task.sign < 0.0:
         goal = goal_of_root(query, root)
-        return query.word_of(_with_maneuvers(query, connection + path), goal)
-    end = [(NO_EDGE, int(one.task.aim_trims[goal]), 0.0)]
-    return query.word_of(_with_maneuvers(query, path[::-1] + connection + end), goal)
+        return query.word_of(_with_maneuvers(query, connection + path, NO_TRIM), goal)
+    end = int(one.task.aim_trims[goal])
+    return query.word_of(_with_maneuvers(query, path[::-1] + connection, end), goal)
 
 
 def _with_maneuvers(
-    query: Ends, steps: Sequence[tuple[int, int, float]]
+    query: Ends, steps: Sequence[tuple[int, int, float]], end: int
 ) -> list[tuple[int, int, float]]:
     """Steps (transition, trim, time) in the automaton's numbers, from those of the search.
 
     Steps of the search name the edge that leads to their trim, or none: then the transition from
     the class before is meant, whatever maneuvers it is made of. Trims that last no time are left
-    out, but for the last.
+    out, but for the trim after the `end`, -1 if any will do.
     """
     library = query.library
-    numbered, at = library.arrays.library, query.start_trim
+    at = query.start_trim
     found = [(SWITCH, int(library.trims[at]), 0.0)] if at >= 0 else []
-    for n, (edge, trim, t) in enumerate(steps):
+    last = [(NO_EDGE, end, 0.0)] if end >= 0 else []
+    for n, (edge, trim, t) in enumerate([*steps, *last]):
         for link in [edge] if edge >= 0 else _edges_between(library.arrays, at, trim):
             source = int(library.arrays.edge_source[link])
             if source != at:
                 found.append((SWITCH, int(library.trims[source]), 0.0))
             at = int(library.arrays.edge_target[link])
             found.append((int(library.edge_maneuver[link]), int(library.trims[at]), 0.0))
-        if t > 0.0 or (n == len(steps) - 1 and trim not in (at, numbered.n_trims, NO_TRIM)):
+        if t > 0.0 or (n == len(steps) and trim != at):
             found.append((SWITCH, int(library.trims[trim]), t))
             at = trim
     return found
