@@ -41,9 +41,13 @@ class Loop:
     inertia: bool = False
 
     def run(self) -> ClosedLoop:
-        """The loop, driven to its end."""
+        """The loop, driven to its end; with inertia, as when it was recorded, by the clock alone.
+
+        What `max_expansions` counts has become more since then: words with maneuvers count, too.
+        """
         problem = self.make()
-        problem = replace(problem, search=replace(WORK, method=problem.search.method))
+        if not self.inertia:
+            problem = replace(problem, search=replace(WORK, method=problem.search.method))
         return simulate(
             problem, step=self.step, steps=self.steps, time_limit=self.time_limit, **self.options
         )
