@@ -19,11 +19,11 @@ from maneuver_automaton.automaton.library import automaton_hash, load_library, s
 from maneuver_automaton.cli import check_command, run
 from maneuver_automaton.cli.compiling import COMPILING
 from maneuver_automaton.formats import load_plan
-from maneuver_automaton.groups import translations
-from maneuver_automaton.models import UserModel, rollout
+from maneuver_automaton.models import rollout
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.problem import Bounds, Problem
 from maneuver_automaton.scenario import load_scenario
+from tests import translations as vehicles
 from tests.scenario.files import SCENARIO, automaton, but
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
@@ -535,16 +535,9 @@ def test_a_plan_in_the_place_of_a_scenario(folder, capsys):
 
 
 def test_check_reports_the_symmetry_that_a_boat_in_a_current_has():
-    boat = UserModel(
-        name="boat",
-        group=translations(2),
-        control_names=("speed", "turn_rate"),
-        reduced_names=("heading",),
-        velocity=lambda z, u: [u[0] * np.cos(z[0]) + 0.3, u[0] * np.sin(z[0])],
-        dynamics=lambda z, u: [u[1]],
-        control_limits=np.array([[0.0, 1.0], [-0.8, 0.8]]),
+    library = Automaton.of_model(
+        vehicles.boat(), {"heading": [0.0, np.pi / 2, np.pi], "speed": [1.0]}
     )
-    library = Automaton.of_model(boat, {"heading": [0.0, np.pi / 2, np.pi], "speed": [1.0]})
     problem = Problem(library, [0, 0, 0], [3, 1], bounds=Bounds(x=(-5.0, 9.0)))
     found = {finding.what: finding for finding in check_command._symmetry(problem)}
     assert found["symmetry: vector field"].holds

@@ -9,25 +9,11 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.headings import trim_headings
 from maneuver_automaton.automaton.library import load_library, save_library
 from maneuver_automaton.groups import SE2, translations
-from maneuver_automaton.models import UserModel
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 from maneuver_automaton.problem import Goal, Problem
+from tests import translations as vehicles
 
-STAGE = UserModel(
-    name="stage",
-    group=translations(2),
-    control_names=("v_x", "v_y"),
-    velocity=lambda z, u: [u[0], u[1]],
-)
-BOAT = UserModel(
-    name="boat",
-    group=translations(2),
-    control_names=("speed", "turn_rate"),
-    reduced_names=("heading",),
-    velocity=lambda z, u: [u[0] * np.cos(z[0]) + 0.3, u[0] * np.sin(z[0])],
-    dynamics=lambda z, u: [u[1]],
-    control_limits=np.array([[0.0, 1.0], [-0.8, 0.8]]),
-)
+STAGE, BOAT = vehicles.stage(), vehicles.boat()
 
 
 @pytest.fixture(scope="module")

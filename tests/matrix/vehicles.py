@@ -15,11 +15,12 @@ import numpy as np
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.stock import load_stock_library
 from maneuver_automaton.collision import Box, Disc, Shape
-from maneuver_automaton.groups import SE2, SE2xR, translations
+from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import Car, Unicycle, UserModel
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.driving import drive_all
 from maneuver_automaton.problem import Goal, Problem, SearchSettings
+from tests import translations
 
 TABLE_2 = {
     "rest": (0.0, 0.0),
@@ -190,12 +191,6 @@ def _omni() -> Automaton:
 
 def _stage() -> Automaton:
     """It moves along x and y and between, and never turns."""
-    model = UserModel(
-        name="stage",
-        group=translations(2),
-        control_names=("v_x", "v_y"),
-        velocity=lambda z, u: [u[0], u[1]],
-    )
     controls = {
         "rest": (0.0, 0.0),
         "right": (1.0, 0.0),
@@ -204,20 +199,12 @@ def _stage() -> Automaton:
         "down": (0.0, -1.0),
         "slant": (0.6, 0.6),
     }
-    return Automaton.of_controls(model, controls)
+    return Automaton.of_controls(translations.stage(), controls)
 
 
 def _boat_in_current() -> Automaton:
     """A current along x breaks the symmetry of rotations: eight headings, and turns between."""
-    model = UserModel(
-        name="boat in a current",
-        group=translations(2),
-        control_names=("speed", "turn_rate"),
-        reduced_names=("heading",),
-        velocity=lambda z, u: [u[0] * np.cos(z[0]) + 0.3, u[0] * np.sin(z[0])],
-        dynamics=lambda z, u: [u[1]],
-        control_limits=np.array([[0.0, 1.0], [-0.8, 0.8]]),
-    )
+    model = translations.boat(name="boat in a current")
     return Automaton.of_model(model, {"heading": np.pi / 4 * np.arange(8), "speed": [1.0, 0.5]})
 
 

@@ -8,19 +8,13 @@ import shapely
 
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import Box
-from maneuver_automaton.groups import translations
-from maneuver_automaton.models import UserModel
 from maneuver_automaton.planning import plan
 from maneuver_automaton.problem import Problem, SearchSettings
+from tests import translations as vehicles
 from tests.search.cases import compiled_only
 
 pytestmark = compiled_only
-STAGE = UserModel(
-    name="stage",
-    group=translations(2),
-    control_names=("v_x", "v_y"),
-    velocity=lambda z, u: [u[0], u[1]],
-)
+STAGE = vehicles.stage()
 AXES = {"rest": (0, 0), "right": (1, 0), "left": (-1, 0), "up": (0, 1), "down": (0, -1)}
 BODY = Box([0.5, 0.3])
 SEARCH = SearchSettings(max_expansions=2000)
@@ -58,15 +52,7 @@ def test_a_stage_goes_around_what_is_in_its_way():
 
 def test_a_boat_heads_up_against_the_current_to_go_across():
     """The current carries it along x as fast as it can go back: it crosses at 90 degrees to it."""
-    boat = UserModel(
-        name="boat",
-        group=translations(2),
-        control_names=("speed", "turn_rate"),
-        reduced_names=("heading",),
-        velocity=lambda z, u: [u[0] * np.cos(z[0]) + 0.5, u[0] * np.sin(z[0])],
-        dynamics=lambda z, u: [u[1]],
-        control_limits=np.array([[0.0, 1.0], [-1.0, 1.0]]),
-    )
+    boat = vehicles.boat(current=0.5, turn_rate=1.0)
     headings = np.pi / 3 * np.arange(6)
     library = Automaton.of_model(boat, {"heading": headings, "speed": [1.0]})
     across = headings[2]
