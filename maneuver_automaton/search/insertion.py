@@ -271,13 +271,7 @@ def _with_insertions(
 
     trims, times = _with_room(word)
     size, cost, least, used = kernels.improve_word(
-        library.twists,
-        library.rates,
-        library.goal,
-        library.rows,
-        library.targets,
-        library.n_priced,
-        library.tail,
+        *_seen_by_kernels(library),
         trims,
         times,
         len(word.trims),
@@ -289,6 +283,12 @@ def _with_insertions(
     return TimedWord(tuple(trims[:size].tolist()), times[:size], float(cost), float(least))
 
 
+def _seen_by_kernels(library: LibraryArrays) -> tuple[Array, Array, Array, Array, Array, int, int]:
+    """The library and the conditions of a problem, in the order in which kernels take them."""
+    conditions = library.goal, library.rows, library.targets
+    return library.twists, library.rates, *conditions, library.n_priced, library.tail
+
+
 def _calmed(library: LibraryArrays, word: TimedWord) -> TimedWord:
     """The word with its runs of trims that chatter shortened."""
     from maneuver_automaton.search import _kernels_insertion as kernels
@@ -297,13 +297,7 @@ def _calmed(library: LibraryArrays, word: TimedWord) -> TimedWord:
         return word
     trims, times = _with_room(word)
     size, cost, least = kernels.calm_word(
-        library.twists,
-        library.rates,
-        library.goal,
-        library.rows,
-        library.targets,
-        library.n_priced,
-        library.tail,
+        *_seen_by_kernels(library),
         trims,
         times,
         len(word.trims),
