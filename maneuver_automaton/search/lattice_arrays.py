@@ -113,7 +113,7 @@ class MotionArrays(NamedTuple):
     edge_high: Array
 
 
-def no_edges(n_parts: int) -> tuple[EdgeArrays, MotionArrays]:
+def no_edges() -> tuple[EdgeArrays, MotionArrays]:
     """What a vehicle has that changes between all its trims at will: no maneuver."""
     numbers, values = np.zeros(0, dtype=np.int64), np.zeros(0)
     edges = EdgeArrays(numbers, numbers, numbers, np.zeros((0, 4)), values, values)

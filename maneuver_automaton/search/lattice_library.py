@@ -95,7 +95,7 @@ def _library(
         min_coast=float(min_coast),
     )
     part = Part(shapes=footprint, trim_poses=np.zeros((m, 3)), course_poses=())
-    edges, motion = no_edges(1)
+    edges, motion = no_edges()
     arrays = lattice_arrays(
         numbered,
         (part,),

@@ -30,6 +30,8 @@ SHORTEST_CONTACT = 0.03  # [half widths] of an edge that ends there
 SAMPLED_HEADINGS = 16  # roots at a goal whose heading is free
 ROUNDING = 1e-12  # relative, by which a coast may fall short of the least one
 MOST_SIDES, MOST_LEVELS, MOST_TICKS = 1 << 15, 1 << 8, 1 << 11  # cells that have numbers of theirs
+MOST_COUNTS = 16  # of trims that make another cell
+MOST_KEYS = 1 << 62  # numbers of cells: they are signed and have 64 bits
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -186,6 +188,13 @@ def task_of(query: Ends, resolution: Resolution, *, sign: float = 1.0) -> Task:
     sharp = INTERVAL * library.radius * library.per_metre
     tick = _tick(query, resolution)
     longest = bool(np.isfinite(numbered.longest[: numbered.n_trims]).any())
+    by_gear = bool(resolution.layered and numbered.direction_change > 0.0)
+    by_trim = len(arrays.trims_of) > len(numbered.cost) and bool(
+        query.least_coast > 0.0 or longest or (resolution.layered and numbered.switch > 0.0)
+    )
+    by_count = query.most_trims > 0
+    layers = len(numbered.cost) * (3 if by_gear else 1) * (MOST_COUNTS if by_count else 1)
+    layers *= numbered.n_trims + 1 if by_trim else 1
     start, goals = _ends(query)
     aims, aim_trims, aim_free = goals if sign > 0.0 else start
     roots, root_trims = start[:2] if sign > 0.0 else goal_roots(query)
@@ -208,7 +217,7 @@ def task_of(query: Ends, resolution: Resolution, *, sign: float = 1.0) -> Task:
         fine_headings=FINE_HEADINGS,
         rise=float(resolution.scale * RISE * library.radius),
         tick=tick,
-        radix=_radix(query, resolution.fine * cell, max(headings, FINE_HEADINGS), tick),
+        radix=_radix(query, resolution.fine * cell, max(headings, FINE_HEADINGS), tick, layers),
         weight=float(resolution.weight),
         per_metre=float(library.per_metre),
         per_climb=float(library.per_climb),
@@ -231,12 +240,9 @@ def task_of(query: Ends, resolution: Resolution, *, sign: float = 1.0) -> Task:
         most_trims=int(query.most_trims),
         least_coast=float(query.least_coast * (1.0 - ROUNDING)),
         checks_words=bool(query.most_trims > 0 or query.least_coast > 0.0 or longest),
-        by_gear=bool(resolution.layered and numbered.direction_change > 0.0),
-        by_trim=bool(
-            len(arrays.trims_of) > len(numbered.cost)
-            and (query.least_coast > 0.0 or longest or (resolution.layered and numbered.switch > 0))
-        ),
-        by_count=query.most_trims > 0,
+        by_gear=by_gear,
+        by_trim=by_trim,
+        by_count=by_count,
     )
 
 
@@ -297,14 +303,21 @@ def _tick(query: Ends, resolution: Resolution) -> float:
     return resolution.durations * float(lasting.min()) if lasting.size else 1.0
 
 
-def _radix(query: Ends, cell: float, headings: int, tick: float) -> tuple[int, int, int, int]:
-    """How many numbers each coordinate of a cell needs; more cells than that share numbers."""
+def _radix(
+    query: Ends, cell: float, headings: int, tick: float, layers: int
+) -> tuple[int, int, int, int]:
+    """How many numbers each coordinate of a cell needs; more cells than that share numbers.
+
+    Where numbers are short, places far apart share them: that drops a node, never a proof.
+    """
     low, high = np.array(query.box[:2]), np.array(query.box[2:])
     far = float((high - low).max())  # no pose of the window is farther from the frame along x or y
+    library = query.library.arrays
+    climbs = library.library.twists[:, 3].any() or library.edge_displacement[:, 3].any()
+    turns, levels = headings + 1, MOST_LEVELS if climbs else 1
+    ticks = MOST_TICKS if tick > 0.0 else 1
+    others = layers * 2 * ticks * levels * turns  # two: truncated edges have cells of their own
     sides = 2
-    while sides < MOST_SIDES and sides * cell < 4.0 * far:
+    while sides < MOST_SIDES and sides * cell < 4.0 * far and others * (2 * sides) ** 2 < MOST_KEYS:
         sides *= 2
-    climbs = bool(query.library.arrays.library.twists[:, 3].any()) or bool(
-        query.library.arrays.edge_displacement[:, 3].any()
-    )
-    return sides, int(headings) + 1, MOST_LEVELS if climbs else 1, MOST_TICKS if tick > 0.0 else 1
+    return sides, int(turns), levels, ticks

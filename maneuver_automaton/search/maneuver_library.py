@@ -53,7 +53,7 @@ def maneuver_library(
     trim_twists, trim_rates = arrays.twists[: arrays.n_trims], arrays.rates[: arrays.n_trims]
     edges = _edges(automaton, transfer)
     twists = [carried_twists(trim_twists, part.trim_poses) for part in parts]
-    motion, spans = no_edges(len(parts))[1], np.zeros((0, 2), dtype=np.int64)
+    motion, spans = no_edges()[1], np.zeros((0, 2), dtype=np.int64)
     if edges.maneuver.size:
         motion, spans = _motion(automaton, parts, edges, np.array(twists), timed=timed)
     radius = length_scale(trim_twists, body_of(parts[0].shapes), wide=False)

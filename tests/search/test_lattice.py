@@ -22,7 +22,7 @@ from maneuver_automaton.search.lattice import SCHEDULE, distance_grids, first_pl
 from maneuver_automaton.search.lattice_memory import search_arrays, with_room
 from maneuver_automaton.search.lattice_pass import both_ends, with_cost
 from maneuver_automaton.search.lattice_query import lattice_query
-from maneuver_automaton.search.lattice_task import Resolution
+from maneuver_automaton.search.lattice_task import Resolution, task_of
 from maneuver_automaton.words.transitions import SWITCH
 from tests import scenes
 from tests.collision.scenes import random_map
@@ -294,6 +294,24 @@ def test_finer_resolutions_begin_one_after_the_other():
     found = first_plan(query, deadline=math.inf, max_expansions=1000)
     assert found.word is None or found.expansions <= 1000
     assert first_plan(query, deadline=math.inf, max_expansions=50).expansions == 50
+
+
+def test_cells_have_numbers_of_64_bits_however_many_there_are():
+    """A window of 1000 km, times, and layers for every trim: numbers are shared, none is lost."""
+    wide = replace(
+        PROBLEMS["moving"],
+        cost=PRICES,
+        bounds=Bounds(x=(-5e5, 5e5), y=(-5e5, 5e5)),
+        horizon=Horizon(max_trims=9, min_coast=0.1),
+        search=SearchSettings(headings=5000),
+    )
+    task = task_of(query_of(wide), Resolution(layered=True))
+    sides, turns, levels, ticks = task.radix
+    layers = 3 * (len(ROBOT) + 1) * 16
+    assert layers * 2 * ticks * levels * turns * sides**2 <= 2**62
+    assert (task.by_gear, task.by_trim, task.by_count) == (True, True, True)
+    near = task_of(query_of(PROBLEMS["car"]), Resolution())
+    assert near.radix[0] * near.fine_cell > 2.0 * 4.5  # no two cells of the scene share a number
 
 
 def test_time_is_up():
