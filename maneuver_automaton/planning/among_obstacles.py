@@ -56,10 +56,10 @@ class _Progress:
         """What is left."""
         return self.found.budget.less(self.found.counts["expansions"])
 
-    def heard(self, word: Word) -> None:
+    def improved(self, word: Word) -> None:
         """A better word was found."""
         self.words.append(word)
-        self.found.hear(word.cost + self.query.padding)
+        self.found.note(word.cost + self.query.padding)
 
     def first_plan(
         self, query: LatticeQuery, budget: Budget, *, most: int | None = None
@@ -128,16 +128,16 @@ def _first(progress: _Progress) -> FirstPlan:
     if query.problem.moves:
         first = progress.first_plan(query, budget, most=QUICK)
         if first.word is not None:
-            progress.heard(with_cost(first.word, query))
+            progress.improved(with_cost(first.word, query))
             return first
         way = progress.first_plan(_among_what_stands(query), budget)
         timed = None if way.word is None else with_waits(query, way.word)
         if timed is not None:
-            progress.heard(timed)
+            progress.improved(timed)
             return first
     first = progress.first_plan(query, budget)
     if first.word is not None:
-        progress.heard(with_cost(first.word, query))
+        progress.improved(with_cost(first.word, query))
     return first
 
 
@@ -154,7 +154,7 @@ def _let_pass(progress: _Progress) -> None:
     for way in list(distinct.values())[::-1][:MOST_WAYS]:
         timed = with_waits(query, way)
         if timed is not None and timed.cost < progress.words[-1].cost:
-            progress.heard(timed)
+            progress.improved(timed)
 
 
 def _among_what_stands(query: LatticeQuery) -> LatticeQuery:
@@ -176,7 +176,7 @@ def _candidates(progress: _Progress, bound: float) -> list[Candidate]:
         replace(left.part(share), expansions=most),
         patience=Patience(),
         floor=bound - query.padding,
-        better=progress.heard,
+        better=progress.improved,
         meanwhile=lambda: load_checks(query.problem, progress.found.workspace),
     )
     candidates = [_candidate(query, word) for word in (*progress.words, *better.others)]

@@ -108,15 +108,15 @@ class _Lattice:
         found, problem = self.found, self.found.problem
         query, numbers = _query(problem, self.goals)
         before = found.counts["expansions"]
-        for heard in maneuver_words(
+        for incumbent in maneuver_words(
             query, deadline=found.budget.deadline, max_expansions=found.budget.expansions
         ):
-            found.counts["expansions"] = before + heard.expansions
-            if heard.word is None:
-                self.exhausted = heard.status is SearchStatus.EXHAUSTED
+            found.counts["expansions"] = before + incumbent.expansions
+            if incumbent.word is None:
+                self.exhausted = incumbent.status is SearchStatus.EXHAUSTED
                 continue
-            index = numbers[heard.word.goal]
-            plan = without_nothing(replace(plan_of_maneuvers(query, heard.word), maneuvers=()))
+            index = numbers[incumbent.word.goal]
+            plan = without_nothing(replace(plan_of_maneuvers(query, incumbent.word), maneuvers=()))
             better = with_relaxed_end(problem, plan, problem.goals[index])
             if better is not None:
                 yield better, index

@@ -68,7 +68,7 @@ class Incumbents:
     refused: Counter[Condition] = field(default_factory=Counter)
     reasons: dict[Condition, str] = field(default_factory=dict)  # the first of each kind
     misfits: list[tuple[Plan, int]] = field(default_factory=list)  # of no times that would do
-    heard: float = math.inf  # cost of the cheapest plan that a search took to be free
+    least_cost: float = math.inf  # cost of the cheapest plan that a search took to be free
     checking: float = 0.0  # [s] that the checks took
 
     @property
@@ -86,10 +86,10 @@ class Incumbents:
         """How many plans were refused for more than their times."""
         return self.refused.total() - self.refused[Condition.WORD]
 
-    def hear(self, cost: float, *, at: float | None = None) -> None:
+    def note(self, cost: float, *, at: float | None = None) -> None:
         """Note what a search has found `at` a time [s], now if omitted; it is checked later."""
-        if cost < self.heard:
-            self.heard = cost
+        if cost < self.least_cost:
+            self.least_cost = cost
             self.improvements.append((self.budget.elapsed if at is None else at, cost))
 
     def offer(self, plan: Plan, goal_index: int, *, proven: bool = True) -> bool:
@@ -139,7 +139,7 @@ class Incumbents:
         if not any(other.rank <= one.rank for other in same):
             others = [other for other in self.plans if other not in same]
             self.plans = sorted([*others, one], key=lambda other: other.rank)
-            if self.plans[0] is one and cost < self.heard * (1.0 - CHEAPER):
+            if self.plans[0] is one and cost < self.least_cost * (1.0 - CHEAPER):
                 self.improvements.append((self.budget.elapsed, cost))
         return True
 

@@ -151,29 +151,28 @@ def _over_maneuvers(search: _Search) -> Iterator[tuple[Plan, int]]:
         before += more
         if known is not None:
             yield plan_of(query, known), query.owner(known)
-    for heard in maneuver_words(
+    for incumbent in maneuver_words(
         query,
         deadline=until,
         max_expansions=budget.expansions,
         better_share=share,
         known=known,
     ):
-        found.counts["expansions"] = before + heard.expansions
-        if heard.word is not None:
-            owner = query.owner(heard.word)
-            plan = plan_of(query, heard.word)
+        found.counts["expansions"] = before + incumbent.expansions
+        if incumbent.word is not None:
+            owner = query.owner(incumbent.word)
+            plan = plan_of(query, incumbent.word)
             yield plan, owner
             if problem.goals[owner].free_heading:
                 better = with_best_times(problem, plan, problem.goals[owner])
                 if better is not None:
                     yield better, owner
         elif not found.plans:
-            if heard.status is SearchStatus.EXHAUSTED:
+            if incumbent.status is SearchStatus.EXHAUSTED:
                 search.reason = "; none over trims and maneuvers at any resolution tried"
-            if math.isfinite(heard.nearest):
-                search.reason += (
-                    f"; the nearest place that was reached is {heard.nearest:.3g} m from the goal"
-                )
+            if math.isfinite(incumbent.nearest):
+                near = f"{incumbent.nearest:.3g} m from the goal"
+                search.reason += f"; the nearest place that was reached is {near}"
 
 
 def _needs_quick_word(problem: Problem, query: ManeuverQuery) -> bool:

@@ -54,7 +54,7 @@ def plan_within_tolerance(
         part = replace(part, expansions=question.search.max_expansions)
         result = answer(question, part, workspace, alternatives=SPARE * alternatives)
         for at, cost in result.improvements:
-            found.hear(cost, at=part.began - budget.began + at)
+            found.note(cost, at=part.began - budget.began + at)
         found.counts.update(result.counts)
         results.append(result)
     for result in results:

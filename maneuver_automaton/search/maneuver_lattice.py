@@ -51,8 +51,8 @@ IN_SPACE: tuple[Resolution, ...] = (
 )
 
 
-class Heard(NamedTuple):
-    """What a search has to say: a better word, or how it ended."""
+class Incumbent(NamedTuple):
+    """The best word so far, or, without one, how the search ended."""
 
     word: Word | None
     expansions: int
@@ -67,13 +67,14 @@ def maneuver_words(
     max_expansions: int | None = None,
     better_share: float = 1.0,
     known: Word | None = None,
-) -> Iterator[Heard]:
+) -> Iterator[Incumbent]:
     """Words from the start to a goal as they are found, each cheaper than the one before.
 
     Where cost is time, the first words may last longer than the query admits: what they are
     improved to need not. Passes of greater weight come first; every word is shortened, and later
     passes are pruned by the best. What is found in a number of expansions is the same at every
-    call; shortcuts are rounds that are not counted. The last thing heard has no word.
+    call; shortcuts are rounds that are not counted. The last incumbent has no word: it says how
+    the search ended.
 
     Parameters
     ----------
@@ -100,15 +101,15 @@ def maneuver_words(
     total = first
     if word is not None:
         if known is None:
-            yield Heard(word, first, SearchStatus.FOUND)
+            yield Incumbent(word, first, SearchStatus.FOUND)
         if better_share < 1.0:
             now = time.monotonic()
             deadline = now + better_share * (deadline - now)
         for better, more in _better(query, grid, word, room=room - first, deadline=deadline):
             total = first + more
             if better is not None:
-                yield Heard(better, total, SearchStatus.FOUND)
-    yield Heard(None, total, ended(total), nearest)
+                yield Incumbent(better, total, SearchStatus.FOUND)
+    yield Incumbent(None, total, ended(total), nearest)
 
 
 def _grid(query: ManeuverQuery) -> DistanceGrid:
@@ -130,10 +131,10 @@ def quick_word(
     cost alone looks everywhere.
     """
     total = 0
-    for heard in maneuver_words(quick, deadline=deadline, max_expansions=max_expansions):
-        total = heard.expansions
-        if heard.word is not None and heard.word.duration <= query.most_time:
-            return with_price(query.transfer, heard.word), total
+    for incumbent in maneuver_words(quick, deadline=deadline, max_expansions=max_expansions):
+        total = incumbent.expansions
+        if incumbent.word is not None and incumbent.word.duration <= query.most_time:
+            return with_price(query.transfer, incumbent.word), total
     return None, total
 
 

@@ -55,6 +55,6 @@ def load_maneuver_kernels() -> None:
         goal_trim="ahead",
         obstacles=(Obstacle(Box([1.0, 1.0], [0.0, 5.0])),),
     )
-    for heard in maneuver_words(query, max_expansions=EXPANSIONS):
-        if heard.word is not None:
-            word_is_free(query, heard.word)
+    for incumbent in maneuver_words(query, max_expansions=EXPANSIONS):
+        if incumbent.word is not None:
+            word_is_free(query, incumbent.word)

@@ -80,9 +80,9 @@ def measured(problem: Problem, seconds: float) -> Row:
     query = maneuver_problem_query(problem, (0,))
     first = word = None
     first_s = word_s = np.nan
-    for heard in maneuver_words(query, deadline=time.monotonic() + seconds):
-        if heard.word is not None:
-            word, word_s = heard.word, time.perf_counter() - began
+    for incumbent in maneuver_words(query, deadline=time.monotonic() + seconds):
+        if incumbent.word is not None:
+            word, word_s = incumbent.word, time.perf_counter() - began
             if first is None:
                 first, first_s = word, word_s
     assert first is not None

@@ -132,10 +132,10 @@ def test_checks_ask_the_clock_too():
     assert unhurried.refused.total() == 3 * LATE
 
 
-def test_what_a_search_has_heard_of_is_an_improvement_once():
+def test_what_a_search_has_noted_is_an_improvement_once():
     found = incumbents(FREE)
-    found.hear(9.0, at=0.5)
-    found.hear(9.5)
-    found.hear(4.0, at=1.5)
+    found.note(9.0, at=0.5)
+    found.note(9.5)
+    found.note(4.0, at=1.5)
     assert found.offer(AHEAD, 0)  # its end closed, it costs what the search said
     assert found.improvements == [(0.5, 9.0), (1.5, 4.0)]

@@ -60,14 +60,14 @@ def query_of(problem):
 
 @functools.cache
 def improved(name, *, expansions=EXPANSIONS):
-    """First word, words heard of on the way, and what came of it."""
+    """First word, words found on the way, and what came of it."""
     query = query_of(PROBLEMS[name])
     first = first_plan(query, deadline=math.inf, max_expansions=20_000).word
     assert first is not None
-    heard = []
+    incumbents = []
     better = improve(query, first, deadline=math.inf, patience=Patience(),
-                     max_expansions=expansions, better=heard.append)  # fmt: skip
-    return query, with_cost(first, query), heard, better
+                     max_expansions=expansions, better=incumbents.append)  # fmt: skip
+    return query, with_cost(first, query), incumbents, better
 
 
 def assert_admitted(query, word, *, first=False):
@@ -101,11 +101,11 @@ def assert_admitted(query, word, *, first=False):
 
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_never_worse_always_admitted(name):
-    query, first, heard, better = improved(name)
-    costs = [first.cost, *(word.cost for word in heard)]
+    query, first, incumbents, better = improved(name)
+    costs = [first.cost, *(word.cost for word in incumbents)]
     assert all(b < a for a, b in itertools.pairwise(costs))
     assert better.word.cost == costs[-1]
-    for word in [first, *heard[-2:], better.word, *better.others[:4]]:
+    for word in [first, *incumbents[-2:], better.word, *better.others[:4]]:
         assert_admitted(query, word)
     if name not in ("few trims", "nothing in the way"):
         assert better.word.cost < first.cost
@@ -113,10 +113,10 @@ def test_never_worse_always_admitted(name):
 
 @pytest.mark.parametrize("name", ["car", "moving", "prices"])
 def test_the_same_twice_to_the_last_bit(name):
-    _, _, heard, better = improved(name)
+    _, _, incumbents, better = improved(name)
     improved.cache_clear()
     _, _, again, better_again = improved(name)
-    assert [word.cost.hex() for word in heard] == [word.cost.hex() for word in again]
+    assert [word.cost.hex() for word in incumbents] == [word.cost.hex() for word in again]
     assert better.word.durations.tobytes() == better_again.word.durations.tobytes()
     assert better.attempts == better_again.attempts
 
@@ -132,36 +132,36 @@ class Clock:
         return self.now
 
 
-def heard_until(deadline, monkeypatch, name="car"):
+def incumbents_until(deadline, monkeypatch, name="car"):
     clock = Clock()
     monkeypatch.setattr(improvement, "time", clock)
     monkeypatch.setattr(lattice_pass, "time", clock)
     query = query_of(PROBLEMS[name])
     first = improved(name)[1]
     word = Word(trims=first.trims, durations=first.durations)
-    heard = []
+    incumbents = []
     improve(query, word, deadline=deadline, patience=Patience(), max_expansions=2000,
-            better=lambda better: heard.append(better.cost))  # fmt: skip
-    return heard
+            better=lambda better: incumbents.append(better.cost))  # fmt: skip
+    return incumbents
 
 
 def test_less_time_gives_the_beginning_of_what_more_time_gives(monkeypatch):
     improved("car")
-    whole = heard_until(math.inf, monkeypatch)
+    whole = incumbents_until(math.inf, monkeypatch)
     assert len(whole) >= 3
     for deadline in (1.0, 3.0, 7.0, 20.0, 45.0, 80.0, 120.0):
-        part = heard_until(deadline, monkeypatch)
+        part = incumbents_until(deadline, monkeypatch)
         # but for the last, of which a part was tried
         assert part[:-1] == whole[: len(part) - 1] if part else True
         assert not part or part[-1] >= whole[min(len(part), len(whole)) - 1]
 
 
 def test_less_patience_gives_the_beginning_too():
-    query, first, heard, _ = improved("car")
+    query, first, incumbents, _ = improved("car")
     short = []
     improve(query, first, deadline=math.inf, patience=Patience(attempts=1, passes=1),
             max_expansions=EXPANSIONS, better=short.append)  # fmt: skip
-    costs = [word.cost for word in heard]
+    costs = [word.cost for word in incumbents]
     assert [word.cost for word in short] == costs[: len(short)]
 
 

@@ -45,10 +45,10 @@ def search_maneuvers(
     begun = time.monotonic()
     found: list[tuple[Word, int, float]] = []
     total, status = 0, SearchStatus.EXHAUSTED
-    for heard in maneuver_words(query, deadline=deadline, max_expansions=max_expansions):
-        total, status = heard.expansions, heard.status
-        if heard.word is not None:
-            found.append((heard.word, total, time.monotonic() - begun))
+    for incumbent in maneuver_words(query, deadline=deadline, max_expansions=max_expansions):
+        total, status = incumbent.expansions, incumbent.status
+        if incumbent.word is not None:
+            found.append((incumbent.word, total, time.monotonic() - begun))
             if first_only:
                 break
     return ManeuverResult(

@@ -247,7 +247,7 @@ def test_a_switch_at_rest_proves_nothing():
     automaton, trailer = truck_with_trailer(levels=3), Box([0.3, 0.25])
     library = library_of(automaton)
     parts = parts_of(automaton, (BODY,), ((trailer,),))
-    heard = 0
+    incumbents = 0
     for side in (-0.4, 0.4):
         for gap in (0.02, 0.1, 0.25):
             wall = Obstacle(Box([0.3, 0.6], [0.25 + 0.15 + gap, 0.5 * side]))
@@ -261,6 +261,6 @@ def test_a_switch_at_rest_proves_nothing():
                 obstacles=(wall,),
             )
             for word in search_maneuvers(query, max_expansions=3000).words:
-                heard += 1
+                incumbents += 1
                 assert word_is_free(query, word)
-    assert heard > 0
+    assert incumbents > 0
