@@ -81,6 +81,18 @@ def part_body(bodies, p):
 
 
 @bare_inner_kernel
+def part_free(world, lib, p, start, twist, speed, t, keep, margin, clock):
+    """How long part `p` is free along a constant twist from its pose `start`; the last clearance.
+
+    No point of the part is faster than `speed`.
+    """
+    x, y, heading = start
+    body = part_body(lib.bodies, p)
+    v_x, v_y, turn = twist[0], twist[1], twist[2]
+    return free_time(world, body, x, y, heading, v_x, v_y, turn, speed, t, keep, margin, clock)
+
+
+@bare_inner_kernel
 def part_coast(world, lib, p, trim, place, begin, t, keep, margin, clock):
     """How long part `p` is free while the vehicle, at `place`, coasts a trim; the last clearance.
 
@@ -89,25 +101,12 @@ def part_coast(world, lib, p, trim, place, begin, t, keep, margin, clock):
     """
     x, y, heading = place
     offset, twist = lib.offsets[p, trim], lib.part_twists[p, trim]
-    x, y, heading = compose(x, y, heading, offset[0], offset[1], offset[2])
+    start = compose(x, y, heading, offset[0], offset[1], offset[2])
     if begin != 0.0:
         d_x, d_y, turn = coast(twist[0], twist[1], twist[2], begin)
-        x, y, heading = compose(x, y, heading, d_x, d_y, turn)
-    return free_time(
-        world,
-        part_body(lib.bodies, p),
-        x,
-        y,
-        heading,
-        twist[0],
-        twist[1],
-        twist[2],
-        lib.speeds[p, trim],
-        t,
-        keep,
-        margin,
-        clock + begin,
-    )
+        start = compose(start[0], start[1], start[2], d_x, d_y, turn)
+    speed = lib.speeds[p, trim]
+    return part_free(world, lib, p, start, twist, speed, t, keep, margin, clock + begin)
 
 
 @bare_inner_kernel
@@ -115,22 +114,9 @@ def part_piece(world, lib, p, k, place, keep, margin, clock):
     """How long part `p` is free along piece `k` of a maneuver begun at `place`; the clearance."""
     x, y, heading = place
     pose, twist = lib.piece_pose[k], lib.piece_twist[k]
-    x, y, heading = compose(x, y, heading, pose[0], pose[1], pose[2])
-    return free_time(
-        world,
-        part_body(lib.bodies, p),
-        x,
-        y,
-        heading,
-        twist[0],
-        twist[1],
-        twist[2],
-        lib.piece_speed[k],
-        lib.piece_time[k],
-        keep + lib.piece_error[k],
-        margin,
-        clock,
-    )
+    start = compose(x, y, heading, pose[0], pose[1], pose[2])
+    speed, t, error = lib.piece_speed[k], lib.piece_time[k], lib.piece_error[k]
+    return part_free(world, lib, p, start, twist, speed, t, keep + error, margin, clock)
 
 
 @inlined_kernel
