@@ -91,6 +91,15 @@ def bare_inner_kernel(function: Kernel) -> Kernel:
     return _inner(function, NO_COUNTS)
 
 
+def merged_kernel(function: Kernel) -> Kernel:
+    """A `bare_inner_kernel` that LLVM merges into its callers, for functions with one caller.
+
+    A call hands over every field of every structure it is given, hundreds of words for a scene;
+    merged, none is copied. Unlike an `inlined_kernel` it is typed once, on its own.
+    """
+    return _inner(function, {"forceinline": True, **NO_COUNTS})
+
+
 def inlined_kernel(function: Kernel) -> Kernel:
     """Compile a function that makes no array into each kernel that calls it, line by line."""
     import numba

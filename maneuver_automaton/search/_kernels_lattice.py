@@ -26,7 +26,12 @@ from __future__ import annotations
 
 import math
 
-from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
+from maneuver_automaton._compile import (
+    bare_inner_kernel,
+    bare_kernel,
+    inlined_kernel,
+    merged_kernel,
+)
 from maneuver_automaton.search._kernels_distance import distance_at, pop, push
 from maneuver_automaton.search._kernels_motion import (
     coast_inside,
@@ -83,7 +88,7 @@ def cell_key(task, x, y, heading, z, layer, time, fine):
     j = math.floor((c * d_y - s * d_x) / cell + 0.5) & (sides - 1)
     turn = (heading - task.frame_heading) / FULL_TURN
     k = math.floor((turn - math.floor(turn)) * n_headings + 0.5) % n_headings
-    level = math.floor(z / task.rise + 0.5) & (levels - 1)
+    level = math.floor(z / task.rise + 0.5) & (levels - 1) if levels > 1 else 0
     tick = math.floor(time / task.tick) & (ticks - 1) if task.tick > 0.0 else 0
     above = ((layer * 2 + fine) * ticks + tick) * levels + level
     return ((above * turns + k) * sides + j) * sides + i
@@ -137,8 +142,6 @@ def table_value(table, task, aim, x, y, heading):
 @bare_inner_kernel
 def table_to_go(table, task, x, y, heading):
     """Cost to go to the nearest aim by the table; 0 where it does not reach one of them."""
-    if table.value.shape[0] == 0:
-        return 0.0
     least = math.inf
     for aim in range(task.aims.shape[0]):
         least = min(least, table_value(table, task, aim, x, y, heading))
@@ -165,7 +168,7 @@ def cost_to_go(task, grid, table, field, pose, trim):
             e_x, e_y = task.aims[g, 0] - x, task.aims[g, 1] - y
             way = min(way, math.sqrt(e_x * e_x + e_y * e_y))
     estimate = way * task.per_metre
-    if estimate < math.inf:
+    if estimate < math.inf and table.value.shape[0] > 0:
         estimate = max(estimate, table_to_go(table, task, x, y, heading))
     if rise > 0.0:
         estimate = max(estimate, rise * task.per_climb)
@@ -185,7 +188,7 @@ def layer_of(task, lib, trim, gear, n_trims):
     return layer
 
 
-@bare_inner_kernel
+@merged_kernel
 def connect_ends(search, task, lib, scene, node, upper_bound, estimate):
     """Analytic expansion: reach the other end by a word; keeps the cheapest plan found.
 
@@ -275,8 +278,8 @@ def too_short(task, lib, trim, run):
     return trim != NO_TRIM and 0.0 < run < task.least_coast and not is_still(lib, trim)
 
 
-@bare_inner_kernel
-def add_node(search, task, slot, key, row, link, estimate):
+@merged_kernel
+def add_node(search, weight, slot, key, row, link, estimate):
     """Append a node, make it the one of its cell, and queue it."""
     nodes, links, state = search.nodes, search.links, search.state
     node = state[N_NODES]
@@ -289,7 +292,7 @@ def add_node(search, task, slot, key, row, link, estimate):
     state[N_NODES] = node + 1
     search.table[slot, 0] = key
     search.table[slot, 1] = (state[GENERATION] << 31) | node
-    push(search.heap_key, search.heap_node, state[HEAP], row[COST] + task.weight * estimate, node)
+    push(search.heap_key, search.heap_node, state[HEAP], row[COST] + weight * estimate, node)
     state[HEAP] += 1
 
 
@@ -312,21 +315,21 @@ def begin(search, task, lib, scene, grid, table):
         if estimate == math.inf or node_in(search.table, generation, slot) >= 0:
             continue
         row = (x, y, heading, z, 0.0, 0.0, 0.0, 0.0, 0.0)
-        add_node(search, task, slot, key, row, (-1, trim, 0, 0, r, ROOTED), estimate)
+        add_node(search, task.weight, slot, key, row, (-1, trim, 0, 0, r, ROOTED), estimate)
 
 
-@bare_inner_kernel
+@inlined_kernel
 def open_node(search, task, upper_bound):
     """The most promising node that is open, taken from the heap; -1 if there is none."""
     links, state = search.links, search.state
-    while state[HEAP] > 0:
-        if task.ends_early and search.heap_key[0] >= min(upper_bound, search.found[0]):
-            return -1
+    most = min(upper_bound, search.found[0]) if task.ends_early else math.inf
+    node = -1
+    while node < 0 and state[HEAP] > 0 and not search.heap_key[0] >= most:
         node = pop(search.heap_key, search.heap_node, state[HEAP])
         state[HEAP] -= 1
-        if links[node, CLOSED] == 0:
-            return node
-    return -1
+        if links[node, CLOSED]:
+            node = -1
+    return node
 
 
 @inlined_kernel
@@ -407,7 +410,7 @@ def relax_coasts(search, task, lib, scene, grid, table, node, upper_bound):
                     links[old, CLOSED] = 1
                 row = (n_x, n_y, n_heading, n_z, cost, time, t, lasted + t, max(gap, 0.0))
                 link = (node, trim, new_gear, count, links[node, ROOT], COASTED)
-                add_node(search, task, slot, key, row, link, ahead)
+                add_node(search, task.weight, slot, key, row, link, ahead)
             if fine:
                 break
 
@@ -456,7 +459,7 @@ def relax_maneuvers(search, task, lib, scene, grid, table, node, upper_bound):
             links[old, CLOSED] = 1
         row = (n_x, n_y, n_heading, n_z, cost, time, 0.0, 0.0, gap)
         link = (node, target, gear, count + 1, links[node, ROOT], edge)
-        add_node(search, task, slot, key, row, link, ahead)
+        add_node(search, task.weight, slot, key, row, link, ahead)
 
 
 @bare_kernel

@@ -10,7 +10,12 @@ from __future__ import annotations
 
 import math
 
-from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
+from maneuver_automaton._compile import (
+    bare_inner_kernel,
+    bare_kernel,
+    inlined_kernel,
+    merged_kernel,
+)
 from maneuver_automaton.collision._kernels_advancement import free_time
 from maneuver_automaton.collision._kernels_layers import layer_world, times_between
 from maneuver_automaton.collision.body import Body
@@ -354,7 +359,7 @@ def transition_free(scene, lib, source, target, pose, clock):
     return True, pose, clock
 
 
-@bare_inner_kernel
+@merged_kernel
 def connection_free(scene, lib, ends, word, climb, times, clock):
     """Whether a connection is free all the way: three trims, a climb, and the trim of its goal.
 
@@ -385,7 +390,7 @@ def connection_free(scene, lib, ends, word, climb, times, clock):
     return True
 
 
-@bare_inner_kernel
+@merged_kernel
 def free_candidate(scene, lib, words, ends, n, limits, clock, scratch):
     """Cheapest of `n` candidates that is proven free; -1 if none of the first few is.
 
