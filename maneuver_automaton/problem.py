@@ -213,8 +213,8 @@ class Problem:
                 "such as a frozen dataclass"
             )
         object.__setattr__(self, "goals", _as_goals(self.goals))
-        if isinstance(self.automaton.model, OnlyTranslated):
-            self._give_headings()
+        if self.automaton.translated is not None:
+            self._give_headings(self.automaton.translated)
         freeze(self, "start", last=dof)
         if self.start.ndim != 1:
             raise ValueError(f"start: pose has shape {self.start.shape}, need one pose")
@@ -247,13 +247,11 @@ class Problem:
         if not self.automaton.is_kinematic:
             self._check_ends()
 
-    def _give_headings(self) -> None:
+    def _give_headings(self, model: OnlyTranslated) -> None:
         """Start and goals of a vehicle that translations alone move get headings of its trims.
 
         A goal of any heading, or of none, becomes one goal for each heading.
         """
-        model = self.automaton.model
-        assert isinstance(model, OnlyTranslated)
         start = as_array("start", self.start)
         if self.start_trim is None or start.shape != (model.group.dof,):
             ((pose, trim),) = posed(self.automaton, start, "start", trim=self.start_trim)
@@ -289,10 +287,10 @@ class Problem:
         On a lattice that is the rest at the heading next to that of the start. Where the heading
         belongs to the trim, the start must have it: within a maneuver there is no first trim.
         """
-        if self.start_trim is not None and isinstance(self.automaton.model, OnlyTranslated):
+        if self.start_trim is not None and self.automaton.translated is not None:
             posed(self.automaton, self.start, "start", trim=self.start_trim)
-        if self.start_trim is None and isinstance(self.automaton.model, OnLattice):
-            return self._rest_facing(self.automaton.model, float(self.start[2]))
+        if self.start_trim is None and self.automaton.lattice is not None:
+            return self._rest_facing(self.automaton.lattice, float(self.start[2]))
         return self._trim_or_rest(self.start_trim)
 
     def last_trim(self, goal: Goal) -> Trim:
@@ -301,8 +299,8 @@ class Problem:
         On a lattice that is the rest at the heading next to that of the goal, as the lattice lies
         under the start.
         """
-        model = self.automaton.model
-        if goal.trim is None and isinstance(model, OnLattice):
+        model = self.automaton.lattice
+        if goal.trim is None and model is not None:
             begun = model.heading(self.first_trim.reduced_state)
             return self._rest_facing(model, float(goal.pose[2] - self.start[2]) + begun)
         return self._trim_or_rest(goal.trim)

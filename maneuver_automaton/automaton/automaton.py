@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, IntArray, as_array, vector_text
 from maneuver_automaton.errors import InvalidAutomaton, UnknownTrim
-from maneuver_automaton.models import Model, OnlyTranslated, in_world
+from maneuver_automaton.models import Model, OnLattice, OnlyTranslated, in_world
 from maneuver_automaton.primitives import Maneuver, Trim, trims_of
 from maneuver_automaton.primitives.bang_bang import Pairs, has_limited_rates
 from maneuver_automaton.primitives.in_world import maneuver_in_world, trim_in_world
@@ -225,6 +225,19 @@ class Automaton:
 
     def __getitem__(self, name: str) -> Trim:
         return self.trims[self.index_of(name)]
+
+    @cached_property
+    def translated(self) -> OnlyTranslated | None:
+        """The model, if translations alone move it; None otherwise. Asked for once: it takes long.
+
+        To ask whether a value obeys a Protocol looks at each of its attributes.
+        """
+        return self.model if isinstance(self.model, OnlyTranslated) else None
+
+    @cached_property
+    def lattice(self) -> OnLattice | None:
+        """The model, if its maneuvers lead along a lattice; None otherwise."""
+        return self.model if isinstance(self.model, OnLattice) else None
 
     @cached_property
     def trim_names(self) -> tuple[str, ...]:

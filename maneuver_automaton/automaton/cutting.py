@@ -26,6 +26,8 @@ def with_samples_at(plan: Plan, times: ArrayLike, model: Model) -> Plan:
     ValueError
         If a maneuver has no course.
     """
+    if not any(plan.maneuvers):
+        return plan
     due = np.asarray(times, dtype=np.float64)
     maneuvers, k = list(plan.maneuvers), 0
     for piece, begin in zip(plan.primitives, plan.switching_times, strict=False):
@@ -114,6 +116,8 @@ def tail_of(plan: Plan, after: float, *, start: Array | None = None) -> Plan:
 
 def committed(plan: Plan, after: float) -> float:
     """Seconds until the maneuver ends that is under way `after` seconds; 0 in a trim."""
+    if not any(plan.maneuvers):
+        return 0.0
     begins = plan.switching_times - plan.start_time
     for k, piece in enumerate(plan.primitives):
         inside = begins[k] + NOTHING < after < begins[k + 1] - NOTHING

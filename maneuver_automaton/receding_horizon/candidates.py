@@ -75,7 +75,8 @@ def bounded(problem: Problem) -> bool:
 
 def cost_until(problem: Problem, plan: Plan, until: float) -> float:
     """What the first `until` seconds of a plan cost, the switches in them included."""
-    return problem.cost_of(plan) - problem.cost_of(rest_of(plan, until))
+    # The cost does not depend on where the rest begins, and to find out where takes longer.
+    return problem.cost_of(plan) - problem.cost_of(rest_of(plan, until, start=plan.start))
 
 
 def is_rest_of(plan: Plan, rest: Plan | None) -> bool:

@@ -70,6 +70,8 @@ def without_nothing(plan: Plan) -> Plan:
     if plan.maneuvers:
         return plan
     word, times = merged(plan.trims, plan.durations.tolist())
+    if len(word) == len(plan.trims):
+        return plan
     return replace(plan, trims=word, durations=np.array(times))
 
 
