@@ -22,6 +22,7 @@ from maneuver_automaton.refinement.improve import Patience, improve
 from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
+from maneuver_automaton.search.lattice_worlds import world_around
 from maneuver_automaton.search.word_plan import plan_of_word
 from maneuver_automaton.words.word import Word
 
@@ -120,7 +121,7 @@ def clearance_at(problem: Problem, poses: Array, times: Array) -> Array:
     >>> bool(0.0 < gap <= 0.5)
     True
     """
-    world = lattice_query(problem, (0,)).world
+    world = world_around(problem)
     return clearances(world, world.into(poses), times=times)
 
 
