@@ -161,9 +161,8 @@ def lattice_query(problem: Problem, goals: Sequence[int]) -> LatticeQuery:
     trims = _end_trims(problem, library, index)
     clear = _end_clearances(problem, library, worlds, ends, trims, level)
     kept = np.ones(len(ends), dtype=np.bool_)
-    if (
-        not turns and (clear[1:] > 0.0).any()
-    ):  # where it turns, the clearance of one heading is none
+    # The clearance at one heading says nothing of a goal at which the vehicle may turn.
+    if not turns and (clear[1:] > 0.0).any():
         kept[1:] = clear[1:] > 0.0
     margin = _margin(library, worlds.whole, clear[kept])
     box, window, bounded = window_of(
