@@ -90,7 +90,8 @@ class _Search:
 
     def track(self, problem: Problem, budget: Budget, **more: Any) -> Tracked:
         """A path of the kinematic vehicle; what it takes is counted."""
-        found = track(problem, time_limit=budget.left, **more)
+        prepared = self.found.workspace.prepared
+        found = track(problem, time_limit=budget.left, prepared=prepared, **more)
         self.found.counts.update(expansions=found.expansions, collision_queries=found.queries)
         return found
 
@@ -137,14 +138,15 @@ def _over_maneuvers(search: _Search) -> Iterator[tuple[Plan, int]]:
     """
     found, problem, budget = search.found, search.found.problem, search.found.budget
     goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
-    query = lattice_query(problem, goals)
+    prepared = found.workspace.prepared
+    query = lattice_query(problem, goals, prepared=prepared)
     before = found.counts["expansions"]
     counted = budget.expansions is not None
     share = 1.0 if counted or why_not_polished(problem) else MANEUVER_SHARE
     until = budget.stage(share if found.plans else 1.0).deadline
     known: Word | None = None
     if _needs_quick_word(query):
-        quick = lattice_query(replace(problem, cost=Cost(time=1.0)), goals)
+        quick = lattice_query(replace(problem, cost=Cost(time=1.0)), goals, prepared=prepared)
         known, more = quick_word(query, quick, deadline=until, max_expansions=budget.expansions)
         before += more
         if known is not None:
@@ -255,12 +257,12 @@ def _stopping(found: Incumbents, path: Plan, goal_index: int) -> Iterator[tuple[
             return
 
 
-def load_inertia(problem: Problem) -> None:
+def load_inertia(problem: Problem, workspace: Workspace) -> None:
     """Compile or load what `plan_with_inertia` needs, before the clock runs."""
     load_lattice()
     load_checking()
     if follows_paths(problem.automaton.model) and rests_at_both_ends(problem):
-        library_table(kinematic_problem(problem, switch=0.0))
+        library_table(kinematic_problem(problem, switch=0.0), workspace)
         if not why_not_polished(problem):
             load_polishing(problem)
     if problem.automaton.maneuvers:

@@ -70,6 +70,7 @@ class LatticeLibrary(NamedTuple):
     """The arrays with what the wrapper needs beside them."""
 
     arrays: LatticeArrays
+    backwards: LatticeArrays  # the same with coasts that lead against time
     priced: Library  # its trims, and what they and the maneuvers cost
     parts: tuple[Part, ...]  # rigid parts of the vehicle, posed in these trims
     trims: IntArray  # (m,) their indices in the automaton

@@ -70,13 +70,9 @@ def aim_of(problem: Problem, goal: Goal) -> Array:
     return near.pose
 
 
-def poses_aimed_at(problem: Problem, goal: Goal, *, any_heading: bool) -> Array:
-    """The poses (n, dof) that a search is asked for at a goal.
-
-    Several headings stand for a free one, from the path there on, unless a search is asked for
-    `any_heading` at once.
-    """
-    if any_heading or not goal.free_heading:
+def poses_aimed_at(problem: Problem, goal: Goal) -> Array:
+    """The poses (n, dof) that a search aims at: several headings where any will do."""
+    if not goal.free_heading:
         return np.array(aim_of(problem, goal))[None]
     ahead = goal.pose[:2] - problem.start[:2]
     first = float(np.arctan2(ahead[1], ahead[0])) if ahead.any() else float(problem.start[2])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
 
 import numpy as np
@@ -21,6 +20,7 @@ from maneuver_automaton.search.lattice_arrays import (
     edge_durations_of,
     lattice_arrays,
     length_scale,
+    moves_of,
     tightest_turn,
 )
 from maneuver_automaton.search.lattice_edges import (
@@ -39,12 +39,15 @@ from maneuver_automaton.search.lattice_trims import (
     trims_of,
 )
 from maneuver_automaton.search.maneuver_motion import Part, posed_parts
+from maneuver_automaton.search.prepared import RECENT, Prepared
 
 OF_A_LATTICE = 0.7  # of its resolution: a cell's diagonal is shorter than the step between poses
-_Carried = tuple[tuple[str, tuple[Shape, ...]], ...]
+Carried = tuple[tuple[str, tuple[Shape, ...]], ...]
 
 
-def lattice_library(problem: Problem, goals: Sequence[int] = ()) -> LatticeLibrary:
+def lattice_library(
+    problem: Problem, goals: Sequence[int] = (), *, prepared: Prepared = RECENT
+) -> LatticeLibrary:
     """The part of a lattice search that is the same for every start, goal and map.
 
     Trims that lead to none of the goals of these numbers are left out: their speeds would make the
@@ -60,7 +63,8 @@ def lattice_library(problem: Problem, goals: Sequence[int] = ()) -> LatticeLibra
         first = automaton.index_of(problem.first_trim.name)
         ends = [automaton.index_of(problem.last_trim(problem.goals[k]).name) for k in goals]
         automaton = part_between(automaton, first, ends)
-    return _library(
+    return prepared.once(
+        _library,
         automaton,
         problem.cost,
         problem.footprint,
@@ -71,12 +75,11 @@ def lattice_library(problem: Problem, goals: Sequence[int] = ()) -> LatticeLibra
     )
 
 
-@functools.lru_cache(maxsize=16)
 def _library(
     automaton: Automaton,
     cost: StageCost,
     footprint: tuple[Shape, ...],
-    carried: _Carried,
+    carried: Carried,
     *,
     fixed_time: bool,
     waits: bool,
@@ -107,15 +110,18 @@ def library_of_trims(
     per_metre = _least(rates, speed) if speed.any() else _least(edges.cost, lengths)
     surplus = np.maximum(edges.cost - per_metre * lengths, 0.0)
     pose_rows = motion.first_piece[len(parts) * len(edges.cost)]
+    durations = edge_durations_of(twists, radius, waits=waits)
+    made = lattice_arrays(
+        arrays,
+        parts,
+        edges,
+        motion,
+        edge_durations=durations,
+        via_edge=via_edges(library, edges),
+    )
     return LatticeLibrary(
-        arrays=lattice_arrays(
-            arrays,
-            parts,
-            edges,
-            motion,
-            edge_durations=edge_durations_of(twists, radius, waits=waits),
-            via_edge=via_edges(library, edges),
-        ),
+        arrays=made,
+        backwards=made._replace(moves=moves_of(twists, -durations)),
         priced=library,
         parts=parts,
         trims=library.trims,

@@ -105,21 +105,27 @@ def pass_of(
     arrays: SearchArrays | None = None,
 ) -> Pass:
     """A search that is ready to run, in arrays of an earlier one if there are any."""
-    library = query.library.arrays
-    numbered = library.library
-    twists = numbered.twists[: numbered.n_trims]
+    scaled = _with_coasts(query, resolution, sign)
+    task = task_of(query, resolution, sign=sign)
+    scene = query.scene(query.margin * resolution.margin)
+    room = search_arrays(scaled.library) if arrays is None else arrays
+    room = with_room(room, len(task.roots) + 4)
+    kernels.begin(room, task, scaled, scene, grid, table)
+    return Pass(query, resolution, task, scene, grid, table, room, scaled)
+
+
+def _with_coasts(query: LatticeQuery, resolution: Resolution, sign: float) -> LatticeArrays:
+    """The library with coasts as long as a resolution asks for, along or against time."""
+    library = query.library.arrays if sign > 0.0 else query.library.backwards
+    if resolution.durations == 1.0 and query.least_coast == 0.0:
+        return library
+    twists = library.library.twists[: library.library.n_trims]
     durations = library.edge_durations * resolution.durations
     if query.least_coast > 0.0:  # no coast that would have to be gone on with
         lasting = np.asarray(twists.any(axis=1))[:, None] & (durations > 0.0)
         least = query.least_coast * np.array([1.0, LONGER])
         durations = np.where(lasting, np.maximum(durations, least), durations)
-    scaled = library._replace(edge_durations=durations, moves=moves_of(twists, sign * durations))
-    task = task_of(query, resolution, sign=sign)
-    scene = query.scene(query.margin * resolution.margin)
-    room = search_arrays(numbered) if arrays is None else arrays
-    room = with_room(room, len(task.roots) + 4)
-    kernels.begin(room, task, scaled, scene, grid, table)
-    return Pass(query, resolution, task, scene, grid, table, room, scaled)
+    return library._replace(edge_durations=durations, moves=moves_of(twists, sign * durations))
 
 
 def both_ends(

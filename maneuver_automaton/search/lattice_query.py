@@ -22,6 +22,7 @@ from maneuver_automaton.search.lattice_goals import poses_aimed_at
 from maneuver_automaton.search.lattice_library import lattice_library
 from maneuver_automaton.search.lattice_window import window_of
 from maneuver_automaton.search.lattice_worlds import Worlds, worlds_around
+from maneuver_automaton.search.prepared import RECENT, Prepared
 from maneuver_automaton.search.scene import Scene, scene_of
 from maneuver_automaton.words.library import NO_TRIM
 from maneuver_automaton.words.word import Word, with_price, word_of_steps
@@ -53,6 +54,7 @@ class LatticeQuery:
     box: Array  # (4,) of the window in the world's frame
     bounded: bool  # whether the window's rim is a wall on every side
     most_time: float  # [s] that a plan may last, inf if free
+    prepared: Prepared  # where its library and its worlds are kept
 
     @property
     def automaton(self) -> Automaton:
@@ -97,7 +99,7 @@ class LatticeQuery:
     @property
     def moves(self) -> bool:
         """Whether an obstacle moves."""
-        return self.problem.moves
+        return bool(self.world.arrays.movers.speed.size)
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -137,7 +139,9 @@ class LatticeQuery:
         return with_price(self.library.priced, word_of_steps(steps, goal=goal))
 
 
-def lattice_query(problem: Problem, goals: Sequence[int]) -> LatticeQuery:
+def lattice_query(
+    problem: Problem, goals: Sequence[int], *, prepared: Prepared = RECENT
+) -> LatticeQuery:
     """What a search is asked that leads from the start of a problem to the goals of these numbers.
 
     A vehicle that switches at will in a plane begins and ends in any trim. For others several
@@ -149,10 +153,13 @@ def lattice_query(problem: Problem, goals: Sequence[int]) -> LatticeQuery:
     ValueError
         If a maneuver has no course, and so no known cost.
     """
-    library = lattice_library(problem, goals)
-    worlds, horizon = worlds_around(problem, library.parts), problem.horizon
+    library = lattice_library(problem, goals, prepared=prepared)
+    worlds, horizon = worlds_around(problem, library.parts, prepared=prepared), problem.horizon
     turns = library.at_will  # at the end, to any heading
-    rows = [poses_aimed_at(problem, problem.goals[k], any_heading=turns) for k in goals]
+    rows = [
+        problem.goals[k].pose[None] if turns else poses_aimed_at(problem, problem.goals[k])
+        for k in goals
+    ]
     index = np.repeat(goals, [len(row) for row in rows])
     free = np.array([problem.goals[k].free_heading for k in index])
     poses = np.concatenate(rows)
@@ -186,6 +193,7 @@ def lattice_query(problem: Problem, goals: Sequence[int]) -> LatticeQuery:
         box=box,
         bounded=bounded,
         most_time=math.inf if most is None else most * (1.0 + 1e-12),
+        prepared=prepared,
     )
 
 
@@ -224,7 +232,9 @@ def _end_clearances(
     altitudes = ends[:, 3] + level
     gaps = []
     for part in library.parts:
-        there = (SE2(ends[:, :3]) @ SE2(part.trim_poses[trims])).pose
+        offsets, there = part.trim_poses[trims], ends[:, :3]
+        if offsets.any():
+            there = (SE2(there) @ SE2(offsets)).pose
         for band, world in zip(worlds.bands, worlds.between, strict=True):
             aside = clearances(replace(world, body=body_of(part.shapes)), there, times=times)
             gaps.append(np.maximum(aside, band.gap(altitudes, problem.body_height)))

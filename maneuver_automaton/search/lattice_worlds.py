@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from maneuver_automaton.collision import AnyObstacle, Obstacle, Shape, Zone
 from maneuver_automaton.collision.body import body_of
 from maneuver_automaton.collision.heights import Layer
-from maneuver_automaton.collision.layers import always, bands_of
+from maneuver_automaton.collision.layers import LayerArrays, always, bands_of, layer_arrays
 from maneuver_automaton.collision.world import World, own_frame, world_of
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.maneuver_motion import Part
+from maneuver_automaton.search.prepared import RECENT, Prepared
 
 _Shapes = tuple[Shape, ...]
 
@@ -27,6 +29,7 @@ class Worlds:
     between: tuple[World, ...]  # the worlds of these
     zones: tuple[World, ...]  # every zone as if it were an obstacle
     outer: World  # all obstacles and all zones, so that paths lead round them
+    flat: LayerArrays | None  # what the kernels see of them where heights do not matter
 
 
 def world_around(problem: Problem) -> World:
@@ -35,11 +38,14 @@ def world_around(problem: Problem) -> World:
     return world_of(problem.obstacles, problem.footprint, frame, keep=problem.margin)
 
 
-def worlds_around(problem: Problem, parts: tuple[Part, ...]) -> Worlds:
+def worlds_around(
+    problem: Problem, parts: tuple[Part, ...], *, prepared: Prepared = RECENT
+) -> Worlds:
     """The obstacles and zones of a problem around the parts of its vehicle."""
     low, high = problem.bounds.z or (-math.inf, math.inf)
     below, above = problem.body_height
-    return _worlds(
+    return prepared.once(
+        _worlds,
         problem.obstacles,
         problem.zones,
         tuple(part.shapes for part in parts),
@@ -49,7 +55,6 @@ def worlds_around(problem: Problem, parts: tuple[Part, ...]) -> Worlds:
     )
 
 
-@functools.lru_cache(maxsize=16)
 def _worlds(
     obstacles: tuple[AnyObstacle, ...],
     zones: tuple[Zone, ...],
@@ -68,12 +73,19 @@ def _worlds(
     bands = bands_of(obstacles, in_space=heights is not None)
     whole = around(obstacles)
     plane = whole if heights is None else around(always(bands, low=heights[0], high=heights[1]))
+    plane = replace(plane, body=body_of(bodies[0]))
     solid = tuple(Obstacle(zone.shape) for zone in zones)
+    between = tuple(around(band.obstacles) for band in bands)
+    beside = tuple(around((one,)) for one in solid)
+    everywhere = np.full(len(between) + len(beside), np.inf)
     return Worlds(
         whole=whole,
-        plane=replace(plane, body=body_of(bodies[0])),
+        plane=plane,
         bands=bands,
-        between=tuple(around(band.obstacles) for band in bands),
-        zones=tuple(around((one,)) for one in solid),
+        between=between,
+        zones=beside,
         outer=around((*obstacles, *solid)) if solid else whole,
+        flat=None
+        if heights is not None
+        else layer_arrays([*between, *beside], low=-everywhere, high=everywhere, plane=plane),
     )

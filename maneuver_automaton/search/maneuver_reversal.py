@@ -12,13 +12,15 @@ from dataclasses import replace
 import numpy as np
 
 from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.collision import Shape
+from maneuver_automaton.costs import StageCost
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.primitives import Maneuver, Trajectory
 from maneuver_automaton.search.lattice_arrays import LatticeLibrary
-from maneuver_automaton.search.lattice_library import library_of_trims
+from maneuver_automaton.search.lattice_library import Carried, library_of_trims
 from maneuver_automaton.search.lattice_query import LatticeQuery
-from maneuver_automaton.search.lattice_trims import trims_of
-from maneuver_automaton.search.maneuver_motion import Part
+from maneuver_automaton.search.lattice_trims import priced_library, trims_of
+from maneuver_automaton.search.maneuver_motion import Part, posed_parts
 from maneuver_automaton.search.scene import for_library
 from maneuver_automaton.words.library import library_of
 from maneuver_automaton.words.word import Word
@@ -28,14 +30,21 @@ def reversed_query(query: LatticeQuery) -> LatticeQuery | None:
     """The same question asked from the goal; None where obstacles move, or with several goals."""
     if query.moves or len(query.goals) > 1:
         return None
-    library = _reversed_library(query.library)
+    problem = query.problem
+    library = query.prepared.once(
+        _reversed_library,
+        query.automaton,
+        problem.cost,
+        problem.footprint,
+        tuple(problem.parts.items()),
+    )
     return replace(
         query,
         library=library,
-        around=for_library(query.around, query.problem, library),
+        around=for_library(query.around, problem, library),
         start=query.goals[0],
         goals=query.start[None],
-        goal_poses=query.problem.start[None],
+        goal_poses=problem.start[None],
         start_trim=int(query.goal_trims[0]),
         goal_trims=np.array([query.start_trim], dtype=np.int64),
     )
@@ -52,15 +61,18 @@ def forward_word(word: Word) -> Word:
     )
 
 
-def _reversed_library(library: LatticeLibrary) -> LatticeLibrary:
+def _reversed_library(
+    automaton: Automaton, cost: StageCost, footprint: tuple[Shape, ...], carried: Carried
+) -> LatticeLibrary:
     """The library of an automaton in reverse, at the same prices, for a map where nothing moves."""
-    priced = library.priced
+    priced = priced_library(automaton, cost)
     back = library_of(
-        _reversed_automaton(priced.automaton),
+        _reversed_automaton(automaton),
         rates=priced.arrays.rates[: priced.arrays.n_trims],
         maneuver_costs=priced.maneuver_costs,
     )
-    return library_of_trims(trims_of(back), _reversed_parts(library.parts), waits=False)
+    parts = posed_parts(automaton, footprint, dict(carried), priced.trims)
+    return library_of_trims(trims_of(back), _reversed_parts(parts), waits=False)
 
 
 def _reversed_automaton(automaton: Automaton) -> Automaton:

@@ -73,6 +73,8 @@ def for_library(scene: Scene, problem: Problem, library: LatticeLibrary) -> Scen
 
 def _layers(problem: Problem, worlds: Worlds, pad: float, level: float) -> LayerArrays:
     """The obstacles between neighbouring heights, then the zones, as the kernels see them."""
+    if worlds.flat is not None:
+        return worlds.flat
     below, above = problem.body_height
     low = [band.low - above - pad - level for band in worlds.bands]
     high = [band.high - below + pad - level for band in worlds.bands]
