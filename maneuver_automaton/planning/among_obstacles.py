@@ -25,6 +25,7 @@ from maneuver_automaton.search.lattice import FirstPlan, first_plan
 from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.limits import why_impossible
+from maneuver_automaton.search.prepared import RECENT
 from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.waiting import with_waits
 from maneuver_automaton.search.word_plan import plan_of_word
@@ -104,9 +105,9 @@ def plan_on_lattice(
 ) -> PlanResult:
     """The cheapest free plan found."""
     goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
-    query = lattice_query(problem, goals)
+    query = lattice_query(problem, goals, prepared=workspace.prepared)
     found = Incumbents(problem, budget, workspace.on(problem.obstacles), alternatives, UNFINISHED)
-    progress = _Progress(query, library_table(problem), found)
+    progress = _Progress(query, library_table(problem, workspace), found)
     first = _first(progress)
     if not progress.words:
         return found.none(*_why_none(query, first, budget), nodes=first.nodes)
@@ -161,7 +162,9 @@ def _among_what_stands(query: LatticeQuery) -> LatticeQuery:
     """The query without what moves."""
     problem = query.problem
     still = tuple(obstacle for obstacle in problem.obstacles if not moves(obstacle))
-    return lattice_query(replace(problem, obstacles=still), query.goal_index)
+    return lattice_query(
+        replace(problem, obstacles=still), query.goal_index, prepared=query.prepared
+    )
 
 
 def _candidates(progress: _Progress, bound: float) -> list[Candidate]:
@@ -188,13 +191,13 @@ def _candidates(progress: _Progress, bound: float) -> list[Candidate]:
 
 def prepare_map(problem: Problem, workspace: Workspace) -> None:
     """The map as the search, FCL and the audit see it."""
-    lattice_query(problem, tuple(range(len(problem.goals))))
+    lattice_query(problem, tuple(range(len(problem.goals))), prepared=workspace.prepared)
     load_checks(problem, workspace)
 
 
-def library_table(problem: Problem) -> CostTable:
+def library_table(problem: Problem, workspace: Workspace | None = None) -> CostTable:
     """The cost to go of the library, made once for all problems."""
-    return cost_to_go_table(problem)
+    return cost_to_go_table(problem, prepared=workspace.prepared if workspace else RECENT)
 
 
 def _candidate(query: LatticeQuery, word: Word) -> Candidate:
@@ -227,7 +230,7 @@ def _detours(progress: _Progress, best: Word, most: int) -> Iterator[Candidate]:
         for problem in with_stones(query, known[n_th]):
             if progress.budget.is_over or progress.budget.expansions == 0:
                 return
-            closed = lattice_query(problem, query.goal_index)
+            closed = lattice_query(problem, query.goal_index, prepared=query.prepared)
             first = progress.first_plan(closed, progress.budget)
             if first.word is None:
                 continue

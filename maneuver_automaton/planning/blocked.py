@@ -16,7 +16,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.problem import Goal, Problem, moves
 from maneuver_automaton.search.inside import outside
-from maneuver_automaton.search.lattice_query import world_around
+from maneuver_automaton.search.lattice_worlds import world_around
 
 CLEARLY = 1e-6  # [m] a clearance beyond the margin that leaves no doubt
 

@@ -27,12 +27,11 @@ from maneuver_automaton.refinement.fitting import without_nothing
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
 from maneuver_automaton.search.budget import Budget
 from maneuver_automaton.search.choose import load_search, search_goal
+from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.limits import closed_bound, why_impossible
 from maneuver_automaton.search.maneuver_lattice import maneuver_words
 from maneuver_automaton.search.maneuver_lattice import plan_of as plan_of_maneuvers
-from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
-from maneuver_automaton.search.maneuver_query import ManeuverQuery
-from maneuver_automaton.search.maneuver_ready import load_maneuver_kernels
+from maneuver_automaton.search.ready import load_maneuver_kernels
 from maneuver_automaton.search.result import SearchStatus, plan_of
 
 WORDS = 24  # of free space that are looked at, for all goals together
@@ -106,7 +105,7 @@ class _Lattice:
     def plans(self) -> Iterator[tuple[Plan, int]]:
         """Plans as they are found, each also with its best times, and the goals they reach."""
         found, problem = self.found, self.found.problem
-        query, numbers = _query(problem, self.goals)
+        query, numbers = _query(found, self.goals)
         before = found.counts["expansions"]
         for incumbent in maneuver_words(
             query, deadline=found.budget.deadline, max_expansions=found.budget.expansions
@@ -146,9 +145,9 @@ def _why_none(found: Incumbents, *, exhausted: bool) -> tuple[PlanStatus, str]:
     )
 
 
-def _query(problem: Problem, goals: tuple[int, ...]) -> tuple[ManeuverQuery, list[int]]:
+def _query(found: Incumbents, goals: tuple[int, ...]) -> tuple[LatticeQuery, list[int]]:
     """What the search over trims and maneuvers is asked, and which goal each of its aims is."""
-    aims: list[Goal] = []
+    problem, aims = found.problem, list[Goal]()
     numbers: list[int] = []
     any_trim = problem.automaton.trim_names[0]
     for index in goals:
@@ -157,7 +156,8 @@ def _query(problem: Problem, goals: tuple[int, ...]) -> tuple[ManeuverQuery, lis
             aims.append(replace(goal, pose=pose, trim=any_trim, free_heading=False))
             numbers.append(index)
     aimed = replace(problem, goals=tuple(aims), start_trim=any_trim)
-    return maneuver_problem_query(aimed, tuple(range(len(aims)))), numbers
+    query = lattice_query(aimed, range(len(aims)), prepared=found.workspace.prepared)
+    return query, numbers
 
 
 def _headings(goal: Goal) -> Iterator[Array]:

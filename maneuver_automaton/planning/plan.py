@@ -72,7 +72,7 @@ def plan_in(
         raise ValueError(f"time_limit must be positive, got {time_limit} s")
     if alternatives < 0:
         raise ValueError(f"alternatives must be at least 0, got {alternatives}")
-    _load(problem)
+    _load(problem, workspace)
     if alternatives and uses_lattice(problem):
         load_search(problem)
     budget = Budget.from_now(time_limit, expansions=problem.search.max_expansions)
@@ -108,15 +108,16 @@ def _searched(
 
 def prepare(problem: Problem, workspace: Workspace | None = None) -> None:
     """Have ready what every problem on the map of this one needs."""
-    _load(problem)
+    workspace = workspace or workspace_of(problem.obstacles)
+    _load(problem, workspace)
     if uses_lattice(problem):
-        prepare_map(problem, workspace or workspace_of(problem.obstacles))
+        prepare_map(problem, workspace)
 
 
-def _load(problem: Problem) -> None:
+def _load(problem: Problem, workspace: Workspace) -> None:
     """Compile or load what planning needs, before the clock runs."""
     if has_inertia(problem):
-        load_inertia(problem)
+        load_inertia(problem, workspace)
         return
     if problem.start.size > 3 and (problem.obstacles or problem.zones):
         load_in_space(problem)
@@ -124,7 +125,7 @@ def _load(problem: Problem) -> None:
     if problem.obstacles or problem.zones or uses_lattice(problem):
         load_lattice()
     if uses_lattice(problem):
-        library_table(problem)
+        library_table(problem, workspace)
     else:
         load_search(problem)
 

@@ -15,13 +15,15 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision.advancement import clearances, free_times
-from maneuver_automaton.planning.among_obstacles import library_table
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.improve import Patience, improve
 from maneuver_automaton.refinement.ready import load_lattice
+from maneuver_automaton.search.cost_to_go import cost_to_go_table
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
+from maneuver_automaton.search.lattice_worlds import world_around
+from maneuver_automaton.search.prepared import RECENT, Prepared
 from maneuver_automaton.search.word_plan import plan_of_word
 from maneuver_automaton.words.word import Word
 
@@ -120,7 +122,7 @@ def clearance_at(problem: Problem, poses: Array, times: Array) -> Array:
     >>> bool(0.0 < gap <= 0.5)
     True
     """
-    world = lattice_query(problem, (0,)).world
+    world = world_around(problem)
     return clearances(world, world.into(poses), times=times)
 
 
@@ -131,6 +133,7 @@ def track(
     known: Plan | None = None,
     patience: Patience = LITTLE,
     max_expansions: int | None = None,
+    prepared: Prepared = RECENT,
 ) -> Tracked:
     """A plan to any goal within `time_limit` [s]; `known` is improved if it is free.
 
@@ -146,6 +149,8 @@ def track(
         When to stop before the time is over.
     max_expansions : int, optional
         Of nodes, until a first plan is found; the problem's own limit if omitted.
+    prepared : Prepared, optional
+        Where libraries, worlds and tables are kept.
 
     Examples
     --------
@@ -156,12 +161,12 @@ def track(
     9.0
     """
     load_lattice()
-    table = library_table(problem)
+    table = cost_to_go_table(problem, prepared=prepared)
     deadline = time.monotonic() + time_limit
     goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
     if not goals:
         return Tracked(plan=None, goal_index=None, cost=math.inf, reason="every goal is blocked")
-    query = lattice_query(problem, goals)
+    query = lattice_query(problem, goals, prepared=prepared)
     word = None if known is None else word_of_plan(query, known)
     expansions = queries = 0
     if word is None:

@@ -38,13 +38,11 @@ from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
 from maneuver_automaton.search import SearchStatus
 from maneuver_automaton.search.budget import Budget
 from maneuver_automaton.search.certificate import certificate
-from maneuver_automaton.search.lattice_query import lattice_query
+from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.maneuver_lattice import maneuver_words, plan_of, quick_word
-from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
-from maneuver_automaton.search.maneuver_query import ManeuverQuery
-from maneuver_automaton.search.maneuver_ready import load_maneuver_kernels
 from maneuver_automaton.search.maneuver_search import maneuver_word_stages
 from maneuver_automaton.search.maneuver_words import load_maneuver_words
+from maneuver_automaton.search.ready import load_maneuver_kernels
 from maneuver_automaton.search.result import plan_of as plan_of_word
 from maneuver_automaton.words.word import Word, word_of_plan
 
@@ -92,7 +90,8 @@ class _Search:
 
     def track(self, problem: Problem, budget: Budget, **more: Any) -> Tracked:
         """A path of the kinematic vehicle; what it takes is counted."""
-        found = track(problem, time_limit=budget.left, **more)
+        prepared = self.found.workspace.prepared
+        found = track(problem, time_limit=budget.left, prepared=prepared, **more)
         self.found.counts.update(expansions=found.expansions, collision_queries=found.queries)
         return found
 
@@ -139,18 +138,19 @@ def _over_maneuvers(search: _Search) -> Iterator[tuple[Plan, int]]:
     """
     found, problem, budget = search.found, search.found.problem, search.found.budget
     goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
-    query = maneuver_problem_query(problem, goals)
+    prepared = found.workspace.prepared
+    query = lattice_query(problem, goals, prepared=prepared)
     before = found.counts["expansions"]
     counted = budget.expansions is not None
     share = 1.0 if counted or why_not_polished(problem) else MANEUVER_SHARE
     until = budget.stage(share if found.plans else 1.0).deadline
     known: Word | None = None
-    if _needs_quick_word(problem, query):
-        quick = maneuver_problem_query(replace(problem, cost=Cost(time=1.0)), goals)
+    if _needs_quick_word(query):
+        quick = lattice_query(replace(problem, cost=Cost(time=1.0)), goals, prepared=prepared)
         known, more = quick_word(query, quick, deadline=until, max_expansions=budget.expansions)
         before += more
         if known is not None:
-            yield plan_of(query, known), query.owner(known)
+            yield plan_of(query, known), query.goal_index[known.goal]
     for incumbent in maneuver_words(
         query,
         deadline=until,
@@ -160,7 +160,7 @@ def _over_maneuvers(search: _Search) -> Iterator[tuple[Plan, int]]:
     ):
         found.counts["expansions"] = before + incumbent.expansions
         if incumbent.word is not None:
-            owner = query.owner(incumbent.word)
+            owner = query.goal_index[incumbent.word.goal]
             plan = plan_of(query, incumbent.word)
             yield plan, owner
             if problem.goals[owner].free_heading:
@@ -175,11 +175,9 @@ def _over_maneuvers(search: _Search) -> Iterator[tuple[Plan, int]]:
                 search.reason += f"; the nearest place that was reached is {near}"
 
 
-def _needs_quick_word(problem: Problem, query: ManeuverQuery) -> bool:
+def _needs_quick_word(query: LatticeQuery) -> bool:
     """Whether a search by cost alone would look everywhere, or for too long motions."""
-    horizon = problem.horizon
-    timed = horizon.time is not None or horizon.max_time is not None
-    return not query.costs_are_times and (timed or query.library.per_metre == 0.0)
+    return math.isfinite(query.most_time) or query.library.per_metre == 0.0
 
 
 def _suits_words(problem: Problem) -> bool:
@@ -259,12 +257,12 @@ def _stopping(found: Incumbents, path: Plan, goal_index: int) -> Iterator[tuple[
             return
 
 
-def load_inertia(problem: Problem) -> None:
+def load_inertia(problem: Problem, workspace: Workspace) -> None:
     """Compile or load what `plan_with_inertia` needs, before the clock runs."""
     load_lattice()
     load_checking()
     if follows_paths(problem.automaton.model) and rests_at_both_ends(problem):
-        library_table(kinematic_problem(problem, switch=0.0))
+        library_table(kinematic_problem(problem, switch=0.0), workspace)
         if not why_not_polished(problem):
             load_polishing(problem)
     if problem.automaton.maneuvers:

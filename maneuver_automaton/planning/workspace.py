@@ -1,4 +1,4 @@
-"""What the checks of all plans on one map need, made once and held in the open."""
+"""What all plans on one map share, made once and held in the open."""
 
 from __future__ import annotations
 
@@ -9,13 +9,16 @@ from typing import TypeAlias
 from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.collision.fcl_checker import FclChecker
 from maneuver_automaton.collision.surroundings import Surroundings, surroundings_around
+from maneuver_automaton.search.prepared import RECENT, Prepared
 
 _Map: TypeAlias = tuple[tuple[AnyObstacle, ...], tuple[float, float]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Workspace:
-    """One map, as FCL and the audit see it; what it has made stays as long as it is held.
+    """One map, as searches, FCL and the audit see it, and what searches know of their vehicle.
+
+    What FCL and the audit know stays as long as it is held; searches keep what was made last.
 
     Examples
     --------
@@ -27,6 +30,7 @@ class Workspace:
     """
 
     obstacles: tuple[AnyObstacle, ...]
+    prepared: Prepared = field(default_factory=Prepared)  # libraries, worlds, and tables
     _checkers: dict[tuple[tuple[Shape, ...], _Map, float, float], FclChecker] = field(
         default_factory=dict, init=False
     )
@@ -34,7 +38,7 @@ class Workspace:
 
     def on(self, obstacles: tuple[AnyObstacle, ...]) -> Workspace:
         """The workspace of these obstacles: itself if they are its own, otherwise a new one."""
-        return self if obstacles == self.obstacles else Workspace(obstacles)
+        return self if obstacles == self.obstacles else Workspace(obstacles, self.prepared)
 
     def checker(
         self,
@@ -69,4 +73,4 @@ class Workspace:
 @functools.lru_cache(maxsize=8)
 def workspace_of(obstacles: tuple[AnyObstacle, ...]) -> Workspace:
     """A workspace for callers that hold none: of the last maps, each once."""
-    return Workspace(obstacles)
+    return Workspace(obstacles, RECENT)

@@ -29,8 +29,9 @@ from maneuver_automaton.receding_horizon.shifting import followed_by, moves_on, 
 from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.refinement.fitting import fitted_plans
 from maneuver_automaton.search.alternatives import TIE
+from maneuver_automaton.search.lattice_query import lattice_query
+from maneuver_automaton.search.lattice_trims import priced_library
 from maneuver_automaton.search.maneuver_lattice import maneuver_words, plan_of
-from maneuver_automaton.search.maneuver_problem import maneuver_problem_query, priced_transfers
 from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
 from maneuver_automaton.search.result import plan_of as plan_of_word
 
@@ -133,14 +134,14 @@ class OverManeuvers:
         )
         if not goals:
             return None
-        query = maneuver_problem_query(problem, goals)
+        query = lattice_query(problem, goals)
         best: Candidate | None = None
         for incumbent in maneuver_words(
             query, deadline=self.now.deadline, max_expansions=problem.search.max_expansions
         ):
             if incumbent.word is None:
                 continue
-            owner = query.owner(incumbent.word)
+            owner = query.goal_index[incumbent.word.goal]
             for plan in fitted_plans(problem, plan_of(query, incumbent.word), problem.goals[owner]):
                 one = self.now.candidate(self.now.whole(plan), owner, Origin.SEARCHED)
                 if (best is None or one.cost < best.cost) and self.is_safe(one.plan):
@@ -189,7 +190,7 @@ class OverManeuvers:
             return self._standing()
         if automaton.rest is None or begin.name not in automaton.trim_names:
             return None
-        library = priced_transfers(automaton, Cost(time=1.0))
+        library = priced_library(automaton, Cost(time=1.0))
         source = automaton.index_of(begin.name)
         if not math.isfinite(library.transitions.cost[library.class_pair(source, automaton.rest)]):
             return None

@@ -282,7 +282,7 @@ def work_of(query: LatticeQuery, word: Word) -> tuple[Work, IntArray]:
     """Arrays that hold a word, and its state."""
     n = max(256, 4 * len(word.trims) + 64)
     work = Work(
-        start=np.array(query.start),
+        start=np.array(query.start[:3]),
         trims=np.zeros(n, dtype=np.int64),
         durations=np.zeros(n),
         poses=np.zeros((n + 1, 3)),

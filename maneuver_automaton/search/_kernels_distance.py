@@ -130,7 +130,7 @@ def seed(grid, points):
         j = math.floor((points[k, 1] - grid.origin_y) / grid.cell)
         if 0 <= i < grid.columns and 0 <= j < grid.rows:
             here = j * grid.columns + i
-            if grid.value[here] > 0.0:
+            if grid.rank[here] > 0.0:  # a value is known only where a rank is
                 grid.rank[here], grid.value[here] = 0.0, 0.0
                 e_x, e_y = (i - grid.aim_i) * grid.cell, (j - grid.aim_j) * grid.cell
                 key = math.sqrt(e_x * e_x + e_y * e_y)

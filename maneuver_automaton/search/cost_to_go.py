@@ -6,7 +6,6 @@ An estimate, not a bound: cells round poses.
 from __future__ import annotations
 
 import contextlib
-import functools
 import hashlib
 import math
 import os
@@ -23,6 +22,7 @@ from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_table
 from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.search.lattice_library import lattice_library
+from maneuver_automaton.search.prepared import RECENT, Prepared
 
 HALF = 48  # cells from the middle to the rim
 HEADINGS = 72
@@ -44,7 +44,11 @@ NO_TABLE = CostTable(NOTHING, NOTHING, 1.0, 0)
 
 
 def cost_to_go_table(
-    problem: Problem, *, reach: float | None = None, folder: Path | None = None
+    problem: Problem,
+    *,
+    reach: float | None = None,
+    folder: Path | None = None,
+    prepared: Prepared = RECENT,
 ) -> CostTable:
     """Cost from every pose within `reach` of the goal, without obstacles, for any goal.
 
@@ -57,6 +61,8 @@ def cost_to_go_table(
     folder : Path, optional
         Where tables are kept, in files named after a hash of what they were made from; the user's
         cache folder if None. Where nothing can be written it works without.
+    prepared : Prepared, optional
+        Where tables are kept in memory.
 
     Returns
     -------
@@ -77,14 +83,15 @@ def cost_to_go_table(
     >>> bool(abs(table.value[0, table.half, 0] - 3.0) < 0.3)
     True
     """
-    library = lattice_library(problem)
+    library = lattice_library(problem, prepared=prepared)
     size = REACH * library.radius if reach is None else reach
     if not (math.isfinite(size) and size > 0.0):
         raise ValueError(f"reach must be positive, got {size} m")
-    return _table(library, size, folder)
+    return prepared.once(_kept, *_made_from(library, size), folder)
 
 
-def _table(library: LatticeLibrary, reach: float, folder: Path | None) -> CostTable:
+def _made_from(library: LatticeLibrary, reach: float) -> tuple[bytes, bytes, bytes, float, bool]:
+    """What a table is made from: twists, rates and edges of the trims that move, and its size."""
     arrays = library.arrays.library
     m = arrays.n_trims
     moving = arrays.twists[:m].any(axis=1)
@@ -97,12 +104,9 @@ def _table(library: LatticeLibrary, reach: float, folder: Path | None) -> CostTa
     with np.errstate(divide="ignore", invalid="ignore"):
         least = np.where(speed > 0.0, smallest / speed, 0.0)
     quanta = np.maximum(quanta, np.multiply.outer(least, [1.0, 2.0, 4.0]))
-    return _kept(
-        twists.tobytes(), rates.tobytes(), quanta.tobytes(), reach, library.mirrored, folder
-    )
+    return twists.tobytes(), rates.tobytes(), quanta.tobytes(), reach, library.mirrored
 
 
-@functools.lru_cache(maxsize=8)
 def _kept(
     twists: bytes, rates: bytes, quanta: bytes, reach: float, mirrored: bool, folder: Path | None
 ) -> CostTable:

@@ -19,7 +19,7 @@ DETOUR = 4.0  # [sides of the grid] that are preferred to a way through a wall t
 class DistanceGrid(NamedTuple):
     """What the kernels see; cells coincide with cells of the world's field of distances."""
 
-    value: Array  # (cells,) [m] length of the way that ranks first
+    value: Array  # (cells,) [m] length of the path that ranks first, where its rank is finite
     rank: Array  # (cells,) [m] that length with a detour for every cell that a wall may cut
     mark: NDArray[np.uint8]  # (cells,) 0 open, 1 blocked, 2 settled
     keys: Array
@@ -67,7 +67,7 @@ def distance_grid(world: World, box: Array, seeds: Array, aim: Array) -> Distanc
     half_diagonal = float(cell) * math.sqrt(0.5)
     aim_i, aim_j = (int(k) for k in np.floor((aim[:2] - start) / cell))
     grid = DistanceGrid(
-        value=np.full(n, np.inf),
+        value=np.empty(n),  # memory that is not touched costs nothing
         rank=np.full(n, np.inf),
         mark=np.zeros(n, dtype=np.uint8),
         keys=np.empty(8 * n + 8),

@@ -168,8 +168,8 @@ def first_plan(
 
 def distance_grids(query: LatticeQuery) -> tuple[DistanceGrid, DistanceGrid]:
     """Distances to the goals and to the start."""
-    to_goal = distance_grid(query.world, query.box, query.goals, query.start)
-    to_start = distance_grid(query.world, query.box, query.start[None], query.goals[0])
+    to_goal = distance_grid(query.plane, query.box, query.goals, query.start)
+    to_start = distance_grid(query.plane, query.box, query.start[None], query.goals[0])
     return to_goal, to_start
 
 

@@ -19,7 +19,7 @@ from maneuver_automaton.search.maneuver_motion import (
     carried_twists,
     fastest_of,
 )
-from maneuver_automaton.words.library import LibraryArrays
+from maneuver_automaton.words.library import Library, LibraryArrays
 
 DURATIONS = (0.17, 0.5)  # of the coasts of edges, in the time a length scale takes
 SPINS = (math.pi / 12.0, math.pi / 4.0)  # [rad] of turns on the spot
@@ -70,6 +70,9 @@ class LatticeLibrary(NamedTuple):
     """The arrays with what the wrapper needs beside them."""
 
     arrays: LatticeArrays
+    backwards: LatticeArrays  # the same with coasts that lead against time
+    priced: Library  # its trims, and what they and the maneuvers cost
+    parts: tuple[Part, ...]  # rigid parts of the vehicle, posed in these trims
     trims: IntArray  # (m,) their indices in the automaton
     number_of: IntArray  # from the indices in the automaton to these, -1 for none
     edge_maneuver: IntArray  # (E,) index in the automaton
@@ -84,6 +87,8 @@ class LatticeLibrary(NamedTuple):
     spans: IntArray  # (N, 2) samples of its course between which each piece of a part lies
     rest: int | None  # index in the automaton of the rest that pads
     rest_rate: float
+    interval: tuple[float, float]  # least expansions, for each goal, and most, between connections
+    at_will: bool  # whether plans begin and end in any trim, and may end with a turn on the spot
     mirrored: bool  # whether the mirror image of every trim is a trim of the same cost
 
 

@@ -1,4 +1,4 @@
-"""Poses of the lattice on which the maneuvers of a library end, next to a goal."""
+"""Poses that a search aims at: goals, several headings, poses on the lattice of a library."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from maneuver_automaton.models import OnLattice
 from maneuver_automaton.problem import Goal, Problem
 
 ENDS = 1e-3  # of a cell, between the end of a primitive and the cell it is taken for
+FREE_HEADINGS = 16  # that stand for a free one
 EXACT = 1e-9  # [m, rad] by which a plan may miss its goal, as in the audit
 
 
@@ -67,6 +68,17 @@ def aim_of(problem: Problem, goal: Goal) -> Array:
     if near is None or not near.is_near(goal) or max(near.way, near.turn) <= EXACT:
         return goal.pose
     return near.pose
+
+
+def poses_aimed_at(problem: Problem, goal: Goal) -> Array:
+    """The poses (n, dof) that a search aims at: several headings where any will do."""
+    if not goal.free_heading:
+        return np.array(aim_of(problem, goal))[None]
+    ahead = goal.pose[:2] - problem.start[:2]
+    first = float(np.arctan2(ahead[1], ahead[0])) if ahead.any() else float(problem.start[2])
+    poses = np.tile(goal.pose, (FREE_HEADINGS, 1))
+    poses[:, 2] = first + np.arange(FREE_HEADINGS) * (2.0 * np.pi / FREE_HEADINGS)
+    return poses
 
 
 def _stays_on_grid(automaton: Automaton, model: OnLattice) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,11 +15,11 @@ from maneuver_automaton.search.distance_grid import DistanceGrid
 from maneuver_automaton.search.lattice_arrays import LatticeArrays, moves_of
 from maneuver_automaton.search.lattice_memory import SearchArrays, search_arrays, with_room
 from maneuver_automaton.search.lattice_query import LatticeQuery
-from maneuver_automaton.search.lattice_task import Ends, Resolution, Task, goal_of_root, task_of
+from maneuver_automaton.search.lattice_task import Resolution, Task, goal_of_root, task_of
 from maneuver_automaton.search.scene import Scene
 from maneuver_automaton.words.library import NO_TRIM
 from maneuver_automaton.words.transitions import SWITCH
-from maneuver_automaton.words.word import Word
+from maneuver_automaton.words.word import Word, with_price
 
 FIRST_CHUNK = 64  # expansions
 TIMELY = 256  # expansions between two looks at the clock
@@ -32,7 +32,7 @@ LEAST = 1e-5  # share of the cost that a better word has to save
 class Pass:
     """A search from one end at one resolution; it can be stopped and resumed."""
 
-    query: Ends
+    query: LatticeQuery
     resolution: Resolution
     task: Task
     scene: Scene
@@ -96,7 +96,7 @@ class Pass:
 
 
 def pass_of(
-    query: Ends,
+    query: LatticeQuery,
     resolution: Resolution,
     *,
     grid: DistanceGrid,
@@ -105,21 +105,27 @@ def pass_of(
     arrays: SearchArrays | None = None,
 ) -> Pass:
     """A search that is ready to run, in arrays of an earlier one if there are any."""
-    library = query.library.arrays
-    numbered = library.library
-    twists = numbered.twists[: numbered.n_trims]
+    scaled = _with_coasts(query, resolution, sign)
+    task = task_of(query, resolution, sign=sign)
+    scene = query.scene(query.margin * resolution.margin)
+    room = search_arrays(scaled.library) if arrays is None else arrays
+    room = with_room(room, len(task.roots) + 4)
+    kernels.begin(room, task, scaled, scene, grid, table)
+    return Pass(query, resolution, task, scene, grid, table, room, scaled)
+
+
+def _with_coasts(query: LatticeQuery, resolution: Resolution, sign: float) -> LatticeArrays:
+    """The library with coasts as long as a resolution asks for, along or against time."""
+    library = query.library.arrays if sign > 0.0 else query.library.backwards
+    if resolution.durations == 1.0 and query.least_coast == 0.0:
+        return library
+    twists = library.library.twists[: library.library.n_trims]
     durations = library.edge_durations * resolution.durations
     if query.least_coast > 0.0:  # no coast that would have to be gone on with
         lasting = np.asarray(twists.any(axis=1))[:, None] & (durations > 0.0)
         least = query.least_coast * np.array([1.0, LONGER])
         durations = np.where(lasting, np.maximum(durations, least), durations)
-    scaled = library._replace(edge_durations=durations, moves=moves_of(twists, sign * durations))
-    task = task_of(query, resolution, sign=sign)
-    scene = query.scene(query.margin * resolution.margin)
-    room = search_arrays(numbered) if arrays is None else arrays
-    room = with_room(room, len(task.roots) + 4)
-    kernels.begin(room, task, scaled, scene, grid, table)
-    return Pass(query, resolution, task, scene, grid, table, room, scaled)
+    return library._replace(edge_durations=durations, moves=moves_of(twists, sign * durations))
 
 
 def both_ends(
@@ -175,7 +181,7 @@ def _word(one: Pass) -> Word:
 
 
 def _with_maneuvers(
-    query: Ends, steps: Sequence[tuple[int, int, float]], end: int
+    query: LatticeQuery, steps: Sequence[tuple[int, int, float]], end: int
 ) -> list[tuple[int, int, float]]:
     """Steps (transition, trim, time) in the automaton's numbers, from those of the search.
 
@@ -214,10 +220,4 @@ def _edges_between(library: LatticeArrays, source: int, target: int) -> list[int
 
 def with_cost(word: Word, query: LatticeQuery) -> Word:
     """The word with what it costs in the lattice library, prices of switches included."""
-    library, numbers = query.library.arrays.library, query.library.number_of[word.trims]
-    cost = float(library.rates[numbers] @ word.durations)
-    cost += library.switch * max(0, len(numbers) - 1)
-    gears = library.gears[numbers]
-    gears = gears[gears != 0]
-    cost += library.direction_change * int(np.count_nonzero(gears[1:] != gears[:-1]))
-    return replace(word, cost=cost)
+    return with_price(query.library.priced, word)

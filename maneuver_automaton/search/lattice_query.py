@@ -1,25 +1,31 @@
-"""One start and its goals among obstacles, seen from the world's own frame."""
+"""One start and its goals, each a pose and a trim, with all that a lattice search is told."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision.advancement import clearances
-from maneuver_automaton.collision.layers import LayerArrays, single_layer
-from maneuver_automaton.collision.world import World, own_frame, world_of
+from maneuver_automaton.collision.body import body_of
+from maneuver_automaton.collision.convex import DIGITS
+from maneuver_automaton.collision.world import World
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.problem import Bounds, Problem, SearchSettings
+from maneuver_automaton.problem import Problem, SearchSettings
 from maneuver_automaton.search.lattice_arrays import LatticeLibrary
+from maneuver_automaton.search.lattice_goals import poses_aimed_at
 from maneuver_automaton.search.lattice_library import lattice_library
-from maneuver_automaton.search.scene import Scene, planar_scene
+from maneuver_automaton.search.lattice_window import window_of
+from maneuver_automaton.search.lattice_worlds import Worlds, worlds_around
+from maneuver_automaton.search.prepared import RECENT, Prepared
+from maneuver_automaton.search.scene import Scene, scene_of
 from maneuver_automaton.words.library import NO_TRIM
-from maneuver_automaton.words.word import Word, word_of_steps
+from maneuver_automaton.words.word import Word, with_price, word_of_steps
 
 MARGIN = 0.005  # proven clearance of every pose looked at, in half widths of the body
 LEAST_MARGIN = 1e-7  # [m]
@@ -27,24 +33,33 @@ LEAST_MARGIN = 1e-7  # [m]
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LatticeQuery:
-    """What every pass of the lattice shares."""
+    """What every pass of the lattice shares, for a vehicle of any kind.
+
+    Poses are seen from the world's frame and have four components; altitudes are counted from that
+    of the first goal, and are 0 in the plane. Trims are numbered as in the library.
+    """
 
     problem: Problem
     library: LatticeLibrary
-    world: World
-    layers: LayerArrays  # the world as the only layer there is
-    start: Array  # (3,) in the world's frame
-    goals: Array  # (n, 3) those that can be reached at all
-    seen_start: Array  # (4,) the same at no altitude
-    seen_goals: Array  # (n, 4)
-    goal_trims: IntArray  # (n,) -1: the vehicle ends in any trim
-    goal_index: tuple[int, ...]  # which of the problem's goals they are
+    world: World  # all obstacles, whatever their heights, around the largest part
+    plane: World  # those in the way at every altitude, around the first part
+    around: Scene  # what motions are tested against
+    start: Array  # (4,)
+    start_trim: int  # NO_TRIM: any will do
+    goals: Array  # (n, 4) those that can be reached at all
+    goal_trims: IntArray  # (n,) NO_TRIM: any will do
     free_heading: NDArray[np.bool_]  # (n,)
-    window: Array  # (9,) as in `_kernels_motion.inside_window`
+    goal_poses: Array  # (n, dof) the goals as the problem sees them
+    goal_index: tuple[int, ...]  # which of the problem's goals they are
     box: Array  # (4,) of the window in the world's frame
     bounded: bool  # whether the window's rim is a wall on every side
-    margin: float  # [m] proven clearance beyond the problem's own margin
-    most_time: float  # [s] inf if free
+    most_time: float  # [s] that a plan may last, inf if free
+    prepared: Prepared  # where its library and its worlds are kept
+
+    @property
+    def automaton(self) -> Automaton:
+        """The automaton, without what leads to no goal."""
+        return self.library.priced.automaton
 
     @property
     def settings(self) -> SearchSettings:
@@ -52,24 +67,29 @@ class LatticeQuery:
         return self.problem.search
 
     @property
-    def start_trim(self) -> int:
-        """The vehicle begins in any trim."""
-        return NO_TRIM
+    def half_width(self) -> float:
+        """Half the width of the narrowest part [m]."""
+        return _half_width(self.library)
 
     @property
-    def half_width(self) -> float:
-        """Half the width of the body [m]."""
-        return self.world.body.half_width
+    def window(self) -> Array:
+        """Window (9,) as in `_kernels_motion.inside_window`."""
+        return self.around.window
+
+    @property
+    def margin(self) -> float:
+        """Proven clearance beyond the problem's own margin [m]."""
+        return self.around.margin
+
+    @property
+    def keep(self) -> float:
+        """Distance kept from everything [m]."""
+        return self.problem.margin
 
     @property
     def start_time(self) -> float:
         """Time of the world at the start [s]."""
         return self.problem.start_time
-
-    @property
-    def searched_time(self) -> float:
-        """Longest duration that is looked at [s]."""
-        return self.most_time
 
     @property
     def least_coast(self) -> float:
@@ -79,26 +99,13 @@ class LatticeQuery:
     @property
     def moves(self) -> bool:
         """Whether an obstacle moves."""
-        return self.problem.moves
+        return bool(self.world.arrays.movers.speed.size)
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Expansions between two connections: as many as the estimate says."""
-        return 0.0, math.inf
-
-    def scene(self, margin: float | None = None) -> Scene:
-        """What motions are tested against, with a proven clearance [m], by default the usual."""
-        return planar_scene(
-            self.layers,
-            self.window,
-            keep=self.keep,
-            margin=self.margin if margin is None else margin,
-            n_trims=len(self.library.trims),
-        )
-
-    def word_of(self, steps: Iterable[tuple[int, int, float]], goal: int) -> Word:
-        """A word of steps in the automaton's numbers, as yet without its cost."""
-        return word_of_steps(steps, goal=goal)
+        """Least and most expansions between two connections: one takes as long as some of these."""
+        least, most = self.library.interval
+        return least * len(self.goals), most
 
     @property
     def padding(self) -> float:
@@ -123,91 +130,129 @@ class LatticeQuery:
         fixed = self.problem.horizon.time
         return -math.inf if fixed is None else self.problem.start_time + fixed
 
-    @property
-    def keep(self) -> float:
-        """Distance kept from everything [m]."""
-        return self.problem.margin
+    def scene(self, margin: float | None = None) -> Scene:
+        """What motions are tested against, with a proven clearance [m], by default the usual."""
+        return self.around if margin is None else self.around._replace(margin=float(margin))
+
+    def word_of(self, steps: Iterable[tuple[int, int, float]], goal: int) -> Word:
+        """A word of steps in the automaton's numbers, with its cost."""
+        return with_price(self.library.priced, word_of_steps(steps, goal=goal))
 
 
-def lattice_query(problem: Problem, goal_index: tuple[int, ...]) -> LatticeQuery:
-    """Start and the goals of these numbers, with the world around them."""
-    library = lattice_library(problem)
-    world = world_around(problem)
-    start = world.into(problem.start)
-    goals = world.into(np.array([problem.goals[k].pose for k in goal_index]))
+def lattice_query(
+    problem: Problem, goals: Sequence[int], *, prepared: Prepared = RECENT
+) -> LatticeQuery:
+    """What a search is asked that leads from the start of a problem to the goals of these numbers.
+
+    A vehicle that switches at will in a plane begins and ends in any trim. For others several
+    headings are asked for where any will do: best times then let the heading go. A fixed time is a
+    longest one, since rest fills it.
+
+    Raises
+    ------
+    ValueError
+        If a maneuver has no course, and so no known cost.
+    """
+    library = lattice_library(problem, goals, prepared=prepared)
+    worlds, horizon = worlds_around(problem, library.parts, prepared=prepared), problem.horizon
+    turns = library.at_will  # at the end, to any heading
+    rows = [
+        problem.goals[k].pose[None] if turns else poses_aimed_at(problem, problem.goals[k])
+        for k in goals
+    ]
+    index = np.repeat(goals, [len(row) for row in rows])
+    free = np.array([problem.goals[k].free_heading for k in index])
+    poses = np.concatenate(rows)
+    level = float(poses[0, 3]) if poses.shape[1] > 3 else 0.0
+    ends = _seen(worlds.whole, np.vstack([problem.start, poses]), level)
+    trims = _end_trims(problem, library, index)
+    clear = _end_clearances(problem, library, worlds, ends, trims, level)
+    kept = np.ones(len(ends), dtype=np.bool_)
+    # The clearance at one heading says nothing of a goal at which the vehicle may turn.
+    if not turns and (clear[1:] > 0.0).any():
+        kept[1:] = clear[1:] > 0.0
+    margin = _margin(library, worlds.whole, clear[kept])
     box, window, bounded = window_of(
-        problem.bounds, world, np.vstack([start, goals]), radius=library.radius
+        problem.bounds, worlds.outer, ends[kept], radius=library.radius
     )
-    horizon = problem.horizon
-    limit = horizon.time if horizon.time is not None else horizon.max_time
+    most = horizon.max_time if horizon.time is None else horizon.time
+    kept = kept[1:]
     return LatticeQuery(
         problem=problem,
         library=library,
-        world=world,
-        layers=single_layer(world),
-        start=start,
-        goals=goals,
-        seen_start=np.append(start, 0.0),
-        seen_goals=np.hstack([goals, np.zeros((len(goals), 1))]),
-        goal_trims=np.full(len(goals), NO_TRIM),
-        goal_index=goal_index,
-        free_heading=np.array([problem.goals[k].free_heading for k in goal_index]),
-        window=window,
+        world=worlds.whole,
+        plane=worlds.plane,
+        around=scene_of(problem, library, worlds, window, margin=margin, level=level),
+        start=ends[0],
+        start_trim=int(trims[0]),
+        goals=ends[1:][kept],
+        goal_trims=trims[1:][kept],
+        free_heading=free[kept] & turns,
+        goal_poses=poses[kept],
+        goal_index=tuple(index[kept].tolist()),
         box=box,
         bounded=bounded,
-        margin=_margin(problem, world, start, goals),
-        most_time=math.inf if limit is None else limit * (1.0 + 1e-12),
+        most_time=math.inf if most is None else most * (1.0 + 1e-12),
+        prepared=prepared,
     )
 
 
-def world_around(problem: Problem) -> World:
-    """The obstacles of a problem around its footprint, prepared once for a map."""
-    frame = own_frame(problem.obstacles, problem.goals[0].pose)
-    return world_of(problem.obstacles, problem.footprint, frame, keep=problem.margin)
+def _seen(world: World, poses: Array, level: float) -> Array:
+    """Poses (n, dof) as the query keeps them, (n, 4)."""
+    seen = np.zeros((len(poses), 4))
+    seen[:, :3] = world.into(poses[:, :3])
+    seen[:, 3 : poses.shape[1]] = np.round(poses[:, 3:] - level, DIGITS)
+    return seen
 
 
-def _margin(problem: Problem, world: World, start: Array, goals: Array) -> float:
+def _end_trims(problem: Problem, library: LatticeLibrary, index: IntArray) -> IntArray:
+    """Trims (1 + n,) at the start, and at these goals of the problem."""
+    automaton = library.priced.automaton
+    if library.at_will:
+        return np.full(1 + len(index), NO_TRIM)
+    last = [problem.last_trim(problem.goals[k]).name for k in index]
+    numbers = [automaton.index_of(name) for name in (problem.first_trim.name, *last)]
+    return np.asarray(library.number_of[numbers], dtype=np.int64)
+
+
+def _end_clearances(
+    problem: Problem,
+    library: LatticeLibrary,
+    worlds: Worlds,
+    ends: Array,
+    trims: IntArray,
+    level: float,
+) -> Array:
+    """Clearance (1 + n,) beyond the margin at the start and every goal, over all parts [m].
+
+    Where something moves, at the start time, and after everything has come to rest.
+    """
+    times = np.full(len(ends), max(problem.start_time, worlds.whole.last_event))
+    times[0] = problem.start_time
+    altitudes = ends[:, 3] + level
+    gaps = []
+    for part in library.parts:
+        offsets, there = part.trim_poses[trims], ends[:, :3]
+        if offsets.any():
+            there = (SE2(there) @ SE2(offsets)).pose
+        for band, world in zip(worlds.bands, worlds.between, strict=True):
+            aside = clearances(replace(world, body=body_of(part.shapes)), there, times=times)
+            gaps.append(np.maximum(aside, band.gap(altitudes, problem.body_height)))
+    least: Array = np.min(gaps, axis=0)
+    return least - problem.margin
+
+
+def _margin(library: LatticeLibrary, world: World, clear: Array) -> float:
     """Proven clearance: a share of the body, at most half of what start and goals have."""
-    usual = MARGIN * (world.body.half_width or _typical(world))
-    poses = np.vstack([start, goals])
-    here = clearances(world, poses[:1], times=problem.start_time) - problem.margin
-    settled = max(problem.start_time, world.last_event)
-    there = clearances(world, poses[1:], times=settled) - problem.margin
-    known = [float(value) for value in np.append(here, there) if value > 0.0]
-    return max(LEAST_MARGIN, min([usual, *(0.5 * value for value in known)]))
+    usual = MARGIN * (_half_width(library) or _typical(world))
+    return float(max(LEAST_MARGIN, min([usual, *(0.5 * clear[clear > 0.0]).tolist()])))
+
+
+def _half_width(library: LatticeLibrary) -> float:
+    return min(body_of(part.shapes).half_width for part in library.parts)
 
 
 def _typical(world: World) -> float:
     """A length of the world, for vehicles that are points."""
     width = world.box[2:] - world.box[:2]
     return float(np.clip(0.02 * width.max(), 1e-3, 1.0)) if np.isfinite(width).all() else 1.0
-
-
-def window_of(
-    bounds: Bounds, world: World, poses: Array, *, radius: float
-) -> tuple[Array, Array, bool]:
-    """Where to search: the bounds, and where there are none, some way around everything.
-
-    A box (4,) in the world's frame, a window as in `_kernels_motion.inside_window`, and whether
-    the window's rim is a wall on every side. `poses` (n, 3 or more) lie inside.
-    """
-    pad = 4.0 * radius + 4.0 * world.body.reach
-    low = np.minimum(world.box[:2], poses[:, :2].min(axis=0)) - pad
-    high = np.maximum(world.box[2:], poses[:, :2].max(axis=0)) + pad
-    if bounds.x is None and bounds.y is None:
-        box = np.concatenate([low, high])
-        return box, np.concatenate([box, [0.0, 0.0, 1.0, 0.0, 0.0]]), False
-    turn = float(world.frame[2])
-    c, s = math.cos(turn), math.sin(turn)
-    corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
-    seen = corners @ np.array([[c, s], [-s, c]])  # along the axes of the problem
-    low, high = seen.min(axis=0), seen.max(axis=0)
-    for axis, pair in enumerate((bounds.x, bounds.y)):
-        if pair is not None:
-            low[axis], high[axis] = pair[0] - world.frame[axis], pair[1] - world.frame[axis]
-    slack = 1e-9 * (1.0 + float(np.abs(np.append(low, high)).max()))
-    window = np.array([low[0], low[1], high[0], high[1], 0.0, 0.0, c, s, slack])
-    inner = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
-    back = np.asarray(SE2(np.array([0.0, 0.0, -turn])).act(inner))
-    box = np.concatenate([back.min(axis=0), back.max(axis=0)])
-    return box, window, bounds.x is not None and bounds.y is not None

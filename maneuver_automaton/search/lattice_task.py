@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.problem import SearchSettings
 from maneuver_automaton.search.lattice_arrays import LatticeLibrary
-from maneuver_automaton.search.scene import Scene
-from maneuver_automaton.words.word import Word
+from maneuver_automaton.search.lattice_query import LatticeQuery
 
 HEADINGS = 72
 FINE_HEADINGS = 250
@@ -50,84 +47,6 @@ class Resolution:
     most: int = 2**62  # expansions
     backwards: bool = False  # from the goal
     ends_early: bool = False  # when the most promising node is no better than what is known
-
-
-class Ends(Protocol):
-    """What a search is asked, seen from the world's frame: a query for any vehicle."""
-
-    @property
-    def library(self) -> LatticeLibrary:
-        """Trims and maneuvers."""
-
-    @property
-    def settings(self) -> SearchSettings:
-        """What the problem says of cells and headings."""
-
-    @property
-    def seen_start(self) -> Array:
-        """Pose (4,) at the start."""
-
-    @property
-    def seen_goals(self) -> Array:
-        """Poses (n, 4) at the goals."""
-
-    @property
-    def start_trim(self) -> int:
-        """Trim before the start, -1 if any will do."""
-
-    @property
-    def goal_trims(self) -> IntArray:
-        """Trims (n,) after the goals, -1 where any will do."""
-
-    @property
-    def free_heading(self) -> NDArray[np.bool_]:
-        """Whether any heading will do at each goal (n,)."""
-
-    @property
-    def box(self) -> Array:
-        """Low and high corner (4,) of where to search."""
-
-    @property
-    def half_width(self) -> float:
-        """Half the width of the narrowest part [m]."""
-
-    @property
-    def start_time(self) -> float:
-        """Time of the world at the start [s]."""
-
-    @property
-    def searched_time(self) -> float:
-        """Longest duration that is looked at [s]."""
-
-    @property
-    def stay_until(self) -> float:
-        """Time of the world until which the goal is kept [s], -inf for none."""
-
-    @property
-    def most_trims(self) -> int:
-        """Trims that a word may have, 0 for any number."""
-
-    @property
-    def least_coast(self) -> float:
-        """Least time of a trim that moves [s]."""
-
-    @property
-    def moves(self) -> bool:
-        """Whether an obstacle moves."""
-
-    @property
-    def margin(self) -> float:
-        """Proven clearance [m]."""
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """Least and most expansions between two connections that are tried."""
-
-    def scene(self, margin: float | None = None) -> Scene:
-        """What motions are tested against, with a proven clearance [m], by default the usual."""
-
-    def word_of(self, steps: Iterable[tuple[int, int, float]], goal: int) -> Word:
-        """A word of steps (transition, trim, time) in the automaton's numbers."""
 
 
 class Task(NamedTuple):
@@ -177,11 +96,11 @@ class Task(NamedTuple):
     by_count: bool
 
 
-def task_of(query: Ends, resolution: Resolution, *, sign: float = 1.0) -> Task:
+def task_of(query: LatticeQuery, resolution: Resolution, *, sign: float = 1.0) -> Task:
     """Limits and sizes of a search, as the kernels see them."""
     library, settings = query.library, query.settings
     arrays, numbered = library.arrays, library.arrays.library
-    frame = query.seen_goals[0]
+    frame = query.goals[0]
     cell = resolution.scale * (settings.cell or library.cell)
     headings = settings.headings or HEADINGS
     size = query.half_width or library.radius * 0.1
@@ -235,7 +154,7 @@ def task_of(query: Ends, resolution: Resolution, *, sign: float = 1.0) -> Task:
         back_off=float(max(BACK_OFF * size, 2.0 * query.margin)),
         shortest_contact=float(SHORTEST_CONTACT * size),
         clock=float(query.start_time),
-        most_time=float(query.searched_time),
+        most_time=float(query.most_time),
         stay_until=float(query.stay_until),
         most_trims=int(query.most_trims),
         least_coast=float(query.least_coast * (1.0 - ROUNDING)),
@@ -246,19 +165,17 @@ def task_of(query: Ends, resolution: Resolution, *, sign: float = 1.0) -> Task:
     )
 
 
-def goal_roots(query: Ends) -> tuple[Array, IntArray]:
+def goal_roots(query: LatticeQuery) -> tuple[Array, IntArray]:
     """Poses (R, 4) at the goals, a few headings where any will do, and their trims."""
     rows, trims = [], []
-    for goal, free, trim in zip(
-        query.seen_goals, query.free_heading, query.goal_trims, strict=True
-    ):
+    for goal, free, trim in zip(query.goals, query.free_heading, query.goal_trims, strict=True):
         turns = np.arange(SAMPLED_HEADINGS if free else 1) * (2.0 * np.pi / SAMPLED_HEADINGS)
         rows += [goal + np.array([0.0, 0.0, turn, 0.0]) for turn in turns]
         trims += [int(trim)] * len(turns)
     return np.array(rows), np.array(trims, dtype=np.int64)
 
 
-def goal_of_root(query: Ends, root: int) -> int:
+def goal_of_root(query: LatticeQuery, root: int) -> int:
     """Which goal a root at the goals belongs to."""
     counts = np.where(query.free_heading, SAMPLED_HEADINGS, 1)
     return int(np.searchsorted(np.cumsum(counts), root, side="right"))
@@ -267,10 +184,10 @@ def goal_of_root(query: Ends, root: int) -> int:
 _End = tuple[Array, IntArray, NDArray[np.bool_]]
 
 
-def _ends(query: Ends) -> tuple[_End, _End]:
+def _ends(query: LatticeQuery) -> tuple[_End, _End]:
     """Poses, trims, and whether any heading will do, at the start and at the goals."""
-    start = np.array(query.seen_start)[None], np.array([query.start_trim], dtype=np.int64)
-    goals = np.array(query.seen_goals), np.array(query.goal_trims, dtype=np.int64)
+    start = np.array(query.start)[None], np.array([query.start_trim], dtype=np.int64)
+    goals = np.array(query.goals), np.array(query.goal_trims, dtype=np.int64)
     return (*start, np.zeros(1, dtype=np.bool_)), (*goals, np.array(query.free_heading))
 
 
@@ -294,9 +211,9 @@ def _slack(library: LatticeLibrary) -> float:
     return float(path + prices) if path > 0.0 else math.inf
 
 
-def _tick(query: Ends, resolution: Resolution) -> float:
+def _tick(query: LatticeQuery, resolution: Resolution) -> float:
     """Length in time of a cell [s]; 0 where a dearer node is never the one that is in time."""
-    if not (query.moves or math.isfinite(query.searched_time)):
+    if not (query.moves or math.isfinite(query.most_time)):
         return 0.0
     durations = query.library.arrays.edge_durations
     lasting = durations[durations > 0.0]
@@ -304,7 +221,7 @@ def _tick(query: Ends, resolution: Resolution) -> float:
 
 
 def _radix(
-    query: Ends, cell: float, headings: int, tick: float, layers: int
+    query: LatticeQuery, cell: float, headings: int, tick: float, layers: int
 ) -> tuple[int, int, int, int]:
     """How many numbers each coordinate of a cell needs; more cells than that share numbers.
 

@@ -13,8 +13,8 @@ from maneuver_automaton.search.distance_grid import DistanceGrid, distance_grid
 from maneuver_automaton.search.lattice import Schedule, first_word
 from maneuver_automaton.search.lattice_memory import SearchArrays
 from maneuver_automaton.search.lattice_pass import LEAST, Pass, pass_of
+from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_task import Resolution
-from maneuver_automaton.search.maneuver_query import ManeuverQuery
 from maneuver_automaton.search.maneuver_reversal import forward_word, reversed_query
 from maneuver_automaton.search.maneuver_shortcuts import shortened
 from maneuver_automaton.search.result import SearchStatus
@@ -61,7 +61,7 @@ class Incumbent(NamedTuple):
 
 
 def maneuver_words(
-    query: ManeuverQuery,
+    query: LatticeQuery,
     *,
     deadline: float = math.inf,
     max_expansions: int | None = None,
@@ -78,7 +78,7 @@ def maneuver_words(
 
     Parameters
     ----------
-    query : ManeuverQuery
+    query : LatticeQuery
     deadline : float
         Of `time.monotonic()` [s].
     max_expansions : int, optional
@@ -112,15 +112,14 @@ def maneuver_words(
     yield Incumbent(None, total, ended(total), nearest)
 
 
-def _grid(query: ManeuverQuery) -> DistanceGrid:
+def _grid(query: LatticeQuery) -> DistanceGrid:
     """Distances in the plane to the goals of a query."""
-    own = query.around(query.parts[0], query.plane)
-    return distance_grid(own, query.window[0], query.seen_goals, query.seen_start)
+    return distance_grid(query.plane, query.box, query.goals, query.start)
 
 
 def quick_word(
-    query: ManeuverQuery,
-    quick: ManeuverQuery,
+    query: LatticeQuery,
+    quick: LatticeQuery,
     *,
     deadline: float = math.inf,
     max_expansions: int | None = None,
@@ -134,23 +133,23 @@ def quick_word(
     for incumbent in maneuver_words(quick, deadline=deadline, max_expansions=max_expansions):
         total = incumbent.expansions
         if incumbent.word is not None and incumbent.word.duration <= query.most_time:
-            return with_price(query.transfer, incumbent.word), total
+            return with_price(query.library.priced, incumbent.word), total
     return None, total
 
 
-def plan_of(query: ManeuverQuery, word: Word) -> Plan:
+def plan_of(query: LatticeQuery, word: Word) -> Plan:
     """A word as a plan that ends exactly at its goal, in the frame of the query."""
     return plan_of_word(
         query.automaton,
         word,
-        query.start,
-        goal=query.goals[word.goal],
+        query.problem.start,
+        goal=query.goal_poses[word.goal],
         start_time=query.start_time,
     )
 
 
 def _first(
-    query: ManeuverQuery, grid: DistanceGrid, *, room: int, deadline: float
+    query: LatticeQuery, grid: DistanceGrid, *, room: int, deadline: float
 ) -> tuple[Word | None, int, float]:
     """Passes of rising resolution in turn until one connects.
 
@@ -170,7 +169,7 @@ def _first(
     return forward_word(found.word) if backwards else found.word, found.expansions, 0.0
 
 
-def _first_stages(query: ManeuverQuery) -> tuple[tuple[int, tuple[Resolution, ...]], ...]:
+def _first_stages(query: LatticeQuery) -> tuple[tuple[int, tuple[Resolution, ...]], ...]:
     """Which passes begin after how many expansions of all of them together.
 
     A vehicle that turns widely for its size gets passes whose cells and coasts are as wide: it
@@ -184,7 +183,7 @@ def _first_stages(query: ManeuverQuery) -> tuple[tuple[int, tuple[Resolution, ..
     return tuple(stages)
 
 
-def _passes(query: ManeuverQuery, resolution: Resolution, grid: DistanceGrid) -> list[Pass]:
+def _passes(query: LatticeQuery, resolution: Resolution, grid: DistanceGrid) -> list[Pass]:
     """Passes that are ready to run; one from the goal only where that can be asked."""
     resolution = replace(resolution, ends_early=True)
     if not resolution.backwards:
@@ -194,12 +193,12 @@ def _passes(query: ManeuverQuery, resolution: Resolution, grid: DistanceGrid) ->
 
 
 def _better(
-    query: ManeuverQuery, grid: DistanceGrid, best: Word, *, room: int, deadline: float
+    query: LatticeQuery, grid: DistanceGrid, best: Word, *, room: int, deadline: float
 ) -> Iterator[tuple[Word | None, int]]:
     """Shortcuts, then passes of falling weight below the cost of the best word, one by one."""
     total = 0
     arrays: SearchArrays | None = None
-    coarse = IN_SPACE if query.start.size > 3 else ()
+    coarse = IN_SPACE if query.problem.start.size > 3 else ()
     wide = query.library.turns
     fast = tuple(Resolution(scale=wide, durations=wide, weight=w) for w in (FAST_WEIGHT, 1.0))
     later = LATER if wide <= FAST else (*fast, *LATER)
@@ -230,7 +229,7 @@ def _better(
 
 
 def _shorter(
-    query: ManeuverQuery,
+    query: LatticeQuery,
     best: Word,
     resolutions: Sequence[Resolution],
     *,

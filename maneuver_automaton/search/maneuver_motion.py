@@ -6,8 +6,8 @@ each follows closely; how far the true motion may be from them is kept beside ev
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -112,6 +112,19 @@ def parts_of(
             for k, shapes in enumerate(carried)
         ),
     )
+
+
+def posed_parts(
+    automaton: Automaton,
+    footprint: tuple[Shape, ...],
+    carried: Mapping[str, tuple[Shape, ...]],
+    trims: IntArray,
+) -> tuple[Part, ...]:
+    """The vehicle's own body and those parts that have one, in `trims` (m,) of the automaton."""
+    names = automaton.model.part_names
+    own, *others = parts_of(automaton, footprint, [carried.get(name, ()) for name in names])
+    bodies = [part for name, part in zip(names, others, strict=True) if name in carried]
+    return tuple(replace(part, trim_poses=part.trim_poses[trims]) for part in (own, *bodies))
 
 
 def body_arrays(bodies: Sequence[Body]) -> BodyArrays:

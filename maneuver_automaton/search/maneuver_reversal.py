@@ -7,34 +7,46 @@ the same words from their other end.
 
 from __future__ import annotations
 
-import functools
 from dataclasses import replace
 
 import numpy as np
 
 from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.collision import Shape
+from maneuver_automaton.costs import StageCost
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.primitives import Maneuver, Trajectory
-from maneuver_automaton.search.maneuver_motion import Part
-from maneuver_automaton.search.maneuver_query import ManeuverQuery
-from maneuver_automaton.words.library import Library, library_of
+from maneuver_automaton.search.lattice_arrays import LatticeLibrary
+from maneuver_automaton.search.lattice_library import Carried, library_of_trims
+from maneuver_automaton.search.lattice_query import LatticeQuery
+from maneuver_automaton.search.lattice_trims import priced_library, trims_of
+from maneuver_automaton.search.maneuver_motion import Part, posed_parts
+from maneuver_automaton.search.scene import for_library
+from maneuver_automaton.words.library import library_of
 from maneuver_automaton.words.word import Word
 
 
-def reversed_query(query: ManeuverQuery) -> ManeuverQuery | None:
+def reversed_query(query: LatticeQuery) -> LatticeQuery | None:
     """The same question asked from the goal; None where obstacles move, or with several goals."""
     if query.moves or len(query.goals) > 1:
         return None
-    transfer = _reversed_transfer(query.transfer)
+    problem = query.problem
+    library = query.prepared.once(
+        _reversed_library,
+        query.automaton,
+        problem.cost,
+        problem.footprint,
+        tuple(problem.parts.items()),
+    )
     return replace(
         query,
-        transfer=transfer,
-        parts=_reversed_parts(query.parts),
+        library=library,
+        around=for_library(query.around, problem, library),
         start=query.goals[0],
         goals=query.start[None],
+        goal_poses=problem.start[None],
         start_trim=int(query.goal_trims[0]),
         goal_trims=np.array([query.start_trim], dtype=np.int64),
-        owners=None,
     )
 
 
@@ -49,16 +61,20 @@ def forward_word(word: Word) -> Word:
     )
 
 
-@functools.lru_cache(maxsize=4)
-def _reversed_transfer(transfer: Library) -> Library:
-    return library_of(
-        _reversed_automaton(transfer.automaton),
-        rates=transfer.arrays.rates[: transfer.arrays.n_trims],
-        maneuver_costs=transfer.maneuver_costs,
+def _reversed_library(
+    automaton: Automaton, cost: StageCost, footprint: tuple[Shape, ...], carried: Carried
+) -> LatticeLibrary:
+    """The library of an automaton in reverse, at the same prices, for a map where nothing moves."""
+    priced = priced_library(automaton, cost)
+    back = library_of(
+        _reversed_automaton(automaton),
+        rates=priced.arrays.rates[: priced.arrays.n_trims],
+        maneuver_costs=priced.maneuver_costs,
     )
+    parts = posed_parts(automaton, footprint, dict(carried), priced.trims)
+    return library_of_trims(trims_of(back), _reversed_parts(parts), waits=False)
 
 
-@functools.lru_cache(maxsize=4)
 def _reversed_automaton(automaton: Automaton) -> Automaton:
     """Trims of opposite twists, and maneuvers from their ends to their begins."""
     trims = tuple(replace(trim, body_velocity=-trim.body_velocity) for trim in automaton.trims)
@@ -91,7 +107,6 @@ def _reversed(maneuver: Maneuver) -> Maneuver:
     )
 
 
-@functools.lru_cache(maxsize=4)
 def _reversed_parts(parts: tuple[Part, ...]) -> tuple[Part, ...]:
     """The parts with the samples of every course in reverse."""
     return tuple(

@@ -13,8 +13,8 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.groups import SE2xR
 from maneuver_automaton.search import _kernels_maneuver_shortcuts as kernels
 from maneuver_automaton.search import _kernels_motion as motion
+from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_task import TRIES
-from maneuver_automaton.search.maneuver_query import ManeuverQuery
 from maneuver_automaton.words.library import Library
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word
@@ -49,7 +49,7 @@ class _Steps(NamedTuple):
 
 
 def shortened(
-    query: ManeuverQuery,
+    query: LatticeQuery,
     word: Word,
     *,
     rounds: int = ROUNDS,
@@ -61,7 +61,7 @@ def shortened(
     Every round cuts the trims at other places, so that points lie elsewhere; first with words of
     few trims, then, unless `all_words` says otherwise, with all.
     """
-    arrays = query.transfer.arrays
+    arrays = query.library.priced.arrays
     best = word
     for n_words in sorted({arrays.n_few, len(arrays.words) if all_words else arrays.n_few}):
         for n in range(rounds):
@@ -76,7 +76,7 @@ def shortened(
                 break
 
 
-def word_is_free(query: ManeuverQuery, word: Word) -> bool:
+def word_is_free(query: LatticeQuery, word: Word) -> bool:
     """Whether a word is proven free all the way, at the times when it is where."""
     steps = _steps(query, word, cut=0.0, most=0)
     library = query.library
@@ -85,7 +85,7 @@ def word_is_free(query: ManeuverQuery, word: Word) -> bool:
     free = motion.word_free(
         query.scene(),
         library.arrays,
-        np.array(query.seen_start),
+        np.array(query.start),
         edge_of[steps.transitions],
         steps.trims,
         steps.times,
@@ -95,7 +95,7 @@ def word_is_free(query: ManeuverQuery, word: Word) -> bool:
 
 
 def _once(
-    query: ManeuverQuery, word: Word, *, cut: float, n_words: int, deadline: float
+    query: LatticeQuery, word: Word, *, cut: float, n_words: int, deadline: float
 ) -> Word | None:
     """One round; None if nothing is gained."""
     steps = _steps(query, word, cut=cut, most=MOST_POINTS)
@@ -110,7 +110,7 @@ def _once(
     )
     least = LEAST * max(word.cost, 1e-12)
     trims = np.concatenate([[word.trims[0]], steps.trims]).astype(np.int64)
-    scene, scratch = query.scene(), query.transfer.scratch()
+    scene, scratch = query.scene(), query.library.priced.scratch()
     for j in range(1, n):
         if time.monotonic() >= deadline:
             return None
@@ -142,12 +142,12 @@ def _once(
             step = (int(steps.transitions[i]), int(steps.trims[i]), float(steps.times[i]))
             found.append(step)
             continue
-        row = query.transfer.arrays.words[plan.rows[j]].tolist()
+        row = query.library.priced.arrays.words[plan.rows[j]].tolist()
         through = [*row, int(plan.climbs[j]), int(trims[j])]
         times = [*plan.times[j].tolist(), 0.0]
-        found += connection_steps(query.transfer, int(trims[i]), through, times)
+        found += connection_steps(query.library.priced, int(trims[i]), through, times)
     better = query.word_of(found, word.goal)
-    late = better.duration > query.searched_time
+    late = better.duration > query.most_time
     if late or (query.moves and not word_is_free(query, better)):
         return None
     lasting = zip(better.trims, better.durations.tolist(), strict=True)
@@ -159,9 +159,9 @@ def _once(
     return better
 
 
-def _steps(query: ManeuverQuery, word: Word, *, cut: float, most: int) -> _Steps:
+def _steps(query: LatticeQuery, word: Word, *, cut: float, most: int) -> _Steps:
     """The word as steps, its longest trims cut in parts until there are `most` points."""
-    transfer, automaton = query.transfer, query.automaton
+    transfer, automaton = query.library.priced, query.automaton
     durations = np.asarray(word.durations)
     room = max(0, most - 2 * len(word.trims))
     total = float(durations.sum())
@@ -174,7 +174,7 @@ def _steps(query: ManeuverQuery, word: Word, *, cut: float, most: int) -> _Steps
             rows += [(SWITCH, trim, t) for t in np.diff(ends).tolist()]
         if k < len(word.transitions):
             rows.append((int(word.transitions[k]), int(word.trims[k + 1]), 0.0))
-    pose = SE2xR(query.seen_start)
+    pose = SE2xR(query.start)
     points, costs, spent = [pose.pose], [0.0], [0.0]
     for transition, trim, t in rows:
         if transition == SWITCH:
@@ -191,7 +191,7 @@ def _steps(query: ManeuverQuery, word: Word, *, cut: float, most: int) -> _Steps
         costs.append(costs[-1] + cost)
         spent.append(spent[-1] + t)
     if rows:
-        points[-1] = query.seen_goals[word.goal]
+        points[-1] = query.goals[word.goal]
     return _Steps(
         transitions=np.array([row[0] for row in rows], dtype=np.int64),
         trims=np.array([row[1] for row in rows], dtype=np.int64),

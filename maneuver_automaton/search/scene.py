@@ -9,7 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.collision.layers import LayerArrays
+from maneuver_automaton.collision.convex import DIGITS
+from maneuver_automaton.collision.layers import ROUNDED, LayerArrays, layer_arrays
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.search.admission import admitted_stretches, piece_is_admitted
+from maneuver_automaton.search.lattice_arrays import LatticeLibrary
+from maneuver_automaton.search.lattice_worlds import Worlds
 
 
 class Scene(NamedTuple):
@@ -27,19 +32,81 @@ class Scene(NamedTuple):
     zone_pieces: NDArray[np.bool_]  # (Z, N) pieces of maneuvers that a zone admits
 
 
-def planar_scene(
-    layers: LayerArrays, window: Array, *, keep: float, margin: float, n_trims: int
+def scene_of(
+    problem: Problem,
+    library: LatticeLibrary,
+    worlds: Worlds,
+    window: Array,
+    *,
+    margin: float,
+    level: float,
 ) -> Scene:
-    """The scene of a vehicle in the plane, without zones."""
+    """The scene of a problem inside a window (9,), seen from an altitude `level` [m].
+
+    `margin` is the clearance that a proof needs beyond the problem's own [m].
+    """
+    edge_window = window.copy()
+    edge_window[8] -= library.worst_error
+    lowest, highest = -math.inf, math.inf
+    if problem.bounds.z is not None and problem.start.size > 3:
+        lowest, highest = problem.bounds.z
     return Scene(
-        layers=layers,
-        keep=float(keep),
+        layers=_layers(problem, worlds, problem.margin + margin + ROUNDED, level),
+        keep=float(problem.margin),
         margin=float(margin),
-        far=float(layers.first.field.outside),
+        far=float(worlds.whole.arrays.field.outside),
         window=window,
-        edge_window=window,
-        lowest=-math.inf,
-        highest=math.inf,
-        zone_trims=np.zeros((0, n_trims), dtype=np.bool_),
-        zone_pieces=np.zeros((0, 0), dtype=np.bool_),
+        edge_window=edge_window,
+        lowest=lowest - level - ROUNDED,
+        highest=highest - level + ROUNDED,
+        zone_trims=_admitted_trims(problem, library),
+        zone_pieces=_admitted_pieces(problem, library),
     )
+
+
+def for_library(scene: Scene, problem: Problem, library: LatticeLibrary) -> Scene:
+    """The same scene for another library of the same trims."""
+    edge_window = scene.window.copy()
+    edge_window[8] -= library.worst_error
+    return scene._replace(edge_window=edge_window, zone_pieces=_admitted_pieces(problem, library))
+
+
+def _layers(problem: Problem, worlds: Worlds, pad: float, level: float) -> LayerArrays:
+    """The obstacles between neighbouring heights, then the zones, as the kernels see them."""
+    if worlds.flat is not None:
+        return worlds.flat
+    below, above = problem.body_height
+    low = [band.low - above - pad - level for band in worlds.bands]
+    high = [band.high - below + pad - level for band in worlds.bands]
+    everywhere = [math.inf] * len(worlds.zones)
+    return layer_arrays(
+        [*worlds.between, *worlds.zones],
+        low=np.append(np.round(low, DIGITS), np.negative(everywhere)),
+        high=np.append(np.round(high, DIGITS), everywhere),
+        plane=worlds.plane,
+    )
+
+
+def _admitted_trims(problem: Problem, library: LatticeLibrary) -> NDArray[np.bool_]:
+    """Which trims each zone admits, (Z, m)."""
+    trims = [library.priced.automaton.trims[k] for k in library.trims] if problem.zones else []
+    rows = [[piece_is_admitted(zone, trim) for trim in trims] for zone in problem.zones]
+    return np.array(rows, dtype=np.bool_).reshape(len(problem.zones), len(library.trims))
+
+
+def _admitted_pieces(problem: Problem, library: LatticeLibrary) -> NDArray[np.bool_]:
+    """Which pieces of the motion of each part along edges each zone admits, (Z, N)."""
+    automaton, spans = library.priced.automaton, library.spans
+    first, n_parts = library.arrays.first_piece, library.arrays.n_parts
+    n_edges = len(library.edge_maneuver)
+    admitted = np.zeros((len(problem.zones), len(spans)), dtype=np.bool_)
+    for z, zone in enumerate(problem.zones):
+        for edge, k in enumerate(library.edge_maneuver.tolist()):
+            maneuver = automaton.maneuvers[k]
+            if maneuver.course is None:
+                continue
+            good = admitted_stretches(zone, maneuver, automaton.model)
+            for group in range(edge, n_parts * n_edges, n_edges):  # one of every part
+                for n in range(first[group], first[group + 1]):
+                    admitted[z, n] = good[spans[n, 0] : spans[n, 1]].all()
+    return admitted

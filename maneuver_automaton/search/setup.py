@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass
 
@@ -37,7 +36,6 @@ class SearchSetup:
         return bool(still and (self.free_heading or abs(turn) <= 1e-12))
 
 
-@functools.lru_cache(maxsize=8)
 def search_setup(problem: Problem, goal: Goal) -> SearchSetup:
     """What every search for one goal starts from."""
     library = moving_trims(problem.automaton, problem.cost)

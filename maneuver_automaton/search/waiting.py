@@ -52,7 +52,7 @@ def with_waits(query: LatticeQuery, word: Word) -> Word | None:
     way = Way(
         trims=trims,
         durations=durations,
-        poses=np.ascontiguousarray(chained(query.start, steps)),
+        poses=np.ascontiguousarray(chained(query.start[:3], steps)),
         before=np.empty((len(trims) + 1, ticks, 2), dtype=np.int32),
     )
     joint, at, _ = kernels.earliest_arrival(

@@ -82,6 +82,13 @@ class Library:
     maneuver_costs: Array  # (M,) of the automaton's maneuvers
     arrays: LibraryArrays
 
+    @property
+    def number_of(self) -> IntArray:
+        """Number of each trim of the automaton among `trims`, NO_TRIM for those left out."""
+        numbers = np.full(len(self.automaton), NO_TRIM)
+        numbers[self.trims] = np.arange(len(self.trims))
+        return numbers
+
     def chain(self, source: int, target: int) -> tuple[tuple[int, int], ...]:
         """What leads from trim to trim of the automaton; see `Transitions.chain`.
 

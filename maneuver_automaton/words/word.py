@@ -86,11 +86,16 @@ def word_of_steps(steps: Iterable[tuple[int, int, float]], *, goal: int) -> Word
 
 
 def with_price(library: Library, word: Word) -> Word:
-    """The word with its cost, prices of switches left out, and the time of its maneuvers."""
+    """The word with its cost at the prices of a library, and the time of its maneuvers."""
+    arrays, numbers = library.arrays, library.number_of[word.trims]
     held = word.transitions[word.transitions != SWITCH]
     lasting = sum(library.automaton.maneuvers[k].duration for k in held)
-    cost = float(library.arrays.rates[word.trims] @ word.durations)
+    cost = float(arrays.rates[numbers] @ word.durations)
     cost += float(library.maneuver_costs[held].sum())
+    cost += arrays.switch * (len(word.transitions) - len(held))
+    gears = arrays.gears[numbers]
+    gears = gears[gears != 0]
+    cost += arrays.direction_change * int(np.count_nonzero(gears[1:] != gears[:-1]))
     return replace(word, cost=cost, maneuver_time=float(lasting))
 
 

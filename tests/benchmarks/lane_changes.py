@@ -21,8 +21,8 @@ from maneuver_automaton.planning import plan
 from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.planning.plan import prepare
 from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.maneuver_lattice import maneuver_words, plan_of
-from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
 
 NODES = 61
 CASES = (
@@ -77,7 +77,7 @@ def measured(problem: Problem, seconds: float) -> Row:
     """Words alone, the planner with all it has, and the direct solution."""
     prepare(problem)
     began = time.perf_counter()
-    query = maneuver_problem_query(problem, (0,))
+    query = lattice_query(problem, (0,))
     first = word = None
     first_s = word_s = np.nan
     for incumbent in maneuver_words(query, deadline=time.monotonic() + seconds):

@@ -16,12 +16,11 @@ import yaml
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
+from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import Box, Obstacle
-from maneuver_automaton.problem import Bounds
+from maneuver_automaton.problem import Bounds, Goal, Problem
+from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.maneuver_lattice import plan_of
-from maneuver_automaton.search.maneuver_motion import parts_of
-from maneuver_automaton.search.maneuver_query import ManeuverQuery, maneuver_query
-from maneuver_automaton.words.library import Library, library_of
 from tests.benchmarks import cases
 from tests.benchmarks.tables import show
 from tests.search.automata import inertial_unicycle, truck_with_trailer
@@ -36,31 +35,30 @@ PROBLEMS = (
 )
 
 
-def libraries() -> dict[str, tuple[Library, tuple, str]]:
-    """Transfers, parts and the trim at rest of each vehicle."""
-    unicycle, truck = inertial_unicycle(levels=5), truck_with_trailer()
-    body, trailer = (Box([0.5, 0.25]),), (Box([0.3, 0.25]),)
+def vehicles() -> dict[str, tuple[Automaton, dict, str]]:
+    """Library, parts and the trim at rest of each vehicle."""
     return {
-        "unicycle2_v0": (library_of(unicycle), parts_of(unicycle, body), "0 0"),
-        "car1_v0": (library_of(truck), parts_of(truck, body, (trailer,)), "0 at 0.00"),
+        "unicycle2_v0": (inertial_unicycle(levels=5), {}, "0 0"),
+        "car1_v0": (truck_with_trailer(), {"trailer": Box([0.3, 0.25])}, "0 at 0.00"),
     }
 
 
-def query_of(name: str, known: dict[str, tuple[Library, tuple, str]]) -> ManeuverQuery:
+def query_of(name: str, known: dict[str, tuple[Automaton, dict, str]]) -> LatticeQuery:
     given = yaml.safe_load((cases.DATA / "dynobench" / "envs" / f"{name}.yaml").read_text())
     robot, world = given["robots"][0], given["environment"]
-    library, parts, rest = known[robot["type"]]
+    automaton, parts, rest = known[robot["type"]]
     low, high = world["min"], world["max"]
-    return maneuver_query(
-        library,
-        parts,
+    problem = Problem(
+        automaton,
         robot["start"][:3],
-        robot["goal"][:3],
+        Goal(pose=robot["goal"][:3], trim=rest),
         start_trim=rest,
-        goal_trim=rest,
+        footprint=Box([0.5, 0.25]),
+        parts=parts,
         obstacles=tuple(Obstacle(Box(one["size"], one["center"])) for one in world["obstacles"]),
         bounds=Bounds(x=(low[0], high[0]), y=(low[1], high[1])),
     )
+    return lattice_query(problem, (0,))
 
 
 def main() -> None:
@@ -69,7 +67,7 @@ def main() -> None:
     options = parser.parse_args()
     if not cases.present("dynobench"):
         return
-    known = libraries()
+    known = vehicles()
     for name in PROBLEMS:  # compile
         search_maneuvers(query_of(name, known), max_expansions=3000)
     rows = []
@@ -77,7 +75,7 @@ def main() -> None:
         query = query_of(name, known)
         result = search_maneuvers(query, deadline=time.monotonic() + options.time_limit)
         first, best = result.words[0], result.words[-1]
-        off = plan_of(query, best).end - query.goals[best.goal]
+        off = plan_of(query, best).end - query.goal_poses[best.goal]
         off[2] = np.remainder(off[2] + np.pi, 2.0 * np.pi) - np.pi
         rows.append([
             name, result.found_after[0], 1e3 * result.found_s[0], first.duration,

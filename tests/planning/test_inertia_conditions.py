@@ -16,9 +16,9 @@ from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.search import maneuver_lattice
 from maneuver_automaton.search.lattice_pass import pass_of
+from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_task import Resolution, task_of
 from maneuver_automaton.search.maneuver_lattice import maneuver_words, plan_of
-from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
 from maneuver_automaton.search.maneuver_reversal import forward_word, reversed_query
 from tests.inertia import unicycle_automaton
 from tests.search.cases import compiled_only
@@ -99,7 +99,7 @@ def test_a_fixed_time_is_kept_among_obstacles(usual):
 def test_no_trim_lasts_less_than_it_must_among_obstacles():
     automaton = unicycle_automaton()
     problem = posed(horizon=Horizon(min_coast=0.4))
-    query = maneuver_problem_query(problem, (0,))
+    query = lattice_query(problem, (0,))
     words = [one.word for one in maneuver_words(query, max_expansions=4000) if one.word]
     assert words
     for word in words:
@@ -113,7 +113,7 @@ def test_no_trim_lasts_less_than_it_must_among_obstacles():
 
 def test_settings_of_the_lattice_are_read(monkeypatch):
     settings = SearchSettings(cell=0.31, headings=36, weight=1.3)
-    query = maneuver_problem_query(posed(search=settings), (0,))
+    query = lattice_query(posed(search=settings), (0,))
     first = task_of(query, Resolution())
     assert (first.cell, first.headings) == (0.31, 36)
     assert task_of(query, Resolution(scale=0.5)).cell == 0.155
@@ -127,7 +127,7 @@ def test_settings_of_the_lattice_are_read(monkeypatch):
 
 def test_a_search_from_the_goal_finds_plans_from_the_start():
     """Every word of the reversed query, turned round, is a free plan of the query."""
-    query = maneuver_problem_query(posed(), (0,))
+    query = lattice_query(posed(), (0,))
     back = reversed_query(query)
     words = [one.word for one in maneuver_words(back, max_expansions=3000) if one.word]
     assert words
@@ -165,7 +165,7 @@ def test_a_fast_car_passes_a_box(along, aside):
         obstacles=(Obstacle(box),),
         footprint=Box([4.5, 1.6]),
     )
-    query = maneuver_problem_query(problem, (0,))
+    query = lattice_query(problem, (0,))
     found = next(one for one in maneuver_words(query, max_expansions=60_000))
     assert found.word is not None
     assert found.word.duration < 8.0

@@ -7,8 +7,10 @@ from dataclasses import fields
 import numpy as np
 
 from maneuver_automaton.collision import Box, Disc, Zone
+from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning import Planner, plan, workspace
 from maneuver_automaton.problem import Goal, Problem, SearchSettings
+from maneuver_automaton.search import cost_to_go, lattice_library, lattice_worlds, prepared
 from tests import inertia, scenes
 from tests.search.cases import TABLE_2, robot
 
@@ -46,35 +48,46 @@ def test_parts_heights_and_trims_reach_the_problem():
 
 
 def test_planners_used_in_turn_keep_what_they_prepared(monkeypatch):
-    """Five of them, each with its own map and body: none makes anything twice."""
+    """Each has its own map and body: none makes anything twice, however many there are."""
     made = []
 
-    def counted(name):
-        make = getattr(workspace, name)
+    def counted(module, name):
+        make = getattr(module, name)
 
         def counting(*args, **more):
             made.append(name)
             return make(*args, **more)
 
-        monkeypatch.setattr(workspace, name, counting)
+        monkeypatch.setattr(module, name, counting)
 
-    counted("FclChecker")
-    counted("surroundings_around")
+    kinds = (
+        (workspace, "FclChecker"),
+        (workspace, "surroundings_around"),
+        (lattice_library, "_library"),
+        (lattice_worlds, "_worlds"),
+        (cost_to_go, "_kept"),
+    )
+    for kind in kinds:
+        counted(*kind)
+    monkeypatch.setattr(prepared, "MOST", 3)  # are remembered for callers that hold no planner
+    monkeypatch.setattr(prepared, "RECENT", prepared.Prepared())
+    n = 5
     vehicle = scenes.differential_robot(1.0, 1.5)
     planners = [
         Planner(
             vehicle,
             obstacles=[Box([1.0, 4.0], [3.0, 0.1 * k]), Disc(0.5, [6.0, 2.0])],
+            cost=Cost(time=1.0 + 0.01 * k),
             footprint=Box([0.4, 0.4 + 0.01 * k]),
-            search=SearchSettings(max_expansions=2000),
+            search=SearchSettings(max_expansions=200),
         )
-        for k in range(5)
+        for k in range(n)
     ]
-    assert sorted(made) == 5 * ["FclChecker"] + 5 * ["surroundings_around"]  # when they are made
+    assert sorted(made) == sorted(n * [name for _, name in kinds])  # when they are made
     for goal in ([8.0, 0.5, 0.2], [7.0, -0.5, 0.0]):
         for planner in planners:
             assert planner.plan([0, 0, 0], goal, time_limit=60.0).audit.passed
-    assert len(made) == 10
+    assert len(made) == len(kinds) * n
 
 
 def test_another_map_has_another_workspace():

@@ -75,8 +75,8 @@ def assert_admitted(query, word, *, first=False):
     problem = query.problem
     horizon = problem.horizon
     twists = problem.automaton.body_velocities[word.trims]
-    end = (SE2(query.start) @ SE2(plain_end(twists, word.durations)[:3])).pose
-    off = np.abs(end - query.goals[word.goal])
+    end = (SE2(query.start[:3]) @ SE2(plain_end(twists, word.durations)[:3])).pose
+    off = np.abs(end - query.goals[word.goal, :3])
     assert off[:2].max() < 1e-6
     assert query.free_heading[word.goal] or abs(math.remainder(off[2], 2 * math.pi)) < 1e-6
     assert len(word.trims) <= (horizon.max_trims or math.inf)
@@ -88,7 +88,7 @@ def assert_admitted(query, word, *, first=False):
     cost = float(rates @ word.durations) + problem.cost.switching(twists)
     assert word.cost == pytest.approx(cost, rel=1e-12)
     world = World(problem)
-    pose = (SE2(query.world.frame) @ SE2(query.start)).pose.copy()
+    pose = (SE2(query.world.frame) @ SE2(query.start[:3])).pose.copy()
     pose[:2] -= problem.start[:2]
     now = problem.start_time
     for twist, duration in zip(twists, word.durations, strict=True):

@@ -6,8 +6,8 @@ import math
 import time
 from dataclasses import dataclass
 
+from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.maneuver_lattice import maneuver_words
-from maneuver_automaton.search.maneuver_query import ManeuverQuery
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.words.word import Word
 
@@ -29,7 +29,7 @@ class ManeuverResult:
 
 
 def search_maneuvers(
-    query: ManeuverQuery,
+    query: LatticeQuery,
     *,
     deadline: float = math.inf,
     max_expansions: int | None = None,

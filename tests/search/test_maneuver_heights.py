@@ -19,9 +19,9 @@ from maneuver_automaton.collision.layers import MOST_LAYERS, always, bands_of
 from maneuver_automaton.groups import SE2xR
 from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.problem import Bounds, Goal, Problem
+from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.maneuver_heights import altitude_ranges
 from maneuver_automaton.search.maneuver_lattice import plan_of
-from maneuver_automaton.search.maneuver_problem import maneuver_problem_query
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.words._kernels_candidates import NO_TRIM
 from maneuver_automaton.words.library import library_of
@@ -51,7 +51,7 @@ def flight(obstacles, *, goal=GOAL, start=(0.0, 0.0, 0.0, 10.0), z=None, margin=
 
 
 def solved(problem, *, expansions=60000, first_only=True):
-    query = maneuver_problem_query(problem, (0,))
+    query = lattice_query(problem, (0,))
     result = search_maneuvers(query, max_expansions=expansions, first_only=first_only)
     assert result.status is SearchStatus.FOUND
     return [plan_of(query, word) for word in result.words]
@@ -109,7 +109,7 @@ def test_a_wall_across_every_altitude_exhausts_the_search():
         flight((wall,), goal=[24.0, 0.0, 0.0, 10.0], z=(8.0, 12.0)),
         bounds=Bounds(x=(-4.0, 30.0), y=(-4.0, 4.0), z=(8.0, 12.0)),
     )
-    query = maneuver_problem_query(problem, (0,))
+    query = lattice_query(problem, (0,))
     assert search_maneuvers(query, max_expansions=20000).best is None
 
 

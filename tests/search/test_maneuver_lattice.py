@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import time
 from dataclasses import replace
@@ -15,14 +16,17 @@ from maneuver_automaton._arrays import wrapped
 from maneuver_automaton.collision import Box, Motion, Obstacle
 from maneuver_automaton.errors import UnknownTrim
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.problem import Bounds
+from maneuver_automaton.problem import Bounds, Goal, Problem
+from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.maneuver_lattice import plan_of
-from maneuver_automaton.search.maneuver_motion import parts_of
-from maneuver_automaton.search.maneuver_query import maneuver_query
 from maneuver_automaton.search.maneuver_shortcuts import word_is_free
 from maneuver_automaton.search.result import SearchStatus
-from maneuver_automaton.words.library import library_of
-from tests.search.automata import inertial_unicycle, linked, truck_with_trailer
+from tests.search.automata import (
+    inertial_unicycle,
+    linked,
+    truck_with_trailer,
+    with_straight_courses,
+)
 from tests.search.cases import compiled_only
 from tests.search.maneuver_searches import search_maneuvers
 
@@ -31,18 +35,26 @@ pytestmark = compiled_only  # whole searches; their kernels have tests of their 
 BODY = Box([0.5, 0.25])
 WALLS = (Obstacle(Box([0.2, 3.0], [1.5, -0.6])), Obstacle(Box([0.2, 3.0], [3.0, 1.4])))
 ROOM = Bounds(x=(-0.5, 5.0), y=(-1.5, 2.5))
+HITCHED = ("0 at 0.00", "0 at 0.00")  # the trailer straight behind its truck
 START, GOAL = np.array([0.5, 0.0, 0.0]), np.array([4.0, 1.0, 2.0])
 
 
 @cache
-def library():
-    automaton = inertial_unicycle(levels=3)
-    return library_of(automaton), parts_of(automaton, (BODY,))
+@functools.cache
+def unicycle():
+    return inertial_unicycle(levels=3)
+
+
+def posed(automaton, start, goal, *, trims, body=BODY, **settings):
+    """The query of a vehicle from a pose in the first of two trims to one in the other."""
+    aim = Goal(pose=np.array(goal), trim=trims[1])
+    problem = Problem(automaton, start, aim, start_trim=trims[0], footprint=body, **settings)
+    return lattice_query(problem, (0,))
 
 
 def query(start=START, goal=GOAL, **changes):
-    settings = {"obstacles": WALLS, "bounds": ROOM} | changes
-    return maneuver_query(*library(), start, goal, start_trim="0 0", goal_trim="0 0", **settings)
+    settings = {"obstacles": WALLS, "bounds": ROOM, "trims": ("0 0", "0 0")} | changes
+    return posed(unicycle(), start, goal, **settings)
 
 
 def least_gap(plan, obstacles, *, model=None, carried=()):
@@ -108,14 +120,12 @@ def test_the_same_expansions_find_the_same_plan():
 
 def test_a_moved_problem_has_the_moved_plan():
     by = SE2([3.0, -2.0, 0.7])
-    still = query(bounds=None)
-    moved = maneuver_query(
-        *library(),
+    still = query(bounds=Bounds())
+    moved = query(
         (by @ SE2(START)).pose,
         (by @ SE2(GOAL)).pose,
-        start_trim="0 0",
-        goal_trim="0 0",
         obstacles=tuple(obstacle.moved(by) for obstacle in WALLS),
+        bounds=Bounds(),
     )
     here, there = (search_maneuvers(one, max_expansions=400) for one in (still, moved))
     assert here.best.trims.tolist() == there.best.trims.tolist()
@@ -125,7 +135,7 @@ def test_a_moved_problem_has_the_moved_plan():
 
 
 def test_the_goal_may_be_a_moving_trim():
-    here = maneuver_query(*library(), START, [2.0, 1.5, 1.0], start_trim="0 0", goal_trim="0.5 0")
+    here = posed(unicycle(), START, [2.0, 1.5, 1.0], trims=("0 0", "0.5 0"))
     plan = plan_of(here, search_maneuvers(here, first_only=True).best)
     assert off_goal(plan, [2.0, 1.5, 1.0]) < 1e-12
     assert plan.trims[-1].name == "0.5 0"
@@ -134,10 +144,8 @@ def test_the_goal_may_be_a_moving_trim():
 
 
 def test_a_straight_way_is_one_trim():
-    here = maneuver_query(
-        *library(), [0.0, 0.0, 0.3], [2 * math.cos(0.3), 2 * math.sin(0.3), 0.3],
-        start_trim="0 0", goal_trim="0 0",
-    )  # fmt: skip
+    goal = [2 * math.cos(0.3), 2 * math.sin(0.3), 0.3]
+    here = posed(unicycle(), [0.0, 0.0, 0.3], goal, trims=("0 0", "0 0"))
     result = search_maneuvers(here, first_only=True)
     assert result.expansions == 1
     assert plan_of(here, result.best).word == ("0 0 to 0.5 0", "0.5 0", "0.5 0 to 0 0")
@@ -164,10 +172,7 @@ def test_what_moves_is_let_pass():
     crossing = Obstacle(
         Box([0.4, 3.0]), motion=Motion([0.0, 20.0], [[2.0, -3.0, 0.0], [2.0, 7.0, 0.0]])
     )
-    here = maneuver_query(
-        *library(), START, [4.0, 0.0, 0.0], start_trim="0 0", goal_trim="0 0",
-        obstacles=(crossing,),
-    )  # fmt: skip
+    here = query(goal=[4.0, 0.0, 0.0], obstacles=(crossing,), bounds=Bounds())
     result = search_maneuvers(here, max_expansions=2500)
     assert result.status is SearchStatus.FOUND
     for word in result.words:
@@ -179,11 +184,9 @@ def test_what_moves_is_let_pass():
 
 def test_a_trailer_stays_free_too():
     automaton, trailer = truck_with_trailer(levels=3), Box([0.3, 0.25])
-    parts = parts_of(automaton, (BODY,), ((trailer,),))
     goal = np.array([3.0, 1.5, 1.0])
-    here = maneuver_query(
-        library_of(automaton), parts, START, goal,
-        start_trim="0 at 0.00", goal_trim="0 at 0.00",
+    here = posed(
+        automaton, START, goal, trims=HITCHED, parts={"trailer": (trailer,)},
         obstacles=(Obstacle(Box([0.2, 3.0], [1.5, -1.0])), Obstacle(Box([0.2, 3.0], [3.5, 2.6]))),
     )  # fmt: skip
     result = search_maneuvers(here, max_expansions=600)
@@ -192,16 +195,17 @@ def test_a_trailer_stays_free_too():
         plan = plan_of(here, word)
         assert off_goal(plan, goal) < 1e-12
         assert abs(plan.sample().reduced_state[-1, 0]) < 1e-9
-        assert least_gap(plan, here.obstacles, model=automaton.model, carried=(trailer,)) > 0.0
+        assert (
+            least_gap(plan, here.problem.obstacles, model=automaton.model, carried=(trailer,)) > 0.0
+        )
 
 
 def test_a_trailer_wider_than_its_truck_does_not_close_the_way_of_the_truck():
     automaton = truck_with_trailer(levels=3)
-    parts = parts_of(automaton, (Box([0.1, 0.1]),), ((Box([0.3, 0.6]),),))
     beside = Obstacle(Box([0.1, 1.0], [0.1, 0.6]))  # nearer to the truck than half the trailer
-    here = maneuver_query(
-        library_of(automaton), parts, np.zeros(3), [0.2, 0.0, 0.0],
-        start_trim="0 at 0.00", goal_trim="0 at 0.00", obstacles=(beside,),
+    here = posed(
+        automaton, np.zeros(3), [0.2, 0.0, 0.0], trims=HITCHED, body=Box([0.1, 0.1]),
+        parts={"trailer": (Box([0.3, 0.6]),)}, obstacles=(beside,),
     )  # fmt: skip
     assert search_maneuvers(here, max_expansions=20, first_only=True).best is not None
 
@@ -210,13 +214,10 @@ def test_a_trailer_wider_than_its_truck_does_not_close_the_way_of_the_truck():
 def test_altitude_is_gained_on_the_way(height):
     flying = [[0.0] * 4, [1.0, 0, 0, 0], [0.7, 0, 0.8, 0], [0.7, 0, -0.8, 0],
               [0.8, 0, 0, 0.2], [0.0, 0, 0, 0.5], [0.0, 0, 0, -0.5]]  # fmt: skip
-    automaton = linked(flying, size=0.1)
+    automaton = with_straight_courses(linked(flying, size=0.1))
     towers = (Obstacle(Box([0.3, 3.0], [2.0, -0.8])), Obstacle(Box([0.3, 3.0], [4.0, 2.0])))
     goal = np.array([6.0, 1.0, 1.0, height])
-    here = maneuver_query(
-        library_of(automaton), parts_of(automaton, (BODY,)), np.zeros(4), goal,
-        start_trim="t0", goal_trim="t0", obstacles=towers,
-    )  # fmt: skip
+    here = posed(automaton, np.zeros(4), goal, trims=("t0", "t0"), obstacles=towers)
     result = search_maneuvers(here, max_expansions=8000, first_only=True)
     assert result.status is SearchStatus.FOUND
     for word in result.words:
@@ -236,28 +237,27 @@ def test_a_limit_of_time_is_kept():
 
 def test_wrong_queries_are_refused():
     with pytest.raises(UnknownTrim):
-        maneuver_query(*library(), START, GOAL, start_trim="rest", goal_trim="0 0")
+        query(trims=("rest", "0 0"))
     with pytest.raises(ValueError) as error:
-        maneuver_query(*library(), [0.0, 0.0], GOAL, start_trim="0 0", goal_trim="0 0")
+        query(start=[0.0, 0.0])
     assert str(error.value) == "start: got shape (2,), need 3 components last"
+    with pytest.raises(ValueError, match="has no course, so its cost is not known"):
+        posed(linked([[0.0] * 3, [1.0, 0, 0]]), START, GOAL, trims=("t0", "t0"))
 
 
 def test_a_switch_at_rest_proves_nothing():
     """Beside a wall, behind a switch of trims that takes no time, motions are looked at too."""
     automaton, trailer = truck_with_trailer(levels=3), Box([0.3, 0.25])
-    library = library_of(automaton)
-    parts = parts_of(automaton, (BODY,), ((trailer,),))
     incumbents = 0
     for side in (-0.4, 0.4):
         for gap in (0.02, 0.1, 0.25):
             wall = Obstacle(Box([0.3, 0.6], [0.25 + 0.15 + gap, 0.5 * side]))
-            query = maneuver_query(
-                library,
-                parts,
+            query = posed(
+                automaton,
                 [0.0, 0.0, 0.0],
                 [3.0, 0.5 * side, 0.0],
-                start_trim="0 at 0.00",
-                goal_trim="0 at 0.00",
+                trims=HITCHED,
+                parts={"trailer": (trailer,)},
                 obstacles=(wall,),
             )
             for word in search_maneuvers(query, max_expansions=3000).words:

@@ -9,7 +9,7 @@ import pytest
 from maneuver_automaton.search import _kernels_lattice as lattice
 from maneuver_automaton.search import _kernels_maneuver_shortcuts as shortcuts
 from maneuver_automaton.search import _kernels_motion as motion
-from maneuver_automaton.search.maneuver_ready import load_maneuver_kernels
+from maneuver_automaton.search.ready import load_maneuver_kernels
 from tests.search.maneuver_searches import search_maneuvers
 from tests.search.test_maneuver_lattice import query
 

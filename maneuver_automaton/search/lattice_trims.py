@@ -1,0 +1,193 @@
+"""Which trims and words a search of the lattice uses, and what they cost."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.automaton.headings import origin_of
+from maneuver_automaton.costs import StageCost
+from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.words.library import (
+    NO_TRIM,
+    STRAIGHT,
+    Library,
+    four_columns,
+    library_arrays,
+    library_of,
+    moving_trims,
+)
+from maneuver_automaton.words.transitions import identities
+
+MOST_TRIMS = 10  # of a larger library the most useful ones
+TURN = 4.0  # length scales that a full turn is taken for, whose radius the speed decides
+WORDS_AN_EXPANSION = 150.0  # words of a connection that take as long as an expansion
+MOST_INTERVAL = 400.0  # expansions between two connections that are tried
+
+
+class PricedTrims(NamedTuple):
+    """Trims with their prices and words, and what follows from how they are switched."""
+
+    library: Library
+    wide: bool  # whether the vehicle turns by driving circles only, however wide
+    per_turn: float | None  # cost of the cheapest full turn; None: it takes length scales
+    rest: int | None  # index in the automaton of the cheapest rest
+    rest_rate: float  # what was taken off all rates, since rest pads a fixed time
+    interval: tuple[float, float]  # least expansions, for each goal, and most, between connections
+    at_will: bool  # whether plans begin and end in any trim
+
+
+def trims_at_will(
+    automaton: Automaton, cost: StageCost, *, fixed_time: bool, waits: bool, min_coast: float
+) -> PricedTrims:
+    """The most useful trims in the plane of a vehicle that switches at will between all.
+
+    `waits`: rest is a trim like any other, since something moves.
+    """
+    known = moving_trims(automaton, cost)
+    pads = fixed_time and known.rest is not None
+    rates = known.rates - (known.rest_rate if pads else 0.0)
+    chosen = _most_useful(known.twists, rates)
+    trims = known.trims[chosen]
+    twists, rates = known.twists[chosen, :3], rates[chosen]
+    twists[np.abs(twists[:, 2]) < STRAIGHT, 2] = 0.0
+    spins = bool((~twists[:, :2].any(axis=1) & (twists[:, 2] != 0.0)).any())
+    if waits and known.rest is not None:
+        trims = np.append(trims, known.rest)
+        twists = np.vstack([twists, np.zeros(3)])
+        rates = np.append(rates, 0.0 if pads else known.rest_rate)
+    moving, m = np.flatnonzero(twists.any(axis=1)), len(trims)
+    words = _words(moving, twists)
+    arrays = library_arrays(four_columns(twists), rates, identities(automaton), trims=trims)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        per_radian = np.where(twists[:, 2] != 0.0, rates / np.abs(twists[:, 2]), np.inf)
+    best = float(per_radian.min())
+    return PricedTrims(
+        library=Library(
+            automaton=automaton,
+            trims=np.asarray(trims, dtype=np.int64),
+            transitions=identities(automaton),
+            maneuver_costs=np.zeros(0),
+            arrays=arrays._replace(
+                words=words,
+                n_few=len(words),
+                free_words=np.array(
+                    [(i, j, m) for i, j in itertools.permutations(moving.tolist(), 2)]
+                    or [(int(i), int(i), m) for i in moving],
+                    dtype=np.int64,
+                ).reshape(-1, 3),
+                switch=float(getattr(cost, "switch", 0.0)),
+                direction_change=float(getattr(cost, "direction_change", 0.0)),
+                min_coast=float(min_coast),
+            ),
+        ),
+        wide=not spins,
+        per_turn=2.0 * math.pi * best if math.isfinite(best) else 0.0,
+        rest=known.rest,
+        rest_rate=known.rest_rate if pads else 0.0,
+        interval=(0.0, math.inf),
+        at_will=True,
+    )
+
+
+def trims_of(library: Library) -> PricedTrims:
+    """All trims of an automaton, whatever leads from one to the other.
+
+    Prices of switches and changes of direction are left to whoever compares plans.
+    """
+    return PricedTrims(
+        library=library,
+        wide=False,
+        per_turn=None,
+        rest=library.automaton.rest,
+        rest_rate=0.0,
+        interval=(library.arrays.n_few / WORDS_AN_EXPANSION, MOST_INTERVAL),
+        at_will=False,
+    )
+
+
+def priced_library(automaton: Automaton, cost: StageCost) -> Library:
+    """All trims and maneuvers of an automaton, priced by a cost.
+
+    Raises
+    ------
+    ValueError
+        If a maneuver has no course, and so no known cost.
+    """
+    origin = origin_of(automaton, automaton.trims[0])
+    rest = automaton.trims[0].name
+    known = Problem(automaton, origin, Goal(pose=origin, trim=rest), start_trim=rest, cost=cost)
+    return library_of(
+        automaton,
+        rates=known.rates,
+        maneuver_costs=[known.maneuver_cost(maneuver) for maneuver in automaton.maneuvers],
+    )
+
+
+def is_mirrored(twists: Array, rates: Array) -> bool:
+    """Whether trims and their prices are their own mirror image."""
+    rows = np.column_stack([twists, rates])
+    image = rows * np.array([1.0, -1.0, -1.0, 1.0])
+    order = np.lexsort(np.round(rows, 9).T)
+    return bool(np.allclose(rows[order], image[np.lexsort(np.round(image + 0.0, 9).T)]))
+
+
+def _words(moving: IntArray, twists: Array) -> IntArray:
+    """Words of three trims whose neighbours differ; of fewer where there are fewer trims.
+
+    Where no trim turns, three times are more than a place asks for, and the times of a triple are
+    not determined: two trims that lead to different sides are enough. They are followed by none.
+    """
+    every = moving.tolist()
+    if len(every) > 1 and not twists[:, 2].any():
+        return np.array(
+            [(i, j, NO_TRIM) for i, j in itertools.permutations(every, 2)], dtype=np.int64
+        )
+    words = [(i, j, k) for i, j, k in itertools.product(every, repeat=3) if i != j and j != k] or [
+        (i, i, i) for i in every
+    ]
+    return np.array(words, dtype=np.int64).reshape(-1, 3)
+
+
+def _most_useful(twists: Array, rates: Array) -> IntArray:
+    """All trims of a small library; of a large one straight, sharp and middling turns, and spins.
+
+    For each kind the cheapest for the way or the turn it makes, and the fastest.
+    """
+    n = len(twists)
+    if n <= MOST_TRIMS:
+        return np.arange(n)
+    speed = np.hypot(twists[:, 0], twists[:, 1])
+    turn = twists[:, 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        curvature = np.where(speed > 0.0, turn / speed, 0.0)
+    drives = speed > 0.0
+    sharpest = float(np.abs(curvature[drives]).max()) if drives.any() else 0.0
+    kinds = []
+    for gear in (1.0, -1.0):
+        going = drives & (np.sign(twists[:, 0]) == gear)
+        kinds += [going & (curvature == 0.0)]
+        for side in (1.0, -1.0):
+            turning = going & (np.sign(curvature) == side)
+            gentle = turning & (np.abs(curvature) <= 0.3 * min(sharpest, 4.0))
+            kinds += [turning & ~gentle, gentle]
+    for side in (1.0, -1.0):
+        kinds.append(~drives & (np.sign(turn) == side))
+        kinds.append((twists[:, 0] == 0.0) & (np.sign(twists[:, 1]) == side) & (turn == 0.0))
+    chosen: list[int] = []
+    amount = np.where(drives, speed, np.abs(turn))
+    for kind in kinds:
+        members = np.flatnonzero(kind)
+        if not members.size:
+            continue
+        price = rates[members] / amount[members]
+        order = np.lexsort((-amount[members], np.round(price, 9)))
+        chosen.append(int(members[order[0]]))
+    fastest = int(np.argmax(np.where(turn == 0.0, speed, -1.0)))
+    chosen.append(fastest)
+    return np.array(sorted(set(chosen)), dtype=np.int64)

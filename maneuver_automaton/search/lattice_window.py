@@ -1,0 +1,42 @@
+"""Where a search of the lattice looks: within the bounds, or some way around everything."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.collision.world import World
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.problem import Bounds
+
+
+def window_of(
+    bounds: Bounds, world: World, poses: Array, *, radius: float
+) -> tuple[Array, Array, bool]:
+    """Where to search: the bounds, and where there are none, some way around everything.
+
+    A box (4,) in the world's frame, a window as in `_kernels_motion.inside_window`, and whether
+    the window's rim is a wall on every side. `poses` (n, 3 or more) lie inside.
+    """
+    pad = 4.0 * radius + 4.0 * world.body.reach
+    low = np.minimum(world.box[:2], poses[:, :2].min(axis=0)) - pad
+    high = np.maximum(world.box[2:], poses[:, :2].max(axis=0)) + pad
+    if bounds.x is None and bounds.y is None:
+        box = np.concatenate([low, high])
+        return box, np.concatenate([box, [0.0, 0.0, 1.0, 0.0, 0.0]]), False
+    turn = float(world.frame[2])
+    c, s = math.cos(turn), math.sin(turn)
+    corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+    seen = corners @ np.array([[c, s], [-s, c]])  # along the axes of the problem
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    for axis, pair in enumerate((bounds.x, bounds.y)):
+        if pair is not None:
+            low[axis], high[axis] = pair[0] - world.frame[axis], pair[1] - world.frame[axis]
+    slack = 1e-9 * (1.0 + float(np.abs(np.append(low, high)).max()))
+    window = np.array([low[0], low[1], high[0], high[1], 0.0, 0.0, c, s, slack])
+    inner = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+    back = np.asarray(SE2(np.array([0.0, 0.0, -turn])).act(inner))
+    box = np.concatenate([back.min(axis=0), back.max(axis=0)])
+    return box, window, bounds.x is not None and bounds.y is not None

@@ -1,0 +1,91 @@
+"""The obstacles and zones of a problem around its vehicle, prepared once for a map."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from maneuver_automaton.collision import AnyObstacle, Obstacle, Shape, Zone
+from maneuver_automaton.collision.body import body_of
+from maneuver_automaton.collision.heights import Layer
+from maneuver_automaton.collision.layers import LayerArrays, always, bands_of, layer_arrays
+from maneuver_automaton.collision.world import World, own_frame, world_of
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.search.maneuver_motion import Part
+from maneuver_automaton.search.prepared import RECENT, Prepared
+
+_Shapes = tuple[Shape, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Worlds:
+    """A map around the largest part of a vehicle, in one frame."""
+
+    whole: World  # all obstacles, whatever their heights
+    plane: World  # those in the way at every altitude within the bounds, around the first part
+    bands: tuple[Layer, ...]  # obstacles between neighbouring heights, in the problem's altitudes
+    between: tuple[World, ...]  # the worlds of these
+    zones: tuple[World, ...]  # every zone as if it were an obstacle
+    outer: World  # all obstacles and all zones, so that paths lead round them
+    flat: LayerArrays | None  # what the kernels see of them where heights do not matter
+
+
+def world_around(problem: Problem) -> World:
+    """The obstacles of a problem around its footprint, prepared once for a map."""
+    frame = own_frame(problem.obstacles, problem.goals[0].pose)
+    return world_of(problem.obstacles, problem.footprint, frame, keep=problem.margin)
+
+
+def worlds_around(
+    problem: Problem, parts: tuple[Part, ...], *, prepared: Prepared = RECENT
+) -> Worlds:
+    """The obstacles and zones of a problem around the parts of its vehicle."""
+    low, high = problem.bounds.z or (-math.inf, math.inf)
+    below, above = problem.body_height
+    return prepared.once(
+        _worlds,
+        problem.obstacles,
+        problem.zones,
+        tuple(part.shapes for part in parts),
+        own_frame(problem.obstacles, problem.goals[0].pose),
+        (low + below, high + above) if problem.start.size > 3 else None,
+        keep=problem.margin,
+    )
+
+
+def _worlds(
+    obstacles: tuple[AnyObstacle, ...],
+    zones: tuple[Zone, ...],
+    bodies: tuple[_Shapes, ...],
+    frame: tuple[float, ...],
+    heights: tuple[float, float] | None,
+    *,
+    keep: float,
+) -> Worlds:
+    """`heights` [m]: lowest and highest point of the vehicle within the bounds; None in a plane."""
+    largest = max(bodies, key=lambda shapes: body_of(shapes).reach)
+
+    def around(these: tuple[AnyObstacle, ...]) -> World:
+        return world_of(these, largest, frame, keep=keep)
+
+    bands = bands_of(obstacles, in_space=heights is not None)
+    whole = around(obstacles)
+    plane = whole if heights is None else around(always(bands, low=heights[0], high=heights[1]))
+    plane = replace(plane, body=body_of(bodies[0]))
+    solid = tuple(Obstacle(zone.shape) for zone in zones)
+    between = tuple(around(band.obstacles) for band in bands)
+    beside = tuple(around((one,)) for one in solid)
+    everywhere = np.full(len(between) + len(beside), np.inf)
+    return Worlds(
+        whole=whole,
+        plane=plane,
+        bands=bands,
+        between=between,
+        zones=beside,
+        outer=around((*obstacles, *solid)) if solid else whole,
+        flat=None
+        if heights is not None
+        else layer_arrays([*between, *beside], low=-everywhere, high=everywhere, plane=plane),
+    )
