@@ -29,15 +29,15 @@ from maneuver_automaton.collision.solids import (
 from maneuver_automaton.collision.spacetime import Mover, Rover, may_meet, meet
 from maneuver_automaton.collision.swept import (
     STANDING,
-    Body,
+    GrownBody,
     Twist,
     Windows,
     along,
-    body_of,
     box_around,
     chunks,
     course_hulls,
     fastest,
+    grown_body,
     halves,
     slice_excess,
     slice_hulls,
@@ -92,9 +92,9 @@ class FclChecker:
     margin: float = field(default=0.0, kw_only=True)  # [m]
     origin: tuple[float, float] = field(default=(0.0, 0.0), kw_only=True)  # [m]
     proven: float = field(default=1e-3, kw_only=True)  # [m]
-    _body: Body = field(init=False, repr=False)
-    _bare: Body = field(init=False, repr=False)
-    _covers: tuple[Body, ...] = field(init=False, repr=False)  # from few corners to all
+    _body: GrownBody = field(init=False, repr=False)
+    _bare: GrownBody = field(init=False, repr=False)
+    _covers: tuple[GrownBody, ...] = field(init=False, repr=False)  # from few corners to all
     _ground: _Ground = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -107,8 +107,8 @@ class FclChecker:
         object.__setattr__(self, "footprint", tuple(self.footprint))
         object.__setattr__(self, "obstacles", tuple(self.obstacles))
         object.__setattr__(self, "origin", (x, y))
-        object.__setattr__(self, "_body", body_of(self.footprint, self.margin, excess))
-        object.__setattr__(self, "_bare", body_of(self.footprint, 0.0, excess))
+        object.__setattr__(self, "_body", grown_body(self.footprint, self.margin, excess))
+        object.__setattr__(self, "_bare", grown_body(self.footprint, 0.0, excess))
         around = box_around(self._body)
         few = sum(map(len, self._body.pieces)) <= len(around.pieces[0])
         object.__setattr__(self, "_covers", (self._body,) if few else (around, self._body))
@@ -233,7 +233,7 @@ class FclChecker:
         low, high = poses[:, :2].min(axis=0) - pad, poses[:, :2].max(axis=0) + pad
         return bool((low <= self._ground.high).all() and (high >= self._ground.low).all())
 
-    def _sweep_hits(self, body: Body, poses: Array, steps: Array) -> bool:
+    def _sweep_hits(self, body: GrownBody, poses: Array, steps: Array) -> bool:
         """Whether one solid around a body along a course touches what stands still."""
         skin = body_skin(course_hulls(body, poses, steps))
         return bool(_touching(_object(skin), np.zeros((1, 3)), self._ground.still, most=1))
@@ -347,13 +347,13 @@ def _ground_of(
 
 
 @functools.lru_cache(maxsize=32)
-def _standing(body: Body) -> Any:
+def _standing(body: GrownBody) -> Any:
     """The body at rest."""
     return _object(body_skin(body.pieces))
 
 
 @functools.lru_cache(maxsize=1024)
-def _sliced(body: Body, twist: Twist, level: int) -> _Sliced:
+def _sliced(body: GrownBody, twist: Twist, level: int) -> _Sliced:
     duration = math.ldexp(1.0, -level)
     hulls = slice_hulls(body, twist, duration)
     return _Sliced(_object(body_skin(hulls)), slice_excess(body, twist, duration))
