@@ -111,14 +111,11 @@ def read_plan_document(path: Path | str) -> dict[str, Any]:
         If the file cannot be read, or is no plan.json.
     """
     needed = ("schema", "status", "primitives", "trajectory")
-    document = read_json(path, needed=needed, kind="plan")
-    if document["schema"] != SCHEMA:
-        raise InvalidScenario(f"{path}: schema: got {document['schema']!r}, need {SCHEMA}")
-    return document
+    return read_json(path, needed=needed, kind="plan")
 
 
 def read_json(path: Path | str, *, needed: Sequence[str], kind: str) -> dict[str, Any]:
-    """The object of a strict JSON file that has the keys `needed`.
+    """The object of a strict JSON file of our `SCHEMA` that has the keys `needed`.
 
     Raises
     ------
@@ -141,6 +138,8 @@ def read_json(path: Path | str, *, needed: Sequence[str], kind: str) -> dict[str
         raise InvalidScenario(f"{path}: not valid JSON: {error}") from error
     if not isinstance(document, dict) or any(key not in document for key in needed):
         raise InvalidScenario(f"{path}: is no {name}, need an object with {', '.join(needed)}")
+    if document["schema"] != SCHEMA:
+        raise InvalidScenario(f"{path}: schema: got {document['schema']!r}, need {SCHEMA}")
     return document
 
 
