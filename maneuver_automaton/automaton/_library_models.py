@@ -16,7 +16,8 @@ def model_entry(model: Model) -> dict[str, Any]:
     if not is_of_a_kind(model):
         names = {"controls": model.control_names, "reduced": model.reduced_names}
         return {"kind": model.name, **{key: list(value) for key, value in names.items()}}
-    values = {field.name: getattr(model, field.name) for field in dataclasses.fields(model)}
+    parameters = [field.name for field in dataclasses.fields(KINDS[model.name])]
+    values = {name: getattr(model, name) for name in parameters}
     return {"kind": model.name} | {k: float(v) for k, v in values.items() if v is not None}
 
 
