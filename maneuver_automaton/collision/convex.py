@@ -14,7 +14,7 @@ from maneuver_automaton.collision.outline import solid_parts, triangles_of
 from maneuver_automaton.collision.shapes import Box, Disc, Polygon, Shape
 
 TINY_EDGE = 1e-6  # [m]
-MOST_JOINED = 60  # triangles that are joined to larger pieces; more stay as they are
+MOST_MERGED = 60  # triangles that are joined to larger pieces; more stay as they are
 DIGITS = 9  # decimals of coordinates seen from a frame [m, rad]
 
 
@@ -200,7 +200,7 @@ def _decomposed(shape: Polygon) -> list[Array]:
 def _merged(pieces: list[Array]) -> list[Array]:
     """Join neighbours across an edge as long as what comes out is convex."""
     pieces = [piece for piece in pieces if len(piece) >= 3]
-    joined = len(pieces) <= MOST_JOINED
+    joined = len(pieces) <= MOST_MERGED
     while joined:
         joined = False
         edges: dict[tuple[tuple[float, ...], tuple[float, ...]], int] = {}
@@ -211,7 +211,7 @@ def _merged(pieces: list[Array]) -> list[Array]:
             other = edges.get((b, a))
             if other is None or other == k:
                 continue
-            union = _joined(pieces[k], pieces[other], a, b)
+            union = _union(pieces[k], pieces[other], a, b)
             if union is not None and _is_convex(union):
                 pieces = [p for i, p in enumerate(pieces) if i not in (k, other)] + [union]
                 joined = True
@@ -219,7 +219,7 @@ def _merged(pieces: list[Array]) -> list[Array]:
     return pieces
 
 
-def _joined(one: Array, other: Array, a: tuple[float, ...], b: tuple[float, ...]) -> Array | None:
+def _union(one: Array, other: Array, a: tuple[float, ...], b: tuple[float, ...]) -> Array | None:
     """Ring of two pieces that share the edge from `a` to `b`."""
     begin = next(i for i, corner in enumerate(one) if tuple(corner) == b)
     first = np.roll(one, -begin, axis=0)  # b ... a

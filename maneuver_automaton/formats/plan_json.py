@@ -33,7 +33,7 @@ TIMINGS = ("load", "automaton", "search", "first_plan", "refine", "audit")
 COUNTS = ("expansions", "collision_queries")
 TRAJECTORY = ("origin", "time_s", "pose", "reduced_state", "control")
 LISTS = ("primitives", "stop", "alternatives", "steps", "broken_guarantees")  # of objects
-SAME_TIME = 1e-9  # [s], relative to the duration, between a switch and its sample
+TIME_TOLERANCE = 1e-9  # [s], relative to the duration, between a switch and its sample
 
 
 def plan_to_dict(result: PlanResult) -> dict[str, Any]:
@@ -363,7 +363,7 @@ def _switches(time: Array, durations: Sequence[float]) -> list[int]:
     """Index of the sample at every switching time."""
     due = time[0] + np.concatenate([[0.0], np.cumsum(durations)])
     indices = [int(np.abs(time - at).argmin()) for at in due]
-    tolerance = SAME_TIME * max(1.0, float(np.abs(due).max()))
+    tolerance = TIME_TOLERANCE * max(1.0, float(np.abs(due).max()))
     if np.abs(time[indices] - due).max() > tolerance or indices[-1] != len(time) - 1:
         raise ValueError("trajectory: has no sample at a switching time of the primitives")
     return indices

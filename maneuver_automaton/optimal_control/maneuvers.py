@@ -219,7 +219,7 @@ def solve_transfer(
     swing : float
         The guess is a straight line if 0; else the inputs go this share of the way to one limit,
         then to the other, and the states are where that leads. Where nothing moves on the straight
-        line, the solver sees no way out of it.
+        line, the solver does not leave it.
     """
     model, settings = program.model, program.settings
     limits = model.control_limits if control_limits is None else control_limits

@@ -32,7 +32,7 @@ from maneuver_automaton.plotting.style import corner_legend
 from maneuver_automaton.plotting.track import track_of_plan
 from maneuver_automaton.problem import Goal, Problem
 
-SAME = 1e-6  # [m, rad] between ends that are one goal
+GOAL_TOLERANCE = 1e-6  # [m, rad] between ends that are one goal
 DASHES: tuple[tuple[float, Sequence[float]] | Literal["-"], ...] = (
     "-",
     (0, (4, 1.5)),
@@ -154,7 +154,7 @@ def _scene(plans: Sequence[Plan], problem: Problem | None, footprint: Any) -> Sc
         return scene_of(problem, begin, float(end), footprint=footprint)
     ends: list[Array] = []
     for plan in plans:
-        if all(np.abs(plan.end - other).max() > SAME for other in ends):
+        if all(np.abs(plan.end - other).max() > GOAL_TOLERANCE for other in ends):
             ends.append(plan.end)
     return Scene(
         goals=tuple(Goal(pose=pose) for pose in ends),
