@@ -11,7 +11,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.audit.clearance import Around, Scene, closest, what_is_hit, zones_broken
 from maneuver_automaton.audit.dynamics import beyond_limits, defect_of, wrong_ends
 from maneuver_automaton.audit.stretches import stretches_of
-from maneuver_automaton.audit.values import Audit, distance_to, seen_from
+from maneuver_automaton.audit.values import Audit, TerminalError, distance_to, seen_from
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.collision import AnyObstacle, Shape, Zone
@@ -84,20 +84,17 @@ def audit_plan(
     reasons = []
     if not defect <= DEFECT_TOLERANCE * scale:
         reasons.append(f"the plan is {defect:.3g} off the model's equations")
-    if not missed.position_m <= goal.tolerance_m + TERMINAL_TOLERANCE:
-        reasons.append(f"it ends {missed.position_m:.3g} m from the goal")
-    if not (goal.free_heading or missed.heading_rad <= goal.tolerance_rad + TERMINAL_TOLERANCE):
-        reasons.append(f"its last heading is {missed.heading_rad:.3g} rad off")
+    reasons += _off_the_goal(missed, goal)
     reasons += beyond_limits(driven, model)
     if states is not None:
         reasons += wrong_ends(near, states)
     distances = []
-    place, clock = goal.pose, plan.start_time
-    bodies = [("", near, footprint)] if obstacles else []
-    if obstacles and parts:
-        bodies += [(name, carried(near, model, name), shapes) for name, shapes in parts.items()]
-    for name, moving, shapes in bodies:
-        scene = Scene(shapes, obstacles, margin, origin_near(place), place, clock, body_height)
+    place = goal.pose
+    where = (margin, origin_near(place), place, plan.start_time, body_height)
+    bodies = {"": footprint, **(parts or {})} if obstacles else {}
+    for name, shapes in bodies.items():
+        moving = carried(near, model, name) if name else near
+        scene = Scene(shapes, obstacles, *where)
         least = closest(moving, scene, around)
         distances.append(least.distance)
         if not least.distance > too_close(margin):
@@ -112,3 +109,13 @@ def audit_plan(
         terminal_heading_rad=missed.heading_rad,
         reason="; ".join(reasons),
     )
+
+
+def _off_the_goal(missed: TerminalError, goal: Goal) -> list[str]:
+    """How far the end is beyond the goal's tolerance."""
+    reasons = []
+    if not missed.position_m <= goal.tolerance_m + TERMINAL_TOLERANCE:
+        reasons.append(f"it ends {missed.position_m:.3g} m from the goal")
+    if not (goal.free_heading or missed.heading_rad <= goal.tolerance_rad + TERMINAL_TOLERANCE):
+        reasons.append(f"its last heading is {missed.heading_rad:.3g} rad off")
+    return reasons
