@@ -22,7 +22,7 @@ from maneuver_automaton.planning import PlanResult, PlanStatus, plan
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
 
-LIMIT = 60.0  # [s] a ceiling that a busy machine does not reach
+LIMIT = 60.0  # [s] a bound that a busy machine does not reach
 
 TABLE_2 = {
     "rest": (0.0, 0.0),

@@ -1,4 +1,4 @@
-"""README.md: its Python runs, its commands run, its tables know every key."""
+"""README.md and the pages in docs/: their Python and commands run, their tables know every key."""
 
 from __future__ import annotations
 
@@ -16,11 +16,13 @@ from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.scenario import json_schema, load_scenario, scenario_of_text
 
 ROOT = Path(__file__).parents[1]
-TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+TEXTS = {page: page.read_text(encoding="utf-8") for page in PAGES}
+TEXT = "\n".join(TEXTS.values())
 
 
 def blocks(language: str) -> list[str]:
-    """The fenced blocks of a language."""
+    """The fenced blocks of a language, those of README.md first."""
     return re.findall(rf"^```{language}\n(.*?)^```", TEXT, flags=re.DOTALL | re.MULTILINE)
 
 
@@ -98,9 +100,25 @@ def test_every_key_of_a_plan_and_every_status_is_explained():
         assert f"`{key}`" in TEXT
 
 
-def test_every_link_and_picture_is_there():
-    for target in re.findall(r"\]\(([^)#]+)\)", TEXT):
-        assert (ROOT / target).is_file(), target
+def anchors(page: Path) -> set[str]:
+    """The names by which GitHub links to the headings of a page."""
+    text = re.sub(r"^```.*?^```", "", TEXTS[page], flags=re.DOTALL | re.MULTILINE)
+    headings = re.findall(r"^#+ (.*)$", text, flags=re.MULTILINE)
+    return {re.sub(r"[^a-z0-9 _-]", "", one.lower()).replace(" ", "-") for one in headings}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_link_leads_somewhere(page):
+    for target in re.findall(r"\]\(([^)]+)\)", TEXTS[page]):
+        name, _, anchor = target.partition("#")
+        there = (page.parent / name).resolve() if name else page
+        assert there.is_file(), target
+        assert not anchor or anchor in anchors(there), target
+
+
+def test_every_page_can_be_found_and_every_picture_is_shown():
+    for page in PAGES[1:]:
+        assert f"](docs/{page.name})" in TEXTS[PAGES[0]]
     for picture in (ROOT / "scenarios" / "pictures").iterdir():
         assert picture.stat().st_size < 120_000
         assert picture.name in TEXT

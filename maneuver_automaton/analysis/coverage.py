@@ -72,16 +72,16 @@ class SpanningFactor:
 def settings_for(automaton: Automaton, *, measure: str = "time") -> CoverageSettings:
     """Settings to the size of a library: a disc of twice its longest maneuver.
 
-    Words may cost four of the dearest maneuvers, or eight quanta of half a second or metre.
+    Words may cost four of the dearest maneuvers, or eight edges of half a second or metre.
     """
     spans = [m.duration if measure == "time" else path_length(m) for m in automaton.maneuvers]
     ways = [float(np.linalg.norm(m.displacement[:2])) for m in automaton.maneuvers]
-    quantum = 0.5
-    most = max(4.0 * max(spans, default=0.0), 8.0 * quantum)
+    edge_cost = 0.5
+    most = max(4.0 * max(spans, default=0.0), 8.0 * edge_cost)
     radius = 2.0 * max(ways, default=0.0) or 2.0
     body = automaton.model
     cell = body.resolution / 4.0 if isinstance(body, LatticeBody) else radius / 100.0
-    reach = ReachSettings(measure=measure, most=most, quantum=quantum, same_m=cell)
+    reach = ReachSettings(measure=measure, most=most, edge_cost=edge_cost, same_m=cell)
     return CoverageSettings(radius=radius, reach=reach)
 
 
@@ -94,7 +94,7 @@ def dispersion(
     """Distance of a pose in a ball to the nearest that words of bounded cost reach, at most.
 
     ``max over poses g of min over reached h of d(g, h)``, with ``d^2 = dx^2 + dy^2 + (L dh)^2``,
-    L as `metres_per_radian` says and headings modulo a turn. Trims last whole quanta here, so that
+    L as `metres_per_radian` says and headings modulo a turn. Trims last whole edges here, so that
     of a library with trims is an upper bound of its own; that of a lattice is not.
 
     Source: Niederreiter (1992), *Random Number Generation and Quasi-Monte Carlo Methods*, Ch. 6,

@@ -26,7 +26,7 @@ class ReachSettings:
 
     measure: str = "time"  # time [s] | length [m]
     most: float = 8.0  # greatest cost of a word [s or m]
-    quantum: float = 0.5  # trims last a multiple of what costs this [s or m]
+    edge_cost: float = 0.5  # trims last a multiple of what costs this [s or m]
     same_m: float = 0.02  # poses of one trim in one cell of this side count as one
     same_rad: float = 0.02  # [rad], or a little less
     most_nodes: int = 100_000
@@ -36,7 +36,7 @@ class ReachSettings:
             raise ValueError(
                 f"reach: measure must be one of {', '.join(MEASURES)}, got {self.measure!r}"
             )
-        for name in ("most", "quantum", "same_m", "same_rad", "most_nodes"):
+        for name in ("most", "edge_cost", "same_m", "same_rad", "most_nodes"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"reach: {name} must be positive, got {getattr(self, name)}")
 
@@ -104,13 +104,13 @@ def _start_class(automaton: Automaton, start: str | None) -> int:
 
 
 def _steps(automaton: Automaton, settings: ReachSettings) -> dict[int, _Steps]:
-    """Maneuvers, and every trim for one quantum of cost, by class."""
+    """Maneuvers, and every trim for one edge, by class."""
     rows: defaultdict[int, list[tuple[Array, float, int]]] = defaultdict(list)
     for trim, where in zip(automaton.trims, automaton.trim_classes.tolist(), strict=True):
-        seconds = _quantum(trim, settings)
+        seconds = _edge_duration(trim, settings)
         if seconds is not None:
             rows[where].append(
-                (SE2.exp(seconds * trim.body_velocity).pose, settings.quantum, where)
+                (SE2.exp(seconds * trim.body_velocity).pose, settings.edge_cost, where)
             )
     for maneuver in automaton.maneuvers:
         source, target = (
@@ -123,12 +123,12 @@ def _steps(automaton: Automaton, settings: ReachSettings) -> dict[int, _Steps]:
     return {where: _table(entries) for where, entries in rows.items()}
 
 
-def _quantum(trim: Trim, settings: ReachSettings) -> float | None:
+def _edge_duration(trim: Trim, settings: ReachSettings) -> float | None:
     """How long a trim lasts in one step [s]; None if it does not move, or not at a cost."""
     rate = 1.0 if settings.measure == "time" else float(np.hypot(*trim.body_velocity[:2]))
     if trim.is_rest or not rate > 0.0:
         return None
-    return min(settings.quantum / rate, trim.max_duration)
+    return min(settings.edge_cost / rate, trim.max_duration)
 
 
 def _table(entries: Sequence[tuple[Array, float, int]]) -> _Steps:
@@ -160,8 +160,8 @@ def _searched(first: int, steps: dict[int, _Steps], settings: ReachSettings) -> 
             complete = False
             break
         parts = [open_, *_followers(fresh, steps, settings)]
-        open_ = _cheapest(_joined(parts), settings)
-    nodes = _cheapest(_joined(closed), settings)
+        open_ = _cheapest(_concatenated(parts), settings)
+    nodes = _cheapest(_concatenated(closed), settings)
     order = np.argsort(nodes.costs, kind="stable")
     nodes = nodes.chosen(order)
     return Reached(poses=nodes.poses, costs=nodes.costs, classes=nodes.classes, complete=complete)
@@ -186,7 +186,7 @@ class _Nodes:
         return keys
 
 
-def _joined(parts: Sequence[_Nodes]) -> _Nodes:
+def _concatenated(parts: Sequence[_Nodes]) -> _Nodes:
     return _Nodes(
         np.concatenate([part.poses for part in parts]),
         np.concatenate([part.costs for part in parts]),

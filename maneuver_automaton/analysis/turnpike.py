@@ -108,7 +108,7 @@ def turnpike(
     ends = sum(_course_cost(model, one.course, stage_cost) for one in (up, down) if one.course)
     cases = []
     for coast in coasts:
-        word = _driven(model, source, up, trim, down, coast=float(coast))
+        word = _trajectory_of(model, source, up, trim, down, coast=float(coast))
         optimum = _optimum(model, word, target, stage_cost, step=step, settings=settings)
         cases.append(
             TurnpikeCase(
@@ -136,7 +136,7 @@ def time_away(solution: OptimalControlSolution, trim: Trim, *, dof: int, distanc
     return float(np.diff(solution.time)[far].sum())
 
 
-def _driven(
+def _trajectory_of(
     model: Model, source: Trim, up: Maneuver, trim: Trim, down: Maneuver, *, coast: float
 ) -> Trajectory:
     """The word as one trajectory from the identity."""

@@ -3,51 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
 from typing import Any
 
 from maneuver_automaton.automaton._library_values import check_keys, number_of
 from maneuver_automaton.errors import InvalidLibrary
-from maneuver_automaton.models import (
-    AcceleratingCar,
-    Car,
-    CarWithTrailer,
-    Helicopter,
-    Hovercraft,
-    LatticeBody,
-    Model,
-    Omnidirectional,
-    SecondOrderCar,
-    SecondOrderUnicycle,
-    SingleTrack,
-    Unicycle,
-    in_world,
-)
-
-KINDS: Mapping[str, Any] = {
-    kind.name: kind
-    for kind in (
-        Unicycle,
-        Car,
-        SecondOrderUnicycle,
-        SecondOrderCar,
-        CarWithTrailer,
-        SingleTrack,
-        Hovercraft,
-        Helicopter,
-        AcceleratingCar,
-        LatticeBody,
-        Omnidirectional,
-    )
-}
+from maneuver_automaton.models import Model, in_world
+from maneuver_automaton.models.kinds import KINDS, is_of_a_kind
 
 
 def model_entry(model: Model) -> dict[str, Any]:
     """The model as a file states it: its parameters; of a user's own model, its names."""
-    if model.name not in KINDS or not isinstance(model, KINDS[model.name]):
+    if not is_of_a_kind(model):
         names = {"controls": model.control_names, "reduced": model.reduced_names}
         return {"kind": model.name, **{key: list(value) for key, value in names.items()}}
-    values = {field.name: getattr(model, field.name) for field in dataclasses.fields(model)}
+    parameters = [field.name for field in dataclasses.fields(KINDS[model.name])]
+    values = {name: getattr(model, name) for name in parameters}
     return {"kind": model.name} | {k: float(v) for k, v in values.items() if v is not None}
 
 

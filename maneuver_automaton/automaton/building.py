@@ -342,7 +342,7 @@ def _assembled(
             failures.append(Failure(source=pair[0], target=pair[1], reason=said))
             continue
         if pair == original:
-            found[pair], defect = _driven(nodes, pair, entry), entry.defect
+            found[pair], defect = _maneuver_of(nodes, pair, entry), entry.defect
         else:
             assert mirror is not None
             found[pair] = mirror.maneuver(found[original], source=pair[0], target=pair[1])
@@ -357,7 +357,7 @@ def _assembled(
     return tuple(found.values()), tuple(failures), defects
 
 
-def _driven(nodes: Automaton, pair: Pair, entry: Entry) -> Maneuver:
+def _maneuver_of(nodes: Automaton, pair: Pair, entry: Entry) -> Maneuver:
     """The maneuver of a line of the journal."""
     inputs = Inputs(control=entry.control, interval=entry.interval)
     course = inputs.drive(nodes.model, nodes[pair[0]].reduced_state)

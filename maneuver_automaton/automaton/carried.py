@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton.plan import Plan
-from maneuver_automaton.groups import group_of
+from maneuver_automaton.groups import LieGroup, group_of
 from maneuver_automaton.models import Model
-from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
+from maneuver_automaton.primitives import Maneuver, Trim
 
 
 def carried(plan: Plan, model: Model, part: str) -> Plan:
@@ -47,33 +48,30 @@ def carried(plan: Plan, model: Model, part: str) -> Plan:
     which = model.part_names.index(part)
     group = group_of(plan.start.size)
 
-    def offset(states: Array) -> Array:
-        poses = model.part_poses(states)
-        return np.asarray(poses[..., which, :], dtype=np.float64)
+    def frame(states: Array) -> LieGroup:
+        """Where the part is, seen from the vehicle."""
+        return group(np.asarray(model.part_poses(states)[..., which, :], dtype=np.float64))
 
-    def carried_trim(trim: Trim) -> Trim:
-        frame = group(offset(trim.reduced_state))
-        return replace(trim, body_velocity=frame.inverse().adjoint() @ trim.body_velocity)
+    def trim_of(trim: Trim) -> Trim:
+        seen = frame(trim.reduced_state).inverse().adjoint() @ trim.body_velocity
+        return replace(trim, body_velocity=seen)
 
-    def carried_maneuver(maneuver: Maneuver) -> Maneuver:
-        course = maneuver.course
-        if course is None:
-            raise ValueError(
-                f"maneuver {maneuver.name!r}: has no course, so nothing can be carried"
-            )
-        frames = group(offset(course.reduced_state))
-        begin = group(frames.pose[0])
-        pose = (begin.inverse() @ group(course.pose) @ frames).pose.copy()
-        pose[0] = 0.0
-        seen = Trajectory(
-            time=course.time, pose=pose, reduced_state=course.reduced_state, control=course.control
-        )
-        return replace(maneuver, displacement=pose[-1], course=seen)
-
-    start = group(plan.start) @ group(offset(plan.trims[0].reduced_state))
+    start = group(plan.start) @ frame(plan.trims[0].reduced_state)
     return replace(
         plan,
         start=start.pose,
-        trims=tuple(carried_trim(trim) for trim in plan.trims),
-        maneuvers=tuple(None if m is None else carried_maneuver(m) for m in plan.maneuvers),
+        trims=tuple(trim_of(trim) for trim in plan.trims),
+        maneuvers=tuple(None if m is None else _maneuver(m, frame) for m in plan.maneuvers),
     )
+
+
+def _maneuver(maneuver: Maneuver, frame: Callable[[Array], LieGroup]) -> Maneuver:
+    """The maneuver of the part, its displacement seen from where the part begins."""
+    course = maneuver.course
+    if course is None:
+        raise ValueError(f"maneuver {maneuver.name!r}: has no course, so nothing can be carried")
+    frames = frame(course.reduced_state)
+    group = type(frames)
+    pose = (group(frames.pose[0]).inverse() @ group(course.pose) @ frames).pose.copy()
+    pose[0] = 0.0
+    return replace(maneuver, displacement=pose[-1], course=replace(course, pose=pose))

@@ -21,7 +21,7 @@ from maneuver_automaton.primitives.driving import drive_all
 from maneuver_automaton.primitives.resimulation import pieces
 
 EVEN = 1e-12  # by which share of a maneuver's duration equal intervals may differ
-SAME = 1e-9  # [m, rad, units of the reduced state] between a course and its inputs driven again
+COURSE_TOLERANCE = 1e-9  # [m, rad, units of the reduced state] off its inputs driven again
 SAMPLED = ("time", "pose", "reduced_state", "control")
 
 Inputs = tuple[Array, Array]  # until when (n,) [s], and the controls (n, n_u)
@@ -68,7 +68,7 @@ def is_reproduced(
     for (k, course), again in zip(courses.items(), driven, strict=True):
         off = np.abs(again.pose[-1] - course.pose[-1]).max()
         off_state = np.abs(again.reduced_state[-1] - course.reduced_state[-1]).max(initial=0.0)
-        flags[k] = max(off, off_state) <= SAME
+        flags[k] = max(off, off_state) <= COURSE_TOLERANCE
     return flags
 
 

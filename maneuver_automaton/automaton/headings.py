@@ -11,8 +11,7 @@ from maneuver_automaton.automaton.automaton import Automaton
 from maneuver_automaton.groups import LieGroup
 from maneuver_automaton.models import OnlyTranslated
 from maneuver_automaton.primitives import Trim
-
-SAME_HEADING = 1e-9  # [rad] headings closer than this are one
+from maneuver_automaton.primitives.turning import HEADING_TOLERANCE
 
 
 def trim_headings(automaton: Automaton) -> Array | None:
@@ -45,7 +44,7 @@ def trim_facing(automaton: Automaton, heading: float, what: str) -> Trim:
     assert headings is not None
     off = [abs(math.remainder(one - heading, 2.0 * math.pi)) for one in headings.tolist()]
     nearest = int(np.argmin(off))
-    if off[nearest] > SAME_HEADING:
+    if off[nearest] > HEADING_TOLERANCE:
         raise ValueError(
             f"{what}: the {automaton.model.name} has no trim of heading {heading:.6g} rad, the "
             f"nearest is {headings[nearest]:.6g} rad; translations alone move it, so a trim keeps "
@@ -61,7 +60,7 @@ def distinct_headings(automaton: Automaton) -> tuple[float, ...]:
     found: list[float] = []
     for heading in headings.tolist():
         off = (abs(math.remainder(one - heading, 2.0 * math.pi)) for one in found)
-        if all(one > SAME_HEADING for one in off):
+        if all(one > HEADING_TOLERANCE for one in off):
             found.append(heading)
     return tuple(found)
 
@@ -122,7 +121,7 @@ def posed(
         )
     if not (stated or free):
         off = abs(math.remainder(float(pose[2]) - headings[0], 2.0 * math.pi))
-        if off > SAME_HEADING:
+        if off > HEADING_TOLERANCE:
             raise ValueError(
                 f"{what}: has the heading {pose[2]:.6g} rad, but trim {trim!r} of the "
                 f"{model.name} has {headings[0]:.6g} rad"
@@ -149,7 +148,7 @@ def motion_of(automaton: Automaton, by: LieGroup) -> LieGroup:
     if by.dof == model.stated.group.dof and "heading" not in by.coordinates:
         return model.group(np.insert(by.pose, 2, 0.0))
     turn = math.remainder(float(by.pose[2]), 2.0 * math.pi)
-    if abs(turn) > SAME_HEADING:
+    if abs(turn) > HEADING_TOLERANCE:
         raise ValueError(
             f"problem: translations alone move the {model.name}, but the motion turns by "
             f"{turn:.6g} rad"

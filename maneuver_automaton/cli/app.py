@@ -32,7 +32,7 @@ Library = Annotated[Path, typer.Argument(metavar="FILE", help="Scenario or libra
 Out = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results.")]
 TimeLimit = Annotated[
     float | None,
-    typer.Option("--time-limit", metavar="S", help="Ceiling for search and refinement [s]."),
+    typer.Option("--time-limit", metavar="S", help="Upper bound for search and refinement [s]."),
 ]
 Alternatives = Annotated[
     int, typer.Option("--alternatives", min=0, metavar="K", help="Dearer plans to list as well.")

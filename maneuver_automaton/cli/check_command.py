@@ -161,7 +161,7 @@ def _trims(automaton: Automaton) -> Finding:
     model, trims = automaton.model, automaton.trims
     start = np.array([0.3, -0.2, 0.7, 0.1][: model.group.dof])
     states = np.array([np.concatenate([start, trim.reduced_state]) for trim in trims])
-    driven = _driven(model, states, automaton.controls)
+    driven = _states_after(model, states, automaton.controls)
     coasted = model.group.exp(TRIM_SECONDS * automaton.body_velocities)
     expected = (model.group(start) @ coasted).pose
     reduced = states[:, model.group.dof :]
@@ -176,7 +176,7 @@ def _trims(automaton: Automaton) -> Finding:
     )
 
 
-def _driven(model: Model, states: Array, controls: Array) -> Array:
+def _states_after(model: Model, states: Array, controls: Array) -> Array:
     """States after the trims were driven side by side, as one large system."""
     field = vector_field(model)
 

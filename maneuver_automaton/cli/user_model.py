@@ -55,7 +55,7 @@ def user_model(text: str) -> Model:
             f"{text} is no model, it is of the type {type(found).__name__} and has no "
             f"{', '.join(missing)}; need a maneuver_automaton.UserModel, or all that one has"
         )
-    from maneuver_automaton.automaton._library_models import KINDS
+    from maneuver_automaton.models.kinds import KINDS
 
     if found.name in KINDS:
         raise _wrong(

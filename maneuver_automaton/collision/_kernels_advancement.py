@@ -29,6 +29,7 @@ def mover_pose(movers, m, time):
     if time >= movers.time[k_1 - 1]:
         k = k_1 - 1
         return movers.pose[k, 0], movers.pose[k, 1], movers.pose[k, 2]
+    # A search by halves: recorded traffic has a knot every tenth of a second.
     low, high = k_0, k_1 - 1
     while high - low > 1:
         middle = (low + high) // 2
@@ -57,10 +58,12 @@ def mover_gap(movers, m, body, x, y, heading, time, keep, enough):
     c, s = math.cos(turn), math.sin(turn)
     m_x = r_x + c * body.middle_x - s * body.middle_y - movers.middle[m, 0]
     m_y = r_y + s * body.middle_x + c * body.middle_y - movers.middle[m, 1]
+    # Discs around both first: an obstacle far away costs neither pieces nor axes.
     best = math.sqrt(m_x * m_x + m_y * m_y) - body.reach - movers.reach[m]
     if best > enough:
         return best
     best = math.inf
+    # Exact where the distance to keep begins, as in `near_step`.
     near = NEAR * (body.reach + movers.reach[m]) + keep / SHARP
     for p in range(movers.first_piece[m], movers.first_piece[m + 1]):
         for b in range(body.first.shape[0] - 1):
@@ -81,19 +84,31 @@ def free_time(
     it is looked at, and more than `keep` in between. The world's time at the start is `clock`; a
     negative `duration` drives, and dates, the motion backwards.
     """
+    # Backwards in time the same poses are passed in the other order: only velocities change their
+    # sign, and the clock runs down.
     sign = 1.0 if duration >= 0.0 else -1.0
     length = abs(duration)
     n_movers = world.movers.speed.shape[0]
+    # Where the field says less than this, solids are looked at one by one: a share of the body, but
+    # not less than a share of the field's cell, by which the field may be off, nor than twice the
+    # margin.
     near = max(max(NEAR * body.reach, 0.25 * world.field.cell), 2.0 * margin)
     c, s = math.cos(heading), math.sin(heading)
+    # The world velocity of a straight motion, which holds all the way.
     w_x, w_y, turning = sign * (c * v_x - s * v_y), sign * (s * v_x + c * v_y), sign * turn_rate
+    # The instantaneous centre of a turn stays where it is, so poses are counted from it: one cosine
+    # and one sine a pose, and no error that adds up.
     center_x, center_y = x, y
     if turn_rate != 0.0:
         center_x = x - (s * v_x + c * v_y) / turn_rate
         center_y = y + (c * v_x - s * v_y) / turn_rate
     flat = math.hypot(v_x, v_y) > FLAT * abs(turn_rate)  # a centre too far away to count from
+    # Beyond that radius the centre loses digits: poses come from `coast`, and no axis is followed.
     if flat and turn_rate != 0.0:
         turning = math.inf
+    # The state of the loop: all before time `t` is proven; (p_x, p_y, p_heading) with cosine and
+    # sine (c, s) is the pose at `t`; `nearest` is the least bound of the gap met so far at the last
+    # pose.
     t, nearest = 0.0, math.inf
     p_x, p_y, p_heading = x, y, heading
     while True:
@@ -109,9 +124,14 @@ def free_time(
                 c, s = math.cos(p_heading), math.sin(p_heading)
                 p_x = center_x + (s * v_x + c * v_y) / turn_rate
                 p_y = center_y - (c * v_x - s * v_y) / turn_rate
+        # The order of the tests: the field, a few look-ups, decides most poses in the open. Solids
+        # are asked where it does not, moving obstacles last: they are asked at every pose, and only
+        # as exactly as the step that is left needs it.
         gap = field_bound(world.field, body, p_x, p_y, c, s)
         if gap > keep + near:
             nearest = gap - keep
+            # The proof of this step: no point of the body is faster than `speed`, so none comes
+            # closer than `keep` for as long as that takes.
             step = nearest / speed if speed > 0.0 else math.inf
         else:
             step, nearest = near_step(
@@ -136,6 +156,7 @@ def free_time(
             if step < 0.0:
                 return t, nearest
         for m in range(n_movers):
+            # Seen from the obstacle, no point of the body is faster than both together.
             fast = speed + world.movers.speed[m]
             time = clock + sign * t
             enough = keep + margin + fast * step
@@ -145,6 +166,8 @@ def free_time(
             nearest = min(nearest, gap)
             if fast > 0.0:
                 step = min(step, gap / fast)
+        # The pose at the end was looked at as all others were: only then all of the motion is
+        # proven.
         if t >= length or step == math.inf:
             return length, nearest
         t = min(t + step, length)  # the end has to be looked at as every pose

@@ -14,6 +14,8 @@ from maneuver_automaton.collision._kernels_gap import point_to_segment
 def distance_to_piece(x, y, corners, first, last):
     """Distance of a point to a convex polygon, its corners counter-clockwise; negative inside."""
     best = math.inf
+    # A point is inside if it is on the left of every edge; a line and a disc's middle have no
+    # inside.
     inside = last - first > 2
     before = last - 1
     for k in range(first, last):
@@ -40,9 +42,12 @@ def write_pieces(distance, origin_x, origin_y, cell, cap, edges, first, plates, 
             for i in range(i_0, i_1):
                 x = origin_x + (i + 0.5) * cell
                 d_x = max(max(plates[p, 0] - x, x - plates[p, 2]), 0.0)
+                # The box around the piece bounds its distance from below: where another piece is
+                # nearer than the box already, the corners are not looked at.
                 known = max(distance[j, i], 0.0)
                 if d_x * d_x + d_y * d_y > known * known:
                     continue
+                # Rounded by its radius, a piece is nearer by as much.
                 value = distance_to_piece(x, y, edges, first[p], first[p + 1]) - plates[p, 4]
                 distance[j, i] = min(distance[j, i], value)
 
@@ -51,7 +56,9 @@ def write_pieces(distance, origin_x, origin_y, cell, cap, edges, first, plates, 
 def rows_to(blocked, wanted):
     """Rows (rows, columns) from each cell to the nearest of its column that is as `wanted`."""
     n_rows, n_columns = blocked.shape
+    # As good as infinite: a row that far away is outside of the map, and `to_cells` skips it.
     far = n_rows + n_columns
+    # Upwards first, then downwards with the better of both: two passes over a column.
     away = np.full((n_rows, n_columns), far, dtype=np.int32)
     for i in range(n_columns):
         last = -far
@@ -77,6 +84,9 @@ def to_cells(blocked, wanted, away, x, y, most):
     n_rows, n_columns = blocked.shape
     row = min(max(math.floor(y), 0), n_rows - 1)
     column = min(max(math.floor(x), 0), n_columns - 1)
+    # Columns from the nearest outwards, right and left in turn. A column whose own edge is further
+    # away than the best cell so far holds nothing better, and neither does any beyond it on that
+    # side; if both sides are at that, the search ends.
     best = most * most
     for reach in range(n_columns + 1):
         ended = True
@@ -114,6 +124,7 @@ def write_map(distance, origin_x, origin_y, cell, cap, blocked, resolution, m_x,
             w_x = origin_x + (i + 0.5) * cell
             d_x, d_y = w_x - m_x, w_y - m_y
             x, y = (c * d_x + s * d_y) / resolution, (c * d_y - s * d_x) / resolution
+            # Nothing further away than what is known already is looked for.
             most = max(distance[j, i], 0.0) / resolution
             value = to_cells(blocked, True, to_blocked, x, y, most)
             if value <= 0.0:  # inside: the way out, over the rim of the map too

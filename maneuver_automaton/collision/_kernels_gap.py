@@ -40,6 +40,9 @@ def separation(body, b, x, y, c, s, solids, p, enough):
     A lower bound of their distance, not positive only if they touch; -inf without edges. The normal
     points to the body. Stops at `enough`.
     """
+    # The theorem of the separating axis: two convex polygons with an area are apart exactly if the
+    # normal of an edge of one of them parts them. Every such separation is a lower bound of the
+    # distance, so the largest is, and a positive one proves that they are apart.
     best, axis_x, axis_y = -math.inf, 0.0, 0.0
     b_0, b_1 = body.first[b], body.first[b + 1]
     p_0, p_1 = solids.first[p], solids.first[p + 1]
@@ -56,6 +59,8 @@ def separation(body, b, x, y, c, s, solids, p, enough):
                 best, axis_x, axis_y = gap, n_x, n_y
                 if best > enough:
                     break
+    # The body's own normals only where those of the solid have not shown enough: most solids that
+    # are looked at are walls, whose normals decide.
     if b_1 - b_0 > 1 and best <= enough:
         for k in range(b_0, b_1):  # edges of the body against corners of the solid
             n_x = c * body.edges[k, 2] - s * body.edges[k, 3]
@@ -78,6 +83,9 @@ def core_distance(body, b, x, y, c, s, solids, p):
     b_0, b_1 = body.first[b], body.first[b + 1]
     p_0, p_1 = solids.first[p], solids.first[p + 1]
     best, axis_x, axis_y = math.inf, 0.0, 0.0
+    # Two convex polygons that do not overlap are nearest at a corner of one of them: all corners of
+    # the body against all edges of the solid, then the other way round. A single corner is an edge
+    # of length zero, so discs need no case of their own.
     for j in range(b_0, b_1):
         at_x = x + c * body.edges[j, 0] - s * body.edges[j, 1]
         at_y = y + s * body.edges[j, 0] + c * body.edges[j, 1]
@@ -107,6 +115,7 @@ def core_distance(body, b, x, y, c, s, solids, p):
                 body.edges[k, 0],
                 body.edges[k, 1],
             )
+            # Here the vector leads from the body to the solid, in the body's frame.
             if e_x * e_x + e_y * e_y < best:
                 best = e_x * e_x + e_y * e_y
                 axis_x, axis_y = s * e_y - c * e_x, -s * e_x - c * e_y
@@ -124,10 +133,18 @@ def piece_gap(body, b, x, y, c, s, solids, p, near, enough):
     A lower bound; exact where it is a small share of `near`; at most 0 if they touch. Need not be
     exact above `enough`.
     """
+    # A rounded polygon is a core that is grown by a radius, so the gap of two is that of their
+    # cores less both radii. `enough` is asked of the rounded ones, so the cores are asked for more.
     rounding = body.radius[b] + solids.plates[p, 4]
     gap, axis_x, axis_y = separation(body, b, x, y, c, s, solids, p, enough + rounding)
+    # In front of a corner the separation of two cores is less than their distance. For sharp
+    # corners that vanishes on contact; rounded cores are a radius apart there, so what they lose
+    # does not, and they are made exact from further away.
     exact = near if rounding > 0.0 else SHARP * near
     corners = body.first[b + 1] - body.first[b] + solids.first[p + 1] - solids.first[p]
+    # `core_distance` knows no depth, so it is asked only where the cores do not overlap: an axis
+    # parts them, or both are points, which have no axis. Of a point and a line it is right in any
+    # case, and needed: no normal parts the line from a point beyond its end.
     apart = not -math.inf < gap <= 0.0 or corners <= 3  # two points, or a point and a line
     if apart and gap - rounding <= min(exact, enough):
         gap, axis_x, axis_y = core_distance(body, b, x, y, c, s, solids, p)
@@ -140,6 +157,9 @@ def field_bound(field, body, x, y, c, s):
     best = math.inf
     for d in range(body.discs.shape[0]):
         q_x, q_y = body.discs[d, 0], body.discs[d, 1]
+        # The field holds the distance at the middle of its cell. Distance is 1-Lipschitz, so less
+        # the way from there it is a lower bound at the disc's middle, and less its radius one for
+        # all of the disc. The discs cover the body: the least of their bounds holds for all of it.
         at_x = (x + c * q_x - s * q_y - field.origin_x) / field.cell
         at_y = (y + s * q_x + c * q_y - field.origin_y) / field.cell
         i, j = math.floor(at_x), math.floor(at_y)
@@ -148,6 +168,7 @@ def field_bound(field, body, x, y, c, s):
             away = field.cell * math.sqrt(e_x * e_x + e_y * e_y)
             value = field.distance[int(j), int(i)] - away
         else:
+            # The field reaches that far beyond all solids.
             value = field.outside
         best = min(best, value - body.discs[d, 2])
     return best
@@ -158,6 +179,7 @@ def near_gap(buckets, solids, body, x, y, c, s, near):
     """Gap to the solids near the body, exact below `near`; at most the buckets' reach."""
     m_x = x + c * body.middle_x - s * body.middle_y
     m_y = y + s * body.middle_x + c * body.middle_y
+    # What is in no list of this cell is at least that far away from a body whose middle is here.
     best = buckets.reach
     i = math.floor((m_x - buckets.origin_x) / buckets.cell)
     j = math.floor((m_y - buckets.origin_y) / buckets.cell)
@@ -168,6 +190,8 @@ def near_gap(buckets, solids, body, x, y, c, s, near):
         p = buckets.items[item]
         d_x = max(max(solids.plates[p, 0] - m_x, m_x - solids.plates[p, 2]), 0.0)
         d_y = max(max(solids.plates[p, 1] - m_y, m_y - solids.plates[p, 3]), 0.0)
+        # The upright box around a solid against the disc around the body: what cannot be nearer
+        # than the nearest so far is passed over before any axis is computed.
         away = best + body.reach
         if d_x * d_x + d_y * d_y >= away * away:
             continue
@@ -186,11 +210,15 @@ def corner_time(a, b, ahead, turn, limit):
     Without `turn` its height is ``a + ahead t``; with it, it is on a circle, (a, b) along the axis
     and aside from the centre, whose height is `ahead`.
     """
+    # The height of a corner that is driven straight is linear; one that does not come down never
+    # meets the limit.
     if turn == 0.0:
         return (a - limit) / -ahead if ahead < 0.0 else math.inf
     radius = math.sqrt(a * a + b * b)
     if ahead - radius > limit:
         return math.inf
+    # Its height on the circle is ``ahead + radius cos(angle)``: it is at the limit where the cosine
+    # is `low`, so it stays above for angles within `reach` of the top.
     low = (limit - ahead) / radius
     if low >= 1.0:
         return 0.0
@@ -210,6 +238,9 @@ def axis_time(body, b, x, y, c, s, center_x, center_y, v_x, v_y, turn, axis_x, a
     m_x, m_y = c * axis_x + s * axis_y, c * axis_y - s * axis_x
     for k in range(b_0, b_1):
         lowest = min(lowest, m_x * body.edges[k, 0] + m_y * body.edges[k, 1])
+    # The gap along a fixed axis is the height of the lowest corner over the solid. As long as no
+    # corner is lower by more than `drop` than the lowest is now, the gap is at least what it was
+    # less `drop`.
     limit = lowest - drop  # heights are counted from the pose
     time = math.inf
     for k in range(b_0, b_1):
@@ -256,10 +287,13 @@ def near_step(
     m_x = x + c * body.middle_x - s * body.middle_y
     m_y = y + s * body.middle_x + c * body.middle_y
     near_enough = near + keep / SHARP  # for gaps to be exact where the distance to keep begins
+    # Solids that are in no list of this cell are further away than this.
     nearest = buckets.reach - keep
     if nearest <= margin:  # the distance to keep is beyond what the buckets know
         return -1.0, nearest
     speed = max(speed, 1e-12)  # a body at rest
+    # The step may at first be longer than the motion, so that solids up to `near` are looked at and
+    # the bound of the gap that is returned means something at the end of a motion, too.
     step = min(max(most, near / speed), nearest / speed)
     i = math.floor((m_x - buckets.origin_x) / buckets.cell)
     j = math.floor((m_y - buckets.origin_y) / buckets.cell)
@@ -270,6 +304,7 @@ def near_step(
         p = buckets.items[item]
         d_x = max(max(solids.plates[p, 0] - m_x, m_x - solids.plates[p, 2]), 0.0)
         d_y = max(max(solids.plates[p, 1] - m_y, m_y - solids.plates[p, 3]), 0.0)
+        # A solid further away than this cannot shorten the step: it is passed over before any axis.
         away = step * speed + keep + body.reach
         if d_x * d_x + d_y * d_y >= away * away:
             continue
@@ -278,8 +313,13 @@ def near_step(
             gap, axis_x, axis_y = piece_gap(body, b, x, y, c, s, solids, p, near_enough, enough)
             gap -= keep
             nearest = min(nearest, gap)
+            # Too near at this pose: the proof ends here.
             if gap <= margin:
                 return -1.0, gap
+            # The proof of the step. No point of the body is faster than `speed`, so the gap lasts
+            # this long. The axis that parts the two now may part them longer, say along a wall,
+            # where the gap hardly changes: until the lowest corner has come down by what the gap is
+            # above the margin.
             lasts = gap / speed
             if lasts < step and turn < math.inf:
                 along = axis_time(

@@ -25,7 +25,7 @@ class CollisionChecker(Protocol):
         *,
         start_time: float = 0.0,
     ) -> int | None:
-        """Which obstacle the body touches while it coasts from a pose; None if the way is free.
+        """Which obstacle the body touches while it coasts from a pose; None if the path is free.
 
         Coasting is ``start @ exp(t * body_velocity)`` for t from 0 to `duration` [s]; it begins at
         `start_time` [s] of the world's clock.

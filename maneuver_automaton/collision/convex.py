@@ -10,10 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.collision.outline import solid_parts, triangles_of
 from maneuver_automaton.collision.shapes import Box, Disc, Polygon, Shape
 
 TINY_EDGE = 1e-6  # [m]
-MOST_JOINED = 60  # triangles that are joined to larger pieces; more stay as they are
+MOST_MERGED = 60  # triangles that are joined to larger pieces; more stay as they are
 DIGITS = 9  # decimals of coordinates seen from a frame [m, rad]
 
 
@@ -180,39 +181,26 @@ def _decomposed(shape: Polygon) -> list[Array]:
     """Pieces of a polygon that is concave, has holes, or is none: nothing solid is lost."""
     import shapely
 
-    polygon = shapely.Polygon(shape.corners, shape.holes)
-    if not polygon.is_valid:
-        polygon = shapely.make_valid(polygon)
     pieces: list[Array] = []
-    for part in shapely.get_parts(polygon, return_index=False):
-        if part.geom_type == "Polygon" and part.area > 0.0:
-            triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(part))
-            pieces += _merged([_simple(_ring_of(triangle)) for triangle in triangles])
-        elif part.geom_type in ("LineString", "LinearRing", "Polygon", "MultiLineString"):
-            for line in shapely.get_parts(part):
-                points = shapely.get_coordinates(line)
-                pieces += [
-                    np.stack([a, b]) for a, b in itertools.pairwise(points) if (a != b).any()
-                ]
-        elif part.geom_type == "MultiPolygon":
-            for polygon_part in shapely.get_parts(part):
-                triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon_part))
-                pieces += _merged([_simple(_ring_of(triangle)) for triangle in triangles])
-        else:
-            pieces += [point[None] for point in shapely.get_coordinates(part)]
-    return [piece for piece in pieces if len(piece)]
-
-
-def _ring_of(triangle: object) -> Array:
-    import shapely
-
-    return np.asarray(shapely.get_coordinates(triangle)[:-1])
+    for part in solid_parts(shape):
+        pieces += _merged([_simple(triangle) for triangle in triangles_of(part)])
+    whole = shapely.Polygon(shape.corners, shape.holes)
+    if whole.is_valid:
+        return pieces
+    # What rounding has left without width is solid still: a line, or a single point.
+    for part in shapely.get_parts(shapely.get_parts(shapely.make_valid(whole))):
+        points = shapely.get_coordinates(part)
+        if part.geom_type == "Point":
+            pieces.append(points)
+        elif part.geom_type != "Polygon":
+            pieces += [np.stack([a, b]) for a, b in itertools.pairwise(points) if (a != b).any()]
+    return pieces
 
 
 def _merged(pieces: list[Array]) -> list[Array]:
     """Join neighbours across an edge as long as what comes out is convex."""
     pieces = [piece for piece in pieces if len(piece) >= 3]
-    joined = len(pieces) <= MOST_JOINED
+    joined = len(pieces) <= MOST_MERGED
     while joined:
         joined = False
         edges: dict[tuple[tuple[float, ...], tuple[float, ...]], int] = {}
@@ -223,7 +211,7 @@ def _merged(pieces: list[Array]) -> list[Array]:
             other = edges.get((b, a))
             if other is None or other == k:
                 continue
-            union = _joined(pieces[k], pieces[other], a, b)
+            union = _union(pieces[k], pieces[other], a, b)
             if union is not None and _is_convex(union):
                 pieces = [p for i, p in enumerate(pieces) if i not in (k, other)] + [union]
                 joined = True
@@ -231,7 +219,7 @@ def _merged(pieces: list[Array]) -> list[Array]:
     return pieces
 
 
-def _joined(one: Array, other: Array, a: tuple[float, ...], b: tuple[float, ...]) -> Array | None:
+def _union(one: Array, other: Array, a: tuple[float, ...], b: tuple[float, ...]) -> Array | None:
     """Ring of two pieces that share the edge from `a` to `b`."""
     begin = next(i for i, corner in enumerate(one) if tuple(corner) == b)
     first = np.roll(one, -begin, axis=0)  # b ... a

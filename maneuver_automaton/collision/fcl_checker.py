@@ -26,18 +26,18 @@ from maneuver_automaton.collision.solids import (
     obstacle_region,
     obstacle_skin,
 )
-from maneuver_automaton.collision.spacetime import Mover, Rover, may_meet, meet
+from maneuver_automaton.collision.spacetime import CoastingBody, MovingBody, may_meet, meet
 from maneuver_automaton.collision.swept import (
     STANDING,
-    Body,
+    GrownBody,
     Twist,
     Windows,
     along,
-    body_of,
     box_around,
     chunks,
     course_hulls,
     fastest,
+    grown_body,
     halves,
     slice_excess,
     slice_hulls,
@@ -92,9 +92,9 @@ class FclChecker:
     margin: float = field(default=0.0, kw_only=True)  # [m]
     origin: tuple[float, float] = field(default=(0.0, 0.0), kw_only=True)  # [m]
     proven: float = field(default=1e-3, kw_only=True)  # [m]
-    _body: Body = field(init=False, repr=False)
-    _bare: Body = field(init=False, repr=False)
-    _covers: tuple[Body, ...] = field(init=False, repr=False)  # from few corners to all
+    _body: GrownBody = field(init=False, repr=False)
+    _bare: GrownBody = field(init=False, repr=False)
+    _covers: tuple[GrownBody, ...] = field(init=False, repr=False)  # from few corners to all
     _ground: _Ground = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -107,8 +107,8 @@ class FclChecker:
         object.__setattr__(self, "footprint", tuple(self.footprint))
         object.__setattr__(self, "obstacles", tuple(self.obstacles))
         object.__setattr__(self, "origin", (x, y))
-        object.__setattr__(self, "_body", body_of(self.footprint, self.margin, excess))
-        object.__setattr__(self, "_bare", body_of(self.footprint, 0.0, excess))
+        object.__setattr__(self, "_body", grown_body(self.footprint, self.margin, excess))
+        object.__setattr__(self, "_bare", grown_body(self.footprint, 0.0, excess))
         around = box_around(self._body)
         few = sum(map(len, self._body.pieces)) <= len(around.pieces[0])
         object.__setattr__(self, "_covers", (self._body,) if few else (around, self._body))
@@ -117,13 +117,13 @@ class FclChecker:
     def pose_hit(self, pose: ArrayLike, *, time: float = 0.0) -> int | None:
         """Which obstacle the body touches at a pose (3,) and a time [s]; None if it is free."""
         here = self._seen("pose", pose)
-        hit = self._still_hit(here[None])
+        hit = self._static_hit(here[None])
         if hit is not None:
             return hit
-        for mover in self._ground.movers:
-            there = mover.path.at(time)
-            if _touching(_standing(self._body), here[None], mover.object, there=there):
-                return mover.owner
+        for one in self._ground.moving:
+            there = one.path.at(time)
+            if _touching(_standing(self._body), here[None], one.object, there=there):
+                return one.owner
         return None
 
     def motion_hit(
@@ -134,7 +134,7 @@ class FclChecker:
         *,
         start_time: float = 0.0,
     ) -> int | None:
-        """Which obstacle the body touches while it coasts from a pose; None if the way is free.
+        """Which obstacle the body touches while it coasts from a pose; None if the path is free.
 
         Coasting is ``start @ exp(t * body_velocity)`` for t from 0 to `duration` [s]; it begins at
         `start_time` [s] of the world's clock.
@@ -149,15 +149,15 @@ class FclChecker:
         if not (math.isfinite(duration) and duration >= 0.0):
             raise ValueError(f"duration must be a number of at least 0, got {duration} s")
         twist = (v_x, v_y, turn_rate)
-        hit = self._still_hit_on_way(here, twist, duration)
-        if hit is not None or not self._ground.movers:
+        hit = self._static_hit_along(here, twist, duration)
+        if hit is not None or not self._ground.moving:
             return hit
-        return self._moving_hit_on_way(here, twist, duration, start_time)
+        return self._moving_hit_along(here, twist, duration, start_time)
 
     def course_hit(
         self, start: ArrayLike, poses: ArrayLike, times: ArrayLike, *, start_time: float = 0.0
     ) -> int | None:
-        """Which obstacle the body touches along a course; None if the way is free.
+        """Which obstacle the body touches along a course; None if the path is free.
 
         The course is sampled at `poses` (n, 3), seen from `start`, and `times` (n,) [s] since its
         begin, and runs with a constant twist from sample to sample. One solid serves several
@@ -180,7 +180,7 @@ class FclChecker:
                 first, last = todo.pop()
                 if last - first == 1:
                     twist = (*steps[first].tolist(),)
-                    hit = self._still_hit_on_way(seen[first], (twist[0], twist[1], twist[2]), 1.0)
+                    hit = self._static_hit_along(seen[first], (twist[0], twist[1], twist[2]), 1.0)
                     if hit is not None:
                         return hit
                     continue
@@ -190,11 +190,11 @@ class FclChecker:
                 ):
                     middle = (first + last) // 2
                     todo += [(middle, last), (first, middle)]
-        if self._ground.movers:
+        if self._ground.moving:
             for pose, twist, span, time in zip(
                 seen[:-1], twists.tolist(), spans.tolist(), clock.tolist(), strict=False
             ):
-                hit = self._moving_hit_on_way(pose, (twist[0], twist[1], twist[2]), span, time)
+                hit = self._moving_hit_along(pose, (twist[0], twist[1], twist[2]), span, time)
                 if hit is not None:
                     return hit
         return None
@@ -207,15 +207,15 @@ class FclChecker:
         """
         seen = np.atleast_2d(self._seen("poses", poses))
         clock = np.broadcast_to(0.0 if times is None else as_array("times", times), len(seen))
-        movers = self._ground.movers
-        if self._ground.still is not None:
-            movers = (_Moving(self._ground.still, _STILL, -1), *movers)
+        moving = self._ground.moving
+        if self._ground.static is not None:
+            moving = (_Moving(self._ground.static, _AT_REST, -1), *moving)
         least = math.inf
         moved = travel(seen, self._bare.middle, self._bare.reach)
-        for mover in movers:
-            others = mover.path.at(clock)
-            both = moved + travel(others, np.zeros(2), mover.path.reach)
-            gap = functools.partial(_distance, _standing(self._bare), mover.object)
+        for one in moving:
+            others = one.path.at(clock)
+            both = moved + travel(others, np.zeros(2), one.path.reach)
+            gap = functools.partial(_distance, _standing(self._bare), one.object)
             least = least_over_poses(gap, seen, others, moved=both, least=least)
         return least
 
@@ -226,78 +226,78 @@ class FclChecker:
         return near
 
     def _may_come_near(self, poses: Array, steps: Array) -> bool:
-        """Whether the rectangles around a course and around what stands still meet."""
+        """Whether the rectangles around a course and around the static obstacles meet."""
         far = float(np.hypot(*self._body.middle)) + self._body.reach
         swings = np.linalg.norm(steps[:, :2], axis=1) + far * np.abs(steps[:, 2])
         pad = far + float(swings.max(initial=0.0))
         low, high = poses[:, :2].min(axis=0) - pad, poses[:, :2].max(axis=0) + pad
         return bool((low <= self._ground.high).all() and (high >= self._ground.low).all())
 
-    def _sweep_hits(self, body: Body, poses: Array, steps: Array) -> bool:
-        """Whether one solid around a body along a course touches what stands still."""
+    def _sweep_hits(self, body: GrownBody, poses: Array, steps: Array) -> bool:
+        """Whether one solid around a body along a course touches a static obstacle."""
         skin = body_skin(course_hulls(body, poses, steps))
-        return bool(_touching(_object(skin), np.zeros((1, 3)), self._ground.still, most=1))
+        return bool(_touching(_object(skin), np.zeros((1, 3)), self._ground.static, most=1))
 
-    def _still_hit(self, poses: Array) -> int | None:
-        """An obstacle that stands still and is touched at one of the poses (n, 3)."""
-        if self._ground.still is None:
+    def _static_hit(self, poses: Array) -> int | None:
+        """A static obstacle that is touched at one of the poses (n, 3)."""
+        if self._ground.static is None:
             return None
-        hits = _touching(_standing(self._body), poses, self._ground.still, most=1)
+        hits = _touching(_standing(self._body), poses, self._ground.static, most=1)
         return self._ground.owner_of(hits)
 
-    def _still_hit_on_way(self, start: Array, twist: Twist, duration: float) -> int | None:
-        """An obstacle that stands still and is touched on the way."""
-        if self._ground.still is None:
+    def _static_hit_along(self, start: Array, twist: Twist, duration: float) -> int | None:
+        """A static obstacle that is touched along a coast."""
+        if self._ground.static is None:
             return None
         if fastest(self._body, twist) * duration <= STANDING:
-            return self._still_hit(start[None])
+            return self._static_hit(start[None])
         once = 2.0 * math.pi / abs(twist[2]) if twist[2] else math.inf  # then it is where it began
         parts = windows(twist, min(duration, once))
         while True:
             solid = _sliced(self._body, twist, parts.level)
-            hits = _touching(solid.object, along(start, twist, parts.begins), self._ground.still)
+            hits = _touching(solid.object, along(start, twist, parts.begins), self._ground.static)
             if not hits or solid.excess <= 0.5 * self.proven:
                 return self._ground.owner_of(hits)
             parts = Windows(parts.level, parts.begins[list(hits)])
             middles = along(start, twist, parts.begins + 0.5 * parts.length)
-            hit = self._still_hit(middles)
+            hit = self._static_hit(middles)
             if hit is not None:
                 return hit
             parts = halves(parts)
 
-    def _moving_hit_on_way(
+    def _moving_hit_along(
         self, start: Array, twist: Twist, duration: float, time: float
     ) -> int | None:
-        """An obstacle that moves and is touched on the way."""
+        """A moving obstacle that is touched along a coast."""
         body = self._body
-        rover = Rover(start, twist, complex(*body.middle), body.reach)
-        center = rover.center(rover.at(0.5 * duration))
-        for mover in self._ground.movers:
-            path = mover.path.from_time(time)
-            gap = functools.partial(_distance, _standing(body), mover.object)
-            if may_meet(rover, path, duration=duration, center=center) and meet(
-                rover, path, duration=duration, distance=gap, contact=0.5 * self.proven
+        coasting = CoastingBody(start, twist, complex(*body.middle), body.reach)
+        center = coasting.center(coasting.at(0.5 * duration))
+        for one in self._ground.moving:
+            path = one.path.from_time(time)
+            gap = functools.partial(_distance, _standing(body), one.object)
+            if may_meet(coasting, path, duration=duration, center=center) and meet(
+                coasting, path, duration=duration, distance=gap, contact=0.5 * self.proven
             ):
-                return mover.owner
+                return one.owner
         return None
 
 
 class _Moving(NamedTuple):
-    """An obstacle that moves."""
+    """A moving obstacle."""
 
     object: Any
-    path: Mover
+    path: MovingBody
     owner: int
 
 
 class _Ground(NamedTuple):
     """Obstacles as FCL sees them."""
 
-    still: Any  # one object for all that stands still, None without
+    static: Any  # one object for all static obstacles, None without
     low: Array  # (2,) corners of the rectangle around it
     high: Array
     owners: IntArray  # which obstacle each of its triangles belongs to
-    movers: tuple[_Moving, ...]
+    moving: tuple[_Moving, ...]
 
     def owner_of(self, hits: dict[int, int]) -> int | None:
         """Which obstacle the first of the triangles hit belongs to."""
@@ -311,7 +311,7 @@ class _Sliced(NamedTuple):
     excess: float  # [m]
 
 
-_STILL = Mover.of(Motion([0.0], [[0.0, 0.0, 0.0]]), 0.0)
+_AT_REST = MovingBody.of(Motion([0.0], [[0.0, 0.0, 0.0]]), 0.0)
 
 
 @functools.lru_cache(maxsize=8)
@@ -321,20 +321,20 @@ def _ground_of(
     to_origin = SE2(np.array([-origin[0], -origin[1], 0.0]))
     regions: list[Region] = []
     owners: list[int] = []
-    movers: list[_Moving] = []
+    moving: list[_Moving] = []
     for index, far in enumerate(obstacles):
         obstacle = far.moved(to_origin) if any(origin) else far
         region = obstacle_region(obstacle, excess=excess)
         if isinstance(obstacle, Obstacle) and obstacle.motion is not None:
             reach = float(np.hypot(*region.cover.reshape(-1, 2).T).max())
             skin, _ = obstacle_skin([region])
-            movers.append(_Moving(_object(skin), Mover.of(obstacle.motion, reach), index))
+            moving.append(_Moving(_object(skin), MovingBody.of(obstacle.motion, reach), index))
         elif len(region.cover):
             regions.append(region)
             owners.append(index)
     if not regions:
         nowhere = np.full(2, np.inf)
-        return _Ground(None, nowhere, -nowhere, np.zeros(0, dtype=np.int64), tuple(movers))
+        return _Ground(None, nowhere, -nowhere, np.zeros(0, dtype=np.int64), tuple(moving))
     skin, which = obstacle_skin(regions)
     corners = skin.vertices[:, :2]
     return _Ground(
@@ -342,18 +342,18 @@ def _ground_of(
         corners.min(axis=0),
         corners.max(axis=0),
         np.array(owners)[which],
-        tuple(movers),
+        tuple(moving),
     )
 
 
 @functools.lru_cache(maxsize=32)
-def _standing(body: Body) -> Any:
+def _standing(body: GrownBody) -> Any:
     """The body at rest."""
     return _object(body_skin(body.pieces))
 
 
 @functools.lru_cache(maxsize=1024)
-def _sliced(body: Body, twist: Twist, level: int) -> _Sliced:
+def _sliced(body: GrownBody, twist: Twist, level: int) -> _Sliced:
     duration = math.ldexp(1.0, -level)
     hulls = slice_hulls(body, twist, duration)
     return _Sliced(_object(body_skin(hulls)), slice_excess(body, twist, duration))

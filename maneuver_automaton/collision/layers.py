@@ -1,4 +1,4 @@
-"""Worlds one above the other: what stands between two heights, as a world in the plane each."""
+"""Worlds one above the other: obstacles between two heights, as a world in the plane each."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def layer_arrays(worlds: Sequence[World], *, low: Array, high: Array, plane: Wor
             plane=plane.arrays.field,
             flat=bool(np.isinf(low).all() and np.isinf(high).all()),
         )
-    solids, still, moving = _joined([(one.solids, one.movers.solids) for one in arrays])
+    solids, still, moving = _concatenated([(one.solids, one.movers.solids) for one in arrays])
     shapes = np.array([one.field.distance.shape for one in arrays])
     distance = np.zeros((len(arrays), *shapes.max(axis=0)))
     most = max(len(one.buckets.start) for one in arrays)
@@ -171,7 +171,7 @@ def _thick(heights: Sequence[float]) -> list[tuple[float, float]]:
     return list(pairwise(kept))
 
 
-def _joined(pairs: Sequence[tuple[Solids, Solids]]) -> tuple[Solids, list[int], list[int]]:
+def _concatenated(pairs: Sequence[tuple[Solids, Solids]]) -> tuple[Solids, list[int], list[int]]:
     """All solids as one, and with which piece those of each pair begin."""
     edges, plates, firsts = [], [], [np.zeros(1, dtype=np.int64)]
     begins: tuple[list[int], list[int]] = ([], [])
@@ -191,7 +191,7 @@ def _joined(pairs: Sequence[tuple[Solids, Solids]]) -> tuple[Solids, list[int], 
 
 
 def _all_movers(movers: Sequence[Movers], solids: Solids, begins: Sequence[int]) -> Movers:
-    """What moves, layer by layer, its pieces and knots among those of all layers."""
+    """Moving obstacles, layer by layer, its pieces and knots among those of all layers."""
     knots = np.cumsum([0, *(len(one.time) for one in movers)]).tolist()
     return Movers(
         solids=solids,

@@ -27,6 +27,18 @@ def outlines(shape: Polygon | Box) -> list[Any]:
     >>> [part.area for part in outlines(knot)]
     [1.0, 1.0]
     """
+    solid = solid_parts(shape)
+    if not solid:
+        raise ValueError(
+            f"polygon: got {len(shape.corners)} corners around no area, near "
+            f"({shape.corners[0, 0]:.6g}, {shape.corners[0, 1]:.6g}); need corners that are not "
+            "all on one line"
+        )
+    return solid
+
+
+def solid_parts(shape: Polygon | Box) -> list[Any]:
+    """As `outlines`; none if the polygon has no area."""
     import shapely
 
     if isinstance(shape, Box):
@@ -37,14 +49,15 @@ def outlines(shape: Polygon | Box) -> list[Any]:
         for hole in shape.holes:
             whole = shapely.difference(whole, shapely.union_all(_faces(hole)))
     parts = shapely.get_parts(whole)
-    solid = [part for part in parts if part.geom_type == "Polygon" and part.area > 0.0]
-    if not solid:
-        raise ValueError(
-            f"polygon: got {len(shape.corners)} corners around no area, near "
-            f"({shape.corners[0, 0]:.6g}, {shape.corners[0, 1]:.6g}); need corners that are not "
-            "all on one line"
-        )
-    return solid
+    return [part for part in parts if part.geom_type == "Polygon" and part.area > 0.0]
+
+
+def triangles_of(polygon: Any) -> Array:
+    """Triangles (n, 3, 2) that cover a valid polygon, cut along its own corners only."""
+    import shapely
+
+    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
+    return np.asarray(shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3])
 
 
 def rings_of(polygon: Any) -> list[Array]:

@@ -16,14 +16,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.collision.outline import outlines, rings_of
+from maneuver_automaton.collision.convex import convex_pieces
+from maneuver_automaton.collision.outline import outlines, triangles_of
 from maneuver_automaton.collision.rectangles import blocked_rectangles
 from maneuver_automaton.collision.shapes import (
     AnyObstacle,
     Box,
     Disc,
     OccupancyMap,
-    Polygon,
     Shape,
 )
 from maneuver_automaton.groups import SE2
@@ -71,7 +71,9 @@ def body_pieces(footprint: tuple[Shape, ...], *, margin: float, excess: float) -
         if isinstance(shape, Disc):
             pieces.append(circumscribed(shape.center, shape.radius + margin, excess))
         else:
-            pieces += [_grown(part, round_corners) for part in _convex_parts(shape)]
+            outlines(shape)  # refuses a polygon without area
+            parts = [ring for ring, _ in convex_pieces(shape) if len(ring) >= 3]
+            pieces += [_grown(part, round_corners) for part in parts]
     return tuple(pieces)
 
 
@@ -190,29 +192,6 @@ def _grown(part: Array, corners: Array) -> Array:
     return convex_hull((part[:, None] + corners).reshape(-1, 2))
 
 
-def _convex_parts(shape: Polygon | Box) -> list[Array]:
-    """Convex polygons that together are a shape: itself, or triangles."""
-    parts: list[Array] = []
-    for polygon in outlines(shape):
-        rings = rings_of(polygon)
-        parts += rings if _is_convex(rings) else list(_triangles(polygon))
-    return parts
-
-
-def _is_convex(rings: list[Array]) -> bool:
-    """Whether the rings of a valid polygon are one, which turns one way at every corner."""
-    if len(rings) > 1:
-        return False
-    edges = _after(rings[0]) - rings[0]
-    after = _after(edges)
-    turns = edges[:, 0] * after[:, 1] - edges[:, 1] * after[:, 0]
-    return bool((turns >= 0.0).all() or (turns <= 0.0).all())
-
-
-def _after(ring: Array) -> Array:
-    return np.concatenate([ring[1:], ring[:1]])
-
-
 def _fan(ring: Array) -> Array:
     """Triangles (n - 2, 3, 2) of a convex polygon."""
     n = len(ring) - 2
@@ -223,17 +202,14 @@ def _triangles(polygon: Any) -> Array:
     """Triangles (n, 3, 2) that cover a valid polygon."""
     import shapely
 
-    rings = rings_of(polygon)
-    if len(rings) == 1 and len(rings[0]) == 3:
-        return rings[0][None]
-    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
-    missed = polygon.area - shapely.area(triangles).sum()
+    triangles = triangles_of(polygon)
+    missed = polygon.area - shapely.area(shapely.polygons(triangles)).sum()
     if abs(missed) > 1e-9 * polygon.area:
         raise ValueError(
             f"polygon: {missed:.3g} m^2 of {polygon.area:.3g} m^2 were lost in triangles; need "
             "corners further apart"
         )
-    return np.asarray(shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3])
+    return triangles
 
 
 def _map_triangles(one: OccupancyMap) -> Array:

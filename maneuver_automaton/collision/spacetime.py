@@ -26,7 +26,7 @@ from maneuver_automaton.collision.swept import Twist
 from maneuver_automaton.groups import SE2
 
 
-class Rover(NamedTuple):
+class CoastingBody(NamedTuple):
     """A body whose frame coasts from a pose."""
 
     start: Array  # (3,)
@@ -49,7 +49,7 @@ class Rover(NamedTuple):
         return complex(pose[0], pose[1]) + _direction(pose) * self.middle
 
 
-class Mover(NamedTuple):
+class MovingBody(NamedTuple):
     """A body whose frame follows poses in time, linear between, still before and after."""
 
     knots: Array  # (n,) [s]
@@ -59,7 +59,7 @@ class Mover(NamedTuple):
     turn_rate: float  # [rad/s] the frame never turns faster
 
     @classmethod
-    def of(cls, motion: Motion, reach: float) -> Mover:
+    def of(cls, motion: Motion, reach: float) -> MovingBody:
         """What follows a motion and has no point further than `reach` [m] from its frame."""
         rates = np.diff(motion.pose, axis=0) / np.diff(motion.time)[:, None]
         speed = float(np.hypot(rates[:, 0], rates[:, 1]).max(initial=0.0))
@@ -67,7 +67,7 @@ class Mover(NamedTuple):
             motion.time, motion.pose, reach, speed, float(np.abs(rates[:, 2]).max(initial=0))
         )
 
-    def from_time(self, time: float) -> Mover:
+    def from_time(self, time: float) -> MovingBody:
         """The same, with the clock at zero at `time` [s]."""
         return self._replace(knots=self.knots - time)
 
@@ -88,16 +88,16 @@ class Mover(NamedTuple):
         return complex(x, y), turn, float(self.knots[k])
 
 
-def may_meet(rover: Rover, mover: Mover, *, duration: float, center: complex) -> bool:
-    """False where both are too far and too slow; `center` is the rover's after half the time."""
-    x, y = (float(np.interp(0.5 * duration, mover.knots, mover.poses[:, k])) for k in range(2))
-    way = 0.5 * duration * (abs(rover.velocity) + mover.speed)
-    return abs(center - complex(x, y)) <= way + rover.reach + mover.reach
+def may_meet(body: CoastingBody, other: MovingBody, *, duration: float, center: complex) -> bool:
+    """False where both are too far and too slow; `center` is the body's after half the time."""
+    x, y = (float(np.interp(0.5 * duration, other.knots, other.poses[:, k])) for k in range(2))
+    way = 0.5 * duration * (abs(body.velocity) + other.speed)
+    return abs(center - complex(x, y)) <= way + body.reach + other.reach
 
 
 def meet(
-    rover: Rover,
-    mover: Mover,
+    body: CoastingBody,
+    other: MovingBody,
     *,
     duration: float,
     distance: Callable[[Array, Array], float],
@@ -106,15 +106,15 @@ def meet(
     """Whether two bodies come within `contact` > 0 [m] of each other until `duration` [s].
 
     True only if they do; False only if they never touch. `distance` is that of the bodies at a
-    pose of the rover and one of the mover, and is asked for where discs around them are close.
+    pose of the body and one of the other, and is asked for where discs around them are close.
 
     Source: conservative advancement, Mirtich (1996), *Impulse-based Dynamic Simulation of Rigid
     Body Systems*, Sec. 2.3, here with the least time in which ``a t + b t^2 / 2`` is the distance.
 
     Examples
     --------
-    >>> still = Rover(np.zeros(3), (0.0, 0.0, 0.0), 0j, 0.5)
-    >>> crossing = Mover.of(Motion([0.0, 4.0], [[-4.0, 0, 0], [4.0, 0, 0]]), 0.5)
+    >>> still = CoastingBody(np.zeros(3), (0.0, 0.0, 0.0), 0j, 0.5)
+    >>> crossing = MovingBody.of(Motion([0.0, 4.0], [[-4.0, 0, 0], [4.0, 0, 0]]), 0.5)
     >>> def gap(one, other):
     ...     return max(0.0, math.hypot(*(one - other)[:2]) - 1.0)
     >>> meet(still, crossing, duration=1.0, distance=gap, contact=1e-3)
@@ -122,21 +122,21 @@ def meet(
     >>> meet(still, crossing, duration=2.0, distance=gap, contact=1e-3)
     True
     """
-    turning = abs(rover.twist[2]) * rover.reach
-    bend = abs(rover.velocity) * abs(rover.twist[2])
-    fastest = abs(rover.velocity) + mover.speed + turning + mover.turn_rate * mover.reach
-    near = 0.5 * (rover.reach + mover.reach)
+    turning = abs(body.twist[2]) * body.reach
+    bend = abs(body.velocity) * abs(body.twist[2])
+    fastest = abs(body.velocity) + other.speed + turning + other.turn_rate * other.reach
+    near = 0.5 * (body.reach + other.reach)
     time = 0.0
     while True:
-        here, there = rover.at(time), mover.at(time)
-        gap = abs(rover.center(here) - complex(there[0], there[1])) - rover.reach - mover.reach
+        here, there = body.at(time), other.at(time)
+        gap = abs(body.center(here) - complex(there[0], there[1])) - body.reach - other.reach
         if gap <= near:
             gap = distance(here, there)
             if gap <= contact:
                 return True
-        velocity, turn_rate, until = mover.rates(time)
-        closing = abs(_direction(here) * rover.velocity - velocity)
-        closing += turning + abs(turn_rate) * mover.reach
+        velocity, turn_rate, until = other.rates(time)
+        closing = abs(_direction(here) * body.velocity - velocity)
+        closing += turning + abs(turn_rate) * other.reach
         speed = closing + math.sqrt(closing * closing + 2.0 * bend * gap)
         same_rates = min(time + 2.0 * gap / speed, until) if speed > 0.0 else until
         after = max(same_rates, time + gap / fastest) if fastest > 0.0 else math.inf

@@ -55,7 +55,7 @@ class Nearest(NamedTuple):
 
 
 class _Single(NamedTuple):
-    """What the tree does not hold: a disc, or a part of an obstacle that moves."""
+    """What the tree does not hold: a disc, or a part of a moving obstacle."""
 
     part: Part
     motion: Motion
@@ -75,7 +75,7 @@ class Surroundings:
     [1.5]
     """
 
-    tree: Any  # of the polygons that stand still
+    tree: Any  # of the polygons of static obstacles
     owners: IntArray  # which obstacle each belongs to
     singles: tuple[_Single, ...]
     speed: float  # [m/s] no point of an obstacle is faster
@@ -152,7 +152,7 @@ def surroundings_around(
                 cores.append(part.core)
                 owners.append(index)
             else:
-                singles.append(_Single(part, obstacle.motion or _STILL, index))
+                singles.append(_Single(part, obstacle.motion or _AT_REST, index))
     return Surroundings(
         tree=shapely.STRtree(cores),
         owners=np.array(owners, dtype=np.int64),
@@ -204,7 +204,7 @@ def fastest_point(body: Sequence[Part], twists: Array) -> Array:
     return np.asarray(np.max(speeds, axis=0))
 
 
-_STILL = Motion([0.0], [[0.0, 0.0, 0.0]])
+_AT_REST = Motion([0.0], [[0.0, 0.0, 0.0]])
 
 
 def _nearer(one: Nearest, other: Nearest) -> Nearest:

@@ -25,8 +25,8 @@ STANDING = 1e-12  # [m] a body that moves no point further is taken to stand
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Body:
-    """Convex pieces in the body's frame, and a disc around them."""
+class GrownBody:
+    """Convex pieces that cover a body grown by a margin, in its frame, and a disc around them."""
 
     pieces: tuple[Array, ...]  # (n, 2) each [m]
 
@@ -59,26 +59,26 @@ class Windows(NamedTuple):
 
 
 @functools.lru_cache(maxsize=16)
-def body_of(footprint: tuple[Shape, ...], margin: float, excess: float) -> Body:
-    """The body of a footprint grown by a margin [m], round corners by at most `excess` [m] more."""
-    return Body(body_pieces(footprint, margin=margin, excess=excess))
+def grown_body(footprint: tuple[Shape, ...], margin: float, excess: float) -> GrownBody:
+    """A footprint grown by a margin [m], round corners by at most `excess` [m] more."""
+    return GrownBody(body_pieces(footprint, margin=margin, excess=excess))
 
 
-def box_around(body: Body) -> Body:
+def box_around(body: GrownBody) -> GrownBody:
     """The rectangle, along the axes of its frame, that holds a body.
 
     Examples
     --------
-    >>> triangle = Body((np.array([[0.0, 0.0], [2.0, 0.0], [1.0, 1.0]]),))
+    >>> triangle = GrownBody((np.array([[0.0, 0.0], [2.0, 0.0], [1.0, 1.0]]),))
     >>> box_around(triangle).pieces[0].tolist()
     [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]]
     """
     corners = np.concatenate(body.pieces)
     (left, low), (right, high) = corners.min(axis=0), corners.max(axis=0)
-    return Body((np.array([[left, low], [right, low], [right, high], [left, high]]),))
+    return GrownBody((np.array([[left, low], [right, low], [right, high], [left, high]]),))
 
 
-def slice_hulls(body: Body, twist: Twist, duration: float) -> list[Array]:
+def slice_hulls(body: GrownBody, twist: Twist, duration: float) -> list[Array]:
     """Convex polygons (m, 2) that hold every point of the body at every time of a short coast.
 
     A corner runs along an arc, which lies in the triangle of its ends and the point where the
@@ -86,7 +86,7 @@ def slice_hulls(body: Body, twist: Twist, duration: float) -> list[Array]:
 
     Examples
     --------
-    >>> square = Body((np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),))
+    >>> square = GrownBody((np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),))
     >>> (ahead,) = slice_hulls(square, (1.0, 0.0, 0.0), 3.0)
     >>> ahead.min(axis=0).tolist(), ahead.max(axis=0).tolist()
     ([-1.0, -1.0], [4.0, 1.0])
@@ -105,7 +105,7 @@ def slice_hulls(body: Body, twist: Twist, duration: float) -> list[Array]:
     return hulls
 
 
-def course_hulls(body: Body, poses: Array, steps: Array) -> list[Array]:
+def course_hulls(body: GrownBody, poses: Array, steps: Array) -> list[Array]:
     """Convex polygons that hold every point of the body along a course.
 
     It stands at `poses` (n + 1, 3) and moves from each to the next with a constant twist, which
@@ -114,7 +114,7 @@ def course_hulls(body: Body, poses: Array, steps: Array) -> list[Array]:
 
     Examples
     --------
-    >>> square = Body((np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),))
+    >>> square = GrownBody((np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),))
     >>> steps = np.array([[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     >>> poses = np.array([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0]])
     >>> (ahead,) = course_hulls(square, poses, steps)
@@ -157,7 +157,7 @@ def chunks(steps: Array) -> list[tuple[int, int]]:
     return runs
 
 
-def slice_excess(body: Body, twist: Twist, duration: float) -> float:
+def slice_excess(body: GrownBody, twist: Twist, duration: float) -> float:
     """No point of the hulls is further than this [m] from where the body passes.
 
     A point of a hull is a mean of corners seen at several times. Hold the same mean of corners
@@ -208,7 +208,7 @@ def along(start: Array, twist: Twist, times: Array) -> Array:
     return (SE2(start) @ SE2.exp(np.multiply.outer(times, twist))).pose
 
 
-def fastest(body: Body, twist: Twist) -> float:
+def fastest(body: GrownBody, twist: Twist) -> float:
     """Speed [m/s] no point of the body exceeds."""
     corners = np.concatenate(body.pieces)
     v_x, v_y, turn_rate = twist

@@ -65,7 +65,7 @@ class Buckets(NamedTuple):
 
 
 class Movers(NamedTuple):
-    """Obstacles that move: each a range of solids in its own frame, and knots in time."""
+    """Moving obstacles: each a range of solids in its own frame, and knots in time."""
 
     solids: Solids
     first_piece: IntArray  # (M + 1,)
@@ -93,8 +93,8 @@ class World:
     frame: Array  # (3,) pose of the world's own frame in the coordinates of the problem
     body: Body
     arrays: WorldArrays
-    box: Array  # (4,) [low x, low y, high x, high y] of what stands still, and where movers go
-    last_event: float  # [s] after it nothing moves
+    box: Array  # (4,) [low x, low y, high x, high y] of static obstacles, and where moving ones go
+    last_event: float  # [s] after it all obstacles stand
 
     def into(self, pose: Array) -> Array:
         """A pose (..., 3) seen from the world's frame: places first, so that no digit is lost."""
@@ -156,7 +156,7 @@ def world_of(
 
 
 def own_frame(obstacles: tuple[AnyObstacle, ...], otherwise: Array) -> tuple[float, ...]:
-    """A pose that moves with the obstacles: at the first that stands still and has a direction.
+    """A pose that moves with the obstacles: at the first static one that has a direction.
 
     The pose `otherwise` (3,) where there is none.
     """

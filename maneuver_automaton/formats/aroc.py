@@ -166,7 +166,7 @@ def automaton_of_aroc(
     }
     maneuvers = []
     for one, begin, end in zip(primitives, begin_levels.tolist(), end_levels.tolist(), strict=True):
-        course = _driven(model, one, begin, end)
+        course = _course_between(model, one, begin, end)
         maneuvers.append(
             Maneuver(
                 name=Path(one.name).stem,
@@ -273,7 +273,9 @@ def _seen(one: ArocPrimitive) -> Array:
     return (SE2(one.states[0, :3]).inverse() @ poses).pose
 
 
-def _driven(model: AcceleratingCar, one: ArocPrimitive, begin: float, end: float) -> Trajectory:
+def _course_between(
+    model: AcceleratingCar, one: ArocPrimitive, begin: float, end: float
+) -> Trajectory:
     """The motion under the inputs of a file, its speeds moved to end at those of the trims."""
     spans = np.diff(one.time)
     control = _controls(one).copy()

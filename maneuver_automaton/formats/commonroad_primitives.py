@@ -222,7 +222,7 @@ def automaton_of_commonroad_primitives(
     )
     index = {tuple(pair): k for k, pair in enumerate(pairs.tolist())}
     maneuvers = []
-    for k, (course, pair) in enumerate(zip(_driven(model, file, ends), ends, strict=True)):
+    for k, (course, pair) in enumerate(zip(_courses_between(model, file, ends), ends, strict=True)):
         maneuvers.append(
             Maneuver(
                 name=f"primitive {k + 1}",
@@ -368,7 +368,9 @@ def _ends(file: RoadPrimitives) -> list[Array]:
     return list(stated)
 
 
-def _driven(model: SecondOrderCar, file: RoadPrimitives, ends: list[Array]) -> list[Trajectory]:
+def _courses_between(
+    model: SecondOrderCar, file: RoadPrimitives, ends: list[Array]
+) -> list[Trajectory]:
     """The motions under controls that lead from state to state, from trim to trim."""
     most = max(len(one.states) for one in file.primitives) - 1
     control = np.zeros((len(ends), most, 2))

@@ -28,7 +28,7 @@ SPEED, TURN_RATE = 1.0, 1.0  # [m/s, rad/s] at which poses follow each other unl
 STRAIGHT = 1e-6  # [rad] a stretch that turns less is straight
 FULLY = 0.9  # of the greatest turn between two poses: a stretch that turns more is on the arc
 ON_GRID = 1e-3  # of a cell, between the end of a primitive and the cell that it is taken for
-SAME_HEADING = 1e-6  # [rad] between the end of a primitive and its heading
+HEADING_TOLERANCE = 1e-6  # [rad] between the end of a primitive and its heading
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -232,7 +232,7 @@ def _move(automaton: Automaton, maneuver: Maneuver, headings: Array, kind: str) 
     body = automaton.model
     assert isinstance(body, LatticeBody)
     off = float(abs(wrapped(poses[-1, 2] - headings[end])))
-    if cells(move, body.resolution) is None or off > SAME_HEADING:
+    if cells(move, body.resolution) is None or off > HEADING_TOLERANCE:
         raise InvalidLibrary(
             f"maneuver {maneuver.name!r}: ends at ({poses[-1, 0]:.6g} m, {poses[-1, 1]:.6g} m, "
             f"{poses[-1, 2]:.6g} rad), but a file of {kind} needs ends in the middle of cells of "

@@ -33,7 +33,7 @@ TIMINGS = ("load", "automaton", "search", "first_plan", "refine", "audit")
 COUNTS = ("expansions", "collision_queries")
 TRAJECTORY = ("origin", "time_s", "pose", "reduced_state", "control")
 LISTS = ("primitives", "stop", "alternatives", "steps", "broken_guarantees")  # of objects
-SAME_TIME = 1e-9  # [s], relative to the duration, between a switch and its sample
+TIME_TOLERANCE = 1e-9  # [s], relative to the duration, between a switch and its sample
 
 
 def plan_to_dict(result: PlanResult) -> dict[str, Any]:
@@ -111,14 +111,11 @@ def read_plan_document(path: Path | str) -> dict[str, Any]:
         If the file cannot be read, or is no plan.json.
     """
     needed = ("schema", "status", "primitives", "trajectory")
-    document = read_json(path, needed=needed, kind="plan")
-    if document["schema"] != SCHEMA:
-        raise InvalidScenario(f"{path}: schema: got {document['schema']!r}, need {SCHEMA}")
-    return document
+    return read_json(path, needed=needed, kind="plan")
 
 
 def read_json(path: Path | str, *, needed: Sequence[str], kind: str) -> dict[str, Any]:
-    """The object of a strict JSON file that has the keys `needed`.
+    """The object of a strict JSON file of our `SCHEMA` that has the keys `needed`.
 
     Raises
     ------
@@ -141,6 +138,8 @@ def read_json(path: Path | str, *, needed: Sequence[str], kind: str) -> dict[str
         raise InvalidScenario(f"{path}: not valid JSON: {error}") from error
     if not isinstance(document, dict) or any(key not in document for key in needed):
         raise InvalidScenario(f"{path}: is no {name}, need an object with {', '.join(needed)}")
+    if document["schema"] != SCHEMA:
+        raise InvalidScenario(f"{path}: schema: got {document['schema']!r}, need {SCHEMA}")
     return document
 
 
@@ -364,7 +363,7 @@ def _switches(time: Array, durations: Sequence[float]) -> list[int]:
     """Index of the sample at every switching time."""
     due = time[0] + np.concatenate([[0.0], np.cumsum(durations)])
     indices = [int(np.abs(time - at).argmin()) for at in due]
-    tolerance = SAME_TIME * max(1.0, float(np.abs(due).max()))
+    tolerance = TIME_TOLERANCE * max(1.0, float(np.abs(due).max()))
     if np.abs(time[indices] - due).max() > tolerance or indices[-1] != len(time) - 1:
         raise ValueError("trajectory: has no sample at a switching time of the primitives")
     return indices

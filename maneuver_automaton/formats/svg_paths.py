@@ -18,6 +18,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.text_source import finite, read_bytes
+from maneuver_automaton.formats.xml_source import parse
 
 _TOKEN = re.compile(r"\s*,?\s*(?:([A-Za-z])|([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?))")
 _TRANSLATE = re.compile(r"\s*translate\s*\(\s*([^\s,()]+)\s*(?:[\s,]\s*([^\s,()]+)\s*)?\)\s*")
@@ -46,13 +47,7 @@ class _Reader:
         self.parser.StartDoctypeDeclHandler = self._doctype
 
     def read(self, content: bytes) -> list[DrawnPath]:
-        try:
-            self.parser.Parse(content, True)
-        except expat.ExpatError as error:
-            said = expat.ErrorString(error.code)
-            raise InvalidScenario(f"{self.path}:{error.lineno}: not valid XML: {said}") from error
-        except LookupError as error:  # an encoding that Python does not know
-            raise InvalidScenario(f"{self.path}: not valid XML: {error}") from error
+        parse(self.parser, content, self.path)
         return self.drawn
 
     @property

@@ -88,13 +88,7 @@ class _Builder:
         self.parser.StartDoctypeDeclHandler = self._doctype
 
     def read(self, content: bytes) -> Element:
-        try:
-            self.parser.Parse(content, True)
-        except expat.ExpatError as error:
-            said = expat.ErrorString(error.code)
-            raise InvalidScenario(f"{self.path}:{error.lineno}: not valid XML: {said}") from error
-        except LookupError as error:  # an encoding that Python does not know
-            raise InvalidScenario(f"{self.path}: not valid XML: {error}") from error
+        parse(self.parser, content, self.path)
         assert self.root is not None  # expat accepts no file without an element
         return self.root
 
@@ -115,6 +109,17 @@ class _Builder:
     def _doctype(self, *_: object) -> None:
         line = self.parser.CurrentLineNumber
         raise InvalidScenario(f"{self.path}:{line}: has a document type, need a file without one")
+
+
+def parse(parser: expat.XMLParserType, content: bytes, path: Path) -> None:
+    """Let a parser read a whole file; what is no XML is an error with its line."""
+    try:
+        parser.Parse(content, True)
+    except expat.ExpatError as error:
+        said = expat.ErrorString(error.code)
+        raise InvalidScenario(f"{path}:{error.lineno}: not valid XML: {said}") from error
+    except LookupError as error:  # an encoding that Python does not know
+        raise InvalidScenario(f"{path}: not valid XML: {error}") from error
 
 
 def read_xml(path: Path, *, what: str, most: int) -> Element:

@@ -14,6 +14,8 @@ def coast(v_x, v_y, turn_rate, duration):
     Source: Solà, Deray, Atchuthan (2018), Eqs. (156), (158), in half-angle form.
     """
     turn = turn_rate * duration
+    # The chord of the arc, in half the angle: no digit is lost near zero, where the difference ``1
+    # - cos(turn)`` would lose all of them, and no series is needed.
     half = 0.5 * turn
     scale = duration if half == 0.0 else duration * (math.sin(half) / half)
     ahead = scale * math.cos(half)

@@ -40,11 +40,11 @@ class Product:
     def __matmul__(self, other: Self) -> Self:
         """Do `other` in the frame of `self`."""
         first, second = self.first @ other.first, self.second @ other.second
-        return type(self)(_joined(first.pose, second.pose))
+        return type(self)(_concatenated(first.pose, second.pose))
 
     def inverse(self) -> Self:
         """Motion back."""
-        return type(self)(_joined(self.first.inverse().pose, self.second.inverse().pose))
+        return type(self)(_concatenated(self.first.inverse().pose, self.second.inverse().pose))
 
     @classmethod
     def identity(cls) -> Self:
@@ -55,11 +55,11 @@ class Product:
     def exp(cls, twist: ArrayLike) -> Self:
         """Pair reached by a constant body twist (..., dof) after 1 s."""
         one, two = cls._parts("twist", twist)
-        return cls(_joined(cls.first_group.exp(one).pose, cls.second_group.exp(two).pose))
+        return cls(_concatenated(cls.first_group.exp(one).pose, cls.second_group.exp(two).pose))
 
     def log(self) -> Array:
         """Constant body twist (..., dof) that leads from the identity here in 1 s."""
-        return _joined(self.first.log(), self.second.log())
+        return _concatenated(self.first.log(), self.second.log())
 
     def adjoint(self) -> Array:
         """Ad (..., dof, dof): ``g @ exp(xi) @ g.inverse() == exp(Ad xi)``; two blocks."""
@@ -76,17 +76,17 @@ class Product:
     def act(self, points: ArrayLike) -> Array:
         """Points (..., space) [m] of the joint space, each part moved by its own group."""
         points, n = as_array("points", points, last=self.space), self.first_group.space
-        return _joined(self.first.act(points[..., :n]), self.second.act(points[..., n:]))
+        return _concatenated(self.first.act(points[..., :n]), self.second.act(points[..., n:]))
 
     def pose_rates(self, twist: ArrayLike) -> Array:
         """Time derivative (..., dof) of `pose` while the pair moves with a twist (..., dof)."""
         one, two = self._parts("twist", twist)
-        return _joined(self.first.pose_rates(one), self.second.pose_rates(two))
+        return _concatenated(self.first.pose_rates(one), self.second.pose_rates(two))
 
     def body_twist(self, rates: ArrayLike) -> Array:
         """Twist (..., dof) of a pair whose `pose` changes at `rates` (..., dof)."""
         one, two = self._parts("rates", rates)
-        return _joined(self.first.body_twist(one), self.second.body_twist(two))
+        return _concatenated(self.first.body_twist(one), self.second.body_twist(two))
 
     @classmethod
     def _parts(cls, name: str, value: ArrayLike) -> tuple[Array, Array]:
@@ -125,7 +125,7 @@ def product(first: type[LieGroup], second: type[LieGroup]) -> type[LieGroup]:
     return cast(type[LieGroup], type(name, (Product,), members))
 
 
-def _joined(first: Array, second: Array) -> Array:
+def _concatenated(first: Array, second: Array) -> Array:
     """(..., n) and (..., m) side by side, after broadcasting their batch axes: (..., n + m)."""
     batch = np.broadcast_shapes(first.shape[:-1], second.shape[:-1])
     parts = (np.broadcast_to(part, (*batch, part.shape[-1])) for part in (first, second))

@@ -219,24 +219,13 @@ def solve_transfer(
     swing : float
         The guess is a straight line if 0; else the inputs go this share of the way to one limit,
         then to the other, and the states are where that leads. Where nothing moves on the straight
-        line, the solver sees no way out of it.
+        line, the solver does not leave it.
     """
     model, settings = program.model, program.settings
     limits = model.control_limits if control_limits is None else control_limits
     controls_within = drawn_in(limits, tightening)
-    states_within = drawn_in(model.reduced_limits, tightening)
-    states_within[:, 0] = np.minimum(states_within[:, 0], np.minimum(start, end))
-    states_within[:, 1] = np.maximum(states_within[:, 1], np.maximum(start, end))
+    bounds = _bounds(program, start, end, controls_within, tightening)
     count = settings.intervals * settings.steps
-    states = np.tile(states_within, (count + 1, 1, 1))
-    states[0], states[-1] = start[:, None], end[:, None]
-    bounds = np.concatenate(
-        [
-            states.reshape(-1, 2),
-            np.tile(controls_within, (settings.intervals, 1, 1)).reshape(-1, 2),
-            np.array([settings.duration]),
-        ]
-    )
     guess_s = duration_guess(model, start, end) if duration is None else duration
     inputs = resampled(controls, settings.intervals)
     path = resampled(np.array([start, end]), count + 1)
@@ -266,6 +255,22 @@ def solve_transfer(
         cost=float(answer["f"]),
         iterations=int(stats["iter_count"]),
         solve_s=solve_s,
+    )
+
+
+def _bounds(
+    program: TransferProgram, start: Array, end: Array, controls_within: Array, tightening: float
+) -> Array:
+    """Least and greatest value (n, 2) of every unknown: reduced states, controls, the duration."""
+    settings = program.settings
+    within = drawn_in(program.model.reduced_limits, tightening)
+    within[:, 0] = np.minimum(within[:, 0], np.minimum(start, end))
+    within[:, 1] = np.maximum(within[:, 1], np.maximum(start, end))
+    states = np.tile(within, (settings.intervals * settings.steps + 1, 1, 1))
+    states[0], states[-1] = start[:, None], end[:, None]
+    controls = np.tile(controls_within, (settings.intervals, 1, 1))
+    return np.concatenate(
+        [states.reshape(-1, 2), controls.reshape(-1, 2), np.array([settings.duration])]
     )
 
 

@@ -1,4 +1,4 @@
-"""Polishing in symbols: the transcription, the ways of the body, walls and limits between nodes."""
+"""Polishing in symbols: the transcription, paths of the body, walls and limits between nodes."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from maneuver_automaton.optimal_control.separation import (
     Frames,
     Lines,
     Pairs,
+    Paths,
     Reach,
-    Ways,
     first_lines,
     near_pairs,
+    paths,
     reaches,
-    ways,
 )
 from maneuver_automaton.optimal_control.transcription import Transcription, transcribe
 from maneuver_automaton.optimal_control.vehicles import moving_frame
@@ -47,7 +47,7 @@ class Program(NamedTuple):
     scene: Scene
     settings: PolishSettings
     written: Transcription
-    ways: list[Ways]
+    paths: list[Paths]
     numbers: Any  # function: variables of the transcription -> x and y of the control points
     objective: Any
     below: Any  # (m,) further expressions that must not be positive
@@ -73,7 +73,7 @@ class Program(NamedTuple):
 
     def points(self, point: Point) -> list[tuple[Array, Array]]:
         """Control points of every solid of the body, in numbers."""
-        if not self.ways:
+        if not self.paths:
             return []
         state, control, duration = self.values(point)
         found = [m.full() for m in self.numbers(state.T, control.T, duration)]
@@ -106,8 +106,8 @@ def program_of(
     with numpy_on_symbols(casadi):
         begin = _frames(casadi, model, state[:, :count], control)
         end = _frames(casadi, model, state[:, 1:], control)
-        found = ways(casadi, scene.parts, begin, end, step=step)
-        (swing,) = ways(casadi, (POINT,), begin, end, step=step)
+        found = paths(casadi, scene.parts, begin, end, step=step)
+        (swing,) = paths(casadi, (POINT,), begin, end, step=step)
         below = _between(model, begin, end, step=step, settings=settings)
     zero = []
     for a, b, c in scene.walls:
@@ -125,8 +125,8 @@ def program_of(
         scene=scene,
         settings=settings,
         written=written,
-        ways=found,
-        numbers=casadi.Function("ways", variables, [m for way in found for m in way]),
+        paths=found,
+        numbers=casadi.Function("paths", variables, [m for path in found for m in path]),
         objective=written.objective + settings.change * _changes(casadi, model, control),
         below=casadi.vertcat(*below),
         zero=casadi.vertcat(*zero),

@@ -69,7 +69,7 @@ def solver_of(
             objective += price * casadi.sum2(inside)
             margin -= inside[:, pairs.interval.tolist()]
         rows.append(
-            line_rows(casadi, program.ways, scene.both, pairs, anchor=given[1:3, :],
+            line_rows(casadi, program.paths, scene.both, pairs, anchor=given[1:3, :],
                       lines=(angle, offset), margin=margin, pieces_too=not fixed)
         )  # fmt: skip
     constraints = casadi.vertcat(*rows)

@@ -64,14 +64,14 @@ def polish(
         What must not be touched, seen from a frame nearby.
     guess : Guess
         States at equal steps, controls between them, and how long it takes; it sets the number of
-        intervals. Defects do no harm.
+        intervals. Defects are allowed.
     stage_cost : callable, optional
         Cost per second ``l(z, u)`` on top of 1 for the time.
     settings : PolishSettings, optional
     fixed_planes : bool
         Keep the lines as the guess has them: quicker, and harder to fail.
     elastic : bool
-        Let the body into obstacles at a price: a way out for guesses that are inside. What comes
+        Let the body into obstacles at a price: for guesses that are inside. What comes
         out may still touch, and is a guess itself.
     gears : (n - 1,) array, optional
         Sign of the speed ahead in every interval; stretches of one sign take their own time.
@@ -125,16 +125,20 @@ def polish(
         missed = pairs_near(program, found, MISSED * reach)
         far = float(np.abs(found.state[:, :2] - before.state[:, :2]).max())
         total = total._replace(status=SolveStatus.FAILED, reason="touches between nodes")
-        if trust > near and far > near and len(pairs.joined(missed).interval) > len(pairs.interval):
+        if (
+            trust > near
+            and far > near
+            and len(pairs.extended(missed).interval) > len(pairs.interval)
+        ):
             trust = TRUST * near  # it went through what was not near: once more, in short steps
             continue
         point, lines, again = found, moved, True
         if trust < near:
             missed = pairs_near(program, found, near)
-        more = pairs.joined(missed)
+        more = pairs.extended(missed)
         if len(more.interval) > len(pairs.interval):
             new = Pairs(*(column[len(pairs.interval) :] for column in more))
-            lines = lines.joined(lines_at(program, point, new))
+            lines = lines.extended(lines_at(program, point, new))
             margins = np.append(margins, np.zeros(len(new.interval)))
             pairs, solver, again = more, None, False
         elif far < 0.99 * trust and _kept(program, point, pairs, lines):
@@ -188,7 +192,7 @@ def _depth(program: Program, point: Point, pairs: Pairs, lines: Lines) -> float:
 
 
 def _kept(program: Program, point: Point, pairs: Pairs, lines: Lines) -> bool:
-    """Whether every way keeps half the gap to its piece."""
+    """Whether every path keeps half of the margin to its piece."""
     reach = reaches_at(program, point, pairs, lines)
     return bool((reach.between - reach.piece <= -0.5 * program.settings.gap).all())
 

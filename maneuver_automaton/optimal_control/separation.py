@@ -1,10 +1,10 @@
-"""Lines that part a moving body from what stands in its way, interval by interval.
+"""Lines that part a moving body from obstacles in its path, interval by interval.
 
 One line for each interval, convex piece of an obstacle and convex piece of the body. It parts the
 obstacle from the body at both nodes, and from how far the corners swing out between them: a margin
-that is computed from the motion and frozen while the solver runs. To check, each corner's way is a
+that is computed from the motion and frozen while the solver runs. To check, each corner's path is a
 cubic with the same places and velocities at both nodes. It lies in the hull of its control points,
-and what the true way differs from it is of fourth order in the step, so that a small gap covers it.
+and the true path differs from it by a fourth order of the step, which a small margin covers.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Pairs(NamedTuple):
     body: IntArray  # (n,) among all solids of all parts
     piece: IntArray  # (n,)
 
-    def joined(self, other: Pairs) -> Pairs:
+    def extended(self, other: Pairs) -> Pairs:
         """These and those of the others that are not among them."""
         have = set(zip(*(column.tolist() for column in self), strict=True))
         rows = list(zip(*(column.tolist() for column in other), strict=True))
@@ -67,8 +67,8 @@ class Pairs(NamedTuple):
         return Pairs(*columns)
 
 
-class Ways(NamedTuple):
-    """Control points of the ways of m corners: first all begins, all ends, then those between."""
+class Paths(NamedTuple):
+    """Control points of the paths of m corners: first all begins, all ends, then those between."""
 
     x: Any  # (4 m, n - 1)
     y: Any  # (4 m, n - 1)
@@ -85,7 +85,7 @@ class Lines(NamedTuple):
         """Unit normals (n, 2)."""
         return np.stack([np.cos(self.angle), np.sin(self.angle)], axis=1)
 
-    def joined(self, other: Lines) -> Lines:
+    def extended(self, other: Lines) -> Lines:
         """These, then the others."""
         return Lines(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
 
@@ -103,9 +103,9 @@ class Frames(NamedTuple):
     reduced_rates: Any  # (n_z, n - 1)
 
 
-def ways(
+def paths(
     casadi: Any, parts: Sequence[BodyPart], begin: Frames, end: Frames, *, step: Any
-) -> list[Ways]:
+) -> list[Paths]:
     """Control points of every solid's corners in every interval, in symbols.
 
     Source: Farin (2002), *Curves and Surfaces for CAGD*, Sec. 7.5 (cubic Hermite interpolation in
@@ -128,7 +128,7 @@ def ways(
             third = casadi.repmat(step / 3.0, len(corners), 1)
             x = casadi.vertcat(x_0, x_1, x_0 + third * v_0, x_1 - third * v_1)
             y = casadi.vertcat(y_0, y_1, y_0 + third * w_0, y_1 - third * w_1)
-            found.append(Ways(x, y))
+            found.append(Paths(x, y))
     return found
 
 
@@ -220,7 +220,7 @@ def first_lines(
 
 def line_rows(
     casadi: Any,
-    found: Sequence[Ways],
+    found: Sequence[Paths],
     scene: tuple[Sequence[Solid], Sequence[Solid]],
     pairs: Pairs,
     *,
@@ -233,7 +233,7 @@ def line_rows(
 
     Parameters
     ----------
-    found : sequence of Ways
+    found : sequence of Paths
         One for each solid of the body.
     scene : (body, pieces)
         Solids of both sides.
@@ -250,17 +250,17 @@ def line_rows(
     angle, offset = lines
     cosine, sine = casadi.cos(angle), casadi.sin(angle)
     rows = []
-    for number, way in enumerate(found):
+    for number, path in enumerate(found):
         which = np.flatnonzero(pairs.body == number).tolist()
         if not which:
             continue
         columns = pairs.interval[which].tolist()
-        count = way.x.shape[0] // 2
+        count = path.x.shape[0] // 2
         c, s, o = (
             casadi.repmat(row[:, which], count, 1) for row in (cosine, sine, offset - margin)
         )
-        x = way.x[:count, columns] - casadi.repmat(anchor[0, which], count, 1)
-        y = way.y[:count, columns] - casadi.repmat(anchor[1, which], count, 1)
+        x = path.x[:count, columns] - casadi.repmat(anchor[0, which], count, 1)
+        y = path.y[:count, columns] - casadi.repmat(anchor[1, which], count, 1)
         rows.append(casadi.vec(c * x + s * y - o + body[number][1]))
     if pieces_too:
         owner = np.concatenate([np.full(len(pieces[p][0]), k) for k, p in enumerate(pairs.piece)])
@@ -278,7 +278,7 @@ class Reach(NamedTuple):
     """How far beyond its anchor each side of a line comes, along the normal."""
 
     nodes: Array  # (n,) [m] of the body at the nodes
-    between: Array  # (n,) [m] of the body on its way
+    between: Array  # (n,) [m] of the body on its path
     piece: Array  # (n,) [m] of the obstacle, that is where it begins
 
 

@@ -43,7 +43,7 @@ class OptimalControlSolution:
     iterations: int
     build_s: float  # [s] to set the problem up, derivatives included
     solve_s: float  # [s] in the solver
-    worst_defect: float  # greatest gap between a step of the rule and the next node
+    worst_defect: float  # greatest difference between a step of the rule and the next node
     worst_violation: float  # greatest excess over start, end and limits
 
     @property

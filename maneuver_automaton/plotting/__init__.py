@@ -32,11 +32,6 @@ from maneuver_automaton.plotting.footprint import footprint_polygons as footprin
 from maneuver_automaton.plotting.labels import control_labels as control_labels
 from maneuver_automaton.plotting.lessons import figure_shift as figure_shift
 from maneuver_automaton.plotting.lessons import figure_symmetry as figure_symmetry
-from maneuver_automaton.plotting.library_size import LibrarySizes as LibrarySizes
-from maneuver_automaton.plotting.library_size import draw_library_sizes as draw_library_sizes
-from maneuver_automaton.plotting.library_size import (
-    save_library_size_figure as save_library_size_figure,
-)
 from maneuver_automaton.plotting.maneuvers import draw_maneuvers as draw_maneuvers
 from maneuver_automaton.plotting.maneuvers import save_maneuvers_figure as save_maneuvers_figure
 from maneuver_automaton.plotting.nodes import draw_nodes as draw_nodes

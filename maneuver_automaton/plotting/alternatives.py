@@ -29,10 +29,10 @@ from maneuver_automaton.plotting.scene import (
     view_box,
 )
 from maneuver_automaton.plotting.style import corner_legend
-from maneuver_automaton.plotting.track import track_of_plan
+from maneuver_automaton.plotting.track import Track, track_of_plan
 from maneuver_automaton.problem import Goal, Problem
 
-SAME = 1e-6  # [m, rad] between ends that are one goal
+GOAL_TOLERANCE = 1e-6  # [m, rad] between ends that are one goal
 DASHES: tuple[tuple[float, Sequence[float]] | Literal["-"], ...] = (
     "-",
     (0, (4, 1.5)),
@@ -101,6 +101,22 @@ def draw_alternatives(
     size = max(scene_size(scene, track) for track in tracks)
     points = np.concatenate([scene_points(scene, track, size=size) for track in tracks])
     box = view_box(scene, points, size=size)
+    paths, bodies = _draw_tracks(ax, tracks, scene)
+    artists = AlternativesArtists(
+        paths=paths,
+        bodies=bodies,
+        ends=draw_ends(ax, plans[0].start, scene.goals, size=mark_size(scene, box, size=size)),
+        obstacles=draw_obstacles(ax, scene.obstacles, time=scene.times),
+        legend=_legend(ax, plans, costs, paths) if legend else None,
+    )
+    set_view(ax, box, plans[0].start[:2])
+    return artists
+
+
+def _draw_tracks(
+    ax: Axes, tracks: Sequence[Track], scene: Scene
+) -> tuple[tuple[Line2D, ...], tuple[PolyCollection, ...]]:
+    """A path for each track, and the body where it switches; the first on top."""
     paths = tuple(
         ax.plot(
             *track.pose[:, :2].T, color=plan_color(rank), linewidth=3.0 if rank == 0 else 1.8,
@@ -119,15 +135,7 @@ def draw_alternatives(
     )  # fmt: skip
     for part in bodies:
         ax.add_collection(part)
-    artists = AlternativesArtists(
-        paths=paths,
-        bodies=bodies,
-        ends=draw_ends(ax, plans[0].start, scene.goals, size=mark_size(scene, box, size=size)),
-        obstacles=draw_obstacles(ax, scene.obstacles, time=scene.times),
-        legend=_legend(ax, plans, costs, paths) if legend else None,
-    )
-    set_view(ax, box, plans[0].start[:2])
-    return artists
+    return paths, bodies
 
 
 def alternative_text(plan: Plan, cost: float | None, *, width: int) -> str:
@@ -154,7 +162,7 @@ def _scene(plans: Sequence[Plan], problem: Problem | None, footprint: Any) -> Sc
         return scene_of(problem, begin, float(end), footprint=footprint)
     ends: list[Array] = []
     for plan in plans:
-        if all(np.abs(plan.end - other).max() > SAME for other in ends):
+        if all(np.abs(plan.end - other).max() > GOAL_TOLERANCE for other in ends):
             ends.append(plan.end)
     return Scene(
         goals=tuple(Goal(pose=pose) for pose in ends),

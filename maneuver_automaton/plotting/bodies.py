@@ -64,7 +64,7 @@ def switch_bodies(track: Track, scene: Scene) -> PolyCollection:
 
 
 def moment_bodies(track: Track, scene: Scene) -> PolyCollection:
-    """The body at the times at which what moves is shown, in the colours of these times."""
+    """The body at the times at which moving obstacles are shown, in the colours of these times."""
     times = scene.times if scene.moves and track.pieces else scene.times[:0]
     colors = [color for _ in scene.body for color in moment_colors(len(times))]
     return PolyCollection(

@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from maneuver_automaton._arrays import Array, wrapped
 from maneuver_automaton.plotting.bodies import DART, DART_SIZE
 from maneuver_automaton.plotting.closed_loop_track import (
-    SAME,
+    END_TOLERANCE,
     driven_track,
     loop_colors,
     loop_points,
@@ -184,7 +184,7 @@ def _jumps(loop: ClosedLoop) -> list[Array]:
         np.array([plan.end[:2], pose[:2]])
         for plan, pose in zip(loop.driven, loop.poses[1:], strict=True)
     ]
-    return [line for line in lines if np.abs(line[1] - line[0]).max() > SAME]
+    return [line for line in lines if np.abs(line[1] - line[0]).max() > END_TOLERANCE]
 
 
 def _draw_replanned(ax: Axes, steps: Sequence[Step]) -> PathCollection:

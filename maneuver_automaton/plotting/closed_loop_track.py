@@ -20,7 +20,7 @@ from maneuver_automaton.plotting.scene import (
 from maneuver_automaton.plotting.track import Piece, Track, track_of_plan
 from maneuver_automaton.receding_horizon import ClosedLoop
 
-SAME = 1e-9  # [m, rad, s] between the end of a piece and the start of what goes on from there
+END_TOLERANCE = 1e-9  # [m, rad, s] between the end of a piece and the start of the next
 
 
 def loop_colors(loop: ClosedLoop) -> dict[str, Color]:
@@ -41,7 +41,7 @@ def driven_track(loop: ClosedLoop) -> Track:
     for plan in loop.driven:
         for piece in track_of_plan(plan).pieces:
             if pieces and _goes_on(pieces[-1], piece):
-                pieces[-1] = _joined(pieces[-1], piece)
+                pieces[-1] = _one_piece(pieces[-1], piece)
             else:
                 pieces.append(piece)
     return Track(loop.poses[0], tuple(pieces))
@@ -70,7 +70,7 @@ def loop_view(loop: ClosedLoop, scene: Scene) -> tuple[Array, float]:
     """Corners (2, 2) of what a picture of a `loop` shows, and the size [m] of its marks."""
     points = loop_points(loop)
     size = max(float(np.linalg.norm(points - points[0], axis=1).max()), 2.0 * scene.reach)
-    size = size if size > SAME else STILL_SIZE_M
+    size = size if size > END_TOLERANCE else STILL_SIZE_M
     around = scene_points(scene, driven_track(loop), size=size)
     bodies = placed(scene.body, loop.poses)
     box = view_box(scene, np.concatenate([points, around, *bodies]), size=size)
@@ -81,12 +81,12 @@ def _goes_on(one: Piece, other: Piece) -> bool:
     scale = 1.0 + float(np.abs(one.pose[-1]).max())
     return bool(
         one.name == other.name
-        and abs(one.time[-1] - other.time[0]) <= SAME * (1.0 + abs(one.time[-1]))
-        and np.abs(one.pose[-1] - other.pose[0]).max() <= SAME * scale
+        and abs(one.time[-1] - other.time[0]) <= END_TOLERANCE * (1.0 + abs(one.time[-1]))
+        and np.abs(one.pose[-1] - other.pose[0]).max() <= END_TOLERANCE * scale
     )
 
 
-def _joined(one: Piece, other: Piece) -> Piece:
+def _one_piece(one: Piece, other: Piece) -> Piece:
     return Piece(
         name=one.name,
         twist=one.twist,

@@ -100,23 +100,12 @@ def draw_feasible_slice(ax: Axes, feasible: FeasibleSet, index: int) -> SliceArt
     x, y, limit = feasible.x, feasible.y, feasible.within
     if x.size < 2 or y.size < 2:
         raise ValueError(f"feasible set: got a grid of {x.size} by {y.size}, need at least 2 by 2")
-    times = feasible.times[index]
     ax.set_facecolor(OUTSIDE)
     cells = ax.pcolormesh(
-        x, y, np.ma.masked_array(times, ~feasible.feasible[index]), cmap=TIMES, vmin=0.0,
-        vmax=limit, shading="nearest", rasterized=True, zorder=1.0,
+        x, y, np.ma.masked_array(feasible.times[index], ~feasible.feasible[index]), cmap=TIMES,
+        vmin=0.0, vmax=limit, shading="nearest", rasterized=True, zorder=1.0,
     )  # fmt: skip
-    finite = np.where(np.isfinite(times), times, np.nan)
-    lines = [level for level in level_times(feasible) if _crossed(finite, level)]
-    levels = None
-    if lines:
-        levels = ax.contour(
-            x, y, finite, levels=lines, colors=["white"], linewidths=0.7, alpha=0.75, zorder=1.5
-        )
-    edge = None
-    capped = np.minimum(times, 2.0 * limit)
-    if _crossed(capped, limit):
-        edge = ax.contour(x, y, capped, levels=[limit], colors=[EDGE], linewidths=1.8, zorder=2.0)
+    levels, edge = _draw_levels(ax, feasible, index)
     size = ARROW * max(float(np.ptp(x)), float(np.ptp(y)))
     goals = feasible.problem.goals
     artists = SliceArtists(
@@ -135,6 +124,24 @@ def draw_feasible_slice(ax: Axes, feasible: FeasibleSet, index: int) -> SliceArt
     tidy(ax, x="x [m]", y="y [m]")
     ax.grid(visible=False)
     return artists
+
+
+def _draw_levels(
+    ax: Axes, feasible: FeasibleSet, index: int
+) -> tuple[ContourSet | None, ContourSet | None]:
+    """Lines of equal least time, and the edge of the set; None where there is none."""
+    x, y, limit, times = feasible.x, feasible.y, feasible.within, feasible.times[index]
+    finite = np.where(np.isfinite(times), times, np.nan)
+    lines = [level for level in level_times(feasible) if _crossed(finite, level)]
+    levels = edge = None
+    if lines:
+        levels = ax.contour(
+            x, y, finite, levels=lines, colors=["white"], linewidths=0.7, alpha=0.75, zorder=1.5
+        )
+    capped = np.minimum(times, 2.0 * limit)
+    if _crossed(capped, limit):
+        edge = ax.contour(x, y, capped, levels=[limit], colors=[EDGE], linewidths=1.8, zorder=2.0)
+    return levels, edge
 
 
 def save_feasible_figure(feasible: FeasibleSet, path: str | Path) -> None:

@@ -1,4 +1,4 @@
-"""Draw obstacles: shapes, maps, and what moves, at one time or at several."""
+"""Draw obstacles: shapes, maps and moving obstacles, at one time or at several."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ from maneuver_automaton.plotting.colors import Color, shaded
 from maneuver_automaton.plotting.regions import map_paths, moved_path, shape_path
 
 SOLID: Color = (0.36, 0.38, 0.42)
-MOVER: Color = (0.44, 0.22, 0.58)
-PALEST, DARKEST = 0.72, -0.15  # of what moves, at the first of several times and at the last
+MOVING: Color = (0.44, 0.22, 0.58)
+PALEST, DARKEST = 0.72, -0.15  # of moving obstacles, at the first of several times and at the last
 TRACK_POINTS = 60
-MOST_STEPS = 5  # between the times at which what moves is shown
+MOST_STEPS = 5  # between the times at which moving obstacles are shown
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ObstacleArtists:
     """What `draw_obstacles` has drawn."""
 
-    still: PathCollection  # one path per shape that stands still
+    still: PathCollection  # one path per static shape
     maps: tuple[PathCollection, ...]  # blocked cells, one collection per map
-    movers: PathCollection  # one path per time and shape that moves, time by time
+    movers: PathCollection  # one path per time and moving shape, time by time
     tracks: LineCollection  # where the middle of each goes in between
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Mover:
-    """The path around a shape that moves, in the frame that moves."""
+class MovingShape:
+    """The path around a moving shape, in its own frame."""
 
     path: Path
     motion: Motion
@@ -64,7 +64,7 @@ def draw_obstacles(
 ) -> ObstacleArtists:
     """Draw `obstacles` on `ax`, which keeps its limits.
 
-    What stands is dark grey. What moves is violet, at several times the darker the later, over
+    Static obstacles are dark grey, moving ones violet, at several times the darker the later, over
     its track from the first time to the last.
 
     Parameters
@@ -92,22 +92,22 @@ def draw_obstacles(
     (1, 2)
     """
     known = as_obstacles(obstacles)
-    moving = movers_of(known)
+    moving = moving_shapes(known)
     if time is None:
-        shown = [mover.at(float(mover.motion.time[0])) for mover in moving]
-        tracks = [mover.track(*mover.motion.time[[0, -1]].tolist()) for mover in moving]
-        colors = [MOVER] * len(shown)
+        shown = [one.at(float(one.motion.time[0])) for one in moving]
+        tracks = [one.track(*one.motion.time[[0, -1]].tolist()) for one in moving]
+        colors = [MOVING] * len(shown)
     else:
         times = np.atleast_1d(as_array("obstacles: time", time))
-        shown = [mover.at(t) for t in times.tolist() for mover in moving]
-        tracks = [mover.track(float(times[0]), float(times[-1])) for mover in moving]
+        shown = [one.at(t) for t in times.tolist() for one in moving]
+        tracks = [one.track(float(times[0]), float(times[-1])) for one in moving]
         colors = [color for color in moment_colors(len(times)) for _ in moving]
     artists = ObstacleArtists(
-        still=_solid([shape_path(one.shape) for one in still_shapes(known)]),
+        still=_solid([shape_path(one.shape) for one in static_shapes(known)]),
         maps=tuple(_solid(map_paths(one)) for one in known if isinstance(one, OccupancyMap)),
-        movers=movers_collection(shown, colors),
+        movers=moving_collection(shown, colors),
         tracks=LineCollection(
-            tracks, colors=[(*MOVER, 0.45)], linewidths=0.8, linestyles=[(0, (4, 2))], zorder=1.3
+            tracks, colors=[(*MOVING, 0.45)], linewidths=0.8, linestyles=[(0, (4, 2))], zorder=1.3
         ),
     )
     for part in (artists.still, *artists.maps, artists.movers, artists.tracks):
@@ -115,22 +115,22 @@ def draw_obstacles(
     return artists
 
 
-def still_shapes(obstacles: Sequence[AnyObstacle]) -> list[Obstacle]:
-    """The shapes that stand still."""
+def static_shapes(obstacles: Sequence[AnyObstacle]) -> list[Obstacle]:
+    """The static shapes."""
     return [one for one in obstacles if isinstance(one, Obstacle) and one.motion is None]
 
 
-def movers_of(obstacles: Sequence[AnyObstacle]) -> list[Mover]:
-    """The shapes that move, ready to be drawn at many times."""
+def moving_shapes(obstacles: Sequence[AnyObstacle]) -> list[MovingShape]:
+    """The moving shapes, ready to be drawn at many times."""
     return [
-        Mover(path=shape_path(one.shape), motion=one.motion)
+        MovingShape(path=shape_path(one.shape), motion=one.motion)
         for one in obstacles
         if isinstance(one, Obstacle) and one.motion is not None
     ]
 
 
-def movers_collection(paths: Sequence[Path], colors: Sequence[Color]) -> PathCollection:
-    """Shapes that move, each in its colour."""
+def moving_collection(paths: Sequence[Path], colors: Sequence[Color]) -> PathCollection:
+    """Moving shapes, each in its colour."""
     return PathCollection(
         paths, facecolors=[(*color, 0.62) for color in colors],
         edgecolors=[shaded(color, -0.25) for color in colors], linewidths=0.7, zorder=1.9,
@@ -158,14 +158,14 @@ def round_times(begin: float, end: float) -> Array:
 def moment_colors(count: int) -> list[Color]:
     """A colour for each of `count` times, pale to dark."""
     if count == 1:
-        return [MOVER]
-    return [shaded(MOVER, amount) for amount in np.linspace(PALEST, DARKEST, count).tolist()]
+        return [MOVING]
+    return [shaded(MOVING, amount) for amount in np.linspace(PALEST, DARKEST, count).tolist()]
 
 
 def obstacle_handles(
     obstacles: Sequence[AnyObstacle], times: Array
 ) -> tuple[list[Patch], list[str]]:
-    """Legend handles: obstacles, and what moves at each of the `times` (n,) [s]."""
+    """Legend handles: obstacles, and moving ones at each of the `times` (n,) [s]."""
     handles, names = [], []
     moving = [one for one in obstacles if isinstance(one, Obstacle) and one.motion is not None]
     if len(moving) < len(obstacles):
@@ -180,5 +180,5 @@ def obstacle_handles(
 
 
 def _solid(paths: Sequence[Path]) -> PathCollection:
-    """What stands still; the thin edge keeps walls of one cell visible, and hides seams."""
+    """Static obstacles; the thin edge keeps walls of one cell visible, and hides seams."""
     return PathCollection(paths, facecolors=[SOLID], edgecolors=[SOLID], linewidths=0.4, zorder=1.0)

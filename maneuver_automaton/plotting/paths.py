@@ -62,7 +62,7 @@ class PlanArtists:
     swept: PathCollection  # what the body covers; empty if it is not known
     darts: PolyCollection  # along the path, where the body is not known
     bodies: PolyCollection  # at the switching times
-    moment_bodies: PolyCollection  # at the times at which what moves is shown
+    moment_bodies: PolyCollection  # at the times at which moving obstacles are shown
     goal_bodies: PolyCollection  # at the goals that are not reached
     switches: PathCollection  # dots where one trim follows another
     spins: LineCollection  # arcs for turns on the spot
@@ -85,7 +85,7 @@ def draw_plan(
 ) -> PlanArtists:
     """Draw a `plan` in the plane on `ax`, to scale, each trim in its colour.
 
-    What moves is shown at a few times, and the body at the same times in the same colours.
+    Moving obstacles are shown at a few times, and the body at the same times in the same colours.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE, shaded
 from maneuver_automaton.plotting.film import Film, picture_times, write_film
-from maneuver_automaton.plotting.obstacles import MOVER, SOLID
+from maneuver_automaton.plotting.obstacles import MOVING, SOLID
 from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
 from maneuver_automaton.plotting.regions import shape_path
 from maneuver_automaton.plotting.style import tidy
@@ -79,7 +79,7 @@ def draw_road(
     for k, moment in enumerate(moments):
         for one in scene.present(moment):
             paths.append(shape_path(one.at(moment)))
-            colors.append(SOLID if one.motion is None else shaded(MOVER, _haze(k, len(moments))))
+            colors.append(SOLID if one.motion is None else shaded(MOVING, _haze(k, len(moments))))
     traffic = PathCollection(paths, facecolors=colors, edgecolors=["white"], linewidths=0.5)
     traffic.set_zorder(2.0)
     bodies = PolyCollection(
@@ -165,7 +165,7 @@ def save_road_animation(
     def show(time: float) -> None:
         here = scene.present(time)
         drawn.traffic.set_paths([shape_path(one.at(time)) for one in here])
-        drawn.traffic.set_facecolor([SOLID if one.motion is None else MOVER for one in here])
+        drawn.traffic.set_facecolor([SOLID if one.motion is None else MOVING for one in here])
         drawn.bodies.set_verts(_bodies(vehicle, plan.pose_at([time])))
         drawn.bodies.set_facecolor([EGO])
         clock.set_text(f"{time:.1f} s")

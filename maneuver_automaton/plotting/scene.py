@@ -14,7 +14,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import AnyObstacle, Obstacle, OccupancyMap
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.footprint import footprint_polygons, placed
-from maneuver_automaton.plotting.obstacles import movers_of, round_times, still_shapes
+from maneuver_automaton.plotting.obstacles import moving_shapes, round_times, static_shapes
 from maneuver_automaton.plotting.regions import shape_path
 from maneuver_automaton.plotting.style import count_from_near, tidy
 from maneuver_automaton.plotting.track import Track
@@ -37,7 +37,7 @@ class Scene:
     reached: int | None = None  # which of the goals
     obstacles: tuple[AnyObstacle, ...] = ()
     body: tuple[Array, ...] = ()  # outlines (n, 2) [m]; none: it is not known
-    times: Array  # (n,) at which what moves is shown [s]
+    times: Array  # (n,) at which moving obstacles are shown [s]
 
     @property
     def reach(self) -> float:
@@ -53,8 +53,8 @@ class Scene:
 def plan_scene(problem: Problem, plan: Plan | None, *, footprint: Any = None) -> Scene:
     """The scene of a `problem`, its own body if no other is given.
 
-    The goal reached is the one nearest to the end of the plan. Without a plan, what moves is shown
-    over all its motion.
+    The goal reached is the one nearest to the end of the plan. Without a plan, moving obstacles are
+    shown over all their motion.
     """
     if plan is None:
         motions = [o.motion for o in problem.obstacles if isinstance(o, Obstacle) and o.motion]
@@ -137,9 +137,9 @@ def scene_points(scene: Scene, track: Track, *, size: float) -> Array:
 
 
 def obstacle_boxes(obstacles: Sequence[AnyObstacle], times: Array) -> list[Array]:
-    """Corners (2, 2) around each obstacle, and around what moves at each time."""
-    paths = [shape_path(one.shape) for one in still_shapes(obstacles)]
-    paths += [mover.at(t) for mover in movers_of(obstacles) for t in times.tolist()]
+    """Corners (2, 2) around each obstacle, and around each moving one at each time."""
+    paths = [shape_path(one.shape) for one in static_shapes(obstacles)]
+    paths += [one.at(t) for one in moving_shapes(obstacles) for t in times.tolist()]
     boxes = [np.asarray(path.get_extents().get_points()) for path in paths]
     maps = [one for one in obstacles if isinstance(one, OccupancyMap) and one.blocked.any()]
     return boxes + [_map_box(one) for one in maps]

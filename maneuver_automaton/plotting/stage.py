@@ -1,4 +1,4 @@
-"""What stands still in a moving picture, what moves by itself, and the clock."""
+"""Static and moving obstacles of an animation, and its clock."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.plotting.colors import INK, Color
 from maneuver_automaton.plotting.ends import draw_ends, end_handles
 from maneuver_automaton.plotting.obstacles import (
-    Mover,
+    MovingShape,
     draw_obstacles,
-    movers_of,
+    moving_shapes,
     obstacle_handles,
 )
 from maneuver_automaton.plotting.pages import (
@@ -44,12 +44,12 @@ class Stage:
     figure: Figure
     ax: Axes
     traffic: PathCollection
-    movers: list[Mover]
+    movers: list[MovingShape]
     clock: Text
 
     def show(self, time: float) -> None:
-        """Put what moves where it is at `time` [s]."""
-        self.traffic.set_paths([mover.at(time) for mover in self.movers])
+        """Put moving obstacles where they are at `time` [s]."""
+        self.traffic.set_paths([one.at(time) for one in self.movers])
 
 
 def stage_of(
@@ -71,7 +71,7 @@ def stage_of(
         figure=figure,
         ax=ax,
         traffic=obstacles.movers,
-        movers=movers_of(scene.obstacles),
+        movers=moving_shapes(scene.obstacles),
         clock=figure.text(
             LEFT / WIDTH, 1.0 - 0.14 / figure.get_size_inches()[1], "", fontsize=10.0, color=INK,
             va="top", parse_math=False,

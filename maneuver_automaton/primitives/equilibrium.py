@@ -16,7 +16,7 @@ from maneuver_automaton.primitives.trim import Trim
 TWIST_NAMES = ("speed", "lateral_speed", "turn_rate", "climb")
 WORLD_NAMES = ("v_x", "v_y", "v_z")  # of a vehicle that translations alone move
 BALANCED = 1e-11  # rates of an equilibrium and misses of what is asked for, over the scale
-SAME = 1e-12  # numbers closer than this are taken for the simpler one
+ROUNDING = 1e-12  # numbers closer than this are taken for the simpler one
 MOST_STEPS = 60
 SHORTEST = 1e-6  # share of a step of Newton
 DIFFERENCE = 1e-6  # of central differences, over the size of the value, at least 1
@@ -280,7 +280,7 @@ def _as_asked(twist: Array, balance: _Balance) -> Array:
     """The body velocity, with the numbers asked for where it has them but for rounding."""
     exact: Array = np.array(twist)
     for k, value in balance.twist.items():
-        if abs(exact[k] - value) <= SAME * max(1.0, abs(value)):
+        if abs(exact[k] - value) <= ROUNDING * max(1.0, abs(value)):
             exact[k] = value
     exact += 0.0  # -0.0 is 0.0
     return exact

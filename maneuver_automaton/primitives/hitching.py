@@ -61,7 +61,7 @@ def connect_hitches(model: CarWithTrailer, trims: Sequence[Trim]) -> tuple[Maneu
     """
     rests = [trim for trim in trims if trim.is_rest]
     low, high = model.control_limits[0].tolist()
-    return _driven(
+    return _maneuvers(
         model,
         [
             (source, target, speed)
@@ -74,7 +74,7 @@ def connect_hitches(model: CarWithTrailer, trims: Sequence[Trim]) -> tuple[Maneu
     )
 
 
-def _driven(
+def _maneuvers(
     model: CarWithTrailer, wanted: Sequence[tuple[Trim, Trim, float]]
 ) -> tuple[Maneuver, ...]:
     """The maneuvers from trim to trim at a speed, those that exist, driven all at once."""

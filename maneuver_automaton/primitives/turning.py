@@ -16,7 +16,7 @@ from maneuver_automaton.primitives.driving import drive_all
 from maneuver_automaton.primitives.maneuver import Maneuver
 from maneuver_automaton.primitives.trim import Trim
 
-SAME_HEADING = 1e-9  # [rad] headings closer than this are one
+HEADING_TOLERANCE = 1e-9  # [rad] headings closer than this are one
 
 
 def turns_between(
@@ -89,7 +89,7 @@ def turns_between(
 
 def _side(turn: float) -> str:
     """Words for the side of half a turn, of which there are two."""
-    if abs(turn) < math.pi - SAME_HEADING:
+    if abs(turn) < math.pi - HEADING_TOLERANCE:
         return ""
     return " by the left" if turn > 0.0 else " by the right"
 
@@ -130,9 +130,9 @@ def _chosen(
         steps = {(a, b) for a in levels for b in levels if a != b}
     for a, trim in enumerate(trims):
         for here, there in sorted(steps):
-            if abs(math.remainder(headings[a] - here, 2.0 * math.pi)) > SAME_HEADING:
+            if abs(math.remainder(headings[a] - here, 2.0 * math.pi)) > HEADING_TOLERANCE:
                 continue
-            b = _match(trims, np.abs(_off(headings, there)) <= SAME_HEADING, trim, rate)
+            b = _match(trims, np.abs(_off(headings, there)) <= HEADING_TOLERANCE, trim, rate)
             yield from ((a, b, turn) for turn in _turns(here, there))
 
 
@@ -150,7 +150,7 @@ def _distinct(headings: Array) -> list[float]:
     """Headings modulo a full turn, each once, in order."""
     levels: list[float] = []
     for heading in sorted(headings.tolist()):
-        if all(abs(_off(level, heading)) > SAME_HEADING for level in levels):
+        if all(abs(_off(level, heading)) > HEADING_TOLERANCE for level in levels):
             levels.append(heading)
     return levels
 
@@ -163,6 +163,6 @@ def _off(heading: Array | float, other: float) -> Array:
 def _turns(here: float, there: float) -> tuple[float, ...]:
     """The turn to the shorter side [rad], or both half turns."""
     turn = math.remainder(there - here, 2.0 * math.pi)
-    if abs(abs(turn) - math.pi) <= SAME_HEADING:
+    if abs(abs(turn) - math.pi) <= HEADING_TOLERANCE:
         return (math.pi, -math.pi)
     return (turn,)

@@ -93,7 +93,7 @@ def drive_scene(
     while not planner.at_goal(state, tick=tick) and tick < limit:
         done.append(_step(planner, state, tick=tick, tail=tail))
         decision = done[-1].decision
-        state = _driven(planner, state, decision.controls[0])
+        state = _state_after(planner, state, decision.controls[0])
         tick, tail = tick + 1, decision.tail()
         if progress is not None:
             progress(tick)
@@ -131,7 +131,7 @@ def _step(planner: RoadPlanner, state: Array, *, tick: int, tail: RoadDecision |
     )
 
 
-def _driven(planner: RoadPlanner, state: Array, control: Array) -> Array:
+def _state_after(planner: RoadPlanner, state: Array, control: Array) -> Array:
     """The state (5,) that a control (2,) leads to in a tick, by the model's own equations."""
     course = drive(
         planner.vehicle.model, state[3:], control=control[None], durations=[planner.tick]

@@ -14,7 +14,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads.goal_region import GoalRegion
 from maneuver_automaton.roads.lanelets import Lanelet
 
-SAME_TIME = 1e-9  # [s] times closer than this are one
+TIME_TOLERANCE = 1e-9  # [s] times closer than this are one
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -78,7 +78,7 @@ class RoadScene:
         return [
             one
             for one, (first, last) in zip(self.traffic, times, strict=True)
-            if first - SAME_TIME <= time <= last + SAME_TIME
+            if first - TIME_TOLERANCE <= time <= last + TIME_TOLERANCE
         ]
 
     def moved(self, by: SE2, *, digits: int | None = None) -> RoadScene:

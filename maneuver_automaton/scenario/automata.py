@@ -65,7 +65,7 @@ def automaton_of(
     if part.trims is not None:
         trims = tuple(_steady(document, k, one, model) for k, one in enumerate(part.trims))
         _check_names(document, part.trims)
-        return _joined(document, model, trims, part.maneuvers)
+        return _with_maneuvers(document, model, trims, part.maneuvers)
     assert part.grid is not None
     return _grid(document, part.grid, model, part.maneuvers or ManeuversPart())
 
@@ -126,7 +126,7 @@ def _steady(document: Document, k: int, part: NamedTrim, model: Model) -> Trim:
     )
 
 
-def _joined(
+def _with_maneuvers(
     document: Document, model: Model, trims: tuple[Trim, ...], part: ManeuversPart | None
 ) -> Automaton:
     """The trims, with the maneuvers that need no solver."""

@@ -27,7 +27,7 @@ from maneuver_automaton.formats.tpcap import FORMAT
 from maneuver_automaton.problem import Bounds, Goal, Problem
 from maneuver_automaton.scenario.scenario import Scenario, scenario_of_text
 
-SAME_STATE = 1e-9  # between a reduced state that a file states and a trim's, in its units
+STATE_TOLERANCE = 1e-9  # between a reduced state that a file states and a trim's, in its units
 TPCAP = """\
 schema: 1
 name: The car of TPCAP
@@ -55,7 +55,7 @@ def combined(statement: Statement, beside: Scenario | None, *, path: Path) -> Sc
     problem = rest.problem
     start_trim, goals = problem.start_trim, _goals(statement, problem)
     if (vehicle := statement.vehicle) is not None:
-        automaton = _driven(vehicle, rest, path)
+        automaton = _automaton_of(vehicle, rest, path)
         if not automaton.is_kinematic:
             start_trim = _trim_at(automaton, statement.start_state, path=path)
             goal_trim = _trim_at(automaton, statement.goal_state, path=path)
@@ -118,7 +118,9 @@ def _trim_at(automaton: Automaton, state: Array | None, *, path: Path) -> str | 
     if state is None:
         return None
     here = [
-        trim for trim in automaton.trims if np.abs(trim.reduced_state - state).max() <= SAME_STATE
+        trim
+        for trim in automaton.trims
+        if np.abs(trim.reduced_state - state).max() <= STATE_TOLERANCE
     ]
     if not here:
         names = ", ".join(automaton.model.reduced_names)
@@ -129,7 +131,7 @@ def _trim_at(automaton: Automaton, state: Array | None, *, path: Path) -> str | 
     return min(here, key=lambda trim: not trim.is_rest).name
 
 
-def _driven(vehicle: StatedVehicle, beside: Scenario, path: Path) -> Automaton:
+def _automaton_of(vehicle: StatedVehicle, beside: Scenario, path: Path) -> Automaton:
     """The scenario's trims, driven by the vehicle that the file names."""
     given, model = beside.problem.automaton, vehicle.automaton.model
     if given is vehicle.automaton:

@@ -9,8 +9,8 @@ from pydantic import BaseModel, ValidationError
 
 from maneuver_automaton.formats.yaml_source import Document, Where, shown
 from maneuver_automaton.models import Model
+from maneuver_automaton.models.kinds import KINDS
 from maneuver_automaton.scenario.schema import ScenarioFile
-from maneuver_automaton.scenario.vehicles import KINDS
 
 File = TypeVar("File", bound=BaseModel)
 OTHER_KINDS: Mapping[str, set[str]] = {  # and what only they have

@@ -45,7 +45,7 @@ class Scenario:
 
     name: str
     problem: Problem
-    time_limit_s: float = 5.0  # ceiling for search and refinement [s]
+    time_limit_s: float = 5.0  # upper bound for search and refinement [s]
     receding_horizon: RecedingHorizonPart | None = None
     maps: tuple[MapFile, ...] = ()  # files of the maps among the obstacles
     stated: AutomatonPart | None = None  # the automaton, as the file states it

@@ -295,8 +295,8 @@ class SearchPart(Part):
         Literal["auto", "words", "insertion", "lattice"],
         Need("auto, words, insertion or lattice"),
     ] = Field("auto", description="auto, words, insertion or lattice")
-    time_limit_s: Positive = Field(5.0, description="ceiling for search and refinement")
-    max_expansions: Count | None = Field(None, description="ceiling for the nodes expanded")
+    time_limit_s: Positive = Field(5.0, description="upper bound for search and refinement")
+    max_expansions: Count | None = Field(None, description="upper bound for the nodes expanded")
     cell_m: Positive | None = Field(None, description="lattice: size of a cell")
     headings: Count | None = Field(None, description="lattice: number of headings")
     weight: (

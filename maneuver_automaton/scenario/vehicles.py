@@ -6,19 +6,8 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from maneuver_automaton.models import (
-    Car,
-    CarWithTrailer,
-    Helicopter,
-    Hovercraft,
-    LatticeBody,
-    Model,
-    Omnidirectional,
-    SecondOrderCar,
-    SecondOrderUnicycle,
-    SingleTrack,
-    Unicycle,
-)
+from maneuver_automaton.models import Model
+from maneuver_automaton.models.kinds import KINDS, is_of_a_kind
 from maneuver_automaton.scenario.checks import Part
 from maneuver_automaton.scenario.vehicle_parts import (
     MODELS,
@@ -44,21 +33,6 @@ UNITS = (
     "n_s_m",
     "n_m_s",
 )
-KINDS: Mapping[str, Any] = {
-    kind.name: kind
-    for kind in (
-        Unicycle,
-        Car,
-        SecondOrderUnicycle,
-        SecondOrderCar,
-        CarWithTrailer,
-        SingleTrack,
-        Hovercraft,
-        Helicopter,
-        LatticeBody,
-        Omnidirectional,
-    )
-}
 
 
 def _keys(part: type[Part], kind: Any) -> dict[str, str]:
@@ -94,7 +68,7 @@ def carried_of(part: Any) -> Mapping[str, Footprint]:
 
 def is_known(model: Model) -> bool:
     """Whether scenario files can state a model; a user's own they can only name."""
-    return model.name in KINDS and isinstance(model, KINDS[model.name])
+    return model.name in KEYS and is_of_a_kind(model)
 
 
 def described(model: Model) -> dict[str, Any]:
@@ -107,6 +81,7 @@ def described(model: Model) -> dict[str, Any]:
 
     Examples
     --------
+    >>> from maneuver_automaton.models import Car
     >>> described(Car(wheelbase=2.5))
     {'model': 'car', 'wheelbase_m': 2.5}
     """

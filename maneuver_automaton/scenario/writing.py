@@ -61,15 +61,6 @@ def to_yaml(scenario: Scenario, *, folder: Path | None = None) -> str:
     <BLANKLINE>
     """
     problem = scenario.problem
-    vehicle = described(problem.automaton.model)
-    if scenario.footprint:
-        shapes = list(scenario.footprint)
-        vehicle["footprint"] = shapes if len(shapes) > 1 else shapes[0]
-    if any(problem.body_height) and problem.start.size > 3:
-        vehicle["footprint_height_m"] = list(problem.body_height)
-    for name, body in problem.parts.items():
-        stated = list(stated_footprint(body))
-        vehicle[name] = stated if len(stated) > 1 else stated[0]
     bounds = {name: getattr(problem.bounds, name) for name in ("x", "y", "z")}
     goals = [_goal(goal) for goal in problem.goals]
     if folder is None:
@@ -77,7 +68,7 @@ def to_yaml(scenario: Scenario, *, folder: Path | None = None) -> str:
     entries: dict[str, Any] = {
         "schema": 1,
         "name": scenario.name,
-        "vehicle": vehicle,
+        "vehicle": _vehicle(scenario),
         "automaton": _automaton(scenario, folder),
         "start": _start(problem),
         "goal": goals if len(goals) > 1 else goals[0],
@@ -94,6 +85,21 @@ def to_yaml(scenario: Scenario, *, folder: Path | None = None) -> str:
     return "".join(
         _block(key, value) for key, value in entries.items() if value not in ({}, [], None)
     )
+
+
+def _vehicle(scenario: Scenario) -> dict[str, Any]:
+    """The model, the body, and the bodies of what it carries."""
+    problem = scenario.problem
+    vehicle = described(problem.automaton.model)
+    if scenario.footprint:
+        shapes = list(scenario.footprint)
+        vehicle["footprint"] = shapes if len(shapes) > 1 else shapes[0]
+    if any(problem.body_height) and problem.start.size > 3:
+        vehicle["footprint_height_m"] = list(problem.body_height)
+    for name, body in problem.parts.items():
+        stated = list(stated_footprint(body))
+        vehicle[name] = stated if len(stated) > 1 else stated[0]
+    return vehicle
 
 
 def json_schema() -> dict[str, Any]:

@@ -234,13 +234,22 @@ def candidates(lib, words, n_words, start, before, goal, after, upper_bound, scr
     g_x, g_y, g_heading, g_z = goal
     start_trim, start_gear = before
     goal_trim, goal_gear = after
+    # Rounding grows with the distance: what a word may miss is relative to it.
     size = 1.0 + abs(g_x - x) + abs(g_y - y)
+    # One class: all transitions are the identity at the price of a switch, so nothing is folded,
+    # and every word is steered from the same pose to the same pose.
     one_class = lib.cost.shape[0] == 1
     count = 0
+    # Without a climb first, then each trim that climbs as the last of the word: those that only
+    # climb, then those that drive as they do, whose time has to be known before the word is
+    # steered.
     for climbing in range(-1, lib.climbs.shape[0]):
         climb = lib.climbs[climbing] if climbing >= 0 else NO_TRIM
         first_before, last_before = -2, -2
         way_in, way_out = 0.0, 0.0
+        # What a word is steered between: from s, the start after the transition into its first
+        # trim, to e, the goal before the transition out of its last one; h is e before a climb is
+        # taken off. `rel` is e seen from s, `way` its distance.
         s_x, s_y, s_heading = x, y, heading
         e_x, e_y, e_heading = g_x, g_y, g_heading
         h_x, h_y, h_heading = g_x, g_y, g_heading
@@ -286,6 +295,9 @@ def candidates(lib, words, n_words, start, before, goal, after, upper_bound, scr
                 rel = seen(s_x, s_y, s_heading, e_x, e_y, e_heading)
                 way = abs(rel[0])
                 fixed += slope * lib.rates[climb]
+            # A word costs at least the distance at the price per metre of its cheapest trim: what
+            # cannot be cheaper than the bound is left out before it is steered. For one class this
+            # is the hot test of the search, so it knows no transition.
             if one_class and n_trims == 3:
                 price = min(lib.per_metre[a], lib.per_metre[b], lib.per_metre[c])
                 if way > lib.met and not way * price < upper_bound:
@@ -329,6 +341,10 @@ def candidates(lib, words, n_words, start, before, goal, after, upper_bound, scr
                 steer_one(motion_of(lib, a), rel, branches[0])
             else:
                 branches[0, 0], branches[0, 1], branches[0, 2] = 0.0, 0.0, 0.0
+            # A branch is usable if all its times are: not negative, where a whole turn counts as
+            # none, not above the longest that the trim may last, nor below the least coasting time
+            # unless the trim before goes on. Switches are priced between trims that last, as a trim
+            # without time is not driven.
             for branch in range(n_branches):
                 cost, duration, usable = fixed, 0.0, True
                 trim, gear = start_trim, start_gear
@@ -352,6 +368,7 @@ def candidates(lib, words, n_words, start, before, goal, after, upper_bound, scr
                 if not usable:
                     continue
                 if goal_trim != NO_TRIM:
+                    # The goal's trim follows: going on into it is a switch as any other.
                     if trim != NO_TRIM and trim != goal_trim:
                         cost += lib.switch
                     if gear * goal_gear < 0:

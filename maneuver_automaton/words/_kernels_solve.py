@@ -46,6 +46,10 @@ def interior_point(rates, twists, goal, rows, targets, times, barrier, iteration
     trial_gap = np.empty(n_rows)
     hessian = np.empty((n, n))
     trial = np.empty(n)
+    # State of the method: `times`, multipliers `p` of the conditions, and `slack` (n,), those of
+    # the bounds ``times >= 0``. On the central path ``times * slack = barrier`` for each of them.
+    # `columns` (n, 3) are derivatives of the end by the times, `gap` the conditions violated, and
+    # `trial` and `trial_gap` the same at the point that the line search tries.
     slack = np.empty(n)
     for i in range(n):
         slack[i] = barrier / times[i]
@@ -70,6 +74,7 @@ def interior_point(rates, twists, goal, rows, targets, times, barrier, iteration
             centring = max(centring, abs(times[i] * slack[i] - barrier))
         if worst < 1e-11 and slope < 1e-9 and complementarity < 1e-10:
             return True, slack
+        # The barrier falls as soon as its own problem is solved well enough, faster than linearly.
         while max(worst, slope, centring) < 10.0 * barrier and barrier > 1e-13:
             barrier = max(1e-13, min(0.1 * barrier, barrier**1.5))
             centring = 0.0
@@ -77,6 +82,8 @@ def interior_point(rates, twists, goal, rows, targets, times, barrier, iteration
                 centring = max(centring, abs(times[i] * slack[i] - barrier))
         damping = 0.0
         step = np.zeros(n + n_rows)
+        # Newton's step for times and multipliers, the slacks eliminated. The Hessian is damped
+        # until the curvature along the step is positive: else it may lead to a saddle.
         for _attempt in range(8):
             for i in range(n + n_rows):
                 for j in range(n + n_rows):
@@ -104,6 +111,7 @@ def interior_point(rates, twists, goal, rows, targets, times, barrier, iteration
             if bend > 1e-10 * size:
                 break
             damping = max(10.0 * damping, 1e-2)
+        # Steps to the boundary, for times and slacks apart: all of them stay positive.
         longest = 1.0
         longest_dual = 1.0
         for i in range(n):
@@ -115,10 +123,13 @@ def interior_point(rates, twists, goal, rows, targets, times, barrier, iteration
         for i in range(n):  # a turn is not crossed in one step
             if abs(step[i] * twists[i, 2]) > 1.0:
                 longest = min(longest, 1.0 / abs(step[i] * twists[i, 2]))
+        # A penalty above the largest multiplier makes the merit exact: its minimum meets the
+        # conditions.
         weight = 1.0
         for e in range(n_rows):
             weight = max(weight, 2.0 * abs(p[e] + step[n + e]))
         before = merit(rates, times, barrier, gap, weight)
+        # Halve the step until the merit falls; the last of ten tries is taken as it is.
         share = longest
         for _attempt in range(10):
             for i in range(n):
@@ -160,6 +171,7 @@ def levenberg_marquardt(twists, goal, rows, targets, times, iterations):
         system = np.zeros((n_rows + n, n))
         rhs = np.zeros(n_rows + n)
         for i in range(n):
+            # A time at zero that the step would push below stays there: its column is left out.
             pinned = times[i] <= 0.0
             if pinned:  # does the gradient push it further below zero?
                 push = 0.0
@@ -173,6 +185,8 @@ def levenberg_marquardt(twists, goal, rows, targets, times, iterations):
         for e in range(n_rows):
             rhs[e] = -gap[e]
         step = least_squares(system, rhs, 1e-14)[0]
+        # Projected on the bounds, then accepted only if the conditions improve; the damping
+        # follows.
         for i in range(n):
             trial[i] = max(0.0, times[i] + step[i])
         after = residual(twists, trial, goal, rows, targets, columns, gap)
@@ -200,6 +214,8 @@ def finish(rates, twists, goal, rows, targets, times, slack, keep):
     m = targets.size
     count = 0
     for i in range(n):
+        # A trim leaves the word where its time is nothing, or small against its slack: then the
+        # bound is active, and the time would go to zero with the barrier.
         if times[i] < 1e-9 or (times[i] < 1e-4 and slack[i] > 1e2 * times[i]):
             times[i] = 0.0
         else:
@@ -217,6 +233,8 @@ def finish(rates, twists, goal, rows, targets, times, slack, keep):
             some_rows[r, k] = rows[r, keep[k]]
     p = np.zeros(3 + m)
     slope = 0.0
+    # More times than conditions: a minimum, refined by Newton. As many or fewer: the conditions
+    # alone fix them, and the multipliers are those that fit best.
     if count > 3 + m:
         p, worst, slope = newton_stationary(
             some_rates, some_twists, goal, some_rows, targets, some_times, 20
@@ -245,6 +263,7 @@ def solve_from(rates, twists, goal, rows, targets, times, barrier):
     n = times.size
     start = np.empty(n)
     for i in range(n):
+        # A start on the boundary has no slack to speak of: away from it by what suits the barrier.
         times[i] = max(times[i], 30.0 * barrier)
         start[i] = times[i]
     keep = np.empty(n, dtype=np.int64)

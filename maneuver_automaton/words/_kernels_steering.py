@@ -45,8 +45,11 @@ def two_circles(a, b, d, tolerance):
     nothing = (math.nan, math.nan, math.nan, math.nan)
     if min(length_a, length_b, length_d) <= tolerance * scale:
         return nothing
+    # Heron's formula for the half angle at the origin, its tangent the root of `below` over
+    # `above`: each factor is a sum or one difference, so it stays exact where the circles touch.
     below = (length_b - length_d + length_a) * (length_b + length_d - length_a)
     above = (length_d + length_a - length_b) * (length_d + length_a + length_b)
+    # By so much two circles may miss each other and still count as touching.
     slack = -tolerance * scale * scale
     if below < slack or above < slack:
         return nothing
@@ -62,10 +65,12 @@ def two_circles(a, b, d, tolerance):
 @inner_kernel
 def line_and_circle(point, velocity, radius, tolerance):
     """Times (later, earlier) at which ``|point - velocity t| = radius``; NaN if never."""
+    # The foot of the perpendicular on the line, then half the chord on either side of it.
     speed = abs(velocity)
     along = (point * velocity.conjugate()).real / speed
     aside = (point * velocity.conjugate()).imag / speed
     scale = abs(point) + radius
+    # A product, not a difference of squares: exact where the line touches the circle.
     square = (radius - aside) * (radius + aside)
     if square < -tolerance * scale * scale:
         return math.nan, math.nan
@@ -100,15 +105,23 @@ def steer(a, gap_ab, b, gap_bc, c, goal, tolerance, out):
             out[row, k] = math.nan
     turn_1 = unit(e_1) if e_1 != 0.0 else 1.0 + 0j
     turn_3 = unit(heading)
+    # The radius of each turn as a vector: from its centre to the pose, in the frame of the pose; 0
+    # for a straight. A turn by the angle h moves the pose by ``r (e^{i h} - 1)``.
     r_a = -1j * v_a / w_a if w_a != 0.0 else 0j
     r_b = -1j * v_b / w_b if w_b != 0.0 else 0j
     r_c = -1j * v_c / w_c if w_c != 0.0 else 0j
+    # The end of the word, with the centres collected: ``at_1 e^{i h_1} + at_2 e^{i h_2}`` plus what
+    # straights add is `d`, h_1 and h_2 the headings after the first trim and after the second one.
+    # A known heading turns its term into a known point; what is left is two circles, a line and a
+    # circle, or two lines.
     d = z + r_a - r_c * turn_3
     at_1 = r_a + d_1 - r_b * turn_1  # multiplies e^{i heading after a}
     at_2 = (
         r_b + d_2 - r_c * (unit(e_2) if e_2 != 0.0 else 1.0 + 0j)
     )  # multiplies e^{i heading after b}
     before_c = heading - e_2
+    # By which trims turn: with three turns both headings are unknown; each straight keeps a heading
+    # and brings its time as the unknown instead.
     if w_a != 0.0 and w_b != 0.0 and w_c != 0.0:
         plus_1, plus_2, minus_1, minus_2 = two_circles(at_1, at_2, d, tolerance)
         if not math.isnan(plus_1):
@@ -119,6 +132,8 @@ def steer(a, gap_ab, b, gap_bc, c, goal, tolerance, out):
             out[1, 1] = turn_time(minus_2 - minus_1 - e_1, w_b)
             out[1, 2] = turn_time(before_c - minus_2, w_c)
     elif w_a != 0.0 and w_c != 0.0:  # turn, straight, turn
+        # Both headings are one and the same but for `e_1`: its rotation keeps lengths, so the
+        # length of what it turns has to be that of `d`, and that gives the time of the straight.
         still = at_1 + at_2 * turn_1
         along = v_b * turn_1
         if abs(along) > 0.0 and abs(d) > tolerance * (abs(still) + abs(d)):

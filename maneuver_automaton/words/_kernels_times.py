@@ -36,6 +36,9 @@ def end_and_columns(twists, times, columns):
         dx, dy, turn = coast(twists[i, 0], twists[i, 1], twists[i, 2], times[i])
         x, y, heading = compose(x, y, heading, dx, dy, turn)
         c, s = math.cos(heading), math.sin(heading)
+        # Velocity of the world's origin if all turned with this trim: its last pose does for `p_i`,
+        # as every pose of the trim lies on the same motion. The end is known only after the last
+        # trim, so what it adds comes in the second loop.
         columns[i, 0] = c * twists[i, 0] - s * twists[i, 1] + twists[i, 2] * y
         columns[i, 1] = s * twists[i, 0] + c * twists[i, 1] - twists[i, 2] * x
         columns[i, 2] = twists[i, 2]
@@ -70,6 +73,9 @@ def least_squares(matrix, rhs, relative_tolerance):
     rank = 0
     largest = 0.0
     for k in range(min(m, n)):
+        # The longest column that is left comes next: the rank is how many are longer than the
+        # tolerance of the longest of all, so words whose columns do not span are solved like any
+        # other.
         best, best_norm = k, -1.0
         for j in range(k, n):
             norm = 0.0
@@ -86,6 +92,7 @@ def least_squares(matrix, rhs, relative_tolerance):
                 matrix[i, k], matrix[i, best] = matrix[i, best], matrix[i, k]
             order[k], order[best] = order[best], order[k]
         head = matrix[k, k]
+        # The sign that adds in `head - alpha`, so that no digit cancels.
         alpha = -best_norm if head >= 0.0 else best_norm
         v0 = head - alpha
         scale = 0.0
@@ -109,6 +116,7 @@ def least_squares(matrix, rhs, relative_tolerance):
             rhs[i] -= factor * matrix[i, k]
         matrix[k, k] = alpha
         rank += 1
+    # The basic solution: columns beyond the rank are not used.
     solution = np.zeros(n)
     for k in range(rank - 1, -1, -1):
         value = rhs[k]
@@ -201,10 +209,13 @@ def newton_stationary(rates, twists, goal, rows, targets, times, iterations):
             rhs[n + e] = -gap[e]
         if worst < 1e-13 and slope < 1e-12:
             break
+        # The system of Karush, Kuhn and Tucker. It may be singular, as where trims share a centre;
+        # the basic least-squares step then goes on in what it determines.
         step, _rank = least_squares(system, rhs, 1e-13)
         length = 0.0
         for i in range(n):
             length = max(length, abs(step[i]))
+        # Half a second at most: headings turn by more than Newton's linear model bears otherwise.
         shrink = min(1.0, 0.5 / length) if length > 0.0 else 1.0
         for i in range(n):
             times[i] += shrink * step[i]
@@ -223,6 +234,7 @@ def newton_feasible(twists, goal, rows, targets, times, iterations):
     columns = np.empty((n, 3))
     gap = np.empty(3 + targets.size)
     best = np.empty(n)
+    # The last steps are below rounding, and a worse one may follow a better: the best is kept.
     assign(best, times)
     worst = residual(twists, times, goal, rows, targets, columns, gap)
     least = worst
@@ -260,6 +272,8 @@ def curvature(rates, twists, goal, rows, targets, times, p):
     d = basis.shape[1]
     if d == 0:
         return np.inf
+    # Second derivatives along directions that keep all conditions, to first order: that they are
+    # positive is the condition of second order for a minimum.
     reduced = np.zeros((d, d))
     for k in range(d):
         for q in range(d):

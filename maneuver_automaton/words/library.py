@@ -310,12 +310,14 @@ def words_of(trims: Sequence[int], transitions: Transitions) -> tuple[IntArray, 
     Those of the first few trims come first; how many they are.
     """
     linked = np.isfinite(transitions.cost)
-    joined = linked[np.ix_(transitions.class_of[list(trims)], transitions.class_of[list(trims)])]
+    allowed = linked[np.ix_(transitions.class_of[list(trims)], transitions.class_of[list(trims)])]
     number = {trim: k for k, trim in enumerate(trims)}
     words = [(NO_TRIM, NO_TRIM, NO_TRIM), *((a, NO_TRIM, NO_TRIM) for a in trims)]
-    pairs = [(a, b) for a, b in itertools.permutations(trims, 2) if joined[number[a], number[b]]]
+    pairs = [(a, b) for a, b in itertools.permutations(trims, 2) if allowed[number[a], number[b]]]
     words += [(a, b, NO_TRIM) for a, b in pairs]
-    words += [(a, b, c) for a, b in pairs for c in trims if b != c and joined[number[b], number[c]]]
+    words += [
+        (a, b, c) for a, b in pairs for c in trims if b != c and allowed[number[b], number[c]]
+    ]
     few = {NO_TRIM, *trims[:FEW_TRIMS]}
 
     def order(word: tuple[int, int, int]) -> tuple[bool, int, int, int, int]:

@@ -22,7 +22,7 @@ BoolArray = NDArray[np.bool_]
 
 FULL_TURN = 2.0 * np.pi
 SMALL = 1e-6  # [s] nearer to zero or a full turn, a time may be zero: rounding at tangent circles
-SAME = 1e-7  # [s] solutions closer than this are one
+TIMES_TOLERANCE = 1e-7  # [s] solutions closer than this are one
 HALVINGS = 60  # of a bracket, to the last bit
 BISECTIONS = 8  # of an interval between nodes that may hide two roots
 
@@ -300,7 +300,9 @@ def _distinct(found: Iterable[Array | None], n: int) -> Array:
     """Solutions (k, n) by rising total time, each once."""
     kept: list[Array] = []
     for times in sorted((row for row in found if row is not None), key=lambda row: row.sum()):
-        if not any(np.abs(times - other).max() <= SAME * (1.0 + times.max()) for other in kept):
+        if not any(
+            np.abs(times - other).max() <= TIMES_TOLERANCE * (1.0 + times.max()) for other in kept
+        ):
             kept.append(times)
     return np.array(kept).reshape(len(kept), n)
 

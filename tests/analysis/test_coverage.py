@@ -103,7 +103,7 @@ def test_a_library_spans_itself():
     robot = Automaton.of_controls(
         Unicycle(), {"ahead": (1, 0), "left": (1, 1), "right": (1, -1)}
     )  # fmt: skip
-    settings = CoverageSettings(radius=1.5, pairs=5, reach=reach(2.0, quantum=0.5))
+    settings = CoverageSettings(radius=1.5, pairs=5, reach=reach(2.0, edge_cost=0.5))
     found = spanning_factor(robot, reference=planned(robot), settings=settings)
     assert 1.0 - 1e-6 <= found.largest < 1.5
     found = spanning_factor(robot, settings=settings)
@@ -115,7 +115,7 @@ def test_a_vehicle_with_inertia_counts_words_that_end_at_rest():
         max_speed=1.0, max_turn_rate=1.0, max_acceleration=1.0, max_angular_acceleration=1.0
     )
     robot = Automaton.of_model(model, {"speed": [0.0, 1.0], "turn_rate": [0.0]})
-    found = reached(robot, settings=reach(3.0, quantum=0.5))
+    found = reached(robot, settings=reach(3.0, edge_cost=0.5))
     rest = robot.trim_classes[robot.rest]
     ends = np.sort(found.poses[found.classes == rest, 0])
     np.testing.assert_allclose(ends, [0.0, 1.0, 1.5, 2.0], atol=1e-9)

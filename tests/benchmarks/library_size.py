@@ -22,9 +22,9 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Unicycle
-from maneuver_automaton.plotting.library_size import LibrarySizes, save_library_size_figure
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.receding_horizon import ClosedLoop, simulate
+from tests.benchmarks.library_size_figure import LibrarySizes, save_library_size_figure
 
 GRIDS = (2.0, 1.0, 0.5, 0.4, 0.25, 0.2, 0.1, 0.05)
 LIMIT = 2.0  # of each control

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from maneuver_automaton.collision import Box, Disc, Obstacle, Polygon
 from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.collision.convex import convex_pieces, pieces_seen_from, solids_of
+from maneuver_automaton.collision.outline import outlines
 from maneuver_automaton.groups import SE2
 from tests.collision import scenes
 from tests.reference_collision import shapely_world, world_around
@@ -20,7 +21,7 @@ from tests.reference_collision import shapely_world, world_around
 
 def assert_pieces_are(shape, *, atol=1e-9):
     """Convex, counter-clockwise, apart from each other, and together the shape."""
-    exact = shapely.make_valid(shapely.Polygon(shape.corners, getattr(shape, "holes", ())))
+    exact = shapely.union_all(outlines(shape))
     pieces = convex_pieces(shape)
     polygons = []
     for ring, rounding in pieces:
@@ -71,6 +72,15 @@ def test_by_hand():
     assert len(assert_pieces_are(scenes.FRAME)) <= 5
     bow = Polygon([[0, 0], [2, 2], [2, 0], [0, 2]])
     assert len(assert_pieces_are(bow)) == 2
+
+
+def test_what_a_ring_runs_around_twice_is_solid():
+    pentagram = [[np.cos(4 * np.pi * k / 5), np.sin(4 * np.pi * k / 5)] for k in range(5)]
+    square = [[0, 0], [2, 0], [2, 2], [0, 2]]
+    for ring, inside in ((pentagram, [0.0, 0.0, 0.0]), (square * 2, [1.0, 1.0, 0.0])):
+        assert_pieces_are(Polygon(ring))
+        world = world_around((Disc(0.01),), [Obstacle(Polygon(ring))])
+        assert clearances(world, world.into([inside]))[0] <= 0.0
 
 
 def test_corners_on_a_line_and_repeated_corners():

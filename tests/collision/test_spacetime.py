@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from maneuver_automaton.collision import Motion
-from maneuver_automaton.collision.spacetime import Mover, Rover, may_meet, meet
+from maneuver_automaton.collision.spacetime import CoastingBody, MovingBody, may_meet, meet
 
 speeds = st.floats(-3.0, 3.0) | st.just(0.0)
 places = st.floats(-5.0, 5.0)
@@ -37,7 +37,7 @@ def gap(here, there):
 )
 def test_against_dense_times(start, twist, knots, begin, duration):
     motion = Motion(begin + np.arange(len(knots)) * 0.8, knots)
-    rover, mover = Rover(np.array(start), twist, 0j, 0.3), Mover.of(motion, 1.3)
+    rover, mover = CoastingBody(np.array(start), twist, 0j, 0.3), MovingBody.of(motion, 1.3)
     times = np.linspace(0.0, duration, 400)
     gaps = gap(np.array([rover.at(time) for time in times]), mover.at(times))
     found = meet(
@@ -53,7 +53,7 @@ def test_against_dense_times(start, twist, knots, begin, duration):
 
 
 def test_rates_by_hand():
-    mover = Mover.of(Motion([1.0, 3.0, 4.0], [[0, 0, 0], [4, 2, 1], [4, 2, 7]]), 1.0)
+    mover = MovingBody.of(Motion([1.0, 3.0, 4.0], [[0, 0, 0], [4, 2, 1], [4, 2, 7]]), 1.0)
     assert mover.rates(0.0) == (0j, 0.0, 1.0)
     assert mover.rates(1.0) == (2 + 1j, 0.5, 3.0)
     assert mover.rates(3.5) == (0j, 6.0, 4.0)
@@ -71,10 +71,10 @@ def test_a_convoy_takes_few_steps():
         asked.append(1)
         return abs(here[0] - there[0]) - 1.0
 
-    rover = Rover(np.zeros(3), (10.0, 0.0, 0.0), 0j, 0.5)
+    rover = CoastingBody(np.zeros(3), (10.0, 0.0, 0.0), 0j, 0.5)
     times = np.arange(100.0)
     road = Motion(times, np.column_stack([1.01 + 10.0 * times, 0 * times, 0 * times]))
-    ahead = Mover.of(road, 0.5)
+    ahead = MovingBody.of(road, 0.5)
     assert not meet(rover, ahead, duration=99.0, distance=distance, contact=1e-3)
     assert len(asked) <= 100  # one for each stretch of the road
 
@@ -86,15 +86,15 @@ def test_what_never_moves_is_asked_once():
         asked.append(1)
         return 0.5
 
-    still = Rover(np.zeros(3), (0.0, 0.0, 0.0), 0j, 1.0)
-    parked = Mover.of(Motion([0.0], [[2.0, 0.0, 0.0]]), 1.0)
+    still = CoastingBody(np.zeros(3), (0.0, 0.0, 0.0), 0j, 1.0)
+    parked = MovingBody.of(Motion([0.0], [[2.0, 0.0, 0.0]]), 1.0)
     assert not meet(still, parked, duration=1e9, distance=distance, contact=1e-3)
     assert len(asked) == 1
 
 
 def test_far_and_slow_cannot_meet():
-    rover = Rover(np.zeros(3), (1.0, 0.0, 0.0), 0j, 1.0)
-    parked = Mover.of(Motion([0.0], [[20.0, 0.0, 0.0]]), 1.0)
+    rover = CoastingBody(np.zeros(3), (1.0, 0.0, 0.0), 0j, 1.0)
+    parked = MovingBody.of(Motion([0.0], [[20.0, 0.0, 0.0]]), 1.0)
     for duration, possible in ((10.0, False), (19.0, True)):
         center = rover.center(rover.at(0.5 * duration))
         assert may_meet(rover, parked, duration=duration, center=center) is possible

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from maneuver_automaton.collision import Box, Disc
 from maneuver_automaton.collision.swept import (
     MOST_TURN,
-    body_of,
     fastest,
+    grown_body,
     halves,
     slice_excess,
     slice_hulls,
@@ -30,7 +30,7 @@ twists = st.tuples(speeds, speeds, speeds)
 @given(twist=twists, part=st.floats(0.01, 1.0))
 @pytest.mark.parametrize("name", ["car", "angle", "truck", "point"])
 def test_every_point_at_every_time_is_inside(name, twist, part):
-    body = body_of(FOOTPRINTS[name], 0.0, 1e-3)
+    body = grown_body(FOOTPRINTS[name], 0.0, 1e-3)
     duration = part * windows(twist, 2.0).length
     poses = SE2.exp(np.multiply.outer(np.linspace(0.0, duration, 9), twist))
     for corners, hull in zip(body.pieces, slice_hulls(body, twist, duration), strict=True):
@@ -49,7 +49,7 @@ def test_every_point_at_every_time_is_inside(name, twist, part):
 @pytest.mark.parametrize("twist", TWISTS)
 @pytest.mark.parametrize("duration", [0.25, 0.05])
 def test_no_point_is_further_off_than_the_excess(footprint, twist, duration):
-    body = body_of(footprint, 0.1, 1e-3)
+    body = grown_body(footprint, 0.1, 1e-3)
     poses = SE2.exp(np.multiply.outer(np.linspace(0.0, duration, 400), twist)).pose
     passed = shapely.union_all(
         [shapely.polygons(SE2(poses[:, None]).act(corners)) for corners in body.pieces]
@@ -66,14 +66,14 @@ def _ring(hull):
 
 
 def test_straight_motions_are_exact():
-    body = body_of((CAR,), 0.0, 1e-3)
+    body = grown_body((CAR,), 0.0, 1e-3)
     assert slice_excess(body, (3.0, 1.0, 0.0), 100.0) == 0.0
     (hull,) = slice_hulls(body, (1.0, 0.0, 0.0), 10.0)
     assert shapely.Polygon(hull).equals(shapely.box(-0.95, -0.95, 13.75, 0.95))
 
 
 def test_the_excess_falls_with_the_length():
-    body = body_of((CAR,), 0.0, 1e-3)
+    body = grown_body((CAR,), 0.0, 1e-3)
     excesses = [slice_excess(body, (1.0, 0.0, 0.25), 2.0**-k) for k in range(12)]
     assert all(b < 0.51 * a for a, b in itertools.pairwise(excesses))
     assert excesses[0] < 0.5
@@ -100,7 +100,7 @@ def test_halves_cover_the_same():
 
 
 def test_sizes_by_hand():
-    body = body_of((Box([4.0, 2.0], center=[1.0, 0.0]),), 0.0, 1e-3)
+    body = grown_body((Box([4.0, 2.0], center=[1.0, 0.0]),), 0.0, 1e-3)
     assert body.middle.tolist() == [1.0, 0.0]
     assert body.reach == pytest.approx(np.sqrt(5.0))
     assert fastest(body, (1.0, 0.0, 0.0)) == 1.0

@@ -83,7 +83,7 @@ def test_rounding_counts_on_both_sides() -> None:
 def test_pairs_are_joined_once() -> None:
     one = Pairs(*(np.array(column) for column in ([0, 1], [0, 0], [2, 2])))
     other = Pairs(*(np.array(column) for column in ([1, 2], [0, 0], [2, 2])))
-    assert one.joined(other).interval.tolist() == [0, 1, 2]
+    assert one.extended(other).interval.tolist() == [0, 1, 2]
 
 
 def test_the_number_of_intervals_follows_the_duration_between_its_limits() -> None:

@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from maneuver_automaton.plotting import LibrarySizes, draw_library_sizes, save_library_size_figure
+from tests.benchmarks.library_size_figure import (
+    LibrarySizes,
+    draw_library_sizes,
+    save_library_size_figure,
+)
 from tests.plotting.cases import assert_picture
 
 TRIMS = [5, 9, 25, 81, 289, 1089, 1681, 4225]

@@ -21,10 +21,11 @@ from maneuver_automaton.models import (
     SecondOrderUnicycle,
     SingleTrack,
 )
+from maneuver_automaton.models.kinds import KINDS
 from maneuver_automaton.scenario import json_schema, load_scenario, scenario_of_text, to_yaml
 from maneuver_automaton.scenario.presets import preset_automaton
 from maneuver_automaton.scenario.vehicle_parts import MODELS, PARTS
-from maneuver_automaton.scenario.vehicles import KEYS, KINDS, described
+from maneuver_automaton.scenario.vehicles import KEYS, described
 from tests import inertia
 
 CAR = (
