@@ -117,9 +117,12 @@ class LatticeQuery:
 
     @property
     def most_trims(self) -> int:
-        """Trims a word may have before the rest that pads it; 0: no limit."""
+        """Trims a word may have before the rest that pads it; 0: no limit.
+
+        None where maneuvers link trims: words of too many are guesses for what has fewer.
+        """
         most = self.problem.horizon.max_trims
-        if most is None:
+        if most is None or not self.library.at_will:
             return 0
         pads = self.problem.horizon.time is not None and self.library.rest is not None
         return max(1, most - int(pads))
