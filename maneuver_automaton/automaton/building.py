@@ -119,7 +119,7 @@ def build_library(
     ValueError
         If a pair joins trims of equal reduced state.
     UnknownTrim
-        If a pair names a trim that there is none.
+        If a pair names an unknown trim.
     OSError
         If the file or its journal cannot be written.
     """
