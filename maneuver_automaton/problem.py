@@ -64,7 +64,7 @@ class Goal:
                 raise ValueError(f"goal: {name} must be a number of at least 0, got {value}")
 
     def off(self, pose: Array) -> tuple[float, float]:
-        """How far a pose (dof,) is from this one: way [m] and turn [rad], 0 if any heading will do.
+        """How far a pose (dof,) is from this one: distance [m] and turn [rad], 0 if any will do.
 
         Examples
         --------
@@ -72,9 +72,9 @@ class Goal:
         (2.0, 0.0)
         """
         places = [0, 1, *range(3, self.pose.size)]
-        way = float(np.linalg.norm(pose[places] - self.pose[places]))
+        distance = float(np.linalg.norm(pose[places] - self.pose[places]))
         turn = math.remainder(float(pose[2] - self.pose[2]), 2.0 * math.pi)
-        return way, 0.0 if self.free_heading else abs(turn)
+        return distance, 0.0 if self.free_heading else abs(turn)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

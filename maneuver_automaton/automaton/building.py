@@ -119,7 +119,7 @@ def build_library(
     ValueError
         If a pair joins trims of equal reduced state.
     UnknownTrim
-        If a pair names a trim that there is none.
+        If a pair names an unknown trim.
     OSError
         If the file or its journal cannot be written.
     """
@@ -361,11 +361,9 @@ def _maneuver_of(nodes: Automaton, pair: Pair, entry: Entry) -> Maneuver:
     """The maneuver of a line of the journal."""
     inputs = Inputs(control=entry.control, interval=entry.interval)
     course = inputs.drive(nodes.model, nodes[pair[0]].reduced_state)
-    return Maneuver(
+    return Maneuver.along(
+        course,
         name=f"{pair[0]} to {pair[1]}",
         source=pair[0],
         target=pair[1],
-        displacement=course.pose[-1],
-        duration=float(course.time[-1]),
-        course=course,
     )

@@ -93,7 +93,7 @@ def _states_a_problem(path: Path, document: Document | None) -> bool:
         if ending == ".xml":
             return commonroad.is_commonroad(path)
     except (OSError, InvalidScenario):
-        return True  # what is wrong is told when it is planned
+        return True  # errors are told when it is planned
     return ending in (".map", ".scen")
 
 

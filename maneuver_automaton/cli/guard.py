@@ -1,4 +1,4 @@
-"""No traceback ever reaches a user: what is wrong is said in one line, with an exit code."""
+"""No traceback ever reaches a user: every error is told in one line, with an exit code."""
 
 from __future__ import annotations
 

@@ -85,7 +85,9 @@ def _cover(ring: Array, rounding: float) -> tuple[Array, float]:
             along, across = across, along
     length, width = float(np.hypot(*along)), float(np.hypot(*across))
     thick = max(width + 2.0 * rounding, length / MOST_DISCS)
+    # More discs stand out less beyond the piece, but each is a look-up in the field at every pose.
     n = min(MOST_DISCS, max(1, math.ceil(1.5 * length / thick)))
+    # The corners of a slice are on the rim of its disc: by that share not outside for rounding.
     radius = math.hypot(0.5 * length / n, 0.5 * width) * (1.0 + 1e-12) + rounding
     centers = a + 0.5 * across + np.outer((np.arange(n) + 0.5) / n, along)
     return np.column_stack([centers, np.full(n, radius)]), 0.5 * width + rounding
@@ -99,6 +101,7 @@ def _inscribed(footprint: tuple[Shape, ...]) -> float:
 
     parts = []
     best = 0.0
+    # A part alone bounds it from below; polygons are united, as the pose may be on a seam.
     for shape in footprint:
         if isinstance(shape, Disc):
             best = max(best, shape.radius - float(np.hypot(*shape.center)))

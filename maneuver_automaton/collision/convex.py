@@ -87,6 +87,8 @@ def _plain_pieces(rings: list[Array], frame: Array) -> list[tuple[Array, float]]
     left = np.minimum.reduceat(cross, first) >= 0.0
     right = np.maximum.reduceat(cross, first) <= 0.0
     apart = np.logical_and.reduceat(edge.any(axis=1), first)
+    # A ring is convex if it turns one way at all corners and once around; twice around crosses
+    # itself.
     once = apart & (np.abs(np.abs(total) - 2.0 * math.pi) < 1.0)
     pieces: list[tuple[Array, float]] = []
     for k, begin in enumerate(first):
@@ -200,6 +202,7 @@ def _decomposed(shape: Polygon) -> list[Array]:
 def _merged(pieces: list[Array]) -> list[Array]:
     """Join neighbours across an edge as long as what comes out is convex."""
     pieces = [piece for piece in pieces if len(piece) >= 3]
+    # Every union starts the search for the next one again, which is too much for thousands.
     joined = len(pieces) <= MOST_MERGED
     while joined:
         joined = False

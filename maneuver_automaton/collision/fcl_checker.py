@@ -184,6 +184,8 @@ class FclChecker:
                     if hit is not None:
                         return hit
                     continue
+                # The rectangle around the body first: its few corners make a hull quickly, and
+                # mostly do.
                 if all(
                     self._sweep_hits(body, seen[first : last + 1], steps[first:last])
                     for body in self._covers

@@ -194,7 +194,7 @@ class Obstacle:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OccupancyMap:
-    """Square cells, each blocked or free; what is outside the map is free.
+    """Square cells, each blocked or free; all outside the map is free.
 
     Examples
     --------

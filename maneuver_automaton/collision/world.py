@@ -133,6 +133,8 @@ def world_of(
     moving = [o for o in obstacles if isinstance(o, Obstacle) and o.motion is not None]
     maps = [_seen_map(o, pose) for o in obstacles if isinstance(o, OccupancyMap)]
     pieces = pieces_seen_from([o.shape for o in still], pose)
+    # Rectangles of maps come last: near contact they are solids as others, but the field takes maps
+    # by a transform of their cells.
     listed = len(pieces)
     for one in obstacles:
         if isinstance(one, OccupancyMap):
@@ -210,10 +212,14 @@ def _field(solids: Solids, listed: int, maps: list[OccupancyMap], body: Body, ke
     low, high = solids.plates[:, :2].min(axis=0), solids.plates[:, 2:4].max(axis=0)
     width = high - low
     most = MOST_MAP_CELLS if maps else MOST_FIELD_CELLS
+    # Cells that are small against the body, so that the field decides most poses by itself; larger
+    # ones where the map would need too many.
     scale = body.half_width or 0.25 * float(np.median(solids.plates[:, 2:4] - solids.plates[:, :2]))
     padded = width + 2.0 * (keep + 4.0 * body.half_width)
     area, longest = max(float(padded.prod()), 1e-12), float(padded.max())
     cell = max(0.25 * scale, math.sqrt(area / most), longest / most)
+    # Every piece writes as far as the cap: where all is further away, a step is as long as the cap
+    # allows.
     cap = keep + max(4.0 * body.half_width, 8.0 * cell)
     columns, rows = np.ceil((width + 2.0 * cap) / cell).astype(int)
     distance = np.full((rows, columns), cap)
@@ -242,6 +248,7 @@ def _buckets(plates: Array, body: Body, keep: float) -> Buckets:
     _kernels_field.count_buckets(start, *where)
     start = np.cumsum(start)
     items = np.empty(int(start[-1]), dtype=np.int64)
+    # A copy, as the kernel moves the starts on while it fills.
     _kernels_field.fill_buckets(start[:-1].copy(), items, *where)
     return Buckets(start, items, float(low[0]), float(low[1]), cell, columns, rows, reach)
 
@@ -287,6 +294,7 @@ def _speed(motion: Motion, pieces: list[tuple[Array, float]]) -> float:
     """No point of the obstacle is ever faster."""
     if motion.time.size < 2:
         return 0.0
+    # Linear between knots, the heading too: the rates of a stretch hold all along it.
     step = np.diff(motion.pose, axis=0) / np.diff(motion.time)[:, None]
     far = max(float(np.hypot(*ring.T).max()) + r for ring, r in pieces)
     return float((np.hypot(step[:, 0], step[:, 1]) + far * np.abs(step[:, 2])).max())

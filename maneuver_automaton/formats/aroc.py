@@ -168,13 +168,11 @@ def automaton_of_aroc(
     for one, begin, end in zip(primitives, begin_levels.tolist(), end_levels.tolist(), strict=True):
         course = _course_between(model, one, begin, end)
         maneuvers.append(
-            Maneuver(
+            Maneuver.along(
+                course,
                 name=Path(one.name).stem,
                 source=trims[begin].name,
                 target=trims[end].name,
-                displacement=course.pose[-1],
-                duration=float(course.time[-1]),
-                course=course,
             )
         )
     return Automaton(model, tuple(trims.values()), tuple(maneuvers), name=name)

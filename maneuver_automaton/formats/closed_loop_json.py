@@ -327,13 +327,11 @@ def _written(entry: Mapping[str, Any]) -> Maneuver:
             for name in ("time", "pose", "reduced_state", "control")
         }
     )
-    return Maneuver(
+    return Maneuver.along(
+        course,
         name=entry["name"],
         source=entry["source"],
         target=entry["target"],
-        displacement=course.pose[-1],
-        duration=float(course.time[-1]),
-        course=course,
     )
 
 

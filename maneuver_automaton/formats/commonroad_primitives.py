@@ -224,13 +224,11 @@ def automaton_of_commonroad_primitives(
     maneuvers = []
     for k, (course, pair) in enumerate(zip(_courses_between(model, file, ends), ends, strict=True)):
         maneuvers.append(
-            Maneuver(
+            Maneuver.along(
+                course,
                 name=f"primitive {k + 1}",
                 source=trims[index[tuple(pair[0].tolist())]].name,
                 target=trims[index[tuple(pair[1].tolist())]].name,
-                displacement=course.pose[-1],
-                duration=float(course.time[-1]),
-                course=course,
             )
         )
     return Automaton(model, trims, tuple(maneuvers), name=name)

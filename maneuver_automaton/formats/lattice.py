@@ -99,13 +99,11 @@ def automaton_of_lattice(
     for move in lattice.moves:
         course = _course(move, speed, turn_rate)
         maneuvers.append(
-            Maneuver(
+            Maneuver.along(
+                course,
                 name=f"{counts[move.start]} from heading {move.start}",
                 source=trims[move.start].name,
                 target=trims[move.end].name,
-                displacement=course.pose[-1],
-                duration=float(course.time[-1]),
-                course=course,
                 cost_multiplier=move.cost_multiplier,
             )
         )

@@ -89,7 +89,7 @@ def write_again(read: PrimitivesRead, target: Path) -> bool:
 
 
 def _is_nav2(path: Path) -> bool:
-    """Whether a JSON file is a lattice of Nav2; what is no JSON is left to whoever reads it."""
+    """Whether a JSON file is a lattice of Nav2; a text that is no JSON is left to its reader."""
     try:
         document = json.loads(read_text(path, most=MOST_LIBRARY_BYTES, what="a library"))
     except (ValueError, RecursionError, InvalidScenario):

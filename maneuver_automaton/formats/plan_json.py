@@ -333,13 +333,11 @@ def _primitive(entry: Mapping[str, Any], course: Trajectory) -> Primitive:
             body_velocity=_twist(course.time, course.pose),
             reduced_state=course.reduced_state[0],
         )
-    return Maneuver(
+    return Maneuver.along(
+        course,
         name=entry["name"],
         source=entry["source"],
         target=entry["target"],
-        displacement=course.pose[-1],
-        duration=float(course.time[-1]),
-        course=course,
     )
 
 

@@ -112,7 +112,7 @@ class _Builder:
 
 
 def parse(parser: expat.XMLParserType, content: bytes, path: Path) -> None:
-    """Let a parser read a whole file; what is no XML is an error with its line."""
+    """Let a parser read a whole file; a fault in the XML is an error that names its line."""
     try:
         parser.Parse(content, True)
     except expat.ExpatError as error:

@@ -1,4 +1,4 @@
-"""The car with a trailer: the angle at the hitch is what it remembers."""
+"""The car with a trailer: the angle at the hitch is its reduced state."""
 
 from __future__ import annotations
 

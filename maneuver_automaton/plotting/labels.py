@@ -67,7 +67,7 @@ def result_text(
     error_rad: float | None,
     clearance_m: float | None = None,
 ) -> str:
-    """Cost, duration, terminal error and clearance in one line; what is None is left out.
+    """Cost, duration, terminal error and clearance in one line; values of None are left out.
 
     Examples
     --------

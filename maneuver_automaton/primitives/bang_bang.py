@@ -154,13 +154,11 @@ def _batch(model: Model, pairs: Sequence[tuple[Trim, Trim]], *, late: bool) -> l
     control, durations = segments(model, source, target, late=late)
     courses = drive_all(model, source, control=control, durations=durations)
     return [
-        Maneuver(
+        Maneuver.along(
+            course,
             name=f"{a.name} to {b.name}" + (", late" if late else ""),
             source=a.name,
             target=b.name,
-            displacement=course.pose[-1],
-            duration=float(course.time[-1]),
-            course=course,
         )
         for (a, b), course in zip(pairs, courses, strict=True)
     ]

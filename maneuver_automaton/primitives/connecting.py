@@ -182,13 +182,11 @@ def _checked(
     if excess.max() > WITHIN:
         worst = model.reduced_names[int(excess.argmax())]
         return replace(nothing, reason=f"{worst} leaves its limits by {excess.max():.2g} of them")
-    maneuver = Maneuver(
+    maneuver = Maneuver.along(
+        course,
         name=f"{source.name} to {target.name}",
         source=source.name,
         target=target.name,
-        displacement=course.pose[-1],
-        duration=float(course.time[-1]),
-        course=course,
     )
     defect = maneuver_defect(model, maneuver, source=source, target=target)
     if not defect <= ADMITTED_DEFECT:

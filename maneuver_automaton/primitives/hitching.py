@@ -100,13 +100,11 @@ def _maneuver(source: Trim, target: Trim, speed: float, course: Trajectory) -> M
     begin, end = float(source.reduced_state[0]), float(target.reduced_state[0])
     states = course.reduced_state.copy()
     states[-1] = end
-    return Maneuver(
+    return Maneuver.along(
+        replace(course, reduced_state=states),
         name=f"{'ahead' if speed > 0.0 else 'back'} from hitch {begin:.6g} to {end:.6g}",
         source=source.name,
         target=target.name,
-        displacement=course.pose[-1],
-        duration=float(course.time[-1]),
-        course=replace(course, reduced_state=states),
     )
 
 

@@ -63,3 +63,34 @@ class Maneuver:
                 f"maneuver {self.name!r}: its course must run from the identity and time 0 to its "
                 f"displacement and duration, got a difference of {off:.3g}"
             )
+
+    @classmethod
+    def along(
+        cls,
+        course: Trajectory,
+        *,
+        name: str,
+        source: str,
+        target: str,
+        cost_multiplier: float = 1.0,
+    ) -> Maneuver:
+        """The maneuver that ends where its course does.
+
+        Examples
+        --------
+        >>> course = Trajectory(
+        ...     time=np.array([0.0, 2.0]), pose=np.array([[0.0, 0, 0], [2.0, 0, 0]]),
+        ...     reduced_state=np.zeros((2, 0)), control=np.ones((2, 1)))
+        >>> hop = Maneuver.along(course, name="hop", source="rest", target="rest")
+        >>> hop.displacement.tolist(), hop.duration
+        ([2.0, 0.0, 0.0], 2.0)
+        """
+        return cls(
+            name=name,
+            source=source,
+            target=target,
+            displacement=course.pose[-1],
+            duration=float(course.time[-1]),
+            course=course,
+            cost_multiplier=cost_multiplier,
+        )

@@ -165,13 +165,11 @@ def _whole(model: Model, swings: Sequence[_Swing]) -> tuple[Maneuver, ...]:
         durations=durations,
     )
     return tuple(
-        Maneuver(
+        Maneuver.along(
+            course,
             name=swing.name,
             source=swing.rest.name,
             target=swing.rest.name,
-            displacement=course.pose[-1],
-            duration=float(course.time[-1]),
-            course=course,
         )
         for swing, course in zip(swings, courses, strict=True)
     )

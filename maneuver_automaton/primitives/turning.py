@@ -75,13 +75,11 @@ def turns_between(
         durations=(turns / controls[:, rate])[:, None],
     )
     return tuple(
-        Maneuver(
+        Maneuver.along(
+            course,
             name=f"{trims[a].name} to {trims[b].name}" + _side(turn),
             source=trims[a].name,
             target=trims[b].name,
-            displacement=course.pose[-1],
-            duration=float(course.time[-1]),
-            course=course,
         )
         for (a, b, turn), course in zip(chosen, courses, strict=True)
     )

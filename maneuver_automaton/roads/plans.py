@@ -81,13 +81,11 @@ def ramps(
         max_step_m=max_step_m,
     )
     return tuple(
-        Maneuver(
+        Maneuver.along(
+            course,
             name=f"acceleration {along:.4g}, steering rate {rate:.3g}",
             source=source.name,
             target=target.name,
-            displacement=course.pose[-1],
-            duration=float(course.time[-1]),
-            course=course,
         )
         for (along, rate), source, target, course in zip(
             control.tolist(), sources, targets, courses, strict=True

@@ -106,7 +106,7 @@ def _need(model: Model) -> str:
 
 
 def _steady(document: Document, k: int, part: NamedTrim, model: Model) -> Trim:
-    """The trim with a reduced state, a control, or both; what is not given is solved for."""
+    """The trim with a reduced state, a control, or both; the rest is solved for."""
     where = (*WHERE, "trims", k)
     if part.state is None and part.control is None:
         raise document.error(where, f"needs {_need(model)}")

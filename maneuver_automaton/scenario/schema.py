@@ -183,7 +183,7 @@ def _norm_order(value: Any) -> Any:
 
 
 class CostPart(Part):
-    """Weights of the stage cost; what is left out is 0."""
+    """Weights of the stage cost, 0 unless stated."""
 
     effort: NotNegative = Field(0.0, description="c1, of the squared control per second")
     norm: NotNegative = Field(0.0, description="c2, of the norm of the control per second")

@@ -164,7 +164,7 @@ def _within(
 
 
 class _ConjugatedWord:
-    """Trims and displacements with least times: what is coasted beyond them is solved for."""
+    """Trims and displacements with least times: the time beyond them is solved for."""
 
     def __init__(
         self, twists: Array, steps: Array, floors: Array, goal: Array, free_heading: bool
