@@ -24,14 +24,14 @@ from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.fitting import without_nothing
+from maneuver_automaton.refinement.maneuver_lattice import maneuver_words
+from maneuver_automaton.refinement.maneuver_lattice import plan_of as plan_of_maneuvers
+from maneuver_automaton.refinement.ready import load_maneuver_kernels
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
 from maneuver_automaton.search.budget import Budget
 from maneuver_automaton.search.choose import load_search, search_goal
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.limits import closed_bound, why_impossible
-from maneuver_automaton.search.maneuver_lattice import maneuver_words
-from maneuver_automaton.search.maneuver_lattice import plan_of as plan_of_maneuvers
-from maneuver_automaton.search.ready import load_maneuver_kernels
 from maneuver_automaton.search.result import SearchStatus, plan_of
 
 WORDS = 24  # of free space that are looked at, for all goals together

@@ -33,16 +33,15 @@ from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.fitting import with_best_times
 from maneuver_automaton.refinement.improve import Patience
 from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinematic_problem
-from maneuver_automaton.refinement.ready import load_lattice
+from maneuver_automaton.refinement.maneuver_lattice import maneuver_words, plan_of, quick_word
+from maneuver_automaton.refinement.ready import load_lattice, load_maneuver_kernels
 from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
 from maneuver_automaton.search import SearchStatus
 from maneuver_automaton.search.budget import Budget
 from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
-from maneuver_automaton.search.maneuver_lattice import maneuver_words, plan_of, quick_word
 from maneuver_automaton.search.maneuver_search import maneuver_word_stages
 from maneuver_automaton.search.maneuver_words import load_maneuver_words
-from maneuver_automaton.search.ready import load_maneuver_kernels
 from maneuver_automaton.search.result import plan_of as plan_of_word
 from maneuver_automaton.words.word import Word, word_of_plan
 

@@ -28,10 +28,10 @@ from maneuver_automaton.receding_horizon.settings import EXACT
 from maneuver_automaton.receding_horizon.shifting import followed_by, moves_on, rested
 from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.refinement.fitting import fitted_plans
+from maneuver_automaton.refinement.maneuver_lattice import maneuver_words, plan_of
 from maneuver_automaton.search.alternatives import TIE
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_trims import priced_library
-from maneuver_automaton.search.maneuver_lattice import maneuver_words, plan_of
 from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
 from maneuver_automaton.search.result import plan_of as plan_of_word
 

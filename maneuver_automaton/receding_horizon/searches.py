@@ -16,10 +16,10 @@ from maneuver_automaton.receding_horizon.over_maneuvers import (
 )
 from maneuver_automaton.receding_horizon.settings import Settings
 from maneuver_automaton.receding_horizon.situation import Situation
-from maneuver_automaton.refinement.ready import load_lattice
+from maneuver_automaton.refinement.ready import load_lattice, load_maneuver_kernels
 from maneuver_automaton.search.choose import load_search as load_words
 from maneuver_automaton.search.maneuver_words import load_maneuver_words
-from maneuver_automaton.search.ready import load_maneuver_kernels, load_times_kernels
+from maneuver_automaton.search.ready import load_times_kernels
 
 
 def started(

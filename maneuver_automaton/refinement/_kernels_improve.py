@@ -10,66 +10,55 @@ from maneuver_automaton.refinement._kernels_word import (
     GAIN,
     LENGTH,
     admitted,
-    append,
+    append_after,
+    append_through,
+    begun,
+    ended,
     gear_after,
     gear_before,
     owner,
     pose_at,
+    price_of_transition,
+    still_free,
     take,
     unroll,
     word_cost,
 )
-from maneuver_automaton.search._kernels_motion import (
-    coast_free,
-    coasted,
-    free_candidate,
-    may_stay,
-)
+from maneuver_automaton.search._kernels_motion import free_candidate
 from maneuver_automaton.words._kernels_candidates import NO_TRIM, candidates, trim_and_gear
 
 
 @bare_inner_kernel
-def spliced(lib, work, n, begin, end, first, last, m):
-    """Write into `work.new_*` the word with what is between two times replaced; its length.
+def spliced(lib, task, work, n, section, m):
+    """Write into `work.new_*` the word with the section replaced; its length.
 
     The new middle is the word `work.middle_*` of `m` trims.
     """
-    size = 0
+    begin, end, first, last = section.begin, section.end, section.first, section.last
+    size = begun(task, work)
     for k in range(first + 1):
         t = work.durations[k] if k < first else begin - work.times[k]
-        size = append(lib, work.new_trims, work.new_durations, size, work.trims[k], t)
+        size = append_after(lib, work, size, k, t)
     for k in range(m):
-        t = work.middle_durations[k]
-        size = append(lib, work.new_trims, work.new_durations, size, work.middle_trims[k], t)
-    for k in range(last, n):
-        t = work.durations[k] if k > last else work.times[k + 1] - end
-        size = append(lib, work.new_trims, work.new_durations, size, work.trims[k], t)
-    return size
-
-
-@bare_inner_kernel
-def still_free(lib, task, scene, work, size, begin):
-    """Whether the word in `work.new_*` is free after `begin` [s], where obstacles move."""
-    pose = (work.start[0], work.start[1], work.start[2], 0.0)
-    time = 0.0
-    for k in range(size):
-        trim, t = work.new_trims[k], work.new_durations[k]
-        begun = time + t > begin
-        if begun and not coast_free(scene, lib, trim, pose, t, task.clock + time):
-            return False
-        pose = coasted(lib, trim, pose, t)
-        time += t
-    last = work.new_trims[max(size - 1, 0)]
-    return may_stay(scene, lib, last, pose, task.clock + time, task.stay_until)
+        size = append_through(lib, work, size, work.middle_trims[k], work.middle_durations[k])
+    size = append_through(lib, work, size, work.trims[last], work.ends[last] - end)
+    for k in range(last + 1, n):
+        size = append_after(lib, work, size, k, work.durations[k])
+    return ended(task, work, n, size)
 
 
 @inlined_kernel
 def put_middle(lib, work, words, scratch, which, m):
-    """Append a candidate to the new middle; returns its length."""
+    """Append a candidate to the new middle; returns its length.
+
+    Between classes a trim counts also where it lasts no time: maneuvers lead to it and on.
+    """
     row = scratch.rows[which]
-    for n_th in range(3):
-        trim, t = words[row, n_th], scratch.times[which, n_th]
-        if t > 0.0 and trim < lib.library.n_trims:
+    passed = lib.library.cost.shape[0] > 1
+    for n_th in range(4):
+        trim = words[row, n_th] if n_th < 3 else scratch.climbs[which]
+        t = scratch.times[which, n_th]
+        if 0 <= trim < lib.library.n_trims and (t > 0.0 or passed):
             work.middle_trims[m], work.middle_durations[m] = trim, t
             m += 1
     return m
@@ -94,13 +83,13 @@ class Section(NamedTuple):
 
 @bare_inner_kernel
 def section_price(lib, work, begin, end, first, last):
-    """Price of the word between two times, its switches included."""
+    """Price of the word between two times, its transitions included."""
     price = 0.0
     for k in range(first, last + 1):
-        low, high = max(work.times[k], begin), min(work.times[k + 1], end)
+        low, high = max(work.times[k], begin), min(work.ends[k], end)
         price += lib.library.rates[work.trims[k]] * max(high - low, 0.0)
-    if lib.library.switch > 0.0:
-        price += lib.library.switch * (last - first)
+    for k in range(first + 1, last + 1):
+        price += price_of_transition(lib, work, k)
     for k in range(first, last):
         if lib.library.gears[work.trims[k]] * lib.library.gears[work.trims[k + 1]] < 0:
             price += lib.library.direction_change
@@ -109,7 +98,11 @@ def section_price(lib, work, begin, end, first, last):
 
 @bare_inner_kernel
 def drawn_section(lib, task, work, n, cost, draw):
-    """The section of a word of `cost` that six numbers between 0 and 1 draw."""
+    """The section of a word of `cost` that six numbers between 0 and 1 draw.
+
+    It begins and ends in coasts, where the state is known. A trim that a maneuver leads to has been
+    entered when its coast begins.
+    """
     total = work.times[n]
     middle = draw[1] * total
     shortest = min(task.shortest_span, 0.5 * total)
@@ -117,14 +110,20 @@ def drawn_section(lib, task, work, n, cost, draw):
     begin = max(middle - 0.5 * span, 0.0)
     end = min(middle + 0.5 * span, total)
     first, last = owner(work, n, begin), owner(work, n, end)
+    if begin > work.ends[first]:  # within a maneuver: a section has all of it
+        begin = work.ends[first]
+    if end > work.ends[last]:
+        last += 1
+        end = work.times[last]
     if draw[3] < task.snap:
         begin = work.times[first]
     if draw[4] < task.snap:
-        end = work.times[last + 1]
+        end = work.ends[last]
     to_end = end >= total
-    entered = first if begin > work.times[first] else first - 1
+    led_to = work.edges[first] >= 0 or (first == 0 and task.given_ends)
+    entered = first if begin > work.times[first] or led_to else first - 1
     before = NO_TRIM if entered < 0 else work.trims[entered]
-    after = NO_TRIM if to_end else work.trims[last]
+    after = NO_TRIM if to_end and not task.given_ends else work.trims[last]
     return Section(
         begin,
         end,
@@ -150,14 +149,22 @@ def cheapest_of(scratch, n):
     return least
 
 
+@inlined_kernel
+def words_to(lib, free_heading):
+    """Words of a connection and how many of them are tried."""
+    if free_heading:
+        return lib.library.free_words, lib.library.free_words.shape[0]
+    return lib.library.words, lib.library.n_few
+
+
 @bare_inner_kernel
-def put_free(lib, task, scene, work, words, pose, n, most_cost, most_time, clock, scratch, m):
+def put_free(lib, task, scene, work, words, ends, n, most_cost, most_time, clock, scratch, m):
     """Append to the new middle, of `m` trims, the cheapest free one of `n` candidates.
 
-    Returns its number and the middle's new length; -1 and -1 if there is none.
+    `ends` as in `connection_free`. Returns its number and the middle's new length; -1 and -1 if
+    there is none.
     """
     limits = (task.tries, most_cost, most_time)
-    ends = (pose, NO_TRIM, NO_TRIM)
     which = free_candidate(scene, lib, words, ends, n, limits, clock, scratch)
     if which < 0:
         return -1, -1
@@ -166,7 +173,7 @@ def put_free(lib, task, scene, work, words, pose, n, most_cost, most_time, clock
 
 @bare_inner_kernel
 def direct_middle(lib, task, scene, work, section):
-    """Write into the new middle three trims that join the ends of a section.
+    """Write into the new middle a connection that joins the ends of a section.
 
     Returns its length, -1 if there is none that is free and cheap enough; so does `via_middle`.
     """
@@ -174,11 +181,11 @@ def direct_middle(lib, task, scene, work, section):
     e_x, e_y, _, _ = section.goal
     if math.hypot(e_x - x, e_y - y) * task.per_metre >= section.budget:
         return -1
-    words = lib.library.free_words if section.free_heading else lib.library.words
+    words, n_words = words_to(lib, section.free_heading)
     n = candidates(
         lib.library,
         words,
-        words.shape[0],
+        n_words,
         section.start,
         section.entry,
         section.goal,
@@ -192,7 +199,7 @@ def direct_middle(lib, task, scene, work, section):
         scene,
         work,
         words,
-        section.start,
+        (section.start, section.entry[0], section.leave[0]),
         n,
         section.budget,
         section.left,
@@ -205,19 +212,24 @@ def direct_middle(lib, task, scene, work, section):
 
 @bare_inner_kernel
 def via_pose(lib, task, work, n, section, size, shift):
-    """A pose near the middle of a section, shifted by normal numbers times the spread of `size`."""
+    """A pose near the middle of a section, and its trim and gear, any where all are of one class.
+
+    It is shifted by normal numbers times the spread of `size`.
+    """
     spread = task.spread * (1.0 / 33.0) ** size
     half = 0.5 * (section.begin + section.end)
-    x, y, heading, z = pose_at(lib, work, owner(work, n, half), half)
+    k = owner(work, n, half)
+    x, y, heading, z = pose_at(lib, work, k, min(half, work.ends[k]))
     x += spread * shift[0]
     y += spread * shift[1]
     heading += 0.5 * spread / task.radius * shift[2]
-    return x, y, heading, z
+    trim = work.trims[k] if lib.library.cost.shape[0] > 1 else NO_TRIM
+    return (x, y, heading, z), trim_and_gear(trim, 0)
 
 
 @bare_inner_kernel
-def via_middle(lib, task, scene, work, section, via):
-    """Write into the new middle three trims to the pose `via`, and three from there on."""
+def via_middle(lib, task, scene, work, section, via, there):
+    """Write into the new middle a connection to the pose `via`, and one from there on."""
     x, y, _, _ = section.start
     v_x, v_y, _, _ = via
     e_x, e_y, _, _ = section.goal
@@ -225,28 +237,28 @@ def via_middle(lib, task, scene, work, section, via):
     way = math.hypot(v_x - x, v_y - y) + math.hypot(e_x - v_x, e_y - v_y)
     if way * task.per_metre >= budget:
         return -1
-    nowhere = trim_and_gear(NO_TRIM, 0)
+    before, n_before = words_to(lib, False)
     n_1 = candidates(
         lib.library,
-        lib.library.words,
-        lib.library.words.shape[0],
+        before,
+        n_before,
         section.start,
         section.entry,
         via,
-        nowhere,
+        there,
         budget,
         one,
     )
     cheapest = cheapest_of(one, n_1)
     if cheapest >= budget:
         return -1
-    words = lib.library.free_words if section.free_heading else lib.library.words
+    words, n_words = words_to(lib, section.free_heading)
     n_2 = candidates(
         lib.library,
         words,
-        words.shape[0],
+        n_words,
         via,
-        nowhere,
+        there,
         section.goal,
         section.leave,
         budget - cheapest,
@@ -260,8 +272,8 @@ def via_middle(lib, task, scene, work, section, via):
         task,
         scene,
         work,
-        lib.library.words,
-        section.start,
+        before,
+        (section.start, section.entry[0], there[0]),
         n_1,
         budget - rest,
         section.left,
@@ -271,6 +283,9 @@ def via_middle(lib, task, scene, work, section, via):
     )
     if which < 0:
         return -1
+    if there[0] >= 0:  # the maneuvers that lead to the trim of the via-point
+        work.middle_trims[m], work.middle_durations[m] = there[0], 0.0
+        m += 1
     used = one.durations[which]
     _, m = put_free(
         lib,
@@ -278,7 +293,7 @@ def via_middle(lib, task, scene, work, section, via):
         scene,
         work,
         words,
-        via,
+        (via, there[0], section.leave[0]),
         n_2,
         budget - one.costs[which],
         section.left - used,
@@ -297,7 +312,7 @@ def attempt_all(lib, task, scene, work, state, uniform, normal):
     `normal` (k, 3): its place and heading.
     """
     n = state[LENGTH]
-    cost = word_cost(lib, work.trims, work.durations, n)
+    cost = word_cost(lib, work.trims, work.durations, work.edges, n)
     unroll(lib, work, n)
     changes = scene.layers.movers.speed.shape[0] > 0  # what comes after is driven at other times
     for row in range(uniform.shape[0]):
@@ -306,20 +321,19 @@ def attempt_all(lib, task, scene, work, state, uniform, normal):
         draw = uniform[row]
         section = drawn_section(lib, task, work, n, cost, draw)
         if draw[0] < task.via:
-            via = via_pose(lib, task, work, n, section, draw[5], normal[row])
-            m = via_middle(lib, task, scene, work, section, via)
+            via, there = via_pose(lib, task, work, n, section, draw[5], normal[row])
+            m = via_middle(lib, task, scene, work, section, via, there)
         else:
             m = direct_middle(lib, task, scene, work, section)
         if m < 0:
             continue
-        begin, end = section.begin, section.end
-        size = spliced(lib, work, n, begin, end, section.first, section.last, m)
+        size = spliced(lib, task, work, n, section, m)
         if not admitted(lib, task, work, size):
             continue
-        new_cost = word_cost(lib, work.new_trims, work.new_durations, size)
+        new_cost = word_cost(lib, work.new_trims, work.new_durations, work.new_edges, size)
         if not new_cost < cost - GAIN * cost:
             continue
-        if changes and not still_free(lib, task, scene, work, size, begin):
+        if changes and not still_free(lib, task, scene, work, size, section.begin):
             continue
         take(work, state, size)
         n, cost = size, new_cost

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import math
 
-from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
 from maneuver_automaton.refinement._kernels_word import (
     GAIN,
     LENGTH,
     admitted,
-    append,
+    append_after,
+    append_through,
+    begun,
+    ended,
     owner,
     pose_at,
+    price_of_transition,
+    still_free,
     take,
     unroll,
     word_cost,
@@ -19,124 +24,150 @@ from maneuver_automaton.refinement._kernels_word import (
 from maneuver_automaton.search._kernels_motion import free_candidate
 from maneuver_automaton.words._kernels_candidates import NO_TRIM, candidates, trim_and_gear
 
+X, Y, HEADING, Z, TIME = range(5)  # columns of the points
+
 
 @bare_inner_kernel
-def put_points(lib, work, n, points):
-    """Fill `work.at` with poses and times of the word, `points` of them at equal times."""
-    total = work.times[n]
-    for j in range(points):
-        time = total * j / (points - 1)
-        k = owner(work, n, time)
-        x, y, heading, _ = pose_at(lib, work, k, min(time, work.times[k + 1]))
-        work.at[j, 0], work.at[j, 1], work.at[j, 2], work.at[j, 3] = x, y, heading, time
+def put_points(lib, work, n, times):
+    """Fill `work.at` and `work.owners` with the word's states at rising times within its coasts."""
+    for j in range(times.shape[0]):
+        k = owner(work, n, times[j]) if j > 0 else 0
+        time = min(times[j], work.ends[k])
+        x, y, heading, z = pose_at(lib, work, k, time)
+        work.at[j, X], work.at[j, Y], work.at[j, HEADING], work.at[j, Z] = x, y, heading, z
+        work.at[j, TIME], work.owners[j] = time, k
         work.best[j] = math.inf
         work.back[j] = -1
-    work.best[0] = 0.0
+    work.best[0], work.spent[0] = 0.0, 0.0
 
 
 @bare_inner_kernel
-def price_along(lib, work, n, j):
+def price_along(lib, work, j):
     """Price of the word from point `j - 1` to point `j`."""
-    begin, end = work.at[j - 1, 3], work.at[j, 3]
-    first, last = owner(work, n, begin), owner(work, n, end)
+    begin, end = work.at[j - 1, TIME], work.at[j, TIME]
+    first, last = work.owners[j - 1], work.owners[j]
     price = 0.0
     for k in range(first, last + 1):
-        low, high = max(work.times[k], begin), min(work.times[k + 1], end)
+        low, high = max(work.times[k], begin), min(work.ends[k], end)
         price += lib.library.rates[work.trims[k]] * max(high - low, 0.0)
         if k > first:
-            price += lib.library.switch
+            price += price_of_transition(lib, work, k)
             if lib.library.gears[work.trims[k]] * lib.library.gears[work.trims[k - 1]] < 0:
                 price += lib.library.direction_change
     return price
 
 
+@inlined_kernel
+def trim_at(lib, work, j):
+    """Trim at a point, as the search for connections is told: any where all are of one class."""
+    trim = work.trims[work.owners[j]] if lib.library.cost.shape[0] > 1 else NO_TRIM
+    return trim_and_gear(trim, 0)
+
+
 @bare_inner_kernel
-def join(lib, task, scene, work, words, i, j, gain):
-    """Reach point `j` from point `i` by three trims, if that is cheaper by `gain`, and free."""
-    x, y, heading = work.at[i, 0], work.at[i, 1], work.at[i, 2]
-    e_x, e_y, e_heading = work.at[j, 0], work.at[j, 1], work.at[j, 2]
+def join(lib, task, scene, work, words, n_words, i, j, gain):
+    """Reach point `j` from point `i` by a connection, if that is cheaper by `gain`, and free."""
+    start = (work.at[i, X], work.at[i, Y], work.at[i, HEADING], work.at[i, Z])
+    goal = (work.at[j, X], work.at[j, Y], work.at[j, HEADING], work.at[j, Z])
     budget = work.best[j] - work.best[i]
-    if math.hypot(e_x - x, e_y - y) * task.per_metre >= budget:
+    if math.hypot(goal[0] - start[0], goal[1] - start[1]) * task.per_metre >= budget:
         return
-    nowhere = trim_and_gear(NO_TRIM, 0)
+    here, there = trim_at(lib, work, i), trim_at(lib, work, j)
     count = candidates(
-        lib.library,
-        words,
-        words.shape[0],
-        (x, y, heading, 0.0),
-        nowhere,
-        (e_x, e_y, e_heading, 0.0),
-        nowhere,
-        budget - gain,
-        work.one,
+        lib.library, words, n_words, start, here, goal, there, budget - gain, work.one
     )
     which = free_candidate(
         scene,
         lib,
         words,
-        ((x, y, heading, 0.0), NO_TRIM, NO_TRIM),
+        (start, here[0], there[0]),
         count,
         (task.tries, budget - gain, task.most_time),
-        task.clock + work.at[i, 3],
+        task.clock + work.spent[i],
         work.one,
     )
     if which < 0:
         return
     work.best[j] = work.best[i] + work.one.costs[which]
+    work.spent[j] = work.spent[i] + work.one.durations[which]
     work.back[j] = i
     row = work.one.rows[which]
-    for n_th in range(3):
-        work.by_trims[j, n_th] = words[row, n_th]
+    for n_th in range(4):
+        trim = words[row, n_th] if n_th < 3 else work.one.climbs[which]
+        work.by_trims[j, n_th] = trim
         work.by_durations[j, n_th] = work.one.times[which, n_th]
 
 
 @bare_inner_kernel
-def unwound(lib, work, n, points):
+def unwound(lib, task, work, n, points):
     """Write the best way to the last point into `work.new_*`; its length."""
     j, n_legs = points - 1, 0
     while j > 0:
         work.legs[n_legs] = j
         n_legs += 1
         j = work.back[j] if work.back[j] >= 0 else j - 1
-    size = 0
+    passed = lib.library.cost.shape[0] > 1  # trims that last no time, too, are passed through
+    size = begun(task, work)
     for leg in range(n_legs - 1, -1, -1):
         j = work.legs[leg]
         if work.back[j] >= 0:
-            for n_th in range(3):
+            for n_th in range(4):
                 trim, t = work.by_trims[j, n_th], work.by_durations[j, n_th]
-                if t > 0.0 and trim < lib.library.n_trims:
-                    size = append(lib, work.new_trims, work.new_durations, size, trim, t)
+                if 0 <= trim < lib.library.n_trims and (t > 0.0 or passed):
+                    size = append_through(lib, work, size, trim, t)
+            if passed:
+                size = append_through(lib, work, size, work.trims[work.owners[j]], 0.0)
             continue
-        begin, end = work.at[j - 1, 3], work.at[j, 3]
-        for k in range(owner(work, n, begin), owner(work, n, end) + 1):
-            t = min(work.times[k + 1], end) - max(work.times[k], begin)
-            size = append(lib, work.new_trims, work.new_durations, size, work.trims[k], t)
-    return size
+        begin, end = work.at[j - 1, TIME], work.at[j, TIME]
+        first, last = work.owners[j - 1], work.owners[j]
+        for k in range(first, last + 1):
+            t = min(work.ends[k], end) - max(work.times[k], begin)
+            if k > first:
+                size = append_after(lib, work, size, k, t)
+            else:
+                size = append_through(lib, work, size, work.trims[k], t)
+    return ended(task, work, n, size)
 
 
 @bare_kernel
-def dynamic_programming(lib, task, scene, work, state, points):
-    """Best way over `points` poses of the word, joined by words where that is cheaper.
+def begin_program(lib, work, state, times):
+    """Cut the word at some times, rising from its begin to its end, all of them within coasts.
 
-    Returns the cost. The word changes only if it gains; nothing may move.
+    Returns its cost. The points are then joined, in order, by `join_points`, and `take_program`
+    makes the word the best way through them: in parts, so that a deadline can end it.
     """
     n = state[LENGTH]
-    cost = word_cost(lib, work.trims, work.durations, n)
     unroll(lib, work, n)
-    if n == 0 or points < 2:
-        return cost
-    put_points(lib, work, n, points)
-    for j in range(1, points):
-        work.best[j] = work.best[j - 1] + price_along(lib, work, n, j)
-        free_heading = task.free_heading and j == points - 1
-        words = lib.library.free_words if free_heading else lib.library.words
+    put_points(lib, work, n, times)
+    return word_cost(lib, work.trims, work.durations, work.edges, n)
+
+
+@bare_kernel
+def join_points(lib, task, scene, work, first, points, n_words, gain):
+    """Find the best way to the points from `first` on, of `points`, by the first `n_words` words.
+
+    A connection in place of what the word does has to save at least `gain`.
+    """
+    for j in range(first, min(points, work.at.shape[0])):
+        work.best[j] = work.best[j - 1] + price_along(lib, work, j)
+        work.spent[j] = work.spent[j - 1] + work.at[j, TIME] - work.at[j - 1, TIME]
+        words, tried = lib.library.words, n_words
+        if task.free_heading and j == work.at.shape[0] - 1:
+            words, tried = lib.library.free_words, lib.library.free_words.shape[0]
         for i in range(j - 1):
-            join(lib, task, scene, work, words, i, j, GAIN * cost)
-    size = unwound(lib, work, n, points)
+            join(lib, task, scene, work, words, tried, i, j, gain)
+
+
+@bare_kernel
+def take_program(lib, task, scene, work, state, cost):
+    """Make the word the best way through its points; as it is where that gains nothing."""
+    n = state[LENGTH]
+    size = unwound(lib, task, work, n, work.at.shape[0])
     if not admitted(lib, task, work, size):
-        return cost
-    new_cost = word_cost(lib, work.new_trims, work.new_durations, size)
-    if new_cost < cost - GAIN * cost:
+        return
+    new_cost = word_cost(lib, work.new_trims, work.new_durations, work.new_edges, size)
+    if not new_cost < cost - GAIN * cost:
+        return
+    moves = scene.layers.movers.speed.shape[0] > 0  # what stays is driven at other times
+    if not moves or still_free(lib, task, scene, work, size, 0.0):
         take(work, state, size)
-        return new_cost
-    return cost

@@ -1,22 +1,37 @@
-"""A word as two arrays, trims and durations, of which the first `n` entries count."""
+"""A word as arrays of which the first `n` entries count: the edge to a trim, the trim, its time.
+
+An edge is a maneuver of the lattice library; -1 stands for a switch at will, as all transitions of
+a kinematic vehicle are. The state is known while a trim is coasted, so that a word is cut there.
+"""
 
 from __future__ import annotations
 
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
-from maneuver_automaton.search._kernels_motion import coasted
+from maneuver_automaton.search._kernels_motion import (
+    coast_free,
+    coasted,
+    edge_end,
+    edge_proven,
+    is_still,
+    may_stay,
+)
+from maneuver_automaton.words._kernels_candidates import class_of
 
+AT_WILL = -1  # edge of a switch
 GAIN = 1e-9  # share of the cost that counts as a gain
 LENGTH = 0  # place of the word's length in `state`
 
 
 @bare_inner_kernel
-def word_cost(lib, trims, durations, n):
-    """Cost of a word with the prices of its switches."""
+def word_cost(lib, trims, durations, edges, n):
+    """Cost of a word with the prices of its switches and maneuvers."""
     cost, gear = 0.0, 0
     for k in range(n):
         trim = trims[k]
         cost += lib.library.rates[trim] * durations[k]
-        if k > 0:
+        if edges[k] >= 0:
+            cost += lib.edge_cost[edges[k]]
+        elif k > 0:
             cost += lib.library.switch
         if lib.library.gears[trim] != 0:
             if gear * lib.library.gears[trim] < 0:
@@ -27,22 +42,24 @@ def word_cost(lib, trims, durations, n):
 
 @bare_inner_kernel
 def unroll(lib, work, n):
-    """Fill the poses and times at the switches of the word in `work`."""
-    x, y, heading = work.start[0], work.start[1], work.start[2]
+    """Fill the poses where coasts begin, and the times where they begin and end."""
+    pose = (work.start[0], work.start[1], work.start[2], work.start[3])
     time = 0.0
     for k in range(n):
-        work.poses[k, 0], work.poses[k, 1], work.poses[k, 2] = x, y, heading
+        if work.edges[k] >= 0:
+            pose = edge_end(lib, work.edges[k], pose)
+            time += lib.edge_time[work.edges[k]]
+        work.poses[k, 0], work.poses[k, 1], work.poses[k, 2], work.poses[k, 3] = pose
         work.times[k] = time
-        trim, t = work.trims[k], work.durations[k]
-        x, y, heading, _ = coasted(lib, trim, (x, y, heading, 0.0), t)
-        time += t
-    work.poses[n, 0], work.poses[n, 1], work.poses[n, 2] = x, y, heading
+        pose = coasted(lib, work.trims[k], pose, work.durations[k])
+        time += work.durations[k]
+        work.ends[k] = time
     work.times[n] = time
 
 
 @inlined_kernel
 def owner(work, n, time):
-    """Number of the trim that is driven at a time; the later one at a switch."""
+    """Number of the last trim that has begun at a time: its coast, or the maneuver after it."""
     low, high = 0, n
     while high - low > 1:
         middle = (low + high) // 2
@@ -57,8 +74,16 @@ def owner(work, n, time):
 def pose_at(lib, work, k, time):
     """Pose (x, y, heading, z) at a time within trim `k`."""
     t = time - work.times[k]
-    begin = (work.poses[k, 0], work.poses[k, 1], work.poses[k, 2], 0.0)
+    begin = (work.poses[k, 0], work.poses[k, 1], work.poses[k, 2], work.poses[k, 3])
     return coasted(lib, work.trims[k], begin, t)
+
+
+@inlined_kernel
+def price_of_transition(lib, work, k):
+    """Price of what leads to trim `k` from the trim before."""
+    if work.edges[k] >= 0:
+        return lib.edge_cost[work.edges[k]]
+    return lib.library.switch
 
 
 @inlined_kernel
@@ -81,18 +106,78 @@ def gear_after(lib, work, n, k):
     return gear
 
 
+# The functions that follow write the new word, `work.new_*`, from its begin. They return its new
+# length; where there is no room for it, one that `admitted` refuses.
+
+
+@inlined_kernel
+def begun(task, work):
+    """Begin the new word: in the trim of the old one, where a word has to begin in a given trim."""
+    if not task.given_ends:
+        return 0
+    work.new_trims[0], work.new_durations[0], work.new_edges[0] = work.trims[0], 0.0, AT_WILL
+    return 1
+
+
 @bare_inner_kernel
-def append(lib, trims, durations, n, trim, t):
-    """Put a trim at the end of a word, joined with the last one if that is the same."""
-    if t < lib.library.shortest:
-        return n
-    if n > 0 and trims[n - 1] == trim:
-        durations[n - 1] += t
-        return n
-    if n >= trims.shape[0] - 1:
-        return n + 1  # too long: the caller sees it
-    trims[n], durations[n] = trim, t
-    return n + 1
+def put(work, size, edge, trim, t):
+    """Append a trim, whatever stands before it."""
+    if size >= work.new_trims.shape[0] - 1:
+        return work.new_trims.shape[0]
+    work.new_trims[size], work.new_durations[size], work.new_edges[size] = trim, t, edge
+    return size + 1
+
+
+@bare_inner_kernel
+def put_edge(lib, work, size, edge):
+    """Append a maneuver, and the trim that it begins in where the word is in another one."""
+    if edge < 0 or size >= work.new_trims.shape[0]:
+        return work.new_trims.shape[0]
+    source = lib.edge_source[edge]
+    if size == 0 or work.new_trims[size - 1] != source:
+        size = put(work, size, AT_WILL, source, 0.0)
+    return put(work, size, edge, lib.edge_target[edge], 0.0)
+
+
+@bare_inner_kernel
+def append(lib, work, size, trim, t):
+    """Append a coast of the class that the word is in, joined with the last one of its trim."""
+    if t < lib.library.shortest or size >= work.new_trims.shape[0]:
+        return size
+    if size > 0 and work.new_trims[size - 1] == trim:
+        work.new_durations[size - 1] += t
+        return size
+    return put(work, size, AT_WILL, trim, t)
+
+
+@bare_inner_kernel
+def append_through(lib, work, size, trim, t):
+    """Append a coast, after the maneuvers that lead to its class."""
+    goal = class_of(lib.library, trim)
+    while 0 < size < work.new_trims.shape[0]:
+        at = class_of(lib.library, work.new_trims[size - 1])
+        if at == goal:
+            break
+        size = put_edge(lib, work, size, lib.via_edge[at, goal])
+    return append(lib, work, size, trim, t)
+
+
+@bare_inner_kernel
+def append_after(lib, work, size, k, t):
+    """Append trim `k` of the old word, for a time, and the maneuver that leads to it there."""
+    if work.edges[k] >= 0:
+        size = put_edge(lib, work, size, work.edges[k])
+    return append(lib, work, size, work.trims[k], t)
+
+
+@inlined_kernel
+def ended(task, work, n, size):
+    """End the new word: in the trim of the old one, of `n` trims, where that is given."""
+    if not task.given_ends or size >= work.new_trims.shape[0]:
+        return size
+    if size > 0 and work.new_trims[size - 1] == work.trims[n - 1]:
+        return size
+    return put(work, size, AT_WILL, work.trims[n - 1], 0.0)
 
 
 @bare_inner_kernel
@@ -102,10 +187,34 @@ def admitted(lib, task, work, size):
         return False
     duration = 0.0
     for k in range(size):
-        if work.new_durations[k] < lib.library.min_coast:
+        t = work.new_durations[k]
+        if 0.0 < t < task.least_coast and not is_still(lib, work.new_trims[k]):
             return False
-        duration += work.new_durations[k]
+        duration += t
+        if work.new_edges[k] >= 0:
+            duration += lib.edge_time[work.new_edges[k]]
     return duration <= task.most_time
+
+
+@bare_inner_kernel
+def still_free(lib, task, scene, work, size, begin):
+    """Whether the word in `work.new_*` is free after `begin` [s], where obstacles move."""
+    pose = (work.start[0], work.start[1], work.start[2], work.start[3])
+    time = 0.0
+    for k in range(size):
+        edge, trim, t = work.new_edges[k], work.new_trims[k], work.new_durations[k]
+        if edge >= 0:
+            later = time + lib.edge_time[edge] > begin
+            if later and edge_proven(scene, lib, edge, pose, task.clock + time) < 0.0:
+                return False
+            pose = edge_end(lib, edge, pose)
+            time += lib.edge_time[edge]
+        if time + t > begin and not coast_free(scene, lib, trim, pose, t, task.clock + time):
+            return False
+        pose = coasted(lib, trim, pose, t)
+        time += t
+    last = work.new_trims[max(size - 1, 0)]
+    return may_stay(scene, lib, last, pose, task.clock + time, task.stay_until)
 
 
 @bare_inner_kernel
@@ -113,4 +222,5 @@ def take(work, state, size):
     """Make the word in `work.new_*` the word."""
     for k in range(size):
         work.trims[k], work.durations[k] = work.new_trims[k], work.new_durations[k]
+        work.edges[k] = work.new_edges[k]
     state[LENGTH] = size

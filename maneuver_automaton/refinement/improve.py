@@ -1,88 +1,42 @@
-"""Make a free word cheaper until nothing gains any more, or the time is over.
+"""Make a free word cheaper until nothing gains any more, or the time is over: for every vehicle.
 
-Dynamic programming over the word's points, random shortcuts and via-points, and new searches from
-both ends at other resolutions, which find other ways round the obstacles. The sequence is the
-same at every call: it is counted in attempts, and a time limit only says where it stops.
+Dynamic programming over the word's points, random shortcuts and via-points, and new searches at
+other resolutions, which find other ways round the obstacles. The sequence is the same at every
+call: it is counted in attempts, and a time limit only says where it stops.
 """
 
 from __future__ import annotations
 
+import functools
 import math
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Any
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.refinement._kernels_improve import attempt_all
-from maneuver_automaton.refinement._kernels_points import dynamic_programming
-from maneuver_automaton.refinement._kernels_word import LENGTH
+from maneuver_automaton.refinement.restarts import RANDOM, Restart, Restarts
+from maneuver_automaton.refinement.work import improve_task, shortcut, word_of, work_of
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.distance_grid import DistanceGrid
 from maneuver_automaton.search.lattice import distance_grids
-from maneuver_automaton.search.lattice_memory import SearchArrays, search_arrays
-from maneuver_automaton.search.lattice_pass import both_ends, with_cost
+from maneuver_automaton.search.lattice_memory import SearchArrays
+from maneuver_automaton.search.lattice_pass import pass_of, with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
-from maneuver_automaton.search.lattice_task import TRIES, Resolution
-from maneuver_automaton.words.library import Scratch, scratch_of
 from maneuver_automaton.words.word import Word
 
-POINTS = 40  # of the dynamic program
+GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)  # of the time between points, by which they move in a round
+WORTH = 1e-3  # share that a round has to save for another one of its kind
 FIRST_GAINS = 4  # new searches after which the first gains are made
 SLICE = 400  # attempts
 SECOND_SLICE = 2000  # attempts for candidates near the best
 NEAR = 1.01  # share of the best cost that is near
-PRUNE = 1.08  # of a new search: its raw path is longer than what it becomes
-FIRST_CAP = 1500  # expansions of the first new search ...
-CAP_GROWTH = 1.35  # ... and how the caps grow
-MOST_CAP = 60_000
-WEIGHTS = (2.0, 1.5, 1.25, 1.1, 1.0)
-VIA = 0.6  # share of attempts with a via-point
-SNAP = 0.25  # chance of an end to snap to a switch
+MOST_CHUNK = 16384  # expansions between two looks at the word of a search
 SEED = 20_09  # of the random draws
 MOST_OTHERS = 50  # words kept beside the best
 TIMELY = 400  # attempts between two looks at the clock
-
-
-class Work(NamedTuple):
-    """Arrays of one word that is being improved."""
-
-    start: Array  # (3,)
-    trims: IntArray
-    durations: Array
-    poses: Array  # (n + 1, 3)
-    times: Array
-    new_trims: IntArray
-    new_durations: Array
-    middle_trims: IntArray  # (6,)
-    middle_durations: Array
-    one: Scratch
-    two: Scratch
-    at: Array  # (points, 4)
-    best: Array
-    back: IntArray
-    by_trims: IntArray  # (points, 3)
-    by_durations: Array
-    legs: IntArray
-
-
-class ImproveTask(NamedTuple):
-    """Limits and sizes, as the kernels see them."""
-
-    tries: int
-    clock: float
-    most_time: float
-    stay_until: float
-    most_trims: int
-    per_metre: float
-    radius: float
-    shortest_span: float  # [s]
-    snap: float
-    via: float
-    spread: float  # [m]
-    free_heading: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -107,6 +61,7 @@ class Patience:
 
 
 Better = Callable[[Word], None]
+Grids = Callable[[], tuple[DistanceGrid, ...]]
 
 
 def improve(
@@ -115,68 +70,75 @@ def improve(
     *,
     deadline: float,
     patience: Patience,
-    floor: float = -math.inf,
-    max_expansions: int | None = None,
-    table: CostTable = NO_TABLE,
     better: Better = lambda word: None,
-    meanwhile: Callable[[], None] = lambda: None,
+    **more: Any,
 ) -> Improved:
     """The cheapest word found from `word` on, which must be free; `better` hears of each gain.
 
-    It ends when no word can be cheaper than `floor` allows. Once the first gains are made,
-    `meanwhile` is called: what has to be prepared, but not at once.
+    See `Improvement` for the other settings.
     """
-    one = _Improvement(query, word, deadline, patience, floor, max_expansions, table, better)
-    return one.run(meanwhile)
+    grids = functools.partial(distance_grids, query)
+    one = Improvement(query, word, grids=grids, deadline=deadline, patience=patience, **more)
+    for gain in one.gains():
+        better(gain)
+    return one.result()
 
 
 @dataclass(slots=True, eq=False)
-class _Improvement:
-    """The state of one improvement."""
+class Improvement:
+    """One improvement: its settings, and what it came to so far."""
 
     query: LatticeQuery
     best: Word
+    _: KW_ONLY
+    grids: Grids  # distances to the goals, and to the start where searches begin at the goals
     deadline: float
     patience: Patience
-    floor: float
-    max_expansions: int | None
-    table: CostTable
-    better: Better
+    floor: float = -math.inf  # it ends when no word can be cheaper than this allows
+    max_expansions: int | None = None
+    table: CostTable = NO_TABLE
+    restarts: Restarts = RANDOM
+    meanwhile: Callable[[], None] = lambda: None  # to prepare once the first gains are made
     attempts: int = 0
     expansions: int = 0
     queries: int = 0
     passes: int = 0
     others: list[Word] = field(default_factory=list)
+    rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(SEED))
+    arrays: SearchArrays | None = None  # of the last search
 
-    def run(self, meanwhile: Callable[[], None]) -> Improved:
-        rng = np.random.default_rng(SEED)
-        query = self.query
-        self.best = with_cost(self.best, query)
-        self._consider(self._shortened(self.best, rng, SLICE))
-        grids = distance_grids(query)
-        memory = [search_arrays(query.library.arrays.library)]
-        idle_attempts = idle_passes = 0
-        step = 0
+    def gains(self) -> Iterator[Word]:
+        """Words, each cheaper than the one before: the word itself first, then new searches."""
+        restarts = self.restarts.of(self.query, self.rng)
+        first = next(restarts)
+        self.best = with_cost(self.best, self.query)
+        yield from self._considered(self._shortened(self.best, first, SLICE))
+        restart: Restart | None = first
+        grids = self.grids()
+        idle_attempts = idle_passes = step = 0
         slice_ = SLICE
-        while not self._over() and (
-            idle_attempts < self.patience.attempts or idle_passes < self.patience.passes
+        while (
+            restart is not None
+            and not self._over()
+            and (idle_attempts < self.patience.attempts or idle_passes < self.patience.passes)
         ):
             before = self.best.cost
-            candidate = self._searched_again(step, rng, grids, memory)
-            if candidate is not None and not self._over():
-                candidate = self._shortened(candidate, rng, SLICE)
-                if candidate.cost < NEAR * self.best.cost:
-                    candidate = self._attempted(candidate, rng, SECOND_SLICE)
-                self._consider(candidate)
+            yield from self._searched_again(restart, grids)
             idle_passes = 0 if self._gained(before) else idle_passes + 1
             if not self._over():
                 before = self.best.cost
-                self._consider(self._attempted(self.best, rng, slice_))
+                yield from self._considered(self._attempted(self.best, slice_))
                 idle_attempts = 0 if self._gained(before) else idle_attempts + slice_
                 slice_ = min(int(1.2 * slice_), 8000)
             step += 1
             if step == FIRST_GAINS:
-                meanwhile()
+                self.meanwhile()
+            begun, restart = restart, next(restarts, None)
+            if restart is not None and restart.all_words != begun.all_words:
+                yield from self._considered(self._shortened(self.best, restart, SLICE))
+
+    def result(self) -> Improved:
+        """What it came to."""
         return Improved(
             word=self.best,
             attempts=self.attempts,
@@ -198,63 +160,69 @@ class _Improvement:
             return True
         return time.monotonic() >= self.deadline
 
-    def _consider(self, candidate: Word) -> None:
+    def _considered(self, candidate: Word) -> Iterator[Word]:
+        """The candidate, if it is the best."""
         self.others.append(candidate)
         if candidate.cost < self.best.cost:
             self.best = candidate
-            self.better(candidate)
+            yield candidate
 
-    def _searched_again(
-        self,
-        step: int,
-        rng: np.random.Generator,
-        grids: tuple[DistanceGrid, DistanceGrid],
-        memory: list[SearchArrays],
-    ) -> Word | None:
-        """A connection found by a new search with other settings; None if there is none."""
-        scale, durations = 1.0, 1.0
-        weight = WEIGHTS[step // 2] if step < 2 * len(WEIGHTS) else float(rng.uniform(1.0, 2.0))
-        if step >= 2:
-            scale, durations = (float(value) for value in rng.uniform(0.5, 1.4, 2))
-        cap = min(int(FIRST_CAP * CAP_GROWTH ** (step // 2)), MOST_CAP)
-        if self.max_expansions is not None:
-            cap = min(cap, self.max_expansions - self.expansions)
-        tight = bool(step % 5 == 4)
-        resolution = Resolution(
-            scale=scale,
-            durations=durations,
-            weight=weight,
-            truncated=tight,
-            stop=step % 3 == 1,
-            layered=step % 4 >= 2,
+    def _searched_again(self, restart: Restart, grids: tuple[DistanceGrid, ...]) -> Iterator[Word]:
+        """Words found by a new search that is pruned by the best, and made shorter."""
+        one = pass_of(
+            self.query,
+            restart.resolution,
+            grid=grids[0 if restart.sign > 0.0 else 1],
+            sign=restart.sign,
+            table=self.table,
+            arrays=self.arrays,
         )
-        sign = -1.0 if step % 2 and not self.query.problem.moves else 1.0
-        (one,) = both_ends(
-            self.query, resolution, grids=grids, table=self.table, arrays=memory[0], ends=(sign,)
-        )
-        word = one.run(cap, PRUNE * self.best.cost, deadline=self.deadline)
-        memory[0] = one.arrays
-        self.expansions += one.expansions
-        self.queries += one.queries
+        one.chunk, last = restart.chunk, math.inf
         self.passes += 1
-        return None if word is None else with_cost(word, self.query)
+        while one.may_go_on and not self._over():
+            done, asked = one.expansions, one.queries
+            most = min(one.chunk, restart.resolution.most - done)
+            if self.max_expansions is not None:
+                most = min(most, self.max_expansions - self.expansions)
+            word = one.run(most, restart.prune * self.best.cost, deadline=self.deadline)
+            self.expansions += one.expansions - done
+            self.queries += one.queries - asked
+            one.chunk = min(2 * one.chunk, MOST_CHUNK)
+            word = None if word is None else with_cost(word, self.query)
+            if word is not None and word.cost < last and not self._over():
+                last = word.cost
+                yield from self._made_of(word, restart)
+            if word is not None and restart.resolution.stop:
+                break
+        self.arrays = one.arrays
 
-    def _shortened(self, word: Word, rng: np.random.Generator, attempts: int) -> Word:
-        """The word after the dynamic program and some attempts."""
-        query = self.query
-        work, state = work_of(query, word)
-        if not query.problem.moves:
-            dynamic_programming(
-                query.library.arrays,
-                improve_task(query, word),
-                query.scene(),
-                work,
-                state,
-                POINTS,
-            )
-        return self._attempted(word_of(work, state, word, query), rng, attempts)
+    def _made_of(self, found: Word, restart: Restart) -> Iterator[Word]:
+        """What the word of a new search becomes."""
+        candidate = self._shortened(found, restart, SLICE)
+        if candidate.cost < NEAR * self.best.cost:
+            candidate = self._attempted(candidate, SECOND_SLICE)
+        yield from self._considered(candidate)
 
-    def _attempted(self, word: Word, rng: np.random.Generator, attempts: int) -> Word:
+    def _shortened(self, word: Word, restart: Restart, attempts: int) -> Word:
+        """The word after rounds of the dynamic program and some attempts.
+
+        Every round looks at other points; first with words of few trims, then with all.
+        """
+        arrays = self.query.library.arrays.library
+        restarts = self.restarts
+        rounds = restarts.moving_rounds if self.query.moves else restarts.rounds
+        most = len(arrays.words) if restart.all_words else arrays.n_few
+        for n_words in sorted({arrays.n_few, most}):
+            for n in range(rounds):
+                if n > 0 and time.monotonic() >= self.deadline:
+                    return word
+                before, cut = word.cost, (GOLDEN * n) % 1.0
+                word = shortcut(self.query, word, n_words=n_words, cut=cut, deadline=self.deadline)
+                if n > 0 and before - word.cost < WORTH * before:
+                    break
+        return self._attempted(word, attempts)
+
+    def _attempted(self, word: Word, attempts: int) -> Word:
         """The word after random shortcuts and via-points."""
         query = self.query
         work, state = work_of(query, word)
@@ -262,76 +230,9 @@ class _Improvement:
         done = 0
         while done < attempts:
             n = min(TIMELY, attempts - done)
-            uniform, normal = rng.random((n, 6)), rng.standard_normal((n, 3))
+            uniform, normal = self.rng.random((n, 6)), self.rng.standard_normal((n, 3))
             if time.monotonic() < self.deadline:
-                attempt_all(
-                    query.library.arrays,
-                    task,
-                    scene,
-                    work,
-                    state,
-                    uniform,
-                    normal,
-                )
+                attempt_all(query.library.arrays, task, scene, work, state, uniform, normal)
                 self.attempts += n
             done += n
         return word_of(work, state, word, query)
-
-
-def work_of(query: LatticeQuery, word: Word) -> tuple[Work, IntArray]:
-    """Arrays that hold a word, and its state."""
-    n = max(256, 4 * len(word.trims) + 64)
-    work = Work(
-        start=np.array(query.start[:3]),
-        trims=np.zeros(n, dtype=np.int64),
-        durations=np.zeros(n),
-        poses=np.zeros((n + 1, 3)),
-        times=np.zeros(n + 1),
-        new_trims=np.zeros(n, dtype=np.int64),
-        new_durations=np.zeros(n),
-        middle_trims=np.zeros(6, dtype=np.int64),
-        middle_durations=np.zeros(6),
-        one=scratch_of(query.library.arrays.library),
-        two=scratch_of(query.library.arrays.library),
-        at=np.zeros((POINTS, 4)),
-        best=np.zeros(POINTS),
-        back=np.zeros(POINTS, dtype=np.int64),
-        by_trims=np.zeros((POINTS, 3), dtype=np.int64),
-        by_durations=np.zeros((POINTS, 3)),
-        legs=np.zeros(POINTS, dtype=np.int64),
-    )
-    work.trims[: len(word.trims)] = query.library.number_of[word.trims]
-    work.durations[: len(word.trims)] = word.durations
-    return work, np.array([len(word.trims)], dtype=np.int64)
-
-
-def word_of(work: Work, state: IntArray, word: Word, query: LatticeQuery) -> Word:
-    """The word that arrays hold."""
-    n = int(state[LENGTH])
-    held = Word(
-        trims=query.library.trims[work.trims[:n]],
-        durations=work.durations[:n].copy(),
-        goal=word.goal,
-    )
-    return with_cost(held, query)
-
-
-def improve_task(query: LatticeQuery, word: Word) -> ImproveTask:
-    """Limits and sizes of improving a word."""
-    library = query.library
-    twists = library.arrays.library.twists
-    speed = np.hypot(twists[:, 0], twists[:, 1]).max()
-    return ImproveTask(
-        tries=TRIES,
-        clock=float(query.problem.start_time),
-        most_time=float(query.most_time),
-        stay_until=query.stay_until,
-        most_trims=query.most_trims,
-        per_metre=float(library.per_metre),
-        radius=float(library.radius),
-        shortest_span=float(0.25 * library.radius / max(float(speed), 1e-9)),
-        snap=SNAP,
-        via=VIA,
-        spread=float(0.25 * library.radius),
-        free_heading=bool(query.free_heading[word.goal]),
-    )

@@ -5,10 +5,22 @@ from __future__ import annotations
 import functools
 import math
 
+import numpy as np
+
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.collision import Box, Obstacle
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.models import UserModel
+from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
+from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.improve import Patience, improve
+from maneuver_automaton.refinement.maneuver_lattice import maneuver_words
 from maneuver_automaton.search.lattice import first_plan
+from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.ready import smallest_lattice_query
 from maneuver_automaton.search.waiting import with_waits
+
+EXPANSIONS = 20
 
 
 @functools.cache
@@ -19,3 +31,53 @@ def load_lattice() -> None:
     assert found.word is not None
     with_waits(query, found.word)
     improve(query, found.word, deadline=math.inf, patience=Patience(attempts=1, passes=1))
+
+
+@functools.cache
+def load_maneuver_kernels() -> None:
+    """Have the kernels of the search over maneuvers ready: a cart that starts beside a wall."""
+    cart = UserModel(
+        name="cart",
+        group=SE2,
+        control_names=("push",),
+        reduced_names=("speed",),
+        velocity=lambda z, u: [z[0], 0.0, 0.1 * z[0]],
+        dynamics=lambda z, u: [u[0]],
+    )
+    rest, ahead = (
+        Trim(
+            name=name,
+            body_velocity=np.array([v, 0.0, 0.1 * v]),
+            control=np.zeros(1),
+            reduced_state=np.array([v]),
+        )
+        for name, v in (("rest", 0.0), ("ahead", 1.0))
+    )
+    step = SE2.exp([0.5, 0.0, 0.05]).pose
+    maneuvers = tuple(
+        Maneuver(
+            name=f"{a.name}-{b.name}",
+            source=a.name,
+            target=b.name,
+            displacement=step,
+            duration=1.0,
+            course=Trajectory(
+                time=np.array([0.0, 1.0]),
+                pose=np.array([np.zeros(3), step]),
+                reduced_state=np.array([a.reduced_state, b.reduced_state]),
+                control=np.zeros((2, 1)),
+            ),
+        )
+        for a, b in ((rest, ahead), (ahead, rest))
+    )
+    problem = Problem(
+        Automaton(cart, (rest, ahead), maneuvers),
+        np.zeros(3),
+        (Goal(pose=SE2.exp([3.0, 0.0, 0.3]).pose, trim="ahead"),),
+        start_trim="rest",
+        obstacles=(Obstacle(Box([1.0, 1.0], [0.0, 5.0])),),
+        footprint=(Box([0.4, 0.2]),),
+    )
+    query = lattice_query(problem, (0,))
+    for _ in maneuver_words(query, max_expansions=EXPANSIONS):
+        pass

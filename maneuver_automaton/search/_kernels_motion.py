@@ -12,7 +12,6 @@ import math
 
 from maneuver_automaton._compile import (
     bare_inner_kernel,
-    bare_kernel,
     inlined_kernel,
     merged_kernel,
 )
@@ -418,24 +417,3 @@ def is_still(lib, trim):
     """Whether a trim stands still: a rest may last as short as it likes."""
     twist = lib.library.twists[trim]
     return not (twist[0] != 0.0 or twist[1] != 0.0 or twist[2] != 0.0 or twist[3] != 0.0)
-
-
-@bare_kernel
-def word_free(scene, lib, start, edges, trims, durations, clock):
-    """Whether a whole word from `start` (4,) is free: each step an edge, or -1 and a coast."""
-    pose = (start[0], start[1], start[2], start[3])
-    for k in range(edges.shape[0]):
-        if edges[k] >= 0:
-            if not edge_free(scene, lib, edges[k], pose, clock):
-                return False
-            pose = edge_end(lib, edges[k], pose)
-            clock += lib.edge_time[edges[k]]
-        elif durations[k] > 0.0:
-            trim, t = trims[k], durations[k]
-            if not coast_inside(scene, lib, trim, pose, t):
-                return False
-            if not coast_free(scene, lib, trim, pose, t, clock):
-                return False
-            pose = coasted(lib, trim, pose, t)
-            clock += t
-    return True

@@ -91,6 +91,12 @@ class LatticeLibrary(NamedTuple):
     at_will: bool  # whether plans begin and end in any trim, and may end with a turn on the spot
     mirrored: bool  # whether the mirror image of every trim is a trim of the same cost
 
+    def edges_of(self, maneuvers: IntArray) -> IntArray:
+        """Edges of maneuvers of the automaton."""
+        order = np.argsort(self.edge_maneuver)
+        places = np.searchsorted(self.edge_maneuver, maneuvers, sorter=order)
+        return np.asarray(order[places], dtype=np.int64)
+
 
 class EdgeArrays(NamedTuple):
     """Maneuvers between classes of trims, those out of one class next to each other."""

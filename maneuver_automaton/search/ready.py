@@ -29,7 +29,6 @@ from maneuver_automaton.words.word import Word
 if TYPE_CHECKING:
     from maneuver_automaton.search.lattice_query import LatticeQuery
 
-EXPANSIONS = 20  # of the search over maneuvers
 PATIENCE = 120.0  # [s] for the second process
 
 
@@ -80,65 +79,6 @@ def smallest_lattice_query() -> LatticeQuery:
     grid = distance_grid(query.world, query.box, query.goals, query.start)
     distances(grid, query.world.arrays.field, np.zeros((1, 2)))
     return query
-
-
-@functools.cache
-def load_maneuver_kernels() -> None:
-    """Have the kernels of the search over maneuvers ready: a cart that starts beside a wall."""
-    from maneuver_automaton.collision import Box, Obstacle
-    from maneuver_automaton.groups import SE2
-    from maneuver_automaton.models import UserModel
-    from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
-    from maneuver_automaton.search.lattice_query import lattice_query
-    from maneuver_automaton.search.maneuver_lattice import maneuver_words
-    from maneuver_automaton.search.maneuver_shortcuts import word_is_free
-
-    cart = UserModel(
-        name="cart",
-        group=SE2,
-        control_names=("push",),
-        reduced_names=("speed",),
-        velocity=lambda z, u: [z[0], 0.0, 0.1 * z[0]],
-        dynamics=lambda z, u: [u[0]],
-    )
-    rest, ahead = (
-        Trim(
-            name=name,
-            body_velocity=np.array([v, 0.0, 0.1 * v]),
-            control=np.zeros(1),
-            reduced_state=np.array([v]),
-        )
-        for name, v in (("rest", 0.0), ("ahead", 1.0))
-    )
-    step = SE2.exp([0.5, 0.0, 0.05]).pose
-    maneuvers = tuple(
-        Maneuver(
-            name=f"{a.name}-{b.name}",
-            source=a.name,
-            target=b.name,
-            displacement=step,
-            duration=1.0,
-            course=Trajectory(
-                time=np.array([0.0, 1.0]),
-                pose=np.array([np.zeros(3), step]),
-                reduced_state=np.array([a.reduced_state, b.reduced_state]),
-                control=np.zeros((2, 1)),
-            ),
-        )
-        for a, b in ((rest, ahead), (ahead, rest))
-    )
-    problem = Problem(
-        Automaton(cart, (rest, ahead), maneuvers),
-        np.zeros(3),
-        (Goal(pose=SE2.exp([3.0, 0.0, 0.3]).pose, trim="ahead"),),
-        start_trim="rest",
-        obstacles=(Obstacle(Box([1.0, 1.0], [0.0, 5.0])),),
-        footprint=(Box([0.4, 0.2]),),
-    )
-    query = lattice_query(problem, (0,))
-    for incumbent in maneuver_words(query, max_expansions=EXPANSIONS):
-        if incumbent.word is not None:
-            word_is_free(query, incumbent.word)
 
 
 def compile_the_rest() -> None:

@@ -21,8 +21,8 @@ from maneuver_automaton.planning import plan
 from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.planning.plan import prepare
 from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.refinement.maneuver_lattice import maneuver_words, plan_of
 from maneuver_automaton.search.lattice_query import lattice_query
-from maneuver_automaton.search.maneuver_lattice import maneuver_words, plan_of
 
 NODES = 61
 CASES = (

@@ -19,8 +19,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import Box, Obstacle
 from maneuver_automaton.problem import Bounds, Goal, Problem
+from maneuver_automaton.refinement.maneuver_lattice import plan_of
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
-from maneuver_automaton.search.maneuver_lattice import plan_of
 from tests.benchmarks import cases
 from tests.benchmarks.tables import show
 from tests.search.automata import inertial_unicycle, truck_with_trailer

@@ -14,11 +14,11 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.search import maneuver_lattice
+from maneuver_automaton.refinement import maneuver_lattice
+from maneuver_automaton.refinement.maneuver_lattice import maneuver_words, plan_of
 from maneuver_automaton.search.lattice_pass import pass_of
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_task import Resolution, task_of
-from maneuver_automaton.search.maneuver_lattice import maneuver_words, plan_of
 from maneuver_automaton.search.maneuver_reversal import forward_word, reversed_query
 from tests.inertia import unicycle_automaton
 from tests.search.cases import compiled_only

@@ -6,9 +6,20 @@ import math
 import time
 from dataclasses import dataclass
 
+import numpy as np
+
+from maneuver_automaton._compile import bare_kernel
+from maneuver_automaton.refinement.maneuver_lattice import maneuver_words
+from maneuver_automaton.search._kernels_motion import (
+    coast_free,
+    coast_inside,
+    coasted,
+    edge_end,
+    edge_free,
+)
 from maneuver_automaton.search.lattice_query import LatticeQuery
-from maneuver_automaton.search.maneuver_lattice import maneuver_words
 from maneuver_automaton.search.result import SearchStatus
+from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word
 
 
@@ -58,3 +69,43 @@ def search_maneuvers(
         found_s=tuple(s for _, _, s in found),
         expansions=total,
     )
+
+
+def word_is_free(query: LatticeQuery, word: Word) -> bool:
+    """Whether a word is proven free all the way, at the times when it is where."""
+    library = query.library
+    edges = np.full(len(word.trims), -1)
+    led = np.flatnonzero(word.transitions != SWITCH)
+    edges[led + 1] = library.edges_of(word.transitions[led])
+    return bool(
+        word_free(
+            query.scene(),
+            library.arrays,
+            np.array(query.start),
+            edges,
+            library.number_of[word.trims],
+            np.array(word.durations),
+            float(query.start_time),
+        )
+    )
+
+
+@bare_kernel
+def word_free(scene, lib, start, edges, trims, durations, clock):
+    """Whether a whole word from `start` (4,) is free: each trim, and the edge to it, or -1."""
+    pose = (start[0], start[1], start[2], start[3])
+    for k in range(edges.shape[0]):
+        if edges[k] >= 0:
+            if not edge_free(scene, lib, edges[k], pose, clock):
+                return False
+            pose = edge_end(lib, edges[k], pose)
+            clock += lib.edge_time[edges[k]]
+        if durations[k] > 0.0:
+            trim, t = trims[k], durations[k]
+            if not coast_inside(scene, lib, trim, pose, t):
+                return False
+            if not coast_free(scene, lib, trim, pose, t, clock):
+                return False
+            pose = coasted(lib, trim, pose, t)
+            clock += t
+    return True

@@ -17,9 +17,8 @@ from maneuver_automaton.collision import Box, Motion, Obstacle
 from maneuver_automaton.errors import UnknownTrim
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds, Goal, Problem
+from maneuver_automaton.refinement.maneuver_lattice import plan_of
 from maneuver_automaton.search.lattice_query import lattice_query
-from maneuver_automaton.search.maneuver_lattice import plan_of
-from maneuver_automaton.search.maneuver_shortcuts import word_is_free
 from maneuver_automaton.search.result import SearchStatus
 from tests.search.automata import (
     inertial_unicycle,
@@ -28,7 +27,7 @@ from tests.search.automata import (
     with_straight_courses,
 )
 from tests.search.cases import compiled_only
-from tests.search.maneuver_searches import search_maneuvers
+from tests.search.maneuver_searches import search_maneuvers, word_is_free
 
 pytestmark = compiled_only  # whole searches; their kernels have tests of their own
 

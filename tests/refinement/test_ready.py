@@ -6,14 +6,21 @@ import os
 
 import pytest
 
+from maneuver_automaton.refinement import _kernels_improve as attempts
+from maneuver_automaton.refinement import _kernels_points as points
+from maneuver_automaton.refinement.ready import load_maneuver_kernels
 from maneuver_automaton.search import _kernels_lattice as lattice
-from maneuver_automaton.search import _kernels_maneuver_shortcuts as shortcuts
-from maneuver_automaton.search import _kernels_motion as motion
-from maneuver_automaton.search.ready import load_maneuver_kernels
 from tests.search.maneuver_searches import search_maneuvers
 from tests.search.test_maneuver_lattice import query
 
-KERNELS = (lattice.begin, lattice.expand, shortcuts.shorten_to, motion.word_free)
+KERNELS = (
+    lattice.begin,
+    lattice.expand,
+    attempts.attempt_all,
+    points.begin_program,
+    points.join_points,
+    points.take_program,
+)
 
 
 @pytest.mark.skipif(bool(os.environ.get("NUMBA_DISABLE_JIT")), reason="nothing is compiled")

@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.refinement.improve import Improvement, Patience
+from maneuver_automaton.refinement.restarts import FAST, FAST_WEIGHT, FINER, FIRST_CHUNK
 from maneuver_automaton.search.distance_grid import DistanceGrid, distance_grid
 from maneuver_automaton.search.lattice import Schedule, first_word
-from maneuver_automaton.search.lattice_memory import SearchArrays
-from maneuver_automaton.search.lattice_pass import LEAST, Pass, pass_of
+from maneuver_automaton.search.lattice_pass import Pass, pass_of
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_task import Resolution
 from maneuver_automaton.search.maneuver_reversal import forward_word, reversed_query
-from maneuver_automaton.search.maneuver_shortcuts import shortened
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.words.word import Word, with_price
 from maneuver_automaton.words.word import plan_of as plan_of_word
 
-FIRST_CHUNK = 128  # expansions
 MOST_CHUNK = 16384
 FIRST: tuple[tuple[int, tuple[Resolution, ...]], ...] = (
     # after so many expansions of all passes together, or when all are exhausted
@@ -32,23 +31,7 @@ FIRST: tuple[tuple[int, tuple[Resolution, ...]], ...] = (
     (8000, (Resolution(scale=0.5, durations=0.5, weight=1.5, backwards=True),)),
     (40000, (Resolution(scale=0.25, durations=0.25, margin=0.1),)),
 )
-LATER: tuple[Resolution, ...] = (
-    Resolution(weight=1.5),
-    Resolution(weight=1.2),
-    Resolution(weight=1.0),
-    Resolution(scale=0.5, durations=0.5, weight=1.2),
-    Resolution(scale=0.5, durations=0.5, weight=1.0),
-)
-FAST = 1.5  # length scales of the tightest turn from which on there are passes of its size
-FAST_WEIGHT = 1.2  # of these: there is little to be decided at a place, so that greed leads astray
-IN_SPACE: tuple[Resolution, ...] = (
-    # one more dimension: coarse cells and little greed find the way, fine ones do not end
-    Resolution(scale=12.0, durations=4.0, weight=1.0, most=40000),
-    Resolution(scale=8.0, durations=3.0, weight=1.0, most=60000),
-    Resolution(scale=4.0, durations=2.0, weight=1.2, most=60000),
-    Resolution(scale=4.0, durations=2.0, weight=1.1, most=100000),
-    Resolution(scale=6.0, durations=2.0, weight=1.0, most=100000),
-)
+TO_THE_END = Patience(passes=2**62)
 
 
 class Incumbent(NamedTuple):
@@ -105,10 +88,18 @@ def maneuver_words(
         if better_share < 1.0:
             now = time.monotonic()
             deadline = now + better_share * (deadline - now)
-        for better, more in _better(query, grid, word, room=room - first, deadline=deadline):
-            total = first + more
-            if better is not None:
-                yield Incumbent(better, total, SearchStatus.FOUND)
+        one = Improvement(
+            query,
+            word,
+            grids=lambda: (grid,),
+            deadline=deadline,
+            patience=TO_THE_END,
+            max_expansions=room - first,
+            restarts=FINER,
+        )
+        for better in one.gains():
+            yield Incumbent(better, first + one.expansions, SearchStatus.FOUND)
+        total = first + one.expansions
     yield Incumbent(None, total, ended(total), nearest)
 
 
@@ -190,52 +181,3 @@ def _passes(query: LatticeQuery, resolution: Resolution, grid: DistanceGrid) -> 
         return [pass_of(query, resolution, grid=grid)]
     back = reversed_query(query)
     return [] if back is None else [pass_of(back, resolution, grid=_grid(back))]
-
-
-def _better(
-    query: LatticeQuery, grid: DistanceGrid, best: Word, *, room: int, deadline: float
-) -> Iterator[tuple[Word | None, int]]:
-    """Shortcuts, then passes of falling weight below the cost of the best word, one by one."""
-    total = 0
-    arrays: SearchArrays | None = None
-    coarse = IN_SPACE if query.problem.start.size > 3 else ()
-    wide = query.library.turns
-    fast = tuple(Resolution(scale=wide, durations=wide, weight=w) for w in (FAST_WEIGHT, 1.0))
-    later = LATER if wide <= FAST else (*fast, *LATER)
-    for resolutions, all_words in ((coarse, False), (later, True)):
-        for shorter in _shorter(query, best, resolutions, all_words=all_words, deadline=deadline):
-            best = shorter
-            yield best, total
-        for each in resolutions:
-            resolution = replace(each, stop=False, ends_early=True)
-            one = pass_of(query, resolution, grid=grid, arrays=arrays)
-            one.chunk = FIRST_CHUNK
-            while one.may_go_on and total < room and time.monotonic() < deadline:
-                before = one.expansions
-                word = one.run(min(one.chunk, room - total), best.cost, deadline=deadline)
-                total += one.expansions - before
-                one.chunk = min(2 * one.chunk, MOST_CHUNK)
-                if word is None or not word.cost < best.cost * (1.0 - LEAST):
-                    continue
-                best = word
-                yield best, total
-                for shorter in _shorter(
-                    query, best, resolutions, all_words=all_words, deadline=deadline
-                ):
-                    best = shorter
-                    yield best, total
-            arrays = one.arrays
-            yield None, total
-
-
-def _shorter(
-    query: LatticeQuery,
-    best: Word,
-    resolutions: Sequence[Resolution],
-    *,
-    all_words: bool,
-    deadline: float,
-) -> Iterator[Word]:
-    """Shortcuts of the best word, where passes are to come."""
-    if resolutions:
-        yield from shortened(query, best, all_words=all_words, deadline=deadline)
