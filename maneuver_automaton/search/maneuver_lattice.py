@@ -39,8 +39,9 @@ LATER: tuple[Resolution, ...] = (
     Resolution(scale=0.5, durations=0.5, weight=1.2),
     Resolution(scale=0.5, durations=0.5, weight=1.0),
 )
-FAST = 1.5  # length scales of the tightest turn from which on there are passes of its size
-FAST_WEIGHT = 1.2  # of these: there is little to be decided at a place, so that greed leads astray
+FAST = 1.5  # length scales of the tightest turn from which on there is a pass of its size
+FAST_WEIGHT = 1.0  # of that: a fast vehicle cannot make up for greed once it is near the goal
+FAST_ALONE = 2000  # expansions until others run in turn with it
 IN_SPACE: tuple[Resolution, ...] = (
     # one more dimension: coarse cells and little greed find the way, fine ones do not end
     Resolution(scale=12.0, durations=4.0, weight=1.0, most=40000),
@@ -173,15 +174,17 @@ def _first(
 def _first_stages(query: ManeuverQuery) -> tuple[tuple[int, tuple[Resolution, ...]], ...]:
     """Which passes begin after how many expansions of all of them together.
 
-    A vehicle that turns widely for its size gets passes whose cells and coasts are as wide: it
-    decides little from one length of its body to the next.
+    A vehicle that turns widely for its size begins with a pass whose cells and coasts are as wide:
+    it decides little from one length of its body to the next.
     """
+    fast = _fast(query)
+    return ((0, fast), (FAST_ALONE, FIRST[0][1]), *FIRST[1:]) if fast else FIRST
+
+
+def _fast(query: ManeuverQuery) -> tuple[Resolution, ...]:
+    """The resolution of a vehicle that turns widely for its size; none for others."""
     wide = query.library.turns
-    stages = list(FIRST)
-    if wide > FAST:
-        fast = Resolution(scale=wide, durations=wide, weight=FAST_WEIGHT)
-        stages.insert(1, (FIRST[1][0], (fast,)))
-    return tuple(stages)
+    return (Resolution(scale=wide, durations=wide, weight=FAST_WEIGHT),) if wide > FAST else ()
 
 
 def _passes(query: ManeuverQuery, resolution: Resolution, grid: DistanceGrid) -> list[Pass]:
@@ -200,10 +203,7 @@ def _better(
     total = 0
     arrays: SearchArrays | None = None
     coarse = IN_SPACE if query.start.size > 3 else ()
-    wide = query.library.turns
-    fast = tuple(Resolution(scale=wide, durations=wide, weight=w) for w in (FAST_WEIGHT, 1.0))
-    later = LATER if wide <= FAST else (*fast, *LATER)
-    for resolutions, all_words in ((coarse, False), (later, True)):
+    for resolutions, all_words in ((coarse, False), ((*_fast(query), *LATER), True)):
         for shorter in _shorter(query, best, resolutions, all_words=all_words, deadline=deadline):
             best = shorter
             yield best, total
