@@ -216,7 +216,8 @@ class ManeuverQuery:
     @property
     def costs_are_times(self) -> bool:
         """Whether what a motion costs is how long it lasts, at one price."""
-        rates = self.transfer.arrays.rates
+        arrays = self.transfer.arrays
+        rates = arrays.rates[: arrays.n_trims]  # the last row is the turn of a free heading
         lasting = np.array([one.duration for one in self.automaton.maneuvers])
         price = float(rates[0])
         close = functools.partial(np.allclose, rtol=1e-9, atol=1e-12)

@@ -88,6 +88,17 @@ def test_a_longest_time_is_kept_among_obstacles(usual, share):
     assert_free(result.plan)
 
 
+def test_words_may_be_late_at_first_where_cheaper_ones_are_quicker():
+    """What shortcuts and polishing make of them is in time; a word by effort is late for good."""
+    limit = Horizon(max_time=5.0)
+    by_time = maneuver_problem_query(posed(horizon=limit, cost=Cost(time=2.0)), (0,))
+    assert by_time.costs_are_times
+    assert (by_time.most_time, by_time.searched_time) == (5.0, np.inf)
+    by_effort = maneuver_problem_query(posed(horizon=limit, cost=Cost(time=2.0, effort=1.0)), (0,))
+    assert not by_effort.costs_are_times
+    assert (by_effort.most_time, by_effort.searched_time) == (5.0, 5.0)
+
+
 def test_a_fixed_time_is_kept_among_obstacles(usual):
     total = 1.4 * usual.plan.duration
     result = plan(posed(horizon=Horizon(time=total)), time_limit=60.0)
