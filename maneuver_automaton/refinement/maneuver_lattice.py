@@ -31,6 +31,7 @@ FIRST: tuple[tuple[int, tuple[Resolution, ...]], ...] = (
     (8000, (Resolution(scale=0.5, durations=0.5, weight=1.5, backwards=True),)),
     (40000, (Resolution(scale=0.25, durations=0.25, margin=0.1),)),
 )
+FAST_ALONE = 2000  # expansions until others run in turn with the one of a fast vehicle
 TO_THE_END = Patience(passes=2**62)
 
 
@@ -163,15 +164,17 @@ def _first(
 def _first_stages(query: LatticeQuery) -> tuple[tuple[int, tuple[Resolution, ...]], ...]:
     """Which passes begin after how many expansions of all of them together.
 
-    A vehicle that turns widely for its size gets passes whose cells and coasts are as wide: it
-    decides little from one length of its body to the next.
+    A vehicle that turns widely for its size begins with a pass whose cells and coasts are as wide:
+    it decides little from one length of its body to the next.
     """
+    fast = _fast(query)
+    return ((0, fast), (FAST_ALONE, FIRST[0][1]), *FIRST[1:]) if fast else FIRST
+
+
+def _fast(query: LatticeQuery) -> tuple[Resolution, ...]:
+    """The resolution of a vehicle that turns widely for its size; none for others."""
     wide = query.library.turns
-    stages = list(FIRST)
-    if wide > FAST:
-        fast = Resolution(scale=wide, durations=wide, weight=FAST_WEIGHT)
-        stages.insert(1, (FIRST[1][0], (fast,)))
-    return tuple(stages)
+    return (Resolution(scale=wide, durations=wide, weight=FAST_WEIGHT),) if wide > FAST else ()
 
 
 def _passes(query: LatticeQuery, resolution: Resolution, grid: DistanceGrid) -> list[Pass]:
