@@ -37,22 +37,9 @@ FAULTS: dict[str, dict[str, str]] = {
     "no lower bound above zero where the world moves": {
         "lower_bound": "boat_in_current",
     },
-    "no plan past a disc is found": {
-        "discs": "single_track",
-        "free_heading_among_obstacles": "single_track",
-        "max_time_among_obstacles": "single_track",
-        "dear_switch_among_obstacles": "single_track",
-        "alternatives_among_obstacles": "single_track",
-        "same_plan_twice_among_obstacles": "single_track",
-        "planner": "single_track",
-        "moved_problem_among_obstacles": "single_track",
-        "loop_obstacles": "single_track",
-        "resume_among_obstacles": "single_track",
-        "polishing": "single_track",
-    },
     "no plan within a binding time is found": {
         "max_time": "helicopter",
-        "max_time_among_obstacles": "car_with_trailer hovercraft helicopter user",
+        "max_time_among_obstacles": "car_with_trailer hovercraft helicopter single_track user",
     },
     "zones are entered for the whole way or not at all": {
         "zones_crossed": "hovercraft",

@@ -155,7 +155,7 @@ def test_it_says_how_near_it_came():
 @pytest.mark.parametrize("aside", [0.0, 1.5, -1.5])
 @pytest.mark.parametrize("along", [40.0, 60.0, 80.0])
 def test_a_fast_car_passes_a_box(along, aside):
-    """Its turns are wide for its size: cells and coasts of that width find the way."""
+    """Its turns are wide for its size: cells and coasts of that width find the way, soon."""
     box = Box([3.0, 3.0], [along, 0.1 * along + aside])
     problem = Problem(
         load_stock_library("single_track"),
@@ -166,9 +166,9 @@ def test_a_fast_car_passes_a_box(along, aside):
         footprint=Box([4.5, 1.6]),
     )
     query = lattice_query(problem, (0,))
-    found = next(one for one in maneuver_words(query, max_expansions=60_000))
+    found = next(one for one in maneuver_words(query, max_expansions=5000))
     assert found.word is not None
-    assert found.word.duration < 8.0
+    assert found.word.duration < 6.5
 
 
 def test_a_zone_is_crossed_slowly_and_left_fast():
