@@ -37,10 +37,6 @@ FAULTS: dict[str, dict[str, str]] = {
     "no lower bound above zero where the world moves": {
         "lower_bound": "boat_in_current",
     },
-    "no plan within a binding time is found": {
-        "max_time": "helicopter",
-        "max_time_among_obstacles": "car_with_trailer hovercraft helicopter single_track user",
-    },
     "zones are entered for the whole way or not at all": {
         "zones_crossed": "hovercraft",
     },
