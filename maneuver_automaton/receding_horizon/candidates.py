@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.planning.plan import has_inertia
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.log import Origin, first_part
 from maneuver_automaton.receding_horizon.pace import at_best_pace, base_name
@@ -41,13 +40,13 @@ def candidate(
 ) -> Candidate:
     """A plan at its best pace, if that is asked for, and in the order that costs most at first.
 
-    The order stays where another one drives elsewhere and something is in the way, or where trims
-    are not switched at will.
+    The order stays where another one drives elsewhere and something is in the way, or where there
+    are maneuvers.
     """
     if settings.retimed:
         plan = at_best_pace(here, plan)
     cost = here.cost_of(plan)
-    fixed = bool(here.obstacles or here.zones) or has_inertia(here)
+    fixed = bool(here.obstacles or here.zones or any(plan.maneuvers))
     ordered = plan if fixed else costliest_first(plan, here.rates_of(plan))
     if ordered is not plan:
         dearer = here.cost_of(ordered)

@@ -14,7 +14,6 @@ from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING, with_samples_at
 from maneuver_automaton.collision import AnyObstacle, Shape, as_obstacles
-from maneuver_automaton.planning.plan import has_inertia
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.receding_horizon.candidates import cost_until, is_rest_of
 from maneuver_automaton.receding_horizon.decision import StepSearch, decide
@@ -22,7 +21,11 @@ from maneuver_automaton.receding_horizon.guarantees import broken, promises, too
 from maneuver_automaton.receding_horizon.log import Deed, Origin, Step, Violation
 from maneuver_automaton.receding_horizon.pace import is_uniform
 from maneuver_automaton.receding_horizon.searches import load_search, started
-from maneuver_automaton.receding_horizon.settings import Settings, filling_rest
+from maneuver_automaton.receding_horizon.settings import (
+    Settings,
+    filling_rest,
+    switches_at_will,
+)
 from maneuver_automaton.receding_horizon.situation import Chosen, Situation
 
 
@@ -119,6 +122,7 @@ class RecedingHorizon:
             hold=hold,
             retimed=retimed,
             pad=filling_rest(problem),
+            at_will=switches_at_will(problem),
             look_ahead=look_ahead,
             stand=stand,
         )
@@ -276,7 +280,7 @@ class RecedingHorizon:
                 uniform=retimed and is_uniform(step.plan, here.cost),
                 moved=here.moves or now.changed,
             )
-        steady = not (here.moves or retimed or has_inertia(here) or here.zones)
+        steady = self.promises.steady and not (here.moves or retimed)
         if steady and step.deed.leads and not step.arrived:
             yield from too_cheap(self.promises, step)
 

@@ -12,7 +12,6 @@ from dataclasses import replace
 from typing import Protocol
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.planning.plan import has_inertia
 from maneuver_automaton.receding_horizon.candidates import Candidate
 from maneuver_automaton.receding_horizon.holding import holding
 from maneuver_automaton.receding_horizon.log import Deed, Guarantee, Origin
@@ -85,7 +84,7 @@ def _there(now: Situation, search: StepSearch) -> Chosen | None:
     index = now.exactly_at()
     inside = now.goal_within(now.here.start) if now.settings.hold and now.may_rest else None
     if index is None and inside is not None:
-        held = None if has_inertia(now.here) else holding(now.here, now.settings, inside)
+        held = holding(now.here, now.settings, inside)
         if held is not None and search.is_safe(held.plan):
             return replace(now.as_chosen(held, held.cost), arrived=True)
         index = inside
@@ -112,7 +111,7 @@ def _kept(now: Situation, search: StepSearch) -> Candidate | None:
         safe.append(now.candidate(plan, last.goal_index, origin))
         if search.improves or not now.is_detour(plan):
             return safe[-1]
-    rest = now.rest_within() if has_inertia(now.here) or not safe else None
+    rest = now.rest_within() if not (safe and now.settings.at_will) else None
     if rest is not None and search.is_safe(rest):
         return now.candidate(rest, last.goal_index, Origin.SHIFTED)
     return min(safe, key=lambda one: one.cost, default=None)

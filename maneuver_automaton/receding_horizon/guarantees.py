@@ -10,9 +10,9 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.planning.plan import has_inertia
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.log import Guarantee, Step, Violation
+from maneuver_automaton.receding_horizon.settings import switches_at_will
 from maneuver_automaton.search.limits import rest_rate
 
 ACCURACY = 1e-9  # relative, of values
@@ -29,6 +29,7 @@ class Promises:
     horizon: float | None  # T [s], None if free
     step: float  # delta [s]
     switch: float = 0.0  # what it costs to switch to the rest that fills a fixed time
+    steady: bool = True  # whether it costs least_rate or more at every moment to move
 
     def most_steps(self, value: float) -> int | None:
         """The paper's bound on the number of steps from a state of that value; None if none.
@@ -83,8 +84,8 @@ def promises(problem: Problem, *, step: float) -> Promises:
     moving = problem.automaton.body_velocities.any(axis=1)
     rates = problem.rates
     rest = rest_rate(problem) or 0.0
-    steady = moving.any() and not (has_inertia(problem) or problem.zones)
-    least = float(rates[moving].min()) - rest if steady else 0.0
+    steady = switches_at_will(problem) and not problem.zones
+    least = float(rates[moving].min()) - rest if steady and moving.any() else 0.0
     cost = problem.cost
     fixed = problem.horizon.time is not None
     effort = 0.0
@@ -98,6 +99,7 @@ def promises(problem: Problem, *, step: float) -> Promises:
         horizon=problem.horizon.time,
         step=step,
         switch=cost.switch if isinstance(cost, Cost) and fixed else 0.0,
+        steady=steady,
     )
 
 

@@ -25,8 +25,10 @@ def holding(here: Problem, settings: Settings, goal_index: int) -> Candidate | N
     """A plan to the middle of a goal's set within a step or a few.
 
     The cheapest that stays in the set all along and does not linger at its edge, otherwise one that
-    is inside whenever the loop closes; None if there is neither.
+    is inside whenever the loop closes; None if there is neither, or trims are not switched at will.
     """
+    if not settings.at_will:
+        return None
     goal = here.goals[goal_index]
     middle = replace(goal, tolerance_m=0.0, tolerance_rad=0.0)
     second: Candidate | None = None

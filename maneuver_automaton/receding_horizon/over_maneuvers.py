@@ -18,13 +18,12 @@ from maneuver_automaton.planning import plan as planned
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.checking import what_is_hit
 from maneuver_automaton.planning.in_space import climbs_among_obstacles
-from maneuver_automaton.planning.plan import has_inertia
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon.candidates import Candidate, allowed, bounded
 from maneuver_automaton.receding_horizon.failsafe import last_event
 from maneuver_automaton.receding_horizon.log import Deed, Origin
 from maneuver_automaton.receding_horizon.mitigation import Mitigation
-from maneuver_automaton.receding_horizon.settings import EXACT
+from maneuver_automaton.receding_horizon.settings import EXACT, switches_at_will
 from maneuver_automaton.receding_horizon.shifting import followed_by, moves_on, rested
 from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.refinement.fitting import fitted_plans
@@ -119,11 +118,10 @@ class OverManeuvers:
         return replace(onward, start_trim=name)
 
     def otherwise(self) -> Candidate | None:
-        """What the lattice finds; where trims are switched at will, and at first, a planner."""
+        """What the lattice finds, or a planner, which is asked alone at first."""
         first = self.now.last is None
         found = self._on_lattice() if self.anew or not first else None
-        plans = first or not has_inertia(self.here)
-        return self._planned() if found is None and plans else found
+        return self._planned() if found is None else found
 
     def _on_lattice(self) -> Candidate | None:
         problem = self._onward()
@@ -150,13 +148,16 @@ class OverManeuvers:
         return best
 
     def _planned(self) -> Candidate | None:
-        """The plan that a planner finds from here."""
-        now, limit = self.now, self.now.longest
-        result = planned(now.here, time_limit=max(now.deadline - time.monotonic(), 1e-3))
-        plan, index = result.plan, result.goal_index
-        if plan is None or index is None:
+        """The plan that a planner finds from the end of what is committed."""
+        now, limit, problem = self.now, self.now.longest, self._onward()
+        if problem is None:
+            return None
+        result = planned(problem, time_limit=max(now.deadline - time.monotonic(), 1e-3))
+        if result.plan is None or result.goal_index is None:
             self.reason = f": {result.reason}"
-        elif limit is not None and plan.duration > limit * (1.0 + EXACT):
+            return None
+        plan, index = now.whole(result.plan), result.goal_index
+        if limit is not None and plan.duration > limit * (1.0 + EXACT):
             self.reason = ": it takes too long"
         elif self.here.moves and not self.is_safe(plan):
             self.reason = ": the goal does not stay free after arrival"
@@ -238,8 +239,9 @@ class OverManeuvers:
 def needs_maneuvers(problem: Problem) -> bool:
     """Whether plans are words with maneuvers, or obey what the other searches do not know."""
     unfilled = problem.horizon.time is not None and problem.automaton.rest is None
-    zones = bool(problem.zones)
-    return has_inertia(problem) or zones or unfilled or climbs_among_obstacles(problem)
+    if not switches_at_will(problem) or unfilled:
+        return True
+    return bool(problem.zones) or climbs_among_obstacles(problem)
 
 
 def with_trims_at_ends(problem: Problem) -> Problem:

@@ -11,9 +11,9 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.planning.plan import has_inertia
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Horizon, Problem
+from maneuver_automaton.receding_horizon.settings import switches_at_will
 from maneuver_automaton.receding_horizon.shifting import merged, without_nothing
 from maneuver_automaton.search.insertion import sub_library
 from maneuver_automaton.search.result import plan_of
@@ -56,7 +56,7 @@ def reanchored(
     same = same_word(problem, plan, goal, pad=pad, under_way=under_way)
     if same is not None:
         yield same
-    if not has_inertia(problem):
+    if switches_at_will(problem):
         yield from rejoining(problem, plan, goal, pad=pad)
     elif goal.tolerance_m or goal.tolerance_rad:
         from_here = replace(plan, start=problem.start)

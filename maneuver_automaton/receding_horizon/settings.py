@@ -26,6 +26,7 @@ class Settings:
     hold: bool = False
     retimed: bool = False
     pad: Trim | None = None  # the rest that prolongs a plan
+    at_will: bool = True  # trims are: nothing is ever committed, and a motion may end anywhere
     look_ahead: float = 60.0  # [s] that a fail-safe trajectory must be free
     stand: float = 2.0  # [s] that the goal must stay free after arrival
 
@@ -53,7 +54,7 @@ class Settings:
             )
         if not self.retimed:
             return
-        if has_inertia(problem) or problem.zones or climbs_among_obstacles(problem):
+        if not self.at_will or problem.zones or climbs_among_obstacles(problem):
             raise ValueError(
                 "receding horizon: retimed is for vehicles without inertia, and no zones or "
                 "heights: at another pace a maneuver leads elsewhere, and a zone may forbid it"
@@ -74,13 +75,21 @@ class Settings:
             )
 
 
+def switches_at_will(problem: Problem) -> bool:
+    """Whether the vehicle may change to any trim of its library, and so stop, at any moment.
+
+    This is the one place of the room where a problem is asked for it.
+    """
+    return not has_inertia(problem)
+
+
 def filling_rest(problem: Problem) -> Trim | None:
     """The cheapest rest of the library, which fills a fixed time; None if no plan may end in it.
 
     Where trims are not switched at will, a plan ends in the goal's trim.
     """
     moving = [not problem.last_trim(goal).is_rest for goal in problem.goals if goal.trim]
-    if has_inertia(problem) and any(moving):
+    if any(moving) and not switches_at_will(problem):
         return None
     still = np.flatnonzero(~problem.automaton.body_velocities.any(axis=1))
     if not still.size:

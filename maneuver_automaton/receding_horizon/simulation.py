@@ -14,7 +14,6 @@ from maneuver_automaton.automaton.cutting import NOTHING, tail_of
 from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.collision.blocked import too_close
 from maneuver_automaton.groups import group_of
-from maneuver_automaton.planning.plan import has_inertia
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.controller import RecedingHorizon
@@ -101,11 +100,6 @@ def simulate(
     upset = Disturbance() if disturbance is None else disturbance
     upset = checked(upset, problem.start.size)
     random = draws(upset, problem.start.size)
-    if upset.twist_scale is not None and has_inertia(problem):
-        raise ValueError(
-            "receding horizon: disturbance: twist_scale is for vehicles without inertia: "
-            "a maneuver is driven as its model says"
-        )
     controller = RecedingHorizon(
         problem,
         step=step,
@@ -118,6 +112,12 @@ def simulate(
         look_ahead=look_ahead,
         stand=stand,
     )
+    at_will = controller.settings.at_will
+    if upset.twist_scale is not None and not at_will:
+        raise ValueError(
+            "receding horizon: disturbance: twist_scale is for vehicles without inertia: "
+            "a maneuver is driven as its model says"
+        )
     begin = 0 if last is None else last.number + 1
     for _ in range(begin):  # the numbers that the steps before have used
         next(random)
@@ -128,8 +128,8 @@ def simulate(
     log: list[Step] = []
     poses, times, driven, audits = [where], [_begin(problem, last)], [], []
     inside: list[bool] = [_inside(problem, where)]
-    stops = controller.arrival is None and not has_inertia(problem)  # where it likes
-    stands = not has_inertia(problem) or problem.first_trim.is_rest
+    stops = controller.arrival is None and at_will  # where it likes
+    stands = at_will or problem.first_trim.is_rest
     arrived = inside[-1] and (stands if last is None else _arrives(last, stops=stops))
     for number in range(begin, begin + steps):
         if arrived and not stay:

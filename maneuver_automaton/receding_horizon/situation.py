@@ -11,7 +11,6 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING, committed, head_of, joined
-from maneuver_automaton.planning.plan import has_inertia
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.candidates import Candidate, candidate, within
@@ -139,7 +138,7 @@ class Situation:
         if self.rest is not None and not moves_on(self.rest):
             return True
         fixed = self.here.horizon.time is not None and self.settings.pad is None
-        return not (has_inertia(self.here) or fixed)
+        return self.settings.at_will and not fixed
 
     def given(self, first: Plan) -> Chosen:
         """The plan that the first step was told to apply."""
