@@ -14,6 +14,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.groups import group_of
@@ -33,6 +34,7 @@ HEADINGS = 24  # a free heading is tried at so many
 SLACK = 0.1  # share by which a grid value may be dearer than what is asked for, and yet be refined
 EXPANSIONS_A_WORD = 8  # steering calls, or expansions, in place of solving one word for its times
 NO_WAY = 1e-6  # [m] between the ends of a transition that is not priced by the metre
+SAME = 1e-9  # relative, between durations; and of twists whose bracket is none
 LEAP = 0.35  # share of the grid's step by which times of one family change more, at most, per time
 
 
@@ -122,6 +124,7 @@ class _Candidates(NamedTuple):
     """What one steering call found."""
 
     costs: Array  # (n,)
+    durations: Array  # (n,) [s]
     rows: IntArray  # (n,) which word
     climbs: IntArray  # (n,) vertical trim at the end, -1 for none
     times: Array  # (n, 4)
@@ -135,6 +138,7 @@ class _Prefix(NamedTuple):
     times: tuple[float, ...]
     pose: Array
     cost: float
+    duration: float  # [s] transitions included
 
 
 class _Job:
@@ -199,14 +203,34 @@ class _Job:
             goal = np.array(setup.goal.pose)
             goal[2] = heading
             found = self._steered(self.problem.start, goal, setup.start_trim, math.inf)
+            fitting = self._fitting(found)
             for k in np.argsort(found.costs, kind="stable"):
                 if found.costs[k] > self._bar() * (1.0 + SLACK * refine + TIE) or self._over():
                     break
                 trims, times = self._word(found, int(k))
-                if len(trims) > most_letters:
+                if len(trims) > most_letters or not fitting[k]:
                     continue
                 self.polished += 1
                 yield setup.solved(trims, [times]) if refine else setup.closed(trims, times)
+
+    def _fitting(self, found: _Candidates) -> NDArray[np.bool_]:
+        """Which candidates (n,) may last exactly as long as is asked for, if it is.
+
+        The pose decides all times of so few trims, unless any heading will do, or two neighbours
+        commute.
+        """
+        setup, arrays = self.setup, self.setup.library.arrays
+        if not setup.exactly or setup.goal.free_heading:
+            return np.ones(len(found.costs), dtype=np.bool_)
+        words = arrays.words[found.rows]
+        rows = arrays.twists[words]
+        brackets = rows[:, :-1, 2:3] * rows[:, 1:, :2] - rows[:, 1:, 2:3] * rows[:, :-1, :2]
+        commute = (np.abs(brackets) < SAME).all(axis=2) & (words[:, 1:] >= 0)
+        return (self._off(found.durations) <= SAME) | commute.any(axis=1) | (found.climbs >= 0)
+
+    def _off(self, durations: Array) -> Array:
+        """Share of the time asked for by which words are longer or shorter."""
+        return np.abs(durations / (self.setup.limit or math.inf) - 1.0)
 
     def _is_refined(self) -> bool:
         """Whether more is asked of a word than to end at the goal."""
@@ -235,6 +259,7 @@ class _Job:
         self.calls += 1
         return _Candidates(
             costs=scratch.costs[:n].copy(),
+            durations=scratch.durations[:n].copy(),
             rows=scratch.rows[:n].copy(),
             climbs=scratch.climbs[:n].copy(),
             times=scratch.times[:n].copy(),
@@ -254,7 +279,9 @@ class _Job:
 
         Families are told apart by their word; a word's solutions on a node by the change of times.
         """
-        setup = self.setup
+        setup, steps = self.setup, self._steps(trims)
+        # Times change by no more than a leap from one node to the next: others never last so long.
+        most = max(steps) / LEAP / (setup.limit or math.inf) if setup.exactly else math.inf
         families: dict[tuple[int, ...], list[_Node]] = {}
         for prefix in self._prefixes(trims):
             if self._over():
@@ -262,20 +289,19 @@ class _Job:
             bar = self._bar() * (1.0 + SLACK)
             for goal in self._goals():
                 found = self._steered(prefix.pose, goal, trims[-1], bar - prefix.cost)
-                for k in range(len(found.costs)):
+                costs = prefix.cost + found.costs
+                order = self._off(prefix.duration + found.durations) if setup.exactly else costs
+                for k in np.flatnonzero(order <= most).tolist():
                     last, times = self._word(found, k)
                     if len(last) < CLOSED_FORM or last[0] == trims[-1]:
                         continue
-                    node = _Node(
-                        prefix.nodes,
-                        np.concatenate([prefix.times, times]),
-                        prefix.cost + float(found.costs[k]),
-                    )
+                    lasting = np.concatenate([prefix.times, times])
+                    node = _Node(prefix.nodes, lasting, float(costs[k]), float(order[k]))
                     families.setdefault((*trims, *last), []).append(node)
         lowest = [
             (node.cost, word, node.times)
             for word, nodes in families.items()
-            for node in _lowest(nodes, self._steps(trims))
+            for node in _lowest(nodes, steps)
         ]
         for cost, word, times in sorted(lowest, key=lambda one: one[:2]):
             if cost > self._bar() * (1.0 + SLACK) or self._over():
@@ -316,17 +342,19 @@ class _Job:
         steps = self._steps(trims)
         nodes = NODES[min(len(trims), len(NODES) - 1)]
         for node in itertools.product(range(nodes + 1), repeat=len(trims)):
-            pose, cost, before = group(self.problem.start), 0.0, self.setup.start_trim
+            pose, before = group(self.problem.start), self.setup.start_trim
+            cost, duration = 0.0, 0.0
             times = tuple(n * step for n, step in zip(node, steps, strict=True))
             for trim, lasting in zip(trims, times, strict=True):
                 pair = library.class_pair(before, trim)
                 pose = pose @ group(library.transitions.displacement[pair][:dof])
                 pose = pose @ group.exp(lasting * arrays.twists[trim, :dof])
                 cost += float(library.transitions.cost[pair] + lasting * arrays.rates[trim])
+                duration += float(library.transitions.time[pair]) + lasting
                 before = trim
             way = float(np.linalg.norm(self.setup.goal.pose[:2] - pose.pose[:2]))
             if cost + self.per_metre * way < self._bar() * (1.0 + TIE):
-                yield _Prefix(trims, node, times, pose.pose, cost)
+                yield _Prefix(trims, node, times, pose.pose, cost, duration)
 
 
 class _Node(NamedTuple):
@@ -335,10 +363,11 @@ class _Node(NamedTuple):
     node: tuple[int, ...]
     times: Array
     cost: float
+    order: float  # by which it is compared: how far off the time asked for, otherwise the cost
 
 
 def _lowest(nodes: list[_Node], steps: list[float]) -> Iterator[_Node]:
-    """Nodes that no neighbour of the same family is cheaper than."""
+    """Nodes that no neighbour of the same family comes before."""
     by_index: dict[tuple[int, ...], list[_Node]] = {}
     for node in nodes:
         by_index.setdefault(node.node, []).append(node)
@@ -351,7 +380,7 @@ def _lowest(nodes: list[_Node], steps: list[float]) -> Iterator[_Node]:
         )
         beside = itertools.chain.from_iterable(by_index.get(index, ()) for index in around)
         if not any(
-            other.cost < node.cost and np.abs(other.times - node.times).max() < leap
+            other.order < node.order and np.abs(other.times - node.times).max() < leap
             for other in beside
         ):
             yield node

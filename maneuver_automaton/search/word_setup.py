@@ -63,6 +63,11 @@ class WordSetup:
         horizon = self.problem.horizon
         return horizon.time if horizon.time is not None else horizon.max_time
 
+    @property
+    def exactly(self) -> bool:
+        """Whether a plan has to last as long as is asked for with no rest to fill the time."""
+        return self.problem.horizon.time is not None and self.pad is None
+
     def links(self, trims: Sequence[int]) -> list[tuple[int, int]]:
         """Neighbours in the word, the first and last trim included."""
         return list(pairwise((self.start_trim, *trims, self.goal_trim)))
@@ -82,13 +87,12 @@ class WordSetup:
             return None
         if not len(trims):
             return self._without_trims()
-        exactly = self.problem.horizon.time is not None and self.pad is None
-        total = None if not exactly or self.limit is None else self.limit - lasting
+        total = None if not self.exactly or self.limit is None else self.limit - lasting
         times = self._times(trims, guesses, total, restarts)
         if times is None:
             return None
         too_late = self.limit is not None and self._is_late(float(times.sum()) + lasting)
-        if too_late and not exactly and self.limit is not None:
+        if too_late and not self.exactly and self.limit is not None:
             times = self._times(trims, [times], self.limit - lasting, restarts)
             if times is None:
                 return None
@@ -110,8 +114,7 @@ class WordSetup:
         )
         if self._is_late(float(closed.sum()) + self.fixed(trims)[1]):
             return None
-        exactly = self.problem.horizon.time is not None and self.pad is None
-        return None if exactly else self.priced(trims, closed)
+        return None if self.exactly else self.priced(trims, closed)
 
     def priced(self, trims: Sequence[int], durations: Array) -> TimedWord | None:
         """The word with these times and its cost; None if it has too many trims."""
@@ -218,8 +221,7 @@ class WordSetup:
         end = np.array((group(self.problem.start) @ group(over[:dof])).pose)
         if max(self.goal.off(end)) > self.library.arrays.met or self._is_late(self.fixed(())[1]):
             return None
-        exactly = self.problem.horizon.time is not None and self.pad is None
-        return None if exactly else self.priced((), np.zeros(0))
+        return None if self.exactly else self.priced((), np.zeros(0))
 
     def _is_late(self, duration: float) -> bool:
         return self.limit is not None and duration > self.limit * (1.0 + LATE)

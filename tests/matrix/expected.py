@@ -19,9 +19,6 @@ FAULTS: dict[str, dict[str, str]] = {
         "zones_crossed": "car_with_trailer helicopter",
         "heights": "helicopter",
     },
-    "a closed loop of fixed time finds no plan for what is left": {
-        "loop_fixed_time": "single_track",
-    },
     "a closed loop with zones finds no plan": {
         "loop_zones": "single_track",
     },

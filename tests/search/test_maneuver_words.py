@@ -12,6 +12,7 @@ from scipy.optimize import least_squares
 
 from maneuver_automaton._arrays import wrapped
 from maneuver_automaton.audit import audit_plan
+from maneuver_automaton.automaton.stock import load_stock_library
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
@@ -137,6 +138,25 @@ def test_without_a_rest_a_fixed_time_is_met_exactly():
     plan = first_plan(fixed)
     assert plan.duration == pytest.approx(least + 1.0, abs=1e-8)
     assert plan.trims[0].name == plan.trims[-1].name == "1, 0"
+
+
+def test_a_fixed_time_is_met_without_solving_every_word_for_it():
+    """The pose decides the times of three trims, so it is words of four that are solved for."""
+    trim = "speed 20, turn_rate 0"
+    one = Problem(
+        load_stock_library("single_track"),
+        [0.0, 0.0, 0.0],
+        Goal(pose=[120.0, 12.0, 0.1], trim=trim),
+        start_trim=trim,
+        cost=Cost(effort=1.0),
+        horizon=Horizon(time=6.8),
+    )
+    short = searched(one, most_letters=3)
+    assert (short.status, short.counts["polished"] < 100) == (SearchStatus.EXHAUSTED, True)
+    found = searched(one, most_trims=14)
+    assert found.counts["polished"] < 2000
+    assert found.solutions[0].cost < 70.0
+    assert plan_of(one, found.solutions[0]).duration == pytest.approx(6.8, abs=1e-8)
 
 
 def test_effort_prefers_slow_words():
