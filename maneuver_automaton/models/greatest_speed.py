@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from maneuver_automaton.models.model import Model
+from maneuver_automaton.models.model import Model, OnlyTranslated
 
 
 def greatest_speed(model: Model) -> float:
@@ -26,6 +24,8 @@ def greatest_speed(model: Model) -> float:
     ...                               max_speed=3.0, min_speed=-1.0))
     3.0
     """
+    if isinstance(model, OnlyTranslated):  # it is as fast seen from the world as from its body
+        model = model.stated
     state = [Interval(low, high) for low, high in model.reduced_limits.tolist()]
     control = [Interval(low, high) for low, high in model.control_limits.tolist()]
     try:

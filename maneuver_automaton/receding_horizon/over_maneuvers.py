@@ -75,10 +75,13 @@ class OverManeuvers:
         return what_is_hit(self.here, plan, self.here.goals[0])
 
     def cheaper(self, kept: Candidate | None) -> list[Candidate]:
-        """The cheapest safe word for each goal, if it costs less than what is kept."""
+        """The cheapest safe word for each goal, if it costs less than what is kept.
+
+        At first a planner is asked instead where something is in the way: it looks at words too.
+        """
         now, here = self.now, self.here
         problem = self._onward()
-        if problem is None or (now.last is None and here.obstacles):
+        if problem is None or (now.last is None and (here.obstacles or here.zones)):
             return []
         upper = math.inf  # bound of what a plan may cost
         if kept is not None:

@@ -19,20 +19,8 @@ FAULTS: dict[str, dict[str, str]] = {
         "zones_crossed": "car_with_trailer helicopter",
         "heights": "helicopter",
     },
-    "a closed loop with zones finds no plan": {
-        "loop_zones": "single_track",
-    },
-    "a step off the plan takes far longer than its time limit": {
-        "loop_noise": "glider",
-    },
-    "a vehicle whose heading is a reduced state is not polished": {
-        "polishing": "boat_in_current",
-    },
     "no alternative is found": {
         "alternatives_among_obstacles": "glider",
-    },
-    "no lower bound above zero where the world moves": {
-        "lower_bound": "boat_in_current",
     },
     "zones are entered for the whole way or not at all": {
         "zones_crossed": "hovercraft",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,6 +12,7 @@ from hypothesis import strategies as st
 from maneuver_automaton.analysis import Region, check_vector_field
 from maneuver_automaton.groups import SE2, translations
 from maneuver_automaton.models import UserModel, as_stated, in_world, vector_field
+from maneuver_automaton.models.greatest_speed import greatest_speed
 
 RIVER = UserModel(
     name="boat",
@@ -33,6 +36,14 @@ def test_it_moves_as_it_is_stated(heading, push, speed, turn_rate, far):
     np.testing.assert_allclose(rates[3], expected[2], atol=1e-12)
     slope = [-np.sin(heading) * turn_rate, np.cos(heading) * turn_rate]
     np.testing.assert_allclose(rates[4:], slope, atol=1e-12)
+
+
+def test_it_is_as_fast_as_it_is_stated():
+    """1 m/s at most through the water, and 0.3 and 0.1 m/s with it."""
+    limits = {"control_limits": np.array([[0.0, 0.6], [-1, 1]])}
+    limits["reduced_limits"] = np.array([[0.0, 0.4], [-np.inf, np.inf]])
+    boat = replace(RIVER, **limits)
+    assert greatest_speed(in_world(boat)) == pytest.approx(np.hypot(1.3, 1.1))
 
 
 def test_its_components_are_those_of_its_arrays():

@@ -27,6 +27,7 @@ from maneuver_automaton.receding_horizon import (
     Guarantee,
     ManeuverHorizon,
     Origin,
+    over_maneuvers,
     simulate,
 )
 from tests.inertia import ROBOT, car_automaton, resting, unicycle_automaton
@@ -212,6 +213,14 @@ def test_a_plan_that_ends_within_the_tolerance_is_kept(noise):
     assert goal.off(loop.steps[0].plan.end)[0] > 1e-3  # it is not the middle
     if not noise:
         assert [step.deed for step in loop.steps[1:]] == [Deed.KEPT] * (len(loop.steps) - 1)
+
+
+def test_at_first_a_planner_has_all_the_time_where_there_are_zones(monkeypatch):
+    """It looks at words itself: looked at before, they would take half of its time."""
+    monkeypatch.setattr(over_maneuvers, "search_words_with_maneuvers", lambda *_, **__: 1 / 0)
+    zone = Zone(shape=Box([0.5, 0.5], [1.5, 0.5]), max_speed=0.9)
+    _, step = ManeuverHorizon(posed(zones=[zone]), step=0.5).step([0.0, 0.0, 0.0])
+    assert step.deed is Deed.PLANNED
 
 
 def test_told_to_stay_it_comes_back_when_it_is_pushed_out():
