@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -138,14 +139,15 @@ def _over_maneuvers(search: _Search) -> Iterator[tuple[Plan, int]]:
     found, problem, budget = search.found, search.found.problem, search.found.budget
     goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
     prepared = found.workspace.prepared
-    query = lattice_query(problem, goals, prepared=prepared)
+    query = late_at_first(lattice_query(problem, goals, prepared=prepared))
     before = found.counts["expansions"]
     counted = budget.expansions is not None
     share = 1.0 if counted or why_not_polished(problem) else MANEUVER_SHARE
     until = budget.stage(share if found.plans else 1.0).deadline
     known: Word | None = None
     if _needs_quick_word(query):
-        quick = lattice_query(replace(problem, cost=Cost(time=1.0)), goals, prepared=prepared)
+        in_time = replace(problem, cost=Cost(time=1.0))
+        quick = late_at_first(lattice_query(in_time, goals, prepared=prepared))
         known, more = quick_word(query, quick, deadline=until, max_expansions=budget.expansions)
         before += more
         if known is not None:
@@ -172,6 +174,19 @@ def _over_maneuvers(search: _Search) -> Iterator[tuple[Plan, int]]:
             if math.isfinite(incumbent.nearest):
                 near = f"{incumbent.nearest:.3g} m from the goal"
                 search.reason += f"; the nearest place that was reached is {near}"
+
+
+def late_at_first(query: LatticeQuery) -> LatticeQuery:
+    """The query with no longest time where what costs less is what lasts less.
+
+    There a first word may be late, and what shortcuts and polishing make of it is in time; whatever
+    stays late is refused.
+    """
+    edges, trims = query.library.arrays, query.library.arrays.library
+    rates = trims.rates[: trims.n_trims]  # the last row is the turn of a free heading
+    close = functools.partial(np.allclose, rtol=1e-9, atol=1e-12)
+    timed = close(rates, rates[0]) and close(edges.edge_cost, rates[0] * edges.edge_time)
+    return replace(query, most_time=math.inf) if timed else query
 
 
 def _needs_quick_word(query: LatticeQuery) -> bool:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.refinement.improve import Improvement, Patience
-from maneuver_automaton.refinement.restarts import FAST, FAST_WEIGHT, FINER, FIRST_CHUNK
+from maneuver_automaton.refinement.restarts import FINER, FIRST_CHUNK, as_wide_as_turns
 from maneuver_automaton.search.distance_grid import DistanceGrid, distance_grid
 from maneuver_automaton.search.lattice import Schedule, first_word
 from maneuver_automaton.search.lattice_pass import Pass, pass_of
@@ -22,6 +22,7 @@ from maneuver_automaton.words.word import Word, with_price
 from maneuver_automaton.words.word import plan_of as plan_of_word
 
 MOST_CHUNK = 16384
+FAST_ALONE = 2000  # expansions of a pass as wide as the turns, until others run in turn with it
 FIRST: tuple[tuple[int, tuple[Resolution, ...]], ...] = (
     # after so many expansions of all passes together, or when all are exhausted
     (0, (Resolution(),)),
@@ -167,14 +168,8 @@ def _first_stages(query: LatticeQuery) -> tuple[tuple[int, tuple[Resolution, ...
     A vehicle that turns widely for its size begins with a pass whose cells and coasts are as wide:
     it decides little from one length of its body to the next.
     """
-    fast = _fast(query)
+    fast = as_wide_as_turns(query)
     return ((0, fast), (FAST_ALONE, FIRST[0][1]), *FIRST[1:]) if fast else FIRST
-
-
-def _fast(query: LatticeQuery) -> tuple[Resolution, ...]:
-    """The resolution of a vehicle that turns widely for its size; none for others."""
-    wide = query.library.turns
-    return (Resolution(scale=wide, durations=wide, weight=FAST_WEIGHT),) if wide > FAST else ()
 
 
 def _passes(query: LatticeQuery, resolution: Resolution, grid: DistanceGrid) -> list[Pass]:

@@ -13,6 +13,7 @@ from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Zone
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanStatus, plan
+from maneuver_automaton.planning.with_inertia import late_at_first
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.refinement import maneuver_lattice
 from maneuver_automaton.refinement.maneuver_lattice import maneuver_words, plan_of
@@ -86,6 +87,16 @@ def test_a_longest_time_is_kept_among_obstacles(usual, share):
     assert result.status is PlanStatus.FOUND, result.reason
     assert result.plan.duration <= most * (1.0 + 1e-9)
     assert_free(result.plan)
+
+
+def test_words_may_be_late_at_first_where_cheaper_ones_are_quicker():
+    """What shortcuts and polishing make of them is in time; a word by effort is late for good."""
+    limit = Horizon(max_time=5.0)
+    by_time = lattice_query(posed(horizon=limit, cost=Cost(time=2.0)), (0,))
+    assert by_time.most_time == pytest.approx(5.0)
+    assert late_at_first(by_time).most_time == np.inf
+    by_effort = lattice_query(posed(horizon=limit, cost=Cost(time=2.0, effort=1.0)), (0,))
+    assert late_at_first(by_effort).most_time == pytest.approx(5.0)
 
 
 def test_a_fixed_time_is_kept_among_obstacles(usual):
