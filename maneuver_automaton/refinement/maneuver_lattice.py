@@ -32,7 +32,6 @@ FIRST: tuple[tuple[int, tuple[Resolution, ...]], ...] = (
     (8000, (Resolution(scale=0.5, durations=0.5, weight=1.5, backwards=True),)),
     (40000, (Resolution(scale=0.25, durations=0.25, margin=0.1),)),
 )
-FAST_ALONE = 2000  # expansions until others run in turn with the one of a fast vehicle
 TO_THE_END = Patience(passes=2**62)
 
 
