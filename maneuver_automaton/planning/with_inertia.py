@@ -41,9 +41,9 @@ from maneuver_automaton.search import SearchStatus
 from maneuver_automaton.search.budget import Budget
 from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
-from maneuver_automaton.search.maneuver_search import maneuver_word_stages
-from maneuver_automaton.search.maneuver_words import load_maneuver_words
+from maneuver_automaton.search.linked_words import load_linked_words
 from maneuver_automaton.search.result import plan_of as plan_of_word
+from maneuver_automaton.search.word_stages import maneuver_word_stages
 from maneuver_automaton.words.word import Word, word_of_plan
 
 FIRST_SHARE = 0.8  # of the time limit, for a first path
@@ -282,7 +282,7 @@ def load_inertia(problem: Problem, workspace: Workspace) -> None:
     if problem.automaton.maneuvers:
         load_maneuver_kernels()
         if _suits_words(problem) or problem.search.method in ("words", "insertion"):
-            load_maneuver_words()
+            load_linked_words()
 
 
 def _certificate(problem: Problem, best: Accepted) -> float | None:

@@ -31,8 +31,8 @@ from maneuver_automaton.refinement.maneuver_lattice import maneuver_words, plan_
 from maneuver_automaton.search.alternatives import TIE
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_trims import priced_library
-from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
 from maneuver_automaton.search.result import plan_of as plan_of_word
+from maneuver_automaton.search.word_stages import search_words_with_maneuvers
 
 FIRST_SHARE = 0.5  # of a step's time limit, for the words of the first step
 OTHERS = 3  # dearer words that are tried where the cheapest ones are not free

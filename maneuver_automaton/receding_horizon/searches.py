@@ -18,7 +18,7 @@ from maneuver_automaton.receding_horizon.settings import Settings
 from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.refinement.ready import load_lattice, load_maneuver_kernels
 from maneuver_automaton.search.choose import load_search as load_words
-from maneuver_automaton.search.maneuver_words import load_maneuver_words
+from maneuver_automaton.search.linked_words import load_linked_words
 from maneuver_automaton.search.ready import load_times_kernels
 
 
@@ -49,7 +49,7 @@ def load_search(problem: Problem) -> None:
     """Have ready what a step needs for a problem, before its clock runs."""
     load_times_kernels()
     if needs_maneuvers(problem):
-        load_maneuver_words()
+        load_linked_words()
         if problem.obstacles or problem.zones:
             load_maneuver_kernels()
     elif problem.obstacles:

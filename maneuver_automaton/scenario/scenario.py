@@ -141,7 +141,7 @@ def _height_of(document: Document, part: Any, model: Model) -> tuple[float, floa
 
 def _refuse_long_words(document: Document, file: ScenarioFile) -> None:
     """Exhaustive search is for short words."""
-    from maneuver_automaton.search.words import MOST_TRIMS
+    from maneuver_automaton.search.word_scan import MOST_TRIMS
 
     goals = file.goal if isinstance(file.goal, tuple) else (file.goal,)
     most = MOST_TRIMS - any(goal.heading == "free" for goal in goals)

@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from maneuver_automaton._compile import inner_kernel, kernel
-from maneuver_automaton.search._kernels_problem import word_extra
+from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
+from maneuver_automaton.search._kernels_problem import (
+    look,
+    room_for,
+    time_left,
+    word_extra,
+    write,
+)
 from maneuver_automaton.words._kernels_times import (
     assign,
     curvature,
@@ -13,30 +19,30 @@ from maneuver_automaton.words._kernels_times import (
     newton_stationary,
 )
 
+NEXT = 0.01  # relative, by which the cost of a start with one time free may be off
 MOMENT = 1e-6  # of the whole time: shorter trims may be due to rounding
 
 
-@inner_kernel
-def place(found, word, n, times, cost):
+@bare_inner_kernel
+def place(problem, found, word, n, times, cost):
     """Record a solution unless the same one is there; keep the list of best costs."""
     count = found.counter[0]
-    for k in range(min(count, found.words.shape[0])):
+    here = min(count, found.costs.size)  # there is a row more than solutions have room in
+    write(problem, word, n, times, found.words[here], found.times[here])
+    for k in range(here):
         if abs(found.costs[k] - cost) <= 1e-7 * (1.0 + abs(cost)):
             same = True
             for i in range(found.words.shape[1]):
-                w = word[i] if i < n else -1
-                if found.words[k, i] != w:
+                lasting = found.times[here, i]
+                if found.words[k, i] != found.words[here, i]:
                     same = False
                     break
-                if i < n and abs(found.times[k, i] - times[i]) > 1e-6 * (1.0 + times[i]):
+                if abs(found.times[k, i] - lasting) > 1e-6 * (1.0 + lasting):
                     same = False
                     break
             if same:
                 return
-    if count < found.words.shape[0]:
-        for i in range(found.words.shape[1]):
-            found.words[count, i] = word[i] if i < n else -1
-            found.times[count, i] = times[i] if i < n else 0.0
+    if count < found.costs.size:
         found.costs[count] = cost
     found.counter[0] = count + 1
     k = found.best.size
@@ -48,7 +54,7 @@ def place(found, word, n, times, cost):
         found.best[k] = cost
 
 
-@inner_kernel
+@bare_inner_kernel
 def accept(problem, found, word, n, times, max_trims):
     """Check a polished solution against all limits, and record it."""
     total = 0.0
@@ -65,31 +71,31 @@ def accept(problem, found, word, n, times, max_trims):
             trims += 1
             total += times[i]
             cost += times[i] * problem.rates[word[i]]
-    if total > problem.time_limit + 1e-9:
+    if total > time_left(problem) + 1e-9:
         return
     padded = 0
     if problem.pad == 1:
         cost += problem.pad_cost
-        if problem.time_limit - total > 1e-9:
+        if time_left(problem) - total > 1e-9:
             padded = 1
     if trims + padded > max_trims:
         return
     cost += word_extra(problem, word, trims) + problem.switch * padded
-    place(found, word, n, times, cost)
+    place(problem, found, word, n, times, cost)
 
 
 @inner_kernel
 def accept_with_turns(problem, found, word, n, times, max_trims):
     """Record a solution and, where admitted, the same with whole extra turns."""
     accept(problem, found, word, n, times, max_trims)
-    if problem.more_turns == 0 or problem.time_limit == np.inf or problem.targets.size > 0:
+    if problem.more_turns == 0 or time_left(problem) == np.inf or problem.targets.size > 0:
         return
     total = 0.0
     shortest = np.inf
     for i in range(n):
         total += problem.weights[word[i]] * times[i]
         shortest = min(shortest, problem.periods[word[i]])
-    if total + shortest > problem.time_limit + 1e-9:
+    if total + shortest > time_left(problem) + 1e-9:
         return
     extra = np.zeros(n, dtype=np.int64)
     longer = np.empty(n)
@@ -103,7 +109,7 @@ def accept_with_turns(problem, found, word, n, times, max_trims):
                 if extra[i] > 0 and problem.weights[word[i]] > 0.0:
                     longer[i] += extra[i] * problem.periods[word[i]]
                 total += problem.weights[word[i]] * longer[i]
-            if total <= problem.time_limit + 1e-9 and problem.weights[word[k]] > 0.0:
+            if total <= time_left(problem) + 1e-9 and problem.weights[word[k]] > 0.0:
                 break
             extra[k] = 0
             k += 1
@@ -114,8 +120,20 @@ def accept_with_turns(problem, found, word, n, times, max_trims):
 
 @inner_kernel
 def polish(problem, found, word, n, times, isolated, max_trims):
-    """Refine times to machine precision, check that they are locally optimal, and record them."""
+    """Refine times to machine precision, check that they are locally optimal, and record them.
+
+    Without linear conditions, a start with at most one time free lies next to its solution, and
+    Newton changes its cost by next to nothing. What is much dearer there than all that is asked
+    for need not be refined: that is where most of the time would go.
+    """
     m = problem.targets.size
+    if n <= 4 and m == 0:
+        dearest = found.best[found.best.size - 1]
+        cost = problem.pad_cost + word_extra(problem, word, n)
+        for i in range(n):
+            cost += problem.rates[word[i]] * times[i]
+        if cost > dearest + NEXT * (1.0 + abs(dearest)):
+            return
     twists = np.empty((n, 4))
     rates = np.empty(n)
     rows = np.empty((m, n))
@@ -170,12 +188,21 @@ def is_neighbour(problem, twists, rows, n, times):
 
 
 @kernel
-def polish_candidates(problem, candidates, found, max_trims):
+def polish_candidates(problem, links, candidates, found, max_trims):
     """Polish all candidates in order, and empty their buffer."""
+    linked, width = links.cost.shape[0] > 1, candidates.words.shape[1]
+    seen = room_for(problem, width) if linked else problem
+    rows = np.empty(width, dtype=np.int64)
     for k in range(min(candidates.counter[0], candidates.words.shape[0])):
-        n = candidates.sizes[k]
-        times = np.empty(n)
-        for i in range(n):
-            times[i] = candidates.times[k, i]
-        polish(problem, found, candidates.words[k], n, times, candidates.isolated[k], max_trims)
+        word, size = candidates.words[k], candidates.sizes[k]
+        if linked:
+            look(problem, links, seen, word, size, rows)
+        times = np.empty(size)
+        n = 0
+        for i in range(size):
+            # of a word with transitions, what is passed through for no time is no row
+            if not linked or candidates.times[k, i] != 0.0:
+                rows[n], times[n] = i if linked else word[i], candidates.times[k, i]
+                n += 1
+        polish(seen, found, rows, n, times[:n], candidates.isolated[k], max_trims)
     candidates.counter[0] = 0

@@ -1,17 +1,39 @@
-"""What every kernel of the search over words shares: the problem, its buffers, small helpers."""
+"""What every kernel of the search over words shares: the problem, its buffers, small helpers.
+
+A word with transitions, seen from before all of them, is a word without: its trims have conjugated
+twists, its goal lies before their product, and what the transitions cost and last is known
+beforehand. So a word has two forms: the numbers of its trims in the whole problem, and the rows of
+the problem that is `seen`, one for each of its trims. Without transitions, `seen` is the problem
+itself, and both forms are the same.
+
+Source: ``D exp(xi) = exp(Ad(D) xi) D``; Solà, Deray, Atchuthan (2018), Eq. (30).
+"""
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
-from maneuver_automaton._compile import inner_kernel
+import numpy as np
+
+from maneuver_automaton._compile import bare_inner_kernel, inner_kernel
+from maneuver_automaton.groups._kernels import compose
+from maneuver_automaton.words._kernels_candidates import back_from
+
+PARALLEL = 1e-9  # sine of the angle between twists below which they span one line
 
 
 class WordProblem(NamedTuple):
-    """What every word of one search shares; times in seconds, angles in radians."""
+    """Trims and conditions: of all words of one search, or of the one word that is seen.
 
-    twists: Any  # (M, 4)
+    Times are in seconds, angles in radians.
+    """
+
+    trims: Any  # (M,) the number of each row in the whole problem
+    size: Any  # (1,) trims of the word that is seen; 0 in the whole problem
+    twists: Any  # (M, 4) conjugated in the problem that is seen
     rates: Any  # (M,) cost per second, that of rest taken off where rest pads
+    prices: Any  # (M, 2) cost per metre and per radian, inf where a trim makes none
     rows: Any  # (m, M) linear conditions on the times: altitude, fixed time
     targets: Any  # (m,)
     periods: Any  # (M,) time of a full turn, inf for straights
@@ -19,7 +41,8 @@ class WordProblem(NamedTuple):
     parallel: Any  # (M, M) whether two twists are parallel
     weights: Any  # (M,) 1 where a trim takes time and counts, 0 for the turn of a free heading
     goal: Any  # (4,) relative to the start
-    time_limit: float  # sum of all times at most this; inf
+    fixed: Any  # (4,) cost and time of the transitions; way and turn left to the trims at least
+    time_limit: float  # sum of all times at most this, transitions included; inf
     pad: int  # 1 where rest fills up to time_limit
     pad_cost: float  # cost of time_limit seconds of rest
     switch: float
@@ -27,9 +50,22 @@ class WordProblem(NamedTuple):
     more_turns: int  # 1 where whole extra turns are admitted
     nodes: int  # grid nodes per scanned time, for words with one scanned time
     nodes_2d: int  # the same for two scanned times
+    slack: float  # share by which a grid node may be dearer than the upper bound, and be looked at
     tolerance: float
     shortest: float  # [s] a shorter coasting time is not admitted
     tail: int  # trim that ends every word without counting, -1 for none
+
+
+class Links(NamedTuple):
+    """The transitions between C classes of trims; one class, whose transition is the identity."""
+
+    class_of: Any  # (M,) of each trim of the whole problem
+    start: int  # class of the trim before the word
+    goal: int  # class of the trim after it
+    displacement: Any  # (C, C, 4)
+    cost: Any  # (C, C) inf where there is none
+    time: Any  # (C, C)
+    gains: Any  # (m, C, C) what a transition adds to each linear condition
 
 
 class Candidates(NamedTuple):
@@ -47,17 +83,20 @@ class Candidates(NamedTuple):
 class Found(NamedTuple):
     """Buffers of what has been found."""
 
-    words: Any  # (capacity, S)
-    times: Any  # (capacity, S)
+    words: Any  # (capacity + 1, S) -1 after the last trim; the last row to work with
+    times: Any  # (capacity + 1, S)
     costs: Any  # (capacity,)
     counter: Any  # (1,)
-    best: Any  # (K + 1,) cheapest costs so far, ascending
+    best: Any  # (K + 1,) cheapest costs so far, ascending; the last is the upper bound
 
 
-@inner_kernel
+@bare_inner_kernel
 def word_extra(problem, word, n):
-    """Price of the switches of a word."""
-    price = problem.switch * (n - 1)
+    """Price of the switches and transitions of a word.
+
+    A problem with transitions has no prices of switches: a conjugated twist has no gear.
+    """
+    price = problem.fixed[0] + problem.switch * (n - 1)
     if problem.direction_change > 0.0:
         sign = 0.0
         for i in range(n):
@@ -69,29 +108,183 @@ def word_extra(problem, word, n):
     return price
 
 
-@inner_kernel
+@bare_inner_kernel
+def time_left(problem):
+    """What the coasting times of a word may add up to."""
+    return problem.time_limit - problem.fixed[1]
+
+
+@bare_inner_kernel
+def write(problem, word, n, times, trims, lasting):
+    """Fill `trims` and `lasting` with `n` rows as a word of the whole problem; its size.
+
+    Rows of a word that is seen are the positions of its trims. A position that is not among them
+    is passed through for no time. After the word there is -1 and 0.
+    """
+    size = problem.size[0]
+    for i in range(trims.size):
+        trims[i] = problem.trims[i] if i < size else -1
+        lasting[i] = 0.0
+    for i in range(n):
+        at = i if size == 0 else word[i]
+        trims[at], lasting[at] = problem.trims[word[i]], times[i]
+    return n if size == 0 else size
+
+
+@bare_inner_kernel
 def propose(problem, candidates, word, n, times):
     """Add a starting point for Newton; beyond the capacity it is counted, not kept."""
     count = candidates.counter[0]
     if count < candidates.words.shape[0]:
-        for i in range(n):
-            candidates.words[count, i] = word[i]
-            candidates.times[count, i] = times[i]
-        candidates.sizes[count] = n
+        candidates.sizes[count] = write(
+            problem, word, n, times, candidates.words[count], candidates.times[count]
+        )
         candidates.isolated[count] = 1 if n <= 3 + problem.targets.size else 0
     candidates.counter[0] = count + 1
 
 
-@inner_kernel
+@bare_inner_kernel
 def is_straight(problem, trim):
     """Whether a trim does not turn."""
     return problem.twists[trim, 2] == 0.0
 
 
-@inner_kernel
+@bare_inner_kernel
 def condition(problem, word, n, r, times):
     """Left-hand side of linear condition r."""
     value = 0.0
     for i in range(n):
         value += problem.rows[r, word[i]] * times[i]
     return value
+
+
+@bare_inner_kernel
+def transitions_cost(links, word, n, tail):
+    """What the transitions of a word cost: a lower bound, since coasting costs something too.
+
+    inf where one is missing, or where a trim follows itself.
+    """
+    cost = 0.0
+    before = links.start
+    for i in range(n):
+        if word[i] != tail:
+            if i > 0 and word[i] == word[i - 1]:
+                return math.inf
+            after = links.class_of[word[i]]
+            cost += links.cost[before, after]
+            before = after
+    return cost + links.cost[before, links.goal]
+
+
+@inner_kernel
+def room_for(problem, n):
+    """A problem of `n` rows as yet empty, in which words of so many trims are seen."""
+    m = problem.targets.size
+    return WordProblem(
+        np.zeros(n, dtype=np.int64),
+        np.zeros(1, dtype=np.int64),
+        np.zeros((n, 4)),
+        np.zeros(n),
+        np.zeros((n, 2)),
+        np.zeros((m, n)),
+        np.zeros(m),
+        np.zeros(n),
+        np.zeros(n),
+        np.zeros((n, n), dtype=np.bool_),
+        np.zeros(n),
+        np.zeros(4),
+        np.zeros(4),
+        problem.time_limit,
+        problem.pad,
+        problem.pad_cost,
+        problem.switch,
+        problem.direction_change,
+        problem.more_turns,
+        problem.nodes,
+        problem.nodes_2d,
+        problem.slack,
+        problem.tolerance,
+        problem.shortest,
+        problem.tail,
+    )
+
+
+@bare_inner_kernel
+def look(problem, links, seen, word, n, rows):
+    """Fill `seen` with a word as it looks from before its transitions, and `rows` with its rows."""
+    m = problem.targets.size
+    x, y, heading, rise = 0.0, 0.0, 0.0, 0.0  # product of the displacements so far
+    for k in range(4):
+        seen.fixed[k] = problem.fixed[k]
+    for r in range(m):
+        seen.targets[r] = problem.targets[r]
+    seen.size[0] = n
+    before = links.start
+    for i in range(n + 1):
+        # the turn of a free heading comes after the last transition, and has none after it
+        if i < n and word[i] != problem.tail:
+            after = links.class_of[word[i]]
+        elif i == n and word[n - 1] == problem.tail:
+            break
+        else:
+            after = links.goal
+        step = links.displacement[before, after]
+        x, y, heading = compose(x, y, heading, step[0], step[1], step[2])
+        rise += step[3]
+        seen.fixed[0] += links.cost[before, after]
+        seen.fixed[1] += links.time[before, after]
+        seen.fixed[2] -= math.hypot(step[0], step[1])
+        seen.fixed[3] -= abs(step[2])
+        for r in range(m):
+            seen.targets[r] -= links.gains[r, before, after]
+        before = after
+        if i < n:
+            rows[i] = i
+            copy_row(problem, word[i], seen, i)
+            conjugate(seen.twists[i], x, y, heading)
+    seen.goal[0], seen.goal[1], seen.goal[2] = back_from(
+        problem.goal[0], problem.goal[1], problem.goal[2], x, y, heading
+    )
+    seen.goal[3] = problem.goal[3] - rise
+    for i in range(n):
+        for k in range(i + 1):
+            seen.parallel[i, k] = is_parallel(seen.twists[i], seen.twists[k])
+            seen.parallel[k, i] = seen.parallel[i, k]
+
+
+@bare_inner_kernel
+def copy_row(problem, trim, seen, row):
+    """What a search knows of a trim, as a row of the problem that is seen."""
+    seen.trims[row] = trim
+    for k in range(4):
+        seen.twists[row, k] = problem.twists[trim, k]
+    seen.rates[row] = problem.rates[trim]
+    for k in range(2):
+        seen.prices[row, k] = problem.prices[trim, k]
+    seen.periods[row] = problem.periods[trim]
+    seen.reaches[row] = problem.reaches[trim]
+    seen.weights[row] = problem.weights[trim]
+    for r in range(problem.targets.size):
+        seen.rows[r, row] = problem.rows[r, trim]
+
+
+@bare_inner_kernel
+def conjugate(twist, x, y, heading):
+    """See a twist from before the displacement (x, y, heading), in place: ``Ad(d) xi``."""
+    c, s = math.cos(heading), math.sin(heading)
+    v, u, w = twist[0], twist[1], twist[2]
+    twist[0] = c * v - s * u + w * y
+    twist[1] = s * v + c * u - w * x
+
+
+@bare_inner_kernel
+def is_parallel(one, other):
+    """Whether two twists span one line only, altitude aside."""
+    size = math.sqrt(
+        (one[0] * one[0] + one[1] * one[1] + one[2] * one[2])
+        * (other[0] * other[0] + other[1] * other[1] + other[2] * other[2])
+    )
+    a = one[0] * other[1] - one[1] * other[0]
+    b = one[1] * other[2] - one[2] * other[1]
+    c = one[2] * other[0] - one[0] * other[2]
+    return math.sqrt(a * a + b * b + c * c) <= PARALLEL * size

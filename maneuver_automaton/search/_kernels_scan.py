@@ -11,13 +11,19 @@ import math
 
 import numpy as np
 
-from maneuver_automaton._compile import inner_kernel
-from maneuver_automaton.search._kernels_problem import condition, is_straight, propose, word_extra
+from maneuver_automaton._compile import bare_inner_kernel, inner_kernel
+from maneuver_automaton.search._kernels_problem import (
+    condition,
+    is_straight,
+    propose,
+    time_left,
+    word_extra,
+)
 from maneuver_automaton.words._kernels_steering import steer, unit
 from maneuver_automaton.words._kernels_times import assign, end_and_columns
 
 
-@inner_kernel
+@bare_inner_kernel
 def choose_triple(problem, word, n, triple):
     """Fill `triple` with the positions solved in closed form, the last ones that fit.
 
@@ -42,7 +48,7 @@ def choose_triple(problem, word, n, triple):
     return False
 
 
-@inner_kernel
+@bare_inner_kernel
 def moved(pose, velocity, turn_rate, time):
     """A complex pose after coasting."""
     position, heading = pose
@@ -51,7 +57,7 @@ def moved(pose, velocity, turn_rate, time):
     return position + velocity * scale * unit(heading + half), heading + 2.0 * half
 
 
-@inner_kernel
+@bare_inner_kernel
 def solve_triple(problem, candidates, word, n, triple, times, out):
     """Both branches (2, 3) of the times at `triple`, the other `times` being given."""
     candidates.counter[2] += 1
@@ -98,14 +104,21 @@ def solve_triple(problem, candidates, word, n, triple, times, out):
 
 
 @inner_kernel
-def reduced_gradient(problem, word, n, triple, times, columns, free, out):
-    """Fill `out` with the derivative of the cost, and of each linear condition, by the free times.
-
-    The three solved times follow; row 0 is the cost, row 1 + r condition r. False if singular.
-    """
+def scratch_for(problem, word, n, n_free):
+    """Room for one word: branches (2, 3), columns (n, 3), gradients (1 + m, d), twists (n, 4)."""
     twists = np.empty((n, 4))
     for i in range(n):
         assign(twists[i], problem.twists[word[i]])
+    return np.empty((2, 3)), np.empty((n, 3)), np.empty((1 + problem.targets.size, n_free)), twists
+
+
+@bare_inner_kernel
+def reduced_gradient(problem, word, triple, times, free, scratch):
+    """Fill the gradients of `scratch`: of the cost, and each linear condition, by the free times.
+
+    The three solved times follow; row 0 is the cost, row 1 + r condition r. False if singular.
+    """
+    _, columns, out, twists = scratch
     end_and_columns(twists, times, columns)
     a, b, c = triple[0], triple[1], triple[2]
     u0 = columns[b, 1] * columns[c, 2] - columns[b, 2] * columns[c, 1]
@@ -141,7 +154,7 @@ def reduced_gradient(problem, word, n, triple, times, columns, free, out):
     return True
 
 
-@inner_kernel
+@bare_inner_kernel
 def unwrap(problem, word, triple, reference, times):
     """Shift the solved turning times by whole turns to lie nearest to `reference`, in place."""
     for s in range(3):
@@ -151,7 +164,7 @@ def unwrap(problem, word, triple, reference, times):
             times[i] -= period * round((times[i] - reference[i]) / period)
 
 
-@inner_kernel
+@bare_inner_kernel
 def levels(problem, candidates, word, n, start, low, high, span):
     """Propose `start` for all whole turns with which the linear conditions can be met.
 
@@ -168,7 +181,7 @@ def levels(problem, candidates, word, n, start, low, high, span):
             last[i] = 1 if low[i] <= 1e-9 else 0
             if problem.more_turns == 1 and m > 0:
                 most = (
-                    2 if problem.time_limit == np.inf else math.floor(problem.time_limit / period)
+                    2 if time_left(problem) == np.inf else math.floor(time_left(problem) / period)
                 )
                 last[i] += int(most)
             last[i] = max(last[i], first[i])
@@ -201,14 +214,14 @@ def levels(problem, candidates, word, n, start, low, high, span):
             return
 
 
-@inner_kernel
+@bare_inner_kernel
 def take_branch(problem, word, n, triple, free, branch, scratch, times, values):
     """Fill `times` and `values` from one branch of `solve_triple`; False if it is empty.
 
     values[0] is what must vanish besides the linear conditions: the reduced gradient by the first
     free time, or its cross product with the condition's; values[1] by the second.
     """
-    out, columns, gradient = scratch
+    out, _, gradient, _ = scratch
     if math.isnan(out[branch, 0]):
         return False
     for s in range(3):
@@ -216,7 +229,7 @@ def take_branch(problem, word, n, triple, free, branch, scratch, times, values):
     d, m = free.size, problem.targets.size
     if d <= m:
         return True
-    if not reduced_gradient(problem, word, n, triple, times, columns, free, gradient):
+    if not reduced_gradient(problem, word, triple, times, free, scratch):
         return False
     if m == 0:
         for q in range(d):
@@ -226,24 +239,24 @@ def take_branch(problem, word, n, triple, free, branch, scratch, times, values):
     return True
 
 
-@inner_kernel
+@bare_inner_kernel
 def evaluate(problem, candidates, word, n, triple, free, times, branch, scratch, values):
     """Solve one branch at given free times, and take it."""
     solve_triple(problem, candidates, word, n, triple, times, scratch[0])
     return take_branch(problem, word, n, triple, free, branch, scratch, times, values)
 
 
-@inner_kernel
-def affordable(problem, word, n, trim, ceiling):
-    """How long one trim of a word may last before it alone costs more than `ceiling`."""
+@bare_inner_kernel
+def affordable(problem, word, n, trim, upper_bound):
+    """How long one trim of a word may last before it alone costs more than `upper_bound`."""
     reach = problem.reaches[trim]
     if problem.rates[trim] > 0.0:
-        left = ceiling - problem.pad_cost - word_extra(problem, word, n)
+        left = upper_bound - problem.pad_cost - word_extra(problem, word, n)
         reach = min(reach, left / problem.rates[trim])
     return reach
 
 
-@inner_kernel
+@bare_inner_kernel
 def copy_branches(target, source):
     """Copy what `solve_triple` filled in."""
     for branch in range(2):
@@ -251,15 +264,15 @@ def copy_branches(target, source):
 
 
 @inner_kernel
-def scan_one(problem, candidates, word, n, triple, free, ceiling):
+def scan_one(problem, candidates, word, n, triple, free, upper_bound):
     """Words with one free time: roots of a scalar function along both branches."""
     q = free[0]
     m = problem.targets.size
-    reach = affordable(problem, word, n, word[q], ceiling)
+    reach = affordable(problem, word, n, word[q], upper_bound)
     if not reach > 0.0:
         return
     nodes = max(8, math.ceil(problem.nodes * reach / problem.reaches[word[q]]))
-    scratch = (np.empty((2, 3)), np.empty((n, 3)), np.empty((1 + m, 1)))
+    scratch = scratch_for(problem, word, n, 1)
     values = np.zeros(2)
     both = np.empty((2, 3))
     times = np.zeros(n)
@@ -316,6 +329,30 @@ def scan_one(problem, candidates, word, n, triple, free, ceiling):
                     branch, scratch, values,
                 )  # fmt: skip
             bisect(problem, candidates, word, n, triple, free, branch, scratch, values, stack)
+
+
+@bare_inner_kernel
+def any_node_is_cheap(problem, candidates, word, n, triple, times, out, upper_bound):
+    """Whether a word with one free time costs little more than the upper bound at any node of it.
+
+    That is no proof, but takes a tenth of the time that the reduced gradients take.
+    """
+    q = 6 - triple[0] - triple[1] - triple[2]  # the position of four that is not solved for
+    reach = affordable(problem, word, n, word[q], upper_bound)
+    if not reach > 0.0:
+        return False
+    most = upper_bound * (1.0 + problem.slack) - problem.pad_cost - word_extra(problem, word, n)
+    nodes = max(8, math.ceil(problem.nodes * reach / problem.reaches[word[q]]))
+    for j in range(nodes + 1):
+        times[q] = reach * j / nodes
+        solve_triple(problem, candidates, word, n, triple, times, out)
+        for branch in range(2):
+            cost = problem.rates[word[q]] * times[q]
+            for s in range(3):
+                cost += problem.rates[word[triple[s]]] * out[branch, s]
+            if cost < most:  # not where the branch is empty: NaN
+                return True
+    return False
 
 
 @inner_kernel
@@ -408,7 +445,7 @@ def bisect(problem, candidates, word, n, triple, free, branch, scratch, values, 
         top += 2
 
 
-@inner_kernel
+@bare_inner_kernel
 def secant(
     problem,
     candidates,
@@ -448,18 +485,17 @@ def secant(
 
 
 @inner_kernel
-def scan_two(problem, candidates, word, n, triple, free, ceiling):
+def scan_two(problem, candidates, word, n, triple, free, upper_bound):
     """Words with two free times: cells of a grid in which both functions change sign."""
-    m = problem.targets.size
     reaches = np.empty(2)
     counts = np.empty(2, dtype=np.int64)
     for k in range(2):
         full = problem.reaches[word[free[k]]]
-        reaches[k] = affordable(problem, word, n, word[free[k]], ceiling)
+        reaches[k] = affordable(problem, word, n, word[free[k]], upper_bound)
         if not reaches[k] > 0.0:
             return
         counts[k] = max(4, math.ceil(problem.nodes_2d * reaches[k] / full))
-    scratch = (np.empty((2, 3)), np.empty((n, 3)), np.empty((1 + m, 2)))
+    scratch = scratch_for(problem, word, n, 2)
     n_0, n_1 = counts[0] + 1, counts[1] + 1
     there = np.zeros((2, n_0, n_1), dtype=np.bool_)
     node_times = np.zeros((2, n_0, n_1, n))
@@ -471,7 +507,7 @@ def scan_two(problem, candidates, word, n, triple, free, ceiling):
             times[free[0]] = reaches[0] * i / counts[0]
             times[free[1]] = reaches[1] * j / counts[1]
             total = times[free[0]] + times[free[1]]
-            if total > problem.time_limit * (1.0 + 2.0 / problem.nodes_2d):
+            if total > time_left(problem) * (1.0 + 2.0 / problem.nodes_2d):
                 continue
             solve_triple(problem, candidates, word, n, triple, times, scratch[0])
             for branch in range(2):

@@ -10,9 +10,19 @@ import math
 
 import numpy as np
 
-from maneuver_automaton._compile import inner_kernel, kernel
-from maneuver_automaton.search._kernels_problem import condition, is_straight, propose, word_extra
+from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
+from maneuver_automaton.search._kernels_problem import (
+    condition,
+    is_straight,
+    look,
+    propose,
+    room_for,
+    time_left,
+    transitions_cost,
+    word_extra,
+)
 from maneuver_automaton.search._kernels_scan import (
+    any_node_is_cheap,
     choose_triple,
     levels,
     scan_one,
@@ -22,9 +32,11 @@ from maneuver_automaton.search._kernels_scan import (
 from maneuver_automaton.words._kernels_steering import phase, unit
 from maneuver_automaton.words._kernels_times import least_squares
 
+ON_THE_WAY = 1e-9  # relative: chains of transitions of one price are one
+
 
 @inner_kernel
-def closed_form_words(problem, candidates, word, n, triple, ceiling):
+def closed_form_words(problem, candidates, word, n, triple, upper_bound):
     """Words of three trims: isolated solutions."""
     out = np.empty((2, 3))
     times = np.zeros(3)
@@ -40,7 +52,7 @@ def closed_form_words(problem, candidates, word, n, triple, ceiling):
                 admissible = False
                 break
             cost += problem.rates[word[i]] * times[i]
-        if admissible and cost < ceiling:
+        if admissible and cost < upper_bound:
             span = np.empty((problem.targets.size, 2))
             for r in range(problem.targets.size):
                 span[r, 0] = condition(problem, word, n, r, times) - 1e-9
@@ -115,8 +127,8 @@ def low_rank_word(problem, candidates, word, n):
     for i in range(n):
         fastest = max(fastest, abs(problem.twists[word[i], 2]))
     most = 1
-    if problem.more_turns == 1 and problem.time_limit < np.inf:
-        most += math.floor(problem.time_limit * fastest / full)
+    if problem.more_turns == 1 and time_left(problem) < np.inf:
+        most += math.floor(time_left(problem) * fastest / full)
     for turns_1 in range(-most if w_1 != 0.0 else 0, (most if w_1 != 0.0 else 0) + 1):
         for turns_2 in range(-most if w_2 != 0.0 else 0, (most if w_2 != 0.0 else 0) + 1):
             matrix = np.zeros((rank + m, n))
@@ -149,120 +161,185 @@ def low_rank_word(problem, candidates, word, n):
 
 
 @inner_kernel
-def promising(problem, word, n, ceiling):
+def passing_words(links, seen, candidates, word, rows, n, tail, room, upper_bound):
+    """Words of four trims that pass through one of them: the other three follow in closed form.
+
+    Its transitions alone turn and move a vehicle on, which may be all that is wanted of a trim.
+    """
+    kept, triple = room[0], room[1]  # rows that last a while, and those solved for
+    for passed in range(n):
+        if word[passed] == tail:
+            continue
+        before = links.start if passed == 0 else links.class_of[word[passed - 1]]
+        last = passed == n - 1 or word[passed + 1] == tail
+        after = links.goal if last else links.class_of[word[passed + 1]]
+        through = links.class_of[word[passed]]
+        around = links.cost[before, through] + links.cost[through, after]
+        if around <= links.cost[before, after] * (1.0 + ON_THE_WAY):
+            continue  # the cheapest chain passes through it by itself
+        for i in range(n - 1):
+            kept[i] = rows[i] if i < passed else rows[i + 1]
+        if word_blocks(seen, kept, n - 1) > 0 and choose_triple(seen, kept, n - 1, triple):
+            closed_form_words(seen, candidates, kept, n - 1, triple, upper_bound)
+
+
+@bare_inner_kernel
+def promising(problem, word, n, upper_bound):
     """Whether a word can be cheaper than the dearest of the solutions asked for.
 
-    Lower bounds that hold for any times: way and turn at the best price per metre and radian, and
-    a fixed time at the best price per second.
+    Lower bounds that hold for any times: way and turn at the best price per metre and radian, as
+    far as the transitions do not make them, and a fixed time at the best price per second.
     """
-    if ceiling == np.inf:
+    if upper_bound == np.inf:
         return True
     per_metre, per_radian, per_second = np.inf, np.inf, np.inf
     for i in range(n):
-        twist = problem.twists[word[i]]
-        rate = problem.rates[word[i]]
-        if rate < 0.0:
-            return True
-        speed = math.hypot(twist[0], twist[1])
-        if speed > 0.0:
-            per_metre = min(per_metre, rate / speed)
-        if twist[2] != 0.0:
-            per_radian = min(per_radian, rate / abs(twist[2]))
-        per_second = min(per_second, rate)
-    full = 2.0 * math.pi
-    way = math.hypot(problem.goal[0], problem.goal[1])
-    turn = abs(problem.goal[2] - full * round(problem.goal[2] / full))
+        per_metre = min(per_metre, problem.prices[word[i], 0])
+        per_radian = min(per_radian, problem.prices[word[i], 1])
+        per_second = min(per_second, problem.rates[word[i]])
+    if per_second < 0.0:
+        return True
     bound = 0.0
-    if way > 0.0:
-        bound = max(bound, way * per_metre)
-    if turn > 0.0:
-        bound = max(bound, turn * per_radian)
+    if problem.fixed[2] > 0.0:
+        bound = max(bound, problem.fixed[2] * per_metre)
+    if problem.fixed[3] > 0.0:
+        bound = max(bound, problem.fixed[3] * per_radian)
     if problem.targets.size > 0 and problem.pad == 0 and problem.time_limit < np.inf:
-        bound = max(bound, problem.time_limit * per_second)
+        bound = max(bound, time_left(problem) * per_second)
     bound += problem.pad_cost + word_extra(problem, word, n)
-    return bound < ceiling
+    return bound < upper_bound
 
 
 @kernel
-def scan_words(problem, candidates, n, first, last, ceiling):
+def scan_words(problem, links, candidates, n, first, last, upper_bound):
     """Propose starts for words of `n` trims, at most one time free, number `first` to `last`.
 
     Returns the number of the word to go on with: before `last` when the buffer is full.
     """
+    linked = links.cost.shape[0] > 1
+    seen = room_for(problem, n) if linked else problem
     word = np.zeros(n, dtype=np.int64)
+    rows = np.zeros(n, dtype=np.int64) if linked else word
     triple = np.zeros(3, dtype=np.int64)
-    free = np.empty(max(n - 3, 0), dtype=np.int64)
+    kept = np.zeros((2, n), dtype=np.int64)
+    times, out = np.zeros(n), np.empty((2, 3))
+    most = upper_bound - problem.pad_cost
     for number in range(first, last):
         if candidates.counter[0] > candidates.words.shape[0] // 2:
             return number
-        kind = prepare_word(problem, candidates, n, number, word, triple, free, ceiling)
-        if kind == 2 and n == 3:
-            closed_form_words(problem, candidates, word, n, triple, ceiling)
-        elif kind == 2:
-            scan_one(problem, candidates, word, n, triple, free, ceiling)
+        spell(problem.twists.shape[0], word, n, number, problem.tail)
+        if linked:
+            if not transitions_cost(links, word, n, problem.tail) < most:
+                continue
+            look(problem, links, seen, word, n, rows)
+        spans = prepare_word(seen, candidates, rows, n, triple, upper_bound)
+        if spans == 2 and n == 3:
+            closed_form_words(seen, candidates, rows, n, triple, upper_bound)
+        elif spans == 2:
+            if linked and problem.targets.size == 0:
+                passing_words(
+                    links, seen, candidates, word, rows, n, problem.tail, kept, upper_bound
+                )
+            if problem.slack == np.inf or any_node_is_cheap(
+                seen, candidates, rows, n, triple, times, out, upper_bound
+            ):
+                scan_one(seen, candidates, rows, n, triple, others(n, triple), upper_bound)
     return last
 
 
 @kernel
-def scan_flat_words(problem, candidates, n, first, last, ceiling):
+def scan_flat_words(problem, links, candidates, n, first, last, upper_bound):
     """`scan_words` for words that cannot span the plane."""
+    linked = links.cost.shape[0] > 1
+    seen = room_for(problem, n) if linked else problem
     word = np.zeros(n, dtype=np.int64)
+    rows = np.zeros(n, dtype=np.int64) if linked else word
     triple = np.zeros(3, dtype=np.int64)
-    free = np.empty(max(n - 3, 0), dtype=np.int64)
+    most = upper_bound - problem.pad_cost
     for number in range(first, last):
         if candidates.counter[0] > candidates.words.shape[0] // 2:
             return number
-        if prepare_word(problem, candidates, n, number, word, triple, free, ceiling) == 1:
-            low_rank_word(problem, candidates, word, n)
+        spell(problem.twists.shape[0], word, n, number, problem.tail)
+        if linked:
+            if not transitions_cost(links, word, n, problem.tail) < most:
+                continue
+            look(problem, links, seen, word, n, rows)
+        spans = prepare_word(seen, candidates, rows, n, triple, upper_bound)
+        if spans == 1:
+            low_rank_word(seen, candidates, rows, n)
     return last
 
 
 @kernel
-def scan_long_words(problem, candidates, n, first, last, ceiling):
+def scan_long_words(problem, links, candidates, n, first, last, upper_bound):
     """`scan_words` for words that span and have two times free."""
+    linked = links.cost.shape[0] > 1
+    seen = room_for(problem, n) if linked else problem
     word = np.zeros(n, dtype=np.int64)
+    rows = np.zeros(n, dtype=np.int64) if linked else word
     triple = np.zeros(3, dtype=np.int64)
-    free = np.empty(2, dtype=np.int64)
+    most = upper_bound - problem.pad_cost
     for number in range(first, last):
         if candidates.counter[0] > candidates.words.shape[0] // 2:
             return number
-        if prepare_word(problem, candidates, n, number, word, triple, free, ceiling) == 2:
-            scan_two(problem, candidates, word, n, triple, free, ceiling)
+        spell(problem.twists.shape[0], word, n, number, problem.tail)
+        if linked:
+            if not transitions_cost(links, word, n, problem.tail) < most:
+                continue
+            look(problem, links, seen, word, n, rows)
+        spans = prepare_word(seen, candidates, rows, n, triple, upper_bound)
+        if spans == 2:
+            scan_two(seen, candidates, rows, n, triple, others(n, triple), upper_bound)
     return last
 
 
-@inner_kernel
-def prepare_word(problem, candidates, n, number, word, triple, free, ceiling):
-    """Fill `word`, `triple`, `free`: 0 nothing to do, 1 a word that cannot span, 2 one that can."""
-    n_trims = problem.twists.shape[0]
-    n_chosen = n
-    if problem.tail >= 0:
+@bare_inner_kernel
+def spell(n_trims, word, n, number, tail):
+    """Fill `word` with the digits of its number, and with the turn of a free heading.
+
+    It takes few arguments, as does the price of the transitions: for most words with transitions
+    that is all there is to do, and arguments cost more than that.
+    """
+    if tail >= 0:
         n_trims -= 1
-        n_chosen -= 1
-        word[n - 1] = problem.tail
-    left = number
-    for i in range(n_chosen - 1, -1, -1):
-        word[i] = left % n_trims
-        left //= n_trims
+        n -= 1
+        word[n] = tail
+    for i in range(n - 1, -1, -1):
+        word[i] = number % n_trims
+        number //= n_trims
+
+
+@bare_inner_kernel
+def prepare_word(problem, candidates, word, n, triple, upper_bound):
+    """Fill `triple`: 0 nothing to do, 1 a word that cannot span, 2 one that can.
+
+    The word is one that is seen: whether its trims span, and what its transitions leave of the way,
+    shows only there. The lower bound of its cost comes before all that is dear.
+    """
     blocks = word_blocks(problem, word, n)
-    if blocks == 0:
+    if blocks == 0 or not time_left(problem) > 0.0:
         return 0
     candidates.counter[1] += 1
-    if not promising(problem, word, n, ceiling):
+    if not promising(problem, word, n, upper_bound):
         return 0
     if blocks < 0:
         return 1
-    if not choose_triple(problem, word, n, triple):
-        return 0
+    return 2 if choose_triple(problem, word, n, triple) else 0
+
+
+@inner_kernel
+def others(n, triple):
+    """Positions of a word that are not among the three of `triple`."""
+    free = np.empty(n - 3, dtype=np.int64)
     count = 0
     for i in range(n):
         if i != triple[0] and i != triple[1] and i != triple[2]:
             free[count] = i
             count += 1
-    return 2
+    return free
 
 
-@inner_kernel
+@bare_inner_kernel
 def word_blocks(problem, word, n):
     """Number of runs of parallel trims; negative where the word cannot span, 0 where it is useless.
 

@@ -15,7 +15,8 @@ from maneuver_automaton.search.ready import (
     load_word_kernels,
 )
 from maneuver_automaton.search.result import SearchResult
-from maneuver_automaton.search.words import MOST_TRIMS, search_words
+from maneuver_automaton.search.word_scan import MOST_TRIMS
+from maneuver_automaton.search.words import search_words
 
 AFFORDABLE = 2.0  # [s] an exhaustive search may be expected to take when the method is `auto`
 SECONDS_PER_WORD = (0.0, 1e-6, 1e-6, 1e-6, 5e-5, 2e-3)  # by moving trims, measured, generous

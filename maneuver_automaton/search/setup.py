@@ -11,6 +11,7 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.words.library import FULL_TURN, MovingTrims, moving_trims
+from maneuver_automaton.words.transitions import Transitions, identities
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -27,6 +28,10 @@ class SearchSetup:
     rest_rate: float
     climbs: bool  # whether altitude is a condition
     library: MovingTrims  # where the trims come from
+    transitions: Transitions  # between the classes of the automaton's trims
+    start_class: int = 0  # of the trim before the word
+    goal_class: int = 0  # of the trim after it
+    shortest: float = 0.0  # [s] words with shorter coasting times are left out
 
     @property
     def start_is_goal(self) -> bool:
@@ -39,9 +44,7 @@ class SearchSetup:
 def search_setup(problem: Problem, goal: Goal) -> SearchSetup:
     """What every search for one goal starts from."""
     library = moving_trims(problem.automaton, problem.cost)
-    relative = np.zeros(4)
-    relative[: problem.start.size] = _seen_from(problem.start, goal.pose)
-    relative.setflags(write=False)
+    relative = goal_from_start(problem, goal)
     return SearchSetup(
         trims=library.trims,
         twists=library.twists,
@@ -53,7 +56,17 @@ def search_setup(problem: Problem, goal: Goal) -> SearchSetup:
         rest_rate=library.rest_rate,
         climbs=bool(library.climbs or relative[3] != 0.0),
         library=library,
+        transitions=identities(problem.automaton),
+        shortest=problem.horizon.min_coast,
     )
+
+
+def goal_from_start(problem: Problem, goal: Goal) -> Array:
+    """The goal (4,) seen from the problem's start, at an altitude of zero in the plane."""
+    relative = np.zeros(4)
+    relative[: problem.start.size] = _seen_from(problem.start, goal.pose)
+    relative.setflags(write=False)
+    return relative
 
 
 def _seen_from(start: Array, goal: Array) -> Array:

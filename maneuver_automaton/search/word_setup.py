@@ -22,10 +22,17 @@ from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.groups import LieGroup, group_of
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.result import plan_of
+from maneuver_automaton.search.setup import SearchSetup, goal_from_start
 from maneuver_automaton.search.timed_word import TimedWord
 from maneuver_automaton.words import TimesStatus, solve_switching_times
 from maneuver_automaton.words.closing import closed_at
-from maneuver_automaton.words.library import Library, library_of, most_different, words_of
+from maneuver_automaton.words.library import (
+    Library,
+    library_of,
+    most_different,
+    moving_trims,
+    words_of,
+)
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word
 
@@ -40,7 +47,7 @@ class WordSetup:
     problem: Problem
     goal: Goal
     library: Library
-    letters: tuple[int, ...]  # trims that words are made of
+    alphabet: tuple[int, ...]  # trims that words are made of
     start_trim: int
     goal_trim: int
 
@@ -67,6 +74,35 @@ class WordSetup:
     def exactly(self) -> bool:
         """Whether a plan has to last as long as is asked for with no rest to fill the time."""
         return self.problem.horizon.time is not None and self.pad is None
+
+    @property
+    def is_mended(self) -> bool:
+        """Whether times must meet more than the goal: a least or a longest one, or a sum."""
+        longest = self.library.arrays.longest[list(self.alphabet)]
+        least = self.problem.horizon.min_coast
+        return bool(self.limit or least > 0.0 or (longest < math.inf).any())
+
+    def as_search(self) -> SearchSetup:
+        """What an exhaustive search starts from: the alphabet, and the transitions between it."""
+        rows, arrays, problem = list(self.alphabet), self.library.arrays, self.problem
+        known, relative = self.library.transitions, goal_from_start(problem, self.goal)
+        waiting = _waiting_rate(problem)
+        climbs = arrays.twists[rows, 3].any() or known.displacement[..., 3].any()
+        return SearchSetup(
+            trims=np.array(rows, dtype=np.int64),
+            twists=arrays.twists[rows],
+            rates=arrays.rates[rows] + waiting,
+            periods=arrays.periods[rows],
+            goal=relative,
+            free_heading=self.goal.free_heading,
+            rest=self.pad,
+            rest_rate=waiting,
+            climbs=bool(climbs or relative[3] != 0.0),
+            library=moving_trims(problem.automaton, problem.cost),
+            transitions=replace(known, cost=known.cost + waiting * known.time),
+            start_class=int(known.class_of[self.start_trim]),
+            goal_class=int(known.class_of[self.goal_trim]),
+        )
 
     def links(self, trims: Sequence[int]) -> list[tuple[int, int]]:
         """Neighbours in the word, the first and last trim included."""
@@ -233,27 +269,28 @@ def word_setup(
     *,
     most_trims: int,
     also: Sequence[int] = (),
-    steers: bool = True,
+    steers: bool = False,
 ) -> WordSetup:
     """What every search over words with maneuvers starts from.
 
     Words are made of the trims that differ most where the library has more than `most_trims`; the
-    first trim, the last, and those of the indices `also` are among them. Unless it `steers`, the
-    library lists no words to be steered along.
+    first trim, the last, and those of the indices `also` are among them. Where it
+    `steers`, the library lists the words to be steered along.
     """
     automaton = problem.automaton
     start_trim = automaton.index_of(problem.first_trim.name)
     goal_trim = automaton.index_of(problem.last_trim(goal).name)
-    pads = problem.horizon.time is not None and automaton.rest is not None
     wanted = tuple(sorted({start_trim, goal_trim, *also}))
     useful = trims_between(automaton, start_trim, [goal_trim])
     kept = None if len(useful) == len(automaton) else tuple(useful.tolist())
-    letters, library = _library(automaton, problem.cost, pads, most_trims, wanted, steers, kept)
+    alphabet, library = _library(
+        automaton, problem.cost, _waiting_rate(problem), most_trims, wanted, steers, kept
+    )
     return WordSetup(
         problem=problem,
         goal=goal,
         library=library,
-        letters=letters,
+        alphabet=alphabet,
         start_trim=start_trim,
         goal_trim=goal_trim,
     )
@@ -271,7 +308,7 @@ def maneuver_prices(automaton: Automaton, cost: StageCost) -> Array:
 def _library(
     automaton: Automaton,
     cost: StageCost,
-    pads: bool,
+    waiting: float,
     most_trims: int,
     wanted: tuple[int, ...],
     steers: bool,
@@ -281,30 +318,37 @@ def _library(
 
     Where only some trims are `useful`, the others, which lead nowhere, are not among them.
     """
-    library = _transitions(automaton, cost, pads)
+    library = _transitions(automaton, cost, waiting)
     twists = library.arrays.twists[: library.arrays.n_trims]
     moving = np.flatnonzero(twists[:, :3].any(axis=1))
     if useful is not None:
         moving = np.intersect1d(moving, useful)
     chosen = set(moving[most_different(twists[moving], most_trims)].tolist())
     chosen |= set(wanted) & set(moving.tolist())
-    letters = tuple(sorted(chosen))
-    if not steers:
-        return (*letters, *library.arrays.climbs.tolist()), library
-    words, n_few = words_of(letters, library.transitions)
-    return letters, replace(library, arrays=library.arrays._replace(words=words, n_few=n_few))
+    if steers:
+        words, n_few = words_of(sorted(chosen), library.transitions)
+        library = replace(library, arrays=library.arrays._replace(words=words, n_few=n_few))
+    upright = library.arrays.climbs[: library.arrays.n_upright].tolist()
+    return tuple(sorted(chosen.union(upright))), library
 
 
 @functools.lru_cache(maxsize=8)
-def _transitions(automaton: Automaton, cost: StageCost, pads: bool) -> Library:
+def _transitions(automaton: Automaton, cost: StageCost, waiting: float) -> Library:
+    """The library with its prices, less what rest would cost per second meanwhile."""
     rates = cost.rates(automaton.controls, automaton.body_velocities)
     prices = maneuver_prices(automaton, cost)
-    if pads and automaton.rest is not None:  # what rest would cost meanwhile is taken off
-        waiting = rates[automaton.rest]
-        lasting = np.array([maneuver.duration for maneuver in automaton.maneuvers])
-        rates = np.maximum(rates - waiting, 0.0)
-        prices = np.maximum(prices - waiting * lasting, 0.0)
+    lasting = np.array([maneuver.duration for maneuver in automaton.maneuvers])
+    rates = np.maximum(rates - waiting, 0.0)
+    prices = np.maximum(prices - waiting * lasting, 0.0)
     return library_of(automaton, rates=rates, maneuver_costs=prices, trims=())
+
+
+def _waiting_rate(problem: Problem) -> float:
+    """Cost per second of the rest that fills a fixed time; 0 where none does."""
+    rest = problem.automaton.rest
+    if problem.horizon.time is None or rest is None:
+        return 0.0
+    return float(problem.rates[rest])
 
 
 def _without_idle(

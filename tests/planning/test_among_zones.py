@@ -16,8 +16,8 @@ from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.planning.result import PlanStatus
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.receding_horizon import RecedingHorizon, simulate
-from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
 from maneuver_automaton.search.result import plan_of
+from maneuver_automaton.search.word_stages import search_words_with_maneuvers
 from tests.inertia import unicycle_automaton
 from tests.search.cases import compiled_only
 

@@ -18,7 +18,7 @@ from maneuver_automaton.optimal_control import has_casadi
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.primitives import Maneuver
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
+from maneuver_automaton.search.word_stages import search_words_with_maneuvers
 from tests.inertia import CAR, resting, unicycle_automaton
 
 BODY = Box([4.689, 1.942], [1.4155, 0.0])

@@ -9,8 +9,8 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.problem import Goal, Horizon, Problem
 from maneuver_automaton.refinement.conditions import broken_condition
 from maneuver_automaton.refinement.fitting import fitted_plans
-from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
 from maneuver_automaton.search.result import plan_of
+from maneuver_automaton.search.word_stages import search_words_with_maneuvers
 from tests.inertia import unicycle_automaton
 
 

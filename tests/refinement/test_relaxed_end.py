@@ -10,8 +10,8 @@ import pytest
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.relaxed_end import _Relaxation, with_relaxed_end
-from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
 from maneuver_automaton.search.result import plan_of
+from maneuver_automaton.search.word_stages import search_words_with_maneuvers
 from tests.inertia import unicycle_automaton
 
 GOAL = Goal(pose=[4.0, 1.5, 0.7], tolerance_m=0.1, tolerance_rad=0.2)

@@ -187,7 +187,7 @@ def test_results_are_the_same_in_every_run():
 
 def test_small_buffers_change_nothing(monkeypatch):
     expected = search(parking(), alternatives=None)
-    monkeypatch.setattr("maneuver_automaton.search.words.CAPACITY", 40)
+    monkeypatch.setattr("maneuver_automaton.search.word_scan.CAPACITY", 40)
     assert_same_solutions(expected, search(parking(), alternatives=None), atol=0.0)
 
 

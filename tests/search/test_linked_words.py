@@ -16,7 +16,7 @@ from maneuver_automaton.automaton.stock import load_stock_library
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.search.maneuver_words import search_maneuver_words
+from maneuver_automaton.search.linked_words import scan_linked_words, steer_linked_words
 from maneuver_automaton.search.result import SearchStatus, plan_of
 from maneuver_automaton.search.word_setup import word_setup
 from tests.inertia import car_automaton, unicycle_automaton
@@ -32,7 +32,7 @@ def problem(goal, *, automaton=None, **changed) -> Problem:
 
 
 def searched(one: Problem, **options):
-    return search_maneuver_words(one, one.goals[0], **options)
+    return scan_linked_words(one, one.goals[0], **options)
 
 
 def first_plan(one: Problem, **options):
@@ -64,7 +64,7 @@ def test_nothing_cheaper_is_found_by_brute_force(goal):
 
 def test_all_words_of_three_trims_are_listed():
     one = problem([2.0, 1.5, 0.7], automaton=unicycle_automaton(SMALL))
-    result = searched(one, alternatives=None, most_letters=3)
+    result = searched(one, alternatives=None, max_trims=3)
     assert result.complete
     setup = word_setup(one, one.goals[0], most_trims=99)
     rng = np.random.default_rng(1)
@@ -112,7 +112,7 @@ def test_every_plan_passes_the_audit(make):
 def test_a_moved_problem_has_the_moved_words(x, y, turn, by):
     one = problem([x, y, turn], automaton=unicycle_automaton(SMALL))
     moved = one.moved(SE2(by))
-    here, there = (searched(p, most_letters=3).solutions for p in (one, moved))
+    here, there = (searched(p, max_trims=3).solutions for p in (one, moved))
     assert len(here) == len(there)
     if here:
         assert there[0].cost == pytest.approx(here[0].cost, abs=1e-5)
@@ -151,10 +151,9 @@ def test_a_fixed_time_is_met_without_solving_every_word_for_it():
         cost=Cost(effort=1.0),
         horizon=Horizon(time=6.8),
     )
-    short = searched(one, most_letters=3)
-    assert (short.status, short.counts["polished"] < 100) == (SearchStatus.EXHAUSTED, True)
-    found = searched(one, most_trims=14)
-    assert found.counts["polished"] < 2000
+    short = steer_linked_words(one, one.goals[0])
+    assert (short.status, short.counts["expansions"]) == (SearchStatus.EXHAUSTED, 0)
+    found = searched(one, alphabet=14)
     assert found.solutions[0].cost < 70.0
     assert plan_of(one, found.solutions[0]).duration == pytest.approx(6.8, abs=1e-8)
 

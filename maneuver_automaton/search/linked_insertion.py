@@ -21,7 +21,7 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.groups import LieGroup
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.alternatives import distinct
-from maneuver_automaton.search.maneuver_words import EXPANSIONS_A_WORD
+from maneuver_automaton.search.linked_words import EXPANSIONS_A_WORD
 from maneuver_automaton.search.result import SearchResult, SearchStatus
 from maneuver_automaton.search.timed_word import TimedWord
 from maneuver_automaton.search.word_setup import WordSetup, word_setup
@@ -35,7 +35,7 @@ MOST_TRIMS = 400  # of a larger library those that differ most
 FEW = 2  # trims of a word that may be taken out at once
 
 
-def improve_maneuver_words(
+def improve_linked_words(
     problem: Problem,
     goal: Goal,
     seeds: Sequence[Word],
@@ -73,11 +73,11 @@ def improve_maneuver_words(
     >>> goal = Goal(pose=[3.0, 0.0, 0.0], trim="slow")
     >>> problem = Problem(robot, [0, 0, 0], goal, start_trim="slow")
     >>> seed = Word(trims=[0], durations=[6.0])
-    >>> found = improve_maneuver_words(problem, goal, [seed]).solutions[0]
+    >>> found = improve_linked_words(problem, goal, [seed]).solutions[0]
     >>> [robot.trim_names[k] for k in found.trims], found.cost
     (['ahead'], 3.0)
     """
-    setup = word_setup(problem, goal, most_trims=MOST_TRIMS, also=_used(seeds), steers=False)
+    setup = word_setup(problem, goal, most_trims=MOST_TRIMS, also=_used(seeds))
     deadline = time.monotonic() + time_limit
     climb = _Climb(setup, deadline, most_tries)
     found: list[Word] = []
@@ -183,7 +183,7 @@ class _Prices:
         self.word = word
         self.arrays = setup.library.arrays
         self.group = setup.group
-        self.letters = np.array(setup.letters, dtype=np.int64)
+        self.alphabet = np.array(setup.alphabet, dtype=np.int64)
         dof = setup.problem.start.size
         self.twists = self.arrays.twists[:, :dof]
         chain = (setup.start_trim, *word.trims, setup.goal_trim)
@@ -226,7 +226,7 @@ class _Prices:
         word, chain = self.word, self.chain
         before, following = chain[first], chain[after + 1]
         rest = self.begins[after].inverse() @ self.end
-        chosen = self.letters[(self.letters != before) & (self.letters != following)]
+        chosen = self.alphabet[(self.alphabet != before) & (self.alphabet != following)]
         if first < after:
             chosen = chosen[chosen != chain[first + 1]]
         removed = float(
@@ -244,7 +244,7 @@ class _Prices:
         """Any trim for `lasting` seconds in the midst of trim `k` of the word."""
         word, group = self.word, self.group
         host, half = word.trims[k], 0.5 * float(word.durations[k])
-        chosen = self.letters[self.letters != host]
+        chosen = self.alphabet[self.alphabet != host]
         middle = self.begins[k] @ group.exp(half * self.twists[host])
         rest = middle.inverse() @ self.end
         prices = self._priced(middle, host, chosen, lasting, host, rest)

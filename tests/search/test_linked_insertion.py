@@ -10,11 +10,11 @@ import pytest
 from maneuver_automaton.audit import audit_plan
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Horizon, Problem
-from maneuver_automaton.search.maneuver_insertion import improve_maneuver_words
-from maneuver_automaton.search.maneuver_search import search_words_with_maneuvers
-from maneuver_automaton.search.maneuver_words import search_maneuver_words
+from maneuver_automaton.search.linked_insertion import improve_linked_words
+from maneuver_automaton.search.linked_words import scan_linked_words
 from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.word_setup import word_setup
+from maneuver_automaton.search.word_stages import search_words_with_maneuvers
 from tests.inertia import car_automaton, unicycle_automaton
 from tests.search.cases import compiled_only, lasting
 
@@ -28,13 +28,13 @@ def posed(goal, automaton=None, **changed) -> Problem:
 
 
 def improved(one: Problem, seeds):
-    return improve_maneuver_words(one, one.goals[0], seeds)
+    return improve_linked_words(one, one.goals[0], seeds)
 
 
 @pytest.mark.parametrize("goal", GOALS)
 def test_insertion_never_ends_dearer_than_it_began(goal):
     one = posed(goal)
-    seeds = search_maneuver_words(one, one.goals[0], alternatives=3, most_letters=3).solutions
+    seeds = scan_linked_words(one, one.goals[0], alternatives=3, max_trims=3).solutions
     best = improved(one, seeds).solutions[0]
     plan = plan_of(one, best)
     assert best.cost <= seeds[0].cost + 1e-9
@@ -45,7 +45,7 @@ def test_insertion_never_ends_dearer_than_it_began(goal):
 @pytest.mark.parametrize("goal", GOALS)
 def test_no_single_change_is_cheaper_at_the_end(goal):
     one = posed(goal, unicycle_automaton(FEW))
-    seeds = search_maneuver_words(one, one.goals[0], most_letters=3).solutions
+    seeds = scan_linked_words(one, one.goals[0], max_trims=3).solutions
     best = improved(one, seeds).solutions[0]
     setup = word_setup(one, one.goals[0], most_trims=99)
     timed = setup.timed(best)
@@ -65,7 +65,7 @@ def test_no_single_change_is_cheaper_at_the_end(goal):
 def test_with_exhaustive_search_it_is_as_cheap_as_all_words_of_four_trims(goal):
     one = posed(goal, unicycle_automaton(FEW))
     both = search_words_with_maneuvers(one, one.goals[0])
-    words = search_maneuver_words(one, one.goals[0], most_letters=4)
+    words = scan_linked_words(one, one.goals[0], max_trims=4)
     assert both.solutions[0].cost <= words.solutions[0].cost + 1e-9
 
 
@@ -103,7 +103,7 @@ def test_a_word_under_work_comes_back_from_the_whole_word(goal, time):
     """Padding and the trims that chains lead through are left out, and the motion is the same."""
     one = posed(goal, horizon=Horizon(time=time))
     setup = word_setup(one, one.goals[0], most_trims=99)
-    for word in search_maneuver_words(one, one.goals[0], alternatives=5).solutions:
+    for word in scan_linked_words(one, one.goals[0], alternatives=5).solutions:
         timed = setup.timed(word)
         assert setup.word(timed).trims.tolist() == word.trims.tolist()
         assert setup.word(timed).durations == pytest.approx(word.durations, abs=1e-12)

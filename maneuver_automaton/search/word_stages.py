@@ -8,16 +8,16 @@ from collections.abc import Iterator
 
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.alternatives import distinct
-from maneuver_automaton.search.maneuver_insertion import improve_maneuver_words
-from maneuver_automaton.search.maneuver_words import CLOSED_FORM, search_maneuver_words
+from maneuver_automaton.search.linked_insertion import improve_linked_words
+from maneuver_automaton.search.linked_words import scan_linked_words, steer_linked_words
 from maneuver_automaton.search.result import SearchResult, SearchStatus
 from maneuver_automaton.words.word import Word
 
+CLOSED_FORM = 3  # trims of a word whose times follow in closed form
 SCANNED_TRIMS = 14  # that words of four trims are made of
-SCANNED = 4  # trims of a scanned word
 SCAN_SHARE = 0.4  # of the time that is left, for scanning
 SEED_SLACK = 0.1  # share by which words may be dearer than a plan that is known, and yet be seeds
-SEEDS = 4  # words that insertion begins with
+SEEDS = 4  # words of three trims that insertion begins with, beside the cheapest one
 
 
 def search_words_with_maneuvers(
@@ -102,32 +102,26 @@ def maneuver_word_stages(
         return SearchResult(status=status, solutions=kept, counts=dict(counts))
 
     yield stage(
-        search_maneuver_words(
-            problem,
-            goal,
-            alternatives=asked,
-            most_letters=CLOSED_FORM,
-            time_limit=time_limit,
-            ceiling=near,
-        )
+        steer_linked_words(problem, goal, alternatives=asked, time_limit=time_limit, ceiling=near)
     )
+    seeds = found[:SEEDS]  # they differ more than the words of four trims, which come in families
     left = deadline - time.monotonic()
     if left > 0.0:
         yield stage(
-            search_maneuver_words(
+            scan_linked_words(
                 problem,
                 goal,
                 alternatives=asked,
-                most_letters=SCANNED,
-                most_trims=SCANNED_TRIMS,
+                alphabet=SCANNED_TRIMS,
                 time_limit=left if counted else SCAN_SHARE * left,
-                ceiling=near,
+                ceiling=found[alternatives].cost if len(found) > alternatives else near,
             )
         )
     left = deadline - time.monotonic()
     most = problem.horizon.max_trims
     if left > 0.0 and found and (most is None or most > CLOSED_FORM):
-        yield stage(improve_maneuver_words(problem, goal, found[:SEEDS], time_limit=left))
+        seeds = [found[0], *(one for one in seeds if one is not found[0])]
+        yield stage(improve_linked_words(problem, goal, seeds, time_limit=left))
 
 
 def _add(counts: dict[str, int], more: dict[str, int]) -> None:

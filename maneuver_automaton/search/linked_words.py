@@ -1,0 +1,268 @@
+"""Words whose trims are linked by transitions of any size: steered first, then scanned.
+
+Words of up to three trims follow from the steering function at once. Longer ones are those of the
+exhaustive search, as they are seen from before their transitions. What neither knows is made good
+afterwards: trims that must last a while, or may not last longer, a time to be met, and the prices
+of switches within maneuvers.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import time
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.search.alternatives import TIE, in_order
+from maneuver_automaton.search.result import SearchResult, SearchStatus
+from maneuver_automaton.search.timed_word import TimedWord
+from maneuver_automaton.search.word_scan import scanned
+from maneuver_automaton.search.word_setup import WordSetup, word_setup
+from maneuver_automaton.words import _kernels_candidates as kernels
+from maneuver_automaton.words.library import four_columns
+
+ALPHABET = 24  # trims that words are made of, of a larger library those that differ most
+LONGEST = 4  # trims of a scanned word, unless fewer are asked for
+NODES = 12  # grid nodes per scanned time: a rough answer will do, insertion follows
+HEADINGS = 24  # a free heading is tried at so many
+SLACK = 0.1  # share by which a word may be dearer than what is asked for before it is made good
+WORDS_AN_EXPANSION = 16  # that are looked at in the time of one expansion of the lattice
+EXPANSIONS_A_WORD = 8  # in place of solving one word for its times
+
+
+def steer_linked_words(
+    problem: Problem,
+    goal: Goal,
+    *,
+    alternatives: int = 0,
+    time_limit: float = math.inf,
+    ceiling: float = math.inf,
+    alphabet: int = ALPHABET,
+) -> SearchResult:
+    """Words of up to three trims, and a climb, from the steering function; see `scan_linked_words`.
+
+    A first answer, and a bound for all that follows: it takes a hundredth of the time of a scan.
+    Where more is asked of a word than to end at the goal, its times are a start to be solved from.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.automaton import Automaton
+    >>> from maneuver_automaton.models import Unicycle
+    >>> controls = {"ahead": (1, 0), "left": (1, 1), "right": (1, -1)}
+    >>> robot = Automaton.of_controls(Unicycle(), controls)
+    >>> goal = Goal(pose=[3.0, 1.0, 0.0], trim="ahead")
+    >>> problem = Problem(robot, [0, 0, 0], goal, start_trim="ahead")
+    >>> best = steer_linked_words(problem, goal).solutions[0]
+    >>> [robot.trim_names[k] for k in best.trims], round(best.cost, 4)
+    (['left', 'ahead', 'right'], 3.1754)
+    """
+    deadline = time.monotonic() + time_limit
+    setup = word_setup(problem, goal, most_trims=alphabet, steers=True)
+    # the times of so few trims follow from the pose: to meet a time exactly is left to the scan
+    headings = _headings(goal)[: 0 if setup.exactly else None]
+    refined = bool(goal.free_heading or setup.limit or problem.horizon.min_coast)
+    found = _made_good(
+        setup, _steered(setup, headings), alternatives, ceiling, deadline, refined=refined
+    )
+    return _result(
+        setup,
+        found,
+        alternatives,
+        ceiling,
+        none=SearchStatus.OUT_OF_BUDGET if time.monotonic() > deadline else SearchStatus.EXHAUSTED,
+        counts={"expansions": len(headings)},
+    )
+
+
+def scan_linked_words(
+    problem: Problem,
+    goal: Goal,
+    *,
+    alternatives: int | None = 0,
+    time_limit: float = math.inf,
+    ceiling: float = math.inf,
+    max_trims: int = LONGEST,
+    alphabet: int = ALPHABET,
+) -> SearchResult:
+    """Words from the problem's first trim to the goal's last one, with transitions in between.
+
+    Between two trims stands the cheapest chain of maneuvers, so a word of the library's graph with
+    dearer ones, or with maneuvers that lead from a trim to itself, is not among them. All trims of
+    a word coast for a while. With a ceiling, or a number of alternatives, a word of four trims is
+    left out where no node of its scanned time is nearly cheap enough.
+
+    Parameters
+    ----------
+    problem : Problem
+    goal : Goal
+    alternatives : int, optional
+        How many solutions beside the cheapest. None: all that are found, nothing is pruned.
+    time_limit : float
+        [s] after which the search ends with what it has; ``search.max_expansions`` of the problem
+        limits it by the number of words instead: the same at every call.
+    ceiling : float
+        Cost of a plan that is known: what is dearer may be left out.
+    max_trims : int
+        Trims of a word that coast, at most; the horizon's ``max_trims`` may be less.
+    alphabet : int
+        Words are made of so many trims of the library, of a larger one of those that differ most.
+
+    Returns
+    -------
+    SearchResult
+        ``complete`` if no word was left out.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.automaton import Automaton
+    >>> from maneuver_automaton.models import Unicycle
+    >>> controls = {"ahead": (1, 0), "left": (1, 1), "right": (1, -1)}
+    >>> robot = Automaton.of_controls(Unicycle(), controls)
+    >>> goal = Goal(pose=[3.0, 1.0, 0.0], trim="ahead")
+    >>> problem = Problem(robot, [0, 0, 0], goal, start_trim="ahead")
+    >>> best = scan_linked_words(problem, goal).solutions[0]
+    >>> [robot.trim_names[k] for k in best.trims], round(best.cost, 4)
+    (['left', 'ahead', 'right'], 3.1754)
+    """
+    deadline = time.monotonic() + time_limit
+    setup = word_setup(problem, goal, most_trims=alphabet)
+    expansions = problem.search.max_expansions
+    later = setup.prices_switches or setup.is_mended
+    pads = problem.horizon.time is not None and setup.pad is not None  # rest is a trim more
+    most = min(max_trims, LONGEST - int(goal.free_heading)) + int(pads)
+    everything = alternatives is None and ceiling == math.inf
+    scan, finished = scanned(
+        problem,
+        setup.as_search(),
+        min(most, problem.horizon.max_trims or most),
+        alternatives=None if later else alternatives,
+        ceiling=ceiling * (1.0 + SLACK * later) + TIE,
+        nodes=NODES,
+        spare=pads,
+        slack=math.inf if everything else SLACK,
+        deadline=deadline,
+        most_words=None if expansions is None else WORDS_AN_EXPANSION * expansions,
+    )
+    found = _made_good(
+        setup, scan.timed(), alternatives, ceiling, deadline, refined=setup.is_mended
+    )
+    return _result(
+        setup,
+        found,
+        alternatives,
+        ceiling,
+        none=SearchStatus.EXHAUSTED if finished else SearchStatus.OUT_OF_BUDGET,
+        complete=everything and finished,
+        counts={
+            "expansions": -(-scan.n_words // WORDS_AN_EXPANSION),
+            "steering_calls": scan.n_steering,
+        },
+    )
+
+
+def _made_good(
+    setup: WordSetup,
+    rough: Iterable[TimedWord],
+    alternatives: int | None,
+    ceiling: float,
+    deadline: float,
+    *,
+    refined: bool,
+) -> Iterator[TimedWord]:
+    """Words found, each with times that meet all conditions, and with its own price.
+
+    They come by rising cost as the search sees it, which is a lower bound where switches are
+    priced. Unless they are `refined`, their times only lose the error of rounding.
+    """
+    most = setup.problem.search.max_expansions
+    prices = list[float]()
+    slack = 1.0 + SLACK * refined + TIE
+    for n, found in enumerate(rough):
+        dearest = ceiling
+        if alternatives is not None and len(prices) > alternatives:
+            dearest = min(ceiling, sorted(prices)[alternatives])
+        if found.cost > dearest * slack or (prices and time.monotonic() > deadline):
+            return
+        if most is not None and EXPANSIONS_A_WORD * n > most:
+            return
+        if refined:
+            word = setup.solved(found.trims, [found.durations])
+        else:
+            word = setup.closed(found.trims, found.durations)
+        if word is not None:
+            prices.append(word.cost)
+            yield word
+
+
+def _result(
+    setup: WordSetup,
+    found: Iterable[TimedWord],
+    alternatives: int | None,
+    ceiling: float,
+    *,
+    none: SearchStatus,
+    complete: bool = False,
+    counts: dict[str, int],
+) -> SearchResult:
+    """What was found and asked for, cheapest first; `none` is the status if that is nothing."""
+    kept = [one for one in found if one.cost <= ceiling * (1.0 + TIE)]
+    kept.sort(key=lambda one: (one.cost, len(one.trims), one.trims))
+    asked = kept if alternatives is None else kept[: alternatives + 1]
+    return SearchResult(
+        status=SearchStatus.FOUND if asked else none,
+        solutions=tuple(in_order(setup.word(one) for one in asked)),
+        complete=complete,
+        counts=counts,
+    )
+
+
+def _headings(goal: Goal) -> Array:
+    """Headings at the goal that are steered to: seeds where any will do."""
+    if not goal.free_heading:
+        return goal.pose[2:3]
+    return np.linspace(0.0, 2.0 * np.pi, HEADINGS, endpoint=False)
+
+
+def _steered(setup: WordSetup, headings: Array) -> Iterator[TimedWord]:
+    """Words of up to three trims and a climb that lead to the goal, cheapest first."""
+    arrays, scratch = setup.library.arrays, setup.library.scratch()
+    start, goal = four_columns(np.array([setup.problem.start, setup.goal.pose]))[:, None]
+    found: list[tuple[Array, IntArray, IntArray, Array]] = []  # costs, rows, climbs, times
+    for heading in headings:
+        goal[0, 2] = heading
+        n = kernels.candidate_batch(
+            arrays,
+            len(arrays.words),
+            start,
+            setup.start_trim,
+            goal,
+            setup.goal_trim,
+            math.inf,
+            scratch,
+        )
+        one = scratch.costs, scratch.rows, scratch.climbs, scratch.times
+        found.append((one[0][:n].copy(), one[1][:n].copy(), one[2][:n].copy(), one[3][:n].copy()))
+    if not found:
+        return
+    costs, rows, climbs, times = (np.concatenate(each) for each in zip(*found, strict=True))
+    for k in np.argsort(costs, kind="stable"):
+        word = np.append(arrays.words[rows[k]], climbs[k])
+        used = word >= 0
+        yield TimedWord(tuple(word[used].tolist()), times[k, used], cost=float(costs[k]))
+
+
+@functools.cache
+def load_linked_words() -> None:
+    """Have the kernels ready that search words with transitions."""
+    from maneuver_automaton.automaton import Automaton
+    from maneuver_automaton.models import Unicycle
+
+    robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
+    goal = Goal(pose=[1.0, 1.0, 1.0], trim="ahead")
+    problem = Problem(robot, [0, 0, 0], goal, start_trim="ahead")
+    steer_linked_words(problem, goal)
+    scan_linked_words(problem, goal)
