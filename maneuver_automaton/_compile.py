@@ -33,12 +33,17 @@ def user_cache_folder() -> Path:
 
 
 def source_hash() -> str:
-    """Hash of every kernel source of the package, 16 hexadecimal digits."""
+    """Hash of every kernel source and of the names of all modules, 16 hexadecimal digits.
+
+    Compiled code names the modules of the structures it is given: where one has moved to another
+    module, numba fails to load what it compiled before.
+    """
     digest = hashlib.sha256()
     package = Path(__file__).parent
-    for path in sorted([*package.rglob("_kernels*.py"), Path(__file__)]):
+    for path in sorted(package.rglob("*.py")):
         digest.update(path.relative_to(package).as_posix().encode())
-        digest.update(path.read_bytes())
+        if path.name.startswith("_kernels") or path.name == "_compile.py":
+            digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
 

@@ -105,7 +105,8 @@ def test_the_folder_is_named_after_all_kernel_sources():
     assert _compile.kernel_folder().name == f"kernels-{number}"
 
 
-def test_the_hash_sees_every_kernel_source_and_nothing_else(package):
+def test_the_hash_sees_every_kernel_source_and_the_name_of_every_module(package):
+    (package / "other.py").write_text("one")
     before = _compile.source_hash()
     (package / "other.py").write_text("changed")
     (package / "search" / "notes.txt").write_text("new")
@@ -118,7 +119,9 @@ def test_the_hash_sees_every_kernel_source_and_nothing_else(package):
     seen.add(_compile.source_hash())
     (package / "search" / "_kernels_more.py").write_text("new")
     seen.add(_compile.source_hash())
-    assert len(seen) == 6
+    (package / "other.py").rename(package / "search" / "other.py")  # structures move with it
+    seen.add(_compile.source_hash())
+    assert len(seen) == 7
 
 
 @pytest.mark.parametrize(
