@@ -22,7 +22,7 @@ from maneuver_automaton.search._kernels_problem import (
     word_extra,
 )
 from maneuver_automaton.search._kernels_scan import (
-    any_node_is_cheap,
+    any_node_may_do,
     choose_triple,
     levels,
     scan_one,
@@ -240,7 +240,7 @@ def scan_words(problem, links, candidates, n, first, last, upper_bound):
                 passing_words(
                     links, seen, candidates, word, rows, n, problem.tail, kept, upper_bound
                 )
-            if problem.slack == np.inf or any_node_is_cheap(
+            if problem.slack == np.inf or any_node_may_do(
                 seen, candidates, rows, n, triple, times, out, upper_bound
             ):
                 scan_one(seen, candidates, rows, n, triple, others(n, triple), upper_bound)
