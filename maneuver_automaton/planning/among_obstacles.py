@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from maneuver_automaton.automaton.same_motion import UNFINISHED, is_new
-from maneuver_automaton.planning.blocked import why_goal_blocked
+from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.checking import Condition, load_checks
 from maneuver_automaton.planning.detours import with_stones
@@ -104,7 +104,7 @@ def plan_on_lattice(
     problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
 ) -> PlanResult:
     """The cheapest free plan found."""
-    goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
+    goals = open_goals(problem)
     query = lattice_query(problem, goals, prepared=workspace.prepared)
     found = Incumbents(problem, budget, workspace.on(problem.obstacles), alternatives, UNFINISHED)
     progress = _Progress(query, library_table(problem, workspace), found)

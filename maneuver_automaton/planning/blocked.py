@@ -61,6 +61,11 @@ def why_goal_blocked(problem: Problem, goal: Goal) -> str:
     return f"at the goal {said}" if said else ""
 
 
+def open_goals(problem: Problem) -> tuple[int, ...]:
+    """Which goals a plan may end at."""
+    return tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
+
+
 def _part_touched(problem: Problem, trim: str | None, pose: Array, time: float) -> str:
     """What something that the vehicle carries touches, in a trim at a pose; empty if nothing."""
     automaton = problem.automaton

@@ -17,7 +17,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.same_motion import UNFINISHED
-from maneuver_automaton.planning.blocked import why_goal_blocked
+from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.planning.checking import load_checks
 from maneuver_automaton.planning.incumbents import Incumbents
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
@@ -67,7 +67,7 @@ def plan_in_space(
     found = Incumbents(problem, budget, workspace.on(problem.obstacles), alternatives, UNFINISHED)
     found.counts.update(expansions=0)
     load_checks(problem, found.workspace)
-    goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
+    goals = open_goals(problem)
     lattice = _Lattice(found, goals)
     for plan, index in itertools.chain(_words(found, goals), lattice.plans()):
         found.offer(plan, index)

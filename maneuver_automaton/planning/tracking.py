@@ -15,7 +15,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision.advancement import clearances, free_times
-from maneuver_automaton.planning.blocked import why_goal_blocked
+from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.improve import Patience, improve
 from maneuver_automaton.refinement.ready import load_lattice
@@ -163,7 +163,7 @@ def track(
     load_lattice()
     table = cost_to_go_table(problem, prepared=prepared)
     deadline = time.monotonic() + time_limit
-    goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
+    goals = open_goals(problem)
     if not goals:
         return Tracked(plan=None, goal_index=None, cost=math.inf, reason="every goal is blocked")
     query = lattice_query(problem, goals, prepared=prepared)

@@ -15,7 +15,7 @@ from maneuver_automaton.automaton.same_motion import POLISHED
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.among_obstacles import library_table
-from maneuver_automaton.planning.blocked import why_goal_blocked
+from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.planning.bounds import lattice_bound, speed_bound, word_bound
 from maneuver_automaton.planning.checking import load_checking, load_checks, what_is_hit
 from maneuver_automaton.planning.incumbents import Accepted, Incumbents
@@ -137,7 +137,7 @@ def _over_maneuvers(search: _Search) -> Iterator[tuple[Plan, int]]:
     where polishing comes after.
     """
     found, problem, budget = search.found, search.found.problem, search.found.budget
-    goals = tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
+    goals = open_goals(problem)
     prepared = found.workspace.prepared
     query = late_at_first(lattice_query(problem, goals, prepared=prepared))
     before = found.counts["expansions"]

@@ -15,7 +15,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import head_of
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning import plan as planned
-from maneuver_automaton.planning.blocked import why_goal_blocked
+from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.planning.checking import what_is_hit
 from maneuver_automaton.planning.in_space import climbs_among_obstacles
 from maneuver_automaton.problem import Problem
@@ -130,9 +130,7 @@ class OverManeuvers:
         problem = self._onward()
         if problem is None or not problem.automaton.maneuvers:
             return None
-        goals = tuple(
-            k for k, one in enumerate(problem.goals) if not why_goal_blocked(problem, one)
-        )
+        goals = open_goals(problem)
         if not goals:
             return None
         query = lattice_query(problem, goals)

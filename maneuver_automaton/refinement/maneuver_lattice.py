@@ -5,33 +5,17 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import NamedTuple
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.refinement.improve import Improvement, Patience
-from maneuver_automaton.refinement.restarts import FINER, FIRST_CHUNK, as_wide_as_turns
-from maneuver_automaton.search.distance_grid import DistanceGrid, distance_grid
-from maneuver_automaton.search.lattice import Schedule, first_word
-from maneuver_automaton.search.lattice_pass import Pass, pass_of
+from maneuver_automaton.refinement.restarts import FINER
+from maneuver_automaton.search.lattice import distance_grids, first_plan
 from maneuver_automaton.search.lattice_query import LatticeQuery
-from maneuver_automaton.search.lattice_task import Resolution
-from maneuver_automaton.search.maneuver_reversal import forward_word, reversed_query
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.words.word import Word, with_price
 from maneuver_automaton.words.word import plan_of as plan_of_word
 
-MOST_CHUNK = 16384
-FAST_ALONE = 2000  # expansions of a pass as wide as the turns, until others run in turn with it
-FIRST: tuple[tuple[int, tuple[Resolution, ...]], ...] = (
-    # after so many expansions of all passes together, or when all are exhausted
-    (0, (Resolution(),)),
-    (300, (Resolution(scale=0.5, durations=0.5), Resolution(durations=0.7))),
-    (2000, (Resolution(scale=0.25, durations=0.25), Resolution(scale=0.5, durations=0.7))),
-    (2000, (Resolution(backwards=True),)),
-    (8000, (Resolution(scale=0.5, durations=0.5, weight=1.5, backwards=True),)),
-    (40000, (Resolution(scale=0.25, durations=0.25, margin=0.1),)),
-)
 TO_THE_END = Patience(passes=2**62)
 
 
@@ -78,10 +62,11 @@ def maneuver_words(
         over = time.monotonic() >= deadline or total >= room
         return SearchStatus.OUT_OF_BUDGET if over else SearchStatus.EXHAUSTED
 
-    grid = _grid(query)
+    grids = distance_grids(query)
     word, first, nearest = known, 0, 0.0
     if word is None:
-        word, first, nearest = _first(query, grid, room=room, deadline=deadline)
+        found = first_plan(query, deadline=deadline, max_expansions=max_expansions, grids=grids)
+        word, first, nearest = found.word, found.expansions, found.nearest
     total = first
     if word is not None:
         if known is None:
@@ -92,7 +77,7 @@ def maneuver_words(
         one = Improvement(
             query,
             word,
-            grids=lambda: (grid,),
+            grids=lambda: grids,
             deadline=deadline,
             patience=TO_THE_END,
             max_expansions=room - first,
@@ -102,11 +87,6 @@ def maneuver_words(
             yield Incumbent(better, first + one.expansions, SearchStatus.FOUND)
         total = first + one.expansions
     yield Incumbent(None, total, ended(total), nearest)
-
-
-def _grid(query: LatticeQuery) -> DistanceGrid:
-    """Distances in the plane to the goals of a query."""
-    return distance_grid(query.plane, query.box, query.goals, query.start)
 
 
 def quick_word(
@@ -138,43 +118,3 @@ def plan_of(query: LatticeQuery, word: Word) -> Plan:
         goal=query.goal_poses[word.goal],
         start_time=query.start_time,
     )
-
-
-def _first(
-    query: LatticeQuery, grid: DistanceGrid, *, room: int, deadline: float
-) -> tuple[Word | None, int, float]:
-    """Passes of rising resolution in turn until one connects.
-
-    The word, expansions, and the distance [m] from a goal to the nearest place that was reached.
-    """
-    weight = query.settings.weight
-    found = first_word(
-        Schedule(_first_stages(query), FIRST_CHUNK, MOST_CHUNK),
-        lambda one: _passes(query, one if weight is None else replace(one, weight=weight), grid),
-        room=room,
-        deadline=deadline,
-    )
-    ahead = [one.nearest for one in found.passes if not one.resolution.backwards]
-    if found.word is None or found.by is None:
-        return None, found.expansions, min(ahead, default=math.inf)
-    backwards = found.by.resolution.backwards
-    return forward_word(found.word) if backwards else found.word, found.expansions, 0.0
-
-
-def _first_stages(query: LatticeQuery) -> tuple[tuple[int, tuple[Resolution, ...]], ...]:
-    """Which passes begin after how many expansions of all of them together.
-
-    A vehicle that turns widely for its size begins with a pass whose cells and coasts are as wide:
-    it decides little from one length of its body to the next.
-    """
-    fast = as_wide_as_turns(query)
-    return ((0, fast), (FAST_ALONE, FIRST[0][1]), *FIRST[1:]) if fast else FIRST
-
-
-def _passes(query: LatticeQuery, resolution: Resolution, grid: DistanceGrid) -> list[Pass]:
-    """Passes that are ready to run; one from the goal only where that can be asked."""
-    resolution = replace(resolution, ends_early=True)
-    if not resolution.backwards:
-        return [pass_of(query, resolution, grid=grid)]
-    back = reversed_query(query)
-    return [] if back is None else [pass_of(back, resolution, grid=_grid(back))]

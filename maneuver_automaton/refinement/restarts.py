@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from maneuver_automaton.search.lattice_query import LatticeQuery
+from maneuver_automaton.search.lattice_schedules import as_wide_as_turns
 from maneuver_automaton.search.lattice_task import Resolution
 
 PRUNE = 1.08  # of a new search: its raw path is longer than what it becomes
@@ -17,8 +18,6 @@ CAP_GROWTH = 1.35  # ... and how the caps grow
 MOST_CAP = 60_000
 WEIGHTS = (2.0, 1.5, 1.25, 1.1, 1.0)
 FIRST_CHUNK = 128  # expansions
-FAST = 1.5  # length scales of the tightest turn from which on there is a search of its size
-FAST_WEIGHT = 1.0  # of that: a fast vehicle cannot make up for greed once it is near the goal
 IN_SPACE: tuple[Resolution, ...] = (
     # one more dimension: coarse cells and little greed find the way, fine ones do not end
     Resolution(scale=12.0, durations=4.0, weight=1.0, most=40000),
@@ -81,17 +80,11 @@ def _random(query: LatticeQuery, rng: np.random.Generator) -> Iterator[Restart]:
 def _finer(query: LatticeQuery, rng: np.random.Generator) -> Iterator[Restart]:
     """Searches of falling weight and size, each to its end below the cost of the best word."""
     coarse = IN_SPACE if query.problem.start.size > 3 else ()
-    later = (*as_wide_as_turns(query), *LATER)
+    later = (*as_wide_as_turns(query.library), *LATER)
     for resolutions, all_words in ((coarse, False), (later, True)):
         for one in resolutions:
             resolution = replace(one, stop=False, ends_early=True)
             yield Restart(resolution, FIRST_CHUNK, all_words=all_words)
-
-
-def as_wide_as_turns(query: LatticeQuery) -> tuple[Resolution, ...]:
-    """The resolution of a vehicle that turns widely for its size; none for others."""
-    wide = query.library.turns
-    return (Resolution(scale=wide, durations=wide, weight=FAST_WEIGHT),) if wide > FAST else ()
 
 
 RANDOM = Restarts(_random, rounds=1, moving_rounds=0)

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -15,112 +13,14 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.search import _kernels_lattice as kernels
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.distance_grid import DistanceGrid, distance_grid
-from maneuver_automaton.search.lattice_pass import Pass, both_ends
+from maneuver_automaton.search.lattice_pass import Pass, both_ends, pass_of
 from maneuver_automaton.search.lattice_query import LatticeQuery
-from maneuver_automaton.search.lattice_task import WEIGHT, Resolution
+from maneuver_automaton.search.lattice_schedules import Schedule, schedule_of
+from maneuver_automaton.search.lattice_task import Resolution
+from maneuver_automaton.search.maneuver_reversal import forward_word, reversed_query
 from maneuver_automaton.words.word import Word
 
-
-class Schedule(NamedTuple):
-    """Which resolutions begin after so many expansions of all together, or when none is left.
-
-    They run in turn, each twice as many expansions as in its turn before.
-    """
-
-    stages: tuple[tuple[int, tuple[Resolution, ...]], ...]
-    first_chunk: int
-    most_chunk: int
-
-
-SCHEDULE = Schedule(
-    (
-        (0, (Resolution(),)),
-        (
-            300,
-            (
-                Resolution(truncated=True, guided=True),
-                Resolution(scale=0.5, durations=0.5, truncated=True, guided=True),
-            ),
-        ),
-        (1500, (Resolution(scale=0.24, durations=0.25, truncated=True, guided=True),)),
-        (
-            8000,
-            (
-                Resolution(scale=0.5, durations=0.5, truncated=True, fine=0.2, guided=True),
-                Resolution(scale=0.5, durations=0.5, truncated=True),
-                Resolution(scale=0.12, durations=0.17),
-            ),
-        ),
-        (
-            2**62,
-            (Resolution(scale=0.24, durations=0.25, truncated=True, margin=0.1, guided=True),),
-        ),
-    ),
-    first_chunk=64,
-    most_chunk=8192,
-)
-
-
-class FirstWord(NamedTuple):
-    """What a schedule of searches came to."""
-
-    word: Word | None
-    passes: list[Pass]
-    expansions: int
-    exhausted: bool  # every resolution was tried to its end
-    enclosed: str = ""  # why no plan can exist, where that is proven
-    by: Pass | None = None  # which search found it
-
-
-def first_word(
-    schedule: Schedule,
-    passes_of: Callable[[Resolution], list[Pass]],
-    *,
-    room: int,
-    deadline: float,
-    enclosed: Callable[[], str] = lambda: "",
-) -> FirstWord:
-    """The first connection from start to a goal, at the first resolution that has one.
-
-    Parameters
-    ----------
-    schedule : Schedule
-    passes_of : callable
-        The searches at a resolution, ready to run.
-    room : int
-        Expansions of all searches together.
-    deadline : float
-        Of `time.monotonic()` [s].
-    enclosed : callable
-        Why no plan can exist; asked where no search has anything left to expand.
-    """
-    stages = list(schedule.stages)
-    passes: list[Pass] = []
-    total = 0
-
-    def begin() -> None:
-        begun = [one for each in stages.pop(0)[1] for one in passes_of(each)]
-        passes.extend(replace(one, chunk=schedule.first_chunk) for one in begun)
-
-    begin()
-    while True:
-        for one in passes:
-            if not one.alive or total >= room or time.monotonic() >= deadline:
-                continue
-            before = one.expansions
-            word = one.run(min(one.chunk, room - total), math.inf, deadline=deadline)
-            total += one.expansions - before
-            one.chunk = min(2 * one.chunk, schedule.most_chunk)
-            if word is not None:
-                return FirstWord(word, passes, total, exhausted=False, by=one)
-        alive = any(one.alive for one in passes)
-        proof = "" if alive else enclosed()
-        if total >= room or time.monotonic() >= deadline or proof:
-            return FirstWord(None, passes, total, exhausted=not alive, enclosed=proof)
-        if stages and (not alive or total >= stages[0][0]):
-            begin()
-        elif not alive:
-            return FirstWord(None, passes, total, exhausted=True)
+Grids = tuple[DistanceGrid, DistanceGrid]  # distances to the goals and to the start
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -142,38 +42,90 @@ def first_plan(
     deadline: float,
     max_expansions: int | None = None,
     table: CostTable = NO_TABLE,
+    grids: Grids | None = None,
 ) -> FirstPlan:
-    """The first connection from start to a goal, at the first resolution that has one."""
-    grids = distance_grids(query)
-    base = Resolution(weight=query.settings.weight or WEIGHT)
-    schedule = SCHEDULE._replace(stages=((0, (base,)), *SCHEDULE.stages[1:]))
-    found = first_word(
-        schedule,
-        lambda one: both_ends(query, one, grids=grids, table=table if one.guided else NO_TABLE),
-        room=max_expansions or 2**62,
-        deadline=deadline,
-        enclosed=lambda: _enclosed(query, grids),
-    )
-    missed = found.word is None
+    """The first connection from start to a goal, at the first resolution that has one.
+
+    Parameters
+    ----------
+    query : LatticeQuery
+        Its library says which resolutions are tried, and when.
+    deadline : float
+        Of `time.monotonic()` [s].
+    max_expansions : int, optional
+        Of all searches together.
+    table : CostTable
+    grids : tuple of DistanceGrid, optional
+        Distances to the goals and to the start, if they are known.
+    """
+    schedule = schedule_of(query.library)
+    grids = distance_grids(query) if grids is None else grids
+    room = 2**62 if max_expansions is None else max_expansions
+    (_, coarse), *stages = schedule.stages
+    if query.settings.weight is not None:
+        coarse = tuple(replace(one, weight=query.settings.weight) for one in coarse)
+    passes = _begun(query, schedule, coarse, grids, table)
+    word, proof, total = None, "", 0
+    while word is None:
+        for one in passes:
+            if not one.alive or total >= room or time.monotonic() >= deadline:
+                continue
+            before = one.expansions
+            word = one.run(min(one.chunk, room - total), math.inf, deadline=deadline)
+            total += one.expansions - before
+            one.chunk = min(2 * one.chunk, schedule.most_chunk)
+            if word is not None:
+                word = forward_word(word) if one.resolution.backwards else word
+                break
+        alive = any(one.alive for one in passes)
+        proof = "" if alive or word is not None else _enclosed(query, grids)
+        if word is not None or total >= room or time.monotonic() >= deadline or proof:
+            break
+        if stages and (not alive or total >= stages[0][0]):
+            passes += _begun(query, schedule, stages.pop(0)[1], grids, table)
+        elif not alive:
+            break
+    ahead = [one for one in passes if not one.resolution.backwards]
     return FirstPlan(
-        word=found.word,
-        expansions=found.expansions,
-        queries=sum(one.queries for one in found.passes),
-        exhausted=found.exhausted,
-        enclosed=found.enclosed,
-        nearest=min(one.nearest for one in found.passes) if missed else math.inf,
-        nodes=_expanded(query, found.passes) if query.settings.show_nodes else None,
+        word=word,
+        expansions=total,
+        queries=sum(one.queries for one in passes),
+        exhausted=word is None and not alive,
+        enclosed=proof,
+        nearest=min(one.nearest for one in ahead) if word is None else math.inf,
+        nodes=_expanded(query, passes) if query.settings.show_nodes else None,
     )
 
 
-def distance_grids(query: LatticeQuery) -> tuple[DistanceGrid, DistanceGrid]:
+def _begun(
+    query: LatticeQuery,
+    schedule: Schedule,
+    resolutions: tuple[Resolution, ...],
+    grids: Grids,
+    table: CostTable,
+) -> list[Pass]:
+    """Searches at some resolutions; one of the library in reverse only where that can be asked."""
+    passes: list[Pass] = []
+    for one in resolutions:
+        if one.backwards:
+            back = reversed_query(query)
+            passes += [] if back is None else [pass_of(back, one, grid=grids[1])]
+        else:
+            guide = table if one.guided else NO_TABLE
+            passes += both_ends(query, one, grids=grids, table=guide, ends=schedule.ends)
+    for begun in passes:
+        begun.chunk = schedule.first_chunk
+    return passes
+
+
+def distance_grids(query: LatticeQuery) -> Grids:
     """Distances to the goals and to the start."""
     to_goal = distance_grid(query.plane, query.box, query.goals, query.start)
     to_start = distance_grid(query.plane, query.box, query.start[None], query.goals[0])
     return to_goal, to_start
 
 
-def _enclosed(query: LatticeQuery, grids: tuple[DistanceGrid, DistanceGrid]) -> str:
+def _enclosed(query: LatticeQuery, grids: Grids) -> str:
     """Why no plan can exist: the plane around the goals, or the start, is closed."""
     from maneuver_automaton.search._kernels_distance import distances
 

@@ -15,8 +15,8 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.planning.with_inertia import late_at_first
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.refinement import maneuver_lattice
 from maneuver_automaton.refinement.maneuver_lattice import maneuver_words, plan_of
+from maneuver_automaton.search import lattice_pass
 from maneuver_automaton.search.lattice_pass import pass_of
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_task import Resolution, task_of
@@ -130,7 +130,7 @@ def test_settings_of_the_lattice_are_read(monkeypatch):
     assert task_of(query, Resolution(scale=0.5)).cell == 0.155
     weights = []
     monkeypatch.setattr(
-        maneuver_lattice, "pass_of", lambda *a, **k: weights.append(a[1].weight) or pass_of(*a, **k)
+        lattice_pass, "pass_of", lambda *a, **k: weights.append(a[1].weight) or pass_of(*a, **k)
     )
     next(maneuver_words(query, max_expansions=200))
     assert weights[0] == 1.3

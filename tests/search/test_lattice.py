@@ -18,10 +18,11 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.search import _kernels_lattice as kernels
-from maneuver_automaton.search.lattice import SCHEDULE, distance_grids, first_plan
+from maneuver_automaton.search.lattice import distance_grids, first_plan
 from maneuver_automaton.search.lattice_memory import search_arrays, with_room
 from maneuver_automaton.search.lattice_pass import both_ends, with_cost
 from maneuver_automaton.search.lattice_query import lattice_query
+from maneuver_automaton.search.lattice_schedules import AT_WILL
 from maneuver_automaton.search.lattice_task import Resolution, task_of
 from maneuver_automaton.words.transitions import SWITCH
 from tests import scenes
@@ -286,7 +287,7 @@ def test_a_lattice_without_a_way_out_is_exhausted():
 
 
 def test_finer_resolutions_begin_one_after_the_other():
-    begun = [after for after, _ in SCHEDULE.stages]
+    begun = [after for after, _ in AT_WILL.stages]
     assert begun == sorted(begun)
     query = query_of(scenes.bay(2.1, 4.3))
     if not COMPILED:
