@@ -16,8 +16,8 @@ from maneuver_automaton.search.lattice import Schedule, first_word
 from maneuver_automaton.search.lattice_pass import Pass, pass_of
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_task import Resolution
-from maneuver_automaton.search.maneuver_reversal import forward_word, reversed_query
 from maneuver_automaton.search.result import SearchStatus
+from maneuver_automaton.search.reversal import forward_word, reversed_query
 from maneuver_automaton.words.word import Word, with_price
 from maneuver_automaton.words.word import plan_of as plan_of_word
 

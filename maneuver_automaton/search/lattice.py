@@ -62,7 +62,7 @@ SCHEDULE = Schedule(
 
 
 class FirstWord(NamedTuple):
-    """What a schedule of searches came to."""
+    """The result of a schedule of searches."""
 
     word: Word | None
     passes: list[Pass]
@@ -125,7 +125,7 @@ def first_word(
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class FirstPlan:
-    """What the schedule of resolutions came to."""
+    """The result of the schedule of resolutions."""
 
     word: Word | None
     expansions: int
@@ -133,7 +133,7 @@ class FirstPlan:
     exhausted: bool  # every resolution was tried to its end
     enclosed: str  # why no plan can exist, if the plane alone proves it
     nearest: float  # [m] least distance to the goal that was reached
-    nodes: Array | None = None  # (n, 4) x, y, heading, cost of what was expanded, if asked for
+    nodes: Array | None = None  # (n, 4) x, y, heading, cost of the expanded nodes, if asked for
 
 
 def first_plan(
