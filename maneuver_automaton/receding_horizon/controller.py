@@ -33,7 +33,7 @@ class RecedingHorizon:
     """Model predictive control with trims: plan to the goal, apply the beginning, plan again.
 
     Every step shifts the last plan, which always leads to the goal, looks for a cheaper one, and
-    checks what the paper proves of the loop; what is broken stands in the log with the reason.
+    checks the paper's guarantees for the loop; the log has each that is broken, with the reason.
 
     What is committed is driven in any case: nothing where trims are switched at will, otherwise the
     maneuver under way to its end. A step decides what comes after it. Off the plan, the last word
@@ -61,7 +61,7 @@ class RecedingHorizon:
     last : Step, optional
         To go on from: the last step of a log.
     first : Plan, optional
-        What the first step applies, instead of searching: a plan from there to the goal.
+        The plan that the first step applies, instead of searching: from there to the goal.
     retimed : bool
         Drive every plan at the pace that makes its effort uniform: the controls are then
         continuous, multiples of those of the library. Needs a fixed horizon, a cost with effort, a
@@ -161,7 +161,7 @@ class RecedingHorizon:
         elapsed : float, optional
             [s] since the last step; if omitted, what was to be applied of its plan.
         obstacles : sequence of Obstacle or OccupancyMap, optional
-            What is seen from now on, with its predicted motions in the time of the world; if
+            The obstacles from now on, with their predicted motions in the time of the world; if
             omitted, what was seen last, at first that of the problem.
 
         Returns
@@ -295,7 +295,7 @@ class RecedingHorizon:
 
 
 def _deed(chosen: Chosen, now: Situation) -> Deed:
-    """What a step does, where the decision does not say it."""
+    """The deed of a step, where the decision does not say it."""
     if chosen.deed is not None:
         return chosen.deed
     if now.last is None:

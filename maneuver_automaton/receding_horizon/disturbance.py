@@ -1,4 +1,4 @@
-"""What a real vehicle does beside its plan: noise, pushes, and speeds unlike its model's."""
+"""Disturbances of a vehicle: noise, pushes, and speeds unlike its model's."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from maneuver_automaton.automaton import Plan
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Disturbance:
-    """What a real vehicle does beside its plan; every random number comes from `seed`.
+    """How a real vehicle departs from its plan; every random number comes from `seed`.
 
     Noise shifts the pose after every step, as a person's push would: the place by a normal number
     per axis, the heading by another. Measurement errors are seen by the controller alone. A push
@@ -77,7 +77,7 @@ def draws(upset: Disturbance, dof: int) -> Iterator[Draw]:
 
 
 def as_driven(piece: Plan, upset: Disturbance) -> Plan:
-    """What the vehicle makes of a piece of plan."""
+    """A piece of plan as the disturbed vehicle drives it."""
     if upset.twist_scale is None:
         return piece
     scale = as_array("disturbance: twist_scale", upset.twist_scale, last=piece.start.size)

@@ -50,7 +50,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Statistics:
-    """What many closed loops came to."""
+    """Statistics of many closed loops."""
 
     outcomes: tuple[Outcome, ...]
 
