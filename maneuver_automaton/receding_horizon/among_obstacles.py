@@ -27,7 +27,7 @@ from maneuver_automaton.search.limits import closed_bound
 
 SEARCHING = 0.6  # share of a step's budget after which no plan to the goal is searched
 LATE = 0.8  # after which no path to the goal is; the rest is for a fail-safe trajectory
-MOST_EXPANSIONS = 4_000  # of such a search, where something moves
+MOST_EXPANSIONS = 4_000  # of such a search, among moving obstacles
 MOMENT = 1e-9  # [s]
 SHARES = (1.0, 0.5, 0.25)  # of a step that a path to the goal is followed before it is left
 
@@ -151,8 +151,8 @@ def _evading(plan: Plan) -> Deed:
 def as_it_stands(here: Problem) -> tuple[Problem, str]:
     """The problem with limits that the vehicle's pose keeps, and the limit that it breaks.
 
-    A vehicle that is closer to something than the margin keeps half of what it has; one outside its
-    bounds is not held by them.
+    A vehicle that is closer to an obstacle than the margin keeps half of its clearance; one outside
+    its bounds is not held by them.
     """
     at, broken = here.start_time, ""
     if not stands_free(here, here.start, time=at, duration=MOMENT) > 0.0:

@@ -1,7 +1,7 @@
 """The decision of a step: the rest of the last plan, a cheaper one, or a fail-safe trajectory.
 
-This is the one sequence for every vehicle and every world. What differs is where plans come from,
-and whether one is safe: that is a `StepSearch`.
+This is the one sequence for every vehicle and every world. A `StepSearch` says where plans come
+from, and whether one is safe.
 """
 
 from __future__ import annotations

@@ -21,8 +21,8 @@ class Disturbance:
     per axis, the heading by another. Measurement errors are seen by the controller alone. A push
     is a displacement in the vehicle's own frame after the step of that number. A vehicle that
     differs from its model has other body velocities: `twist_scale` times those of the library.
-    With `delay` 1 the controller sees every pose a step late, and plans from where the piece under
-    way will have led.
+    With `delay` 1 the controller sees every pose a step late, and plans from the predicted end of
+    the piece that is driven meanwhile.
     """
 
     position_m: float = 0.0  # standard deviation per axis and step

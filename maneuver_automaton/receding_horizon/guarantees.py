@@ -35,7 +35,7 @@ class Promises:
         """The paper's bound on the number of steps from a state of that value; None if none.
 
         V(x0) / (delta min l) for finite control sets, V(x0) / (delta c3) for penalised time: the
-        smaller one. With a fixed time what rest costs is taken off first.
+        smaller one. With a fixed time the cost of rest is taken off first.
 
         Source: the paper, Sec. 4.2 and 4.3.
         """
@@ -106,7 +106,7 @@ def promises(problem: Problem, *, step: float) -> Promises:
 def _least_effort(problem: Problem, cost: Cost) -> float:
     """c1 lambda_min(R), the paper's constant for the unicycle, whose controls are its speeds.
 
-    For other vehicles at most what a trim of the library spends per (m/s)^2 + (rad/s)^2.
+    For other vehicles at most the effort of a trim of the library per (m/s)^2 + (rad/s)^2.
     """
     weight = cost.effort_matrix
     smallest = 1.0 if weight is None else float(np.linalg.eigvalsh(weight)[0])

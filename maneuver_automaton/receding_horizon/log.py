@@ -91,7 +91,7 @@ class Step:
     number: int  # 0 for the first
     arrived: bool = False  # nothing remains to be done but to rest
     violations: tuple[Violation, ...] = ()
-    measured: Array | None = None  # (dof,) what was seen meanwhile, if it is used a step later
+    measured: Array | None = None  # (dof,) pose that was measured, if it is used a step later
     deed: Deed = Deed.PLANNED
     free_until: float | None = None  # [s] no contact is predicted until then; None: nothing there
     clearance_m: float | None = None  # least one while it was driven, by the audit

@@ -162,7 +162,7 @@ class _Track:
         """The pose for the controller: the one measured, or the one predicted from the last."""
         late, self.measured = self.measured, measured
         before = self.log[-1] if self.log else self.last
-        if self.upset.delay and before is not None:  # what has been applied is a group element
+        if self.upset.delay and before is not None:  # the piece applied since is a group element
             return _after(before, late)
         return measured
 
@@ -216,7 +216,7 @@ def _closed_loop(
         value, status = log[-1].lower_bound, "no_plan"
         reason = str(log[-1].violations[-1])
     elif not inside[-1]:
-        if applied:  # what would have come next
+        if applied:  # the value of the step that would have come next
             controller.last = applied[-1]
             then = applied[-1].number + 1
             value = controller.step(track.poses[-1], obstacles=seen and seen(then))[1].value

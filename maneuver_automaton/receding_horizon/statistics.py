@@ -43,7 +43,7 @@ class Outcome:
 
     @property
     def collisions(self) -> tuple[int, ...]:
-        """Numbers of the steps that hit something, as the audit found."""
+        """Numbers of the steps that hit an obstacle, by the audit."""
         hits = (step for step, one in self.violations if one.guarantee is Guarantee.NO_COLLISION)
         return tuple(hits)
 

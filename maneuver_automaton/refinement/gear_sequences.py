@@ -1,7 +1,7 @@
-"""Topologically different plans: kinematic plans that differ in their gears, most promising first.
+"""Kinematic plans that differ in their gears, most promising first.
 
-What polishing comes to is decided by the sequence of gears and the side on which obstacles are
-passed. So several are made, by pricing changes of direction differently and by turning less
+The sequence of gears, and the side on which obstacles are passed, decide the result of polishing.
+So several plans are made, by pricing changes of direction differently and by turning less
 tightly than the vehicle could, and ranked by the time they would take from stop to stop.
 """
 

@@ -1,7 +1,7 @@
 """Guesses for polishing: the geometry of a kinematic plan, driven at a pace that inertia allows.
 
-A guess may jump where the plan jumps from arc to arc: defects do no damage. What it must get right
-is the sequence of gears and, roughly, the time each stroke takes.
+A guess may jump where the plan jumps from arc to arc: the solver closes the defects. It must get
+right the sequence of gears and, roughly, the duration of each stroke.
 """
 
 from __future__ import annotations

@@ -210,8 +210,8 @@ def polish_guesses(
     time_limit : float
         [s].
     most_iterations : int, optional
-        Of the solver, over all guesses: what is tried then does not depend on the clock, unless
-        the time is over before.
+        Of the solver, over all guesses: the attempts then do not depend on the clock, unless the
+        time is over before.
     accepts : callable
         Whether a motion is sound, say by an audit: solver success proves nothing.
 
@@ -310,17 +310,17 @@ class _Polishing:
         if found.status is SolveStatus.SOLVED:
             self._consider(found)
             return None
-        # nothing was solved; what is near enough to a motion is closed and audited all the same
+        # None is solved; a result near enough to a motion is closed and audited all the same.
         for one in [*unfinished, found]:
             if self.best is None and one.status is SolveStatus.OUT_OF_BUDGET and one.iterations:
                 self._consider(one)
         return None
 
     def _lines(self, number: int, rough: Polished) -> None:
-        """Free lines from what fixed planes came to, which counts itself if they fail."""
+        """Solve with free lines from the result of fixed planes, which is kept if that fails."""
         if not self._is_over():
             found = self._solve("lines", number, rough.as_guess, longer=LONGER)
-            # what the solver did not finish may be sound all the same: it is closed and audited
+            # An unfinished solve may be sound all the same: it is closed and audited.
             cheaper = found.objective < rough.objective
             unfinished = found.status is SolveStatus.OUT_OF_BUDGET and cheaper
             if (found.status is SolveStatus.SOLVED or unfinished) and self._consider(found):
@@ -395,7 +395,7 @@ class _Polishing:
         return found
 
     def _consider(self, found: Polished) -> bool:
-        """Close what was found, and keep it if it is accepted and better."""
+        """Close the motion found, and keep it if it is accepted and better."""
         ends = self.task.ends(float(found.state[-1, 2]))
         ending = closed(
             self.task.model,

@@ -40,7 +40,7 @@ def with_relaxed_end(
     share : float
         Of the tolerance that may be used.
     first : int
-        Trim from which on the times may change: what is before stays, and stays collision-free.
+        First trim whose time may change: the motion before it stays, and stays collision-free.
 
     Returns
     -------

@@ -1,6 +1,6 @@
 """A kinematic path as a plan of a vehicle with inertia: it stops wherever the twist jumps.
 
-The path is followed exactly, so what is free for the kinematic vehicle is free for this one.
+The path is followed exactly, so a plan that is free for the kinematic vehicle is free for this one.
 """
 
 from __future__ import annotations

@@ -59,7 +59,7 @@ def cost_to_go_table(
     reach : float, optional
         Half the side of the square around the goal [m]; three turning radii if None.
     folder : Path, optional
-        Where tables are kept, in files named after a hash of what they were made from; the user's
+        Where tables are kept, in files named after a hash of their key; the user's
         cache folder if None. Where nothing can be written it works without.
     prepared : Prepared, optional
         Where tables are kept in memory.

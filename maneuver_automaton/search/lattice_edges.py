@@ -54,7 +54,7 @@ def motion_along(
 ) -> tuple[MotionArrays, IntArray]:
     """Pieces of every part, then of the pose alone, along every edge; samples of the parts.
 
-    `timed`: something moves, so that it matters when the vehicle is where.
+    `timed`: obstacles move, so that it matters when the vehicle is where.
     """
     if not edges.maneuver.size:
         return no_edges()[1], np.zeros((0, 2), dtype=np.int64)

@@ -98,7 +98,7 @@ def _library(
 def library_of_trims(
     priced: PricedTrims, parts: tuple[Part, ...], *, waits: bool
 ) -> LatticeLibrary:
-    """Trims and the maneuvers between them; `waits`: something moves, and rest is an edge."""
+    """Trims and the maneuvers between them; `waits`: obstacles move, and rest is an edge."""
     library, arrays = priced.library, priced.library.arrays
     twists, rates = arrays.twists[: arrays.n_trims], arrays.rates[: arrays.n_trims]
     edges = edges_of(library)

@@ -119,7 +119,7 @@ class LatticeQuery:
     def most_trims(self) -> int:
         """Trims a word may have before the rest that pads it; 0: no limit.
 
-        None where maneuvers link trims: words of too many are guesses for what has fewer.
+        No limit where maneuvers link trims: words of too many are guesses for words of fewer.
         """
         most = self.problem.horizon.max_trims
         if most is None or not self.library.at_will:
@@ -246,7 +246,7 @@ def _end_clearances(
 
 
 def _margin(library: LatticeLibrary, world: World, clear: Array) -> float:
-    """Proven clearance: a share of the body, at most half of what start and goals have."""
+    """Proven clearance: a share of the body, at most half of that at start and goals."""
     usual = MARGIN * (_half_width(library) or _typical(world))
     return float(max(LEAST_MARGIN, min([usual, *(0.5 * clear[clear > 0.0]).tolist()])))
 

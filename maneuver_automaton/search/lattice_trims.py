@@ -47,7 +47,7 @@ def trims_at_will(
 ) -> PricedTrims:
     """The most useful trims in the plane of a vehicle that switches at will between all.
 
-    `waits`: rest is a trim like any other, since something moves.
+    `waits`: rest is a trim like any other, since obstacles move.
     """
     known = moving_trims(automaton, cost)
     pads = fixed_time and known.rest is not None

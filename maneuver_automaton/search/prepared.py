@@ -15,7 +15,7 @@ _P = ParamSpec("_P")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prepared:
-    """The values of each kind that were made last, by what they were made from.
+    """The values of each kind that were made last, by the arguments of their making.
 
     Each planner holds one of its own, so that planners used in turn do not evict each other. What
     it lacks is taken from `RECENT`, which serves whoever holds none.

@@ -1,7 +1,7 @@
 """Load or compile the search kernels before the clock runs: a time limit is for searching.
 
-The first time after installation two processes share the compiling: one compiles what scans
-words, the other what refines and prices them, into the cache that both read.
+The first time after installation two processes share the compiling: one compiles the kernels that
+scan words, the other those that refine and price them, into the cache that both read.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def load_word_kernels(max_trims: int) -> None:
         try:
             helper.wait(PATIENCE)
         except subprocess.TimeoutExpired:
-            helper.kill()  # what it did not compile is compiled here
+            helper.kill()  # the kernels that it did not compile are compiled here
     found = search_words(problem, problem.goals[0])
     certificate(problem, problem.goals[0], found.solutions[0])
 
