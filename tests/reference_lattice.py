@@ -110,7 +110,7 @@ class Heap:
         self.items[i], self.items[j] = self.items[j], self.items[i]
 
 
-def cost_table(twists, rates, quanta, cell: float, half: int, n_headings: int) -> Array:
+def cost_table(twists, rates, edge_durations, cell: float, half: int, n_headings: int) -> Array:
     """Cost (headings, rows, columns) to the goal in the middle, inf where none was found.
 
     Dijkstra backwards over a dictionary of cells, each with the pose by which it was reached.
@@ -131,7 +131,7 @@ def cost_table(twists, rates, quanta, cell: float, half: int, n_headings: int) -
             continue
         cost, (x, y, heading) = best[here]
         settled[here] = cost
-        for twist, rate, times in zip(twists, rates, quanta, strict=True):
+        for twist, rate, times in zip(twists, rates, edge_durations, strict=True):
             for t in times:
                 if t == 0.0:
                     continue

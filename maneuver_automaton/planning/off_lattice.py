@@ -53,6 +53,7 @@ at (1, 0) m'
         )
     cell = problem.automaton.model.resolution  # type: ignore[attr-defined]
     return (
-        f"the goal is {near.way:.6g} m beside the lattice of {cell:g} m that begins at the start: "
+        f"the goal is {near.distance:.6g} m beside the lattice of {cell:g} m "
+        "that begins at the start: "
         f"its next cell is at ({x:.10g}, {y:.10g}) m"
     )

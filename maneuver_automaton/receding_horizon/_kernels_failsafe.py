@@ -1,8 +1,14 @@
 """A search in space and time for a fail-safe trajectory: collision-free, wherever it leads.
 
-A node is a row of two arrays. `nodes`: x, y, heading, clock, duration of the edge that leads here,
-time until which it is safe. `links`: parent, trim. A vehicle that can rest is safe as long as rest
-is free there; one that cannot, as long as the trim that led there stays free.
+A node is a row of two arrays. Columns of `nodes` (n, 6):
+
+    X, Y, HEADING   the pose
+    CLOCK           [s] time of the world there
+    LASTING         [s] of the coast that leads here
+    SAFE            [s] time of the world until which it is safe
+
+and of `links` (n, 2): PARENT (-1 for the root) and TRIM (of that coast). A vehicle that can rest is
+safe as long as rest is free there; one that cannot, as long as the trim that led there stays free.
 
 The open list is ordered by safety lost and time spent: the node that is safe for longest comes
 first, and of equal ones the one that gets there soonest. The search ends at the first node that is
@@ -21,11 +27,14 @@ from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.collision._kernels_advancement import free_time
 from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search._kernels_distance import pop, push
+from maneuver_automaton.search._kernels_lattice import first_slot
 from maneuver_automaton.search._kernels_motion import inside_window
 
 FULL_TURN = 2.0 * math.pi
-# rows of `state`: nodes in use, nodes in the open list, 1 once a node is safe for long enough, the
-# node that is safe for longest, nodes expanded
+X, Y, HEADING, CLOCK, LASTING, SAFE = range(6)
+PARENT, TRIM = range(2)
+# Rows of `state`: nodes in use, nodes in the open list, 1 once a node is safe for long enough, the
+# node that is safe for longest, nodes expanded.
 N_NODES, HEAP, FOUND, BEST, EXPANSIONS = range(5)
 EMPTY = -1
 
@@ -40,7 +49,7 @@ class FailSafeTask(NamedTuple):
     until: float  # [s] to be free until then
     rest: int  # number of the trim that rests, -1 for none
     keep: float  # [m] clearance that is kept
-    margin: float  # [m] of the proof: what comes nearer counts as hit
+    margin: float  # [m] of clearance beyond it that a proof needs
     cell: float  # [m] size of a cell in space
     headings: int  # cells of a full turn
     tick: float  # [s] size of a cell in time
@@ -62,9 +71,9 @@ class FailSafeArrays(NamedTuple):
 
 @bare_inner_kernel
 def is_new(task, cells, x, y, heading, clock):
-    """Mark the cell of a pose and a time; whether it was free."""
+    """Whether the cell of a pose and a time is entered for the first time; marks it."""
     # 16 bits for each place, 9 for the heading, the rest for the time: places 65,536 cells apart
-    # share a key, which drops a node and never a proof
+    # share a key, which drops a node and never a proof.
     i = math.floor((x - task.x) / task.cell + 0.5) & 0xFFFF
     j = math.floor((y - task.y) / task.cell + 0.5) & 0xFFFF
     turn = (heading - task.heading) / FULL_TURN
@@ -72,8 +81,7 @@ def is_new(task, cells, x, y, heading, clock):
     tick = math.floor((clock - task.clock) / task.tick + 0.5) & 0xFFFF
     key = ((tick * 512 + k) * 65536 + j) * 65536 + i
     mask = cells.shape[0] - 1
-    mixed = (key ^ (key >> 23) ^ (key >> 41)) & 0x7FFFFFFF
-    slot = ((mixed * 0x9E3779B1) >> 15) & mask
+    slot = first_slot(key, mask)
     while cells[slot] != EMPTY:
         if cells[slot] == key:
             return False
@@ -84,7 +92,7 @@ def is_new(task, cells, x, y, heading, clock):
 
 @bare_inner_kernel
 def safe_until(task, lib, world, body, x, y, heading, clock):
-    """Until when it is free to rest at a pose from a time on."""
+    """Time of the world until which rest at a pose is free, from a time on."""
     proven, _ = free_time(
         world,
         body,
@@ -108,11 +116,11 @@ def add_node(task, search, x, y, heading, clock, lasting, safe, parent, trim):
     """Append a node and queue it; the one that is safe for longest is remembered."""
     nodes, links, state = search.nodes, search.links, search.state
     node = state[N_NODES]
-    nodes[node, 0], nodes[node, 1], nodes[node, 2] = x, y, heading
-    nodes[node, 3], nodes[node, 4], nodes[node, 5] = clock, lasting, safe
-    links[node, 0], links[node, 1] = parent, trim
+    nodes[node, X], nodes[node, Y], nodes[node, HEADING] = x, y, heading
+    nodes[node, CLOCK], nodes[node, LASTING], nodes[node, SAFE] = clock, lasting, safe
+    links[node, PARENT], links[node, TRIM] = parent, trim
     state[N_NODES] = node + 1
-    if node == 0 or safe > nodes[state[BEST], 5]:
+    if node == 0 or safe > nodes[state[BEST], SAFE]:
         state[BEST] = node
     if safe >= task.until:
         state[FOUND] = 1
@@ -123,7 +131,7 @@ def add_node(task, search, x, y, heading, clock, lasting, safe, parent, trim):
 
 @bare_kernel
 def begin(task, lib, world, body, search):
-    """Queue the pose to begin at."""
+    """Push the pose to begin at, into arrays whose cells are free."""
     for k in range(search.state.shape[0]):
         search.state[k] = 0
     x, y, heading = task.x, task.y, task.heading
@@ -141,6 +149,7 @@ def expand(task, lib, world, body, search, n):
     Every trim is held as long as it is free, and left at several moments. Returns whether it may go
     on: 0 when nothing is left, or no room.
     """
+    # The times at which a trim is left double: there are at most 32 unless they grow by 2**32.
     nodes, state = search.nodes, search.state
     room = nodes.shape[0] - 32 * lib.library.n_trims
     for _ in range(n):
@@ -149,7 +158,8 @@ def expand(task, lib, world, body, search, n):
         node = pop(search.heap_key, search.heap_node, state[HEAP])
         state[HEAP] -= 1
         state[EXPANSIONS] += 1
-        x, y, heading, clock = nodes[node, 0], nodes[node, 1], nodes[node, 2], nodes[node, 3]
+        x, y, heading = nodes[node, X], nodes[node, Y], nodes[node, HEADING]
+        clock = nodes[node, CLOCK]
         left = task.until - clock
         for trim in range(lib.library.n_trims):
             v_x, v_y, turn = (
@@ -158,8 +168,9 @@ def expand(task, lib, world, body, search, n):
                 lib.library.twists[trim, 2],
             )
             if trim == task.rest:
-                proven = nodes[node, 5] - clock  # proven when the node was made
+                proven = nodes[node, SAFE] - clock  # proven when the node was made
             else:
+                # One proof for all children by this trim: whatever is left before `proven` is free.
                 most = left if task.rest < 0 else min(left, task.longest)
                 proven, _ = free_time(
                     world,
@@ -187,7 +198,7 @@ def expand(task, lib, world, body, search, n):
                 if is_new(task, search.cells, n_x, n_y, n_heading, clock + t):
                     safe = clock + proven
                     if trim == task.rest:
-                        safe = nodes[node, 5]
+                        safe = nodes[node, SAFE]
                     elif task.rest >= 0:
                         safe = safe_until(task, lib, world, body, n_x, n_y, n_heading, clock + t)
                     add_node(task, search, n_x, n_y, n_heading, clock + t, t, safe, node, trim)

@@ -16,12 +16,12 @@ from maneuver_automaton.groups._kernels import compose
 
 
 class IntervalTables(NamedTuple):
-    """What one interval of each trim does and costs."""
+    """Displacements and costs of one interval of each of m trims."""
 
     places: np.ndarray  # (m, q, 3) displacement at the nodes of the quadrature
     ends: np.ndarray  # (m, 3) displacement at the end
     weights: np.ndarray  # (q,) of the quadrature [s]
-    effort: np.ndarray  # (m,) what the control costs in an interval
+    effort: np.ndarray  # (m,) cost of the control in an interval
     pose_weights: np.ndarray  # (3,)
     pose_orders: np.ndarray  # (3,)
     near: np.ndarray  # (m, k) trims of most similar twist, the trim itself first
@@ -40,7 +40,7 @@ def power(value, order):
 
 @inner_kernel
 def pose_rate(tables, x, y, heading):
-    """What it costs per second to be at a pose."""
+    """Cost per second of a pose."""
     q, p = tables.pose_weights, tables.pose_orders
     return q[0] * power(x, p[0]) + q[1] * power(y, p[1]) + q[2] * power(heading, p[2])
 
@@ -83,6 +83,7 @@ def roll_out(tables, pose, sequence, poses, costs):
 def tail_cost(tables, sequence, first, pose, limit):
     """Cost of the trims from `first` on, from a pose; inf once it is not below `limit`."""
     x, y, heading = pose
+    # Costs are not negative, so a sum that reaches the limit stays there.
     total = 0.0
     for k in range(first, sequence.size):
         c, s = math.cos(heading), math.sin(heading)
@@ -132,8 +133,10 @@ def improve(tables, pose, sequence, gain):
     One interval tries every trim; two intervals try the trims most similar to theirs.
     """
     n = sequence.size
+    # Poses between the intervals, and the cost of each: `poses[i]` is up to date when i is changed.
     poses, costs = np.empty((n + 1, 3)), np.empty(n)
     total = roll_out(tables, pose, sequence, poses, costs)
+    # It ends: each change lowers the cost by more than `gain`, and sequences are finitely many.
     changed = True
     while changed:
         changed = False
@@ -176,10 +179,12 @@ def beam(tables, pose, n, width, growth, same):
     the rate of standing still there; of those that end within `same` [m, rad] the first one stays.
     """
     m = tables.effort.size
-    time = tables.weights.sum()
+    time = tables.weights.sum()  # of an interval
+    # The sequences kept so far, a row each: where they end, what they cost, and their trims.
     poses, spent = np.empty((width, 3)), np.empty(width)
     words = np.empty((width, n), np.int64)
     poses[0], spent[0], kept = pose, 0.0, 1
+    # Their children, m for each in the order of the rows, and the score by which they are ranked.
     ends, costs, scores = np.empty((width * m, 3)), np.empty(width * m), np.empty(width * m)
     for level in range(n):
         left = min(time * (n - 1 - level), growth)
@@ -193,6 +198,7 @@ def beam(tables, pose, n, width, growth, same):
                 scores[at] = costs[at] + left * pose_rate(
                     tables, ends[at, 0], ends[at, 1], ends[at, 2]
                 )
+        # A stable order: equal scores come in the order of rows and trims.
         order = np.argsort(scores[: kept * m], kind="mergesort")
         old_words, kept = words.copy(), 0
         for at in order:

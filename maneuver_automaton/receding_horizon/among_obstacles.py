@@ -1,4 +1,4 @@
-"""Plans of a step where something is in the way of trims that are switched at will: the lattice.
+"""Plans of a step among obstacles, for trims that are switched at will: the lattice.
 
 A plan to the goal is safe if all of it is proven collision-free and the vehicle can stay at its
 end. Where there is none, the step goes towards the goal as far as a fail-safe trajectory follows,
@@ -27,7 +27,7 @@ from maneuver_automaton.search.limits import closed_bound
 
 SEARCHING = 0.6  # share of a step's budget after which no plan to the goal is searched
 LATE = 0.8  # after which no path to the goal is; the rest is for a fail-safe trajectory
-MOST_EXPANSIONS = 4_000  # of such a search, where something moves
+MOST_EXPANSIONS = 4_000  # of such a search, among moving obstacles
 MOMENT = 1e-9  # [s]
 SHARES = (1.0, 0.5, 0.25)  # of a step that a path to the goal is followed before it is left
 
@@ -75,7 +75,7 @@ class AmongObstacles:
         return track(problem, time_limit=max(left, 1e-6), known=known, max_expansions=most)
 
     def _candidate(self, found: Tracked) -> Candidate | None:
-        """What was found; it is proven free, but where something moves its end may not stay so."""
+        """The plan found; it is proven free, but among moving obstacles its end may not stay so."""
         if found.plan is None or found.goal_index is None:
             return None
         one = self.now.candidate(found.plan, found.goal_index, Origin.SEARCHED)
@@ -143,16 +143,16 @@ class AmongObstacles:
 
 
 def _evading(plan: Plan) -> Deed:
-    """To wait, or to go out of the way."""
+    """Fail-safe trajectories: to wait, or to make room."""
     waits = bool(plan.trims) and plan.trims[0].is_rest
     return Deed.STOPPED if waits else Deed.EVADED
 
 
 def as_it_stands(here: Problem) -> tuple[Problem, str]:
-    """The problem as far as the vehicle's pose keeps to it, and what it breaks.
+    """The problem with limits that the vehicle's pose keeps, and the limit that it breaks.
 
-    A vehicle that is closer to something than the margin keeps half of what it has; one outside its
-    bounds is not held by them.
+    A vehicle that is closer to an obstacle than the margin keeps half of its clearance; one outside
+    its bounds is not held by them.
     """
     at, broken = here.start_time, ""
     if not stands_free(here, here.start, time=at, duration=MOMENT) > 0.0:

@@ -1,4 +1,4 @@
-"""Plans that a step may apply, and what they are compared by."""
+"""Plans that a step may apply, and the costs by which they are compared."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Candidate:
     cost: float
     goal_index: int
     origin: Origin
-    at_first: float  # what it costs until the next step
+    at_first: float  # cost until the next step
 
     @property
     def preference(self) -> tuple[float, bool, int, tuple[str, ...]]:
@@ -40,7 +40,7 @@ def candidate(
 ) -> Candidate:
     """A plan at its best pace, if that is asked for, and in the order that costs most at first.
 
-    The order stays where another one drives elsewhere and something is in the way, or where there
+    The order stays where another one drives elsewhere among obstacles, or where there
     are maneuvers.
     """
     if settings.retimed:
@@ -73,7 +73,7 @@ def bounded(problem: Problem) -> bool:
 
 
 def cost_until(problem: Problem, plan: Plan, until: float) -> float:
-    """What the first `until` seconds of a plan cost, the switches in them included."""
+    """Cost of the first `until` seconds of a plan, the switches in them included."""
     # The cost does not depend on where the rest begins, and to find out where takes longer.
     return problem.cost_of(plan) - problem.cost_of(rest_of(plan, until, start=plan.start))
 

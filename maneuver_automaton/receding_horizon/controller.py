@@ -33,10 +33,10 @@ class RecedingHorizon:
     """Model predictive control with trims: plan to the goal, apply the beginning, plan again.
 
     Every step shifts the last plan, which always leads to the goal, looks for a cheaper one, and
-    checks what the paper proves of the loop; what is broken stands in the log with the reason.
+    checks the paper's guarantees for the loop; the log has each that is broken, with the reason.
 
-    What is committed is driven in any case: nothing where trims are switched at will, otherwise the
-    maneuver under way to its end. A step decides what comes after it. Off the plan, the last word
+    The committed part is driven in any case: none where trims are switched at will, otherwise the
+    maneuver under way to its end. A step decides the motion after it. Off the plan, the last word
     gets new times from where the vehicle was measured.
 
     Among obstacles the last plan is checked against where they are predicted now. Nothing is driven
@@ -57,17 +57,17 @@ class RecedingHorizon:
         A new word must be cheaper than the rest of the last one by more than this. At 0 the
         cheapest plan is applied; of plans that cost the same, the one that costs most at first.
     time_limit : float
-        [s] per step for the search; what is best by then is applied.
+        [s] per step for the search; the best plan by then is applied.
     last : Step, optional
         To go on from: the last step of a log.
     first : Plan, optional
-        What the first step applies, instead of searching: a plan from there to the goal.
+        The plan that the first step applies, instead of searching: from there to the goal.
     retimed : bool
         Drive every plan at the pace that makes its effort uniform: the controls are then
         continuous, multiples of those of the library. Needs a fixed horizon, a cost with effort, a
         vehicle without inertia whose body velocity scales with its control, and no zones.
     hold : bool
-        Within the goal's tolerance, correct what is left within a few steps, along plans that stay
+        Within the goal's tolerance, correct the error within a few steps, along plans that stay
         within it if there are such; otherwise, and with inertia, rest.
     look_ahead : float
         [s] that a fail-safe trajectory, or standing still, must be free; less where nothing moves
@@ -152,22 +152,22 @@ class RecedingHorizon:
         elapsed: float | None = None,
         obstacles: Sequence[AnyObstacle | Shape] | None = None,
     ) -> tuple[Array | None, Step]:
-        """Decide what to do from `measured_state`.
+        """The control to apply from `measured_state`, and the log of the decision.
 
         Parameters
         ----------
         measured_state : (dof,) array_like
             Pose [m, m, rad(, m)].
         elapsed : float, optional
-            [s] since the last step; if omitted, what was to be applied of its plan.
+            [s] since the last step; if omitted, the time for which its plan was to be applied.
         obstacles : sequence of Obstacle or OccupancyMap, optional
-            What is seen from now on, with its predicted motions in the time of the world; if
-            omitted, what was seen last, at first that of the problem.
+            The obstacles from now on, with their predicted motions in the time of the world; if
+            omitted, those seen last, at first those of the problem.
 
         Returns
         -------
         control : (n_u,) array or None
-            What holds from now on; None if the goal is reached and the library has no rest.
+            The control from now on; None if the goal is reached and the library has no rest.
         log : Step
             The whole plan, its value, how it came about, and the guarantees that were broken.
 
@@ -179,8 +179,8 @@ class RecedingHorizon:
         Notes
         -----
         Where no plan leads to the goal, in whatever time, the log says so: its value is infinite,
-        and the vehicle rests. Among obstacles its value is then a lower bound, and ``deed`` says
-        what it does instead.
+        and the vehicle rests. Among obstacles its value is then a lower bound, and ``deed`` names
+        the motion that it drives instead.
         """
         dof = self.problem.automaton.model.group.dof
         pose = np.array(as_array("measured_state", measured_state, last=dof))
@@ -295,7 +295,7 @@ class RecedingHorizon:
 
 
 def _deed(chosen: Chosen, now: Situation) -> Deed:
-    """What a step does, where the decision does not say it."""
+    """The deed of a step, where the decision does not say it."""
     if chosen.deed is not None:
         return chosen.deed
     if now.last is None:

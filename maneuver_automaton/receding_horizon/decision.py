@@ -1,7 +1,7 @@
-"""What a step decides: the rest of the last plan, a cheaper one, or a fail-safe trajectory.
+"""The decision of a step: the rest of the last plan, a cheaper one, or a fail-safe trajectory.
 
-This is the one sequence for every vehicle and every world. What differs is where plans come from,
-and what it takes for one to be safe: that is a `StepSearch`.
+This is the one sequence for every vehicle and every world. A `StepSearch` says where plans come
+from, and whether one is safe.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from maneuver_automaton.receding_horizon.situation import Chosen, Situation
 
 
 class StepSearch(Protocol):
-    """Where the plans of a step come from. All start with what is committed of the last one."""
+    """The source of the plans of a step. All start with the committed part of the last one."""
 
     @property
     def free_until(self) -> float | None:
-        """Time [s] until which plans are proven collision-free; None if nothing is in the way."""
+        """Time [s] until which plans are proven collision-free; None without obstacles."""
 
     @property
     def knows_all(self) -> bool:
@@ -47,13 +47,13 @@ class StepSearch(Protocol):
         """Why there is no plan to the goal."""
 
     def fail_safe(self) -> Iterator[tuple[Plan, Deed]]:
-        """Safe motions that do not lead to the goal, and what they are; the first is driven."""
+        """Fail-safe trajectories with their deeds; the first one is driven."""
 
     def mitigation(self) -> Mitigation:
         """The motion that collides last, where none is safe."""
 
     def lower_bound(self) -> float:
-        """No plan to any goal costs less."""
+        """Lower bound of the cost of all plans to any goal."""
 
 
 def decide(now: Situation, search: StepSearch) -> Chosen:
@@ -125,7 +125,7 @@ def _without_plan(now: Situation, search: StepSearch) -> Chosen:
         return _leading_nowhere(now, plan, deed, search.free_until)
     least = search.mitigation()
     now.flag(Guarantee.SAFETY, least.reason)
-    return _leading_nowhere(now, least.plan, Deed.HARMFUL, least.contact)
+    return _leading_nowhere(now, least.plan, Deed.MITIGATED, least.contact)
 
 
 def _leading_nowhere(now: Situation, plan: Plan, deed: Deed, free_until: float | None) -> Chosen:

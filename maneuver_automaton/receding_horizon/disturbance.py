@@ -1,4 +1,4 @@
-"""What a real vehicle does beside its plan: noise, pushes, and speeds unlike its model's."""
+"""Disturbances of a vehicle: noise, pushes, and speeds unlike its model's."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from maneuver_automaton.automaton import Plan
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Disturbance:
-    """What a real vehicle does beside its plan; every random number comes from `seed`.
+    """How a real vehicle departs from its plan; every random number comes from `seed`.
 
     Noise shifts the pose after every step, as a person's push would: the place by a normal number
     per axis, the heading by another. Measurement errors are seen by the controller alone. A push
     is a displacement in the vehicle's own frame after the step of that number. A vehicle that
     differs from its model has other body velocities: `twist_scale` times those of the library.
-    With `delay` 1 the controller sees every pose a step late, and plans from where the piece under
-    way will have led.
+    With `delay` 1 the controller sees every pose a step late, and plans from the predicted end of
+    the piece that is driven meanwhile.
     """
 
     position_m: float = 0.0  # standard deviation per axis and step
@@ -77,7 +77,7 @@ def draws(upset: Disturbance, dof: int) -> Iterator[Draw]:
 
 
 def as_driven(piece: Plan, upset: Disturbance) -> Plan:
-    """What the vehicle makes of a piece of plan."""
+    """A piece of plan as the disturbed vehicle drives it."""
     if upset.twist_scale is None:
         return piece
     scale = as_array("disturbance: twist_scale", upset.twist_scale, last=piece.start.size)

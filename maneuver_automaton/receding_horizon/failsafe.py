@@ -15,7 +15,7 @@ from maneuver_automaton.receding_horizon.log import first_part
 from maneuver_automaton.receding_horizon.settings import Settings
 from maneuver_automaton.receding_horizon.shifting import followed_by
 
-SAME = 1e-9  # [s]
+LEAST_AHEAD = 1e-9  # [s] that a fail-safe trajectory covers at least
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -34,7 +34,7 @@ class Prediction:
     def is_safe(self, plan: Plan) -> bool:
         """Whether a plan is free, and the vehicle may stand at its end or leave it safely.
 
-        Where nothing moves, the end of a free plan is free for ever.
+        Without moving obstacles, the end of a free plan is free for ever.
         """
         if not self.is_free(plan):
             return False
@@ -54,7 +54,9 @@ class Prediction:
     def fail_safe(self, pose: Array, time: float) -> FailSafe:
         """A motion from a pose and a time that is free for as long as is looked ahead."""
         there = replace(self.here, start=pose, start_time=time)
-        return search_fail_safe(there, until=max(self.until, time + SAME), deadline=self.deadline)
+        return search_fail_safe(
+            there, until=max(self.until, time + LEAST_AHEAD), deadline=self.deadline
+        )
 
     def continued(self, plan: Plan, after: float) -> Plan | None:
         """The first seconds of a plan, then a fail-safe trajectory; None if either is not free."""
@@ -66,7 +68,7 @@ class Prediction:
 
 
 def predicted(here: Problem, settings: Settings, *, deadline: float) -> Prediction:
-    """How far to look ahead: as far as is asked for, or until nothing moves any more."""
+    """How far to look ahead: as far as is asked for, or until all obstacles are static."""
     until = here.start_time + settings.look_ahead
     if here.moves and settings.pad is not None:
         until = min(until, last_event(here))
@@ -79,7 +81,7 @@ def predicted(here: Problem, settings: Settings, *, deadline: float) -> Predicti
 
 
 def last_event(problem: Problem) -> float:
-    """Time [s] after which nothing moves; -inf if nothing does.
+    """Time [s] after which all obstacles are static; -inf if they always are.
 
     Examples
     --------

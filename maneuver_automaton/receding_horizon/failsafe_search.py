@@ -44,8 +44,8 @@ def search_fail_safe(
 ) -> FailSafe:
     """A motion from the problem's start that is free of its obstacles until a time, if possible.
 
-    A vehicle that can rest ends at rest. What is returned is the best there is: the motion that is
-    free for longest.
+    A vehicle that can rest ends at rest. Where no motion is free until then, the one that
+    is free for longest comes back.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def search_fail_safe(
             break
     state = search.state
     node = int(state[kernels.BEST])
-    free_until = float(search.nodes[node, 5])
+    free_until = float(search.nodes[node, kernels.SAFE])
     return FailSafe(
         plan=_plan(query, search, node, rest),
         free_until=free_until,
@@ -135,10 +135,12 @@ def _plan(query: LatticeQuery, search: kernels.FailSafeArrays, node: int, rest: 
     problem = query.problem
     edges: list[tuple[int, float]] = []
     if rest >= 0:
-        edges.append((rest, float(search.nodes[node, 5] - search.nodes[node, 3])))
-    while search.links[node, 0] >= 0:
-        edges.append((int(search.links[node, 1]), float(search.nodes[node, 4])))
-        node = int(search.links[node, 0])
+        left = search.nodes[node, kernels.SAFE] - search.nodes[node, kernels.CLOCK]
+        edges.append((rest, float(left)))
+    while search.links[node, kernels.PARENT] >= 0:
+        trim, t = search.links[node, kernels.TRIM], search.nodes[node, kernels.LASTING]
+        edges.append((int(trim), float(t)))
+        node = int(search.links[node, kernels.PARENT])
     trims = [problem.automaton.trims[query.library.trims[k]] for k, _ in reversed(edges)]
     word, times = merged(trims, [t for _, t in reversed(edges)])
     return Plan(problem.start, word, durations=times, start_time=problem.start_time)

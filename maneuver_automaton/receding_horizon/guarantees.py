@@ -1,4 +1,4 @@
-"""What the paper proves of the closed loop, checked while it runs."""
+"""Guarantees of the paper for the closed loop, checked while it runs."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ ACCURACY = 1e-9  # relative, of values
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Promises:
-    """The constants of the paper's bounds for one problem, per second beyond what rest costs."""
+    """The constants of the paper's bounds for one problem, per second beyond the cost of rest."""
 
     least_rate: float  # min l over the trims that move; 0 if there is none
-    rest_rate: float  # what a second of rest costs where it pads a fixed time, else 0
+    rest_rate: float  # cost of a second of rest where it pads a fixed time, else 0
     time_rate: float  # c3, with a free final time
     effort: float  # c1 lambda_min(R), or less where speeds are no controls; 0 if time is free
     horizon: float | None  # T [s], None if free
     step: float  # delta [s]
-    switch: float = 0.0  # what it costs to switch to the rest that fills a fixed time
+    switch: float = 0.0  # cost of the switch to the rest that fills a fixed time
     steady: bool = True  # whether it costs least_rate or more at every moment to move
 
     def most_steps(self, value: float) -> int | None:
         """The paper's bound on the number of steps from a state of that value; None if none.
 
         V(x0) / (delta min l) for finite control sets, V(x0) / (delta c3) for penalised time: the
-        smaller one. With a fixed time what rest costs is taken off first.
+        smaller one. With a fixed time the cost of rest is taken off first.
 
         Source: the paper, Sec. 4.2 and 4.3.
         """
@@ -57,7 +57,7 @@ class Promises:
         return self.effort * (distance**2 + turn**2) / self.horizon
 
     def effort_decrease(self, pose: Array, goal: Goal) -> float:
-        """lambda_R c1 delta |x|^2 / T^2: what continuous controls decrease the value by.
+        """lambda_R c1 delta |x|^2 / T^2: the decrease of the value by continuous controls.
 
         Source: the paper, Theorem 17.
         """
@@ -106,7 +106,7 @@ def promises(problem: Problem, *, step: float) -> Promises:
 def _least_effort(problem: Problem, cost: Cost) -> float:
     """c1 lambda_min(R), the paper's constant for the unicycle, whose controls are its speeds.
 
-    For other vehicles at most what a trim of the library spends per (m/s)^2 + (rad/s)^2.
+    For other vehicles at most the effort of a trim of the library per (m/s)^2 + (rad/s)^2.
     """
     weight = cost.effort_matrix
     smallest = 1.0 if weight is None else float(np.linalg.eigvalsh(weight)[0])

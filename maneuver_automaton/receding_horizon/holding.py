@@ -1,4 +1,4 @@
-"""In the set that is the goal: correct what pushes the vehicle out, and stay."""
+"""Plans within a goal's tolerance: they correct disturbances, and stay."""
 
 from __future__ import annotations
 

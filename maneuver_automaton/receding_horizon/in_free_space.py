@@ -1,4 +1,4 @@
-"""Plans of a step where nothing is in the way of trims that are switched at will: words."""
+"""Plans of a step in free space, for trims that are switched at will: words."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class InFreeSpace:
         return allowed(self.here, plan)
 
     def cheaper(self, kept: Candidate | None) -> list[Candidate]:
-        """What a search from here finds for each goal."""
+        """The result of a search from here for each goal."""
         now, here = self.now, self.here
         found: list[Candidate] = []
         now.exhaustive = True

@@ -1,4 +1,4 @@
-"""What a closed loop did, step by step, as values."""
+"""The log of a closed loop, step by step, as values."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from maneuver_automaton.problem import Problem
 
 
 class Guarantee(enum.Enum):
-    """What the paper promises of every step; the values are those of closed_loop.json."""
+    """Guarantees of the paper for every step; the values are those of closed_loop.json."""
 
     FEASIBILITY = "recursive feasibility"
     DECREASE = "value decrease"
@@ -27,8 +27,8 @@ class Guarantee(enum.Enum):
     HORIZON = "horizon"
     BUDGET = "time budget"
     BOUNDS = "bounds"
-    SAFETY = "safety"  # what is applied is free, and a free motion follows
-    NO_COLLISION = "no collision"  # found by the audit of what was driven
+    SAFETY = "safety"  # the applied motion is free, and a free motion follows
+    NO_COLLISION = "no collision"  # found by the audit of the driven motion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +52,7 @@ class Origin(enum.Enum):
 
 
 class Deed(enum.Enum):
-    """What a step did."""
+    """Kinds of motion that a step applies."""
 
     PLANNED = "planned"  # the first plan to the goal
     KEPT = "kept"  # the last plan
@@ -61,7 +61,7 @@ class Deed(enum.Enum):
     APPROACHED = "approached"  # towards the goal, then a fail-safe trajectory
     STOPPED = "stopped"  # it waits at rest
     EVADED = "evaded"  # a fail-safe trajectory that does not wait
-    HARMFUL = "harmful"  # nothing is free: collision mitigation
+    MITIGATED = "harmful"  # no motion is free: the one that collides last
 
     @property
     def leads(self) -> bool:
@@ -71,7 +71,7 @@ class Deed(enum.Enum):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Step:
-    """One step: where the vehicle was, what was planned from there, and what of it is applied."""
+    """One step: the pose of the vehicle, the plan from there, and the piece that is applied."""
 
     time: float  # [s]
     pose: Array  # (dof,) the plan starts here [m, m, rad(, m)]
@@ -84,14 +84,14 @@ class Step:
     origin: Origin
     replanned: bool  # the word is not the rest of the previous one
     shifted_value: float | None  # cost of the rest of the last plan, None if it has none here
-    off_plan: float | None  # [m or rad] between `pose` and what the last plan had said
+    off_plan: float | None  # [m or rad] between `pose` and the prediction of the last plan
     lower_bound: float
     exhaustive: bool  # every admitted word was searched
     solve_s: float
     number: int  # 0 for the first
     arrived: bool = False  # nothing remains to be done but to rest
     violations: tuple[Violation, ...] = ()
-    measured: Array | None = None  # (dof,) what was seen meanwhile, if it is used a step later
+    measured: Array | None = None  # (dof,) pose that was measured, if it is used a step later
     deed: Deed = Deed.PLANNED
     free_until: float | None = None  # [s] no contact is predicted until then; None: nothing there
     clearance_m: float | None = None  # least one while it was driven, by the audit
@@ -111,7 +111,7 @@ class Step:
 
     @property
     def piece(self) -> Plan:
-        """What is applied of the plan, until the next step."""
+        """The piece of the plan that is applied, until the next step."""
         return first_part(self.plan, self.applied)
 
     @property
@@ -139,7 +139,7 @@ class ClosedLoop:
     reason: str  # one line; empty if reached
     cost: float  # accumulated over the steps applied
     value: float  # cost of the plan at the end, 0 at the goal
-    driven: tuple[Plan, ...] = ()  # what was driven of each plan, from where the vehicle was
+    driven: tuple[Plan, ...] = ()  # the driven piece of each plan, from where the vehicle was
     audits: tuple[Audit, ...] = ()  # of the pieces driven
     inside: tuple[bool, ...] = ()  # (n + 1) whether each pose is within the goal's tolerance
     steps_bound: int | None = None  # the paper's bound on the number of steps
@@ -157,7 +157,7 @@ class ClosedLoop:
 
     @property
     def collisions(self) -> Iterator[tuple[int, Violation]]:
-        """Number of the step and what it hit, as the audit found."""
+        """Number of the step, and the obstacle it hit, by the audit."""
         for number, violation in self.violations:
             if violation.guarantee is Guarantee.NO_COLLISION:
                 yield number, violation

@@ -27,7 +27,7 @@ class Mitigation:
     plan: Plan
     contact: float  # [s] of the world's clock, when it is hit first; the time asked for if never
     clearance: float  # [m] least one until then, as far as looked for; inf if not measured
-    reason: str  # what is predicted
+    reason: str  # the predicted contact
 
 
 def mitigate(

@@ -1,6 +1,6 @@
 """Plans of a step over trims and maneuvers, from the end of the maneuver under way on.
 
-They serve every vehicle that does not switch at will, and what the other searches do not know:
+They serve every vehicle that does not switch at will, and conditions that the others do not know:
 zones, heights of obstacles, a fixed time that no rest fills.
 """
 
@@ -52,10 +52,10 @@ class OverManeuvers:
         self.settings = now.settings
         self.anew = now.here.moves or now.changed  # obstacles are not where they were
         self.reason = ""
-        self.tried: list[Plan] = []  # motions that hit something
+        self.tried: list[Plan] = []  # motions that are hit
 
     def is_safe(self, plan: Plan) -> bool:
-        """Whether a plan stays inside the bounds, hits nothing, and may stand at its end.
+        """Whether a plan stays inside the bounds, is collision-free, and may stand at its end.
 
         The rest of the last plan, from where it had said the vehicle would be, was checked before.
         """
@@ -64,7 +64,7 @@ class OverManeuvers:
         return allowed(self.here, plan) and not self._hit(plan)
 
     def _hit(self, plan: Plan, *, until: float = -math.inf) -> str:
-        """What a plan hits, or if it ends at rest what comes there; empty if nothing.
+        """The obstacle that a plan hits, or that comes to its end at rest; empty if there is none.
 
         It must be free to stand there for a while, and until a time [s] of the world's clock.
         """
@@ -75,15 +75,15 @@ class OverManeuvers:
         return what_is_hit(self.here, plan, self.here.goals[0])
 
     def cheaper(self, kept: Candidate | None) -> list[Candidate]:
-        """The cheapest safe word for each goal, if it costs less than what is kept.
+        """The cheapest safe word for each goal, if it costs less than the kept plan.
 
-        At first a planner is asked instead where something is in the way: it looks at words too.
+        At first a planner is asked instead among obstacles: it looks at words too.
         """
         now, here = self.now, self.here
         problem = self._onward()
         if problem is None or (now.last is None and (here.obstacles or here.zones)):
             return []
-        upper = math.inf  # bound of what a plan may cost
+        upper = math.inf  # bound of the cost of a plan
         if kept is not None:
             upper = kept.cost - self.settings.margin - TIE * (1.0 + abs(kept.cost))
         committed = 0.0 if now.head is None else here.cost_of(now.head)
@@ -109,7 +109,7 @@ class OverManeuvers:
         return found
 
     def _onward(self) -> Problem | None:
-        """The problem from the end of what is committed; None where the library knows it not."""
+        """The problem from the end of the committed part; None if the library lacks its trim."""
         onward = self.now.onward
         if onward is None:
             return None
@@ -121,7 +121,7 @@ class OverManeuvers:
         return replace(onward, start_trim=name)
 
     def otherwise(self) -> Candidate | None:
-        """What the lattice finds, or a planner, which is asked alone at first."""
+        """The plan of the lattice, or of a planner, which is asked alone at first."""
         first = self.now.last is None
         found = self._on_lattice() if self.anew or not first else None
         return self._planned() if found is None else found
@@ -149,7 +149,7 @@ class OverManeuvers:
         return best
 
     def _planned(self) -> Candidate | None:
-        """The plan that a planner finds from the end of what is committed."""
+        """The plan that a planner finds from the end of the committed part."""
         now, limit, problem = self.now, self.now.longest, self._onward()
         if problem is None:
             return None
@@ -172,9 +172,10 @@ class OverManeuvers:
         return f"no word was found to the goal from {off:.3g} off the plan{self.reason}"
 
     def fail_safe(self) -> Iterator[tuple[Plan, Deed]]:
-        """To brake, and to drive the last plan to its end, which comes first where nothing is new.
+        """Fail-safe trajectories: to brake, or to drive the last plan to its end.
 
-        What is committed is driven in any case.
+        The last plan comes first unless obstacles have changed. The committed part is driven in
+        any case.
         """
         rest, here = self.now.rest, self.here
         motions = [self._braking(), rest] if self.anew else [rest, self._braking()]
@@ -186,7 +187,7 @@ class OverManeuvers:
                     yield plan, Deed.APPROACHED if moves_on(plan) else Deed.STOPPED
 
     def _braking(self) -> Plan | None:
-        """What is committed, then the quickest maneuvers to rest; None if there are none."""
+        """The committed part, then the quickest maneuvers to rest; None if there are none."""
         begin, automaton = self.now.trim, self.here.automaton
         if begin.is_rest or (self.now.last is None and not self.anew):
             return self._standing()
@@ -203,23 +204,23 @@ class OverManeuvers:
         return self._then(Plan(self.here.start, trims, durations=lasting, maneuvers=maneuvers))
 
     def _standing(self) -> Plan:
-        """What is committed, then a step at rest; in a trim that moves no time."""
+        """The committed part, then a step at rest; no time in a trim that moves."""
         lasting = self.settings.step if self.now.trim.is_rest else 0.0
         return self._then(Plan(self.here.start, (self.now.trim,), durations=[lasting]))
 
     def _then(self, plan: Plan) -> Plan:
-        """What is committed, then `plan`, wherever that starts."""
+        """The committed part, then `plan`, wherever that starts."""
         if self.now.head is not None:
             return followed_by(self.now.head, plan)
         return replace(plan, start_time=self.here.start_time)
 
     def mitigation(self) -> Mitigation:
-        """Of braking and driving on, what is hit later."""
+        """Of braking and driving on, the motion that is hit later."""
         found = [self._contact(plan) for plan in self.tried or [self._standing()]]
         return max(found, key=lambda one: one.contact)
 
     def _contact(self, plan: Plan) -> Mitigation:
-        """When a plan is hit first, by halving, and what it hits."""
+        """When a plan is hit first, by halving, and the obstacle."""
         free, hit = 0.0, plan.duration
         for _ in range(HALVINGS):
             middle = 0.5 * (free + hit)
@@ -238,7 +239,7 @@ class OverManeuvers:
 
 
 def needs_maneuvers(problem: Problem) -> bool:
-    """Whether plans are words with maneuvers, or obey what the other searches do not know."""
+    """Whether plans are words with maneuvers, or obey conditions unknown to the other searches."""
     unfilled = problem.horizon.time is not None and problem.automaton.rest is None
     if not switches_at_will(problem) or unfilled:
         return True

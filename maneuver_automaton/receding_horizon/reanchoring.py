@@ -42,10 +42,10 @@ def reanchored(
     problem : Problem
         Its start is where the vehicle was measured.
     plan : Plan
-        What was about to be driven, from somewhere near; it ends at the goal, rest included.
+        The plan that was about to be driven, from nearby; it ends at the goal, rest included.
     goal : Goal
     pad : Trim, optional
-        The rest that makes up for what is left of a fixed time.
+        The rest that fills the remainder of a fixed time.
     under_way : bool
         Whether `plan` begins within a maneuver.
 
@@ -130,7 +130,7 @@ def _eased(goal: Goal, end: Array) -> Goal:
 
 
 def rejoining(problem: Problem, plan: Plan, goal: Goal, *, pad: Trim | None) -> Iterator[Plan]:
-    """Three trims to a joint of `plan` or to its end, then what follows there, then rest."""
+    """Three trims to a joint of `plan` or to its end, then its trims from there, then rest."""
     moving = [k for k, trim in enumerate(plan.trims) if trim.body_velocity.any()]
     leads_there = missed(plan, goal) <= NEAR * (1.0 + float(np.abs(plan.start).max()))
     joints = [k + 1 for k in moving[:LOOK_AHEAD]] if leads_there else []
@@ -170,7 +170,7 @@ def _connections(problem: Problem, goal: Goal) -> Iterator[Plan]:
 def _in_time(
     problem: Problem, trims: tuple[Trim, ...], times: list[float], pad: Trim | None
 ) -> Plan | None:
-    """A plan that rests for what is left of a fixed time; None if it takes longer."""
+    """A plan that rests for the remainder of a fixed time; None if it takes longer."""
     spent = math.fsum(times)
     total = problem.horizon.time
     limit = total if total is not None else problem.horizon.max_time

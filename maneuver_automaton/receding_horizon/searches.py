@@ -1,4 +1,4 @@
-"""Which search a step uses: the one that knows the vehicle's trims and what is in their way."""
+"""Which search a step uses: the one for the vehicle's trims and the obstacles."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def started(
 
 
 def load_search(problem: Problem) -> None:
-    """Have ready what a step needs for a problem, before its clock runs."""
+    """Prepare the search of a step for a problem, before its clock runs."""
     load_times_kernels()
     if needs_maneuvers(problem):
         load_linked_words()

@@ -16,7 +16,7 @@ from maneuver_automaton.primitives import Maneuver, Trim
 def rest_of(
     plan: Plan, after: float, *, start: Array | None = None, pad: Trim | None = None
 ) -> Plan:
-    """What remains of a plan `after` seconds, from `start`; `pad` makes it last as long again.
+    """The rest of a plan after `after` seconds, from `start`; `pad` makes it last as long again.
 
     Of a maneuver under way its end remains. This is the plan that makes the loop recursively
     feasible: where the goal was to be met after T, it is met after T - `after`, and the vehicle
@@ -90,7 +90,7 @@ def moves_on(plan: Plan) -> bool:
 def merged(
     trims: Sequence[Trim], durations: Sequence[float]
 ) -> tuple[tuple[Trim, ...], list[float]]:
-    """Equal neighbours as one, and what lasts no time left out."""
+    """Equal neighbours as one trim, and trims that last no time left out."""
     word: list[Trim] = []
     times: list[float] = []
     for trim, duration in zip(trims, durations, strict=True):

@@ -1,9 +1,10 @@
-"""The closed loop in simulation: what was done, and how it went."""
+"""The closed loop in simulation, and its log."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -58,7 +59,7 @@ def simulate(
     steps : int
         At most so many.
     disturbance : Disturbance, optional
-        None: the vehicle does what its model says.
+        None: the vehicle moves as its model says.
     margin, time_limit, first, retimed, look_ahead, stand
         As in `RecedingHorizon`.
     last : Step, optional
@@ -66,8 +67,8 @@ def simulate(
     stay : bool
         Go on for all steps after the goal's set is reached, and try to stay in it.
     obstacles : callable, optional
-        What the controller sees and predicts at the step of a number; if omitted, the obstacles of
-        the problem. Those are what there is: what was driven is judged by them.
+        The obstacles that the controller sees and predicts at the step of a number; if omitted,
+        those of the problem. By these, which are the true ones, the driven motion is judged.
     audit : bool
         Have an ODE solver drive every piece again that was applied, and measure its distance to
         the obstacles of the problem.
@@ -97,9 +98,7 @@ def simulate(
     """
     if steps < 1:
         raise ValueError(f"steps must be at least 1, got {steps}")
-    upset = Disturbance() if disturbance is None else disturbance
-    upset = checked(upset, problem.start.size)
-    random = draws(upset, problem.start.size)
+    upset = checked(Disturbance() if disturbance is None else disturbance, problem.start.size)
     controller = RecedingHorizon(
         problem,
         step=step,
@@ -119,82 +118,96 @@ def simulate(
             "a maneuver is driven as its model says"
         )
     begin = 0 if last is None else last.number + 1
-    for _ in range(begin):  # the numbers that the steps before have used
-        next(random)
-    where = np.array(problem.start)
-    before, measured_late = last, where
-    if last is not None and last.measured is not None:
-        measured_late = last.measured
-    log: list[Step] = []
-    poses, times, driven, audits = [where], [_begin(problem, last)], [], []
-    inside: list[bool] = [_inside(problem, where)]
+    random = itertools.islice(draws(upset, problem.start.size), begin, None)  # after those used
+    track = _track(problem, upset, last)
     stops = controller.arrival is None and at_will  # where it likes
     stands = at_will or problem.first_trim.is_rest
-    arrived = inside[-1] and (stands if last is None else _arrives(last, stops=stops))
+    arrived = track.inside[-1] and (stands if last is None else _arrives(last, stops=stops))
     for number in range(begin, begin + steps):
         if arrived and not stay:
             break
         draw = next(random)
-        measured = where + draw.measurement
-        seen = measured
-        if upset.delay and before is not None:  # what has been applied since is a group element
-            seen = _after(before, measured_late)
-        measured_late = measured
-        _, now = controller.step(seen, obstacles=None if obstacles is None else obstacles(number))
-        if upset.delay:
-            now = replace(now, measured=measured)
-        before = now
-        log.append(now)
+        measured = track.poses[-1] + draw.measurement
+        there = None if obstacles is None else obstacles(number)
+        _, now = controller.step(track.seen(measured), obstacles=there)
+        track.log.append(replace(now, measured=measured) if upset.delay else now)
         stuck = not (now.deed.leads or problem.moves or obstacles is not None)
-        stuck = stuck and (stops or not moves_on(now.plan))
-        if stuck:
+        if stuck and (stops or not moves_on(now.plan)):
             break
-        piece = replace(now.piece, start=where)
-        driven.append(as_driven(piece, upset))
-        if audit and piece.trims:
-            audits.append(_audited(problem, piece))
-            real = audits[-1] if driven[-1] is piece else _audited(problem, driven[-1])
-            log[-1] = _judged(now, real)
+        track.drive(audit=audit)
         if progress is not None:
-            progress(log[-1])
-        where = np.array(driven[-1].end) + draw.noise
-        if number in upset.pushes:
+            progress(track.log[-1])
+        track.arrive(draw.noise)
+        arrived = track.inside[-1] and _arrives(now, stops=stops)
+    reached = any(track.inside) if stay else arrived
+    return _closed_loop(track, controller, step=step, reached=reached, seen=obstacles)
+
+
+@dataclass(slots=True, kw_only=True)
+class _Track:
+    """The vehicle along the loop; `poses`, `times` and `inside` have one entry more than steps."""
+
+    problem: Problem
+    upset: Disturbance
+    last: Step | None  # of the loop before
+    measured: Array  # at the step before
+    poses: list[Array]
+    times: list[float]
+    inside: list[bool]  # whether a pose is within a goal's tolerance
+    log: list[Step] = field(default_factory=list)
+    driven: list[Plan] = field(default_factory=list)
+    audits: list[Audit] = field(default_factory=list)
+
+    def seen(self, measured: Array) -> Array:
+        """The pose for the controller: the one measured, or the one predicted from the last."""
+        late, self.measured = self.measured, measured
+        before = self.log[-1] if self.log else self.last
+        if self.upset.delay and before is not None:  # the piece applied since is a group element
+            return _after(before, late)
+        return measured
+
+    def drive(self, *, audit: bool) -> None:
+        """Drive the piece of the last step with its disturbance; have it audited."""
+        now = self.log[-1]
+        piece = replace(now.piece, start=self.poses[-1])
+        self.driven.append(as_driven(piece, self.upset))
+        if audit and piece.trims:
+            self.audits.append(_audited(self.problem, piece))
+            same = self.driven[-1] is piece
+            real = self.audits[-1] if same else _audited(self.problem, self.driven[-1])
+            self.log[-1] = _judged(now, real)
+
+    def arrive(self, noise: Array) -> None:
+        """Note the pose after the last step: the end of its piece, with noise and pushes."""
+        now = self.log[-1]
+        where = np.array(self.driven[-1].end) + noise
+        if now.number in self.upset.pushes:
             group = group_of(where.size)
-            push = as_array("disturbance: push", upset.pushes[number], last=where.size)
+            push = as_array("disturbance: push", self.upset.pushes[now.number], last=where.size)
             where = np.array((group(where) @ group(push)).pose)
-        poses.append(where)
-        times.append(now.time + now.applied)
-        inside.append(_inside(problem, where))
-        arrived = inside[-1] and _arrives(now, stops=stops)
-    return _closed_loop(
-        problem,
-        controller,
-        log,
-        poses,
-        times,
-        driven,
-        audits,
-        inside,
-        step=step,
-        reached=any(inside) if stay else arrived,
-        seen=obstacles,
+        self.poses.append(where)
+        self.times.append(now.time + now.applied)
+        self.inside.append(_inside(self.problem, where))
+
+
+def _track(problem: Problem, upset: Disturbance, last: Step | None) -> _Track:
+    """The vehicle at the start of the loop, or after the last step of another one."""
+    where = np.array(problem.start)
+    return _Track(
+        problem=problem,
+        upset=upset,
+        last=last,
+        measured=where if last is None or last.measured is None else last.measured,
+        poses=[where],
+        times=[_begin(problem, last)],
+        inside=[_inside(problem, where)],
     )
 
 
 def _closed_loop(
-    problem: Problem,
-    controller: RecedingHorizon,
-    log: list[Step],
-    poses: list[Array],
-    times: list[float],
-    driven: list[Plan],
-    audits: list[Audit],
-    inside: list[bool],
-    *,
-    step: float,
-    reached: bool,
-    seen: Seen | None,
+    track: _Track, controller: RecedingHorizon, *, step: float, reached: bool, seen: Seen | None
 ) -> ClosedLoop:
+    log, driven, inside = track.log, track.driven, track.inside
     helpless = len(log) > len(driven)
     applied = log[:-1] if helpless else log
     cost = log[-1].accumulated_cost if helpless else _spent(controller.last)
@@ -203,27 +216,27 @@ def _closed_loop(
         value, status = log[-1].lower_bound, "no_plan"
         reason = str(log[-1].violations[-1])
     elif not inside[-1]:
-        if applied:  # what would have come next
+        if applied:  # the value of the step that would have come next
             controller.last = applied[-1]
             then = applied[-1].number + 1
-            value = controller.step(poses[-1], obstacles=seen and seen(then))[1].value
+            value = controller.step(track.poses[-1], obstacles=seen and seen(then))[1].value
             controller.last = applied[-1]
         if not reached:
             status = "steps_spent"
             reason = f"the goal is not reached after {len(applied)} steps"
     return ClosedLoop(
-        problem=problem,
+        problem=track.problem,
         step=step,
         steps=tuple(applied),
-        poses=np.array(poses),
-        times=np.array(times),
+        poses=np.array(track.poses),
+        times=np.array(track.times),
         reached=reached,
         status=status,
         reason=reason,
         cost=cost,
         value=value,
         driven=tuple(driven),
-        audits=tuple(audits),
+        audits=tuple(track.audits),
         inside=tuple(inside),
         steps_bound=bound,
     )
@@ -262,7 +275,7 @@ def _audited(problem: Problem, piece: Plan) -> Audit:
 
 
 def _judged(now: Step, driven: Audit) -> Step:
-    """The step with the clearance of what was driven; a collision is flagged."""
+    """The step with the clearance of the driven motion; a collision is flagged."""
     clearance = driven.min_clearance_m
     if clearance is None or clearance > too_close(0.0):
         return replace(now, clearance_m=clearance)

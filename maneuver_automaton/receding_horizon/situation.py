@@ -1,4 +1,4 @@
-"""Where a step stands: the state, the last plan, what of it is committed, and the problem after."""
+"""The situation of a step: state, last plan, its committed part, and the problem after it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from maneuver_automaton.search.alternatives import TIE
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Chosen:
-    """What a step came to."""
+    """The result of a step."""
 
     plan: Plan
     goal_index: int
@@ -41,7 +41,7 @@ class Chosen:
 
 
 class Situation:
-    """One step under way: what is known before anything is searched.
+    """One step under way: all that is known before a search.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class Situation:
 
     @property
     def size(self) -> float:
-        """What errors of rounding grow with [m or rad]."""
+        """The size [m or rad] that errors of rounding grow with."""
         return 1.0 + float(np.abs(self.here.start).max())
 
     @property
@@ -97,12 +97,12 @@ class Situation:
 
     @cached_property
     def head(self) -> Plan | None:
-        """What is driven whatever is found: to the end of the maneuver under way; None if none."""
+        """The committed part, to the end of the maneuver under way; None if there is none."""
         return head_of(self.rest, self.busy) if self.rest is not None and self.busy else None
 
     @property
     def trim(self) -> Trim:
-        """The trim in which the vehicle is, or will be at the end of what is committed."""
+        """The trim in which the vehicle is, or will be at the end of the committed part."""
         if self.head is not None:
             return self.head.trims[-1]
         if self.rest is not None and self.rest.trims:
@@ -113,7 +113,7 @@ class Situation:
 
     @property
     def onward(self) -> Problem | None:
-        """The problem from the end of what is committed; None if no time is left then."""
+        """The problem from the end of the committed part; None if no time is left then."""
         head, horizon = self.head, self.here.horizon
         if head is None:
             return self.here
@@ -129,7 +129,7 @@ class Situation:
         )
 
     def whole(self, plan: Plan) -> Plan:
-        """What is committed, then `plan`, which starts at its end."""
+        """The committed part, then `plan`, which starts at its end."""
         return plan if self.head is None else joined(self.head, plan)
 
     @property
@@ -153,7 +153,7 @@ class Situation:
         )
 
     def filled(self, plan: Plan) -> Plan:
-        """A plan that takes no longer than it may, with rest for what is left of a fixed time."""
+        """A plan that takes no longer than it may, with rest for the remainder of a fixed time."""
         limit = self.longest
         if limit is not None and plan.duration > limit * (1.0 + EXACT):
             raise ValueError(
@@ -168,14 +168,14 @@ class Situation:
         return horizon.time if horizon.time is not None else horizon.max_time
 
     def padded(self, plan: Plan) -> Plan:
-        """The plan, then rest for what is left of a fixed time."""
+        """The plan, then rest for the remainder of a fixed time."""
         total, pad = self.here.horizon.time, self.settings.pad
         if total is None or pad is None:
             return plan
         return rested(plan, pad, total - plan.duration)
 
     def as_chosen(self, best: Candidate, shifted_value: float | None) -> Chosen:
-        """A candidate as what the step came to."""
+        """A candidate as the result of the step."""
         return Chosen(
             plan=best.plan,
             goal_index=best.goal_index,
@@ -259,7 +259,7 @@ class Situation:
         return not same or self.here.cost_of(plan) > self.last.value
 
     def best(self, kept: Candidate | None, found: Iterable[Candidate]) -> Candidate | None:
-        """The cheapest; of equal ones, what costs most at first; of these, the known word."""
+        """The cheapest; of equal ones, that which costs most at first; of these, the known word."""
         everything = [*found] if kept is None else [kept, *found]
         if not everything:
             return None
@@ -275,7 +275,7 @@ class Situation:
         return min(tied, key=lambda one: one.preference)
 
     def candidate(self, plan: Plan, index: int, origin: Origin) -> Candidate:
-        """A plan from here, with what it is compared by."""
+        """A plan from here, with the costs by which it is compared."""
         return candidate(self.here, self.settings, plan, goal_index=index, origin=origin)
 
     def flag(self, guarantee: Guarantee, reason: str) -> None:

@@ -43,14 +43,14 @@ class Outcome:
 
     @property
     def collisions(self) -> tuple[int, ...]:
-        """Numbers of the steps that hit something, as the audit found."""
+        """Numbers of the steps that hit an obstacle, by the audit."""
         hits = (step for step, one in self.violations if one.guarantee is Guarantee.NO_COLLISION)
         return tuple(hits)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Statistics:
-    """What many closed loops came to."""
+    """Statistics of many closed loops."""
 
     outcomes: tuple[Outcome, ...]
 

@@ -151,7 +151,7 @@ class UnconstrainedProblem:
 
     @cached_property
     def tables(self) -> IntervalTables:
-        """What an interval of each trim does and costs, for the kernels."""
+        """Displacements and costs of an interval of each trim, for the kernels."""
         from maneuver_automaton.receding_horizon._kernels_unconstrained import IntervalTables
 
         points, weights = np.polynomial.legendre.leggauss(NODES)
@@ -173,7 +173,7 @@ class UnconstrainedProblem:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class HorizonPlan:
-    """A sequence of trims on the horizon, what it costs, and where it leads."""
+    """A sequence of trims on the horizon, its cost, and its poses."""
 
     trims: IntArray  # (n,) indices, one per interval
     poses: Array  # (n + 1, 3) seen from the goal [m, m, rad]

@@ -19,11 +19,11 @@ from maneuver_automaton.receding_horizon.unconstrained import (
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class UnconstrainedLoop:
-    """What the closed loop did: k steps, and the horizon's value before and after each."""
+    """The closed loop: k steps, and the horizon's value before and after each."""
 
     poses: Array  # (k + 1, 3) of the world [m, m, rad]
     trims: IntArray  # (k, applied) indices, one per interval
-    stage_costs: Array  # (k,) of what was driven
+    stage_costs: Array  # (k,) of the driven pieces
     values: Array  # (k + 1,) of the horizon at each pose
     settled: bool  # whether standing still is the best sequence at the last pose
 
@@ -42,7 +42,7 @@ def simulate_unconstrained(
 ) -> UnconstrainedLoop:
     """The closed loop from a `start` (3,) of the world, for `steps` steps or until it settles.
 
-    Each search begins with the sequence before it, shifted by what was driven and filled up with
+    Each search begins with the sequence before it, shifted by the driven piece and filled up with
     the trim whose control is cheapest. It settles where standing still is the best sequence found:
     from there on every step would be the same.
 

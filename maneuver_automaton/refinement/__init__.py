@@ -1,4 +1,4 @@
-"""What makes a found plan better."""
+"""Improvement of plans: words, smooth motions, and the pace along a path."""
 
 from maneuver_automaton.refinement.effort import EffortReport as EffortReport
 from maneuver_automaton.refinement.effort import effort_report as effort_report

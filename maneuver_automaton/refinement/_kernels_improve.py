@@ -1,4 +1,10 @@
-"""Shorten a free word by random shortcuts and via-points."""
+"""Shorten a free word by random shortcuts and via-points.
+
+A section of the word is replaced by a new middle: one connection between its ends, or two that meet
+at a via-point. Arrays of `work.Work` beside those of `_kernels_word`: `middle_trims` and
+`middle_durations` (9,), the new middle, at most twice three trims and a climb with the trim of the
+via-point between; `one` and `two`, the candidates of the first and of the second connection.
+"""
 
 from __future__ import annotations
 
@@ -34,6 +40,8 @@ def spliced(lib, task, work, n, section, m):
 
     The new middle is the word `work.middle_*` of `m` trims.
     """
+    # The trims before the section, the last of them cut; the middle; the trims after it, the first
+    # of them cut.
     begin, end, first, last = section.begin, section.end, section.first, section.last
     size = begun(task, work)
     for k in range(first + 1):
@@ -67,8 +75,8 @@ def put_middle(lib, work, words, scratch, which, m):
 class Section(NamedTuple):
     """A stretch of a word for which a new middle is sought."""
 
-    begin: float  # [s]
-    end: float
+    begin: float  # [s] since the word began
+    end: float  # [s]
     first: int  # place of the trim that is driven at its begin
     last: int  # and at its end
     start: tuple[float, float, float, float]  # poses [m, m, rad, m]
@@ -76,8 +84,8 @@ class Section(NamedTuple):
     entry: tuple[int, int]  # trim and gear before
     leave: tuple[int, int]  # and after
     free_heading: bool
-    budget: float  # the new middle must be cheaper
-    left: float  # [s] it may last so long
+    budget: float  # cost that the new middle has to undercut
+    left: float  # [s] that it may last
     clock: float  # [s] time of the world at its begin
 
 
@@ -103,6 +111,8 @@ def drawn_section(lib, task, work, n, cost, draw):
     It begins and ends in coasts, where the state is known. A trim that a maneuver leads to has been
     entered when its coast begins.
     """
+    # The length of the section is drawn evenly in its logarithm, so that short sections of a long
+    # word are drawn as often as long ones.
     total = work.times[n]
     middle = draw[1] * total
     shortest = min(task.shortest_span, 0.5 * total)
@@ -177,6 +187,8 @@ def direct_middle(lib, task, scene, work, section):
 
     Returns its length, -1 if there is none that is free and cheap enough; so does `via_middle`.
     """
+    # In the order of their price: the straight line at the least cost per metre, which no path
+    # undercuts; words in closed form; the proof that one of them is free. So in `via_middle`.
     x, y, _, _ = section.start
     e_x, e_y, _, _ = section.goal
     if math.hypot(e_x - x, e_y - y) * task.per_metre >= section.budget:
@@ -234,35 +246,20 @@ def via_middle(lib, task, scene, work, section, via, there):
     v_x, v_y, _, _ = via
     e_x, e_y, _, _ = section.goal
     one, two, budget = work.one, work.two, section.budget
-    way = math.hypot(v_x - x, v_y - y) + math.hypot(e_x - v_x, e_y - v_y)
-    if way * task.per_metre >= budget:
+    length = math.hypot(v_x - x, v_y - y) + math.hypot(e_x - v_x, e_y - v_y)
+    if length * task.per_metre >= budget:
         return -1
     before, n_before = words_to(lib, False)
     n_1 = candidates(
-        lib.library,
-        before,
-        n_before,
-        section.start,
-        section.entry,
-        via,
-        there,
-        budget,
-        one,
+        lib.library, before, n_before, section.start, section.entry, via, there, budget, one
     )
     cheapest = cheapest_of(one, n_1)
     if cheapest >= budget:
         return -1
+    # Each half may cost what the cheapest of the other leaves, whether that is free or not.
     words, n_words = words_to(lib, section.free_heading)
     n_2 = candidates(
-        lib.library,
-        words,
-        n_words,
-        via,
-        there,
-        section.goal,
-        section.leave,
-        budget - cheapest,
-        two,
+        lib.library, words, n_words, via, there, section.goal, section.leave, budget - cheapest, two
     )
     rest = cheapest_of(two, n_2)
     if cheapest + rest >= budget:
@@ -283,6 +280,7 @@ def via_middle(lib, task, scene, work, section, via, there):
     )
     if which < 0:
         return -1
+    # The first half is chosen and proven: the second one begins when it ends, with what it leaves.
     if there[0] >= 0:  # the maneuvers that lead to the trim of the via-point
         work.middle_trims[m], work.middle_durations[m] = there[0], 0.0
         m += 1
@@ -306,7 +304,9 @@ def via_middle(lib, task, scene, work, section, via, there):
 
 @bare_kernel
 def attempt_all(lib, task, scene, work, state, uniform, normal):
-    """Try one shortcut or via-point per row of the draws; the length in `state`; returns the cost.
+    """Cost of the word after one shortcut or via-point per row of the draws has been tried.
+
+    The word is changed in place, and its length in `state`.
 
     `uniform` (k, 6): kind, middle, span, two chances to snap to a switch, spread of the via-point;
     `normal` (k, 3): its place and heading.
@@ -314,7 +314,7 @@ def attempt_all(lib, task, scene, work, state, uniform, normal):
     n = state[LENGTH]
     cost = word_cost(lib, work.trims, work.durations, work.edges, n)
     unroll(lib, work, n)
-    changes = scene.layers.movers.speed.shape[0] > 0  # what comes after is driven at other times
+    changes = scene.layers.movers.speed.shape[0] > 0
     for row in range(uniform.shape[0]):
         if n == 0 or not work.times[n] > 0.0:
             return cost
@@ -333,6 +333,7 @@ def attempt_all(lib, task, scene, work, state, uniform, normal):
         new_cost = word_cost(lib, work.new_trims, work.new_durations, work.new_edges, size)
         if not new_cost < cost - GAIN * cost:
             continue
+        # What comes after the section is driven at other times: the dearest test, so the last.
         if changes and not still_free(lib, task, scene, work, size, section.begin):
             continue
         take(work, state, size)

@@ -1,4 +1,16 @@
-"""Shorten a free word by dynamic programming over its points."""
+"""Shorten a free word by dynamic programming over its points.
+
+Points are states of the word at rising times. A path to a point goes along the word from the point
+before, or by a connection from any earlier one. Arrays of `work.Work` with a row a point:
+
+    at         the pose and the time of the point in the word
+    owners     the trim that is coasted there
+    best       cost of the cheapest path to it
+    spent      [s] how long that path lasts
+    back       the point that its connection begins at, -1 along the word
+    by_trims, by_durations   (4,) of that connection: three trims and a climb
+    legs       the points of the cheapest path, the last first
+"""
 
 from __future__ import annotations
 
@@ -69,6 +81,8 @@ def join(lib, task, scene, work, words, n_words, i, j, gain):
     """Reach point `j` from point `i` by a connection, if that is cheaper by `gain`, and free."""
     start = (work.at[i, X], work.at[i, Y], work.at[i, HEADING], work.at[i, Z])
     goal = (work.at[j, X], work.at[j, Y], work.at[j, HEADING], work.at[j, Z])
+    # In the order of their price: the straight line at the least cost per metre, which no path
+    # undercuts; words in closed form; the proof that one of them is free.
     budget = work.best[j] - work.best[i]
     if math.hypot(goal[0] - start[0], goal[1] - start[1]) * task.per_metre >= budget:
         return
@@ -83,7 +97,7 @@ def join(lib, task, scene, work, words, n_words, i, j, gain):
         (start, here[0], there[0]),
         count,
         (task.tries, budget - gain, task.most_time),
-        task.clock + work.spent[i],
+        task.clock + work.spent[i],  # when the cheapest path gets to point i
         work.one,
     )
     if which < 0:
@@ -100,7 +114,7 @@ def join(lib, task, scene, work, words, n_words, i, j, gain):
 
 @bare_inner_kernel
 def unwound(lib, task, work, n, points):
-    """Write the best way to the last point into `work.new_*`; its length."""
+    """Write the cheapest path to the last point into `work.new_*`; its length."""
     j, n_legs = points - 1, 0
     while j > 0:
         work.legs[n_legs] = j
@@ -134,7 +148,7 @@ def begin_program(lib, work, state, times):
     """Cut the word at some times, rising from its begin to its end, all of them within coasts.
 
     Returns its cost. The points are then joined, in order, by `join_points`, and `take_program`
-    makes the word the best way through them: in parts, so that a deadline can end it.
+    makes the word the cheapest path through them: in parts, so that a deadline can end it.
     """
     n = state[LENGTH]
     unroll(lib, work, n)
@@ -144,10 +158,12 @@ def begin_program(lib, work, state, times):
 
 @bare_kernel
 def join_points(lib, task, scene, work, first, points, n_words, gain):
-    """Find the best way to the points from `first` on, of `points`, by the first `n_words` words.
+    """Find the cheapest paths to the points from `first` to before `points`.
 
-    A connection in place of what the word does has to save at least `gain`.
+    Connections are the first `n_words` words of the library. One has to save at least `gain`
+    against the path along the word.
     """
+    # Forwards over the points: the cheapest path to each earlier one is final.
     for j in range(first, min(points, work.at.shape[0])):
         work.best[j] = work.best[j - 1] + price_along(lib, work, j)
         work.spent[j] = work.spent[j - 1] + work.at[j, TIME] - work.at[j - 1, TIME]
@@ -160,7 +176,7 @@ def join_points(lib, task, scene, work, first, points, n_words, gain):
 
 @bare_kernel
 def take_program(lib, task, scene, work, state, cost):
-    """Make the word the best way through its points; as it is where that gains nothing."""
+    """Make the word the cheapest path through its points; as it is where that gains nothing."""
     n = state[LENGTH]
     size = unwound(lib, task, work, n, work.at.shape[0])
     if not admitted(lib, task, work, size):
@@ -168,6 +184,7 @@ def take_program(lib, task, scene, work, state, cost):
     new_cost = word_cost(lib, work.new_trims, work.new_durations, work.new_edges, size)
     if not new_cost < cost - GAIN * cost:
         return
-    moves = scene.layers.movers.speed.shape[0] > 0  # what stays is driven at other times
+    # Trims that stay are driven at other times: among moving obstacles all is proven once more.
+    moves = scene.layers.movers.speed.shape[0] > 0
     if not moves or still_free(lib, task, scene, work, size, 0.0):
         take(work, state, size)

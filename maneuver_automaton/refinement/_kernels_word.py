@@ -2,6 +2,11 @@
 
 An edge is a maneuver of the lattice library; -1 stands for a switch at will, as all transitions of
 a kinematic vehicle are. The state is known while a trim is coasted, so that a word is cut there.
+
+The arrays are those of `work.Work`. `trims`, `durations` and `edges` (n,) are the word. `poses`
+(n, 4), `times` (n + 1,) and `ends` (n,) follow from it, by `unroll`: where and when each coast
+begins, and when it ends; `times[n]` is the duration of the word. `new_trims`, `new_durations` and
+`new_edges` are the word that may take its place. `state` (1,) holds the length of the word.
 """
 
 from __future__ import annotations
@@ -18,13 +23,14 @@ from maneuver_automaton.search._kernels_motion import (
 from maneuver_automaton.words._kernels_candidates import class_of
 
 AT_WILL = -1  # edge of a switch
-GAIN = 1e-9  # share of the cost that counts as a gain
+GAIN = 1e-9  # relative; a word that is cheaper by less is no gain
 LENGTH = 0  # place of the word's length in `state`
 
 
 @bare_inner_kernel
 def word_cost(lib, trims, durations, edges, n):
     """Cost of a word with the prices of its switches and maneuvers."""
+    # `gear` is the sign of the last forward speed: trims without one do not change direction.
     cost, gear = 0.0, 0
     for k in range(n):
         trim = trims[k]
@@ -60,6 +66,7 @@ def unroll(lib, work, n):
 @inlined_kernel
 def owner(work, n, time):
     """Number of the last trim that has begun at a time: its coast, or the maneuver after it."""
+    # By halving: `times` rise, and times[low] <= time < times[high], the ends aside.
     low, high = 0, n
     while high - low > 1:
         middle = (low + high) // 2
@@ -106,8 +113,8 @@ def gear_after(lib, work, n, k):
     return gear
 
 
-# The functions that follow write the new word, `work.new_*`, from its begin. They return its new
-# length; where there is no room for it, one that `admitted` refuses.
+# The functions that follow write the new word, `work.new_*`, from its begin to its end. They return
+# its new length; where there is no room for it, one that `admitted` refuses.
 
 
 @inlined_kernel
@@ -153,6 +160,7 @@ def append(lib, work, size, trim, t):
 @bare_inner_kernel
 def append_through(lib, work, size, trim, t):
     """Append a coast, after the maneuvers that lead to its class."""
+    # `via_edge` is the first maneuver of the cheapest chain, so each round is nearer to the class.
     goal = class_of(lib.library, trim)
     while 0 < size < work.new_trims.shape[0]:
         at = class_of(lib.library, work.new_trims[size - 1])
@@ -199,6 +207,7 @@ def admitted(lib, task, work, size):
 @bare_inner_kernel
 def still_free(lib, task, scene, work, size, begin):
     """Whether the word in `work.new_*` is free after `begin` [s], where obstacles move."""
+    # What ends before `begin` is driven as before, and was proven then.
     pose = (work.start[0], work.start[1], work.start[2], work.start[3])
     time = 0.0
     for k in range(size):

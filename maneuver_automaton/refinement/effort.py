@@ -14,7 +14,7 @@ from maneuver_automaton.costs import Cost
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class EffortReport:
-    """Quadratic effort ``|u|_R^2`` of every trim of a plan, and what it would cost uniform."""
+    """Quadratic effort ``|u|_R^2`` of every trim of a plan, and the effort if it were uniform."""
 
     efforts: Array  # (n,) of each trim; rest has none
     durations: Array  # (n,) [s]
@@ -26,7 +26,7 @@ class EffortReport:
 
     @property
     def saving(self) -> float:
-        """What a uniform effort would save of the integral."""
+        """Saving of a uniform effort, of the integral."""
         return self.cost - self.uniform_cost
 
 

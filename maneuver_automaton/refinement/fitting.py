@@ -107,7 +107,7 @@ def _coasting_limits(problem: Problem, plan: Plan) -> Iterator[tuple[Array, Arra
     least_coast = problem.horizon.min_coast
     longest = np.array([trim.max_duration for trim in plan.trims])
     still = np.array([trim.is_rest for trim in plan.trims])
-    yield np.zeros(len(longest)), longest  # the times alone may be what is wrong
+    yield np.zeros(len(longest)), longest  # maybe only the times are wrong
     if least_coast == 0.0:
         return
     moving = np.flatnonzero(~still & (longest >= least_coast)).tolist()

@@ -1,7 +1,7 @@
-"""Different ways to drive there: kinematic plans that differ in their gears, most promising first.
+"""Kinematic plans that differ in their gears, most promising first.
 
-What polishing comes to is decided by the sequence of gears and the side on which obstacles are
-passed. So several are made, by pricing changes of direction differently and by turning less
+The sequence of gears, and the side on which obstacles are passed, decide the result of polishing.
+So several plans are made, by pricing changes of direction differently and by turning less
 tightly than the vehicle could, and ranked by the time they would take from stop to stop.
 """
 
@@ -35,8 +35,8 @@ PRICES = (  # of a change of direction, and of a switch of trims, in the time of
 )
 BRIEF = Patience(attempts=300, passes=1)
 MOST = 20_000  # expansions of one search, unless the problem asks for fewer
-SAME = 0.15  # share of a stroke in which it differs at most from that of a like sequence
-SMALL = 0.02  # share of the whole way by which a stroke counts as longer
+STROKE_TOLERANCE = 0.15  # share of a stroke by which like sequences may differ
+SMALL = 0.02  # share of the whole path by which a stroke counts as longer
 OTHERS = 8  # further words of each search that are looked at
 
 
@@ -46,7 +46,7 @@ Estimate = Callable[[Plan], float]
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Drive:
-    """A kinematic plan and what it comes to from stop to stop."""
+    """A kinematic plan, and its motion from stop to stop."""
 
     plan: Plan
     estimate: float  # [s]
@@ -59,13 +59,13 @@ class Drive:
         mine, theirs = np.abs(self.strokes), np.abs(other.strokes)
         longer = np.maximum(mine, theirs) + SMALL * (mine.sum() + theirs.sum())
         signs = (np.sign(self.strokes) == np.sign(other.strokes)).all()
-        return bool(signs and (np.abs(mine - theirs) <= SAME * longer).all())
+        return bool(signs and (np.abs(mine - theirs) <= STROKE_TOLERANCE * longer).all())
 
 
 def car_library(
     *, wheelbase: float, max_steering: float, share: float = 1.0, reverses: bool = True
 ) -> Automaton:
-    """Straight on and as tightly as a share of the greatest curvature allows, both ways."""
+    """Straight on and as tightly as a share of the greatest curvature allows, to both sides."""
     return _car_library(wheelbase, max_steering, share, reverses)
 
 
@@ -113,7 +113,7 @@ def gear_sequences(
     libraries : sequence of Automaton
         Kinematic ones, from `car_library` or `unicycle_library`.
     estimate : callable
-        What a plan would take; see `timed`.
+        Duration of a plan; see `timed`.
     time_limit : float
         For all searches together [s]; they are counted in expansions and attempts, so it only cuts
         them short.
@@ -137,7 +137,7 @@ def gear_sequences(
 
 
 def _plans(problem: Problem, deadline: float) -> Iterator[Plan]:
-    """Plans of one search: what improving its first one comes to, and what it met on the way."""
+    """Plans of one search: its first one improved, and the others that it found."""
     query = lattice_query(problem, tuple(range(len(problem.goals))))
     table = cost_to_go_table(problem)
     most = min(MOST, problem.search.max_expansions or MOST)  # the clock decides nothing

@@ -1,7 +1,7 @@
 """Guesses for polishing: the geometry of a kinematic plan, driven at a pace that inertia allows.
 
-A guess may jump where the plan jumps from arc to arc: defects do no harm. What it must get right
-is the sequence of gears and, roughly, the time each stroke takes.
+A guess may jump where the plan jumps from arc to arc: the solver closes the defects. It must get
+right the sequence of gears and, roughly, the duration of each stroke.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Pace:
 
 
 class Timed(NamedTuple):
-    """A kinematic plan driven from stop to stop: samples in time, and what each belongs to."""
+    """A kinematic plan driven from stop to stop: samples in time, and the stroke of each."""
 
     time: Array  # (m,) [s]
     pose: Array  # (m, 3)
@@ -239,7 +239,7 @@ def _at(run: Timed, at: Array) -> Array:
 
 
 def _followed(wanted: Array, rate: float, step: float) -> Array:
-    """What follows a signal at a limited rate, half of it ahead of its jumps."""
+    """A signal of limited rate that follows another one, half of it ahead of its jumps."""
     after, before = wanted.copy(), wanted.copy()
     most = rate * step
     for k in range(1, len(wanted)):

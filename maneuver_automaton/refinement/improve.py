@@ -1,7 +1,7 @@
 """Make a free word cheaper until nothing gains any more, or the time is over: for every vehicle.
 
 Dynamic programming over the word's points, random shortcuts and via-points, and new searches at
-other resolutions, which find other ways round the obstacles. The sequence is the same at every
+other resolutions, which find other paths round the obstacles. The sequence is the same at every
 call: it is counted in attempts, and a time limit only says where it stops.
 """
 
@@ -41,7 +41,7 @@ TIMELY = 400  # attempts between two looks at the clock
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Improved:
-    """What the improvement came to."""
+    """The result of an improvement: the best word and how it ended."""
 
     word: Word
     attempts: int
@@ -49,7 +49,7 @@ class Improved:
     queries: int  # collision queries of the new searches
     passes: int  # new searches
     finished: bool  # nothing gained for as long as the settings ask
-    others: tuple[Word, ...] = ()  # what other searches came to, cheapest first
+    others: tuple[Word, ...] = ()  # words of the other searches, cheapest first
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,7 +86,7 @@ def improve(
 
 @dataclass(slots=True, eq=False)
 class Improvement:
-    """One improvement: its settings, and what it came to so far."""
+    """One improvement: its settings and its state."""
 
     query: LatticeQuery
     best: Word
@@ -138,7 +138,7 @@ class Improvement:
                 yield from self._considered(self._shortened(self.best, restart, SLICE))
 
     def result(self) -> Improved:
-        """What it came to."""
+        """The result so far."""
         return Improved(
             word=self.best,
             attempts=self.attempts,
@@ -197,7 +197,7 @@ class Improvement:
         self.arrays = one.arrays
 
     def _made_of(self, found: Word, restart: Restart) -> Iterator[Word]:
-        """What the word of a new search becomes."""
+        """The word of a new search, shortened."""
         candidate = self._shortened(found, restart, SLICE)
         if candidate.cost < NEAR * self.best.cost:
             candidate = self._attempted(candidate, SECOND_SLICE)

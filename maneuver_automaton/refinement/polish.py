@@ -1,7 +1,7 @@
 """Polish plans of a vehicle with inertia: several guesses, the best exact motion that is accepted.
 
 For each guess: with the lines between body and obstacles kept as the guess has them, which is quick
-and seldom fails; from there with lines that are free. The first guess goes all the way at once, of
+and seldom fails; from there with lines that are free. The first guess goes to the end at once, of
 the others only those that come close to the best. Whatever is found is closed: it ends at the goal.
 """
 
@@ -43,7 +43,7 @@ FINER = 0.6  # share of the step with which the best is solved once more
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PolishTask:
-    """A vehicle, its two ends and what is in its way.
+    """A vehicle, its start and goal, and the obstacles around it.
 
     Parameters
     ----------
@@ -54,9 +54,9 @@ class PolishTask:
     goal, goal_state : sequences of dof, n_z numbers
         Last pose and reduced state; None for a heading, a height or a reduced state that is free.
     parts : tuple of BodyPart
-        The body; without one, nothing is in its way.
+        The body; without one, no obstacle counts.
     obstacles : tuple of Shape
-        What stands still around it.
+        The static obstacles around it.
     bounds : Bounds
         Where the reference point may be.
     margin : float
@@ -142,7 +142,7 @@ class Attempt:
 
     guess: int  # number of the guess
     kind: str  # fixed planes | lines | elastic | gears | finer
-    duration: float  # [s] of what came out
+    duration: float  # [s] of the result
     status: str
     iterations: int
     seconds: float
@@ -155,7 +155,7 @@ class PolishedMotion:
     course: Trajectory  # from the identity pose and time 0
     control: Array  # (n, n_u)
     durations: Array  # (n,) [s]
-    objective: float  # what the solver minimised
+    objective: float  # of the solver, at its end
     error: float  # [m, rad, units of z] of its end
 
     @property
@@ -177,7 +177,7 @@ class PolishedMotion:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PolishResult:
-    """The best motion, and what was tried for it."""
+    """The best motion, and the attempts made for it."""
 
     motion: PolishedMotion | None
     reason: str  # why there is none
@@ -210,8 +210,8 @@ def polish_guesses(
     time_limit : float
         [s].
     most_iterations : int, optional
-        Of the solver, over all guesses: what is tried then does not depend on the clock, unless
-        the time is over before.
+        Of the solver, over all guesses: the attempts then do not depend on the clock, unless the
+        time is over before.
     accepts : callable
         Whether a motion is sound, say by an audit: solver success proves nothing.
 
@@ -265,7 +265,7 @@ class _Polishing:
                             attempts=tuple(self.attempts))  # fmt: skip
 
     def _left(self) -> float:
-        """Time for a solver [s]: what is left less what it takes to write a problem down."""
+        """Time for a solver [s]: the time left less that to write a problem down."""
         return self.deadline - time.monotonic() - self.building
 
     def _work_left(self) -> int | None:
@@ -280,7 +280,7 @@ class _Polishing:
         return self._left() <= 0.0 or (work is not None and work <= 0)
 
     def _room_for(self, last: Sequence[Attempt]) -> bool:
-        """Whether three more solves like the longest of some fit in what is left."""
+        """Whether three more solves like the longest of some fit in the time left."""
         work = self._work_left()
         if work is not None:
             return work >= 3 * max((one.iterations for one in last), default=0)
@@ -310,17 +310,17 @@ class _Polishing:
         if found.status is SolveStatus.SOLVED:
             self._consider(found)
             return None
-        # nothing was solved; what is near enough to a motion is closed and audited all the same
+        # None is solved; a result near enough to a motion is closed and audited all the same.
         for one in [*unfinished, found]:
             if self.best is None and one.status is SolveStatus.OUT_OF_BUDGET and one.iterations:
                 self._consider(one)
         return None
 
     def _lines(self, number: int, rough: Polished) -> None:
-        """Free lines from what fixed planes came to, which counts itself if they fail."""
+        """Solve with free lines from the result of fixed planes, which is kept if that fails."""
         if not self._is_over():
             found = self._solve("lines", number, rough.as_guess, longer=LONGER)
-            # what the solver did not finish may be sound all the same: it is closed and audited
+            # An unfinished solve may be sound all the same: it is closed and audited.
             cheaper = found.objective < rough.objective
             unfinished = found.status is SolveStatus.OUT_OF_BUDGET and cheaper
             if (found.status is SolveStatus.SOLVED or unfinished) and self._consider(found):
@@ -395,7 +395,7 @@ class _Polishing:
         return found
 
     def _consider(self, found: Polished) -> bool:
-        """Close what was found, and keep it if it is accepted and better."""
+        """Close the motion found, and keep it if it is accepted and better."""
         ends = self.task.ends(float(found.state[-1, 2]))
         ending = closed(
             self.task.model,

@@ -11,6 +11,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.cutting import NOTHING
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.fitting import without_nothing
@@ -20,7 +21,6 @@ from maneuver_automaton.words.conjugation import conjugated
 INSIDE = 1e-7  # share of a tolerance that is left to rounding
 ITERATIONS = 100
 ACCURACY = 1e-12  # of the cost, relative to itself
-NOTHING = 1e-9  # [s] coasting times below it are none
 CLOSING_STEPS = 4
 RANK = 1e-9  # singular values below this, relative, count as none
 
@@ -40,7 +40,7 @@ def with_relaxed_end(
     share : float
         Of the tolerance that may be used.
     first : int
-        Trim from which on the times may change: what is before stays, and stays collision-free.
+        First trim whose time may change: the motion before it stays, and stays collision-free.
 
     Returns
     -------
@@ -88,13 +88,13 @@ class _Relaxation:
 
     @property
     def total(self) -> float | None:
-        """What the coasting times add up to, if that is fixed [s]."""
+        """Sum of the coasting times [s], if it is fixed."""
         fixed = self.problem.horizon.time
         return None if fixed is None else fixed - self._under_way
 
     @property
     def most(self) -> float | None:
-        """What the coasting times add up to at most [s]."""
+        """Greatest sum of the coasting times [s]."""
         most = self.problem.horizon.max_time
         return None if most is None else most - self._under_way
 
@@ -104,7 +104,7 @@ class _Relaxation:
 
     @cached_property
     def _ending(self) -> EndConditions:
-        """What the times must meet to end at the goal, seen from its place.
+        """Conditions of the times to end at the goal, seen from its place.
 
         The twists are seen from after all displacements, so that the last pose is the plan's own.
         """
@@ -127,7 +127,7 @@ class _Relaxation:
         return -missing, columns
 
     def exact(self, times: Array) -> tuple[Array, Array]:
-        """What must be zero (m,), and how it follows the times (m, n)."""
+        """Equality constraints (m,), which must be 0, and their derivatives by the times (m, n)."""
         end, columns = self.off(times)
         rows = [] if self.far else [0, 1, *range(3, end.size)]
         if not (self.turned or self.goal.free_heading):
@@ -139,7 +139,7 @@ class _Relaxation:
         return values, jacobian
 
     def room(self, times: Array) -> tuple[Array, Array]:
-        """What must be at least zero (m,), and how it follows the times (m, n)."""
+        """Inequality constraints (m,), at least 0, and their derivatives by the times (m, n)."""
         end, columns = self.off(times)
         values, rows = [], []
         if self.far:
@@ -166,7 +166,7 @@ def _best_times(task: _Relaxation) -> Array | None:
     moving = np.array([not trim.is_rest for trim in plan.trims])
     least = np.where(moving & (plan.durations > 0.0), horizon.min_coast, 0.0)
     longest = np.array([trim.max_duration for trim in plan.trims])
-    if horizon.min_coast > 0.0:  # what is not in the word stays out of it
+    if horizon.min_coast > 0.0:  # trims that are not in the word stay out of it
         longest = np.where(moving & (plan.durations == 0.0), 0.0, longest)
     least[: task.first] = longest[: task.first] = plan.durations[: task.first]
     begin = np.clip(plan.durations, least, longest)
@@ -209,7 +209,7 @@ def _independent(jacobian: Array) -> IntArray:
 
 
 def _closed(task: _Relaxation, times: Array) -> Array | None:
-    """Times near `times` that meet exactly what must be; None if they would be negative."""
+    """Times near `times` that meet the equality constraints; None if they would be negative."""
     used = times > 0.0
     used[: task.first] = False
     for _ in range(CLOSING_STEPS):

@@ -12,14 +12,14 @@ from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_schedules import as_wide_as_turns
 from maneuver_automaton.search.lattice_task import Resolution
 
-PRUNE = 1.08  # of a new search: its raw path is longer than what it becomes
+PRUNE = 1.08  # of a new search: its raw path is longer than the improved one
 FIRST_CAP = 1500  # expansions of the first new search ...
 CAP_GROWTH = 1.35  # ... and how the caps grow
 MOST_CAP = 60_000
 WEIGHTS = (2.0, 1.5, 1.25, 1.1, 1.0)
 FIRST_CHUNK = 128  # expansions
 IN_SPACE: tuple[Resolution, ...] = (
-    # one more dimension: coarse cells and little greed find the way, fine ones do not end
+    # one more dimension: coarse cells and little greed find the path, fine ones do not end
     Resolution(scale=12.0, durations=4.0, weight=1.0, most=40000),
     Resolution(scale=8.0, durations=3.0, weight=1.0, most=60000),
     Resolution(scale=4.0, durations=2.0, weight=1.2, most=60000),
@@ -41,7 +41,7 @@ class Restart(NamedTuple):
     resolution: Resolution
     chunk: int  # expansions until its word is looked at first
     sign: float = 1.0  # -1: from the goal
-    prune: float = 1.0  # it looks at what costs less than so many times the best word
+    prune: float = 1.0  # children below so many times the cost of the best word are kept
     all_words: bool = True  # of the library, for shortcuts; otherwise those of few trims
 
 
@@ -51,7 +51,7 @@ class Restarts:
 
     of: Callable[[LatticeQuery, np.random.Generator], Iterator[Restart]]
     rounds: int
-    moving_rounds: int  # where obstacles move: what stays of a word is then driven at other times
+    moving_rounds: int  # among moving obstacles: the trims that stay are then driven at other times
 
 
 def _random(query: LatticeQuery, rng: np.random.Generator) -> Iterator[Restart]:

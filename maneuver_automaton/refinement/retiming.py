@@ -27,13 +27,13 @@ from maneuver_automaton.refinement.effort import (
 )
 
 HALF = 0.5  # pace at which a model is first asked whether it keeps to the path
-SAME = 1e-9  # relative difference of twists that counts as none
+TWIST_TOLERANCE = 1e-9  # relative difference of twists that counts as none
 UNCHANGED = 1e-12  # relative difference of a pace from 1 that counts as none
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Retiming:
-    """A plan, the same path at the best pace in the same time, and what that is worth."""
+    """A plan, the same path at the best pace in the same time, and the saving."""
 
     before: Plan
     after: Plan  # without the rests of the plan before
@@ -75,7 +75,7 @@ def retime(
     model : Model
         The vehicle that drives it, asked whether its body velocity scales with its control.
     cost : Cost, optional
-        What to save; the effort has to count. The squared norm of the control if left out.
+        The cost to lower; the effort has to count. The squared norm of the control if left out.
     limits : (n_u, 2) array, optional
         Least and greatest control; the model's own if left out.
 
@@ -154,7 +154,7 @@ def shared_time(lengths: Array, *, least: Array, total: float) -> Array:
     least : (n,) array
         Least times [s].
     total : float
-        What they add up to [s].
+        Their sum [s].
 
     Raises
     ------
@@ -212,7 +212,7 @@ def _check_model(trims: Sequence[Trim], model: Model) -> None:
         )
     for trim in trims:
         twist = model.body_velocity(np.zeros(0), trim.control)
-        if not _same(twist, trim.body_velocity):
+        if not _same_twist(twist, trim.body_velocity):
             raise ValueError(
                 f"retime: trim {trim.name!r} moves with {vector_text(trim.body_velocity)}, but at "
                 f"its control the {model.name} moves with {vector_text(twist)}; need the vehicle "
@@ -225,7 +225,7 @@ def _check_scaling(trims: Sequence[Trim], model: Model, *, paces: Array) -> None
     """Refuse a model that leaves the path when the control is scaled."""
     for trim, pace in zip(trims, paces.tolist(), strict=True):
         twist = model.body_velocity(np.zeros(0), pace * trim.control)
-        if not _same(twist, pace * trim.body_velocity):
+        if not _same_twist(twist, pace * trim.body_velocity):
             raise ValueError(
                 f"retime: at {pace:.4g} times the control of trim {trim.name!r} the {model.name} "
                 f"moves with {vector_text(twist)}, not {vector_text(pace * trim.body_velocity)}, "
@@ -233,8 +233,9 @@ def _check_scaling(trims: Sequence[Trim], model: Model, *, paces: Array) -> None
             )
 
 
-def _same(a: Array, b: Array) -> bool:
-    return bool(np.abs(a - b).max() <= SAME * np.abs(b).max())
+def _same_twist(a: Array, b: Array) -> bool:
+    """Whether two twists are equal to within rounding."""
+    return bool(np.abs(a - b).max() <= TWIST_TOLERANCE * np.abs(b).max())
 
 
 def _fastest(trim: Trim, box: Array, model: Model) -> float:

@@ -1,6 +1,6 @@
 """A kinematic path as a plan of a vehicle with inertia: it stops wherever the twist jumps.
 
-The path is followed exactly, so what is free for the kinematic vehicle is free for this one.
+The path is followed exactly, so a plan that is free for the kinematic vehicle is free for this one.
 """
 
 from __future__ import annotations
@@ -136,7 +136,7 @@ class _Word:
             self._maneuver(name, source, target, change / duration, duration)
 
     def stroke(self, standing: Trim, twist: Array, length: float) -> None:
-        """Follow a twist for `length` times what it does in a second, from rest to rest."""
+        """Motion along a twist, from rest to rest, by `length` times that of a second."""
         per_pace = self.model.state_along(twist, 1.0) - standing.reduced_state
         growth = float(np.min(_ratio(self._rates, np.abs(per_pace))))
         low, high = np.moveaxis(self.model.reduced_limits, -1, 0)

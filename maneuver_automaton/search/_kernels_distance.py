@@ -8,14 +8,16 @@ import numpy as np
 
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, kernel
 
-SETTLED = 2
+BLOCKED, SETTLED = 1, 2  # marks of a cell; 0 is open
 NARROW = 4.0  # how much dearer a cell is whose middle is no place for the vehicle
-BLOCKED = 1
+QUEUED, N_SETTLED, AT_RIM = range(3)  # places in `grid.state`
 
 
 @bare_inner_kernel
 def push(keys, items, size, key, item):
     """Put (key, item) into a binary heap in arrays that holds `size`."""
+    # The children of place k are 2 k + 1 and 2 k + 2. Parents move down until the key fits in, so
+    # that it is written once; of equal keys the one that is there stays above.
     k = size
     while k > 0:
         up = (k - 1) >> 1
@@ -29,6 +31,7 @@ def push(keys, items, size, key, item):
 @bare_inner_kernel
 def pop(keys, items, size):
     """Take the least out of a binary heap that holds `size`; returns its item."""
+    # The last entry is let sink from the top: the lesser child moves up until it fits in.
     top = items[0]
     last = size - 1
     key, item = keys[last], items[last]
@@ -59,22 +62,28 @@ def centre_clearance(grid, field, i, j):
 @bare_inner_kernel
 def blocked_cell(grid, field, i, j):
     """Whether no reference point can be anywhere in the cell: sound."""
+    # `inflation` is the body's inscribed radius less half a diagonal of the cell. No point of the
+    # cell is farther than that half from its middle, so its clearance is below the radius.
     return centre_clearance(grid, field, i, j) < grid.inflation
 
 
 @bare_inner_kernel
 def distance_at(grid, field, x, y):
-    """Distance [m] from the nearest seed to the cell of (x, y); inf if there is no way.
+    """Distance [m] from the nearest seed to the cell of (x, y); inf if there is no path.
 
     Cells in whose middle the vehicle cannot be count more: an estimate, not a bound. Where a wall
     may pass between the middles of two cells although neither is blocked (the body is small and
-    the wall thin), a way through costs `grid.detour` more in `rank`, by which ways are compared.
+    the wall thin), a path through costs `grid.detour` more in `rank`, by which paths are compared.
     `value` keeps the length alone: it is compared with costs, and is finite behind every gap that
     the cells cannot show.
 
-    Grows until that cell is settled, in the order of distance plus the straight way to where the
-    grid is aimed at, so that cells off the way are not looked at.
+    Grows until that cell is settled, in the order of the rank plus the straight line to where the
+    grid is aimed at, so that cells far from the path are not looked at. The state of the search is
+    kept in the grid: the next call goes on from it.
     """
+    # Of the arrays of the grid, one entry a cell: `mark`, open, blocked or settled; `rank` and
+    # `value`, the least known so far, final once the cell is settled. `keys` and `items` are the
+    # open list, a binary heap in which a cell may stand several times.
     i = math.floor((x - grid.origin_x) / grid.cell)
     j = math.floor((y - grid.origin_y) / grid.cell)
     if not (0 <= i < grid.columns and 0 <= j < grid.rows):
@@ -83,18 +92,18 @@ def distance_at(grid, field, x, y):
     if grid.mark[wanted] == BLOCKED or blocked_cell(grid, field, i, j):
         return math.inf
     while grid.mark[wanted] != SETTLED:
-        size = grid.state[0]
+        size = grid.state[QUEUED]
         if size == 0:
             return math.inf
         here = pop(grid.keys, grid.items, size)
-        grid.state[0] = size - 1
+        grid.state[QUEUED] = size - 1
         if grid.mark[here] == SETTLED:
             continue
         grid.mark[here] = SETTLED
-        grid.state[1] += 1
+        grid.state[N_SETTLED] += 1
         h_j, h_i = here // grid.columns, here % grid.columns
         if h_i == 0 or h_j == 0 or h_i == grid.columns - 1 or h_j == grid.rows - 1:
-            grid.state[2] = 1  # the rim was reached: what is beyond is not known
+            grid.state[AT_RIM] = 1  # a path may lead around outside, which is not known
         value, rank = grid.value[here], grid.rank[here]
         for b in range(-1, 2):
             for a in range(-1, 2):
@@ -104,6 +113,7 @@ def distance_at(grid, field, x, y):
                 there = n_j * grid.columns + n_i
                 if grid.mark[there] != 0:
                     continue
+                # The field is asked once for a blocked cell: then its mark says it.
                 room = centre_clearance(grid, field, n_i, n_j)
                 if room < grid.inflation:
                     grid.mark[there] = BLOCKED
@@ -116,9 +126,9 @@ def distance_at(grid, field, x, y):
                     grid.rank[there], grid.value[there] = ranked, value + step
                     e_x, e_y = (n_i - grid.aim_i) * grid.cell, (n_j - grid.aim_j) * grid.cell
                     key = ranked + math.sqrt(e_x * e_x + e_y * e_y)
-                    if grid.state[0] < grid.keys.shape[0]:
-                        push(grid.keys, grid.items, grid.state[0], key, there)
-                        grid.state[0] += 1
+                    if grid.state[QUEUED] < grid.keys.shape[0]:
+                        push(grid.keys, grid.items, grid.state[QUEUED], key, there)
+                        grid.state[QUEUED] += 1
     return grid.value[wanted]
 
 
@@ -134,8 +144,8 @@ def seed(grid, points):
                 grid.rank[here], grid.value[here] = 0.0, 0.0
                 e_x, e_y = (i - grid.aim_i) * grid.cell, (j - grid.aim_j) * grid.cell
                 key = math.sqrt(e_x * e_x + e_y * e_y)
-                push(grid.keys, grid.items, grid.state[0], key, here)
-                grid.state[0] += 1
+                push(grid.keys, grid.items, grid.state[QUEUED], key, here)
+                grid.state[QUEUED] += 1
 
 
 @kernel

@@ -17,9 +17,17 @@ and of `links` (n, 7): PARENT (-1 for a root), TRIM (NO_TRIM where any will do),
 last forward speed), COUNT (of trims), ROOT, EDGE (the maneuver that leads here, COASTED for none),
 and CLOSED (1 once it was expanded, or replaced by a cheaper node of its cell).
 
-The hash table holds the cheapest node of each cell. Its rows carry the number of the search they
-belong to, so that a new search need not clear it. The heap may hold a node that was replaced; it is
-closed then, and passed over when it is popped.
+The hash table `table` (4 n, 2) holds the cheapest node of each cell: the key of the cell, and the
+number of the search with the node below it. So a new search need not clear the table. It is never
+more than a quarter full, so that a probe ends soon.
+
+The open list is a binary heap in `heap_key` and `heap_node` (n,), ordered by the cost plus the
+weighted cost to go. A node is pushed once, when it is made. A cheaper node of its cell closes it,
+and leaves it in the heap; it is passed over when it is popped.
+
+`state` (12,) are the numbers named below; `found` (5,) is the cost of the cheapest plan found, then
+the durations of the three trims of its connection and of the climb. `scratch` holds the candidates
+of one connection.
 """
 
 from __future__ import annotations
@@ -54,21 +62,22 @@ from maneuver_automaton.words._kernels_candidates import (
 
 FULL_TURN = 2.0 * math.pi
 COASTED, ROOTED = -1, -2  # in place of the maneuver that leads to a node
+NODE_BITS = 0x7FFFFFFF  # of an entry of the hash table: the node; above them the search
 X, Y, HEADING, Z, COST, TIME, COAST, RUN, CLEARANCE = range(9)
 PARENT, TRIM, GEAR, COUNT, ROOT, EDGE, CLOSED = range(7)
 (
-    N_NODES,
-    HEAP,
-    GENERATION,
-    EXPANSIONS,
-    PATIENCE,  # expansions until the next analytic expansion
-    FOUND,
-    NODE,  # from which the best connection leads, ...
-    GOAL,  # to which aim, ...
-    ROW,  # by which of the words, ...
-    CLIMB,  # the trim at its end that climbs, ...
-    FREE,  # and whether its words are those of a free heading
-    QUERIES,
+    N_NODES,  # nodes in use
+    HEAP,  # entries of the open list
+    GENERATION,  # number of this search, which its rows of the hash table carry
+    EXPANSIONS,  # nodes expanded
+    INTERVAL,  # expansions until the next analytic expansion
+    FOUND,  # 1 once a connection is found; the next five say which is the cheapest:
+    NODE,  # it leads from this node, ...
+    GOAL,  # to this aim, ...
+    ROW,  # by this row of the words, ...
+    CLIMB,  # with this trim that climbs at its end, ...
+    FREE,  # and whether the words are those of a free heading
+    QUERIES,  # motions and connections that were tested
 ) = range(12)
 
 
@@ -79,6 +88,7 @@ def cell_key(task, x, y, heading, z, layer, time, fine):
     `task.radix` is the number of cells along a side of the window, a power of two, of headings,
     levels of altitude and ticks of the clock; the last two are 1 where they make no difference.
     """
+    # The grid is fixed to the first goal, so a moved problem has the moved cells.
     d_x, d_y = x - task.frame_x, y - task.frame_y
     c, s = task.frame_cos, task.frame_sin
     cell = task.fine_cell if fine else task.cell
@@ -90,8 +100,22 @@ def cell_key(task, x, y, heading, z, layer, time, fine):
     k = math.floor((turn - math.floor(turn)) * n_headings + 0.5) % n_headings
     level = math.floor(z / task.rise + 0.5) & (levels - 1) if levels > 1 else 0
     tick = math.floor(time / task.tick) & (ticks - 1) if task.tick > 0.0 else 0
+    # Digits of one number, the least last. Cells `sides` apart along an axis share a number, as do
+    # times `ticks` apart: that drops a node, and never a proof.
     above = ((layer * 2 + fine) * ticks + tick) * levels + level
     return ((above * turns + k) * sides + j) * sides + i
+
+
+@inlined_kernel
+def first_slot(key, mask):
+    """Row of a hash table, of `mask` + 1 rows, at which the probes for a key begin.
+
+    Source: Knuth (1998), *The art of computer programming 3*, Sec. 6.4, Fibonacci hashing.
+    """
+    # The high digits of a key (class, time, heading) are folded onto the low ones (place): cells of
+    # one place could share a row otherwise. 31 bits times 32 bits stay below the sign.
+    mixed = (key ^ (key >> 23) ^ (key >> 41)) & 0x7FFFFFFF
+    return ((mixed * 0x9E3779B1) >> 15) & mask
 
 
 @inlined_kernel
@@ -100,9 +124,9 @@ def slot_of(table, generation, key):
 
     Rows are (key, generation and node); those of another generation are free.
     """
+    # Linear probing: nothing is ever deleted within a search, so the first free row ends it.
     mask = table.shape[0] - 1
-    mixed = (key ^ (key >> 23) ^ (key >> 41)) & 0x7FFFFFFF
-    slot = ((mixed * 0x9E3779B1) >> 15) & mask
+    slot = first_slot(key, mask)
     while table[slot, 1] >> 31 == generation and table[slot, 0] != key:
         slot = (slot + 1) & mask
     return slot
@@ -112,14 +136,19 @@ def slot_of(table, generation, key):
 def node_in(table, generation, slot):
     """Node that a row of the hash table holds; -1 if it is free."""
     entry = table[slot, 1]
-    return entry & 0x7FFFFFFF if entry >> 31 == generation else -1
+    return entry & NODE_BITS if entry >> 31 == generation else -1
 
 
 @inlined_kernel
 def table_value(table, task, aim, x, y, heading):
-    """Cost to go to one aim from a table made without obstacles; 0 where it does not reach."""
+    """Cost to go to one aim from a table made without obstacles; 0 where it does not reach.
+
+    `table.value` (headings, rows, columns) is the cost from a pose seen from its goal; `table.free`
+    is the least of it over the headings of the goal.
+    """
     g_x, g_y, g_heading = task.aims[aim, 0], task.aims[aim, 1], task.aims[aim, 2]
     values = table.value
+    # By symmetry one table serves every goal: only the pose of one end seen from the other counts.
     if task.sign > 0.0:  # this pose seen from the goal
         c, s = math.cos(g_heading), math.sin(g_heading)
         d_x, d_y, turn = x - g_x, y - g_y, heading - g_heading
@@ -136,7 +165,7 @@ def table_value(table, task, aim, x, y, heading):
     share = turn / FULL_TURN
     k = math.floor((share - math.floor(share)) * n + 0.5) % n
     value = values[k, j, i]
-    return value if value < math.inf else 0.0
+    return value if value < math.inf else 0.0  # not reached says nothing: 0 is always right
 
 
 @bare_inner_kernel
@@ -158,16 +187,18 @@ def cost_to_go(task, grid, table, field, pose, trim):
     the maneuvers to the class at the other end, as far as the path does not pay for them.
     """
     x, y, heading, z = pose
-    way, rise = math.inf, math.inf
+    length, rise = math.inf, math.inf
     for g in range(task.aims.shape[0]):
         rise = min(rise, abs(task.aims[g, 3] - z))
     if grid.columns > 0:
-        way = distance_at(grid, field, x, y)
+        length = distance_at(grid, field, x, y)
     else:
         for g in range(task.aims.shape[0]):
             e_x, e_y = task.aims[g, 0] - x, task.aims[g, 1] - y
-            way = min(way, math.sqrt(e_x * e_x + e_y * e_y))
-    estimate = way * task.per_metre
+            length = min(length, math.sqrt(e_x * e_x + e_y * e_y))
+    # The plane comes first: where it forbids the pose, the table is not asked. Each of the three is
+    # an estimate of the whole cost, so the largest counts, not the sum.
+    estimate = length * task.per_metre
     if estimate < math.inf and table.value.shape[0] > 0:
         estimate = max(estimate, table_to_go(table, task, x, y, heading))
     if rise > 0.0:
@@ -177,7 +208,10 @@ def cost_to_go(task, grid, table, field, pose, trim):
 
 @inlined_kernel
 def layer_of(task, lib, trim, gear, n_trims):
-    """What beside the pose makes two nodes different: the class, and what prices and limits ask."""
+    """Number of a node's layer: its class, and the gear, trim and count that prices or limits need.
+
+    Nodes of one pose in different layers do not replace each other.
+    """
     layer = class_of(lib.library, trim)
     if task.by_gear:
         layer = layer * 3 + gear + 1
@@ -207,15 +241,19 @@ def connect_ends(search, task, lib, scene, node, upper_bound, estimate):
         if not free_heading and links[node, PARENT] >= 0:
             n_words = lib.library.n_few
         aim = (task.aims[g, 0], task.aims[g, 1], task.aims[g, 2], task.aims[g, 3])
+        # What a connection may cost: less than is left to the best plan, and not much more than the
+        # estimate.
         most = min(upper_bound, found[0]) - done
         if estimate < math.inf:
-            most = min(most, task.patience * estimate + task.slack)
+            most = min(most, task.connection_factor * estimate + task.connection_slack)
         there = trim_and_gear(task.aim_trims[g], 0)
         begin, first, end, last = pose, here, aim, there
         clock = task.clock + spent
         if task.sign < 0.0:  # the node is nearer to the goal: the word leads from the start to it
             begin, first, end, last = aim, there, pose, here
             clock = task.clock
+        # In the order of their price: words in closed form, limits of words, then the proofs, the
+        # cheapest word first, until one is free or `tries` are not.
         n = candidates(lib.library, words, n_words, begin, first, end, last, most, scratch)
         if task.checks_words:
             for k in range(n):
@@ -231,6 +269,7 @@ def connect_ends(search, task, lib, scene, node, upper_bound, estimate):
             if not may_stay(scene, lib, trim, aim, arrival, task.stay_until):
                 which = -1
         if which >= 0:
+            # It is cheaper than what was found before: `most` says so.
             found[0] = done + scratch.costs[which]
             for n_th in range(4):
                 found[1 + n_th] = scratch.times[which, n_th]
@@ -249,6 +288,7 @@ def word_admitted(search, task, lib, words, node, k):
     scratch, links, nodes = search.scratch, search.links, search.nodes
     row = scratch.rows[k]
     count = links[node, COUNT]
+    # (trim, run) is the trim that lasts and its time so far; the last one is judged after the loop.
     trim, run = links[node, TRIM], nodes[node, RUN]
     forward = task.sign > 0.0
     for step in range(4):
@@ -280,7 +320,10 @@ def too_short(task, lib, trim, run):
 
 @merged_kernel
 def add_node(search, weight, slot, key, row, link, estimate):
-    """Append a node, make it the one of its cell, and queue it."""
+    """Append a node, make it the one of its cell, and push it.
+
+    `row` are its columns of `nodes`, `link` those of `links` but the last.
+    """
     nodes, links, state = search.nodes, search.links, search.state
     node = state[N_NODES]
     for k in range(9):
@@ -298,9 +341,9 @@ def add_node(search, weight, slot, key, row, link, estimate):
 
 @bare_kernel
 def begin(search, task, lib, scene, grid, table):
-    """Queue the roots of a search; what was searched before is forgotten."""
+    """Push the roots of a search; what was searched before is forgotten."""
     state, found = search.state, search.found
-    generation = state[GENERATION] + 1
+    generation = state[GENERATION] + 1  # which frees all rows of the hash table at once
     for k in range(state.shape[0]):
         state[k] = 0
     state[GENERATION] = generation
@@ -312,6 +355,7 @@ def begin(search, task, lib, scene, grid, table):
         estimate = cost_to_go(task, grid, table, scene.layers.plane, pose, trim)
         key = cell_key(task, x, y, heading, z, layer_of(task, lib, trim, 0, 0), 0.0, 0)
         slot = slot_of(search.table, generation, key)
+        # A root that cannot reach an aim, or shares its cell with an earlier one, is left out.
         if estimate == math.inf or node_in(search.table, generation, slot) >= 0:
             continue
         row = (x, y, heading, z, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -322,6 +366,7 @@ def begin(search, task, lib, scene, grid, table):
 def open_node(search, task, upper_bound):
     """The most promising node that is open, taken from the heap; -1 if there is none."""
     links, state = search.links, search.state
+    # Only where the task says so does a key end the search: with a weight above 1 it is no bound.
     most = min(upper_bound, search.found[0]) if task.ends_early else math.inf
     node = -1
     while node < 0 and state[HEAP] > 0 and not search.heap_key[0] >= most:
@@ -349,7 +394,8 @@ def relax_coasts(search, task, lib, scene, grid, table, node, upper_bound):
     # Of 32 bits in the array: the numbers of cells need more.
     before, gear = int(links[node, TRIM]), int(links[node, GEAR])
     limit = min(upper_bound, search.found[0])
-    # Clearance known from before spares a test, unless obstacles move or zones are in the way.
+    # Clearance known from before spares a test, unless obstacles move, since it is that of an
+    # earlier time, or there are zones, which it does not count.
     known = scene.layers.movers.speed.shape[0] == 0 and scene.zone_trims.shape[0] == 0
     cos, sin = math.cos(heading), math.sin(heading)
     held = class_of(lib.library, before)
@@ -371,7 +417,8 @@ def relax_coasts(search, task, lib, scene, grid, table, node, upper_bound):
                 continue
             cost, time = done + price + t * lib.library.rates[trim], spent + t
             if cost >= limit or time > task.most_time:
-                break
+                break  # durations rise, and cost and time with them
+            # `moves` is the displacement of the coast, known before: the child is exact.
             d_x, d_y = lib.moves[trim, q, 0], lib.moves[trim, q, 1]
             n_x, n_y = x + cos * d_x - sin * d_y, y + sin * d_x + cos * d_y
             n_heading, n_z = heading + lib.moves[trim, q, 2], z + lib.moves[trim, q, 3]
@@ -379,24 +426,28 @@ def relax_coasts(search, task, lib, scene, grid, table, node, upper_bound):
             key = cell_key(task, n_x, n_y, n_heading, n_z, layer, time, 0)
             slot = slot_of(search.table, generation, key)
             old = node_in(search.table, generation, slot)
-            if old >= 0 and nodes[old, COST] <= cost and not task.contact:
+            if old >= 0 and nodes[old, COST] <= cost and not task.truncated:
                 continue
             child = (n_x, n_y, n_heading, n_z)
             ahead = cost_to_go(task, grid, table, scene.layers.plane, child, trim)
-            if cost + ahead >= limit and not task.contact:
+            if cost + ahead >= limit and not task.truncated:
                 continue
-            gap, free = nodes[node, CLEARANCE] - lib.fastest[trim] * t, t
-            if gap <= scene.margin or climbs or not known:
+            # The proof without a test: no point of the body moves farther than `fastest * t`, so
+            # the clearance shrinks by no more than that. A climb may lead into another layer, whose
+            # obstacles the clearance does not know.
+            clearance, free = nodes[node, CLEARANCE] - lib.fastest[trim] * t, t
+            if clearance <= scene.margin or climbs or not known:
                 state[QUERIES] += 1
                 clock = task.clock + task.sign * spent
-                free, gap = coast_proven(scene, lib, trim, pose, task.sign * t, clock)
+                free, clearance = coast_proven(scene, lib, trim, pose, task.sign * t, clock)
             if free < t:
-                if not task.contact or not lib.fastest[trim] > 0.0:
-                    break
+                if not task.truncated or not lib.fastest[trim] > 0.0:
+                    break  # longer coasts of this trim pass the same place
+                # All before `free` is proven, so what is left of the edge needs no other proof.
                 t = free - task.back_off / lib.fastest[trim]
-                if t * lib.fastest[trim] < task.shortest_contact:
+                if t * lib.fastest[trim] < task.shortest_truncated:
                     break
-                fine, gap = 1, 0.0
+                fine, clearance = 1, 0.0
                 cost, time = done + price + t * lib.library.rates[trim], spent + t
                 child = coasted(lib, trim, pose, task.sign * t)
                 n_x, n_y, n_heading, n_z = child
@@ -405,10 +456,11 @@ def relax_coasts(search, task, lib, scene, grid, table, node, upper_bound):
                 old = node_in(search.table, generation, slot)
                 ahead = cost_to_go(task, grid, table, scene.layers.plane, child, trim)
             fits = cost + ahead < limit and (old < 0 or nodes[old, COST] > cost)
+            # The window comes last: only now is it known how long the edge is.
             if fits and coast_inside(scene, lib, trim, pose, task.sign * t):
                 if old >= 0:
                     links[old, CLOSED] = 1
-                row = (n_x, n_y, n_heading, n_z, cost, time, t, lasted + t, max(gap, 0.0))
+                row = (n_x, n_y, n_heading, n_z, cost, time, t, lasted + t, max(clearance, 0.0))
                 link = (node, trim, new_gear, count, links[node, ROOT], COASTED)
                 add_node(search, task.weight, slot, key, row, link, ahead)
             if fine:
@@ -420,7 +472,7 @@ def relax_maneuvers(search, task, lib, scene, grid, table, node, upper_bound):
     """Children of a node by the maneuvers that lead out of its class.
 
     Coasts begin at the child, so a maneuver is an edge with a coast of no time. The order of the
-    tests is that of `relax_coasts`.
+    tests is that of `relax_coasts`; a maneuver is not truncated, since within it no trim is driven.
     """
     nodes, links, state = search.nodes, search.links, search.state
     generation = state[GENERATION]
@@ -448,16 +500,17 @@ def relax_maneuvers(search, task, lib, scene, grid, table, node, upper_bound):
         ahead = cost_to_go(task, grid, table, scene.layers.plane, child, target)
         if not cost + ahead < limit or not edge_inside(scene, lib, edge, pose):
             continue
-        gap = nodes[node, CLEARANCE] - lib.edge_reach[edge]
+        # No point moves farther than `edge_reach`: as for coasts, that may be the proof.
+        clearance = nodes[node, CLEARANCE] - lib.edge_reach[edge]
         climbs = lib.edge_high[edge] > lib.edge_low[edge] and not scene.layers.flat
-        if gap <= scene.margin or climbs or not known:
+        if clearance <= scene.margin or climbs or not known:
             state[QUERIES] += 1
-            gap = edge_proven(scene, lib, edge, pose, task.clock + spent)
-            if not gap >= 0.0:
+            clearance = edge_proven(scene, lib, edge, pose, task.clock + spent)
+            if not clearance >= 0.0:
                 continue
         if old >= 0:
             links[old, CLOSED] = 1
-        row = (n_x, n_y, n_heading, n_z, cost, time, 0.0, 0.0, gap)
+        row = (n_x, n_y, n_heading, n_z, cost, time, 0.0, 0.0, clearance)
         link = (node, target, gear, count + 1, links[node, ROOT], edge)
         add_node(search, task.weight, slot, key, row, link, ahead)
 
@@ -470,12 +523,13 @@ def expand(search, task, lib, scene, grid, table, n, upper_bound):
     1, or 0 when nothing is left to expand.
     """
     nodes, links, state = search.nodes, search.links, search.state
-    room = nodes.shape[0] - lib.most_children - 1
+    room = nodes.shape[0] - lib.most_children - 1  # so that one expansion always fits
     for _ in range(n):
         node = open_node(search, task, upper_bound)
         if node < 0:
             return 0
         if state[N_NODES] > room:  # the caller widens the arrays, and comes back
+            # Before all others, whose keys are costs and so not below 0.
             push(search.heap_key, search.heap_node, state[HEAP], -1.0, node)
             state[HEAP] += 1
             return 1
@@ -487,10 +541,10 @@ def expand(search, task, lib, scene, grid, table, n, upper_bound):
         if here == math.inf:
             continue
         # Analytic expansions cost as much as many nodes: the nearer the goal, the more often.
-        state[PATIENCE] -= 1
-        if state[PATIENCE] < 0:
-            wait = min(here / task.per_shot, task.most_patience)
-            state[PATIENCE] = int(max(wait, task.least_patience))
+        state[INTERVAL] -= 1
+        if state[INTERVAL] < 0:
+            interval = min(here / task.per_interval, task.most_interval)
+            state[INTERVAL] = int(max(interval, task.least_interval))
             connect_ends(search, task, lib, scene, node, upper_bound, here)
             if state[FOUND] == 1 and task.stop_at_first:
                 return 1

@@ -10,11 +10,7 @@ from __future__ import annotations
 
 import math
 
-from maneuver_automaton._compile import (
-    bare_inner_kernel,
-    inlined_kernel,
-    merged_kernel,
-)
+from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel, merged_kernel
 from maneuver_automaton.collision._kernels_advancement import free_time
 from maneuver_automaton.collision._kernels_layers import layer_world, times_between
 from maneuver_automaton.collision.body import Body
@@ -26,9 +22,11 @@ from maneuver_automaton.words._kernels_candidates import class_of
 def inside_window(window, x, y, heading, v_x, v_y, turn, t):
     """Whether a motion stays inside [low x, low y, high x, high y], seen from the bounds' frame.
 
-    `window` is those four, then the frame's (x, y, cos, sin) in the world; extreme points of arcs
-    count.
+    `window` (9,) is those four, the frame's (x, y, cos, sin) that take a pose of the world to it,
+    and what the pose may be outside [m].
     """
+    # a is the pose where the motion begins, seen from the frame, e the one where it ends. The box
+    # [low, high] holds both, and grows by the extreme points of the arc between them.
     c, s = window[6], window[7]
     d_x, d_y = x - window[4], y - window[5]
     a_x, a_y = c * d_x - s * d_y, s * d_x + c * d_y
@@ -43,6 +41,8 @@ def inside_window(window, x, y, heading, v_x, v_y, turn, t):
         m_x = a_x + cos * radius_x - sin * radius_y
         m_y = a_y + sin * radius_x + cos * radius_y
         radius = math.hypot(radius_x, radius_y)
+        # (m_x, m_y) is the centre. The proof: along an axis an arc is extreme at its ends or at a
+        # multiple of a quarter turn, and four of these in a row are all there are.
         begin = math.atan2(a_y - m_y, a_x - m_x)
         end = begin + angle
         first, last = min(begin, end), max(begin, end)
@@ -70,7 +70,9 @@ def inside_window(window, x, y, heading, v_x, v_y, turn, t):
 
 @bare_inner_kernel
 def part_body(bodies, p):
-    """One rigid part of the vehicle."""
+    """One rigid part of the vehicle, cut out of the arrays of all."""
+    # The polygons of part p are those from `piece_of[p]` to `piece_of[p + 1]`, its discs those of
+    # `disc_of`; `first` says where the edges of each polygon begin, and where the last ones end.
     return Body(
         bodies.edges,
         bodies.first[bodies.piece_of[p] : bodies.piece_of[p + 1] + 1],
@@ -88,7 +90,7 @@ def part_body(bodies, p):
 def part_free(world, lib, p, start, twist, speed, t, keep, margin, clock):
     """How long part `p` is free along a constant twist from its pose `start`; the last clearance.
 
-    No point of the part is faster than `speed`.
+    No point of the part is faster than `speed`: the proof of `free_time` rests on that.
     """
     x, y, heading = start
     body = part_body(lib.bodies, p)
@@ -127,12 +129,12 @@ def part_piece(world, lib, p, k, place, keep, margin, clock):
 def coast_proven(scene, lib, trim, pose, t, clock):
     """How long coasting a trim from a pose (x, y, heading, z) is proven free; the last clearance.
 
-    A negative `t` drives, and dates, the motion backwards. The time that comes back has no sign.
-    One body among obstacles in one plane has a line of its own: it is asked for at every edge, and
-    to choose a part and a layer copies more than the proof takes.
+    A negative `t` drives the motion backwards, and the world's clock too. The time that comes back
+    has no sign. One body among obstacles in one plane has a line of its own: it is asked for at
+    every edge, and to choose a part and a layer copies more than the proof takes.
     """
     if scene.layers.low.shape[0] == 1 and scene.layers.flat and lib.n_parts == 1:
-        free, gap = free_time(
+        free, clearance = free_time(
             scene.layers.first,
             lib.body,
             pose[0],
@@ -148,17 +150,19 @@ def coast_proven(scene, lib, trim, pose, t, clock):
             clock,
         )
     else:
-        free, gap = coast_proven_everywhere(scene, lib, trim, pose, t, clock)
-    return free, gap
+        free, clearance = coast_proven_everywhere(scene, lib, trim, pose, t, clock)
+    return free, clearance
 
 
 @bare_inner_kernel
 def coast_proven_everywhere(scene, lib, trim, pose, t, clock):
-    """What `coast_proven` says of several parts, in every layer they pass, and among zones.
+    """`coast_proven` for several parts, in every layer that the altitude passes, and among zones.
 
-    A layer counts while the altitude is in it, so that a climb is no cylinder. What was blocked
-    once shortens what is looked at next.
+    A layer counts while the altitude is in it, so that a climb is no cylinder.
     """
+    # `free` is how long all that was looked at is free: each part and layer is asked for no more,
+    # so the least of them remains, and all of it is proven. `nearest` is the clearance at the end:
+    # only layers that the vehicle is in there count.
     x, y, heading, z = pose
     sign = 1.0 if t >= 0.0 else -1.0
     length = abs(t)
@@ -168,11 +172,11 @@ def coast_proven_everywhere(scene, lib, trim, pose, t, clock):
     for k in range(n_layers):
         begin, end = times_between(z, climb, scene.layers.low[k], scene.layers.high[k], length)
         if end < begin or begin > free:
-            continue
+            continue  # never in this layer, or only after the motion is blocked
         world = layer_world(scene.layers, k)
         for p in range(lib.n_parts):
             span = min(end, free) - begin
-            proven, gap = part_coast(
+            proven, clearance = part_coast(
                 world,
                 lib,
                 p,
@@ -187,7 +191,7 @@ def coast_proven_everywhere(scene, lib, trim, pose, t, clock):
             if proven < span:
                 free = begin + proven
             elif end == length:
-                nearest = min(nearest, gap)
+                nearest = min(nearest, clearance)
     for k in range(scene.zone_trims.shape[0]):
         if scene.zone_trims[k, trim]:
             continue
@@ -239,6 +243,8 @@ def coast_free(scene, lib, trim, pose, t, clock):
 @bare_inner_kernel
 def may_stay(scene, lib, trim, pose, clock, until):
     """Whether a vehicle that stands as in `trim` from `clock` on is free until a time."""
+    # Static obstacles were proven clear along the motion that ends here; without moving obstacles
+    # that holds for good.
     movers = scene.layers.movers.speed.shape[0]
     if not until > clock or movers == 0:
         return True
@@ -264,9 +270,12 @@ def may_stay(scene, lib, trim, pose, clock, until):
 def edge_proven(scene, lib, edge, pose, clock):
     """Least clearance at the end of a maneuver, -1 if it is not proven free.
 
-    Each piece of its course moves by one twist; what the true motion deviates from that is kept
-    as a distance beside what is asked for. A layer counts for all of a piece that is in it.
+    Each piece of its course moves by one twist. The true motion deviates from it by at most
+    `piece_error`, which is kept in addition to `keep`: so the proof holds for the true motion.
+    A layer counts for all of a piece that is in it.
     """
+    # Pieces of part p along an edge are those from `first_piece[p * n_edges + edge]` to the next
+    # entry; their times add up to `time`. `nearest` is the clearance after the last of them.
     x, y, heading, z = pose
     place = (x, y, heading)
     nearest = scene.far
@@ -286,12 +295,14 @@ def edge_proven(scene, lib, edge, pose, clock):
                 if z + lib.piece_high[k] < layers.low[n] or z + lib.piece_low[k] > layers.high[n]:
                     time += t
                     continue
-                proven, gap = part_piece(world, lib, p, k, place, scene.keep, scene.margin, time)
+                proven, clearance = part_piece(
+                    world, lib, p, k, place, scene.keep, scene.margin, time
+                )
                 if proven < t:
                     return -1.0
                 time += t
                 if k == end - 1:
-                    nearest = min(nearest, gap)
+                    nearest = min(nearest, clearance)
     for n in range(scene.zone_trims.shape[0]):
         world = layer_world(layers, n_layers + n)
         for p in range(lib.n_parts):
@@ -299,6 +310,7 @@ def edge_proven(scene, lib, edge, pose, clock):
             for k in range(lib.first_piece[group], lib.first_piece[group + 1]):
                 if scene.zone_pieces[n, k]:
                     continue
+                # Zones stand still, so the time does not matter.
                 proven, _ = part_piece(world, lib, p, k, place, 0.0, scene.margin, clock)
                 if proven < lib.piece_time[k]:
                     return -1.0
@@ -316,14 +328,7 @@ def edge_inside(scene, lib, edge, pose):
         at, twist = lib.piece_pose[k], lib.piece_twist[k]
         p_x, p_y, p_heading = compose(x, y, heading, at[0], at[1], at[2])
         if not inside_window(
-            scene.edge_window,
-            p_x,
-            p_y,
-            p_heading,
-            twist[0],
-            twist[1],
-            twist[2],
-            lib.piece_time[k],
+            scene.edge_window, p_x, p_y, p_heading, twist[0], twist[1], twist[2], lib.piece_time[k]
         ):
             return False
     return True
@@ -332,9 +337,9 @@ def edge_inside(scene, lib, edge, pose):
 @bare_inner_kernel
 def edge_end(lib, edge, pose):
     """Pose at the end of a maneuver."""
-    shift = lib.edge_displacement[edge]
-    x, y, heading = compose(pose[0], pose[1], pose[2], shift[0], shift[1], shift[2])
-    return x, y, heading, pose[3] + shift[3]
+    moved = lib.edge_displacement[edge]
+    x, y, heading = compose(pose[0], pose[1], pose[2], moved[0], moved[1], moved[2])
+    return x, y, heading, pose[3] + moved[3]
 
 
 @bare_inner_kernel
@@ -365,6 +370,8 @@ def connection_free(scene, lib, ends, word, climb, times, clock):
     `ends` are the pose it begins at, the trim before it, and the trim after it (-1 for any). A trim
     of the word that is none, or the turn in place of a free heading, is passed over.
     """
+    # (pose, before, clock) is where, in which trim and when the word is: at first its begin. The
+    # fifth trim is the one of the goal, which lasts no time: only what leads to it is tested.
     pose, before, after = ends
     for n in range(5):
         trim, t = after, 0.0
@@ -380,6 +387,7 @@ def connection_free(scene, lib, ends, word, climb, times, clock):
                 return False
         before = trim
         if t > 0.0:
+            # The window is a few sums, the proof a loop over obstacles.
             if not coast_inside(scene, lib, trim, pose, t):
                 return False
             if not coast_free(scene, lib, trim, pose, t, clock):
@@ -396,6 +404,7 @@ def free_candidate(scene, lib, words, ends, n, limits, clock, scratch):
     `ends` as in `connection_free`; `limits` are how many are tried, the cost that a candidate has
     to undercut, and the time [s] it may last. A candidate that was tried costs inf from then on.
     """
+    # The least is sought anew each time: few are tried, so that sorting all would cost more.
     tries, most_cost, most_time = limits
     for _ in range(tries):
         best, which = most_cost, -1
@@ -414,6 +423,6 @@ def free_candidate(scene, lib, words, ends, n, limits, clock, scratch):
 
 @inlined_kernel
 def is_still(lib, trim):
-    """Whether a trim stands still: a rest may last as short as it likes."""
+    """Whether a trim stands still; a rest may be as short as it likes."""
     twist = lib.library.twists[trim]
     return not (twist[0] != 0.0 or twist[1] != 0.0 or twist[2] != 0.0 or twist[3] != 0.0)

@@ -1,4 +1,4 @@
-"""Octile ways over the corners of cells."""
+"""Octile paths over the corners of cells."""
 
 from __future__ import annotations
 
@@ -19,15 +19,17 @@ def open_cell(grid, field, i, j):
 
 
 @kernel
-def corner_way(grid, field, goals, x, y):
-    """Length [m] of the shortest octile way between the corners nearest to (x, y) and a goal.
+def corner_path(grid, field, goals, x, y):
+    """Length [m] of the shortest octile path between the corners nearest to (x, y) and a goal.
 
-    A* over corners: along an edge that an open cell touches, and across open cells. Where the rim
-    of the grid may be left, a way along it is as good as any outside.
+    A* over corners, from the goals to the end: along an edge that an open cell touches, and across
+    open cells. Where the rim of the grid may be left, a path along it is as good as any outside.
     """
-    columns, rows = grid.columns + 1, grid.rows + 1
-    value = np.full(columns * rows, np.inf)
-    settled = np.zeros(columns * rows, dtype=np.uint8)
+    columns, rows = grid.columns + 1, grid.rows + 1  # of corners
+    value = np.full(columns * rows, np.inf)  # [m] to the nearest goal, as far as known
+    settled = np.zeros(columns * rows, dtype=np.uint8)  # 1 once that is final
+    # The open list, a binary heap. A corner is expanded once and has eight neighbours, and each may
+    # be a goal: it is never pushed more than nine times.
     keys = np.empty(9 * columns * rows)
     items = np.empty(9 * columns * rows, dtype=np.int64)
     end_i = min(max(round((x - grid.origin_x) / grid.cell), 0), columns - 1)
@@ -39,6 +41,8 @@ def corner_way(grid, field, goals, x, y):
         here = j * columns + i
         if value[here] > 0.0:
             value[here] = 0.0
+            # No octile path is shorter than the straight line, and its length obeys the triangle
+            # inequality: so the first time that a corner is popped, its value is final.
             key = grid.cell * math.hypot(i - end_i, j - end_j)
             push(keys, items, size, key, here)
             size += 1
@@ -60,6 +64,8 @@ def corner_way(grid, field, goals, x, y):
                 there = n_j * columns + n_i
                 if settled[there]:
                     continue
+                # A step across a cell needs that cell open; one along an edge needs one of the two
+                # cells beside it.
                 low_i, low_j = min(i, n_i), min(j, n_j)
                 if a != 0 and b != 0:
                     passable = open_cell(grid, field, low_i, low_j)

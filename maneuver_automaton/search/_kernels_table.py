@@ -15,7 +15,7 @@ FULL_TURN = 2.0 * math.pi
 
 @inlined_kernel
 def cell_of(x, y, heading, cell, half, n_headings):
-    """Flat number of the cell of a pose; -1 outside."""
+    """Number of the cell of a pose, of all headings, rows and columns; -1 outside."""
     i = math.floor(x / cell + 0.5) + half
     j = math.floor(y / cell + 0.5) + half
     size = 2 * half + 1
@@ -27,17 +27,19 @@ def cell_of(x, y, heading, cell, half, n_headings):
 
 
 @kernel
-def fill_table(twists, rates, quanta, cell, half, n_headings, mirrored):
+def fill_table(twists, rates, edge_durations, cell, half, n_headings, mirrored):
     """Cost (headings, rows, columns) from each cell to the goal in the middle; inf if not reached.
 
-    Dijkstra over cells that each hold the exact pose of the cheapest way found. Where the library
+    Dijkstra over cells that each hold the exact pose of the cheapest path found. Where the library
     is its own mirror image, only poses on the left are looked at, and written twice.
     """
     size = 2 * half + 1
     n = n_headings * size * size
-    value = np.full(n, np.inf)
-    poses = np.empty((n, 3))
-    closed = np.zeros(n, dtype=np.uint8)
+    value = np.full(n, np.inf)  # least cost from each cell to the goal that is known so far
+    poses = np.empty((n, 3))  # where the path of that cost begins, of cells with a finite value
+    closed = np.zeros(n, dtype=np.uint8)  # 1 once the value of a cell is final
+    # The open list, a binary heap. A cell is pushed again each time that its value falls; its older
+    # entries are passed over once it is closed. Where the heap is full, a lower value is left out.
     room = 4 * n + 16
     keys, items = np.empty(room), np.empty(room, dtype=np.int64)
     goal = cell_of(0.0, 0.0, 0.0, cell, half, n_headings)
@@ -53,14 +55,15 @@ def fill_table(twists, rates, quanta, cell, half, n_headings, mirrored):
         closed[here] = 1
         x, y, heading, cost = poses[here, 0], poses[here, 1], poses[here, 2], value[here]
         for trim in range(twists.shape[0]):
-            for q in range(quanta.shape[1]):
-                t = quanta[trim, q]
+            for q in range(edge_durations.shape[1]):
+                t = edge_durations[trim, q]
                 if not t > 0.0:
                     continue
+                # Backwards in time: from there the coast leads here.
                 d_x, d_y, turn = coast(twists[trim, 0], twists[trim, 1], twists[trim, 2], -t)
                 n_x, n_y, n_heading = compose(x, y, heading, d_x, d_y, turn)
                 if mirrored and n_y < 0.0:
-                    n_y, n_heading = -n_y, -n_heading
+                    n_y, n_heading = -n_y, -n_heading  # costs as much as its image
                 there = cell_of(n_x, n_y, n_heading, cell, half, n_headings)
                 if there < 0 or closed[there]:
                     continue
@@ -75,7 +78,7 @@ def fill_table(twists, rates, quanta, cell, half, n_headings, mirrored):
         for j in range(size):
             for i in range(size):
                 best = value[(k * size + j) * size + i]
-                if mirrored:
+                if mirrored:  # (x, -y, -heading)
                     image = ((n_headings - k) % n_headings * size + size - 1 - j) * size + i
                     best = min(best, value[image])
                 out[k, j, i] = best

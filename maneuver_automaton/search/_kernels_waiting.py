@@ -1,6 +1,6 @@
-"""When to wait along a given way so that what moves is let pass: times are all that is searched.
+"""When to wait along a given path so that moving obstacles pass: only times are searched.
 
-The way is cut into pieces; a state is a joint of them and a tick of the clock at which the vehicle
+The path is cut into pieces; a state is a joint of them and a tick of the clock at which the vehicle
 may stand there.
 """
 
@@ -12,45 +12,50 @@ from maneuver_automaton._compile import bare_kernel
 from maneuver_automaton.search._kernels_motion import coast_free, coasted, may_stay
 
 UNREACHED = -1
-WAITED = -2  # stood since the tick before
+WAITED = -2  # the vehicle has stood since the tick before
 
 
 @bare_kernel
-def earliest_arrival(lib, scene, clocks, way, rest, tick):
-    """Fill `way.before` with how each state is reached; the joint and tick of the last departure.
+def earliest_arrival(lib, scene, clocks, path, rest, tick):
+    """Joint and tick of the last departure, and when it arrives; the joint is -1 if none does.
 
-    Returns (joint, tick, duration), the joint -1 if there is no way. `way.trims`, `way.durations`
-    (n,) are the pieces, `way.poses` (n + 1, 3) their joints; `way.before` (n + 1, ticks, 2) becomes
-    the joint and tick a state was left from, or WAITED. `rest` is the trim that waits, -1 if none.
-    `clocks` are the time of the world at the start, the longest duration, and the time of the world
-    until which the goal is kept.
+    Fills `path.before` with how each state is reached. `path.trims`, `path.durations`
+    (n,) are the pieces, `path.poses` (n + 1, 3) their joints. `path.before` (n + 1, ticks, 2)
+    becomes the joint and tick from which a state is reached by driving, or WAITED, or UNREACHED.
+    `rest` is the trim that waits, -1 if none. `clocks` are the time of the world at the start, the
+    longest duration, and the time of the world until which the goal is kept.
     """
+    # Forwards over ticks: a piece and a wait end at later ticks, so when a tick is looked at, all
+    # that leads to its states has been. A state is entered once; how does not matter, since what
+    # can be driven from it is the same.
     clock_of_start, most_time, stay_until = clocks
-    n, ticks = way.trims.shape[0], way.before.shape[1]
+    n, ticks = path.trims.shape[0], path.before.shape[1]
     for i in range(n + 1):
         for j in range(ticks):
-            way.before[i, j, 0] = UNREACHED
-    way.before[0, 0, 0] = 0
-    way.before[0, 0, 1] = 0
+            path.before[i, j, 0] = UNREACHED
+    path.before[0, 0, 0] = 0
+    path.before[0, 0, 1] = 0
     best, best_joint, best_tick = math.inf, -1, -1
     for j in range(ticks):
         now = j * tick
         if now >= best:
-            break
+            break  # what departs later arrives later
         for i in range(n):
-            if way.before[i, j, 0] == UNREACHED:
+            if path.before[i, j, 0] == UNREACHED:
                 continue
-            pose = (way.poses[i, 0], way.poses[i, 1], way.poses[i, 2], 0.0)
+            pose = (path.poses[i, 0], path.poses[i, 1], path.poses[i, 2], 0.0)
             if (
                 rest >= 0
                 and j + 1 < ticks
-                and way.before[i, j + 1, 0] == UNREACHED
+                and path.before[i, j + 1, 0] == UNREACHED
                 and coast_free(scene, lib, rest, pose, tick, clock_of_start + now)
             ):
-                way.before[i, j + 1, 0] = WAITED
+                path.before[i, j + 1, 0] = WAITED
+            # Drive on without a wait as far as that is free, and note each joint where it may stand
+            # from the arrival until the next tick.
             time = now
             for k in range(i, n):
-                trim, t = way.trims[k], way.durations[k]
+                trim, t = path.trims[k], path.durations[k]
                 if not coast_free(scene, lib, trim, pose, t, clock_of_start + time):
                     break
                 pose = coasted(lib, trim, pose, t)
@@ -62,9 +67,9 @@ def earliest_arrival(lib, scene, clocks, way, rest, tick):
                         best, best_joint, best_tick = time, i, j
                     break
                 then = math.ceil(time / tick)
-                if rest < 0 or then >= ticks or way.before[k + 1, then, 0] != UNREACHED:
+                if rest < 0 or then >= ticks or path.before[k + 1, then, 0] != UNREACHED:
                     continue
                 if coast_free(scene, lib, rest, pose, then * tick - time, clock):
-                    way.before[k + 1, then, 0] = i
-                    way.before[k + 1, then, 1] = j
+                    path.before[k + 1, then, 0] = i
+                    path.before[k + 1, then, 1] = j
     return best_joint, best_tick, best

@@ -1,4 +1,4 @@
-"""What is listed of the words that a search found: in which order, and each motion once."""
+"""Order of the words that a search found, and a list with each motion once."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ def cost_to_go_table(
     reach : float, optional
         Half the side of the square around the goal [m]; three turning radii if None.
     folder : Path, optional
-        Where tables are kept, in files named after a hash of what they were made from; the user's
+        Where tables are kept, in files named after a hash of their key; the user's
         cache folder if None. Where nothing can be written it works without.
     prepared : Prepared, optional
         Where tables are kept in memory.
@@ -91,28 +91,33 @@ def cost_to_go_table(
 
 
 def _made_from(library: LatticeLibrary, reach: float) -> tuple[bytes, bytes, bytes, float, bool]:
-    """What a table is made from: twists, rates and edges of the trims that move, and its size."""
+    """The key of a table: twists, rates and edge durations of the trims that move, and its size."""
     arrays = library.arrays.library
     m = arrays.n_trims
     moving = arrays.twists[:m].any(axis=1)
     twists, rates = arrays.twists[:m][moving, :3].copy(), arrays.rates[:m][moving].copy()
     longest = library.arrays.edge_durations[moving].max(axis=1)
-    quanta = np.multiply.outer(longest, SCALES)
+    edge_durations = np.multiply.outer(longest, SCALES)
     cell = reach / HALF
     smallest = np.where(arrays.twists[:m][moving, :2].any(axis=1), cell, 0.0)
     speed = np.hypot(twists[:, 0], twists[:, 1])
     with np.errstate(divide="ignore", invalid="ignore"):
         least = np.where(speed > 0.0, smallest / speed, 0.0)
-    quanta = np.maximum(quanta, np.multiply.outer(least, [1.0, 2.0, 4.0]))
-    return twists.tobytes(), rates.tobytes(), quanta.tobytes(), reach, library.mirrored
+    edge_durations = np.maximum(edge_durations, np.multiply.outer(least, [1.0, 2.0, 4.0]))
+    return twists.tobytes(), rates.tobytes(), edge_durations.tobytes(), reach, library.mirrored
 
 
 def _kept(
-    twists: bytes, rates: bytes, quanta: bytes, reach: float, mirrored: bool, folder: Path | None
+    twists: bytes,
+    rates: bytes,
+    edge_durations: bytes,
+    reach: float,
+    mirrored: bool,
+    folder: Path | None,
 ) -> CostTable:
     """The table from memory, from the cache folder, or made anew."""
     cell = reach / HALF
-    digest = hashlib.sha256(twists + rates + quanta)
+    digest = hashlib.sha256(twists + rates + edge_durations)
     digest.update(repr((reach, mirrored, HALF, HEADINGS, 1)).encode())
     path = (folder or user_cache_folder() / "cost_to_go") / f"{digest.hexdigest()[:24]}.npy"
     value = _load(path)
@@ -120,7 +125,7 @@ def _kept(
         value = _kernels_table.fill_table(
             np.frombuffer(twists).reshape(-1, 3).copy(),
             np.frombuffer(rates).copy(),
-            np.frombuffer(quanta).reshape(-1, len(SCALES)).copy(),
+            np.frombuffer(edge_durations).reshape(-1, len(SCALES)).copy(),
             cell,
             HALF,
             HEADINGS,
@@ -133,8 +138,8 @@ def _kept(
 def _to_any_heading(value: NDArray[np.float32]) -> NDArray[np.float32]:
     """The least of a table over the headings of its goal, from every pose seen from the goal.
 
-    To turn the goal is to turn the pose around it the other way. So the least depends on the
-    distance and on the heading against the direction to the goal alone.
+    To turn the goal is to turn the pose around it in the opposite direction. So the least depends
+    on the distance and on the heading against the direction to the goal alone.
     """
     n, size, _ = value.shape
     half = size // 2

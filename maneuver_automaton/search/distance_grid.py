@@ -13,18 +13,18 @@ from maneuver_automaton.collision.world import World
 from maneuver_automaton.search import _kernels_distance
 
 MOST_CELLS = 1_000_000
-DETOUR = 4.0  # [sides of the grid] that are preferred to a way through a wall thinner than a cell
+DETOUR = 4.0  # [sides of the grid] that are preferred to a path through a wall thinner than a cell
 
 
 class DistanceGrid(NamedTuple):
-    """What the kernels see; cells coincide with cells of the world's field of distances."""
+    """The grid as the kernels see it; its cells coincide with those of the world's field."""
 
     value: Array  # (cells,) [m] length of the path that ranks first, where its rank is finite
     rank: Array  # (cells,) [m] that length with a detour for every cell that a wall may cut
     mark: NDArray[np.uint8]  # (cells,) 0 open, 1 blocked, 2 settled
-    keys: Array
-    items: IntArray
-    state: IntArray  # heap size, settled cells, whether the rim was reached
+    keys: Array  # (8 cells + 8,) of the open list, a binary heap
+    items: IntArray  # its cells
+    state: IntArray  # (3,) heap size, settled cells, whether the rim was reached
     origin_x: float
     origin_y: float
     cell: float
@@ -36,7 +36,7 @@ class DistanceGrid(NamedTuple):
     inflation: float  # [m] clearance of a cell's centre below which the pose cannot be in it
     wanted: float  # [m] clearance of a cell's centre below which the vehicle cannot be there
     cut: float  # [m] clearance of a cell's centre below which a wall may cut the cell; -inf: none
-    detour: float  # [m] how long a way is preferred to one through such a cell
+    detour: float  # [m] how much longer a path is preferred to one through such a cell
     aim_i: int  # cell towards which it grows first
     aim_j: int
 
@@ -93,7 +93,7 @@ def distance_grid(world: World, box: Array, seeds: Array, aim: Array) -> Distanc
 
 
 def _none() -> DistanceGrid:
-    """No obstacle stands still: the straight way is as good."""
+    """A grid without cells, where no obstacle is static: the straight line is as good."""
     empty, none = np.zeros(0), np.zeros(0, dtype=np.int64)
     return DistanceGrid(
         value=empty,

@@ -17,7 +17,7 @@ from maneuver_automaton.search.lattice_pass import Pass, both_ends, pass_of
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_schedules import Schedule, schedule_of
 from maneuver_automaton.search.lattice_task import Resolution
-from maneuver_automaton.search.maneuver_reversal import forward_word, reversed_query
+from maneuver_automaton.search.reversal import forward_word, reversed_query
 from maneuver_automaton.words.word import Word
 
 Grids = tuple[DistanceGrid, DistanceGrid]  # distances to the goals and to the start
@@ -25,7 +25,7 @@ Grids = tuple[DistanceGrid, DistanceGrid]  # distances to the goals and to the s
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class FirstPlan:
-    """What the schedule of resolutions came to."""
+    """The result of the schedule of resolutions."""
 
     word: Word | None
     expansions: int
@@ -33,7 +33,7 @@ class FirstPlan:
     exhausted: bool  # every resolution was tried to its end
     enclosed: str  # why no plan can exist, if the plane alone proves it
     nearest: float  # [m] least distance to the goal that was reached
-    nodes: Array | None = None  # (n, 4) x, y, heading, cost of what was expanded, if asked for
+    nodes: Array | None = None  # (n, 4) x, y, heading, cost of the expanded nodes, if asked for
 
 
 def first_plan(

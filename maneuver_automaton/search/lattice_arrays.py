@@ -11,7 +11,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.body import Body
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.search.maneuver_motion import (
+from maneuver_automaton.search.part_motion import (
     BodyArrays,
     Part,
     bodies_of,
@@ -27,7 +27,7 @@ CELL = 0.122  # side of a cell at the first resolution, in length scales
 
 
 class LatticeArrays(NamedTuple):
-    """What the kernels see of m trims in C classes, E maneuvers between these, and P parts.
+    """Arrays for the kernels of m trims in C classes, E maneuvers between these, and P parts.
 
     Edges are maneuvers, those out of one class next to each other. A vehicle that changes between
     all its trims at will has one class and no edges.
@@ -67,11 +67,11 @@ class LatticeArrays(NamedTuple):
 
 
 class LatticeLibrary(NamedTuple):
-    """The arrays with what the wrapper needs beside them."""
+    """The arrays, and the values that the wrapper needs beside them."""
 
     arrays: LatticeArrays
     backwards: LatticeArrays  # the same with coasts that lead against time
-    priced: Library  # its trims, and what they and the maneuvers cost
+    priced: Library  # its trims and maneuvers, with their costs
     parts: tuple[Part, ...]  # rigid parts of the vehicle, posed in these trims
     trims: IntArray  # (m,) their indices in the automaton
     number_of: IntArray  # from the indices in the automaton to these, -1 for none
@@ -125,7 +125,7 @@ class MotionArrays(NamedTuple):
 
 
 def no_edges() -> tuple[EdgeArrays, MotionArrays]:
-    """What a vehicle has that changes between all its trims at will: no maneuver."""
+    """Empty arrays of edges, for a vehicle that changes between all its trims at will."""
     numbers, values = np.zeros(0, dtype=np.int64), np.zeros(0)
     edges = EdgeArrays(numbers, numbers, numbers, np.zeros((0, 4)), values, values)
     rows, first = np.zeros((0, 3)), np.zeros(1, dtype=np.int64)
@@ -220,8 +220,8 @@ def tightest_turn(twists: Array) -> float:
 def length_scale(twists: Array, body: Body, *, wide: bool) -> float:
     """Radius of the tightest turn that drives; a few widths of the body where there is none.
 
-    Unless turns may be `wide`, it is at most that: a vehicle that has other ways to turn than to
-    drive a circle decides on the scale of its body.
+    Unless turns may be `wide`, it is at most that: a vehicle that can turn without driving a
+    circle decides on the scale of its body.
     """
     radius, size = tightest_turn(twists), 4.0 * body.half_width or 4.0 * body.reach
     if radius == 0.0:

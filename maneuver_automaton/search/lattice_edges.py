@@ -1,4 +1,4 @@
-"""Maneuvers as edges of the lattice: where they lead, what they cost, and the motion along them."""
+"""Maneuvers as edges of the lattice: their ends, costs, and motion."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.search.altitude_ranges import altitude_ranges
 from maneuver_automaton.search.lattice_arrays import (
     EdgeArrays,
     MotionArrays,
     no_edges,
 )
-from maneuver_automaton.search.maneuver_heights import altitude_ranges
-from maneuver_automaton.search.maneuver_motion import (
+from maneuver_automaton.search.part_motion import (
     CLOSE,
     Part,
     bodies_of,
@@ -54,7 +54,7 @@ def motion_along(
 ) -> tuple[MotionArrays, IntArray]:
     """Pieces of every part, then of the pose alone, along every edge; samples of the parts.
 
-    `timed`: something moves, so that it matters when the vehicle is where.
+    `timed`: obstacles move, so that it matters when the vehicle is where.
     """
     if not edges.maneuver.size:
         return no_edges()[1], np.zeros((0, 2), dtype=np.int64)
@@ -118,7 +118,7 @@ def via_edges(library: Library, edges: EdgeArrays) -> IntArray:
 
 
 def lags(library: Library, surplus: Array, edges: EdgeArrays) -> Array:
-    """Least surplus (C, C) of chains of maneuvers over the price of the way they make."""
+    """Least surplus (C, C) of chains of maneuvers over the price of the path they make."""
     by_maneuver = np.zeros(len(library.maneuver_costs))
     by_maneuver[edges.maneuver] = surplus
     return transitions_of(library.automaton, by_maneuver).cost

@@ -22,13 +22,13 @@ class LatticePose(NamedTuple):
     """The pose of a lattice that is next to a goal, at the heading of the goal's trim."""
 
     pose: Array  # (3,) [m, m, rad]
-    way: float  # [m] from the goal
+    distance: float  # [m] from the goal
     turn: float  # [rad] from the goal, 0 if its heading is free
 
     def is_near(self, goal: Goal) -> bool:
         """Whether it is within the goal's tolerance."""
         exact = EXACT * (1.0 + float(np.abs(self.pose[:2]).max()))
-        return self.way <= goal.tolerance_m + exact and self.turn <= goal.tolerance_rad + EXACT
+        return self.distance <= goal.tolerance_m + exact and self.turn <= goal.tolerance_rad + EXACT
 
 
 def nearest_on_lattice(problem: Problem, goal: Goal) -> LatticePose | None:
@@ -55,8 +55,8 @@ def nearest_on_lattice(problem: Problem, goal: Goal) -> LatticePose | None:
     turn = math.remainder(model.heading(last.reduced_state) - float(seen[2]), 2.0 * math.pi)
     pose = np.array((world @ SE2(np.append(cell, 0.0))).pose)
     pose[2] = goal.pose[2] + turn
-    way = float(np.linalg.norm(seen[:2] - cell))
-    return LatticePose(pose, way, 0.0 if goal.free_heading else abs(turn))
+    distance = float(np.linalg.norm(seen[:2] - cell))
+    return LatticePose(pose, distance, 0.0 if goal.free_heading else abs(turn))
 
 
 def aim_of(problem: Problem, goal: Goal) -> Array:
@@ -65,7 +65,7 @@ def aim_of(problem: Problem, goal: Goal) -> Array:
     A goal on the lattice keeps its own digits.
     """
     near = nearest_on_lattice(problem, goal)
-    if near is None or not near.is_near(goal) or max(near.way, near.turn) <= EXACT:
+    if near is None or not near.is_near(goal) or max(near.distance, near.turn) <= EXACT:
         return goal.pose
     return near.pose
 

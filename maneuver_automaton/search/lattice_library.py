@@ -38,7 +38,7 @@ from maneuver_automaton.search.lattice_trims import (
     trims_at_will,
     trims_of,
 )
-from maneuver_automaton.search.maneuver_motion import Part, posed_parts
+from maneuver_automaton.search.part_motion import Part, posed_parts
 from maneuver_automaton.search.prepared import RECENT, Prepared
 
 OF_A_LATTICE = 0.7  # of its resolution: a cell's diagonal is shorter than the step between poses
@@ -98,7 +98,7 @@ def _library(
 def library_of_trims(
     priced: PricedTrims, parts: tuple[Part, ...], *, waits: bool
 ) -> LatticeLibrary:
-    """Trims and the maneuvers between them; `waits`: something moves, and rest is an edge."""
+    """Trims and the maneuvers between them; `waits`: obstacles move, and rest is an edge."""
     library, arrays = priced.library, priced.library.arrays
     twists, rates = arrays.twists[: arrays.n_trims], arrays.rates[: arrays.n_trims]
     edges = edges_of(library)
@@ -145,7 +145,7 @@ def library_of_trims(
 
 
 def _least(rates: Array, speed: Array) -> float:
-    """Least cost per metre; 0 if nothing moves."""
+    """Least cost per metre; 0 if no trim moves."""
     moving = speed > 0.0
     return float((rates[moving] / speed[moving]).min()) if moving.any() else 0.0
 

@@ -137,7 +137,7 @@ def both_ends(
     arrays: SearchArrays | None = None,
     ends: tuple[float, ...] = (1.0, -1.0),
 ) -> list[Pass]:
-    """Searches from the start and, where nothing moves, from the goals."""
+    """Searches from the start and, without moving obstacles, from the goals."""
     return [
         pass_of(
             query,
@@ -219,5 +219,5 @@ def _edges_between(library: LatticeArrays, source: int, target: int) -> list[int
 
 
 def with_cost(word: Word, query: LatticeQuery) -> Word:
-    """The word with what it costs in the lattice library, prices of switches included."""
+    """The word with its cost in the lattice library, prices of switches included."""
     return with_price(query.library.priced, word)

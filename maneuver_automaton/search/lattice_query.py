@@ -33,7 +33,7 @@ LEAST_MARGIN = 1e-7  # [m]
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LatticeQuery:
-    """What every pass of the lattice shares, for a vehicle of any kind.
+    """Values that every pass of the lattice shares, for a vehicle of any kind.
 
     Poses are seen from the world's frame and have four components; altitudes are counted from that
     of the first goal, and are 0 in the plane. Trims are numbered as in the library.
@@ -42,8 +42,8 @@ class LatticeQuery:
     problem: Problem
     library: LatticeLibrary
     world: World  # all obstacles, whatever their heights, around the largest part
-    plane: World  # those in the way at every altitude, around the first part
-    around: Scene  # what motions are tested against
+    plane: World  # obstacles at every altitude, around the first part
+    around: Scene  # that motions are tested against
     start: Array  # (4,)
     start_trim: int  # NO_TRIM: any will do
     goals: Array  # (n, 4) those that can be reached at all
@@ -58,7 +58,7 @@ class LatticeQuery:
 
     @property
     def automaton(self) -> Automaton:
-        """The automaton, without what leads to no goal."""
+        """The automaton, without trims and maneuvers that lead to no goal."""
         return self.library.priced.automaton
 
     @property
@@ -109,7 +109,7 @@ class LatticeQuery:
 
     @property
     def padding(self) -> float:
-        """What the rest that pads a fixed time costs every word, its switch included."""
+        """Cost to every word of the rest that pads a fixed time, its switch included."""
         library, fixed = self.library, self.problem.horizon.time
         if fixed is None or library.rest is None:
             return 0.0
@@ -119,7 +119,7 @@ class LatticeQuery:
     def most_trims(self) -> int:
         """Trims a word may have before the rest that pads it; 0: no limit.
 
-        None where maneuvers link trims: words of too many are guesses for what has fewer.
+        No limit where maneuvers link trims: words of too many are guesses for words of fewer.
         """
         most = self.problem.horizon.max_trims
         if most is None or not self.library.at_will:
@@ -134,7 +134,7 @@ class LatticeQuery:
         return -math.inf if fixed is None else self.problem.start_time + fixed
 
     def scene(self, margin: float | None = None) -> Scene:
-        """What motions are tested against, with a proven clearance [m], by default the usual."""
+        """The scene for tests of motions, with a proven clearance [m], by default the usual."""
         return self.around if margin is None else self.around._replace(margin=float(margin))
 
     def word_of(self, steps: Iterable[tuple[int, int, float]], goal: int) -> Word:
@@ -145,7 +145,7 @@ class LatticeQuery:
 def lattice_query(
     problem: Problem, goals: Sequence[int], *, prepared: Prepared = RECENT
 ) -> LatticeQuery:
-    """What a search is asked that leads from the start of a problem to the goals of these numbers.
+    """The query of a search from the start of a problem to the goals of these numbers.
 
     A vehicle that switches at will in a plane begins and ends in any trim. For others several
     headings are asked for where any will do: best times then let the heading go. A fixed time is a
@@ -228,25 +228,25 @@ def _end_clearances(
 ) -> Array:
     """Clearance (1 + n,) beyond the margin at the start and every goal, over all parts [m].
 
-    Where something moves, at the start time, and after everything has come to rest.
+    Among moving obstacles, at the start time, and after everything has come to rest.
     """
     times = np.full(len(ends), max(problem.start_time, worlds.whole.last_event))
     times[0] = problem.start_time
     altitudes = ends[:, 3] + level
-    gaps = []
+    found = []
     for part in library.parts:
         offsets, there = part.trim_poses[trims], ends[:, :3]
         if offsets.any():
             there = (SE2(there) @ SE2(offsets)).pose
         for band, world in zip(worlds.bands, worlds.between, strict=True):
             aside = clearances(replace(world, body=body_of(part.shapes)), there, times=times)
-            gaps.append(np.maximum(aside, band.gap(altitudes, problem.body_height)))
-    least: Array = np.min(gaps, axis=0)
+            found.append(np.maximum(aside, band.gap(altitudes, problem.body_height)))
+    least: Array = np.min(found, axis=0)
     return least - problem.margin
 
 
 def _margin(library: LatticeLibrary, world: World, clear: Array) -> float:
-    """Proven clearance: a share of the body, at most half of what start and goals have."""
+    """Proven clearance: a share of the body, at most half of that at start and goals."""
     usual = MARGIN * (_half_width(library) or _typical(world))
     return float(max(LEAST_MARGIN, min([usual, *(0.5 * clear[clear > 0.0]).tolist()])))
 

@@ -17,13 +17,13 @@ HEADINGS = 72
 FINE_HEADINGS = 250
 WEIGHT = 2.0
 TRIES = 6  # candidates of one connection that are tried
-PATIENCE = 1.5  # a connection may cost so much more than the estimate ...
+CONNECTION_FACTOR = 1.5  # a connection may cost so many times the estimate ...
 SLACK = 2.0  # ... and so many length scales, and a full turn, and the prices of its joints
-MOST_JOINTS = 4  # of a connection of three trims, those with what is before and after it included
-INTERVAL = 0.25  # of a length scale's cost between two connections that are tried, times the rest
+MOST_JOINTS = 4  # of a connection of three trims, those with the trims before and after it included
+INTERVAL = 0.25  # [cost of a length scale] to go for each expansion between connections
 RISE = 0.25  # [length scales] of altitude that make another cell
 BACK_OFF = 0.01  # [half widths of the body] kept before contact
-SHORTEST_CONTACT = 0.03  # [half widths] of an edge that ends there
+SHORTEST_TRUNCATED = 0.03  # [half widths] of an edge that ends there
 SAMPLED_HEADINGS = 16  # roots at a goal whose heading is free
 ROUNDING = 1e-12  # relative, by which a coast may fall short of the least one
 MOST_SIDES, MOST_LEVELS, MOST_TICKS = 1 << 15, 1 << 8, 1 << 11  # cells that have numbers of theirs
@@ -38,7 +38,7 @@ class Resolution:
     scale: float = 1.0  # of the cells
     durations: float = 1.0  # of the edges
     weight: float = WEIGHT
-    truncated: bool = False  # keep what was driven before a contact
+    truncated: bool = False  # keep the part of an edge before a contact
     fine: float = 0.4  # cells of such edges, in cells of this resolution
     margin: float = 1.0  # of the proven clearance
     guided: bool = False  # by the table of the cost to go
@@ -46,7 +46,7 @@ class Resolution:
     layered: bool = False  # whether cells know the gear and the trim that prices ask for
     most: int = 2**62  # expansions
     backwards: bool = False  # from the goal
-    ends_early: bool = False  # when the most promising node is no better than what is known
+    ends_early: bool = False  # when the most promising node is not below the upper bound
 
 
 class Task(NamedTuple):
@@ -71,49 +71,44 @@ class Task(NamedTuple):
     rise: float  # [m] of altitude that makes another cell
     tick: float  # [s] of the clock that makes another cell, 0 where it makes none
     radix: tuple[int, int, int, int]  # cells along a side, headings, levels, ticks
-    weight: float
-    per_metre: float
-    per_climb: float
-    per_shot: float  # cost to go for each expansion between two connections that are tried
-    least_patience: float  # expansions
-    most_patience: float
-    patience: float
-    slack: float
-    tries: int
-    stop_at_first: bool
-    ends_early: bool
-    contact: bool
+    weight: float  # of the estimate in the open list
+    per_metre: float  # least cost per metre
+    per_climb: float  # least cost per metre of altitude
+    per_interval: float  # cost to go for each expansion between two analytic expansions
+    least_interval: float  # expansions between two of them, at least ...
+    most_interval: float  # ... and at most
+    connection_factor: float  # a connection may cost so many times the estimate ...
+    connection_slack: float  # ... and so much more
+    tries: int  # candidates of one connection that are proven, at most
+    stop_at_first: bool  # connection
+    ends_early: bool  # when the most promising node is not below the upper bound
+    truncated: bool  # whether the part of an edge before a contact is kept
     back_off: float  # [m]
-    shortest_contact: float  # [m]
-    clock: float
-    most_time: float
-    stay_until: float
-    most_trims: int
-    least_coast: float
+    shortest_truncated: float  # [m]
+    clock: float  # [s] time of the world at the start
+    most_time: float  # [s]
+    stay_until: float  # [s] time of the world until which the goal is kept
+    most_trims: int  # 0: no limit
+    least_coast: float  # [s]
     checks_words: bool  # whether connections have limits of single words to keep
-    by_gear: bool
-    by_trim: bool
-    by_count: bool
+    by_gear: bool  # whether cells know the gear, ...
+    by_trim: bool  # the trim, ...
+    by_count: bool  # and the number of trims
 
 
 def task_of(query: LatticeQuery, resolution: Resolution, *, sign: float = 1.0) -> Task:
     """Limits and sizes of a search, as the kernels see them."""
     library, settings = query.library, query.settings
-    arrays, numbered = library.arrays, library.arrays.library
+    numbered = library.arrays.library
     frame = query.goals[0]
     cell = resolution.scale * (settings.cell or library.cell)
     headings = settings.headings or HEADINGS
     size = query.half_width or library.radius * 0.1
     sharp = INTERVAL * library.radius * library.per_metre
     tick = _tick(query, resolution)
-    longest = bool(np.isfinite(numbered.longest[: numbered.n_trims]).any())
-    by_gear = bool(resolution.layered and numbered.direction_change > 0.0)
-    by_trim = len(arrays.trims_of) > len(numbered.cost) and bool(
-        query.least_coast > 0.0 or longest or (resolution.layered and numbered.switch > 0.0)
-    )
-    by_count = query.most_trims > 0
-    layers = len(numbered.cost) * (3 if by_gear else 1) * (MOST_COUNTS if by_count else 1)
-    layers *= numbered.n_trims + 1 if by_trim else 1
+    moving = numbered.twists[: numbered.n_trims].any()
+    longest = _limits_coasts(query)
+    by_gear, by_trim, by_count, layers = _layers(query, resolution)
     start, goals = _ends(query)
     aims, aim_trims, aim_free = goals if sign > 0.0 else start
     roots, root_trims = start[:2] if sign > 0.0 else goal_roots(query)
@@ -142,17 +137,17 @@ def task_of(query: LatticeQuery, resolution: Resolution, *, sign: float = 1.0) -
         per_climb=float(library.per_climb),
         # The path to the goal says how long to wait, unless no trim moves: then nothing is solved
         # for, and the node that ends at the goal must not be missed.
-        per_shot=(float(sharp) or 1.0) if numbered.twists[: numbered.n_trims].any() else math.inf,
-        least_patience=query.interval[0],
-        most_patience=query.interval[1],
-        patience=PATIENCE,
-        slack=_slack(library),
+        per_interval=(float(sharp) or 1.0) if moving else math.inf,
+        least_interval=query.interval[0],
+        most_interval=query.interval[1],
+        connection_factor=CONNECTION_FACTOR,
+        connection_slack=_slack(library),
         tries=TRIES,
         stop_at_first=bool(resolution.stop),
         ends_early=bool(resolution.ends_early),
-        contact=resolution.truncated,
+        truncated=resolution.truncated,
         back_off=float(max(BACK_OFF * size, 2.0 * query.margin)),
-        shortest_contact=float(SHORTEST_CONTACT * size),
+        shortest_truncated=float(SHORTEST_TRUNCATED * size),
         clock=float(query.start_time),
         most_time=float(query.most_time),
         stay_until=float(query.stay_until),
@@ -163,6 +158,27 @@ def task_of(query: LatticeQuery, resolution: Resolution, *, sign: float = 1.0) -
         by_trim=by_trim,
         by_count=by_count,
     )
+
+
+def _limits_coasts(query: LatticeQuery) -> bool:
+    """Whether a trim has a longest time."""
+    numbered = query.library.arrays.library
+    return bool(np.isfinite(numbered.longest[: numbered.n_trims]).any())
+
+
+def _layers(query: LatticeQuery, resolution: Resolution) -> tuple[bool, bool, bool, int]:
+    """Whether cells know the gear, the trim and the count of trims, and how many layers that is."""
+    arrays = query.library.arrays
+    numbered = arrays.library
+    by_gear = bool(resolution.layered and numbered.direction_change > 0.0)
+    by_trim = len(arrays.trims_of) > len(numbered.cost) and bool(
+        query.least_coast > 0.0
+        or _limits_coasts(query)
+        or (resolution.layered and numbered.switch > 0.0)
+    )
+    by_count = query.most_trims > 0
+    layers = len(numbered.cost) * (3 if by_gear else 1) * (MOST_COUNTS if by_count else 1)
+    return by_gear, by_trim, by_count, layers * (numbered.n_trims + 1 if by_trim else 1)
 
 
 def goal_roots(query: LatticeQuery) -> tuple[Array, IntArray]:
@@ -200,7 +216,7 @@ def _lag(library: LatticeLibrary, aim_trims: IntArray) -> Array:
 
 
 def _slack(library: LatticeLibrary) -> float:
-    """What a connection may cost beyond a multiple of the estimate, which knows no prices.
+    """Cost that a connection may have beyond a multiple of the estimate, which knows no prices.
 
     Two length scales and a full turn, and the switches and changes of direction of three trims and
     of the joints at both their ends.

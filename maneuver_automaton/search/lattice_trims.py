@@ -1,4 +1,4 @@
-"""Which trims and words a search of the lattice uses, and what they cost."""
+"""Trims and words that a search of the lattice uses, with their costs."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ MOST_INTERVAL = 400.0  # expansions between two connections that are tried
 
 
 class PricedTrims(NamedTuple):
-    """Trims with their prices and words, and what follows from how they are switched."""
+    """Trims with their prices and words, and how they are switched."""
 
     library: Library
     wide: bool  # whether the vehicle turns by driving circles only, however wide
     per_turn: float | None  # cost of the cheapest full turn; None: it takes length scales
     rest: int | None  # index in the automaton of the cheapest rest
-    rest_rate: float  # what was taken off all rates, since rest pads a fixed time
+    rest_rate: float  # taken off all rates, since rest pads a fixed time
     interval: tuple[float, float]  # least expansions, for each goal, and most, between connections
     at_will: bool  # whether plans begin and end in any trim
 
@@ -47,7 +47,7 @@ def trims_at_will(
 ) -> PricedTrims:
     """The most useful trims in the plane of a vehicle that switches at will between all.
 
-    `waits`: rest is a trim like any other, since something moves.
+    `waits`: rest is a trim like any other, since obstacles move.
     """
     known = moving_trims(automaton, cost)
     pads = fixed_time and known.rest is not None
@@ -157,7 +157,7 @@ def _words(moving: IntArray, twists: Array) -> IntArray:
 def _most_useful(twists: Array, rates: Array) -> IntArray:
     """All trims of a small library; of a large one straight, sharp and middling turns, and spins.
 
-    For each kind the cheapest for the way or the turn it makes, and the fastest.
+    For each kind the cheapest for the path or the turn it makes, and the fastest.
     """
     n = len(twists)
     if n <= MOST_TRIMS:

@@ -1,4 +1,4 @@
-"""Where a search of the lattice looks: within the bounds, or some way around everything."""
+"""The window of a search of the lattice: the bounds, or a box around everything."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from maneuver_automaton.problem import Bounds
 def window_of(
     bounds: Bounds, world: World, poses: Array, *, radius: float
 ) -> tuple[Array, Array, bool]:
-    """Where to search: the bounds, and where there are none, some way around everything.
+    """The window to search: the bounds, and where there are none, a box around everything.
 
     A box (4,) in the world's frame, a window as in `_kernels_motion.inside_window`, and whether
     the window's rim is a wall on every side. `poses` (n, 3 or more) lie inside.

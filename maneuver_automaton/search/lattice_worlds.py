@@ -13,7 +13,7 @@ from maneuver_automaton.collision.heights import Layer
 from maneuver_automaton.collision.layers import LayerArrays, always, bands_of, layer_arrays
 from maneuver_automaton.collision.world import World, own_frame, world_of
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.maneuver_motion import Part
+from maneuver_automaton.search.part_motion import Part
 from maneuver_automaton.search.prepared import RECENT, Prepared
 
 _Shapes = tuple[Shape, ...]
@@ -24,12 +24,12 @@ class Worlds:
     """A map around the largest part of a vehicle, in one frame."""
 
     whole: World  # all obstacles, whatever their heights
-    plane: World  # those in the way at every altitude within the bounds, around the first part
+    plane: World  # obstacles at every altitude within the bounds, around the first part
     bands: tuple[Layer, ...]  # obstacles between neighbouring heights, in the problem's altitudes
     between: tuple[World, ...]  # the worlds of these
     zones: tuple[World, ...]  # every zone as if it were an obstacle
     outer: World  # all obstacles and all zones, so that paths lead round them
-    flat: LayerArrays | None  # what the kernels see of them where heights do not matter
+    flat: LayerArrays | None  # they as arrays, where heights do not matter
 
 
 def world_around(problem: Problem) -> World:

@@ -1,4 +1,4 @@
-"""The shortest way of the reference point round what stands still: a bound on every plan."""
+"""Length of the shortest path of the pose among static obstacles: a lower bound of every plan."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from maneuver_automaton.search import _kernels_plane
 from maneuver_automaton.search.distance_grid import distance_grid
 from maneuver_automaton.search.lattice_query import LatticeQuery
 
-FACTOR = 1.0823922002923938  # an octile way is at most so much longer than the true one
+FACTOR = 1.0823922002923938  # by which an octile path may be longer than the shortest one
 
 
 def plane_bound(query: LatticeQuery) -> float:
-    """No way in the plane from the start to a goal's tolerance is shorter [m]; 0 if unknown.
+    """Lower bound [m] of the path in the plane from the start to a goal's tolerance; 0 if unknown.
 
-    The shortest way round blocked cells leads over their corners, and among the corners of cells
-    an octile way is at most 1.0824 times as long; start and goal are at most half a diagonal from
+    The shortest path round blocked cells leads over their corners, and among the corners of cells
+    an octile path is at most 1.0824 times as long; start and goal are at most half a diagonal from
     a corner. Cells are blocked only where the pose cannot be at all.
 
     Source: Bailey, Tovey, Uras, Koenig, Nash (2015), *Path planning on grids: the effect of vertex
@@ -24,14 +24,14 @@ def plane_bound(query: LatticeQuery) -> float:
     grid = distance_grid(query.world, query.box, query.goals, query.start)
     if not grid.columns:
         return 0.0
-    way: float = _kernels_plane.corner_way(
+    length: float = _kernels_plane.corner_path(
         grid,
         query.world.arrays.field,
         np.ascontiguousarray(query.goals[:, :2]),
         float(query.start[0]),
         float(query.start[1]),
     )
-    if not np.isfinite(way):
+    if not np.isfinite(length):
         return 0.0
     beside = max(query.problem.goals[k].tolerance_m for k in query.goal_index)
-    return max(0.0, way / FACTOR - grid.cell * float(np.sqrt(2.0)) - beside)
+    return max(0.0, length / FACTOR - grid.cell * float(np.sqrt(2.0)) - beside)

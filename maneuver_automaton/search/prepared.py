@@ -1,4 +1,4 @@
-"""What searches share: made once, and kept by whoever holds it."""
+"""Values that searches share: made once, and kept by whoever holds them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _P = ParamSpec("_P")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prepared:
-    """The values of each kind that were made last, by what they were made from.
+    """The values of each kind that were made last, by the arguments of their making.
 
     Each planner holds one of its own, so that planners used in turn do not evict each other. What
     it lacks is taken from `RECENT`, which serves whoever holds none.
@@ -32,7 +32,7 @@ class Prepared:
     _makers: dict[Callable[..., Any], Callable[..., Any]] = field(default_factory=dict, init=False)
 
     def once(self, make: Callable[_P, _T], *args: _P.args, **more: _P.kwargs) -> _T:
-        """What `make` returns for these arguments, which are values: made at the first call."""
+        """The result of `make` for these arguments, which are values: made at the first call."""
         if make not in self._makers:
             maker = make if self is RECENT else functools.partial(RECENT.once, make)
             self._makers[make] = functools.lru_cache(MOST)(maker)

@@ -1,7 +1,7 @@
 """Load or compile the search kernels before the clock runs: a time limit is for searching.
 
-The first time after installation two processes share the compiling: one compiles what scans
-words, the other what refines and prices them, into the cache that both read.
+The first time after installation two processes share the compiling: one compiles the kernels that
+scan words, the other those that refine and price them, into the cache that both read.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def load_word_kernels(max_trims: int) -> None:
         try:
             helper.wait(PATIENCE)
         except subprocess.TimeoutExpired:
-            helper.kill()  # what it did not compile is compiled here
+            helper.kill()  # the kernels that it did not compile are compiled here
     found = search_words(problem, problem.goals[0])
     certificate(problem, problem.goals[0], found.solutions[0])
 
@@ -65,7 +65,7 @@ def load_times_kernels() -> None:
 
 
 def smallest_lattice_query() -> LatticeQuery:
-    """A wall and a map beside the way: what compiles every kernel of the lattice."""
+    """A query with a wall and a map, which compiles every kernel of the lattice."""
     from maneuver_automaton.collision import Box, Obstacle, OccupancyMap
     from maneuver_automaton.search._kernels_distance import distances
     from maneuver_automaton.search.distance_grid import distance_grid
@@ -82,7 +82,7 @@ def smallest_lattice_query() -> LatticeQuery:
 
 
 def compile_the_rest() -> None:
-    """What the second process does: compile what refines words and prices them."""
+    """Work of the second process: compile the kernels that refine words and price them."""
     problem = _smallest_problem()
     compile_polishing(problem)
     straight = Word(trims=np.array([0]), durations=np.array([1.0]), cost=1.0)
@@ -90,7 +90,7 @@ def compile_the_rest() -> None:
 
 
 def _second_process() -> subprocess.Popen[bytes] | None:
-    """A process that compiles its share; None if nothing is to be compiled, or cannot be kept."""
+    """A process that compiles its share; None without kernels to compile, or without a cache."""
     folder = kernel_folder()
     if folder is None or any(folder.rglob("*scan_words*")) or (os.cpu_count() or 1) < 2:
         return None

@@ -1,4 +1,4 @@
-"""What the motions of a search are tested against: obstacles, zones, and the window."""
+"""The scene that motions of a search are tested against: obstacles, zones, and the window."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Scene(NamedTuple):
     margin: float  # [m] ... and the clearance beyond it that a proof needs
     far: float  # [m] clearance where no obstacle is near
     window: Array  # (9,) as in `_kernels_motion.inside_window`
-    edge_window: Array  # (9,) narrower by what the courses of maneuvers may be off
+    edge_window: Array  # (9,) narrower by the deviation of the courses of maneuvers
     lowest: float  # [m] altitudes within the bounds
     highest: float
     zone_trims: NDArray[np.bool_]  # (Z, m) trims that a zone admits

@@ -1,7 +1,7 @@
 """From a word with more trims than are admitted to the best short one that resembles it.
 
-Insertion under a limit fills the word with what pays first, and stops. It is better to let it grow,
-and to take out again what is missed least.
+Insertion under a limit fills the word with the trims that pay first, and stops. It is better to let
+it grow, and to take out again the trims that are missed least.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from maneuver_automaton.words import TimesStatus, solve_switching_times
 
 AT_ONCE = 4  # of the shortest trims, how many are tried to be left out
 LAST = 2  # trims too many, from when on everything is tried
-JOINED = 5  # trims near the mean of two that may stand for both
+NEAR_MEAN = 5  # trims near the mean of two that may stand for both
 NEAR = 4  # trims of similar twist that one trim is exchanged for
 SWEEPS = 3  # over all trims of a word, at most
-GAIN = 1e-9  # relative, what an exchange must gain
+GAIN = 1e-9  # relative, by which an exchange must be cheaper
 
 
 def shortened(library: LibraryArrays, word: TimedWord, most: int) -> TimedWord | None:
@@ -41,7 +41,7 @@ def shortened(library: LibraryArrays, word: TimedWord, most: int) -> TimedWord |
 
 
 def _some_less(library: LibraryArrays, now: TimedWord, most: int) -> TimedWord | None:
-    """The word without a third of what is too much, the shortest trims; None near the end."""
+    """The word without a third of the trims too many, the shortest; None near the end."""
     many = (len(now.trims) - most) // 3
     if len(now.trims) <= most + LAST or many < 2:
         return None
@@ -57,7 +57,7 @@ def _one_less(library: LibraryArrays, now: TimedWord, most: int) -> TimedWord | 
     if len(now.trims) <= most + LAST or all(one is None for one in trials):
         trials += [_without(library, now, k) for k in order[AT_ONCE:]]
         for k in range(len(now.trims) - 1):
-            trials += list(_joined(library, now, k))
+            trials += list(_with_mean_trim(library, now, k))
     found = [one for one in trials if one is not None and len(one.trims) < len(now.trims)]
     return min(found, key=lambda one: float(f"{one.cost:.9g}"), default=None)
 
@@ -67,14 +67,14 @@ def _without(library: LibraryArrays, now: TimedWord, k: int) -> TimedWord | None
     return _solved(library, np.delete(now.numbers, k), times)
 
 
-def _joined(library: LibraryArrays, now: TimedWord, k: int) -> Iterator[TimedWord | None]:
+def _with_mean_trim(library: LibraryArrays, now: TimedWord, k: int) -> Iterator[TimedWord | None]:
     """Trims `k` and `k + 1` as one of the library near their mean."""
     pair = slice(k, k + 2)
     lasting = now.durations[pair].sum()
     mean = now.durations[pair] @ library.twists[now.numbers[pair]] / lasting
     word, times = np.delete(now.numbers, k), np.delete(now.durations, k)
     times[k] = lasting
-    for other in _similar(library, mean)[:JOINED]:
+    for other in _similar(library, mean)[:NEAR_MEAN]:
         word[k] = other
         yield _solved(library, word.copy(), times)
 
@@ -87,12 +87,12 @@ def _similar(library: LibraryArrays, twist: Array) -> IntArray:
 
 
 def _by_size(values: Array) -> IntArray:
-    """Indices by rising value; what differs by rounding only keeps its order."""
+    """Indices by rising value; values that differ by rounding only keep their order."""
     return np.argsort(values.round(9), kind="stable")
 
 
 def _spread(times: Array, left: float) -> Array:
-    """Times that take over what a trim left out has lasted."""
+    """Times that take over the duration of a trim left out."""
     return np.asarray(times + left / max(times.size, 1))
 
 

@@ -1,4 +1,4 @@
-"""Drive a way that is free of what stands still, and let pass what moves."""
+"""Rests along a path that is free of static obstacles, so that moving obstacles pass."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ MOST_TICKS = 300  # of the clock, until nothing moves any more
 SHORTEST_TICK = 0.1  # [s]
 
 
-class Way(NamedTuple):
-    """Pieces of a way, as the kernel sees them."""
+class PathArrays(NamedTuple):
+    """Pieces of a path, as the kernel sees them."""
 
     trims: IntArray  # (n,)
     durations: Array  # (n,)
     poses: Array  # (n + 1, 3)
-    before: NDArray[np.int32]  # (n + 1, ticks, 2)
+    before: NDArray[np.int32]  # (n + 1, ticks, 2) joint and tick of the departure, or a mark
 
 
 def with_waits(query: LatticeQuery, word: Word) -> Word | None:
@@ -49,7 +49,7 @@ def with_waits(query: LatticeQuery, word: Word) -> Word | None:
     tick = max(SHORTEST_TICK, lasting / MOST_TICKS)
     ticks = math.ceil(lasting / tick) + 2
     steps = SE2.exp(durations[:, None] * twists[trims, :3]).pose
-    way = Way(
+    path = PathArrays(
         trims=trims,
         durations=durations,
         poses=np.ascontiguousarray(chained(query.start[:3], steps)),
@@ -59,13 +59,13 @@ def with_waits(query: LatticeQuery, word: Word) -> Word | None:
         library,
         query.scene(),
         (float(query.start_time), float(query.most_time), float(query.stay_until)),
-        way,
+        path,
         rest,
         tick,
     )
     if joint < 0:
         return None
-    parts = _driven(way, joint, at, rest, tick)
+    parts = _with_rests(path, joint, at, rest, tick)
     driven = [(SWITCH, int(query.library.trims[trim]), t) for trim, t in parts]
     return with_cost(query.word_of(driven, word.goal), query)
 
@@ -78,19 +78,21 @@ def _pieces(word: Word, query: LatticeQuery) -> tuple[IntArray, Array]:
     return np.repeat(numbers, counts), np.repeat(word.durations / counts, counts)
 
 
-def _driven(way: Way, joint: int, at: int, rest: int, tick: float) -> list[tuple[int, float]]:
-    """Trims and durations from the start to the end, read backwards from the last departure."""
-    end = len(way.trims)
+def _with_rests(
+    path: PathArrays, joint: int, at: int, rest: int, tick: float
+) -> list[tuple[int, float]]:
+    """Trims and durations of the path with its rests, read backwards from the last departure."""
+    end = len(path.trims)
     parts: list[tuple[int, float]] = []
     while True:
-        pieces = list(zip(way.trims[joint:end], way.durations[joint:end], strict=True))
+        pieces = list(zip(path.trims[joint:end], path.durations[joint:end], strict=True))
         parts = [(int(trim), float(t)) for trim, t in pieces] + parts
         waited = 0
-        while way.before[joint, at, 0] == kernels.WAITED:
+        while path.before[joint, at, 0] == kernels.WAITED:
             waited, at = waited + 1, at - 1
         if joint == 0 and at == 0:
             return [(rest, waited * tick), *parts] if waited else parts
-        before, left = (int(k) for k in way.before[joint, at])
-        spent = left * tick + float(way.durations[before:joint].sum())
+        before, left = (int(k) for k in path.before[joint, at])
+        spent = left * tick + float(path.durations[before:joint].sum())
         parts = [(rest, (at + waited) * tick - spent), *parts]
         end, joint, at = joint, before, left

@@ -20,7 +20,7 @@ from maneuver_automaton.search import lattice_pass
 from maneuver_automaton.search.lattice_pass import pass_of
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_task import Resolution, task_of
-from maneuver_automaton.search.maneuver_reversal import forward_word, reversed_query
+from maneuver_automaton.search.reversal import forward_word, reversed_query
 from tests.inertia import unicycle_automaton
 from tests.search.cases import compiled_only
 

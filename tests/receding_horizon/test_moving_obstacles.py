@@ -173,17 +173,17 @@ class TestHarm:
         wall = mover([0.0, 1.0], [(0.0, -3.0), (0.0, 3.0)], Box([20.0, 0.2]))
         loop = simulate(among(wall), step=0.5)
         assert loop.reached
-        assert deeds(loop)[0] is Deed.HARMFUL
+        assert deeds(loop)[0] is Deed.MITIGATED
         assert loop.steps[0].violations[0].guarantee is Guarantee.SAFETY
         assert "contact is predicted at 0.4" in loop.steps[0].violations[0].reason
         assert loop.steps[0].free_until == pytest.approx(0.45, abs=0.05)
         assert next(loop.collisions)[0] == 0
-        assert deeds(loop)[-1] is not Deed.HARMFUL
+        assert deeds(loop)[-1] is not Deed.MITIGATED
 
     def test_it_is_put_off_as_long_as_can_be(self):
         faster = mover([0.0, 9.0], [(-4.0, 0.0), (14.0, 0.0)], Box([0.2, 40.0]))
         loop = simulate(among(faster, goal=[-9.0, 0.0, 0.0]), step=0.5, steps=6)
-        assert set(deeds(loop)) == {Deed.HARMFUL}
+        assert set(deeds(loop)) == {Deed.MITIGATED}
         assert loop.poses[-1] == pytest.approx([3.0, 0.0, 0.0])
 
 

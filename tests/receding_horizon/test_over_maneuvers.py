@@ -255,7 +255,7 @@ def test_what_cannot_be_evaded_is_flagged_with_the_time_of_contact():
         search=SearchSettings(max_expansions=200),
     )
     _, step = ManeuverHorizon(problem, step=1.0, time_limit=30.0).step([0.0, 0.0, 0.0])
-    assert step.deed is Deed.HARMFUL
+    assert step.deed is Deed.MITIGATED
     assert [one.guarantee for one in step.violations] == [Guarantee.SAFETY]
     assert step.free_until == pytest.approx(0.925, abs=0.01)
 

@@ -29,14 +29,16 @@ ROOT = Path(__file__).parents[2]
 HALF, HEADINGS, CELL = 7, 12, 0.31
 ODD = np.array([[1.0, 0.0, 0.0], [1.0, 0.0, 1.13], [0.9, 0.0, -1.27], [-0.7, 0.1, 0.3]])
 RATES = np.array([1.0, 1.171, 1.313, 1.557])
-QUANTA = np.array([[0.37, 0.91, 0.0], [0.41, 0.83, 0.0], [0.43, 0.97, 0.0], [0.57, 1.13, 0.0]])
+EDGE_DURATIONS = np.array(
+    [[0.37, 0.91, 0.0], [0.41, 0.83, 0.0], [0.43, 0.97, 0.0], [0.57, 1.13, 0.0]]
+)
 SIX = np.array([[v, 0.0, v * w] for v in (1.0, -1.0) for w in (1.0, 0.0, -1.0)])
 
 
 @pytest.mark.parametrize("n", [1, 2, 4])
 def test_the_table_is_that_of_a_dictionary(n):
-    got = fill_table(ODD[:n], RATES[:n], QUANTA[:n], CELL, HALF, HEADINGS, False)
-    slow = cost_table(ODD[:n], RATES[:n], QUANTA[:n], CELL, HALF, HEADINGS)
+    got = fill_table(ODD[:n], RATES[:n], EDGE_DURATIONS[:n], CELL, HALF, HEADINGS, False)
+    slow = cost_table(ODD[:n], RATES[:n], EDGE_DURATIONS[:n], CELL, HALF, HEADINGS)
     assert np.array_equal(np.isinf(got), np.isinf(slow))
     known = np.isfinite(slow)
     assert known.sum() > 7
@@ -45,10 +47,10 @@ def test_the_table_is_that_of_a_dictionary(n):
 
 
 def test_mirrored_and_whole_agree():
-    quanta = np.tile([0.15, 0.31, 0.62], (6, 1))
+    edge_durations = np.tile([0.15, 0.31, 0.62], (6, 1))
     rates = np.full(6, 1.0)
     half = 16
-    shared = (SIX, rates, quanta, 0.15, half, 36)
+    shared = (SIX, rates, edge_durations, 0.15, half, 36)
     whole, mirrored = fill_table(*shared, False), fill_table(*shared, True)
     image = mirrored[(36 - np.arange(36)) % 36, ::-1]
     assert np.array_equal(mirrored, image)

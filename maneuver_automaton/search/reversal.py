@@ -1,8 +1,8 @@
 """The search from the goal: an automaton in reverse, and its words turned round.
 
 Run backwards in time a trim moves by the opposite twist and a maneuver leads from its target to its
-source, along the same poses. So what searches from the start also searches from the goal, and finds
-the same words from their other end.
+source, along the same poses. So the search from the start also serves from the goal, and finds the
+same words from their other end.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.search.lattice_library import Carried, library_of_trims
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_trims import priced_library, trims_of
-from maneuver_automaton.search.maneuver_motion import Part, posed_parts
+from maneuver_automaton.search.part_motion import Part, posed_parts
 from maneuver_automaton.search.scene import for_library
 from maneuver_automaton.words.library import library_of
 from maneuver_automaton.words.word import Word
@@ -64,7 +64,7 @@ def forward_word(word: Word) -> Word:
 def _reversed_library(
     automaton: Automaton, cost: StageCost, footprint: tuple[Shape, ...], carried: Carried
 ) -> LatticeLibrary:
-    """The library of an automaton in reverse, at the same prices, for a map where nothing moves."""
+    """The library of an automaton in reverse, at the same prices, for static obstacles."""
     priced = priced_library(automaton, cost)
     back = library_of(
         _reversed_automaton(automaton),

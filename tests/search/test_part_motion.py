@@ -8,7 +8,7 @@ import pytest
 from maneuver_automaton.collision import Box
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.primitives.driving import drive
-from maneuver_automaton.search.maneuver_motion import (
+from maneuver_automaton.search.part_motion import (
     carried_twists,
     course_of,
     parts_of,

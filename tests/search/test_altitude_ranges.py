@@ -20,8 +20,8 @@ from maneuver_automaton.groups import SE2xR
 from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.problem import Bounds, Goal, Problem
 from maneuver_automaton.refinement.maneuver_lattice import plan_of
+from maneuver_automaton.search.altitude_ranges import altitude_ranges
 from maneuver_automaton.search.lattice_query import lattice_query
-from maneuver_automaton.search.maneuver_heights import altitude_ranges
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.words._kernels_candidates import NO_TRIM
 from maneuver_automaton.words.library import library_of

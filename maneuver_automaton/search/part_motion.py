@@ -61,7 +61,7 @@ def parts_of(
     footprint: Sequence[Shape],
     carried: Sequence[Sequence[Shape]] = (),
 ) -> tuple[Part, ...]:
-    """The vehicle's own body, and what it carries where its model says.
+    """The vehicle's own body, and its other parts where its model says.
 
     Parameters
     ----------
@@ -194,13 +194,13 @@ def pieces_of(
     sizes = np.array([len(times) for _, times in courses])
     first = np.concatenate([[0], np.cumsum(sizes)[:-1]])
     between = _between(poses, times, first, sizes, ends, reach, timed=timed)
-    way = np.zeros(len(poses))
-    way[1:] = np.linalg.norm(_moves(poses[:-1], poses[1:]) * [1.0, 1.0, reach], axis=1)
-    way = np.cumsum(way)
+    length = np.zeros(len(poses))
+    length[1:] = np.linalg.norm(_moves(poses[:-1], poses[1:]) * [1.0, 1.0, reach], axis=1)
+    length = np.cumsum(length)
     begin, end = first, first + sizes - 1
     begins, finals, errors = [], [], []
     while begin.size:
-        off = _deviations(poses, times if timed else way, begin, end, reach, timed=timed)
+        off = _deviations(poses, times if timed else length, begin, end, reach, timed=timed)
         split = (off > close) & (end - begin > 1)
         kept = ~split
         begins.append(begin[kept])
@@ -262,7 +262,7 @@ def _between(
     """Bound (n,) [m] of the deviation between each sample and the next.
 
     A twist that changes linearly is off by an eighth of its change times the spacing; twice that is
-    taken of the greater change to either side. Without time only what changes the way itself
+    taken of the greater change to either side. Without time only a change of the path itself
     counts: the part of the change that is not along the twist, unless it turns back.
     """
     lasting = np.zeros(len(poses))
@@ -304,7 +304,7 @@ def _deviations(
     share = (progress[k] - progress[begin[span]]) / np.where(whole > 0.0, whole, 1.0)
     weights = np.array([1.0, 1.0, reach])
     off = _off(moves, share, twists, weights)
-    if not timed:  # the nearest place on the way of the twist
+    if not timed:  # the nearest place on the path of the twist
         square = ((twists * weights) ** 2).sum(axis=1)
         missing = _logs(_moves(SE2.exp(share[:, None] * twists).pose, moves))
         more = ((missing * weights * weights) * twists).sum(axis=1) / np.maximum(square, 1e-300)
@@ -337,5 +337,5 @@ def body_reach(body: Body) -> float:
 
 
 def bodies_of(parts: Sequence[Part]) -> tuple[Body, ...]:
-    """What the kernels know of each part."""
+    """The body of each part, for the kernels."""
     return tuple(body_of(part.shapes) for part in parts)

@@ -1,4 +1,4 @@
-"""Altitudes through which the pieces of maneuvers lead."""
+"""Ranges of altitude of the pieces of maneuvers."""
 
 from __future__ import annotations
 
