@@ -16,10 +16,11 @@ from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.planning.with_inertia import late_at_first
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.refinement.maneuver_lattice import maneuver_words, plan_of
-from maneuver_automaton.search import lattice_pass
+from maneuver_automaton.search import lattice_pass, lattice_schedules
 from maneuver_automaton.search.lattice_pass import pass_of
 from maneuver_automaton.search.lattice_query import lattice_query
-from maneuver_automaton.search.lattice_task import Resolution, task_of
+from maneuver_automaton.search.lattice_schedules import LINKED
+from maneuver_automaton.search.lattice_task import WEIGHT, Resolution, task_of
 from maneuver_automaton.search.reversal import forward_word, reversed_query
 from tests.inertia import unicycle_automaton
 from tests.search.cases import compiled_only
@@ -123,6 +124,7 @@ def test_no_trim_lasts_less_than_it_must_among_obstacles():
 
 
 def test_settings_of_the_lattice_are_read(monkeypatch):
+    """The weight is that of the first pass; those that begin after it have their own."""
     settings = SearchSettings(cell=0.31, headings=36, weight=1.3)
     query = lattice_query(posed(search=settings), (0,))
     first = task_of(query, Resolution())
@@ -132,8 +134,10 @@ def test_settings_of_the_lattice_are_read(monkeypatch):
     monkeypatch.setattr(
         lattice_pass, "pass_of", lambda *a, **k: weights.append(a[1].weight) or pass_of(*a, **k)
     )
+    stages = ((0, (Resolution(),)), (0, (Resolution(scale=0.5),)))
+    monkeypatch.setattr(lattice_schedules, "LINKED", LINKED._replace(stages=stages, first_chunk=4))
     next(maneuver_words(query, max_expansions=200))
-    assert weights[0] == 1.3
+    assert weights == [1.3, WEIGHT]
 
 
 def test_a_search_from_the_goal_finds_plans_from_the_start():
