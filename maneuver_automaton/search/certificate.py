@@ -18,9 +18,6 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import SE2, group_of
 from maneuver_automaton.groups.chain import chained
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.library_arrays import library_arrays
-from maneuver_automaton.search.setup import search_setup
-from maneuver_automaton.search.time_limit import within_time
 from maneuver_automaton.words.conjugation import conjugated, conjugated_turn
 from maneuver_automaton.words.library import FULL_TURN, four_columns
 from maneuver_automaton.words.transitions import SWITCH
@@ -49,11 +46,9 @@ def certificate(problem: Problem, goal: Goal, word: Word) -> float | None:
     ...  for k, t in ((0, 2.0), (1, 1.0))]
     [-1.0, 0.0]
     """
-    if word.trims.size == 0:
+    if not (word.durations > 0.0).any():
         return None
-    find = _with_maneuvers if word.has_maneuvers else _without_maneuvers
-    priced = find(problem, goal, word)
-    return None if priced is None else smallest_reduced_cost(priced)
+    return smallest_reduced_cost(_priced(problem, goal, word))
 
 
 class Stretch(NamedTuple):
@@ -152,56 +147,28 @@ def smallest_reduced_cost(word: PricedWord) -> float:
     return best
 
 
-def _without_maneuvers(problem: Problem, goal: Goal, word: Word) -> PricedWord | None:
-    """A word of trims alone: every trim of the library can be inserted anywhere."""
-    setup = search_setup(problem, goal)
-    library = library_arrays(problem, setup)
-    if _time_binds(problem, word):  # then time has a price
-        library = within_time(library, problem.horizon.max_time or 0.0)
-    used = (word.durations > 0.0) & (library.number_of[word.trims] >= 0)
-    if not used.any():
-        return None
-    numbers, times = library.number_of[word.trims[used]], word.durations[used]
-    priced = slice(0, library.n_priced)
-    everywhere = Stretch(
-        library.twists[priced],
-        library.rates[priced],
-        library.rows[:, priced],
-        0,
-        numbers.size,
-    )
-    if library.free_heading:
-        numbers = np.append(numbers, len(library.rates) - 1)
-        turned = float(library.twists[numbers[:-1], 2] @ times)
-        times = np.append(times, np.remainder(setup.goal[2] - turned, FULL_TURN))
-    return PricedWord(
-        twists=library.twists[numbers],
-        rates=library.rates[numbers],
-        rows=library.rows[:, numbers],
-        times=times,
-        stretches=(everywhere,),
-        scale=library.scale,
-    )
-
-
-def _with_maneuvers(problem: Problem, goal: Goal, word: Word) -> PricedWord | None:
-    """A word with maneuvers: between two of them the trims of one class can be inserted."""
-    if not (word.durations > 0.0).any():
-        return None
+def _priced(problem: Problem, goal: Goal, word: Word) -> PricedWord:
+    """The word, and in each of its stretches the trims of one class; unused time in the first."""
     automaton = problem.automaton
-    own, all_rates = automaton.body_velocities, problem.rates
+    own, all_rates = automaton.body_velocities, _rates(problem)
     steps = displacements_of(automaton, word.transitions)
     before = chained(np.zeros(own.shape[1]), steps)
     twists, product = conjugated(own[word.trims], steps)
     times, rates = np.array(word.durations), all_rates[word.trims]
-    fixed = problem.horizon.time is not None or _time_binds(problem, word)
-    stretches = []
+    binds = _time_binds(problem, word)
+    rises = bool(own[:, 3:].any() or twists[:, 3:].any())
+    fixed = problem.horizon.time is not None or binds
+    stretches = list[Stretch]()
     for first, last in _stretches(word):
         chosen = np.flatnonzero(automaton.trim_classes == automaton.trim_classes[word.trims[first]])
         seen = own[chosen] @ group_of(own.shape[1])(before[first]).adjoint().T
-        rows = _rows(seen, fixed=fixed)
-        stretches.append(Stretch(four_columns(seen), all_rates[chosen], rows, first, last))
-    rows = _rows(twists, fixed=fixed)
+        prices = all_rates[chosen]
+        if binds and not stretches:  # time that is left over moves nothing and costs nothing
+            seen = np.vstack([seen, np.zeros(own.shape[1])])
+            prices = np.append(prices, 0.0)
+        rows = _rows(seen, rises=rises, fixed=fixed)
+        stretches.append(Stretch(four_columns(seen), prices, rows, first, last))
+    rows = _rows(twists, rises=rises, fixed=fixed)
     if goal.free_heading:  # a full turn in place at the end, which costs nothing
         twists = np.vstack([twists, conjugated_turn(product)])
         rows = np.hstack([rows, np.zeros((len(rows), 1))])
@@ -216,6 +183,14 @@ def _with_maneuvers(problem: Problem, goal: Goal, word: Word) -> PricedWord | No
     )
 
 
+def _rates(problem: Problem) -> Array:
+    """Cost per second of every trim (m,), less that of the rest that fills a fixed time."""
+    rest = problem.automaton.rest
+    if problem.horizon.time is None or rest is None:
+        return problem.rates
+    return np.asarray(problem.rates - problem.rates[rest])
+
+
 def _time_binds(problem: Problem, word: Word) -> bool:
     """Whether a word lasts as long as it may at most."""
     most = problem.horizon.max_time
@@ -228,9 +203,9 @@ def _stretches(word: Word) -> Iterator[tuple[int, int]]:
     yield from pairwise(cuts)
 
 
-def _rows(twists: Array, *, fixed: bool) -> Array:
-    """Linear conditions (m, n) of trims: altitude, and the time where it is fixed."""
-    rows = [twists[:, 3]] if twists.shape[1] > 3 else []
+def _rows(twists: Array, *, rises: bool, fixed: bool) -> Array:
+    """Linear conditions (m, n) of trims: altitude where any `rises`, and a fixed time."""
+    rows = [twists[:, 3]] if rises else []
     if fixed:
         rows.append(np.ones(len(twists)))
     return np.array(rows).reshape(len(rows), len(twists))
