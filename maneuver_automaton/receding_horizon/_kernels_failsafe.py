@@ -26,8 +26,8 @@ import numpy as np
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.collision._kernels_advancement import free_time
 from maneuver_automaton.groups._kernels import coast, compose
+from maneuver_automaton.search._kernels_cells import enter
 from maneuver_automaton.search._kernels_distance import pop, push
-from maneuver_automaton.search._kernels_lattice import first_slot
 from maneuver_automaton.search._kernels_motion import inside_window
 
 FULL_TURN = 2.0 * math.pi
@@ -36,7 +36,6 @@ PARENT, TRIM = range(2)
 # Rows of `state`: nodes in use, nodes in the open list, 1 once a node is safe for long enough, the
 # node that is safe for longest, nodes expanded.
 N_NODES, HEAP, FOUND, BEST, EXPANSIONS = range(5)
-EMPTY = -1
 
 
 class FailSafeTask(NamedTuple):
@@ -80,14 +79,7 @@ def is_new(task, cells, x, y, heading, clock):
     k = math.floor((turn - math.floor(turn)) * task.headings + 0.5) % task.headings
     tick = math.floor((clock - task.clock) / task.tick + 0.5) & 0xFFFF
     key = ((tick * 512 + k) * 65536 + j) * 65536 + i
-    mask = cells.shape[0] - 1
-    slot = first_slot(key, mask)
-    while cells[slot] != EMPTY:
-        if cells[slot] == key:
-            return False
-        slot = (slot + 1) & mask
-    cells[slot] = key
-    return True
+    return enter(cells, key)
 
 
 @bare_inner_kernel

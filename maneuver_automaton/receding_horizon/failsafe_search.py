@@ -14,6 +14,7 @@ from maneuver_automaton.planning.tracking import stands_free
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon import _kernels_failsafe as kernels
 from maneuver_automaton.receding_horizon.shifting import merged
+from maneuver_automaton.search._kernels_cells import EMPTY
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 
 CELL = 0.25  # of the search, in turning radii
@@ -123,7 +124,7 @@ def _arrays(n: int) -> kernels.FailSafeArrays:
     return kernels.FailSafeArrays(
         nodes=np.empty((n, 6)),
         links=np.empty((n, 2), dtype=np.int64),
-        cells=np.full(4 * n, kernels.EMPTY),
+        cells=np.full(4 * n, EMPTY),
         heap_key=np.empty(n),
         heap_node=np.empty(n, dtype=np.int64),
         state=np.zeros(5, dtype=np.int64),

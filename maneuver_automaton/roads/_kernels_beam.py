@@ -33,13 +33,13 @@ from maneuver_automaton.roads._kernels_route import (
     on_route,
 )
 from maneuver_automaton.roads._kernels_stops import first_free_stop
+from maneuver_automaton.search._kernels_cells import EMPTY, enter
 from maneuver_automaton.search._kernels_distance import pop, push
 
 PARENT, MANEUVER, TRIM, NEAR = range(4)  # columns of `links`
 N_NODES, HEAP, KEPT, CHECKS = range(4)  # places of `state`
 STOPPING, UNSAFE = range(2)  # rows of `reached`
 COST, NODE, TICK = range(3)  # columns of `reached`
-EMPTY = -1
 STRIP = 1.0  # [m] width of a strip along the route
 TRIES = 16  # nodes of a level from which a fail-safe stop is looked for
 
@@ -74,8 +74,7 @@ class BeamArrays(NamedTuple):
     kept: np.ndarray  # (levels, W) nodes
     counts: np.ndarray  # (levels,) how many of them
     # Of the level at hand. Strips keep nodes on either side of an obstacle in the beam, where the
-    # cheaper side alone would fill it. Cells are a hash table with open addressing, its size a
-    # power of two, so that a mask finds the slot.
+    # cheaper side alone would fill it.
     strips: np.ndarray  # (n,) how many in each strip, the first and last without an end
     cells: np.ndarray  # (4 W,) keys of cells that are taken, EMPTY for none
     # A binary heap of the level at hand: cost plus weighted cost-to-go, and the node.
@@ -107,15 +106,7 @@ def is_new(task, cells, x, y, heading, speed):
     k = math.floor((heading - task.heading) / task.turn_cell + 0.5) & 0xFF
     v = int(speed / task.speed_cell) & 0xFF
     key = (((v << 8 | k) << 12 | j) << 12) | i
-    mask = cells.shape[0] - 1
-    mixed = (key ^ (key >> 13) ^ (key >> 27)) & 0x7FFFFFFF
-    slot = ((mixed * 0x9E3779B1) >> 13) & mask
-    while cells[slot] != EMPTY:
-        if cells[slot] == key:
-            return False
-        slot = (slot + 1) & mask
-    cells[slot] = key
-    return True
+    return enter(cells, key)
 
 
 @bare_inner_kernel

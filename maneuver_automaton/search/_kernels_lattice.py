@@ -40,6 +40,7 @@ from maneuver_automaton._compile import (
     inlined_kernel,
     merged_kernel,
 )
+from maneuver_automaton.search._kernels_cells import first_slot
 from maneuver_automaton.search._kernels_distance import distance_at, pop, push
 from maneuver_automaton.search._kernels_motion import (
     coast_inside,
@@ -104,18 +105,6 @@ def cell_key(task, x, y, heading, z, layer, time, fine):
     # times `ticks` apart: that drops a node, and never a proof.
     above = ((layer * 2 + fine) * ticks + tick) * levels + level
     return ((above * turns + k) * sides + j) * sides + i
-
-
-@inlined_kernel
-def first_slot(key, mask):
-    """Row of a hash table, of `mask` + 1 rows, at which the probes for a key begin.
-
-    Source: Knuth (1998), *The art of computer programming 3*, Sec. 6.4, Fibonacci hashing.
-    """
-    # The high digits of a key (class, time, heading) are folded onto the low ones (place): cells of
-    # one place could share a row otherwise. 31 bits times 32 bits stay below the sign.
-    mixed = (key ^ (key >> 23) ^ (key >> 41)) & 0x7FFFFFFF
-    return ((mixed * 0x9E3779B1) >> 15) & mask
 
 
 @inlined_kernel
