@@ -77,22 +77,34 @@ def improve_linked_words(
     >>> [robot.trim_names[k] for k in found.trims], found.cost
     (['ahead'], 3.0)
     """
-    setup = word_setup(problem, goal, most_trims=MOST_TRIMS, also=_used(seeds))
-    deadline = time.monotonic() + time_limit
-    climb = _Climb(setup, deadline, most_tries)
-    found: list[Word] = []
-    for seed in seeds:
-        timed = setup.timed(seed)
-        word = setup.solved(timed.trims, [timed.durations])
-        if word is not None:
-            found.append(setup.word(climb.top(word)))
-        if climb.is_over():
-            break
+    stages = tuple(linked_improvements(problem, goal, seeds, time_limit, most_tries))
+    found = [word for stage in stages for word in stage.solutions]
+    counts = ("solved", "changes")
     return SearchResult(
         status=SearchStatus.FOUND if found else SearchStatus.EXHAUSTED,
         solutions=tuple(distinct(problem, found, most=len(found))),
-        counts={"solved": climb.solved, "changes": climb.changes},
+        counts={name: sum(stage.counts[name] for stage in stages) for name in counts},
     )
+
+
+def linked_improvements(
+    problem: Problem, goal: Goal, seeds: Sequence[Word], time_limit: float, most_tries: int
+) -> Iterator[SearchResult]:
+    """What becomes of each seed in turn; see `improve_linked_words`."""
+    setup = word_setup(problem, goal, most_trims=MOST_TRIMS, also=_used(seeds))
+    climb = _Climb(setup, time.monotonic() + time_limit, most_tries)
+    for seed in seeds:
+        solved, changes = climb.solved, climb.changes
+        timed = setup.timed(seed)
+        word = setup.solved(timed.trims, [timed.durations])
+        found = () if word is None else (setup.word(climb.top(word)),)
+        yield SearchResult(
+            status=SearchStatus.FOUND if found else SearchStatus.EXHAUSTED,
+            solutions=found,
+            counts={"solved": climb.solved - solved, "changes": climb.changes - changes},
+        )
+        if climb.is_over():
+            break
 
 
 class _Change(NamedTuple):
