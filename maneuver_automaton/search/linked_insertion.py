@@ -20,7 +20,6 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.groups import LieGroup
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.alternatives import distinct
 from maneuver_automaton.search.linked_words import EXPANSIONS_A_WORD
 from maneuver_automaton.search.result import SearchResult, SearchStatus
 from maneuver_automaton.search.timed_word import TimedWord
@@ -42,7 +41,7 @@ def improve_linked_words(
     *,
     time_limit: float = math.inf,
     most_tries: int = MOST_TRIES,
-) -> SearchResult:
+) -> Iterator[SearchResult]:
     """Insert, replace, split and delete trims of words with maneuvers while that gains.
 
     Parameters
@@ -57,12 +56,11 @@ def improve_linked_words(
     most_tries : int
         Changes of one word that are tried: those of the least prices.
 
-    Returns
-    -------
+    Yields
+    ------
     SearchResult
-        One solution for each seed, cheapest first, each once. They are local optima: no single
-        change that was tried is cheaper. With maneuvers of finite size no reduced cost certifies
-        more than that.
+        The solution of each seed in turn. It is a local optimum: no single change that was tried is
+        cheaper. With maneuvers of finite size no reduced cost certifies more than that.
 
     Examples
     --------
@@ -73,24 +71,10 @@ def improve_linked_words(
     >>> goal = Goal(pose=[3.0, 0.0, 0.0], trim="slow")
     >>> problem = Problem(robot, [0, 0, 0], goal, start_trim="slow")
     >>> seed = Word(trims=[0], durations=[6.0])
-    >>> found = improve_linked_words(problem, goal, [seed]).solutions[0]
+    >>> found = next(improve_linked_words(problem, goal, [seed])).solutions[0]
     >>> [robot.trim_names[k] for k in found.trims], found.cost
     (['ahead'], 3.0)
     """
-    stages = tuple(linked_improvements(problem, goal, seeds, time_limit, most_tries))
-    found = [word for stage in stages for word in stage.solutions]
-    counts = ("solved", "changes")
-    return SearchResult(
-        status=SearchStatus.FOUND if found else SearchStatus.EXHAUSTED,
-        solutions=tuple(distinct(problem, found, most=len(found))),
-        counts={name: sum(stage.counts[name] for stage in stages) for name in counts},
-    )
-
-
-def linked_improvements(
-    problem: Problem, goal: Goal, seeds: Sequence[Word], time_limit: float, most_tries: int
-) -> Iterator[SearchResult]:
-    """What becomes of each seed in turn; see `improve_linked_words`."""
     setup = word_setup(problem, goal, most_trims=MOST_TRIMS, also=_used(seeds))
     climb = _Climb(setup, time.monotonic() + time_limit, most_tries)
     for seed in seeds:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.alternatives import distinct
-from maneuver_automaton.search.linked_insertion import MOST_TRIES, linked_improvements
+from maneuver_automaton.search.linked_insertion import improve_linked_words
 from maneuver_automaton.search.linked_words import scan_linked_words, steer_linked_words
 from maneuver_automaton.search.result import SearchResult, SearchStatus
 from maneuver_automaton.words.word import Word
@@ -121,7 +121,7 @@ def maneuver_word_stages(
     most = problem.horizon.max_trims
     if left > 0.0 and found and (most is None or most > CLOSED_FORM):
         seeds = [found[0], *(one for one in seeds if one is not found[0])]
-        for one in linked_improvements(problem, goal, seeds, left, MOST_TRIES):
+        for one in improve_linked_words(problem, goal, seeds, time_limit=left):
             yield stage(one)
 
 
