@@ -33,10 +33,10 @@ from maneuver_automaton.words.word import Word
 
 AT_ONCE = Patience(attempts=0, passes=0)
 SOME = Patience(attempts=400, passes=0)  # of a plan beside a stone
-BRIEF = Patience(attempts=1000, passes=3)  # of the way among what stands still
+BRIEF = Patience(attempts=1000, passes=3)  # of the path among static obstacles
 MOST_WAYS = 4  # that are tried with rests
 QUICK = 1500  # expansions in space and time before a way with rests is tried
-PASSING_SHARE = 0.3  # of the time that is left, for ways that let pass what moves
+PASSING_SHARE = 0.3  # of the time that is left, for paths that let moving obstacles pass
 FOR_THE_BEST = 0.6  # share of what is left that the best plan gets where alternatives are asked for
 FREE_WORDS = 4  # words of free space that are looked at for every alternative
 FREE_WORDS_SHARE = 0.3  # of the time that is left for alternatives
@@ -143,7 +143,7 @@ def _first(progress: _Progress) -> FirstPlan:
 
 
 def _let_pass(progress: _Progress) -> None:
-    """Hear of the cheapest way among what stands still, with rests that let pass what moves."""
+    """Take note of the cheapest path among static obstacles, with rests that let others pass."""
     query, calm = progress.query, _among_what_stands(progress.query)
     soon = progress.found.budget.part(PASSING_SHARE)
     found = progress.first_plan(calm, soon)
@@ -159,7 +159,7 @@ def _let_pass(progress: _Progress) -> None:
 
 
 def _among_what_stands(query: LatticeQuery) -> LatticeQuery:
-    """The query without what moves."""
+    """The query without moving obstacles."""
     problem = query.problem
     still = tuple(obstacle for obstacle in problem.obstacles if not moves(obstacle))
     return lattice_query(

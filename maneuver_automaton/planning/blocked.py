@@ -44,7 +44,7 @@ def blocked_ends(problem: Problem) -> PlanResult | None:
 
 
 def why_goal_blocked(problem: Problem, goal: Goal) -> str:
-    """Why no plan can end at a goal; empty if one may. What moves may be gone on arrival."""
+    """Why no plan can end at a goal; empty if one may. Moving obstacles may be gone on arrival."""
     reason = outside(goal.pose, problem.bounds)
     if reason:
         return f"the goal is outside the bounds: {reason}"
@@ -85,7 +85,7 @@ def _part_touched(problem: Problem, trim: str | None, pose: Array, time: float) 
 
 
 def where_touched(problem: Problem, pose: Array, time: float) -> str:
-    """What the vehicle touches at a pose and a time; inf: only what stands still counts.
+    """What the vehicle touches at a pose and a time; inf: only static obstacles count.
 
     The kernels prove most poses free; where they do not, shapely decides.
     """

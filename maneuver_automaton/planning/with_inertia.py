@@ -215,7 +215,7 @@ def _by_words(found: Incumbents) -> Iterator[tuple[Plan, int]]:
             goal,
             time_limit=found.budget.stage(MANEUVER_SHARE if found.plans else WORDS_SHARE).left,
             alternatives=others,
-            ceiling=found.cost if others == 0 else math.inf,
+            upper_bound=found.cost if others == 0 else math.inf,
         ):
             for word in stage.solutions:
                 if not any(word is one for one in seen):
@@ -245,7 +245,7 @@ def _stopping(found: Incumbents, path: Plan, goal_index: int) -> Iterator[tuple[
     """Stop and steer along a path, once obstacles that move let it.
 
     The path was free at the pace of the kinematic vehicle. This one is slower, so that it meets
-    what moves elsewhere: it waits before it starts, as long as it takes, or it does not go.
+    moving obstacles elsewhere: it waits before it starts, as long as it takes, or does not go.
     """
     problem, goal = found.problem, found.problem.goals[goal_index]
     plan = stop_and_steer(

@@ -98,7 +98,7 @@ class OverManeuvers:
                 goal,
                 time_limit=(FIRST_SHARE if now.last is None else 1.0) * left,
                 alternatives=OTHERS if guarded else 0,
-                ceiling=upper - committed,
+                upper_bound=upper - committed,
             )
             for word in words.solutions:
                 whole = now.whole(plan_of_word(problem, word))

@@ -74,7 +74,7 @@ def search_goal(
         return [
             search_with_least_times(problem, goal, alternatives=alternatives, time_limit=time_limit)
         ]
-    ceiling = math.inf if known is None else problem.cost_of(known)
+    upper_bound = math.inf if known is None else problem.cost_of(known)
     if method == "words" or (method == "auto" and _affordable(problem, goal)):
         return [
             search_words(
@@ -82,7 +82,7 @@ def search_goal(
                 goal,
                 alternatives=alternatives,
                 time_limit=time_limit,
-                ceiling=ceiling,
+                upper_bound=upper_bound,
                 ties=ties,
             )
         ]
@@ -99,14 +99,14 @@ def search_goal(
         few = replace(problem, horizon=replace(problem.horizon, max_trims=4 - goal.free_heading))
         best = min((one.cost for one in results[0].solutions), default=math.inf)
         if alternatives == 0:
-            ceiling = min(ceiling, best)
+            upper_bound = min(upper_bound, best)
         if (problem.horizon.max_trims or math.inf) > 4 and _affordable(few, goal, second_opinion):
             short = search_words(
                 few,
                 goal,
                 alternatives=alternatives,
                 time_limit=time_limit,
-                ceiling=ceiling,
+                upper_bound=upper_bound,
                 ties=ties,
             )
             results.append(replace(short, exhaustive=False))

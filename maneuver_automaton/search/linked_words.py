@@ -40,7 +40,7 @@ def steer_linked_words(
     *,
     alternatives: int = 0,
     time_limit: float = math.inf,
-    ceiling: float = math.inf,
+    upper_bound: float = math.inf,
     alphabet: int = ALPHABET,
 ) -> SearchResult:
     """Words of up to three trims, and a climb, from the steering function; see `scan_linked_words`.
@@ -66,13 +66,13 @@ def steer_linked_words(
     headings = _headings(goal)[: 0 if setup.exactly else None]
     refined = bool(goal.free_heading or setup.limit or problem.horizon.min_coast)
     found = _made_good(
-        setup, _steered(setup, headings), alternatives, ceiling, deadline, refined=refined
+        setup, _steered(setup, headings), alternatives, upper_bound, deadline, refined=refined
     )
     return _result(
         setup,
         found,
         alternatives,
-        ceiling,
+        upper_bound,
         none=SearchStatus.OUT_OF_BUDGET if time.monotonic() > deadline else SearchStatus.EXHAUSTED,
         counts={"expansions": len(headings)},
     )
@@ -84,7 +84,7 @@ def scan_linked_words(
     *,
     alternatives: int | None = 0,
     time_limit: float = math.inf,
-    ceiling: float = math.inf,
+    upper_bound: float = math.inf,
     max_trims: int = LONGEST,
     alphabet: int = ALPHABET,
 ) -> SearchResult:
@@ -92,8 +92,8 @@ def scan_linked_words(
 
     Between two trims stands the cheapest chain of maneuvers, so a word of the library's graph with
     dearer ones, or with maneuvers that lead from a trim to itself, is not among them. All trims of
-    a word coast for a while. With a ceiling, or a number of alternatives, a word of four trims is
-    left out where no node of its scanned time is nearly cheap enough.
+    a word coast for a while. With an upper bound, or a number of alternatives, a word of four trims
+    is left out where no node of its scanned time is nearly cheap enough.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def scan_linked_words(
     time_limit : float
         [s] after which the search ends with what it has; ``search.max_expansions`` of the problem
         limits it by the number of words instead: the same at every call.
-    ceiling : float
+    upper_bound : float
         Cost of a plan that is known: what is dearer may be left out.
     max_trims : int
         Trims of a word that coast, at most; the horizon's ``max_trims`` may be less.
@@ -134,13 +134,13 @@ def scan_linked_words(
     later = setup.prices_switches or setup.is_mended
     pads = problem.horizon.time is not None and setup.pad is not None  # rest is a trim more
     most = min(max_trims, LONGEST - int(goal.free_heading)) + int(pads)
-    everything = alternatives is None and ceiling == math.inf
+    everything = alternatives is None and upper_bound == math.inf
     scan, finished = scanned(
         problem,
         setup.as_search(),
         min(most, problem.horizon.max_trims or most),
         alternatives=None if later else alternatives,
-        ceiling=ceiling * (1.0 + SLACK * later) + TIE,
+        upper_bound=upper_bound * (1.0 + SLACK * later) + TIE,
         nodes=NODES,
         spare=pads,
         slack=math.inf if everything else SLACK,
@@ -148,13 +148,13 @@ def scan_linked_words(
         most_words=None if expansions is None else WORDS_AN_EXPANSION * expansions,
     )
     found = _made_good(
-        setup, scan.timed(), alternatives, ceiling, deadline, refined=setup.is_mended
+        setup, scan.timed(), alternatives, upper_bound, deadline, refined=setup.is_mended
     )
     return _result(
         setup,
         found,
         alternatives,
-        ceiling,
+        upper_bound,
         none=SearchStatus.EXHAUSTED if finished else SearchStatus.OUT_OF_BUDGET,
         complete=everything and finished,
         counts={
@@ -168,7 +168,7 @@ def _made_good(
     setup: WordSetup,
     rough: Iterable[TimedWord],
     alternatives: int | None,
-    ceiling: float,
+    upper_bound: float,
     deadline: float,
     *,
     refined: bool,
@@ -182,9 +182,9 @@ def _made_good(
     prices = list[float]()
     slack = 1.0 + SLACK * refined + TIE
     for n, found in enumerate(rough):
-        dearest = ceiling
+        dearest = upper_bound
         if alternatives is not None and len(prices) > alternatives:
-            dearest = min(ceiling, sorted(prices)[alternatives])
+            dearest = min(upper_bound, sorted(prices)[alternatives])
         if found.cost > dearest * slack or (prices and time.monotonic() > deadline):
             return
         if most is not None and EXPANSIONS_A_WORD * n > most:
@@ -202,14 +202,14 @@ def _result(
     setup: WordSetup,
     found: Iterable[TimedWord],
     alternatives: int | None,
-    ceiling: float,
+    upper_bound: float,
     *,
     none: SearchStatus,
     complete: bool = False,
     counts: dict[str, int],
 ) -> SearchResult:
     """What was found and asked for, cheapest first; `none` is the status if that is nothing."""
-    kept = [one for one in found if one.cost <= ceiling * (1.0 + TIE)]
+    kept = [one for one in found if one.cost <= upper_bound * (1.0 + TIE)]
     kept.sort(key=lambda one: (one.cost, len(one.trims), one.trims))
     asked = kept if alternatives is None else kept[: alternatives + 1]
     return SearchResult(

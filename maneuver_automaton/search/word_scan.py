@@ -38,7 +38,7 @@ def scanned(
     most: int,
     *,
     alternatives: int | None,
-    ceiling: float,
+    upper_bound: float,
     nodes: int,
     deadline: float,
     spare: bool = False,
@@ -57,7 +57,7 @@ def scanned(
             nodes=nodes,
             spare=spare,
             slack=slack,
-            ceiling=ceiling,
+            upper_bound=upper_bound,
         )
         finished = scan.run(deadline, most_words)
         if scan.n_found <= capacity:
@@ -88,7 +88,7 @@ class WordScan:
         nodes: int = NODES,
         spare: bool = False,
         slack: float = math.inf,
-        ceiling: float = math.inf,
+        upper_bound: float = math.inf,
     ) -> None:
         from maneuver_automaton.search import _kernels_polish, _kernels_problem, _kernels_words
 
@@ -106,8 +106,8 @@ class WordScan:
         # a user's own price of switches is added afterwards, so nothing is pruned by it
         self.own_prices = not isinstance(problem.cost, Cost)
         if self.own_prices:
-            alternatives, ceiling = None, math.inf
-        self.pruned = alternatives is not None or ceiling < math.inf
+            alternatives, upper_bound = None, math.inf
+        self.pruned = alternatives is not None or upper_bound < math.inf
         asked = capacity if alternatives is None else alternatives + 1
         self.candidates = _kernels_problem.Candidates(
             words=np.zeros((CAPACITY, width), dtype=np.int64),
@@ -123,7 +123,7 @@ class WordScan:
             times=np.zeros((capacity + 1, width)),
             costs=np.zeros(capacity),
             counter=np.zeros(1, dtype=np.int64),
-            best=np.full(asked, ceiling),
+            best=np.full(asked, upper_bound),
         )
 
     @property
@@ -177,8 +177,10 @@ class WordScan:
         while number < last:
             left = chunk if max_words is None else max(max_words - self.n_words, 1)
             until = min(number + min(chunk, left), last)
-            ceiling = tied(float(self.found.best[-1]))
-            number = scan(*mode.kernel_problem, self.candidates, n + tail, number, until, ceiling)
+            upper_bound = tied(float(self.found.best[-1]))
+            number = scan(
+                *mode.kernel_problem, self.candidates, n + tail, number, until, upper_bound
+            )
             if self.candidates.counter[0]:
                 self.polish(*mode.kernel_problem, self.candidates, self.found, self.most)
             if time.monotonic() > deadline:

@@ -26,7 +26,7 @@ def search_words_with_maneuvers(
     *,
     time_limit: float = math.inf,
     alternatives: int = 0,
-    ceiling: float = math.inf,
+    upper_bound: float = math.inf,
 ) -> SearchResult:
     """Plans to a goal in free space: words of up to four trims, and what insertion makes of them.
 
@@ -41,7 +41,7 @@ def search_words_with_maneuvers(
         every stage counts its work, and the time only ends it earlier.
     alternatives : int
         How many plans beside the cheapest.
-    ceiling : float
+    upper_bound : float
         Cost of a plan that is known: what costs as much is left out. Insertion still begins with
         words that are a little dearer.
 
@@ -63,7 +63,7 @@ def search_words_with_maneuvers(
     ['left', 'ahead', 'right']
     """
     *_, last = maneuver_word_stages(
-        problem, goal, time_limit=time_limit, alternatives=alternatives, ceiling=ceiling
+        problem, goal, time_limit=time_limit, alternatives=alternatives, upper_bound=upper_bound
     )
     return last
 
@@ -74,7 +74,7 @@ def maneuver_word_stages(
     *,
     time_limit: float = math.inf,
     alternatives: int = 0,
-    ceiling: float = math.inf,
+    upper_bound: float = math.inf,
 ) -> Iterator[SearchResult]:
     """What is found so far after each stage: short words, longer ones, and insertion seed by seed.
 
@@ -86,7 +86,7 @@ def maneuver_word_stages(
     deadline = time.monotonic() + time_limit
     counted = problem.search.max_expansions is not None
     asked = max(alternatives, SEEDS - 1)
-    near = ceiling * (1.0 + SEED_SLACK)
+    near = upper_bound * (1.0 + SEED_SLACK)
     found: list[Word] = []
     counts: dict[str, int] = {}
 
@@ -95,14 +95,16 @@ def maneuver_word_stages(
         everything = [*found, *more.solutions]
         found = list(distinct(problem, everything, most=len(everything)))
         _add(counts, more.counts)
-        kept = tuple(one for one in found if one.cost < ceiling)[: alternatives + 1]
+        kept = tuple(one for one in found if one.cost < upper_bound)[: alternatives + 1]
         out = time.monotonic() > deadline
         none = SearchStatus.OUT_OF_BUDGET if out else SearchStatus.EXHAUSTED
         status = SearchStatus.FOUND if kept else none
         return SearchResult(status=status, solutions=kept, counts=dict(counts))
 
     yield stage(
-        steer_linked_words(problem, goal, alternatives=asked, time_limit=time_limit, ceiling=near)
+        steer_linked_words(
+            problem, goal, alternatives=asked, time_limit=time_limit, upper_bound=near
+        )
     )
     seeds = found[:SEEDS]  # they differ more than the words of four trims, which come in families
     left = deadline - time.monotonic()
@@ -114,7 +116,7 @@ def maneuver_word_stages(
                 alternatives=asked,
                 alphabet=SCANNED_TRIMS,
                 time_limit=left if counted else SCAN_SHARE * left,
-                ceiling=found[alternatives].cost if len(found) > alternatives else near,
+                upper_bound=found[alternatives].cost if len(found) > alternatives else near,
             )
         )
     left = deadline - time.monotonic()

@@ -24,7 +24,7 @@ def search_words(
     alternatives: int | None = 0,
     time_limit: float = math.inf,
     nodes: int = NODES,
-    ceiling: float = math.inf,
+    upper_bound: float = math.inf,
     ties: bool = False,
 ) -> SearchResult:
     """Search every word of at most ``max_trims`` trims for its locally optimal coasting times.
@@ -45,7 +45,7 @@ def search_words(
         [s] after which the search ends with what it has.
     nodes : int
         Grid nodes per scanned time.
-    ceiling : float
+    upper_bound : float
         Cost of a plan that is known: what is dearer may be left out, and so there may be none.
     ties : bool
         Whether to list, beside the solutions asked for, all that cost as much as the last of them.
@@ -88,7 +88,7 @@ def search_words(
         setup,
         most,
         alternatives=alternatives,
-        ceiling=ceiling,
+        upper_bound=upper_bound,
         nodes=nodes,
         deadline=deadline,
         most_words=problem.search.max_expansions,
@@ -107,7 +107,7 @@ def search_words(
     return SearchResult(
         status=status,
         solutions=solutions,
-        complete=alternatives is None and finished and ceiling == math.inf,
+        complete=alternatives is None and finished and upper_bound == math.inf,
         exhaustive=finished and problem.horizon.max_trims is not None and not job.gridded,
         counts={"expansions": job.n_words, "steering_calls": job.n_steering},
     )
