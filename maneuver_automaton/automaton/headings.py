@@ -26,8 +26,8 @@ def trim_headings(automaton: Automaton) -> Array | None:
     >>> trim_headings(Automaton.of_controls(stage, {"right": (1, 0), "up": (0, 1)})).tolist()
     [0.0, 0.0]
     """
-    model = automaton.model
-    if not isinstance(model, OnlyTranslated):
+    model = automaton.translated
+    if model is None:
         return None
     return np.array([model.heading(trim.reduced_state) for trim in automaton.trims])
 
@@ -68,8 +68,8 @@ def distinct_headings(automaton: Automaton) -> tuple[float, ...]:
 def origin_of(automaton: Automaton, trim: Trim) -> Array:
     """A pose (dof,) at the origin in which the vehicle may be in a trim."""
     pose = np.zeros(automaton.model.group.dof)
-    if isinstance(automaton.model, OnlyTranslated):
-        pose[2] = automaton.model.heading(trim.reduced_state)
+    if automaton.translated is not None:
+        pose[2] = automaton.translated.heading(trim.reduced_state)
     return pose
 
 

@@ -13,7 +13,7 @@ from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.models import Model, OnLattice, SecondOrderCar, SecondOrderUnicycle
+from maneuver_automaton.models import Model, SecondOrderCar, SecondOrderUnicycle
 from maneuver_automaton.optimal_control import Guess, PolishSettings, has_casadi, load_casadi
 from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.problem import Components, RunningCost
@@ -58,7 +58,7 @@ class Aimed:
 
 def why_not_polished(problem: Problem) -> str:
     """Why plans of a problem cannot be polished; empty if they can."""
-    if isinstance(problem.automaton.model, OnLattice):
+    if problem.automaton.lattice is not None:
         return "the vehicle moves by the maneuvers of its library alone"
     if any(moves(obstacle) for obstacle in problem.obstacles):
         return "something moves"

@@ -44,8 +44,8 @@ def nearest_on_lattice(problem: Problem, goal: Goal) -> LatticePose | None:
     >>> nearest_on_lattice(problem, problem.goals[0]) is None
     True
     """
-    automaton, model = problem.automaton, problem.automaton.model
-    if not isinstance(model, OnLattice) or not _stays_on_grid(automaton, model):
+    automaton, model = problem.automaton, problem.automaton.lattice
+    if model is None or not _stays_on_grid(automaton, model):
         return None
     first, last = problem.first_trim, problem.last_trim(goal)
     # the lattice's own frame, seen from the world: at the start it has the first trim's heading
