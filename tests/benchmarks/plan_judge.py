@@ -21,7 +21,7 @@ import shapely
 
 ENDS = 1e-6  # [m, rad] off start and goal
 DRIVEN = 1e-5  # [m, rad] between the recorded pose and the one integrated from the sample before
-STRAIGHT = 1e-3  # the same where states are taken as straight between samples some cm apart
+STRAIGHT = 2e-3  # the same where states are taken as straight between samples up to 0.1 s apart
 STEPS = 4  # of Runge and Kutta between two samples
 Rates = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
