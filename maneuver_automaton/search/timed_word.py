@@ -9,8 +9,6 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray, freeze
 
-SAME_TIME = 1e-6  # [s] times that differ by less are the same
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimedWord:
@@ -28,16 +26,3 @@ class TimedWord:
     def numbers(self) -> IntArray:
         """The trims as an array (n,)."""
         return np.array(self.trims, dtype=np.int64)
-
-    def same_as(self, other: TimedWord) -> bool:
-        """Whether both have the same trims and times.
-
-        Examples
-        --------
-        >>> word = TimedWord((0, 1), np.array([1.0, 2.0]))
-        >>> word.same_as(TimedWord((0, 1), np.array([1.0, 2.1])))
-        False
-        """
-        return self.trims == other.trims and bool(
-            np.abs(self.durations - other.durations).max(initial=0.0) <= SAME_TIME
-        )

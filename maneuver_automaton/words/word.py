@@ -49,11 +49,6 @@ class Word:
         """Time the motion takes, maneuvers included [s]."""
         return float(self.durations.sum()) + self.maneuver_time
 
-    @property
-    def has_maneuvers(self) -> bool:
-        """Whether a transition is more than a switch."""
-        return bool((self.transitions != SWITCH).any())
-
 
 def word_of_steps(steps: Iterable[tuple[int, int, float]], *, goal: int) -> Word:
     """A word from its steps: the transition that leads to a trim, the trim, and its time [s].
