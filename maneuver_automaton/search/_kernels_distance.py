@@ -8,7 +8,7 @@ import numpy as np
 
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, kernel
 
-BLOCKED, SETTLED = 1, 2  # marks of a cell; 0 is open
+BLOCKED, SETTLED, REACHED = 1, 2, 3  # marks of a cell; 0 is one that nothing is known of
 NARROW = 4.0  # how much dearer a cell is whose middle is no place for the vehicle
 QUEUED, N_SETTLED, AT_RIM = range(3)  # places in `grid.state`
 
@@ -81,9 +81,10 @@ def distance_at(grid, field, x, y):
     grid is aimed at, so that cells far from the path are not looked at. The state of the search is
     kept in the grid: the next call goes on from it.
     """
-    # Of the arrays of the grid, one entry a cell: `mark`, open, blocked or settled; `rank` and
-    # `value`, the least known so far, final once the cell is settled. `keys` and `items` are the
-    # open list, a binary heap in which a cell may stand several times.
+    # Of the arrays of the grid, one entry a cell: `mark`; `rank` and `value`, the least known so
+    # far, final once the cell is settled. Neither holds anything before the mark says so: a large
+    # grid of which little is used is not filled first. `keys` and `items` are the open list, a
+    # binary heap in which a cell may stand several times.
     i = math.floor((x - grid.origin_x) / grid.cell)
     j = math.floor((y - grid.origin_y) / grid.cell)
     if not (0 <= i < grid.columns and 0 <= j < grid.rows):
@@ -111,7 +112,8 @@ def distance_at(grid, field, x, y):
                 if not (0 <= n_i < grid.columns and 0 <= n_j < grid.rows):
                     continue
                 there = n_j * grid.columns + n_i
-                if grid.mark[there] != 0:
+                mark = grid.mark[there]
+                if mark in (BLOCKED, SETTLED):
                     continue
                 # The field is asked once for a blocked cell: then its mark says it.
                 room = centre_clearance(grid, field, n_i, n_j)
@@ -122,7 +124,8 @@ def distance_at(grid, field, x, y):
                 if room < grid.wanted:
                     step *= NARROW
                 ranked = rank + step + (grid.detour if room < grid.cut else 0.0)
-                if ranked < grid.rank[there]:
+                if mark != REACHED or ranked < grid.rank[there]:
+                    grid.mark[there] = REACHED
                     grid.rank[there], grid.value[there] = ranked, value + step
                     e_x, e_y = (n_i - grid.aim_i) * grid.cell, (n_j - grid.aim_j) * grid.cell
                     key = ranked + math.sqrt(e_x * e_x + e_y * e_y)
@@ -140,7 +143,8 @@ def seed(grid, points):
         j = math.floor((points[k, 1] - grid.origin_y) / grid.cell)
         if 0 <= i < grid.columns and 0 <= j < grid.rows:
             here = j * grid.columns + i
-            if grid.rank[here] > 0.0:  # a value is known only where a rank is
+            if grid.mark[here] != REACHED:  # no seed has its cell yet
+                grid.mark[here] = REACHED
                 grid.rank[here], grid.value[here] = 0.0, 0.0
                 e_x, e_y = (i - grid.aim_i) * grid.cell, (j - grid.aim_j) * grid.cell
                 key = math.sqrt(e_x * e_x + e_y * e_y)

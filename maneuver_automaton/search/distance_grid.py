@@ -19,9 +19,9 @@ DETOUR = 4.0  # [sides of the grid] that are preferred to a path through a wall 
 class DistanceGrid(NamedTuple):
     """The grid as the kernels see it; its cells coincide with those of the world's field."""
 
-    value: Array  # (cells,) [m] length of the path that ranks first, where its rank is finite
+    value: Array  # (cells,) [m] length of the path that ranks first, where one is known
     rank: Array  # (cells,) [m] that length with a detour for every cell that a wall may cut
-    mark: NDArray[np.uint8]  # (cells,) 0 open, 1 blocked, 2 settled
+    mark: NDArray[np.uint8]  # (cells,) 0 nothing is known, 1 blocked, 2 settled, 3 reached
     keys: Array  # (8 cells + 8,) of the open list, a binary heap
     items: IntArray  # its cells
     state: IntArray  # (3,) heap size, settled cells, whether the rim was reached
@@ -68,7 +68,7 @@ def distance_grid(world: World, box: Array, seeds: Array, aim: Array) -> Distanc
     aim_i, aim_j = (int(k) for k in np.floor((aim[:2] - start) / cell))
     grid = DistanceGrid(
         value=np.empty(n),  # memory that is not touched costs nothing
-        rank=np.full(n, np.inf),
+        rank=np.empty(n),
         mark=np.zeros(n, dtype=np.uint8),
         keys=np.empty(8 * n + 8),
         items=np.empty(8 * n + 8, dtype=np.int64),
