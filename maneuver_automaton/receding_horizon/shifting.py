@@ -55,7 +55,8 @@ def rested(plan: Plan, pad: Trim, duration: float) -> Plan:
     if not duration > NOTHING:
         return plan
     rest = plan.trims[-1] if plan.trims and plan.trims[-1].is_rest else pad
-    return followed_by(plan, Plan(plan.end, (rest,), durations=[duration]))
+    # What follows is joined on: its own start is not asked, so the plan's end is not worked out.
+    return followed_by(plan, Plan(plan.start, (rest,), durations=[duration]))
 
 
 def followed_by(first: Plan, second: Plan) -> Plan:
