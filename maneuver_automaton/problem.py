@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, freeze
+from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton, Plan, Primitive
 from maneuver_automaton.automaton.headings import motion_of, posed
 from maneuver_automaton.collision import (
@@ -420,7 +420,7 @@ def moves(obstacle: AnyObstacle) -> bool:
     return isinstance(obstacle, Obstacle) and obstacle.motion is not None
 
 
-@functools.lru_cache(maxsize=8)
+@kept_by_first
 def _known_rates(automaton: Automaton, cost: StageCost) -> dict[str, tuple[Trim, float]]:
     """Every trim of a library with its cost per second, by name."""
     rates = cost.rates(automaton.controls, automaton.body_velocities)

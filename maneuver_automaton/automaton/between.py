@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterable
 
 import numpy as np
@@ -11,6 +10,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import breadth_first_order
 
 from maneuver_automaton._arrays import IntArray
+from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton.automaton import Automaton
 
 
@@ -49,7 +49,7 @@ def part_between(automaton: Automaton, start: int, goals: Iterable[int]) -> Auto
     return automaton if len(kept) == len(automaton) else _part(automaton, tuple(sorted(kept)))
 
 
-@functools.lru_cache(maxsize=16)
+@kept_by_first
 def _part(automaton: Automaton, kept: tuple[int, ...]) -> Automaton:
     trims = tuple(automaton.trims[k] for k in kept)
     names = {trim.name for trim in trims}

@@ -7,7 +7,6 @@ the number of trims, not with its power.
 
 from __future__ import annotations
 
-import functools
 import math
 import time
 from collections.abc import Iterator, Sequence
@@ -16,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Goal, Problem
@@ -421,7 +421,7 @@ def sub_library(setup: SearchSetup) -> SearchSetup:
     )
 
 
-@functools.lru_cache(maxsize=8)
+@kept_by_first
 def _far_reaching(library: MovingTrims) -> IntArray:
     """The trims of a sub-library: the same for every start and goal."""
     twists, rates = library.twists, library.rates

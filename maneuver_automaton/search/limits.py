@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import StageCost
 from maneuver_automaton.groups import group_of
@@ -147,7 +147,7 @@ class _Prices:
     per_square: float  # per (m/s)^2 + (rad/s)^2 and second
 
 
-@functools.lru_cache(maxsize=8)
+@kept_by_first
 def _prices(automaton: Automaton, cost: StageCost, pads: bool) -> _Prices | None:
     """None where a trim is cheaper than the rest that pads."""
     library = moving_trims(automaton, cost)

@@ -6,7 +6,6 @@ the first trim and to the last, is the cheapest chain of maneuvers, so it need n
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.between import trims_between
 from maneuver_automaton.automaton.headings import origin_of
@@ -296,7 +296,7 @@ def word_setup(
     )
 
 
-@functools.lru_cache(maxsize=16)
+@kept_by_first
 def maneuver_prices(automaton: Automaton, cost: StageCost) -> Array:
     """What every maneuver costs (M,) without the prices of switches."""
     name, still = automaton.trim_names[0], origin_of(automaton, automaton.trims[0])
@@ -304,7 +304,7 @@ def maneuver_prices(automaton: Automaton, cost: StageCost) -> Array:
     return np.array([any_problem.maneuver_cost(one) for one in automaton.maneuvers])
 
 
-@functools.lru_cache(maxsize=32)
+@kept_by_first
 def _library(
     automaton: Automaton,
     cost: StageCost,
@@ -332,7 +332,7 @@ def _library(
     return tuple(sorted(chosen.union(upright))), library
 
 
-@functools.lru_cache(maxsize=8)
+@kept_by_first
 def _transitions(automaton: Automaton, cost: StageCost, waiting: float) -> Library:
     """The library with its prices, less what rest would cost per second meanwhile."""
     rates = cost.rates(automaton.controls, automaton.body_velocities)

@@ -5,7 +5,6 @@ Everything here is the same for every start, goal and map: symmetry makes it reu
 
 from __future__ import annotations
 
-import functools
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, IntArray, as_array
+from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import StageCost
 from maneuver_automaton.words.transitions import Transitions, transitions_of
@@ -250,7 +250,7 @@ def library_arrays(
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class MovingTrims:
     """The trims of an automaton that move, of equal twists only the cheapest, and its rest."""
 
@@ -265,7 +265,7 @@ class MovingTrims:
     turn_rates: Array  # (M,) [rad/s] without sign
 
 
-@functools.lru_cache(maxsize=8)
+@kept_by_first
 def moving_trims(automaton: Automaton, cost: StageCost) -> MovingTrims:
     """Moving trims of an automaton with what they cost, of equal twists only the cheapest."""
     twists = four_columns(automaton.body_velocities)
