@@ -13,20 +13,19 @@ from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.checking import Condition, load_checks
 from maneuver_automaton.planning.detours import with_stones
+from maneuver_automaton.planning.free_words import free_words, word_candidate, words_once
 from maneuver_automaton.planning.incumbents import Candidate, Incumbents
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem, moves
 from maneuver_automaton.refinement.improve import Improved, Patience, improve
 from maneuver_automaton.search.budget import Budget
-from maneuver_automaton.search.choose import search_goal
 from maneuver_automaton.search.cost_to_go import CostTable, cost_to_go_table
 from maneuver_automaton.search.lattice import FirstPlan, first_plan
 from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.limits import why_impossible
 from maneuver_automaton.search.prepared import RECENT
-from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.waiting import with_waits
 from maneuver_automaton.search.word_plan import plan_of_word
 from maneuver_automaton.words.word import Word
@@ -208,16 +207,14 @@ def _candidate(query: LatticeQuery, word: Word) -> Candidate:
 def _free_words(progress: _Progress, alternatives: int) -> Iterator[Candidate]:
     """Words that are locally optimal in free space: those that hit nothing are so here, too."""
     problem = progress.query.problem
-    for index in progress.query.goal_index:
-        left = FREE_WORDS_SHARE * progress.budget.left
-        if left <= 0.0:
-            return
-        found = search_goal(
-            problem, problem.goals[index], alternatives=FREE_WORDS * alternatives, time_limit=left
-        )
-        for solution in (one for result in found for one in result.solutions):
-            make = functools.partial(plan_of, problem, solution)
-            yield Candidate(solution.cost, index, make, proven=False)
+    stages = free_words(
+        progress.found,
+        progress.query.goal_index,
+        others=FREE_WORDS * alternatives,
+        share=FREE_WORDS_SHARE,
+    )
+    for word, index in words_once(stages):
+        yield word_candidate(problem, word, index, proven=False)
 
 
 def _detours(progress: _Progress, best: Word, most: int) -> Iterator[Candidate]:

@@ -19,6 +19,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.same_motion import UNFINISHED
 from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.planning.checking import load_checks
+from maneuver_automaton.planning.free_words import free_words, words_once
 from maneuver_automaton.planning.incumbents import Incumbents
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
@@ -29,7 +30,7 @@ from maneuver_automaton.refinement.maneuver_lattice import plan_of as plan_of_ma
 from maneuver_automaton.refinement.ready import load_maneuver_kernels
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
 from maneuver_automaton.search.budget import Budget
-from maneuver_automaton.search.choose import load_search, search_goal
+from maneuver_automaton.search.choose import load_search
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.limits import closed_bound, why_impossible
 from maneuver_automaton.search.result import SearchStatus, plan_of
@@ -81,17 +82,10 @@ def plan_in_space(
 
 def _words(found: Incumbents, goals: tuple[int, ...]) -> Iterator[tuple[Plan, int]]:
     """Words of free space, and the goals they reach."""
-    problem = found.problem
-    words = max(FEWEST_WORDS, WORDS // max(1, len(goals)))
-    for index in goals:
-        for result in search_goal(
-            problem,
-            problem.goals[index],
-            alternatives=words - 1,
-            time_limit=WORDS_SHARE * found.budget.left / len(goals),
-        ):
-            for word in result.solutions[:words]:
-                yield plan_of(problem, word), index
+    others = max(FEWEST_WORDS, WORDS // max(1, len(goals))) - 1
+    share = WORDS_SHARE / max(1, len(goals))
+    for word, index in words_once(free_words(found, goals, others=others, share=share)):
+        yield plan_of(found.problem, word), index
 
 
 @dataclass(slots=True, eq=False)

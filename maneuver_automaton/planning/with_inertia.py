@@ -18,6 +18,7 @@ from maneuver_automaton.planning.among_obstacles import library_table
 from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.planning.bounds import lattice_bound, speed_bound, word_bound
 from maneuver_automaton.planning.checking import load_checking, load_checks, what_is_hit
+from maneuver_automaton.planning.free_words import free_words, words_once
 from maneuver_automaton.planning.incumbents import Accepted, Incumbents
 from maneuver_automaton.planning.polishing import (
     Aimed,
@@ -43,7 +44,6 @@ from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.linked_words import load_linked_words
 from maneuver_automaton.search.result import plan_of as plan_of_word
-from maneuver_automaton.search.word_stages import maneuver_word_stages
 from maneuver_automaton.words.word import Word, word_of_plan
 
 FIRST_SHARE = 0.8  # of the time limit, for a first path
@@ -208,19 +208,10 @@ def _by_words(found: Incumbents) -> Iterator[tuple[Plan, int]]:
     problem = found.problem
     guarded = bool(problem.obstacles) or not problem.bounds.are_open
     others = max(found.alternatives, OTHERS if guarded else 0)
-    seen: list[Word] = []
-    for index, goal in enumerate(problem.goals):
-        for stage in maneuver_word_stages(
-            problem,
-            goal,
-            time_limit=found.budget.stage(MANEUVER_SHARE if found.plans else WORDS_SHARE).left,
-            alternatives=others,
-            upper_bound=found.cost if others == 0 else math.inf,
-        ):
-            for word in stage.solutions:
-                if not any(word is one for one in seen):
-                    seen.append(word)
-                    yield plan_of_word(problem, word), index
+    share = MANEUVER_SHARE if found.plans else WORDS_SHARE
+    stages = free_words(found, range(len(problem.goals)), others=others, share=share)
+    for word, index in words_once(stages):
+        yield plan_of_word(problem, word), index
 
 
 def _along_paths(search: _Search) -> Iterator[tuple[Plan, int]]:
