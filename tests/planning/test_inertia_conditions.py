@@ -13,7 +13,7 @@ from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Zone
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanStatus, plan
-from maneuver_automaton.planning.with_inertia import late_at_first
+from maneuver_automaton.planning.lattice_words import late_at_first
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.refinement.maneuver_lattice import maneuver_words, plan_of
 from maneuver_automaton.search import lattice_pass, lattice_schedules
@@ -164,7 +164,7 @@ def test_it_says_how_near_it_came():
     goal = Goal(pose=[6.0, 0.0, 0.0], trim="1, 0")
     result = plan(posed(goal, obstacles=walls, search=SearchSettings(max_expansions=15)))
     assert result.plan is None
-    assert result.reason.endswith("m from the goal")
+    assert result.reason.endswith("m off")
 
 
 @pytest.mark.parametrize("aside", [0.0, 1.5, -1.5])
