@@ -22,14 +22,15 @@ def free_words(
     """What the searches for words to some goals found, stage by stage, each with its goal.
 
     Each search may take a `share` of the time that is left, and finds `others` words beside the
-    cheapest; None asks for all there are. Where only the cheapest word counts and trims are linked
-    by maneuvers, what is known already bounds its cost.
+    cheapest; None asks for all there are. Words with maneuvers count their work where the problem
+    limits it, and then may take all the time. Where only the cheapest of these counts, what is
+    known already bounds its cost.
     """
     problem = found.problem
     for index in goals:
         goal = problem.goals[index]
-        seconds = max(found.budget.stage(share).left, LEAST_TIME)
         if problem.automaton.is_kinematic:
+            seconds = max(share * found.budget.left, LEAST_TIME)
             for result in search_goal(problem, goal, alternatives=others, time_limit=seconds):
                 yield index, result
             continue
@@ -37,7 +38,7 @@ def free_words(
             problem,
             goal,
             alternatives=others or 0,
-            time_limit=seconds,
+            time_limit=max(found.budget.stage(share).left, LEAST_TIME),
             upper_bound=math.inf if others else found.cost,
         ):
             yield index, result

@@ -25,8 +25,9 @@ from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.words.word import word_of_plan
 
 WORDS_SHARE = 0.4  # of what is left, for words of free space where there is no plan yet
-LATER_SHARE = 0.2  # the same where there is a plan already
+LATER_SHARE = 0.2  # the same where there is a plan already, or the lattice will find one
 OTHERS = 6  # dearer words that are looked at where bounds or obstacles may refuse the cheapest
+IN_SPACE = 23  # the same where some may pass above or below
 
 
 def plan_in_steps(
@@ -48,7 +49,7 @@ def plan_in_steps(
     if steps.along_paths:
         _offer(found, paths.plans())
     if steps.words and not budget.is_over:
-        _offer(found, _free_words(found), proven=not problem.obstacles)
+        _offer(found, _free_words(found, steps), proven=not problem.obstacles)
     if steps.lattice and not (found.plans and budget.is_over):
         lattice = search_lattice(found, steps)
         searched = budget.elapsed if lattice.knows_all else None
@@ -75,12 +76,13 @@ def _offer(found: Incumbents, plans: Iterable[tuple[Plan, int]], *, proven: bool
             return
 
 
-def _free_words(found: Incumbents) -> Iterator[tuple[Plan, int]]:
+def _free_words(found: Incumbents, steps: Steps) -> Iterator[tuple[Plan, int]]:
     """Words of free space as plans, and the goals they reach."""
     problem = found.problem
     guarded = bool(problem.obstacles) or not problem.bounds.are_open
-    others = max(found.alternatives, OTHERS if guarded else 0)
-    share = LATER_SHARE if found.plans else WORDS_SHARE
+    most = IN_SPACE if steps.at_will else OTHERS
+    others = max(found.alternatives, most if guarded else 0)
+    share = LATER_SHARE if found.plans or steps.at_will else WORDS_SHARE
     for word, index in words_once(
         free_words(found, open_goals(problem), others=others, share=share)
     ):
