@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models.greatest_speed import greatest_speed
+from maneuver_automaton.planning.polishing import rests_at_both_ends, why_not_polished
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.lattice_query import LatticeQuery
+from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinematic_problem
+from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.limits import closed_bound
 from maneuver_automaton.search.plane_bound import plane_bound
 from maneuver_automaton.words.library import moving_trims
@@ -53,6 +57,26 @@ def word_bound(problem: Problem) -> float:
         if way > 0.0:
             prices.append(problem.maneuver_cost(maneuver) / way)
     return _least_way(problem) * max(0.0, min(prices, default=0.0))
+
+
+def bound_along_paths(problem: Problem) -> float:
+    """No plan is cheaper: the shortest way, driven from rest to rest at the limits.
+
+    A way that the kinematic vehicle needs B seconds for at full speed v takes ``B + v / a`` with
+    the acceleration a, or ``2 sqrt(B v / a)`` where v is not reached.
+    """
+    model, cost = problem.automaton.model, problem.cost
+    known = speed_bound(problem)
+    if why_not_polished(problem) and not follows_paths(model):  # all plans are words
+        known = max(known, word_bound(problem))
+    if not (follows_paths(model) and rests_at_both_ends(problem) and isinstance(cost, Cost)):
+        return known
+    simpler = kinematic_problem(problem, switch=0.0)
+    least = lattice_bound(lattice_query(simpler, tuple(range(len(problem.goals)))))
+    fastest = float(np.abs(model.reduced_limits[0]).max())
+    ramp = fastest / float(model.control_limits[0, 1])
+    duration = least + ramp if least >= ramp else 2.0 * math.sqrt(least * ramp)
+    return max(known, cost.time * duration + cost.length * least * fastest)
 
 
 def _least_way(problem: Problem) -> float:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import functools
 from dataclasses import dataclass, replace
 
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.checking import Condition
+from maneuver_automaton.planning.free_words import free_words, word_candidate
 from maneuver_automaton.planning.incumbents import Candidate, Incumbents
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
@@ -17,11 +17,9 @@ from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.choose import search_goal
 from maneuver_automaton.search.inside import outside
 from maneuver_automaton.search.limits import closed_bound, why_impossible
-from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.words.word import Word, word_of_plan
 
 SPARE = 2  # solutions for every alternative, as some may be one motion
-LEAST_TIME = 1e-3  # [s] for each goal, also where the time is over
 
 
 def plan_by_words(
@@ -63,26 +61,19 @@ def _search_goals(found: Incumbents) -> _Listed:
     """Search for every goal that is inside the bounds."""
     problem = found.problem
     sorted_out = not problem.bounds.are_open or bool(problem.obstacles or problem.zones)
+    goals = [k for k, goal in enumerate(problem.goals) if not outside(goal.pose, problem.bounds)]
+    others = None if sorted_out else SPARE * found.alternatives
     rows: list[tuple[tuple[float, int, tuple[int, ...]], Candidate]] = []
-    exhausted = proven = True
-    for index, goal in enumerate(problem.goals):
-        if outside(goal.pose, problem.bounds):
-            continue
-        results = search_goal(
-            problem,
-            goal,
-            alternatives=None if sorted_out else SPARE * found.alternatives,
-            time_limit=max(found.budget.left, LEAST_TIME),
-        )
-        proven = proven and any(result.exhaustive for result in results)
-        for result in results:
-            exhausted = exhausted and result.status is not SearchStatus.OUT_OF_BUDGET
-            found.counts.update(result.counts)
-            for word in result.solutions:
-                make = functools.partial(plan_of, problem, word)
-                rows.append((_order(word), Candidate(word.cost, index, make)))
+    exhausted, proven = True, set[int]()  # goals whose every admitted word was searched
+    for index, result in free_words(found, goals, others=others):
+        exhausted = exhausted and result.status is not SearchStatus.OUT_OF_BUDGET
+        proven |= {index} if result.exhaustive else set()
+        found.counts.update(result.counts)
+        rows += [(_order(word), word_candidate(problem, word, index)) for word in result.solutions]
     rows.sort(key=lambda row: row[0])
-    return _Listed(candidates=[one for _, one in rows], exhausted=exhausted, proven=proven)
+    return _Listed(
+        candidates=[one for _, one in rows], exhausted=exhausted, proven=len(proven) == len(goals)
+    )
 
 
 def _order(word: Word) -> tuple[float, int, tuple[int, ...]]:

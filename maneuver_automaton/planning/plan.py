@@ -2,30 +2,21 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from maneuver_automaton.planning.among_obstacles import (
-    library_table,
-    plan_on_lattice,
-    prepare_map,
-)
 from maneuver_automaton.planning.among_zones import plan_among_zones
 from maneuver_automaton.planning.blocked import blocked_ends
+from maneuver_automaton.planning.checking import load_checks
 from maneuver_automaton.planning.free_space import plan_by_words
-from maneuver_automaton.planning.in_space import (
-    climbs_among_obstacles,
-    load_in_space,
-    plan_in_space,
-)
+from maneuver_automaton.planning.in_steps import plan_in_steps
 from maneuver_automaton.planning.off_lattice import goals_off_lattice
 from maneuver_automaton.planning.result import PlanResult
-from maneuver_automaton.planning.with_inertia import load_inertia, plan_with_inertia
+from maneuver_automaton.planning.steps import has_inertia, load_steps, uses_lattice
 from maneuver_automaton.planning.within_tolerance import has_tolerance, plan_within_tolerance
 from maneuver_automaton.planning.workspace import Workspace, workspace_of
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.search.budget import Budget
 from maneuver_automaton.search.choose import load_search
+from maneuver_automaton.search.lattice_query import lattice_query
 
 
 def plan(problem: Problem, *, time_limit: float = 5.0, alternatives: int = 0) -> PlanResult:
@@ -98,10 +89,8 @@ def _searched(
     problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
 ) -> PlanResult:
     """The answer of the search that suits a problem without zones."""
-    kinematic = plan_on_lattice if uses_lattice(problem) else plan_by_words
-    if climbs_among_obstacles(problem):
-        kinematic = plan_in_space
-    how = plan_with_inertia if has_inertia(problem) else kinematic
+    in_steps = has_inertia(problem) or uses_lattice(problem)
+    how = plan_in_steps if in_steps else plan_by_words
     return how(problem, budget, workspace, alternatives=alternatives)
 
 
@@ -110,45 +99,18 @@ def prepare(problem: Problem, workspace: Workspace | None = None) -> None:
     workspace = workspace or workspace_of(problem.obstacles)
     _load(problem, workspace)
     if uses_lattice(problem):
-        prepare_map(problem, workspace)
+        goals = tuple(range(len(problem.goals)))
+        lattice_query(problem, goals, prepared=workspace.prepared)
+        load_checks(problem, workspace)
 
 
 def _load(problem: Problem, workspace: Workspace) -> None:
     """Compile or load what planning needs, before the clock runs."""
-    if has_inertia(problem):
-        load_inertia(problem, workspace)
+    guarded = bool(problem.obstacles or problem.zones)
+    in_space = problem.start.size > 3 and guarded
+    if has_inertia(problem) or uses_lattice(problem) or in_space:
+        load_steps(problem, workspace)
         return
-    if problem.start.size > 3 and (problem.obstacles or problem.zones):
-        load_in_space(problem)
-        return
-    if problem.obstacles or problem.zones or uses_lattice(problem):
+    if guarded:
         load_lattice()
-    if uses_lattice(problem):
-        library_table(problem, workspace)
-    else:
-        load_search(problem)
-
-
-def has_inertia(problem: Problem) -> bool:
-    """Whether the vehicle cannot switch at will between the trims that it needs."""
-    automaton = problem.automaton
-    return bool(automaton.model.reduced_names) or not automaton.is_kinematic
-
-
-def uses_lattice(problem: Problem) -> bool:
-    """Whether the lattice is what plans: it was asked for, or there is something in the way.
-
-    It needs trims in the plane of which one turns, or two that lead to different sides where none
-    does and the heading never changes; and a rest where the time is fixed. Otherwise words are
-    searched, and what is in the way sorts them out.
-    """
-    velocities = problem.automaton.body_velocities
-    moving = velocities[velocities.any(axis=1)]
-    turns = bool(moving[:, 2].any())
-    keeps_heading = problem.automaton.translated is not None and not has_inertia(problem)
-    sides = turns or (keeps_heading and np.linalg.matrix_rank(moving[:, :2]) == 2)
-    steers = len(moving) > 1 and sides and velocities.shape[1] == 3
-    if not steers or (problem.horizon.time is not None and len(moving) == len(velocities)):
-        return False
-    method = problem.search.method
-    return method == "lattice" or (method == "auto" and bool(problem.obstacles))
+    load_search(problem)

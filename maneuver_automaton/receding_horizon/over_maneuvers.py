@@ -17,7 +17,7 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning import plan as planned
 from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.planning.checking import what_is_hit
-from maneuver_automaton.planning.in_space import climbs_among_obstacles
+from maneuver_automaton.planning.steps import climbs_among_obstacles
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon.candidates import Candidate, allowed, bounded
 from maneuver_automaton.receding_horizon.failsafe import last_event
@@ -27,11 +27,12 @@ from maneuver_automaton.receding_horizon.settings import EXACT, switches_at_will
 from maneuver_automaton.receding_horizon.shifting import followed_by, moves_on, rested
 from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.refinement.fitting import fitted_plans
-from maneuver_automaton.refinement.maneuver_lattice import maneuver_words, plan_of
+from maneuver_automaton.refinement.maneuver_lattice import maneuver_words
 from maneuver_automaton.search.alternatives import TIE
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_trims import priced_library
-from maneuver_automaton.search.result import plan_of as plan_of_word
+from maneuver_automaton.search.result import plan_of
+from maneuver_automaton.search.word_plan import plan_of_word
 from maneuver_automaton.search.word_stages import search_words_with_maneuvers
 
 FIRST_SHARE = 0.5  # of a step's time limit, for the words of the first step
@@ -101,7 +102,7 @@ class OverManeuvers:
                 upper_bound=upper - committed,
             )
             for word in words.solutions:
-                whole = now.whole(plan_of_word(problem, word))
+                whole = now.whole(plan_of(problem, word))
                 cost = here.cost_of(whole)
                 if cost < upper and self.is_safe(whole):
                     found.append(now.candidate(whole, index, Origin.SEARCHED))
@@ -141,7 +142,9 @@ class OverManeuvers:
             if incumbent.word is None:
                 continue
             owner = query.goal_index[incumbent.word.goal]
-            for plan in fitted_plans(problem, plan_of(query, incumbent.word), problem.goals[owner]):
+            for plan in fitted_plans(
+                problem, plan_of_word(query, incumbent.word), problem.goals[owner]
+            ):
                 one = self.now.candidate(self.now.whole(plan), owner, Origin.SEARCHED)
                 if (best is None or one.cost < best.cost) and self.is_safe(one.plan):
                     best = one

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from maneuver_automaton.planning.among_obstacles import library_table
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon.among_obstacles import AmongObstacles, as_it_stands
 from maneuver_automaton.receding_horizon.decision import StepSearch
@@ -18,6 +17,7 @@ from maneuver_automaton.receding_horizon.settings import Settings
 from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.refinement.ready import load_lattice, load_maneuver_kernels
 from maneuver_automaton.search.choose import load_search as load_words
+from maneuver_automaton.search.cost_to_go import cost_to_go_table
 from maneuver_automaton.search.linked_words import load_linked_words
 from maneuver_automaton.search.ready import load_times_kernels
 
@@ -55,6 +55,6 @@ def load_search(problem: Problem) -> None:
     elif problem.obstacles:
         load_lattice()
         load_fail_safe()
-        library_table(problem)
+        cost_to_go_table(problem)
     else:
         load_words(problem)

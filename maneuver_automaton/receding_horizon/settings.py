@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.planning.in_space import climbs_among_obstacles
-from maneuver_automaton.planning.plan import has_inertia
+from maneuver_automaton.planning.steps import climbs_among_obstacles, has_inertia
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
 

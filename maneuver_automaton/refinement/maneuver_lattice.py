@@ -7,14 +7,12 @@ import time
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from maneuver_automaton.automaton import Plan
 from maneuver_automaton.refinement.improve import Improvement, Patience
 from maneuver_automaton.refinement.restarts import FINER
 from maneuver_automaton.search.lattice import distance_grids, first_plan
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.words.word import Word, with_price
-from maneuver_automaton.words.word import plan_of as plan_of_word
 
 TO_THE_END = Patience(passes=2**62)
 
@@ -107,14 +105,3 @@ def quick_word(
         if incumbent.word is not None and incumbent.word.duration <= query.most_time:
             return with_price(query.library.priced, incumbent.word), total
     return None, total
-
-
-def plan_of(query: LatticeQuery, word: Word) -> Plan:
-    """A word as a plan that ends exactly at its goal, in the frame of the query."""
-    return plan_of_word(
-        query.automaton,
-        word,
-        query.problem.start,
-        goal=query.goal_poses[word.goal],
-        start_time=query.start_time,
-    )

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_schedules import as_wide_as_turns
 from maneuver_automaton.search.lattice_task import Resolution
@@ -85,6 +86,11 @@ def _finer(query: LatticeQuery, rng: np.random.Generator) -> Iterator[Restart]:
         for one in resolutions:
             resolution = replace(one, stop=False, ends_early=True)
             yield Restart(resolution, FIRST_CHUNK, all_words=all_words)
+
+
+def restarts_of(library: LatticeLibrary) -> Restarts:
+    """The schedule for a library: trims that are switched at will in the plane, or others."""
+    return RANDOM if library.at_will else FINER
 
 
 RANDOM = Restarts(_random, rounds=1, moving_rounds=0)

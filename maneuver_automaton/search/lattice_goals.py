@@ -71,11 +71,16 @@ def aim_of(problem: Problem, goal: Goal) -> Array:
 
 
 def poses_aimed_at(problem: Problem, goal: Goal) -> Array:
-    """The poses (n, dof) that a search aims at: several headings where any will do."""
+    """The poses (n, dof) that a search aims at: several headings where any will do.
+
+    A vehicle that switches at will may turn anywhere: the goal's own heading is among them, so that
+    to leave it free is no loss. Others come in from where they start.
+    """
     if not goal.free_heading:
         return np.array(aim_of(problem, goal))[None]
     ahead = goal.pose[:2] - problem.start[:2]
     first = float(np.arctan2(ahead[1], ahead[0])) if ahead.any() else float(problem.start[2])
+    first = float(goal.pose[2]) if problem.automaton.is_kinematic else first
     poses = np.tile(goal.pose, (FREE_HEADINGS, 1))
     poses[:, 2] = first + np.arange(FREE_HEADINGS) * (2.0 * np.pi / FREE_HEADINGS)
     return poses

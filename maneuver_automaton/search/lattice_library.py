@@ -90,7 +90,7 @@ def _library(
             automaton, cost, fixed_time=fixed_time, waits=waits, min_coast=min_coast
         )
     else:
-        trims = trims_of(priced_library(automaton, cost))
+        trims = trims_of(priced_library(automaton, cost), cost)
     parts = posed_parts(automaton, footprint, dict(carried), trims.library.trims)
     return library_of_trims(trims, parts, waits=waits)
 

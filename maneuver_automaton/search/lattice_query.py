@@ -122,7 +122,7 @@ class LatticeQuery:
         No limit where maneuvers link trims: words of too many are guesses for words of fewer.
         """
         most = self.problem.horizon.max_trims
-        if most is None or not self.library.at_will:
+        if most is None or not self.automaton.is_kinematic:
             return 0
         pads = self.problem.horizon.time is not None and self.library.rest is not None
         return max(1, most - int(pads))
@@ -147,9 +147,9 @@ def lattice_query(
 ) -> LatticeQuery:
     """The query of a search from the start of a problem to the goals of these numbers.
 
-    A vehicle that switches at will in a plane begins and ends in any trim. For others several
-    headings are asked for where any will do: best times then let the heading go. A fixed time is a
-    longest one, since rest fills it.
+    A vehicle that switches at will begins and ends in any trim. Unless it does so in a plane,
+    several headings are asked for where any will do: best times then let the heading go. A fixed
+    time is a longest one, since rest fills it.
 
     Raises
     ------
@@ -211,7 +211,7 @@ def _seen(world: World, poses: Array, level: float) -> Array:
 def _end_trims(problem: Problem, library: LatticeLibrary, index: IntArray) -> IntArray:
     """Trims (1 + n,) at the start, and at these goals of the problem."""
     automaton = library.priced.automaton
-    if library.at_will:
+    if automaton.is_kinematic:
         return np.full(1 + len(index), NO_TRIM)
     last = [problem.last_trim(problem.goals[k]).name for k in index]
     numbers = [automaton.index_of(name) for name in (problem.first_trim.name, *last)]

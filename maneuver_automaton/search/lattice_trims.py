@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from maneuver_automaton.words.library import (
     NO_TRIM,
     STRAIGHT,
     Library,
+    LibraryArrays,
     four_columns,
     library_arrays,
     library_of,
@@ -73,7 +75,7 @@ def trims_at_will(
             trims=np.asarray(trims, dtype=np.int64),
             transitions=identities(automaton),
             maneuver_costs=np.zeros(0),
-            arrays=arrays._replace(
+            arrays=_with_prices(arrays, cost)._replace(
                 words=words,
                 n_few=len(words),
                 free_words=np.array(
@@ -81,8 +83,6 @@ def trims_at_will(
                     or [(int(i), int(i), m) for i in moving],
                     dtype=np.int64,
                 ).reshape(-1, 3),
-                switch=float(getattr(cost, "switch", 0.0)),
-                direction_change=float(getattr(cost, "direction_change", 0.0)),
                 min_coast=float(min_coast),
             ),
         ),
@@ -95,11 +95,14 @@ def trims_at_will(
     )
 
 
-def trims_of(library: Library) -> PricedTrims:
+def trims_of(library: Library, cost: StageCost) -> PricedTrims:
     """All trims of an automaton, whatever leads from one to the other.
 
-    Prices of switches and changes of direction are left to whoever compares plans.
+    Where maneuvers do, prices of switches and changes of direction are left to whoever compares
+    plans.
     """
+    if library.automaton.is_kinematic:
+        library = replace(library, arrays=_with_prices(library.arrays, cost))
     return PricedTrims(
         library=library,
         wide=False,
@@ -108,6 +111,14 @@ def trims_of(library: Library) -> PricedTrims:
         rest_rate=0.0,
         interval=(library.arrays.n_few / WORDS_AN_EXPANSION, MOST_INTERVAL),
         at_will=False,
+    )
+
+
+def _with_prices(arrays: LibraryArrays, cost: StageCost) -> LibraryArrays:
+    """The arrays with the prices of a switch and of a change of direction."""
+    return arrays._replace(
+        switch=float(getattr(cost, "switch", 0.0)),
+        direction_change=float(getattr(cost, "direction_change", 0.0)),
     )
 
 

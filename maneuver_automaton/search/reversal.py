@@ -72,7 +72,7 @@ def _reversed_library(
         maneuver_costs=priced.maneuver_costs,
     )
     parts = posed_parts(automaton, footprint, dict(carried), priced.trims)
-    return library_of_trims(trims_of(back), _reversed_parts(parts), waits=False)
+    return library_of_trims(trims_of(back, cost), _reversed_parts(parts), waits=False)
 
 
 def _reversed_automaton(automaton: Automaton) -> Automaton:

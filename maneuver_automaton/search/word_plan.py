@@ -12,19 +12,23 @@ from maneuver_automaton.words.word import Word, plan_of
 
 
 def plan_of_word(query: LatticeQuery, word: Word) -> Plan:
-    """The word from the problem's own start, its times corrected until it ends at the goal."""
+    """The word from the problem's own start, its times corrected until it ends at the goal.
+
+    Where trims are switched at will, a rest fills a fixed time.
+    """
     problem = query.problem
-    goal = problem.goals[query.goal_index[word.goal]]
     plan = plan_of(
-        problem.automaton,
+        query.automaton,
         word,
         problem.start,
-        goal=goal.pose,
-        free_heading=goal.free_heading,
+        goal=query.goal_poses[word.goal],
+        free_heading=bool(query.free_heading[word.goal]),
         start_time=problem.start_time,
     )
     fixed, rest = problem.horizon.time, query.library.rest
-    if fixed is None or rest is None or not plan.duration < fixed:
+    if not query.automaton.is_kinematic or fixed is None or rest is None:
+        return plan
+    if not plan.duration < fixed:
         return plan
     return replace(
         plan,

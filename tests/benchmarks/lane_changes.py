@@ -21,8 +21,9 @@ from maneuver_automaton.planning import plan
 from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.planning.plan import prepare
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.refinement.maneuver_lattice import maneuver_words, plan_of
+from maneuver_automaton.refinement.maneuver_lattice import maneuver_words
 from maneuver_automaton.search.lattice_query import lattice_query
+from maneuver_automaton.search.word_plan import plan_of_word
 
 NODES = 61
 CASES = (
@@ -87,7 +88,7 @@ def measured(problem: Problem, seconds: float) -> Row:
                 first, first_s = word, word_s
     assert first is not None
     assert word is not None
-    checked = check_plan(problem, plan_of(query, word), problem.goals[0])
+    checked = check_plan(problem, plan_of_word(query, word), problem.goals[0])
     result = plan(problem, time_limit=seconds)
     reached = [when for when, cost in result.improvements if cost == result.cost]
     began = time.perf_counter()

@@ -19,8 +19,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import Box, Obstacle
 from maneuver_automaton.problem import Bounds, Goal, Problem
-from maneuver_automaton.refinement.maneuver_lattice import plan_of
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
+from maneuver_automaton.search.word_plan import plan_of_word
 from tests.benchmarks import cases
 from tests.benchmarks.tables import show
 from tests.search.automata import inertial_unicycle, truck_with_trailer
@@ -75,7 +75,7 @@ def main() -> None:
         query = query_of(name, known)
         result = search_maneuvers(query, deadline=time.monotonic() + options.time_limit)
         first, best = result.words[0], result.words[-1]
-        off = plan_of(query, best).end - query.goal_poses[best.goal]
+        off = plan_of_word(query, best).end - query.goal_poses[best.goal]
         off[2] = np.remainder(off[2] + np.pi, 2.0 * np.pi) - np.pi
         rows.append([
             name, result.found_after[0], 1e3 * result.found_s[0], first.duration,

@@ -12,6 +12,8 @@ from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyM
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
+from maneuver_automaton.search.lattice_query import lattice_query
+from maneuver_automaton.words.library import NO_TRIM
 from tests.search.cases import compiled_only
 from tests.test_planning import GLIDER
 
@@ -124,6 +126,38 @@ def test_times_and_prices():
     assert fixed.plan.duration == pytest.approx(17.0, abs=1e-9)
     dear = found(replace(scene, cost=Cost(time=1.0, switch=5.0)))
     assert len(dear.plan.word) <= len(found(scene).plan.word)
+
+
+def test_a_longest_time_and_few_trims_are_kept():
+    scene = replace(BASE, obstacles=(TOWER,))
+    usual = found(scene)
+    quick = found(replace(scene, horizon=Horizon(max_time=12.0)))
+    few = found(replace(scene, horizon=Horizon(max_trims=8)))
+    assert quick.plan.duration <= 12.0 + 1e-9
+    assert len(few.plan.word) <= 8
+    for result in (quick, few):
+        assert result.cost <= usual.cost * 1.01
+
+
+def test_the_search_knows_what_a_switch_costs():
+    """A word of three trims, at 15 for its switches; twelve would cost 45."""
+    dear = found(replace(BASE, obstacles=(TOWER,), cost=Cost(time=1.0, switch=5.0)))
+    assert dear.cost < 40.0
+
+
+def test_any_trim_will_do_at_both_ends():
+    query = lattice_query(replace(BASE, obstacles=(TOWER,)), (0,))
+    assert query.start_trim == NO_TRIM
+    assert query.goal_trims.tolist() == [NO_TRIM]
+
+
+def test_walls_prove_that_there_is_no_way():
+    walls = [Box([8.0, 0.5], [9.0, 1.0 + side]) for side in (-2.0, 2.0)]
+    walls += [Box([0.5, 8.0], [9.0 + side, 1.0]) for side in (-2.5, 2.5)]
+    result = plan(replace(BASE, obstacles=tuple(map(Obstacle, walls))), time_limit=LIMIT)
+    assert (result.status, result.reason) == (
+        PlanStatus.UNREACHABLE, "obstacles enclose the goal"
+    )  # fmt: skip
 
 
 def test_a_blocked_goal_in_space_is_named():

@@ -13,15 +13,16 @@ from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Zone
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanStatus, plan
-from maneuver_automaton.planning.with_inertia import late_at_first
+from maneuver_automaton.planning.lattice_words import late_at_first
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.refinement.maneuver_lattice import maneuver_words, plan_of
+from maneuver_automaton.refinement.maneuver_lattice import maneuver_words
 from maneuver_automaton.search import lattice_pass, lattice_schedules
 from maneuver_automaton.search.lattice_pass import pass_of
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_schedules import LINKED
 from maneuver_automaton.search.lattice_task import WEIGHT, Resolution, task_of
 from maneuver_automaton.search.reversal import forward_word, reversed_query
+from maneuver_automaton.search.word_plan import plan_of_word
 from tests.inertia import unicycle_automaton
 from tests.search.cases import compiled_only
 
@@ -147,7 +148,7 @@ def test_a_search_from_the_goal_finds_plans_from_the_start():
     words = [one.word for one in maneuver_words(back, max_expansions=3000) if one.word]
     assert words
     for word in words:
-        one = plan_of(query, forward_word(word))
+        one = plan_of_word(query, forward_word(word))
         np.testing.assert_allclose(one.start, [0.0, 0.0, 0.0])
         np.testing.assert_allclose(one.end, [6.0, 0.0, 0.0], atol=1e-9)
         assert one.duration == pytest.approx(word.duration, abs=1e-6)
@@ -164,7 +165,7 @@ def test_it_says_how_near_it_came():
     goal = Goal(pose=[6.0, 0.0, 0.0], trim="1, 0")
     result = plan(posed(goal, obstacles=walls, search=SearchSettings(max_expansions=15)))
     assert result.plan is None
-    assert result.reason.endswith("m from the goal")
+    assert result.reason.endswith("m off")
 
 
 @pytest.mark.parametrize("aside", [0.0, 1.5, -1.5])

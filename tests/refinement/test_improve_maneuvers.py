@@ -12,8 +12,9 @@ import pytest
 from maneuver_automaton.refinement import improve as improvement
 from maneuver_automaton.refinement import work
 from maneuver_automaton.refinement.improve import Improvement, Patience
-from maneuver_automaton.refinement.maneuver_lattice import maneuver_words, plan_of
+from maneuver_automaton.refinement.maneuver_lattice import maneuver_words
 from maneuver_automaton.refinement.restarts import FINER
+from maneuver_automaton.search.word_plan import plan_of_word
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import word_of_steps
 from tests.search.cases import compiled_only
@@ -37,7 +38,7 @@ def improving(word, **changes):
 def assert_sound(word):
     """Free, from the start to the goal, from trim to trim, each where a maneuver leaves it."""
     here = query()
-    plan = plan_of(here, word)
+    plan = plan_of_word(here, word)
     assert off_goal(plan, GOAL) < 1e-12
     assert least_gap(plan, WALLS) > 0.0
     assert word_is_free(here, word)

@@ -17,9 +17,9 @@ from maneuver_automaton.collision import Box, Motion, Obstacle
 from maneuver_automaton.errors import UnknownTrim
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds, Goal, Problem
-from maneuver_automaton.refinement.maneuver_lattice import plan_of
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.result import SearchStatus
+from maneuver_automaton.search.word_plan import plan_of_word
 from tests.search.automata import (
     inertial_unicycle,
     linked,
@@ -99,7 +99,7 @@ def test_plans_are_exact_free_inside_and_cheaper_one_by_one():
     assert costs == sorted(costs, reverse=True)
     assert len(costs) >= 2
     for word in result.words:
-        plan = plan_of(here, word)
+        plan = plan_of_word(here, word)
         assert off_goal(plan, GOAL) < 1e-12
         assert plan.duration == pytest.approx(word.cost, abs=1e-6)
         assert plan.trims[0].name == plan.trims[-1].name == "0 0"
@@ -128,14 +128,14 @@ def test_a_moved_problem_has_the_moved_plan():
     )
     here, there = (search_maneuvers(one, max_expansions=400) for one in (still, moved))
     assert here.best.trims.tolist() == there.best.trims.tolist()
-    a, b = plan_of(still, here.best), plan_of(moved, there.best)
+    a, b = plan_of_word(still, here.best), plan_of_word(moved, there.best)
     assert np.abs(a.durations - b.durations).max() < 1e-7
     assert np.abs((by @ SE2(a.end)).pose - b.end).max() < 1e-9
 
 
 def test_the_goal_may_be_a_moving_trim():
     here = posed(unicycle(), START, [2.0, 1.5, 1.0], trims=("0 0", "0.5 0"))
-    plan = plan_of(here, search_maneuvers(here, first_only=True).best)
+    plan = plan_of_word(here, search_maneuvers(here, first_only=True).best)
     assert off_goal(plan, [2.0, 1.5, 1.0]) < 1e-12
     assert plan.trims[-1].name == "0.5 0"
     state = plan.sample().reduced_state[-1]
@@ -147,7 +147,7 @@ def test_a_straight_way_is_one_trim():
     here = posed(unicycle(), [0.0, 0.0, 0.3], goal, trims=("0 0", "0 0"))
     result = search_maneuvers(here, first_only=True)
     assert result.expansions == 1
-    assert plan_of(here, result.best).word == ("0 0 to 0.5 0", "0.5 0", "0.5 0 to 0 0")
+    assert plan_of_word(here, result.best).word == ("0 0 to 0.5 0", "0.5 0", "0.5 0 to 0 0")
     assert result.best.cost == pytest.approx(2 / 0.5 + 2.0, abs=1e-9)
 
 
@@ -175,7 +175,7 @@ def test_what_moves_is_let_pass():
     result = search_maneuvers(here, max_expansions=2500)
     assert result.status is SearchStatus.FOUND
     for word in result.words:
-        plan = plan_of(here, word)
+        plan = plan_of_word(here, word)
         assert off_goal(plan, [4.0, 0.0, 0.0]) < 1e-12
         assert word_is_free(here, word)
         assert least_gap(plan, (crossing,)) > 0.0
@@ -191,7 +191,7 @@ def test_a_trailer_stays_free_too():
     result = search_maneuvers(here, max_expansions=600)
     assert result.status is SearchStatus.FOUND
     for word in result.words:
-        plan = plan_of(here, word)
+        plan = plan_of_word(here, word)
         assert off_goal(plan, goal) < 1e-12
         assert abs(plan.sample().reduced_state[-1, 0]) < 1e-9
         assert (
@@ -220,7 +220,7 @@ def test_altitude_is_gained_on_the_way(height):
     result = search_maneuvers(here, max_expansions=8000, first_only=True)
     assert result.status is SearchStatus.FOUND
     for word in result.words:
-        plan = plan_of(here, word)
+        plan = plan_of_word(here, word)
         assert off_goal(plan, goal) < 1e-12
         assert word_is_free(here, word)
 

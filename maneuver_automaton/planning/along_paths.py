@@ -1,0 +1,93 @@
+"""Plans along the paths of a simpler vehicle, which switches at will: stop at each switch, and go.
+
+For vehicles that can: those whose model knows that simpler vehicle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.collision import Obstacle
+from maneuver_automaton.planning.checking import what_is_hit
+from maneuver_automaton.planning.incumbents import Incumbents
+from maneuver_automaton.planning.polishing import Aimed, guess_along
+from maneuver_automaton.planning.tracking import Tracked, track
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.refinement.improve import Patience
+from maneuver_automaton.refinement.kinematic_paths import kinematic_problem
+from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
+from maneuver_automaton.search.budget import Budget
+
+FIRST_SHARE = 0.8  # of the time limit, for a first path
+IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
+AT_ONCE = Patience(attempts=0, passes=0)
+WAITS = 9  # at rest, before a path is followed among obstacles that move
+
+
+@dataclass(slots=True, eq=False)
+class AlongPaths:
+    """Paths of the simpler vehicle, and what came of them."""
+
+    found: Incumbents
+    reason: str = ""  # why there is no path
+    enclosed: str = ""  # why no plan can exist
+    guesses: list[Aimed] = field(default_factory=list)  # along the paths, for polishing
+
+    def plans(self) -> Iterator[tuple[Plan, int]]:
+        """Stop and steer along a first path, then along one that is fast to follow so."""
+        found, problem = self.found, self.found.problem
+        free = kinematic_problem(problem, switch=0.0)
+        first = self._track(free, found.budget.stage(FIRST_SHARE), patience=AT_ONCE)
+        if first.plan is None or first.goal_index is None:
+            self.enclosed = first.reason if first.enclosed else ""
+            self.reason = f" ({first.reason})" if first.reason else ""
+            return
+        yield from _stopping(found, first.plan, first.goal_index)
+        if first.plan.duration > 0.0:
+            self.guesses.append(guess_along(problem, first.plan))
+        soon = found.budget.stage(IMPROVED_SHARE)
+        better = self._track(kinematic_problem(problem), soon, known=first.plan)
+        if better.plan is not None and better.goal_index is not None:
+            yield from _stopping(found, better.plan, better.goal_index)
+
+    def _track(self, problem: Problem, budget: Budget, **more: Any) -> Tracked:
+        """A path of the simpler vehicle; what it takes is counted."""
+        prepared = self.found.workspace.prepared
+        path = track(problem, time_limit=budget.left, prepared=prepared, **more)
+        self.found.counts.update(expansions=path.expansions, collision_queries=path.queries)
+        return path
+
+
+def _stopping(found: Incumbents, path: Plan, goal_index: int) -> Iterator[tuple[Plan, int]]:
+    """Stop and steer along a path, once obstacles that move let it.
+
+    The path was free at the pace of the simpler vehicle. This one is slower, so that it meets
+    moving obstacles elsewhere: it waits before it starts, as long as it takes, or does not go.
+    """
+    problem, goal = found.problem, found.problem.goals[goal_index]
+    plan = stop_and_steer(
+        problem.automaton.model,  # type: ignore[arg-type]
+        path,
+        first=problem.first_trim,
+        last=problem.last_trim(goal),
+    )
+    if not problem.moves:
+        yield plan, goal_index
+        return
+    settled = max(
+        float(one.motion.time[-1])
+        for one in problem.obstacles
+        if isinstance(one, Obstacle) and one.motion is not None
+    )
+    for wait in np.linspace(0.0, max(settled - problem.start_time, 0.0), WAITS):
+        durations = plan.durations.copy()
+        durations[0] += wait
+        later = replace(plan, durations=durations)
+        if not what_is_hit(problem, later, goal, found.workspace):
+            yield later, goal_index
+            return

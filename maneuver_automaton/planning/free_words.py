@@ -1,0 +1,62 @@
+"""Words of free space, for every vehicle: they look at no obstacle, and the checks decide."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Iterable, Iterator
+
+from maneuver_automaton.planning.incumbents import Candidate, Incumbents
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.search.choose import search_goal
+from maneuver_automaton.search.result import SearchResult, plan_of
+from maneuver_automaton.search.word_stages import maneuver_word_stages
+from maneuver_automaton.words.word import Word
+
+LEAST_TIME = 1e-3  # [s] for each goal, also where the time is over
+
+
+def free_words(
+    found: Incumbents, goals: Iterable[int], *, others: int | None, share: float = 1.0
+) -> Iterator[tuple[int, SearchResult]]:
+    """What the searches for words to some goals found, stage by stage, each with its goal.
+
+    Each search may take a `share` of the time that is left, and finds `others` words beside the
+    cheapest; None asks for all there are. Words with maneuvers count their work where the problem
+    limits it, and then may take all the time. Where only the cheapest of these counts, what is
+    known already bounds its cost.
+    """
+    problem = found.problem
+    for index in goals:
+        goal = problem.goals[index]
+        if problem.automaton.is_kinematic:
+            seconds = max(share * found.budget.left, LEAST_TIME)
+            for result in search_goal(problem, goal, alternatives=others, time_limit=seconds):
+                yield index, result
+            continue
+        for result in maneuver_word_stages(
+            problem,
+            goal,
+            alternatives=others or 0,
+            time_limit=max(found.budget.stage(share).left, LEAST_TIME),
+            upper_bound=math.inf if others else found.cost,
+        ):
+            yield index, result
+
+
+def words_once(stages: Iterable[tuple[int, SearchResult]]) -> Iterator[tuple[Word, int]]:
+    """The words of all stages as they are found, each once, with the goals they reach."""
+    seen: list[Word] = []
+    for index, result in stages:
+        for word in result.solutions:
+            if not any(word is one for one in seen):
+                seen.append(word)
+                yield word, index
+
+
+def word_candidate(
+    problem: Problem, word: Word, goal_index: int, *, proven: bool = True
+) -> Candidate:
+    """A word as a plan that is still to be checked, `proven` as in `Candidate`."""
+    make = functools.partial(plan_of, problem, word)
+    return Candidate(word.cost, goal_index, make, proven=proven)

@@ -1,0 +1,297 @@
+"""Words of the lattice among obstacles: a first one, then better ones, and others beside it."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.same_motion import UNFINISHED, is_new
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.planning.blocked import open_goals
+from maneuver_automaton.planning.bounds import lattice_bound
+from maneuver_automaton.planning.checking import load_checks
+from maneuver_automaton.planning.detours import with_stones
+from maneuver_automaton.planning.free_words import free_words, word_candidate, words_once
+from maneuver_automaton.planning.incumbents import Candidate, Incumbents
+from maneuver_automaton.planning.steps import Steps
+from maneuver_automaton.problem import moves
+from maneuver_automaton.refinement.improve import Improved, Patience, improve
+from maneuver_automaton.refinement.maneuver_lattice import quick_word
+from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
+from maneuver_automaton.refinement.restarts import restarts_of
+from maneuver_automaton.search.budget import Budget
+from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable, cost_to_go_table
+from maneuver_automaton.search.lattice import FirstPlan, first_plan
+from maneuver_automaton.search.lattice_pass import with_cost
+from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
+from maneuver_automaton.search.waiting import with_waits
+from maneuver_automaton.search.word_plan import plan_of_word
+from maneuver_automaton.words.word import Word
+
+AT_ONCE = Patience(attempts=0, passes=0)
+SOME = Patience(attempts=400, passes=0)  # of a plan beside a stone
+BRIEF = Patience(attempts=1000, passes=3)  # of the path among static obstacles
+MOST_WAYS = 4  # that are tried with rests
+QUICK = 1500  # expansions in space and time before a way with rests is tried
+PASSING_SHARE = 0.3  # of the time that is left, for paths that let moving obstacles pass
+BEFORE_POLISHING = 0.2  # share of what is left that the lattice gets, once there is a plan
+FOR_THE_BEST = 0.6  # the same where alternatives are asked for
+FREE_WORDS = 4  # words of free space that are looked at for every alternative
+FREE_WORDS_SHARE = 0.3  # of the time that is left for alternatives
+MOST_DETOURS = 8  # known ways beside which others are looked for
+
+
+@dataclass(slots=True, eq=False)
+class LatticeWords:
+    """The words that the lattice has found so far, the cheapest last."""
+
+    query: LatticeQuery
+    table: CostTable
+    found: Incumbents
+    steps: Steps
+    limit: Budget
+    words: list[Word] = field(default_factory=list)
+    spent: int = 0  # expansions of first plans and improvements
+    first: FirstPlan | None = None  # how the search for a first plan ended
+    bound: float = 0.0  # no word is cheaper
+
+    @property
+    def budget(self) -> Budget:
+        """What is left."""
+        return self.limit.less(self.spent)
+
+    @property
+    def knows_all(self) -> bool:
+        """Whether the lattice knows every condition and price, so that its words are plans.
+
+        It does where trims in the plane are switched at will. What others find is checked, with
+        its best times, as soon as it is found: a later word may be refused.
+        """
+        return self.query.library.at_will
+
+    def gained(self, word: Word) -> None:
+        """A better word was found."""
+        self.words.append(word)
+        if self.knows_all:
+            self.found.note(word.cost + self.query.padding)
+            return
+        problem, index = self.query.problem, self.query.goal_index[word.goal]
+        plan = plan_of_word(self.query, word)
+        self.found.offer(plan, index)
+        better = with_relaxed_end(problem, plan, problem.goals[index])
+        if better is not None:
+            self.found.offer(better, index, proven=False)  # it ends its coasts elsewhere
+
+    def first_plan(
+        self, query: LatticeQuery, budget: Budget, *, most: int | None = None
+    ) -> FirstPlan:
+        """A first plan for a query, its expansions counted."""
+        limits = [one for one in (most, budget.expansions) if one is not None]
+        found = first_plan(
+            query,
+            deadline=budget.deadline,
+            max_expansions=min(limits, default=None),
+            table=self.table,
+        )
+        self._count(found.expansions, found.queries, searches=1)
+        return found
+
+    def improve(
+        self, query: LatticeQuery, word: Word, budget: Budget, *, patience: Patience, **more: Any
+    ) -> Improved:
+        """A better word for a query, its attempts and expansions counted."""
+        found = improve(
+            query,
+            word,
+            deadline=budget.deadline,
+            max_expansions=budget.expansions,
+            patience=patience,
+            table=self.table,
+            restarts=restarts_of(query.library),
+            **more,
+        )
+        self._count(found.expansions, found.queries, searches=found.passes, attempts=found.attempts)
+        return found
+
+    def _count(self, expansions: int, queries: int, **more: int) -> None:
+        self.spent += expansions
+        self.found.counts.update(expansions=expansions, collision_queries=queries)
+        if self.knows_all:
+            self.found.counts.update(more)
+
+
+def search_lattice(found: Incumbents, steps: Steps) -> LatticeWords:
+    """The words found for a problem: a first one, and better ones for as long as there is time.
+
+    All the time that is left may go by until there is a plan; a share of it is for better ones
+    where polishing or alternatives come after.
+    """
+    problem, prepared = found.problem, found.workspace.prepared
+    query = lattice_query(problem, open_goals(problem), prepared=prepared)
+    known = query.library.at_will
+    table = cost_to_go_table(problem, prepared=prepared) if known else NO_TABLE
+    query = query if known else late_at_first(query)
+    share = BEFORE_POLISHING if steps.polishes and found.plans else 1.0
+    lattice = LatticeWords(query, table, found, steps, found.budget.stage(share))
+    lattice.first = _first(lattice)
+    lattice.bound = lattice_bound(query) if steps.at_will else 0.0
+    return lattice
+
+
+def _first(lattice: LatticeWords) -> FirstPlan | None:
+    """The first plan; where something moves, a way that lets it pass if a quick look finds none."""
+    query, limit = lattice.query, lattice.limit
+    if not lattice.knows_all and _needs_quick_word(query) and _quick(lattice):
+        return None
+    if query.problem.moves and lattice.knows_all:
+        first = lattice.first_plan(query, limit, most=QUICK)
+        if first.word is not None:
+            lattice.gained(with_cost(first.word, query))
+            return first
+        way = lattice.first_plan(_among_what_stands(query), limit)
+        timed = None if way.word is None else with_waits(query, way.word)
+        if timed is not None:
+            lattice.gained(timed)
+            return first
+    first = lattice.first_plan(query, limit)
+    if first.word is not None:
+        lattice.gained(with_cost(first.word, query))
+    return first
+
+
+def _quick(lattice: LatticeWords) -> bool:
+    """Whether a search at the price of time alone found a word in time."""
+    query, limit = lattice.query, lattice.limit
+    in_time = replace(query.problem, cost=Cost(time=1.0))
+    quick = lattice_query(in_time, _goals(query), prepared=query.prepared)
+    known, more = quick_word(
+        query, late_at_first(quick), deadline=limit.deadline, max_expansions=limit.expansions
+    )
+    lattice.found.counts.update(expansions=more)
+    if known is not None:
+        lattice.gained(known)
+    return known is not None
+
+
+def late_at_first(query: LatticeQuery) -> LatticeQuery:
+    """The query with no longest time where what costs less is what lasts less.
+
+    There a first word may be late, and what shortcuts and polishing make of it is in time; whatever
+    stays late is refused.
+    """
+    edges, trims = query.library.arrays, query.library.arrays.library
+    rates = trims.rates[: trims.n_trims]  # the last row is the turn of a free heading
+    close = functools.partial(np.allclose, rtol=1e-9, atol=1e-12)
+    timed = close(rates, rates[0]) and close(edges.edge_cost, rates[0] * edges.edge_time)
+    return replace(query, most_time=math.inf) if timed else query
+
+
+def _needs_quick_word(query: LatticeQuery) -> bool:
+    """Whether a search by cost alone would look everywhere, or for too long motions."""
+    return math.isfinite(query.most_time) or query.library.per_metre == 0.0
+
+
+def improved(lattice: LatticeWords) -> list[Candidate]:
+    """Plans to be checked, the cheapest first: what was found, and others if they are asked for."""
+    query, found = lattice.query, lattice.found
+    if not lattice.words:
+        return []
+    if query.problem.moves and lattice.knows_all:
+        _let_pass(lattice)
+    better = lattice.improve(
+        query,
+        lattice.words[-1],
+        _for_the_best(lattice),
+        patience=Patience(),
+        floor=lattice.bound - query.padding if lattice.knows_all else -math.inf,
+        better=lattice.gained,
+        meanwhile=lambda: load_checks(query.problem, found.workspace),
+    )
+    if not lattice.knows_all:
+        return []
+    candidates = [_candidate(query, word) for word in (*lattice.words, *better.others)]
+    if found.alternatives:
+        candidates += _free_words(lattice)
+        candidates += _detours(lattice, better.word, 2 * found.alternatives)
+    return sorted(candidates, key=lambda one: one.cost)
+
+
+def _for_the_best(lattice: LatticeWords) -> Budget:
+    """What the improvement of the best plan may take."""
+    left = lattice.budget
+    if lattice.steps.polishes:
+        return left.stage(BEFORE_POLISHING)
+    share = FOR_THE_BEST if lattice.knows_all and lattice.found.alternatives else 1.0
+    most = None if left.expansions is None else int(share * left.expansions)
+    return replace(left.part(share), expansions=most)
+
+
+def _let_pass(lattice: LatticeWords) -> None:
+    """Take note of the cheapest path among static obstacles, with rests that let others pass."""
+    query, calm = lattice.query, _among_what_stands(lattice.query)
+    soon = lattice.limit.part(PASSING_SHARE)
+    found = lattice.first_plan(calm, soon)
+    if found.word is None:
+        return
+    better = lattice.improve(calm, found.word, replace(soon, expansions=None), patience=BRIEF)
+    ways = sorted([found.word, better.word, *better.others], key=lambda one: one.cost)
+    distinct = {tuple(way.trims.tolist()): way for way in reversed(ways)}
+    for way in list(distinct.values())[::-1][:MOST_WAYS]:
+        timed = with_waits(query, way)
+        if timed is not None and timed.cost < lattice.words[-1].cost:
+            lattice.gained(timed)
+
+
+def _among_what_stands(query: LatticeQuery) -> LatticeQuery:
+    """The query without moving obstacles."""
+    problem = query.problem
+    still = tuple(obstacle for obstacle in problem.obstacles if not moves(obstacle))
+    return lattice_query(replace(problem, obstacles=still), _goals(query), prepared=query.prepared)
+
+
+def _goals(query: LatticeQuery) -> list[int]:
+    """Which of the problem's goals a query leads to, each once, however many headings it has."""
+    return list(dict.fromkeys(query.goal_index))
+
+
+def _candidate(query: LatticeQuery, word: Word) -> Candidate:
+    make = functools.partial(plan_of_word, query, word)
+    return Candidate(word.cost + query.padding, query.goal_index[word.goal], make)
+
+
+def _free_words(lattice: LatticeWords) -> Iterator[Candidate]:
+    """Words that are locally optimal in free space: those that hit nothing are so here, too."""
+    found, goals = lattice.found, _goals(lattice.query)
+    others = FREE_WORDS * found.alternatives
+    for word, index in words_once(free_words(found, goals, others=others, share=FREE_WORDS_SHARE)):
+        yield word_candidate(found.problem, word, index, proven=False)
+
+
+def _detours(lattice: LatticeWords, best: Word, most: int) -> Iterator[Candidate]:
+    """Up to `most` plans on other ways round the obstacles: a stone closes each known way."""
+    query = lattice.query
+    known: list[Plan] = [plan_of_word(query, best)]
+    for n_th in range(MOST_DETOURS):
+        if n_th >= len(known) or len(known) > most:
+            return
+        for problem in with_stones(query, known[n_th]):
+            if lattice.budget.is_over or lattice.budget.expansions == 0:
+                return
+            closed = lattice_query(problem, _goals(query), prepared=query.prepared)
+            first = lattice.first_plan(closed, lattice.budget)
+            if first.word is None:
+                continue
+            word = with_cost(first.word, closed)
+            for where in (closed, query):  # away from the stone, then without it
+                patience = SOME if where is closed else AT_ONCE
+                word = lattice.improve(where, word, lattice.budget, patience=patience).word
+            plan = plan_of_word(query, word)
+            if is_new(plan, known, UNFINISHED):
+                known.append(plan)
+                yield _candidate(query, word)

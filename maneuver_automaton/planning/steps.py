@@ -1,0 +1,140 @@
+"""Which steps lead to the plans of a problem: decided once, by what its vehicle and library can do.
+
+The order of the steps and all that they share is the same for every vehicle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from maneuver_automaton.automaton.same_motion import POLISHED, UNFINISHED, Likeness
+from maneuver_automaton.planning.checking import load_checking
+from maneuver_automaton.planning.polishing import (
+    load_polishing,
+    rests_at_both_ends,
+    why_not_polished,
+)
+from maneuver_automaton.planning.workspace import Workspace
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinematic_problem
+from maneuver_automaton.refinement.ready import load_lattice, load_maneuver_kernels
+from maneuver_automaton.search.choose import load_search
+from maneuver_automaton.search.cost_to_go import cost_to_go_table
+from maneuver_automaton.search.linked_words import load_linked_words
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Steps:
+    """What is done for a problem, in this order."""
+
+    along_paths: bool  # stop and steer along the paths of a kinematic vehicle
+    words: bool  # offer words of free space before the lattice is searched
+    lattice: bool
+    polishes: bool  # at the end, what was found
+    at_will: bool  # trims are switched so: plans are words, and words are all there is
+    likeness: Likeness  # of plans that count as one motion
+
+
+def steps_of(problem: Problem) -> Steps:
+    """The steps that lead to plans of a problem.
+
+    Where nothing is in the way, words come before the lattice: they are found sooner, and keep to
+    every condition of the horizon. Among obstacles the lattice alone finds its way round; but in
+    space, where it has one more dimension, a word that passes above or below is found sooner.
+    """
+    method, automaton = problem.search.method, problem.automaton
+    searched = method in ("auto", "lattice")
+    if not has_inertia(problem):
+        return Steps(
+            along_paths=False,
+            words=climbs_among_obstacles(problem),
+            lattice=searched,
+            polishes=False,
+            at_will=True,
+            likeness=UNFINISHED,
+        )
+    linked = bool(automaton.maneuvers)
+    first = method == "auto" and _suits_words(problem)
+    return Steps(
+        along_paths=searched and follows_paths(automaton.model) and rests_at_both_ends(problem),
+        words=linked and (not searched or first),
+        lattice=linked and searched,
+        polishes=not why_not_polished(problem),
+        at_will=False,
+        likeness=POLISHED,
+    )
+
+
+def has_inertia(problem: Problem) -> bool:
+    """Whether the vehicle cannot switch at will between the trims that it needs."""
+    automaton = problem.automaton
+    return bool(automaton.model.reduced_names) or not automaton.is_kinematic
+
+
+def uses_lattice(problem: Problem) -> bool:
+    """Whether the lattice is what plans: it was asked for, or there is something in the way.
+
+    In the plane it needs trims of which one turns, or two that lead to different sides where none
+    does and the heading never changes; and a rest where the time is fixed. Otherwise words are
+    searched, and what is in the way sorts them out.
+    """
+    if climbs_among_obstacles(problem):
+        return True
+    velocities = problem.automaton.body_velocities
+    moving = velocities[velocities.any(axis=1)]
+    turns = bool(moving[:, 2].any())
+    keeps_heading = problem.automaton.translated is not None and not has_inertia(problem)
+    sides = turns or (keeps_heading and np.linalg.matrix_rank(moving[:, :2]) == 2)
+    steers = len(moving) > 1 and sides and velocities.shape[1] == 3
+    if not steers or (problem.horizon.time is not None and len(moving) == len(velocities)):
+        return False
+    method = problem.search.method
+    return method == "lattice" or (method == "auto" and bool(problem.obstacles))
+
+
+def climbs_among_obstacles(problem: Problem) -> bool:
+    """Whether a vehicle that switches at will has more than a plane, and something is in its way.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Disc, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "left": (0.0, 1.0)})
+    >>> climbs_among_obstacles(Problem(robot, [0, 0, 0], [9, 0, 0], obstacles=Disc(1.0, [4, 0])))
+    False
+    """
+    in_space = problem.start.size > 3 and problem.automaton.is_kinematic
+    return in_space and bool(problem.obstacles) and problem.search.method in ("auto", "lattice")
+
+
+def load_steps(problem: Problem, workspace: Workspace) -> None:
+    """Compile or load what the steps of a problem need, before the clock runs."""
+    steps = steps_of(problem)
+    if steps.at_will and problem.start.size > 3:
+        load_search(problem)
+        load_maneuver_kernels()
+        return
+    load_lattice()
+    if steps.at_will:
+        cost_to_go_table(problem, prepared=workspace.prepared)
+        return
+    load_checking()
+    if follows_paths(problem.automaton.model) and rests_at_both_ends(problem):
+        simpler = kinematic_problem(problem, switch=0.0)
+        cost_to_go_table(simpler, prepared=workspace.prepared)
+        if steps.polishes:
+            load_polishing(problem)
+    if problem.automaton.maneuvers:
+        load_maneuver_kernels()
+        if _suits_words(problem) or steps.words:
+            load_linked_words()
+
+
+def _suits_words(problem: Problem) -> bool:
+    """Whether words may be searched first: nothing is in the way, or the time is to be met exactly.
+
+    Where no rest fills a fixed time, words alone have times that add up to it.
+    """
+    rests = problem.first_trim.is_rest or problem.last_trim(problem.goals[0]).is_rest
+    return not problem.obstacles or (problem.horizon.time is not None and not rests)
