@@ -11,8 +11,12 @@ import math
 
 import numpy as np
 
-from maneuver_automaton._compile import bare_inner_kernel, inner_kernel
+from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, merged_kernel
+from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search._kernels_problem import (
+    AIM,
+    FIRST,
+    FOLLOWING,
     condition,
     is_straight,
     propose,
@@ -21,6 +25,8 @@ from maneuver_automaton.search._kernels_problem import (
 )
 from maneuver_automaton.words._kernels_steering import steer, unit
 from maneuver_automaton.words._kernels_times import assign, end_and_columns
+
+NONE_LEFT = 1e-9  # [m] that only rounding leaves
 
 
 @bare_inner_kernel
@@ -279,10 +285,13 @@ def scan_one(problem, candidates, word, n, triple, free, upper_bound):
     there = np.zeros((2, nodes + 1), dtype=np.bool_)
     node_times = np.zeros((2, nodes + 1, n))
     node_values = np.zeros((2, nodes + 1))
+    costs = np.zeros((2, nodes + 1))
+    most = nearly_cheap(problem, word, n, upper_bound)
     for j in range(nodes + 1):
         times[q] = reach * j / nodes
         solve_triple(problem, candidates, word, n, triple, times, both)
         for branch in range(2):
+            costs[branch, j] = coasting_cost(problem, word, triple, q, times[q], both[branch])
             copy_branches(scratch[0], both)
             if take_branch(problem, word, n, triple, free, branch, scratch, times, values):
                 there[branch, j] = True
@@ -299,6 +308,8 @@ def scan_one(problem, candidates, word, n, triple, free, upper_bound):
     stack = (np.zeros((24, n)), np.zeros((24, n)), np.zeros((24, 4)))
     for branch in range(2):
         for j in range(nodes):
+            if not may_be_cheap(costs[branch, j], costs[branch, j + 1], most):
+                continue
             if not (there[branch, j] or there[branch, j + 1]):
                 continue
             bend = np.inf
@@ -331,8 +342,8 @@ def scan_one(problem, candidates, word, n, triple, free, upper_bound):
             bisect(problem, candidates, word, n, triple, free, branch, scratch, values, stack)
 
 
-@bare_inner_kernel
-def any_node_may_do(problem, candidates, word, n, triple, times, out, upper_bound):
+@merged_kernel
+def any_node_may_do(problem, candidates, word, n, triple, room, upper_bound):
     """Whether a word with one free time may have a solution, as far as its nodes show.
 
     At one of them it costs little more than the upper bound and, where a time is to be met, at one
@@ -340,23 +351,26 @@ def any_node_may_do(problem, candidates, word, n, triple, times, out, upper_boun
     a tenth of the time that the reduced gradients and the bisection take. To climb is no reason:
     of words that climb too many were left out, and plans came out 3 % dearer.
     """
+    times, out, _ = room
     q = 6 - triple[0] - triple[1] - triple[2]  # the position of four that is not solved for
     reach = affordable(problem, word, n, word[q], upper_bound)
     if not reach > 0.0:
         return False
     m = problem.targets.size
-    most = upper_bound * (1.0 + problem.slack) - problem.pad_cost - word_extra(problem, word, n)
+    most = nearly_cheap(problem, word, n, upper_bound)
+    lowest = upper_bound - problem.pad_cost - word_extra(problem, word, n)
     nodes = max(8, math.ceil(problem.nodes * reach / problem.reaches[word[q]]))
     is_cheap, is_near = False, m == 0 or time_left(problem) == np.inf
     before = (math.nan, math.nan)  # what each branch lacked at the node before
+    per_metre = least_per_metre(problem, word, n, q)
     for j in range(nodes + 1):
         times[q] = reach * j / nodes
+        if is_near and q == 0 and least_after(problem, word[0], times[0], per_metre) >= lowest:
+            continue  # no time of the others makes it cheap
         solve_triple(problem, candidates, word, n, triple, times, out)
         lacks = (math.nan, math.nan)
         for branch in range(2):
-            cost = problem.rates[word[q]] * times[q]
-            for s in range(3):
-                cost += problem.rates[word[triple[s]]] * out[branch, s]
+            cost = coasting_cost(problem, word, triple, q, times[q], out[branch])
             is_cheap = is_cheap or cost < most  # not where the branch is empty: NaN
             if is_near:
                 continue
@@ -371,7 +385,63 @@ def any_node_may_do(problem, candidates, word, n, triple, times, out, upper_boun
     return False
 
 
+@merged_kernel
+def nearly_cheap(problem, word, n, upper_bound):
+    """What the trims of a word may cost at a node for it to be looked at."""
+    if problem.slack == np.inf:
+        return np.inf
+    extra = problem.pad_cost + word_extra(problem, word, n)
+    return upper_bound * (1.0 + problem.slack) - extra
+
+
 @bare_inner_kernel
+def may_be_cheap(one, other, most):
+    """Whether a branch may cost less than `most` between nodes; NaN where it is not at a node."""
+    change = abs(other - one)
+    if math.isnan(change):
+        return one < most or other < most
+    return min(one, other) - change < most
+
+
+@merged_kernel
+def coasting_cost(problem, word, triple, free, time, solved):
+    """What the trims of a word cost: one for a given time, three for the times of a branch."""
+    cost = problem.rates[word[free]] * time
+    for s in range(3):
+        cost += problem.rates[word[triple[s]]] * abs(solved[s])
+    return cost
+
+
+@merged_kernel
+def least_per_metre(problem, word, n, left_out):
+    """Best price per metre among the trims of a word but one; 0 where one of them is paid for."""
+    price = np.inf
+    for i in range(n):
+        if i != left_out:
+            price = min(price, problem.prices[word[i], 0])
+            if problem.rates[word[i]] < 0.0:
+                return 0.0
+    return price
+
+
+@merged_kernel
+def least_after(problem, trim, time, per_metre):
+    """Lower bound of what coasting costs in a word whose first trim lasts `time`.
+
+    From where it ends, and the transition before it began, the rest of the word has to lead to the
+    goal: as far as its transitions cannot, at `per_metre`.
+    """
+    dx, dy, heading = coast(
+        problem.twists[trim, 0], problem.twists[trim, 1], problem.twists[trim, 2], time
+    )
+    x, y, _ = compose(dx, dy, heading, problem.fixed[FIRST], problem.fixed[FIRST + 1], 0.0)
+    way = math.hypot(problem.fixed[AIM] - x, problem.fixed[AIM + 1] - y)
+    left = way - problem.fixed[FOLLOWING]
+    least = problem.rates[trim] * time
+    return least + left * per_metre if left > NONE_LEFT else least
+
+
+@merged_kernel
 def is_met_nearby(problem, word, triple, lack, before):
     """Whether what a condition lacks at a node is next to nothing, or whole turns can make it up.
 
