@@ -41,7 +41,7 @@ class WordProblem(NamedTuple):
     parallel: Any  # (M, M) whether two twists are parallel
     weights: Any  # (M,) 1 where a trim takes time and counts, 0 for the turn of a free heading
     goal: Any  # (4,) relative to the start
-    fixed: Any  # (9,) see below
+    fixed: Any  # (9,) what is known of a word before its times are: COST, TIME, ... below
     time_limit: float  # sum of all times at most this, transitions included; inf
     pad: int  # 1 where rest fills up to time_limit
     pad_cost: float  # cost of time_limit seconds of rest
@@ -56,7 +56,7 @@ class WordProblem(NamedTuple):
     tail: int  # trim that ends every word without counting, -1 for none
 
 
-# What is known of a word before its times are, by its place in `fixed`:
+# Places in `fixed`:
 COST, TIME = 0, 1  # of the transitions
 WAY, TURN = 2, 3  # that is left to the trims at least
 FIRST = 4  # x and y of the place after the first transition

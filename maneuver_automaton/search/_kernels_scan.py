@@ -64,9 +64,16 @@ def moved(pose, velocity, turn_rate, time):
 
 
 @bare_inner_kernel
-def solve_triple(problem, candidates, word, n, triple, times, out):
-    """Both branches (2, 3) of the times at `triple`, the other `times` being given."""
-    candidates.counter[2] += 1
+def solve_triple(steering, word, n, triple, times, out):
+    """Both branches (2, 3) of the times at `triple`, the other `times` being given.
+
+    It takes what it needs, twists, goal, tolerance and the counter of its calls, and not the
+    problem: a call hands over every field of every structure, and this is called at every node. A
+    function for that would not do: it counts no references, so it may not return an array to one
+    that does.
+    """
+    twists, goal, tolerance, counter = steering
+    counter[2] += 1
     pose = (0j, 0.0)
     lead = pose
     gap_1 = pose
@@ -86,25 +93,25 @@ def solve_triple(problem, candidates, word, n, triple, times, out):
             t = word[i]
             pose = moved(
                 pose,
-                complex(problem.twists[t, 0], problem.twists[t, 1]),
-                problem.twists[t, 2],
+                complex(twists[t, 0], twists[t, 1]),
+                twists[t, 2],
                 times[i],
             )
     # goal seen from the end of the lead, before the tail
-    z = complex(problem.goal[0], problem.goal[1])
-    heading = problem.goal[2] - pose[1]
+    z = complex(goal[0], goal[1])
+    heading = goal[2] - pose[1]
     z -= pose[0] * unit(heading)
     z = (z - lead[0]) * unit(-lead[1])
     heading -= lead[1]
     a, b, c = word[triple[0]], word[triple[1]], word[triple[2]]
     steer(
-        (complex(problem.twists[a, 0], problem.twists[a, 1]), problem.twists[a, 2]),
+        (complex(twists[a, 0], twists[a, 1]), twists[a, 2]),
         gap_1,
-        (complex(problem.twists[b, 0], problem.twists[b, 1]), problem.twists[b, 2]),
+        (complex(twists[b, 0], twists[b, 1]), twists[b, 2]),
         gap_2,
-        (complex(problem.twists[c, 0], problem.twists[c, 1]), problem.twists[c, 2]),
+        (complex(twists[c, 0], twists[c, 1]), twists[c, 2]),
         (z, heading),
-        problem.tolerance,
+        tolerance,
         out,
     )
 
@@ -248,7 +255,8 @@ def take_branch(problem, word, n, triple, free, branch, scratch, times, values):
 @bare_inner_kernel
 def evaluate(problem, candidates, word, n, triple, free, times, branch, scratch, values):
     """Solve one branch at given free times, and take it."""
-    solve_triple(problem, candidates, word, n, triple, times, scratch[0])
+    steering = (problem.twists, problem.goal, problem.tolerance, candidates.counter)
+    solve_triple(steering, word, n, triple, times, scratch[0])
     return take_branch(problem, word, n, triple, free, branch, scratch, times, values)
 
 
@@ -286,10 +294,11 @@ def scan_one(problem, candidates, word, n, triple, free, upper_bound):
     node_times = np.zeros((2, nodes + 1, n))
     node_values = np.zeros((2, nodes + 1))
     costs = np.zeros((2, nodes + 1))
+    steering = (problem.twists, problem.goal, problem.tolerance, candidates.counter)
     most = nearly_cheap(problem, word, n, upper_bound)
     for j in range(nodes + 1):
         times[q] = reach * j / nodes
-        solve_triple(problem, candidates, word, n, triple, times, both)
+        solve_triple(steering, word, n, triple, times, both)
         for branch in range(2):
             costs[branch, j] = coasting_cost(problem, word, triple, q, times[q], both[branch])
             copy_branches(scratch[0], both)
@@ -363,11 +372,12 @@ def any_node_may_do(problem, candidates, word, n, triple, room, upper_bound):
     is_cheap, is_near = False, m == 0 or time_left(problem) == np.inf
     before = (math.nan, math.nan)  # what each branch lacked at the node before
     per_metre = least_per_metre(problem, word, n, q)
+    steering = (problem.twists, problem.goal, problem.tolerance, candidates.counter)
     for j in range(nodes + 1):
         times[q] = reach * j / nodes
         if is_near and q == 0 and least_after(problem, word[0], times[0], per_metre) >= lowest:
             continue  # no time of the others makes it cheap
-        solve_triple(problem, candidates, word, n, triple, times, out)
+        solve_triple(steering, word, n, triple, times, out)
         lacks = (math.nan, math.nan)
         for branch in range(2):
             cost = coasting_cost(problem, word, triple, q, times[q], out[branch])
@@ -396,7 +406,11 @@ def nearly_cheap(problem, word, n, upper_bound):
 
 @bare_inner_kernel
 def may_be_cheap(one, other, most):
-    """Whether a branch may cost less than `most` between nodes; NaN where it is not at a node."""
+    """Whether a branch that costs `one` and `other` at two nodes may cost less between them.
+
+    Less than `most`, if it falls no more than it does from one to the other. NaN where it is not at
+    a node.
+    """
     change = abs(other - one)
     if math.isnan(change):
         return one < most or other < most
@@ -405,7 +419,10 @@ def may_be_cheap(one, other, most):
 
 @merged_kernel
 def coasting_cost(problem, word, triple, free, time, solved):
-    """What the trims of a word cost: one for a given time, three for the times of a branch."""
+    """What the trims of a word cost: one for a given time, three for the times of a branch.
+
+    A negative time, of a straight, costs as much as a positive one: so far it is from admissible.
+    """
     cost = problem.rates[word[free]] * time
     for s in range(3):
         cost += problem.rates[word[triple[s]]] * abs(solved[s])
@@ -414,13 +431,13 @@ def coasting_cost(problem, word, triple, free, time, solved):
 
 @merged_kernel
 def least_per_metre(problem, word, n, left_out):
-    """Best price per metre among the trims of a word but one; 0 where one of them is paid for."""
+    """Best price per metre among the trims of a word but one; -inf where one of them pays."""
     price = np.inf
     for i in range(n):
         if i != left_out:
             price = min(price, problem.prices[word[i], 0])
             if problem.rates[word[i]] < 0.0:
-                return 0.0
+                price = -np.inf
     return price
 
 
@@ -429,16 +446,16 @@ def least_after(problem, trim, time, per_metre):
     """Lower bound of what coasting costs in a word whose first trim lasts `time`.
 
     From where it ends, and the transition before it began, the rest of the word has to lead to the
-    goal: as far as its transitions cannot, at `per_metre`.
+    goal: as far as its transitions cannot, at `per_metre`. NaN for no bound.
     """
-    dx, dy, heading = coast(
-        problem.twists[trim, 0], problem.twists[trim, 1], problem.twists[trim, 2], time
-    )
+    v, u, w = problem.twists[trim, 0], problem.twists[trim, 1], problem.twists[trim, 2]
+    dx, dy, heading = coast(v, u, w, time)
     x, y, _ = compose(dx, dy, heading, problem.fixed[FIRST], problem.fixed[FIRST + 1], 0.0)
     way = math.hypot(problem.fixed[AIM] - x, problem.fixed[AIM + 1] - y)
     left = way - problem.fixed[FOLLOWING]
-    least = problem.rates[trim] * time
-    return least + left * per_metre if left > NONE_LEFT else least
+    if per_metre < 0.0:
+        return math.nan
+    return problem.rates[trim] * time + (left * per_metre if left > NONE_LEFT else 0.0)
 
 
 @merged_kernel
@@ -607,6 +624,7 @@ def scan_two(problem, candidates, word, n, triple, free, upper_bound):
     node_values = np.zeros((2, n_0, n_1, 2))
     times = np.zeros(n)
     values = np.zeros(2)
+    steering = (problem.twists, problem.goal, problem.tolerance, candidates.counter)
     for i in range(n_0):
         for j in range(n_1):
             times[free[0]] = reaches[0] * i / counts[0]
@@ -614,7 +632,7 @@ def scan_two(problem, candidates, word, n, triple, free, upper_bound):
             total = times[free[0]] + times[free[1]]
             if total > time_left(problem) * (1.0 + 2.0 / problem.nodes_2d):
                 continue
-            solve_triple(problem, candidates, word, n, triple, times, scratch[0])
+            solve_triple(steering, word, n, triple, times, scratch[0])
             for branch in range(2):
                 if take_branch(problem, word, n, triple, free, branch, scratch, times, values):
                     there[branch, i, j] = True

@@ -45,7 +45,8 @@ NONE_LEFT = 1e-9  # [m, s] of a linear condition: transitions leave no more than
 def closed_form_words(problem, candidates, word, n, triple, room, upper_bound):
     """Words of three trims: isolated solutions."""
     times, out, span = room
-    solve_triple(problem, candidates, word, n, triple, times, out)
+    steering = (problem.twists, problem.goal, problem.tolerance, candidates.counter)
+    solve_triple(steering, word, n, triple, times, out)
     for branch in range(2):
         admissible = not math.isnan(out[branch, 0])
         cost = problem.pad_cost + word_extra(problem, word, n)
@@ -179,7 +180,7 @@ def passing_words(links, seen, candidates, word, rows, n, tail, less, room, uppe
         after = links.goal if last else links.class_of[word[passed + 1]]
         through = links.class_of[word[passed]]
         if first_of_class(links, through) != word[passed]:
-            continue  # the same way leads through another trim
+            continue  # the same transitions lead through another trim of its class
         around = links.cost[before, through] + links.cost[through, after]
         if around <= links.cost[before, after] * (1.0 + ON_THE_WAY):
             continue  # the cheapest chain passes through it by itself
@@ -247,7 +248,8 @@ def scan_words(problem, links, candidates, n, first, last, upper_bound):
     word = np.zeros(n, dtype=np.int64)
     rows = np.zeros(n, dtype=np.int64) if linked else word
     triple = np.zeros(3, dtype=np.int64)
-    less = np.zeros((2, n), dtype=np.int64)
+    less = np.zeros((2, n), dtype=np.int64)  # rows that last where one is passed, their triple
+    # times of a word, both branches of those that are solved for, and what conditions come to
     room = np.zeros(n), np.empty((2, 3)), np.empty((problem.targets.size, 2))
     most = upper_bound - problem.pad_cost
     passes = linked and problem.targets.size == 0
