@@ -40,10 +40,10 @@ from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
 from maneuver_automaton.search import SearchStatus
 from maneuver_automaton.search.budget import Budget
 from maneuver_automaton.search.certificate import certificate
+from maneuver_automaton.search.insertion import insertion_stages
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.linked_words import load_linked_words
 from maneuver_automaton.search.result import plan_of as plan_of_word
-from maneuver_automaton.search.word_stages import maneuver_word_stages
 from maneuver_automaton.words.word import Word, word_of_plan
 
 FIRST_SHARE = 0.8  # of the time limit, for a first path
@@ -210,7 +210,7 @@ def _by_words(found: Incumbents) -> Iterator[tuple[Plan, int]]:
     others = max(found.alternatives, OTHERS if guarded else 0)
     seen: list[Word] = []
     for index, goal in enumerate(problem.goals):
-        for stage in maneuver_word_stages(
+        for stage in insertion_stages(
             problem,
             goal,
             time_limit=found.budget.stage(MANEUVER_SHARE if found.plans else WORDS_SHARE).left,
