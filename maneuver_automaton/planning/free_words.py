@@ -9,8 +9,8 @@ from collections.abc import Iterable, Iterator
 from maneuver_automaton.planning.incumbents import Candidate, Incumbents
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.choose import search_goal
+from maneuver_automaton.search.insertion import insertion_stages
 from maneuver_automaton.search.result import SearchResult, plan_of
-from maneuver_automaton.search.word_stages import maneuver_word_stages
 from maneuver_automaton.words.word import Word
 
 LEAST_TIME = 1e-3  # [s] for each goal, also where the time is over
@@ -34,7 +34,7 @@ def free_words(
             for result in search_goal(problem, goal, alternatives=others, time_limit=seconds):
                 yield index, result
             continue
-        for result in maneuver_word_stages(
+        for result in insertion_stages(
             problem,
             goal,
             alternatives=others or 0,

@@ -29,11 +29,11 @@ from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.refinement.fitting import fitted_plans
 from maneuver_automaton.refinement.maneuver_lattice import maneuver_words
 from maneuver_automaton.search.alternatives import TIE
+from maneuver_automaton.search.insertion import search_insertion
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_trims import priced_library
 from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.word_plan import plan_of_word
-from maneuver_automaton.search.word_stages import search_words_with_maneuvers
 
 FIRST_SHARE = 0.5  # of a step's time limit, for the words of the first step
 OTHERS = 3  # dearer words that are tried where the cheapest ones are not free
@@ -94,7 +94,7 @@ class OverManeuvers:
             left = now.deadline - time.monotonic()
             if left <= 0.0:
                 break
-            words = search_words_with_maneuvers(
+            words = search_insertion(
                 problem,
                 goal,
                 time_limit=(FIRST_SHARE if now.last is None else 1.0) * left,

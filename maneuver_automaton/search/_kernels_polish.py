@@ -7,6 +7,7 @@ import numpy as np
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
 from maneuver_automaton.search._kernels_problem import (
     look,
+    look_ahead,
     room_for,
     time_left,
     word_extra,
@@ -196,6 +197,7 @@ def polish_candidates(problem, links, candidates, found, max_trims):
     for k in range(min(candidates.counter[0], candidates.words.shape[0])):
         word, size = candidates.words[k], candidates.sizes[k]
         if linked:
+            look_ahead(problem, links, seen, word, size)
             look(problem, links, seen, word, size, rows)
         times = np.empty(size)
         n = 0

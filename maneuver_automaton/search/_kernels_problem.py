@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from maneuver_automaton._compile import bare_inner_kernel, inner_kernel
+from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, merged_kernel
 from maneuver_automaton.groups._kernels import compose
 from maneuver_automaton.words._kernels_candidates import back_from
 
@@ -41,7 +41,7 @@ class WordProblem(NamedTuple):
     parallel: Any  # (M, M) whether two twists are parallel
     weights: Any  # (M,) 1 where a trim takes time and counts, 0 for the turn of a free heading
     goal: Any  # (4,) relative to the start
-    fixed: Any  # (4,) cost and time of the transitions; way and turn left to the trims at least
+    fixed: Any  # (9,) what is known of a word before its times are: COST, TIME, ... below
     time_limit: float  # sum of all times at most this, transitions included; inf
     pad: int  # 1 where rest fills up to time_limit
     pad_cost: float  # cost of time_limit seconds of rest
@@ -54,6 +54,14 @@ class WordProblem(NamedTuple):
     tolerance: float
     shortest: float  # [s] a shorter coasting time is not admitted
     tail: int  # trim that ends every word without counting, -1 for none
+
+
+# Places in `fixed`:
+COST, TIME = 0, 1  # of the transitions
+WAY, TURN = 2, 3  # that is left to the trims at least
+FIRST = 4  # x and y of the place after the first transition
+FOLLOWING = 6  # way of the transitions after the first, at most
+AIM = 7  # x and y of the goal itself
 
 
 class Links(NamedTuple):
@@ -92,11 +100,17 @@ class Found(NamedTuple):
 
 @bare_inner_kernel
 def word_extra(problem, word, n):
-    """Price of the switches and transitions of a word.
+    """Price of the switches and transitions of a word."""
+    return problem.fixed[COST] + switch_prices(problem, word, n)
 
-    A problem with transitions has no prices of switches: a conjugated twist has no gear.
+
+@merged_kernel
+def switch_prices(problem, word, n):
+    """Price of the switches of a word.
+
+    A problem with transitions has none: a conjugated twist has no gear.
     """
-    price = problem.fixed[0] + problem.switch * (n - 1)
+    price = problem.switch * (n - 1)
     if problem.direction_change > 0.0:
         sign = 0.0
         for i in range(n):
@@ -111,7 +125,7 @@ def word_extra(problem, word, n):
 @bare_inner_kernel
 def time_left(problem):
     """What the coasting times of a word may add up to."""
-    return problem.time_limit - problem.fixed[1]
+    return problem.time_limit - problem.fixed[TIME]
 
 
 @bare_inner_kernel
@@ -193,7 +207,7 @@ def room_for(problem, n):
         np.zeros((n, n), dtype=np.bool_),
         np.zeros(n),
         np.zeros(4),
-        np.zeros(4),
+        np.zeros(problem.fixed.size),
         problem.time_limit,
         problem.pad,
         problem.pad_cost,
@@ -209,34 +223,62 @@ def room_for(problem, n):
     )
 
 
-@bare_inner_kernel
+@merged_kernel
+def look_ahead(problem, links, seen, word, n):
+    """Fill in what the transitions of a word leave to its trims, which takes no pose.
+
+    Most words are too dear already then.
+    """
+    for k in range(seen.fixed.size):
+        seen.fixed[k] = problem.fixed[k]
+    for r in range(problem.targets.size):
+        seen.targets[r] = problem.targets[r]
+    before = links.start
+    for i in range(n + 1):
+        after = class_after(problem, links, word, n, i)
+        if after < 0:
+            break
+        step = links.displacement[before, after]
+        way = math.hypot(step[0], step[1])
+        seen.fixed[COST] += links.cost[before, after]
+        seen.fixed[TIME] += links.time[before, after]
+        seen.fixed[WAY] -= way
+        seen.fixed[TURN] -= abs(step[2])
+        if i > 0:
+            seen.fixed[FOLLOWING] += way
+        for r in range(problem.targets.size):
+            seen.targets[r] -= links.gains[r, before, after]
+        before = after
+
+
+@merged_kernel
+def class_after(problem, links, word, n, i):
+    """Class of trims that the transition before position `i` leads to; -1 for no transition.
+
+    The turn of a free heading comes after the last transition, and has none after it.
+    """
+    if i < n and word[i] != problem.tail:
+        return links.class_of[word[i]]
+    if i == n and word[n - 1] == problem.tail:
+        return -1
+    return links.goal
+
+
+@merged_kernel
 def look(problem, links, seen, word, n, rows):
     """Fill `seen` with a word as it looks from before its transitions, and `rows` with its rows."""
-    m = problem.targets.size
     x, y, heading, rise = 0.0, 0.0, 0.0, 0.0  # product of the displacements so far
-    for k in range(4):
-        seen.fixed[k] = problem.fixed[k]
-    for r in range(m):
-        seen.targets[r] = problem.targets[r]
     seen.size[0] = n
     before = links.start
     for i in range(n + 1):
-        # the turn of a free heading comes after the last transition, and has none after it
-        if i < n and word[i] != problem.tail:
-            after = links.class_of[word[i]]
-        elif i == n and word[n - 1] == problem.tail:
+        after = class_after(problem, links, word, n, i)
+        if after < 0:
             break
-        else:
-            after = links.goal
         step = links.displacement[before, after]
         x, y, heading = compose(x, y, heading, step[0], step[1], step[2])
         rise += step[3]
-        seen.fixed[0] += links.cost[before, after]
-        seen.fixed[1] += links.time[before, after]
-        seen.fixed[2] -= math.hypot(step[0], step[1])
-        seen.fixed[3] -= abs(step[2])
-        for r in range(m):
-            seen.targets[r] -= links.gains[r, before, after]
+        if i == 0:
+            seen.fixed[FIRST], seen.fixed[FIRST + 1] = x, y
         before = after
         if i < n:
             rows[i] = i
@@ -252,7 +294,7 @@ def look(problem, links, seen, word, n, rows):
             seen.parallel[k, i] = seen.parallel[i, k]
 
 
-@bare_inner_kernel
+@merged_kernel
 def copy_row(problem, trim, seen, row):
     """What a search knows of a trim, as a row of the problem that is seen."""
     seen.trims[row] = trim

@@ -11,8 +11,12 @@ import math
 
 import numpy as np
 
-from maneuver_automaton._compile import bare_inner_kernel, inner_kernel
+from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, merged_kernel
+from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search._kernels_problem import (
+    AIM,
+    FIRST,
+    FOLLOWING,
     condition,
     is_straight,
     propose,
@@ -21,6 +25,8 @@ from maneuver_automaton.search._kernels_problem import (
 )
 from maneuver_automaton.words._kernels_steering import steer, unit
 from maneuver_automaton.words._kernels_times import assign, end_and_columns
+
+NONE_LEFT = 1e-9  # [m] that only rounding leaves
 
 
 @bare_inner_kernel
@@ -58,9 +64,16 @@ def moved(pose, velocity, turn_rate, time):
 
 
 @bare_inner_kernel
-def solve_triple(problem, candidates, word, n, triple, times, out):
-    """Both branches (2, 3) of the times at `triple`, the other `times` being given."""
-    candidates.counter[2] += 1
+def solve_triple(steering, word, n, triple, times, out):
+    """Both branches (2, 3) of the times at `triple`, the other `times` being given.
+
+    It takes what it needs, twists, goal, tolerance and the counter of its calls, and not the
+    problem: a call hands over every field of every structure, and this is called at every node. A
+    function for that would not do: it counts no references, so it may not return an array to one
+    that does.
+    """
+    twists, goal, tolerance, counter = steering
+    counter[2] += 1
     pose = (0j, 0.0)
     lead = pose
     gap_1 = pose
@@ -80,25 +93,25 @@ def solve_triple(problem, candidates, word, n, triple, times, out):
             t = word[i]
             pose = moved(
                 pose,
-                complex(problem.twists[t, 0], problem.twists[t, 1]),
-                problem.twists[t, 2],
+                complex(twists[t, 0], twists[t, 1]),
+                twists[t, 2],
                 times[i],
             )
     # goal seen from the end of the lead, before the tail
-    z = complex(problem.goal[0], problem.goal[1])
-    heading = problem.goal[2] - pose[1]
+    z = complex(goal[0], goal[1])
+    heading = goal[2] - pose[1]
     z -= pose[0] * unit(heading)
     z = (z - lead[0]) * unit(-lead[1])
     heading -= lead[1]
     a, b, c = word[triple[0]], word[triple[1]], word[triple[2]]
     steer(
-        (complex(problem.twists[a, 0], problem.twists[a, 1]), problem.twists[a, 2]),
+        (complex(twists[a, 0], twists[a, 1]), twists[a, 2]),
         gap_1,
-        (complex(problem.twists[b, 0], problem.twists[b, 1]), problem.twists[b, 2]),
+        (complex(twists[b, 0], twists[b, 1]), twists[b, 2]),
         gap_2,
-        (complex(problem.twists[c, 0], problem.twists[c, 1]), problem.twists[c, 2]),
+        (complex(twists[c, 0], twists[c, 1]), twists[c, 2]),
         (z, heading),
-        problem.tolerance,
+        tolerance,
         out,
     )
 
@@ -242,7 +255,8 @@ def take_branch(problem, word, n, triple, free, branch, scratch, times, values):
 @bare_inner_kernel
 def evaluate(problem, candidates, word, n, triple, free, times, branch, scratch, values):
     """Solve one branch at given free times, and take it."""
-    solve_triple(problem, candidates, word, n, triple, times, scratch[0])
+    steering = (problem.twists, problem.goal, problem.tolerance, candidates.counter)
+    solve_triple(steering, word, n, triple, times, scratch[0])
     return take_branch(problem, word, n, triple, free, branch, scratch, times, values)
 
 
@@ -279,10 +293,14 @@ def scan_one(problem, candidates, word, n, triple, free, upper_bound):
     there = np.zeros((2, nodes + 1), dtype=np.bool_)
     node_times = np.zeros((2, nodes + 1, n))
     node_values = np.zeros((2, nodes + 1))
+    costs = np.zeros((2, nodes + 1))
+    steering = (problem.twists, problem.goal, problem.tolerance, candidates.counter)
+    most = nearly_cheap(problem, word, n, upper_bound)
     for j in range(nodes + 1):
         times[q] = reach * j / nodes
-        solve_triple(problem, candidates, word, n, triple, times, both)
+        solve_triple(steering, word, n, triple, times, both)
         for branch in range(2):
+            costs[branch, j] = coasting_cost(problem, word, triple, q, times[q], both[branch])
             copy_branches(scratch[0], both)
             if take_branch(problem, word, n, triple, free, branch, scratch, times, values):
                 there[branch, j] = True
@@ -299,6 +317,8 @@ def scan_one(problem, candidates, word, n, triple, free, upper_bound):
     stack = (np.zeros((24, n)), np.zeros((24, n)), np.zeros((24, 4)))
     for branch in range(2):
         for j in range(nodes):
+            if not may_be_cheap(costs[branch, j], costs[branch, j + 1], most):
+                continue
             if not (there[branch, j] or there[branch, j + 1]):
                 continue
             bend = np.inf
@@ -331,8 +351,8 @@ def scan_one(problem, candidates, word, n, triple, free, upper_bound):
             bisect(problem, candidates, word, n, triple, free, branch, scratch, values, stack)
 
 
-@bare_inner_kernel
-def any_node_may_do(problem, candidates, word, n, triple, times, out, upper_bound):
+@merged_kernel
+def any_node_may_do(problem, candidates, word, n, triple, room, upper_bound):
     """Whether a word with one free time may have a solution, as far as its nodes show.
 
     At one of them it costs little more than the upper bound and, where a time is to be met, at one
@@ -340,23 +360,27 @@ def any_node_may_do(problem, candidates, word, n, triple, times, out, upper_boun
     a tenth of the time that the reduced gradients and the bisection take. To climb is no reason:
     of words that climb too many were left out, and plans came out 3 % dearer.
     """
+    times, out, _ = room
     q = 6 - triple[0] - triple[1] - triple[2]  # the position of four that is not solved for
     reach = affordable(problem, word, n, word[q], upper_bound)
     if not reach > 0.0:
         return False
     m = problem.targets.size
-    most = upper_bound * (1.0 + problem.slack) - problem.pad_cost - word_extra(problem, word, n)
+    most = nearly_cheap(problem, word, n, upper_bound)
+    lowest = upper_bound - problem.pad_cost - word_extra(problem, word, n)
     nodes = max(8, math.ceil(problem.nodes * reach / problem.reaches[word[q]]))
     is_cheap, is_near = False, m == 0 or time_left(problem) == np.inf
     before = (math.nan, math.nan)  # what each branch lacked at the node before
+    per_metre = least_per_metre(problem, word, n, q)
+    steering = (problem.twists, problem.goal, problem.tolerance, candidates.counter)
     for j in range(nodes + 1):
         times[q] = reach * j / nodes
-        solve_triple(problem, candidates, word, n, triple, times, out)
+        if is_near and q == 0 and least_after(problem, word[0], times[0], per_metre) >= lowest:
+            continue  # no time of the others makes it cheap
+        solve_triple(steering, word, n, triple, times, out)
         lacks = (math.nan, math.nan)
         for branch in range(2):
-            cost = problem.rates[word[q]] * times[q]
-            for s in range(3):
-                cost += problem.rates[word[triple[s]]] * out[branch, s]
+            cost = coasting_cost(problem, word, triple, q, times[q], out[branch])
             is_cheap = is_cheap or cost < most  # not where the branch is empty: NaN
             if is_near:
                 continue
@@ -371,7 +395,70 @@ def any_node_may_do(problem, candidates, word, n, triple, times, out, upper_boun
     return False
 
 
+@merged_kernel
+def nearly_cheap(problem, word, n, upper_bound):
+    """What the trims of a word may cost at a node for it to be looked at."""
+    if problem.slack == np.inf:
+        return np.inf
+    extra = problem.pad_cost + word_extra(problem, word, n)
+    return upper_bound * (1.0 + problem.slack) - extra
+
+
 @bare_inner_kernel
+def may_be_cheap(one, other, most):
+    """Whether a branch that costs `one` and `other` at two nodes may cost less between them.
+
+    Less than `most`, if it falls no more than it does from one to the other. NaN where it is not at
+    a node.
+    """
+    change = abs(other - one)
+    if math.isnan(change):
+        return one < most or other < most
+    return min(one, other) - change < most
+
+
+@merged_kernel
+def coasting_cost(problem, word, triple, free, time, solved):
+    """What the trims of a word cost: one for a given time, three for the times of a branch.
+
+    A negative time, of a straight, costs as much as a positive one: so far it is from admissible.
+    """
+    cost = problem.rates[word[free]] * time
+    for s in range(3):
+        cost += problem.rates[word[triple[s]]] * abs(solved[s])
+    return cost
+
+
+@merged_kernel
+def least_per_metre(problem, word, n, left_out):
+    """Best price per metre among the trims of a word but one; -inf where one of them pays."""
+    price = np.inf
+    for i in range(n):
+        if i != left_out:
+            price = min(price, problem.prices[word[i], 0])
+            if problem.rates[word[i]] < 0.0:
+                price = -np.inf
+    return price
+
+
+@merged_kernel
+def least_after(problem, trim, time, per_metre):
+    """Lower bound of what coasting costs in a word whose first trim lasts `time`.
+
+    From where it ends, and the transition before it began, the rest of the word has to lead to the
+    goal: as far as its transitions cannot, at `per_metre`. NaN for no bound.
+    """
+    v, u, w = problem.twists[trim, 0], problem.twists[trim, 1], problem.twists[trim, 2]
+    dx, dy, heading = coast(v, u, w, time)
+    x, y, _ = compose(dx, dy, heading, problem.fixed[FIRST], problem.fixed[FIRST + 1], 0.0)
+    way = math.hypot(problem.fixed[AIM] - x, problem.fixed[AIM + 1] - y)
+    left = way - problem.fixed[FOLLOWING]
+    if per_metre < 0.0:
+        return math.nan
+    return problem.rates[trim] * time + (left * per_metre if left > NONE_LEFT else 0.0)
+
+
+@merged_kernel
 def is_met_nearby(problem, word, triple, lack, before):
     """Whether what a condition lacks at a node is next to nothing, or whole turns can make it up.
 
@@ -537,6 +624,7 @@ def scan_two(problem, candidates, word, n, triple, free, upper_bound):
     node_values = np.zeros((2, n_0, n_1, 2))
     times = np.zeros(n)
     values = np.zeros(2)
+    steering = (problem.twists, problem.goal, problem.tolerance, candidates.counter)
     for i in range(n_0):
         for j in range(n_1):
             times[free[0]] = reaches[0] * i / counts[0]
@@ -544,7 +632,7 @@ def scan_two(problem, candidates, word, n, triple, free, upper_bound):
             total = times[free[0]] + times[free[1]]
             if total > time_left(problem) * (1.0 + 2.0 / problem.nodes_2d):
                 continue
-            solve_triple(problem, candidates, word, n, triple, times, scratch[0])
+            solve_triple(steering, word, n, triple, times, scratch[0])
             for branch in range(2):
                 if take_branch(problem, word, n, triple, free, branch, scratch, times, values):
                     there[branch, i, j] = True

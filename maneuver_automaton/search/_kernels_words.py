@@ -10,13 +10,18 @@ import math
 
 import numpy as np
 
-from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
+from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel, merged_kernel
 from maneuver_automaton.search._kernels_problem import (
+    COST,
+    TURN,
+    WAY,
     condition,
     is_straight,
     look,
+    look_ahead,
     propose,
     room_for,
+    switch_prices,
     time_left,
     transitions_cost,
     word_extra,
@@ -33,14 +38,15 @@ from maneuver_automaton.words._kernels_steering import phase, unit
 from maneuver_automaton.words._kernels_times import least_squares
 
 ON_THE_WAY = 1e-9  # relative: chains of transitions of one price are one
+NONE_LEFT = 1e-9  # [m, s] of a linear condition: transitions leave no more than rounding
 
 
-@inner_kernel
-def closed_form_words(problem, candidates, word, n, triple, upper_bound):
+@bare_inner_kernel
+def closed_form_words(problem, candidates, word, n, triple, room, upper_bound):
     """Words of three trims: isolated solutions."""
-    out = np.empty((2, 3))
-    times = np.zeros(3)
-    solve_triple(problem, candidates, word, n, triple, times, out)
+    times, out, span = room
+    steering = (problem.twists, problem.goal, problem.tolerance, candidates.counter)
+    solve_triple(steering, word, n, triple, times, out)
     for branch in range(2):
         admissible = not math.isnan(out[branch, 0])
         cost = problem.pad_cost + word_extra(problem, word, n)
@@ -53,7 +59,6 @@ def closed_form_words(problem, candidates, word, n, triple, upper_bound):
                 break
             cost += problem.rates[word[i]] * times[i]
         if admissible and cost < upper_bound:
-            span = np.empty((problem.targets.size, 2))
             for r in range(problem.targets.size):
                 span[r, 0] = condition(problem, word, n, r, times) - 1e-9
                 span[r, 1] = span[r, 0] + 2e-9
@@ -160,13 +165,13 @@ def low_rank_word(problem, candidates, word, n):
                 propose(problem, candidates, word, n, times)
 
 
-@inner_kernel
-def passing_words(links, seen, candidates, word, rows, n, tail, room, upper_bound):
+@bare_inner_kernel
+def passing_words(links, seen, candidates, word, rows, n, tail, less, room, upper_bound):
     """Words of four trims that pass through one of them: the other three follow in closed form.
 
     Its transitions alone turn and move a vehicle on, which may be all that is wanted of a trim.
     """
-    kept, triple = room[0], room[1]  # rows that last a while, and those solved for
+    kept, triple = less[0], less[1]  # rows that last a while, and those solved for
     for passed in range(n):
         if word[passed] == tail:
             continue
@@ -174,21 +179,32 @@ def passing_words(links, seen, candidates, word, rows, n, tail, room, upper_boun
         last = passed == n - 1 or word[passed + 1] == tail
         after = links.goal if last else links.class_of[word[passed + 1]]
         through = links.class_of[word[passed]]
+        if first_of_class(links, through) != word[passed]:
+            continue  # the same transitions lead through another trim of its class
         around = links.cost[before, through] + links.cost[through, after]
         if around <= links.cost[before, after] * (1.0 + ON_THE_WAY):
             continue  # the cheapest chain passes through it by itself
         for i in range(n - 1):
             kept[i] = rows[i] if i < passed else rows[i + 1]
         if word_blocks(seen, kept, n - 1) > 0 and choose_triple(seen, kept, n - 1, triple):
-            closed_form_words(seen, candidates, kept, n - 1, triple, upper_bound)
+            closed_form_words(seen, candidates, kept, n - 1, triple, room, upper_bound)
 
 
-@bare_inner_kernel
-def promising(problem, word, n, upper_bound):
+@merged_kernel
+def first_of_class(links, wanted):
+    """The first trim of a class."""
+    for trim in range(links.class_of.size):
+        if links.class_of[trim] == wanted:
+            return trim
+    return -1
+
+
+@merged_kernel
+def promising(problem, left, word, n, upper_bound):
     """Whether a word can be cheaper than the dearest of the solutions asked for.
 
-    Lower bounds that hold for any times: way and turn at the best price per metre and radian, as
-    far as the transitions do not make them, and a fixed time at the best price per second.
+    Lower bounds that hold for any times, of what its transitions have `left` to its trims: way and
+    turn at the best price per metre and radian, each linear condition at the best per unit.
     """
     if upper_bound == np.inf:
         return True
@@ -200,13 +216,20 @@ def promising(problem, word, n, upper_bound):
     if per_second < 0.0:
         return True
     bound = 0.0
-    if problem.fixed[2] > 0.0:
-        bound = max(bound, problem.fixed[2] * per_metre)
-    if problem.fixed[3] > 0.0:
-        bound = max(bound, problem.fixed[3] * per_radian)
-    if problem.targets.size > 0 and problem.pad == 0 and problem.time_limit < np.inf:
-        bound = max(bound, time_left(problem) * per_second)
-    bound += problem.pad_cost + word_extra(problem, word, n)
+    if left.fixed[WAY] > 0.0:
+        bound = max(bound, left.fixed[WAY] * per_metre)
+    if left.fixed[TURN] > 0.0:
+        bound = max(bound, left.fixed[TURN] * per_radian)
+    for r in range(left.targets.size):
+        target = left.targets[r]
+        if abs(target) > NONE_LEFT:  # no trim of the other direction brings it nearer
+            per_unit = np.inf
+            for i in range(n):
+                pace = problem.rows[r, word[i]] * math.copysign(1.0, target)
+                if pace > 0.0:
+                    per_unit = min(per_unit, problem.rates[word[i]] / pace)
+            bound = max(bound, abs(target) * per_unit)
+    bound += problem.pad_cost + left.fixed[COST] + switch_prices(problem, word, n)
     return bound < upper_bound
 
 
@@ -225,28 +248,32 @@ def scan_words(problem, links, candidates, n, first, last, upper_bound):
     word = np.zeros(n, dtype=np.int64)
     rows = np.zeros(n, dtype=np.int64) if linked else word
     triple = np.zeros(3, dtype=np.int64)
-    kept = np.zeros((2, n), dtype=np.int64)
-    times, out = np.zeros(n), np.empty((2, 3))
+    less = np.zeros((2, n), dtype=np.int64)  # rows that last where one is passed, their triple
+    # times of a word, both branches of those that are solved for, and what conditions come to
+    room = np.zeros(n), np.empty((2, 3)), np.empty((problem.targets.size, 2))
     most = upper_bound - problem.pad_cost
+    passes = linked and problem.targets.size == 0
+    everything, tail, n_trims = problem.slack == np.inf, problem.tail, problem.twists.shape[0]
+    counter, full = candidates.counter, candidates.words.shape[0] // 2
     for number in range(first, last):
-        if candidates.counter[0] > candidates.words.shape[0] // 2:
+        if counter[0] > full:
             return number
-        spell(problem.twists.shape[0], word, n, number, problem.tail)
+        spell(n_trims, word, n, number, tail)
         if linked:
-            if not transitions_cost(links, word, n, problem.tail) < most:
+            if not transitions_cost(links, word, n, tail) < most:
+                continue
+            look_ahead(problem, links, seen, word, n)
+            if not promising(problem, seen, word, n, upper_bound):
+                counter[1] += 1
                 continue
             look(problem, links, seen, word, n, rows)
         spans = prepare_word(seen, candidates, rows, n, triple, upper_bound)
         if spans == 2 and n == 3:
-            closed_form_words(seen, candidates, rows, n, triple, upper_bound)
+            closed_form_words(seen, candidates, rows, n, triple, room, upper_bound)
         elif spans == 2:
-            if linked and problem.targets.size == 0:
-                passing_words(
-                    links, seen, candidates, word, rows, n, problem.tail, kept, upper_bound
-                )
-            if problem.slack == np.inf or any_node_may_do(
-                seen, candidates, rows, n, triple, times, out, upper_bound
-            ):
+            if passes:
+                passing_words(links, seen, candidates, word, rows, n, tail, less, room, upper_bound)
+            if everything or any_node_may_do(seen, candidates, rows, n, triple, room, upper_bound):
                 scan_one(seen, candidates, rows, n, triple, others(n, triple), upper_bound)
     return last
 
@@ -266,6 +293,10 @@ def scan_flat_words(problem, links, candidates, n, first, last, upper_bound):
         spell(problem.twists.shape[0], word, n, number, problem.tail)
         if linked:
             if not transitions_cost(links, word, n, problem.tail) < most:
+                continue
+            look_ahead(problem, links, seen, word, n)
+            if not promising(problem, seen, word, n, upper_bound):
+                candidates.counter[1] += 1
                 continue
             look(problem, links, seen, word, n, rows)
         spans = prepare_word(seen, candidates, rows, n, triple, upper_bound)
@@ -290,6 +321,10 @@ def scan_long_words(problem, links, candidates, n, first, last, upper_bound):
         if linked:
             if not transitions_cost(links, word, n, problem.tail) < most:
                 continue
+            look_ahead(problem, links, seen, word, n)
+            if not promising(problem, seen, word, n, upper_bound):
+                candidates.counter[1] += 1
+                continue
             look(problem, links, seen, word, n, rows)
         spans = prepare_word(seen, candidates, rows, n, triple, upper_bound)
         if spans == 2:
@@ -313,7 +348,7 @@ def spell(n_trims, word, n, number, tail):
         number //= n_trims
 
 
-@bare_inner_kernel
+@merged_kernel
 def prepare_word(problem, candidates, word, n, triple, upper_bound):
     """Fill `triple`: 0 nothing to do, 1 a word that cannot span, 2 one that can.
 
@@ -324,7 +359,7 @@ def prepare_word(problem, candidates, word, n, triple, upper_bound):
     if blocks == 0 or not time_left(problem) > 0.0:
         return 0
     candidates.counter[1] += 1
-    if not promising(problem, word, n, upper_bound):
+    if not promising(problem, problem, word, n, upper_bound):
         return 0
     if blocks < 0:
         return 1

@@ -1,9 +1,8 @@
 """Insertion of trims with their maneuvers: a local search over words.
 
-A kinematic trim is inserted by an infinitesimal time, and a price decides whether that pays. One
-that needs maneuvers to be entered and left changes the end of the word by a jump. So the price, the
-momentum of Pontryagin's condition times that jump, only says which changes to try first; each is
-tried with its best times. What no change makes cheaper is a local optimum, without a certificate.
+A trim that needs maneuvers to be entered and left changes the end of the word by a jump. So its
+price, the momentum of Pontryagin's condition times that jump, only says which changes to try first;
+each is tried with its best times. What no change makes cheaper is a local optimum.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,11 +19,16 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.groups import LieGroup
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.linked_words import EXPANSIONS_A_WORD
+from maneuver_automaton.search.asked import Asked, Found
+from maneuver_automaton.search.linked_words import (
+    EXPANSIONS_A_WORD,
+    scan_linked_words,
+    steer_linked_words,
+)
 from maneuver_automaton.search.result import SearchResult, SearchStatus
 from maneuver_automaton.search.timed_word import TimedWord
 from maneuver_automaton.search.word_setup import WordSetup, word_setup
-from maneuver_automaton.words.word import Word
+from maneuver_automaton.words.word import Word, word_of_plan
 
 GAIN = 1e-7  # relative: less is none
 AT_FIRST = 0.25  # [s] an inserted trim lasts before its times are solved for
@@ -32,6 +36,66 @@ CHUNK = 30  # changes that are tried before the best of them is taken
 MOST_TRIES = 240  # changes of one word that are tried, by rising price
 MOST_TRIMS = 400  # of a larger library those that differ most
 FEW = 2  # trims of a word that may be taken out at once
+CLOSED_FORM = 3  # trims of a word whose times follow in closed form
+SCANNED_TRIMS = 14  # that words of four trims are made of
+SCAN_SHARE = 0.4  # of the time that is left, for scanning
+SEED_SLACK = 0.1  # share by which words may be dearer than a plan that is known, and yet be seeds
+SEEDS = 4  # words of three trims that insertion begins with, beside the cheapest one
+
+
+def linked_stages(asked: Asked) -> Iterator[SearchResult]:
+    """Short words, then longer ones, then what insertion makes of them seed by seed."""
+    problem, goal = asked.problem, asked.goal
+    if not problem.automaton.body_velocities.any():  # nothing that words are made of
+        yield SearchResult(status=SearchStatus.EXHAUSTED, solutions=())
+        return
+    most_seeds = SEEDS if asked.seeds is None else asked.seeds
+    others = max(asked.alternatives, most_seeds - 1)
+    near = asked.upper_bound * (1.0 + SEED_SLACK)
+    found, known = Found(problem, others + 1), _known(asked)
+    found.add(SearchResult(status=SearchStatus.EXHAUSTED, solutions=known))
+    found.add(
+        steer_linked_words(
+            problem, goal, alternatives=others, time_limit=asked.left, upper_bound=near
+        )
+    )
+    yield _so_far(asked, found)
+    seeds = found.words[:most_seeds]  # they differ more than words of four trims: those are alike
+    if asked.left > 0.0:
+        counted = problem.search.max_expansions is not None
+        cheap = len(found.words) > asked.alternatives
+        found.add(
+            scan_linked_words(
+                problem,
+                goal,
+                alternatives=others,
+                alphabet=SCANNED_TRIMS,
+                time_limit=asked.left if counted else SCAN_SHARE * asked.left,
+                upper_bound=found.words[asked.alternatives].cost if cheap else near,
+            )
+        )
+        yield _so_far(asked, found)
+    most = problem.horizon.max_trims
+    if asked.left > 0.0 and found.words and (most is None or most > CLOSED_FORM):
+        begun = dict.fromkeys([*known, found.words[0], *seeds])
+        for one in improve_linked_words(problem, goal, list(begun), time_limit=asked.left):
+            found.add(one)
+            yield _so_far(asked, found)
+
+
+def _known(asked: Asked) -> tuple[Word, ...]:
+    """The plan that is known as a word, if it is one of the library."""
+    plan = asked.known
+    word = None if plan is None else word_of_plan(asked.problem.automaton, plan)
+    if plan is None or word is None:
+        return ()
+    return (replace(word, cost=asked.problem.cost_of(plan)),)
+
+
+def _so_far(asked: Asked, found: Found) -> SearchResult:
+    """What is found, and whether the time is over."""
+    status = SearchStatus.OUT_OF_BUDGET if asked.is_over() else SearchStatus.EXHAUSTED
+    return replace(found.result(), status=status)
 
 
 def improve_linked_words(
@@ -44,23 +108,10 @@ def improve_linked_words(
 ) -> Iterator[SearchResult]:
     """Insert, replace, split and delete trims of words with maneuvers while that gains.
 
-    Parameters
-    ----------
-    problem : Problem
-    goal : Goal
-    seeds : sequence of Word
-        Words that lead from the problem's first trim to the goal and its last one.
-    time_limit : float
-        [s] after which the search ends with what it has; ``search.max_expansions`` of the problem
-        limits it by the number of words that are solved for instead, the same at every call.
-    most_tries : int
-        Changes of one word that are tried: those of the least prices.
-
-    Yields
-    ------
-    SearchResult
-        The solution of each seed in turn. It is a local optimum: no single change that was tried is
-        cheaper. With maneuvers of finite size no reduced cost certifies more than that.
+    Yields the solution of each seed in turn, a local optimum: none of up to `most_tries` changes of
+    it, those of the least prices, is cheaper. With maneuvers of finite size no reduced cost
+    certifies more than that. `time_limit` is in seconds; ``search.max_expansions`` of the problem
+    limits the number of words that are solved for instead, the same at every call.
 
     Examples
     --------

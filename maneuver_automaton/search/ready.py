@@ -21,7 +21,8 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.problem import Goal, Horizon, Problem
 from maneuver_automaton.search.certificate import certificate
-from maneuver_automaton.search.insertion import compile_calming, search_insertion
+from maneuver_automaton.search.free_insertion import compile_calming
+from maneuver_automaton.search.insertion import search_insertion
 from maneuver_automaton.search.words import compile_polishing, compile_scanning, search_words
 from maneuver_automaton.words import solve_switching_times
 from maneuver_automaton.words.word import Word

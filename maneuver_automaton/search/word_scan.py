@@ -258,7 +258,7 @@ class WordScan:
             parallel=tables.parallel,
             weights=weights,
             goal=np.array(setup.goal),
-            fixed=np.array([0.0, 0.0, way, turn]),
+            fixed=np.array([0.0, 0.0, way, turn, 0.0, 0.0, 0.0, *setup.goal[:2]]),
             time_limit=float(bounded),
             pad=int(pad),
             pad_cost=float(setup.rest_rate * bounded) if pad else 0.0,

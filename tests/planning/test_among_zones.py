@@ -16,8 +16,8 @@ from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.planning.result import PlanStatus
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.receding_horizon import RecedingHorizon, simulate
+from maneuver_automaton.search.insertion import search_insertion
 from maneuver_automaton.search.result import plan_of
-from maneuver_automaton.search.word_stages import search_words_with_maneuvers
 from tests.inertia import unicycle_automaton
 from tests.search.cases import compiled_only
 
@@ -122,7 +122,7 @@ def test_maneuvers_keep_to_zones_too():
     automaton = unicycle_automaton()
     slow = Zone(shape=Box([0.6, 4.0], [0.0, 0.0]), max_speed=0.3)  # around the start
     problem = posed([4.0, 0.0, 0.0], slow, automaton=automaton)
-    found = plan_of(problem, search_words_with_maneuvers(problem, problem.goals[0]).solutions[0])
+    found = plan_of(problem, search_insertion(problem, problem.goals[0]).solutions[0])
     checked = check_plan(problem, found, problem.goals[0])
     assert not checked.passed
     assert "does not admit" in checked.reason

@@ -18,7 +18,7 @@ from maneuver_automaton.optimal_control import has_casadi
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.primitives import Maneuver
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.search.word_stages import search_words_with_maneuvers
+from maneuver_automaton.search.insertion import search_insertion
 from tests.inertia import CAR, resting, unicycle_automaton
 
 BODY = Box([4.689, 1.942], [1.4155, 0.0])
@@ -176,7 +176,7 @@ FREE = {
 def test_words_come_first_where_nothing_is_in_the_way(name, cost):
     """No plan is dearer than what the search over words finds by itself."""
     problem = replace(FREE[name], cost=cost)
-    words = search_words_with_maneuvers(problem, problem.goals[0], time_limit=60.0)
+    words = search_insertion(problem, problem.goals[0], time_limit=60.0)
     result = plan(problem, time_limit=60.0)
     assert result.status is PlanStatus.FOUND
     assert result.cost <= words.solutions[0].cost * (1.0 + 1e-9)

@@ -217,7 +217,7 @@ def test_a_plan_that_ends_within_the_tolerance_is_kept(noise):
 
 def test_at_first_a_planner_has_all_the_time_where_there_are_zones(monkeypatch):
     """It looks at words itself: looked at before, they would take half of its time."""
-    monkeypatch.setattr(over_maneuvers, "search_words_with_maneuvers", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr(over_maneuvers, "search_insertion", lambda *_, **__: 1 / 0)
     zone = Zone(shape=Box([0.5, 0.5], [1.5, 0.5]), max_speed=0.9)
     _, step = ManeuverHorizon(posed(zones=[zone]), step=0.5).step([0.0, 0.0, 0.0])
     assert step.deed is Deed.PLANNED

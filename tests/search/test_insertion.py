@@ -19,11 +19,14 @@ from maneuver_automaton.models import Unicycle, UserModel
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.search import SearchStatus, search_insertion, search_words
 from maneuver_automaton.search.certificate import certificate
+from maneuver_automaton.search.insertion import insertion_stages
 from maneuver_automaton.search.library_arrays import library_arrays
+from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.setup import search_setup
 from maneuver_automaton.search.shortening import shortened
 from maneuver_automaton.search.timed_word import TimedWord
 from tests import reference
+from tests.inertia import unicycle_automaton
 from tests.search.cases import (
     DUBINS,
     INTERPRETED,
@@ -338,6 +341,56 @@ def test_results_are_the_same_in_every_run():
     first, second = best(problem), best(problem)
     assert first.trims.tolist() == second.trims.tolist()
     assert first.durations.tolist() == second.durations.tolist()
+
+
+# Every vehicle.
+
+VEHICLES = {
+    "at will": lambda: parking(max_trims=None),
+    "maneuvers": lambda: Problem(unicycle_automaton(), [0.0, 0.0, 0.0], [5.0, 1.0, 1.0]),
+}
+
+
+@compiled_only
+@pytest.mark.parametrize("name", VEHICLES)
+def test_what_costs_as_much_as_a_known_plan_is_left_out(name):
+    problem = VEHICLES[name]()
+    cost = best(problem).cost
+    for upper_bound, found in ((cost * (1.0 + 1e-6), True), (cost, False)):
+        result = search_insertion(problem, problem.goals[0], upper_bound=upper_bound)
+        assert bool(result.solutions) == found
+        assert (result.status is SearchStatus.FOUND) == found
+
+
+@compiled_only
+@pytest.mark.parametrize("name", VEHICLES)
+def test_a_known_plan_is_improved(name):
+    problem = VEHICLES[name]()
+    dear = search_insertion(problem, problem.goals[0], alternatives=8).solutions[-1]
+    known = plan_of(problem, dear)
+    first = replace(problem, search=SearchSettings(max_expansions=1))
+    found = search_insertion(first, first.goals[0], known=known).solutions
+    assert found[0].cost <= dear.cost + 1e-9
+
+
+@compiled_only
+@pytest.mark.parametrize("name", VEHICLES)
+def test_trims_last_as_long_as_they_have_to(name):
+    problem = VEHICLES[name]()
+    problem = replace(problem, horizon=Horizon(max_trims=4, min_coast=0.3))
+    for solution in search_insertion(problem, problem.goals[0], alternatives=2).solutions:
+        moving = problem.automaton.body_velocities[solution.trims].any(axis=1)
+        coasted = solution.durations[moving & (solution.durations > 0.0)]
+        assert (coasted >= 0.3 - 1e-9).all()
+
+
+@compiled_only
+@pytest.mark.parametrize("name", VEHICLES)
+def test_the_last_stage_is_the_answer_and_none_is_dearer_than_the_one_before(name):
+    problem = VEHICLES[name]()
+    stages = [stage.solutions[0].cost for stage in insertion_stages(problem, problem.goals[0])]
+    assert stages == sorted(stages, reverse=True)
+    assert stages[-1] == best(problem).cost
 
 
 # Compiled and interpreted kernels.

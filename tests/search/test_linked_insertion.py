@@ -10,11 +10,11 @@ import pytest
 from maneuver_automaton.audit import audit_plan
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Horizon, Problem
+from maneuver_automaton.search.insertion import search_insertion
 from maneuver_automaton.search.linked_insertion import improve_linked_words
 from maneuver_automaton.search.linked_words import scan_linked_words
 from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.word_setup import word_setup
-from maneuver_automaton.search.word_stages import search_words_with_maneuvers
 from maneuver_automaton.words.word import Word
 from tests.inertia import car_automaton, unicycle_automaton
 from tests.search.cases import compiled_only, lasting
@@ -67,14 +67,14 @@ def test_no_single_change_is_cheaper_at_the_end(goal):
 @pytest.mark.parametrize("goal", GOALS)
 def test_with_exhaustive_search_it_is_as_cheap_as_all_words_of_four_trims(goal):
     one = posed(goal, unicycle_automaton(FEW))
-    both = search_words_with_maneuvers(one, one.goals[0])
+    both = search_insertion(one, one.goals[0])
     words = scan_linked_words(one, one.goals[0], max_trims=4)
     assert both.solutions[0].cost <= words.solutions[0].cost + 1e-9
 
 
 def test_the_planners_alternatives_differ_and_pass_the_audit():
     one = posed([5.0, 1.0, 1.0], car_automaton())
-    result = search_words_with_maneuvers(one, one.goals[0], alternatives=4)
+    result = search_insertion(one, one.goals[0], alternatives=4)
     rest = one.automaton["rest"].reduced_state
     assert len(result.solutions) == 5
     assert len({(s.trims.tobytes(), s.durations.round(6).tobytes()) for s in result.solutions}) == 5
@@ -86,14 +86,14 @@ def test_the_planners_alternatives_differ_and_pass_the_audit():
 def test_a_moved_problem_has_the_moved_plan():
     one = posed([2.0, 1.0, 0.5])
     moved = one.moved(SE2([10.0, -3.0, 2.0]))
-    here, there = (search_words_with_maneuvers(p, p.goals[0]).solutions[0] for p in (one, moved))
+    here, there = (search_insertion(p, p.goals[0]).solutions[0] for p in (one, moved))
     assert there.trims.tolist() == here.trims.tolist()
     assert np.abs(there.durations - here.durations).max() < 1e-6
 
 
 def test_limits_hold():
     one = posed([5.0, 1.0, 1.0], horizon=Horizon(max_trims=4, max_time=9.0))
-    result = search_words_with_maneuvers(one, one.goals[0], alternatives=3)
+    result = search_insertion(one, one.goals[0], alternatives=3)
     for solution in result.solutions:
         assert len(lasting(solution)[0]) <= 4
         assert solution.duration == pytest.approx(plan_of(one, solution).duration)
@@ -116,4 +116,4 @@ def test_a_word_under_work_comes_back_from_the_whole_word(goal, time):
 
 def test_a_time_limit_ends_the_search_with_what_it_has():
     one = posed([5.0, 1.0, 1.0], car_automaton())
-    assert search_words_with_maneuvers(one, one.goals[0], time_limit=0.05).solutions
+    assert search_insertion(one, one.goals[0], time_limit=0.05).solutions

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from maneuver_automaton._compile import kernel
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search import _kernels_problem as kernels
+from maneuver_automaton.search._kernels_scan import least_after, least_per_metre
+from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.setup import search_setup
+from maneuver_automaton.search.timed_word import TimedWord
 from maneuver_automaton.search.word_scan import WordScan
 from maneuver_automaton.search.word_setup import word_setup
 from maneuver_automaton.words.conjugation import conjugated, conjugated_turn, goal_before
@@ -22,8 +27,16 @@ CONTROLS = ((0.0, 0.0), (1.0, 0.0), (0.8, 0.8), (0.8, -0.8))
 def looked_at(problem, links, word, rows):
     """`look` for Python: it counts no references, so that only kernels may call it."""
     seen = kernels.room_for(problem, word.size)
+    kernels.look_ahead(problem, links, seen, word, word.size)
     kernels.look(problem, links, seen, word, word.size, rows)
     return seen
+
+
+@kernel
+def least_cost_after(seen, rows, time):
+    """`least_after` for Python, of the first trim of a word that is seen."""
+    per_metre = least_per_metre(seen, rows, rows.size, 0)
+    return least_after(seen, rows[0], time, per_metre)
 
 
 @kernel
@@ -65,6 +78,20 @@ def test_the_transitions_of_a_word_are_priced_before_it_is_seen():
     trims = setup.as_search().trims[[0, 2, 1]].tolist()
     priced = price_of_transitions(links, np.array([0, 2, 1]), problem.tail)
     assert priced == pytest.approx(setup.fixed(trims)[0])
+
+
+@given(st.permutations(range(3)), st.lists(st.floats(0.0, 5.0), min_size=3, max_size=3))
+def test_a_word_coasts_for_no_less_than_its_first_trim_leaves_to_do(word, times):
+    """To wherever these times lead: the bound holds for them, as for all that lead there."""
+    one = Problem(unicycle_automaton(CONTROLS), [0.0, 0.0, 0.0], Goal(pose=[1.0, 0.0, 0.0]))
+    setup = word_setup(one, one.goals[0], most_trims=99)
+    trims = setup.as_search().trims[list(word)]
+    end = plan_of(one, setup.word(TimedWord(tuple(trims.tolist()), np.array(times)))).end
+    setup, (problem, links) = searched(Goal(pose=end))
+    rows = np.zeros(3, dtype=np.int64)
+    seen = looked_at(problem, links, np.array(word), rows)
+    cost = float(setup.library.arrays.rates[trims] @ times)
+    assert least_cost_after(seen, rows, times[0]) <= cost + 1e-9
 
 
 def test_a_trim_does_not_follow_itself():

@@ -10,6 +10,7 @@ import pytest
 
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2, SE2xR
+from maneuver_automaton.models import UserModel
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.search import SearchStatus, search_words
 from tests.reference import Word, words_of
@@ -449,6 +450,25 @@ def test_a_climb_in_a_fixed_time():
     solution = best(problem)
     assert_valid(problem, solution)
     assert "hover" in names(problem, solution)
+
+
+@compiled_only
+def test_a_greatest_time_that_is_far_off_changes_no_climb():
+    """An altitude to reach is no time to fill: words need not last as long as they may."""
+    model = UserModel(
+        name="glider", group=SE2xR, control_names=tuple("abcd"), velocity=lambda _, u: np.asarray(u)
+    )
+    rates = {"up": 1.0, "sink": -1.0, "ahead": 0.0, "left": 0.0, "right": 0.5, "low": -0.4}
+    turns = {"left": 1.0, "right": -1.0, "low": 0.3}
+    controls = {
+        name: (float(name not in ("up", "sink")), 0.0, turns.get(name, 0.0), rate)
+        for name, rate in rates.items()
+    } | {"spin": (0.0, 0.0, 1.0, 0.0), "fast": (2.0, 0.0, 0.0, 0.5)}
+    problem = Problem(robot(controls, model), [0, 0, 0, 0], [3.0, 1.0, 0.7, 0.6])
+    free, limited = (
+        best(replace(problem, horizon=Horizon(max_trims=4, max_time=most))) for most in (None, 20.0)
+    )
+    assert limited.cost == pytest.approx(free.cost, abs=1e-9)
 
 
 # A moved problem has the moved plan.

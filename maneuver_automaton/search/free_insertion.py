@@ -1,0 +1,360 @@
+"""Insertion of trims that switch at will: what pays most, where it pays most, times solved again.
+
+The price of every trim at every moment of a word is known, so a word that nothing improves has a
+certificate over the whole library. The work grows with the number of trims, not with its power.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.problem import Horizon, Problem
+from maneuver_automaton.search.alternatives import in_order
+from maneuver_automaton.search.asked import Asked, Found
+from maneuver_automaton.search.exact_end import corrected, with_fewer_digits
+from maneuver_automaton.search.library_arrays import LibraryArrays, library_arrays
+from maneuver_automaton.search.result import SearchResult, SearchStatus
+from maneuver_automaton.search.setup import SearchSetup, search_setup
+from maneuver_automaton.search.shortening import shortened
+from maneuver_automaton.search.sub_library import FEW, sub_library
+from maneuver_automaton.search.time_limit import UNUSED, within_time
+from maneuver_automaton.search.timed_word import TimedWord
+from maneuver_automaton.search.words import resting, search_setup_words
+from maneuver_automaton.words.word import Word
+
+SEEDS = 10  # cheapest words that are improved, where the library is its own sub-library
+SEEDS_OF_MANY = 4  # the same for larger libraries: insertion makes more of them
+ACCURACY = 1e-9  # reduced costs above minus this, relative, count as none
+LONGEST = 24  # trims of one word under way
+FIRST_ROUNDS = 4  # insertions into every seed
+FIRST_ROUNDS_OF_MANY = 2
+FULL = 2  # how many of the then cheapest words go on
+FULL_OF_MANY = 1
+ROUNDS = 60  # insertions into these
+GROWN = 2  # seeds that may grow beyond the limit before they are shortened
+SHORTENED = 3  # words that are tried with fewer trims where switches cost
+CHATTER = 5  # trims of a word in which two may chatter
+LATE = 1e-9  # [s] by which rounding may exceed a time
+
+
+def free_stages(asked: Asked) -> Iterator[SearchResult]:
+    """Words of one class of trims; again with the greatest time as a condition where it binds.
+
+    Their certificate is the smallest reduced cost over the whole library and all times.
+    """
+    problem = asked.problem
+    setup = search_setup(problem, asked.goal)
+    if setup.start_is_goal and (problem.horizon.time is None or setup.rest is not None):
+        yield resting(problem, setup)
+        return
+    if not len(setup.trims):  # nothing that words are made of
+        yield SearchResult(status=SearchStatus.EXHAUSTED, solutions=())
+        return
+    found = Found(problem, asked.alternatives + 1)
+    work = _work(asked, setup)
+    most_time = problem.horizon.max_time
+    free = _improved(work)
+    found.add(_in_time(free, most_time))
+    yield found.result()
+    late = not free.solutions or free.solutions[0].duration > _latest(most_time)
+    if most_time is not None and late and not asked.is_over():
+        library = within_time(work.library, most_time)
+        found.add(_in_time(_improved(replace(work, library=library, limit=most_time)), most_time))
+        yield found.result()
+
+
+def _latest(most_time: float | None) -> float:
+    """When a plan has to end, but for rounding [s]."""
+    return math.inf if most_time is None else most_time + LATE
+
+
+def _in_time(found: SearchResult, most_time: float | None) -> SearchResult:
+    """What was found, as far as it ends in time."""
+    kept = tuple(one for one in found.solutions if one.duration <= _latest(most_time))
+    return replace(found, solutions=kept)
+
+
+def _work(asked: Asked, setup: SearchSetup) -> _Work:
+    """What is searched, from the whole goal on."""
+    exact, setup = setup.goal, with_fewer_digits(setup)
+    many = len(setup.trims) > FEW
+    seeds = asked.seeds
+    if seeds is None:
+        seeds = max(SEEDS_OF_MANY if many else SEEDS, 2 * asked.alternatives + 1)
+    library = library_arrays(asked.problem, setup)
+    return _Work(asked.problem, setup, library, exact, asked, seeds)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Work:
+    """One search by insertion: for what, and with which library."""
+
+    problem: Problem
+    setup: SearchSetup
+    library: LibraryArrays
+    exact: Array  # (4,) the goal with all its digits
+    asked: Asked
+    seeds: int
+    limit: float | None = None  # [s] greatest time, if the library prices it
+
+    @property
+    def total(self) -> float | None:
+        """What the times of a word add up to, rest or unused time included; None if free [s]."""
+        return self.problem.horizon.time if self.limit is None else self.limit
+
+    @property
+    def most(self) -> int:
+        """Columns of the library that one word may have."""
+        most = self.problem.horizon.max_trims
+        return LONGEST if most is None else min(most + int(self.limit is not None), LONGEST)
+
+
+def _improved(work: _Work) -> SearchResult:
+    """Solutions of all seeds and of what insertion makes of them, each word once."""
+    problem, library, asked, most = work.problem, work.library, work.asked, work.most
+    many = len(work.setup.trims) > FEW
+    begun = list(_seeds(work))
+    if asked.known is not None:
+        begun = [*_as_seed(work, asked.known), *begun]
+    counts = {"expansions": 0, "insertions": 0, "seeds": 0}
+    limit = problem.search.max_expansions
+    words: list[TimedWord] = []
+    status = SearchStatus.EXHAUSTED
+    rounds = FIRST_ROUNDS_OF_MANY if many else FIRST_ROUNDS
+    for seed in begun:
+        if words and (asked.is_over() or (limit is not None and len(words) >= limit)):
+            status = SearchStatus.OUT_OF_BUDGET
+            break
+        words.append(_with_insertions(library, seed, most, rounds, counts))
+    counts["expansions"] = counts["seeds"] = len(words)
+    words = sorted((word for word in words if math.isfinite(word.cost)), key=_cost)
+    for k in range(min(len(words), max(FULL_OF_MANY if many else FULL, asked.alternatives + 1))):
+        if words[k].certificate < -ACCURACY * library.scale and not asked.is_over():
+            words[k] = _with_insertions(library, words[k], most, ROUNDS, counts)
+    words = [_calmed(library, word) for word in words]
+    binding = not words or min(words, key=_cost).certificate < -ACCURACY * library.scale
+    if most < LONGEST and binding and not library.free_heading and not asked.is_over():
+        words += _from_longer(library, begun, most, counts)
+    if _prices_switches(problem) and not asked.is_over():
+        words += _with_fewer_switches(library, words)
+    if asked.alternatives > 0:  # the best times of a seed's own word are locally optimal, too
+        words += [_with_insertions(library, seed, most, 0, counts) for seed in begun]
+    if asked.is_over():
+        status = SearchStatus.OUT_OF_BUDGET
+    improved = [
+        solution
+        for word in words
+        if len(word.trims) - library.tail <= most
+        for solution in _solutions(work, word)
+        if solution.trims.size <= (problem.horizon.max_trims or LONGEST)
+    ]
+    return SearchResult(status=status, solutions=tuple(in_order(improved)), counts=counts)
+
+
+def _cost(word: TimedWord) -> float:
+    return word.cost
+
+
+def compile_calming(problem: Problem) -> None:
+    """Have the kernel that shortens chattering words compiled, for any problem like this one."""
+    library = library_arrays(problem, search_setup(problem, problem.goals[0]))
+    _calmed(library, TimedWord((0,) * CHATTER, np.ones(CHATTER), cost=1.0))
+
+
+def _from_longer(
+    library: LibraryArrays, begun: list[TimedWord], most: int, counts: dict[str, int]
+) -> Iterator[TimedWord]:
+    """What becomes of the cheapest seed if it may grow first, and is shortened afterwards."""
+    grown = [
+        _calmed(library, _with_insertions(library, seed, LONGEST, ROUNDS, counts))
+        for seed in begun[:GROWN]
+    ]
+    longer = [word for word in grown if math.isfinite(word.cost) and len(word.trims) > most]
+    for word in sorted(longer, key=_cost)[:1]:
+        short = shortened(library, word, most)
+        if short is not None and len(short.trims) <= most:
+            again = _with_insertions(library, short, most, ROUNDS, counts)
+            if math.isfinite(again.cost) and len(again.trims) <= most:
+                yield again
+
+
+def _prices_switches(problem: Problem) -> bool:
+    """Whether a switch of trims costs something by itself."""
+    cost = problem.cost
+    return not isinstance(cost, Cost) or cost.switch > 0.0 or cost.direction_change > 0.0
+
+
+def _with_fewer_switches(library: LibraryArrays, words: Sequence[TimedWord]) -> Iterator[TimedWord]:
+    """The words found with fewer and fewer trims: where switches cost, these may pay."""
+    if library.free_heading:
+        return
+    for word in words[:SHORTENED]:
+        longer = word
+        for most in range(len(word.trims) - 1, 0, -1):
+            short = shortened(library, longer, most)
+            if short is None:
+                break
+            yield short
+            longer = short
+
+
+def _as_seed(work: _Work, known: Plan) -> Iterator[TimedWord]:
+    """A plan in the library's numbers, rest and free turn appended.
+
+    None if a trim is not in the library, or the word is longer than those that are searched.
+    """
+    automaton, library = work.problem.automaton, work.library
+    names = set(automaton.trim_names)
+    if len(known.trims) <= LONGEST and all(trim.name in names for trim in known.trims):
+        word = np.array([automaton.index_of(trim.name) for trim in known.trims], dtype=np.int64)
+        if not word.size or (library.number_of[word] >= 0).all():
+            yield _in_library(work, word, known.durations)
+
+
+def _with_insertions(
+    library: LibraryArrays, word: TimedWord, most: int, rounds: int, counts: dict[str, int]
+) -> TimedWord:
+    """The word with its best times, after inserting what pays, at most `rounds` times."""
+    from maneuver_automaton.search import _kernels_insertion as kernels
+
+    trims, times = _with_room(word)
+    size, cost, least, used = kernels.improve_word(
+        *_seen_by_kernels(library),
+        trims,
+        times,
+        len(word.trims),
+        min(most, LONGEST),
+        ACCURACY * library.scale,
+        rounds,
+    )
+    counts["insertions"] += int(used)
+    return TimedWord(tuple(trims[:size].tolist()), times[:size], float(cost), float(least))
+
+
+def _seen_by_kernels(library: LibraryArrays) -> tuple[Array, Array, Array, Array, Array, int, int]:
+    """The library and the conditions of a problem, in the order in which kernels take them."""
+    conditions = library.goal, library.rows, library.targets
+    return library.twists, library.rates, *conditions, library.n_priced, library.tail
+
+
+def _calmed(library: LibraryArrays, word: TimedWord) -> TimedWord:
+    """The word with its runs of trims that chatter shortened."""
+    from maneuver_automaton.search import _kernels_insertion as kernels
+
+    if len(word.trims) - library.tail < CHATTER:
+        return word
+    trims, times = _with_room(word)
+    size, cost, least = kernels.calm_word(
+        *_seen_by_kernels(library),
+        trims,
+        times,
+        len(word.trims),
+        word.cost,
+    )
+    return TimedWord(tuple(trims[:size].tolist()), times[:size], float(cost), float(least))
+
+
+def _with_room(word: TimedWord) -> tuple[IntArray, Array]:
+    """Trims and times in buffers that a kernel lengthens in place."""
+    trims, times = np.zeros(LONGEST + 4, dtype=np.int64), np.zeros(LONGEST + 4)
+    trims[: len(word.trims)], times[: len(word.trims)] = word.trims, word.durations
+    return trims, times
+
+
+def _solutions(work: _Work, word: TimedWord) -> Iterator[Word]:
+    """What a word under work has come to, ending at the goal itself; none if it cannot."""
+    problem, library = work.problem, work.library
+    numbers = word.numbers
+    times = corrected(library, numbers, word.durations, work.exact)
+    if times is None:
+        return
+    cost = word.cost + float(library.rates[numbers] @ (times - word.durations))
+    kept = slice(0, numbers.size - library.tail)
+    trims, lasting = _without_unused(library.trims[numbers[kept]], times[kept])
+    switching = problem.cost.switching(problem.automaton.body_velocities[trims])
+    yield Word(
+        trims=trims,
+        durations=lasting,
+        cost=cost + library.fixed_cost + switching,
+        certificate=word.certificate,
+    )
+
+
+def _without_unused(trims: IntArray, times: Array) -> tuple[IntArray, Array]:
+    """A word without unused time; neighbours that it has parted become one."""
+    if not (trims == UNUSED).any():
+        return trims, times
+    used = trims != UNUSED
+    trims, times = trims[used], times[used]
+    if not trims.size:
+        return trims, times
+    begins = np.flatnonzero(np.append(True, trims[1:] != trims[:-1]))
+    return trims[begins], np.add.reduceat(times, begins)
+
+
+def _seeds(work: _Work) -> Iterator[TimedWord]:
+    """Cheapest words of the sub-library, in the library's numbers, rest and free turn appended."""
+    found = _words_of_few(work, work.problem)
+    if not found and work.total is not None:
+        found = _fast_words(work)
+    yield from found
+
+
+def _words_of_few(work: _Work, problem: Problem) -> list[TimedWord]:
+    """Seeds of `problem` from the sub-library."""
+    solutions = search_setup_words(
+        problem,
+        sub_library(work.setup),
+        alternatives=work.seeds - 1,
+        deadline=work.asked.deadline,
+        spare=True,
+    )
+    return [_in_library(work, solution.trims, solution.durations) for solution in solutions]
+
+
+def _fast_words(work: _Work) -> list[TimedWord]:
+    """For a time that no seed meets: first insert for least time, then fill up the time."""
+    limit = work.total
+    hurry = replace(work.problem, cost=Cost(time=1.0), horizon=Horizon())
+    setup = search_setup(hurry, hurry.goals[0])
+    setup = replace(setup, goal=work.setup.goal, free_heading=work.setup.free_heading)
+    library = library_arrays(hurry, setup)
+    least = replace(
+        work, problem=hurry, setup=setup, library=library, exact=library.goal, limit=None
+    )
+    met = []
+    for seed in _words_of_few(least, hurry):
+        word = _with_insertions(library, seed, LONGEST, ROUNDS, {"insertions": 0})
+        if not math.isfinite(word.cost):
+            continue
+        quick = next(_solutions(least, word), None)
+        if quick is not None and limit is not None and quick.duration <= limit + LATE:
+            met.append(_in_library(work, quick.trims, quick.durations))
+    return met
+
+
+def _in_library(work: _Work, trims: IntArray, durations: Array) -> TimedWord:
+    """A word of the automaton in the library's numbers, rest and free turn appended."""
+    library, limit = work.library, work.total
+    word = library.number_of[trims].tolist()
+    times = durations.tolist()
+    if limit is not None and library.rest is not None and word[-1:] != [library.rest]:
+        word.append(library.rest)
+        times.append(max(0.0, limit - sum(times)))
+    if library.free_heading:
+        word.append(len(library.rates) - 1)
+        times.append(_free_turn(library, word[:-1], times))
+    return TimedWord(tuple(word), np.array(times))
+
+
+def _free_turn(library: LibraryArrays, word: list[int], times: list[float]) -> float:
+    """Time of the turn that a free heading needs at the end of a word [s], at 1 rad/s."""
+    turned = float(library.twists[word, 2] @ np.array(times))
+    return float(np.remainder(library.goal[2] - turned, 2.0 * np.pi))
