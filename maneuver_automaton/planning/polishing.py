@@ -12,13 +12,13 @@ import numpy as np
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.collision.convex import convex_pieces
-from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Model, SecondOrderCar, SecondOrderUnicycle
 from maneuver_automaton.optimal_control import Guess, PolishSettings, has_casadi, load_casadi
 from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.problem import Components, RunningCost
 from maneuver_automaton.optimal_control.separation import BodyPart
 from maneuver_automaton.planning.incumbents import Incumbents
+from maneuver_automaton.planning.polished_price import admitted_durations, polished_price
 from maneuver_automaton.problem import Problem, moves
 from maneuver_automaton.refinement.gear_sequences import (
     car_library,
@@ -66,10 +66,9 @@ def why_not_polished(problem: Problem) -> str:
         return "there is an occupancy map"
     if any(obstacle.height for obstacle in problem.obstacles if isinstance(obstacle, Obstacle)):
         return "obstacles have heights"
-    if not isinstance(problem.cost, Cost) or problem.cost.time == 0.0:
+    unlimited = problem.horizon.time is None and problem.horizon.max_time is None
+    if unlimited and polished_price(problem).cost.time == 0.0:
         return "time costs nothing"
-    if problem.horizon.time is not None:
-        return "the time is fixed"
     if not has_casadi():
         return "CasADi is not installed"
     return ""
@@ -88,9 +87,13 @@ def polish_found(found: Incumbents, paths: Sequence[Aimed]) -> None:
     `paths` are guesses along kinematic plans that are known already.
     """
     problem, budget = found.problem, found.budget
-    known = [(one.plan, one.goal_index) for one in found.plans[:1]]
+    price = polished_price(problem)
+    known = [(one.plan, one.goal_index) for one in found.plans]
+    cheapest = sorted(known, key=lambda one: price.of(one[0]))[:1]
+    quickest = sorted(known, key=lambda one: one[0].duration)[:1]
+    known = [*cheapest, *(one for one in quickest if one not in cheapest)]
     horizon = problem.horizon
-    if not known and (horizon.max_time is not None or horizon.max_trims is not None):
+    if not known and (horizon.max_time or horizon.time or horizon.max_trims):
         # what is late may be made quicker, and of too many trims one maneuver
         known = sorted(found.misfits, key=lambda one: one[0].duration)[:1]
     if not known or budget.is_over or why_not_polished(problem):
@@ -111,6 +114,7 @@ def polish_found(found: Incumbents, paths: Sequence[Aimed]) -> None:
                 problem,
                 [one.guess for one in aimed if one.goal_index == goal_index],
                 goal_index,
+                price.stage_cost(known[0][0]),
                 time_limit=budget.left,
                 most_iterations=work,
                 accepts=functools.partial(found.offer, goal_index=goal_index),
@@ -168,6 +172,7 @@ def polish_plans(
     problem: Problem,
     guesses: Sequence[Guess],
     goal_index: int,
+    stage_cost: RunningCost | None,
     *,
     time_limit: float,
     most_iterations: int | None = None,
@@ -192,6 +197,7 @@ def polish_plans(
         obstacles=tuple(one.shape for one in problem.obstacles if isinstance(one, Obstacle)),
         bounds=problem.bounds,
         margin=problem.margin,
+        durations=admitted_durations(problem),
     )
 
     def sound(motion: PolishedMotion) -> bool:
@@ -209,36 +215,11 @@ def polish_plans(
     return polish_guesses(
         task,
         guesses,
-        stage_cost=_stage_cost(problem),
+        stage_cost=stage_cost,
         time_limit=time_limit,
         most_iterations=most_iterations,
         accepts=sound,
     )
-
-
-def _stage_cost(problem: Problem) -> RunningCost | None:
-    """What a second costs beside the time, in units of its price: effort and length."""
-    cost, model = problem.cost, problem.automaton.model
-    assert isinstance(cost, Cost)
-    if cost.effort == 0.0 and cost.length == 0.0:
-        return None
-    count = len(model.control_names)
-    weight = np.eye(count) if cost.effort_matrix is None else cost.effort_matrix
-    effort, length = cost.effort / cost.time, cost.length / cost.time
-
-    def price(z: Components, u: Components) -> Any:
-        spent: Any = 0.0
-        if effort:
-            spent += effort * sum(
-                float(weight[i, j]) * u[i] * u[j] for i in range(count) for j in range(count)
-            )
-        if length:
-            v_x, v_y, _, *climb = model.velocity(z, u)
-            square = v_x * v_x + v_y * v_y + sum(v * v for v in climb) + 1e-9
-            spent += length * np.sqrt(square)
-        return spent
-
-    return price
 
 
 def _body_parts(problem: Problem) -> tuple[BodyPart, ...]:

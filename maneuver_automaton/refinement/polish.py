@@ -21,6 +21,8 @@ from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control import Guess, SolveStatus
 from maneuver_automaton.optimal_control.polish_values import (
+    LEAST_DURATION,
+    MOST_DURATION,
     Ends,
     Polished,
     PolishSettings,
@@ -61,6 +63,8 @@ class PolishTask:
         Where the reference point may be.
     margin : float
         Distance to keep from obstacles [m].
+    durations : (2,) tuple
+        Least and greatest duration [s].
     """
 
     model: Model
@@ -72,6 +76,7 @@ class PolishTask:
     obstacles: tuple[Shape, ...] = ()
     bounds: Bounds = field(default_factory=Bounds)
     margin: float = 0.0  # [m]
+    durations: tuple[float, float] = (LEAST_DURATION, MOST_DURATION)  # [s]
 
     def __post_init__(self) -> None:
         freeze(self, "start", last=self.model.group.dof)
@@ -133,7 +138,7 @@ class PolishTask:
         if len(self.goal) > 3 and self.goal[3] is None:
             end[3] = None
         still = (0.0,) * self.start.size
-        return Ends((*still, *self.start_state.tolist()), (*end, *self.goal_state))
+        return Ends((*still, *self.start_state.tolist()), (*end, *self.goal_state), self.durations)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -11,11 +11,6 @@ from tests.matrix.vehicles import VEHICLES
 # fails until it is taken out.
 FAULTS: dict[str, dict[str, str]] = {
     "a plan found otherwise is cheaper": {
-        "fixed_time": "second_order_unicycle car_with_trailer user",
-        "stage_cost": "second_order_car car_with_trailer single_track user",
-        "dear_switch": "single_track",
-        "effort": "car_with_trailer",
-        "norm": "user",
         "zones_crossed": "car_with_trailer helicopter",
         "heights": "helicopter",
     },
