@@ -38,7 +38,7 @@ from maneuver_automaton.refinement.maneuver_lattice import maneuver_words, plan_
 from maneuver_automaton.refinement.ready import load_lattice, load_maneuver_kernels
 from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
 from maneuver_automaton.search import SearchStatus
-from maneuver_automaton.search.budget import Budget
+from maneuver_automaton.search.budget import COUNTED, Budget
 from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.linked_words import load_linked_words
@@ -142,7 +142,8 @@ def _over_maneuvers(search: _Search) -> Iterator[tuple[Plan, int]]:
     query = late_at_first(lattice_query(problem, goals, prepared=prepared))
     before = found.counts["expansions"]
     counted = budget.expansions is not None
-    share = 1.0 if counted or why_not_polished(problem) else MANEUVER_SHARE
+    share = COUNTED if counted else MANEUVER_SHARE
+    share = 1.0 if why_not_polished(problem) else share
     until = budget.stage(share if found.plans else 1.0).deadline
     known: Word | None = None
     if _needs_quick_word(query):
