@@ -9,6 +9,7 @@ import pytest
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.stock import load_stock_library
+from maneuver_automaton.collision import Disc, Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.optimal_control import has_casadi
 from maneuver_automaton.planning import plan
@@ -92,3 +93,21 @@ def test_a_longest_time_bounds_what_is_polished():
 def test_effort_alone_has_no_quickest_motion():
     assert why_not_polished(posed(cost=Cost(effort=1.0))) == "time costs nothing"
     assert not why_not_polished(posed(cost=Cost(effort=1.0), horizon=Horizon(max_time=9.0)))
+
+
+@compiled_only
+@needs_casadi
+def test_what_is_passed_above_or_below_does_not_keep_from_polishing():
+    bridge = Obstacle(Disc(1.6, [15.0, 2.0]), height=(50.0, 60.0))
+    problem = Problem(
+        load_stock_library("helicopter"),
+        [0.0, 0.0, 0.0, 0.0],
+        (30.0, 4.0, 0.2, 4.0),
+        footprint=Disc(2.0),
+        body_height=(-0.5, 0.5),
+        obstacles=bridge,
+        search=SearchSettings(max_expansions=800),
+    )
+    result = plan(problem, time_limit=30.0)
+    assert result.plan.word == ("polished",)
+    assert result.audit.passed
