@@ -10,15 +10,8 @@ from tests.matrix.vehicles import VEHICLES
 # Reason, then features and the vehicles for which they do not work; a cell that begins to work
 # fails until it is taken out.
 FAULTS: dict[str, dict[str, str]] = {
-    "a plan found otherwise is cheaper": {
-        "zones_crossed": "car_with_trailer helicopter",
-        "heights": "helicopter",
-    },
     "no alternative is found": {
         "alternatives_among_obstacles": "glider",
-    },
-    "zones are entered for the whole way or not at all": {
-        "zones_crossed": "hovercraft",
     },
 }
 GROUPS = {
