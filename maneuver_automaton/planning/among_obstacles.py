@@ -227,7 +227,7 @@ def _detours(progress: _Progress, best: Word, most: int) -> Iterator[Candidate]:
     for n_th in range(MOST_DETOURS):
         if n_th >= len(known) or len(known) > most:
             return
-        for problem in with_stones(query, known[n_th]):
+        for problem in with_stones(query.problem, known[n_th]):
             if progress.budget.is_over or progress.budget.expansions == 0:
                 return
             closed = lattice_query(problem, query.goal_index, prepared=query.prepared)

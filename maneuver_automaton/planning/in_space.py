@@ -19,6 +19,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.same_motion import UNFINISHED
 from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.planning.checking import load_checks
+from maneuver_automaton.planning.detours import with_stones
 from maneuver_automaton.planning.incumbents import Incumbents
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
@@ -37,6 +38,7 @@ from maneuver_automaton.search.result import SearchStatus, plan_of
 WORDS = 24  # of free space that are looked at, for all goals together
 FEWEST_WORDS = 2  # for each goal
 WORDS_SHARE = 0.2  # of the time that they may take
+DETOURS_SHARE = 0.5  # of the time, for other ways, where they are asked for
 HEADINGS = 16  # that are aimed at where the goal's heading is free
 
 
@@ -69,7 +71,9 @@ def plan_in_space(
     load_checks(problem, found.workspace)
     goals = open_goals(problem)
     lattice = _Lattice(found, goals)
-    for plan, index in itertools.chain(_words(found, goals), lattice.plans()):
+    share = DETOURS_SHARE if alternatives else 0.0
+    first = lattice.plans(problem, budget.part(1.0 - share))
+    for plan, index in itertools.chain(_words(found, goals), first, _detours(lattice)):
         found.offer(plan, index)
         if found.plans and budget.is_over:
             break
@@ -102,13 +106,13 @@ class _Lattice:
     goals: tuple[int, ...]
     exhausted: bool = False
 
-    def plans(self) -> Iterator[tuple[Plan, int]]:
+    def plans(self, problem: Problem, budget: Budget) -> Iterator[tuple[Plan, int]]:
         """Plans as they are found, each also with its best times, and the goals they reach."""
-        found, problem = self.found, self.found.problem
-        query, numbers = _query(found, self.goals)
+        found = self.found
+        query, numbers = _query(found, problem, self.goals)
         before = found.counts["expansions"]
         for incumbent in maneuver_words(
-            query, deadline=found.budget.deadline, max_expansions=found.budget.expansions
+            query, deadline=budget.deadline, max_expansions=budget.expansions
         ):
             found.counts["expansions"] = before + incumbent.expansions
             if incumbent.word is None:
@@ -120,6 +124,18 @@ class _Lattice:
             if better is not None:
                 yield better, index
             yield _in_time(problem, plan), index
+
+
+def _detours(lattice: _Lattice) -> Iterator[tuple[Plan, int]]:
+    """Plans on other ways, as long as there are too few: a stone closes the one that is known."""
+    found = lattice.found
+    known = found.plans[:1]
+    for one in known:
+        closed = list(with_stones(found.problem, one.plan))
+        for k, problem in enumerate(closed):
+            if len(found.plans) > found.alternatives or found.budget.is_over:
+                return
+            yield from lattice.plans(problem, found.budget.part(1.0 / (len(closed) - k)))
 
 
 def _in_time(problem: Problem, plan: Plan) -> Plan:
@@ -145,9 +161,11 @@ def _why_none(found: Incumbents, *, exhausted: bool) -> tuple[PlanStatus, str]:
     )
 
 
-def _query(found: Incumbents, goals: tuple[int, ...]) -> tuple[LatticeQuery, list[int]]:
+def _query(
+    found: Incumbents, problem: Problem, goals: tuple[int, ...]
+) -> tuple[LatticeQuery, list[int]]:
     """What the search over trims and maneuvers is asked, and which goal each of its aims is."""
-    problem, aims = found.problem, list[Goal]()
+    aims = list[Goal]()
     numbers: list[int] = []
     any_trim = problem.automaton.trim_names[0]
     for index in goals:

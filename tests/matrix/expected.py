@@ -9,11 +9,7 @@ from tests.matrix.vehicles import VEHICLES
 
 # Reason, then features and the vehicles for which they do not work; a cell that begins to work
 # fails until it is taken out.
-FAULTS: dict[str, dict[str, str]] = {
-    "no alternative is found": {
-        "alternatives_among_obstacles": "glider",
-    },
-}
+FAULTS: dict[str, dict[str, str]] = {}
 GROUPS = {
     "all": list(VEHICLES),
     "inertia": [name for name, vehicle in VEHICLES.items() if vehicle.inertia],
