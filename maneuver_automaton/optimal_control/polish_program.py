@@ -11,7 +11,12 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control._casadi import load_casadi, numpy_on_symbols
-from maneuver_automaton.optimal_control.polish_values import Ends, Point, PolishSettings, Scene
+from maneuver_automaton.optimal_control.polish_values import (
+    Ends,
+    Point,
+    PolishSettings,
+    Scene,
+)
 from maneuver_automaton.optimal_control.problem import (
     Components,
     Grid,
@@ -35,7 +40,6 @@ from maneuver_automaton.optimal_control.transcription import Transcription, tran
 from maneuver_automaton.optimal_control.vehicles import moving_frame
 
 POINT = BodyPart(solids=((np.zeros((1, 2)), 0.0),))  # the reference point alone
-LEAST_DURATION, MOST_DURATION = 1e-2, 1e4  # [s]
 LEAST_PACE, MOST_PACE = 0.02, 50.0  # of a phase, against the even pace of the guess
 CURVED = 20.0  # times the tightening for reduced states that do not run straight
 
@@ -187,7 +191,7 @@ def _problem(
         return 1.0 + settings.effort * effort + more
 
     limits = np.vstack([np.tile([-np.inf, np.inf], (dof, 1)), _tight(model, settings)])
-    for state in ends:
+    for state in (ends.start, ends.end):
         values = np.array([math.nan if value is None else value for value in state])
         limits[:, 0], limits[:, 1] = np.fmin(limits[:, 0], values), np.fmax(limits[:, 1], values)
     return OptimalControlProblem(
@@ -196,7 +200,7 @@ def _problem(
         dynamics=moving_frame(model.group, velocity=model.velocity, reduced=model.dynamics),
         start=ends.start,
         end=ends.end,
-        duration=(LEAST_DURATION, MOST_DURATION),
+        duration=ends.duration,
         stage_cost=cost,
         state_limits=limits,
         control_limits=_within(model.control_limits, settings.tightening),

@@ -12,6 +12,8 @@ from maneuver_automaton.optimal_control.problem import Guess
 from maneuver_automaton.optimal_control.separation import BodyPart, Solid
 from maneuver_automaton.optimal_control.solution import SolveStatus
 
+LEAST_DURATION, MOST_DURATION = 1e-2, 1e4  # [s]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PolishSettings:
@@ -59,6 +61,7 @@ class Ends(NamedTuple):
 
     start: tuple[float | None, ...]
     end: tuple[float | None, ...]
+    duration: tuple[float, float] = (LEAST_DURATION, MOST_DURATION)  # [s] from the one to the other
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

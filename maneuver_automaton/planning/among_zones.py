@@ -3,7 +3,9 @@
 A search that knows nothing of zones is asked simpler questions, whose answers keep to all zones:
 each zone is either entered, then only motions that it admits are used, or it is an obstacle. What
 comes out is quickened outside of the zones, and the cheapest plan that passes every check is kept.
-The first question is the one without zones: if its answer keeps to them, none is better.
+The first question is the one without zones: if its answer keeps to them, none is better. Where it
+does not, a vehicle that does not switch at will follows it from zone to zone, each stretch planned
+on its own, and coasts through every zone in a trim that is admitted there.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.collision.surroundings import fastest_point, parts_of, surroundings_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.planning.blocked import blocked_ends
+from maneuver_automaton.planning.crossing import crossed_slowly, nearest_goal, polish_slowed
 from maneuver_automaton.planning.incumbents import Incumbents
 from maneuver_automaton.planning.result import Answer, PlanResult, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
@@ -32,6 +35,7 @@ from maneuver_automaton.search.admission import admitted_stretches, piece_is_adm
 from maneuver_automaton.search.budget import Budget
 
 MOST_QUESTIONS = 8  # ways to enter some zones and go around others
+CROSSED_SHARE = 0.5  # of the time left, for a plan from zone to zone
 LEAST_TIME = 1e-3  # [s] for each question, also where the time is over
 STEP = 0.02  # [m, rad] between places where a trim may be replaced by a faster one
 PARALLEL = 1e-12  # of twists, relative
@@ -62,6 +66,13 @@ def plan_among_zones(
             found.offer(plan, goal_index)
         if k == 0 and found.plans and result.plan is found.plans[0].plan and not alternatives:
             return replace(result, problem=problem)
+        if k == 0 and itself and result.plan is not None:
+            part = budget.part(CROSSED_SHARE, at_least=LEAST_TIME)
+            crossed = crossed_slowly(problem, result.plan, search, part, workspace)
+            if crossed is not None:
+                found.offer(*crossed)
+        elif k > 0 and question is not problem and first.plan is not None:
+            polish_slowed(found, question, first.plan, budget)
     assert first is not None
     if found.plans:
         return found.found(bound=first.lower_bound or 0.0)
@@ -78,16 +89,11 @@ def _plans(problem: Problem, result: PlanResult) -> Iterator[tuple[Plan, int]]:
         return
     found = [result.plan, *(other.plan for other in result.alternatives)]
     for plan in found:
-        goal_index = result.goal_index if plan is result.plan else _nearest_goal(problem, plan)
+        goal_index = result.goal_index if plan is result.plan else nearest_goal(problem, plan)
         yield plan, goal_index
         quick = quickened(problem, plan)
         if quick is not None:
             yield quick, goal_index
-
-
-def _nearest_goal(problem: Problem, plan: Plan) -> int:
-    """The goal that a plan ends at."""
-    return min(range(len(problem.goals)), key=lambda k: sum(problem.goals[k].off(plan.end)))
 
 
 def _questions(problem: Problem) -> Iterator[Problem]:

@@ -11,7 +11,6 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Disc, Obstacle
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.lattice_query import LatticeQuery
 
 STONES = (  # where stones are laid and their radii, in shares of the way
     (0.5, 0.12),  # so wide that the other side of an obstacle is the shorter way
@@ -21,12 +20,11 @@ STONES = (  # where stones are laid and their radii, in shares of the way
 )
 
 
-def with_stones(query: LatticeQuery, known: Plan) -> Iterator[Problem]:
+def with_stones(problem: Problem, known: Plan) -> Iterator[Problem]:
     """The problem with one more obstacle on the way of a known plan, which closes that way.
 
     Problems whose start or goal the stone touches are left out.
     """
-    problem = query.problem
     times = np.linspace(0.0, known.duration, 101)
     poses = known.pose_at(times)
     way = np.append(0.0, np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T)))

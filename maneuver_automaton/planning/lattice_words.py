@@ -280,7 +280,7 @@ def _detours(lattice: LatticeWords, best: Word, most: int) -> Iterator[Candidate
     for n_th in range(MOST_DETOURS):
         if n_th >= len(known) or len(known) > most:
             return
-        for problem in with_stones(query, known[n_th]):
+        for problem in with_stones(query.problem, known[n_th]):
             if lattice.budget.is_over or lattice.budget.expansions == 0:
                 return
             closed = lattice_query(problem, _goals(query), prepared=query.prepared)

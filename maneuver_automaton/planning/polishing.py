@@ -11,14 +11,16 @@ import numpy as np
 
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.collision import Obstacle
+from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.collision.convex import convex_pieces
-from maneuver_automaton.costs import Cost
+from maneuver_automaton.collision.surroundings import parts_of, surroundings_of
 from maneuver_automaton.models import Model, SecondOrderCar, SecondOrderUnicycle
 from maneuver_automaton.optimal_control import Guess, PolishSettings, has_casadi, load_casadi
 from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.problem import Components, RunningCost
 from maneuver_automaton.optimal_control.separation import BodyPart
 from maneuver_automaton.planning.incumbents import Incumbents
+from maneuver_automaton.planning.polished_price import admitted_durations, polished_price
 from maneuver_automaton.problem import Problem, moves
 from maneuver_automaton.refinement.gear_sequences import (
     car_library,
@@ -41,10 +43,13 @@ from maneuver_automaton.refinement.polish import (
     PolishTask,
     polish_guesses,
 )
+from maneuver_automaton.search.budget import Budget
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
 
 POINT = ((np.zeros((1, 2)), 0.0),)  # the body of a vehicle without a footprint
+SAMPLES = 500  # of a plan that passes above or below obstacles
 EXPANSIONS_AN_ITERATION = 4  # of the lattice, in place of one iteration of polishing
+FEWEST_ITERATIONS = 100  # however few expansions are allowed: one guess to its end
 TURNS = (1.0, 0.8)  # of the greatest curvature, with which they turn
 
 
@@ -64,12 +69,9 @@ def why_not_polished(problem: Problem) -> str:
         return "something moves"
     if not all(isinstance(obstacle, Obstacle) for obstacle in problem.obstacles):
         return "there is an occupancy map"
-    if any(obstacle.height for obstacle in problem.obstacles if isinstance(obstacle, Obstacle)):
-        return "obstacles have heights"
-    if not isinstance(problem.cost, Cost) or problem.cost.time == 0.0:
+    unlimited = problem.horizon.time is None and problem.horizon.max_time is None
+    if unlimited and polished_price(problem).cost.time == 0.0:
         return "time costs nothing"
-    if problem.horizon.time is not None:
-        return "the time is fixed"
     if not has_casadi():
         return "CasADi is not installed"
     return ""
@@ -88,29 +90,34 @@ def polish_found(found: Incumbents, paths: Sequence[Aimed]) -> None:
     `paths` are guesses along kinematic plans that are known already.
     """
     problem, budget = found.problem, found.budget
-    known = [(one.plan, one.goal_index) for one in found.plans[:1]]
+    price = polished_price(problem)
+    known = [(one.plan, one.goal_index) for one in found.plans]
+    cheapest = sorted(known, key=lambda one: price.of(one[0]))[:1]
+    quickest = sorted(known, key=lambda one: one[0].duration)[:1]
+    known = [*cheapest, *(one for one in quickest if one not in cheapest)]
     horizon = problem.horizon
-    if not known and (horizon.max_time is not None or horizon.max_trims is not None):
+    if not known and (horizon.max_time or horizon.time or horizon.max_trims):
         # what is late may be made quicker, and of too many trims one maneuver
         known = sorted(found.misfits, key=lambda one: one[0].duration)[:1]
     if not known or budget.is_over or why_not_polished(problem):
         return
     if not known[0][0].duration > 0.0:
         return  # it is there already
+    solid = _without_passed(problem, known[0][0])
     aimed = [Aimed(guess_of_plan(plan), goal_index) for plan, goal_index in known]
     if rests_at_both_ends(problem):
         along = list(guesses_along_paths(problem, time_limit=budget.left))
         aimed = along or [*paths, *aimed]
-    most = budget.expansions
-    work = None if most is None else 1 + most // EXPANSIONS_AN_ITERATION
+    work = iterations_within(budget)
     for goal_index in dict.fromkeys(one.goal_index for one in aimed):
         if budget.is_over or (work is not None and work <= 0):
             return
         try:
             polished = polish_plans(
-                problem,
+                solid,
                 [one.guess for one in aimed if one.goal_index == goal_index],
                 goal_index,
+                price.stage_cost(known[0][0]),
                 time_limit=budget.left,
                 most_iterations=work,
                 accepts=functools.partial(found.offer, goal_index=goal_index),
@@ -121,6 +128,35 @@ def polish_found(found: Incumbents, paths: Sequence[Aimed]) -> None:
         found.counts.update(polished=len(polished.attempts))
         if work is not None:
             work -= sum(attempt.iterations for attempt in polished.attempts)
+
+
+def iterations_within(budget: Budget) -> int | None:
+    """Iterations of the solver that a budget of expansions allows; None if they do not count."""
+    most = budget.expansions
+    return None if most is None else FEWEST_ITERATIONS + most // EXPANSIONS_AN_ITERATION
+
+
+def _without_passed(problem: Problem, known: Plan) -> Problem:
+    """The problem without obstacles above or below which a `known` plan passes.
+
+    The solver takes the others for as high as can be. What it finds is checked among all.
+    """
+    if not any(isinstance(one, Obstacle) and one.height for one in problem.obstacles):
+        return problem
+    origin, body = origin_near(known.start[:2]), parts_of(problem.footprint)
+    times = known.start_time + np.linspace(0.0, known.duration, SAMPLES)
+    poses = known.pose_at(times)[:, :3].copy()
+    poses[:, :2] -= origin
+    kept = [
+        one
+        for one in problem.obstacles
+        if not (isinstance(one, Obstacle) and one.height)
+        or surroundings_of((replace(one, height=None),), origin)
+        .nearest(body, poses, times)
+        .distance.min()
+        > problem.margin
+    ]
+    return replace(problem, obstacles=tuple(kept))
 
 
 def rests_at_both_ends(problem: Problem) -> bool:
@@ -168,6 +204,7 @@ def polish_plans(
     problem: Problem,
     guesses: Sequence[Guess],
     goal_index: int,
+    stage_cost: RunningCost | None,
     *,
     time_limit: float,
     most_iterations: int | None = None,
@@ -192,6 +229,7 @@ def polish_plans(
         obstacles=tuple(one.shape for one in problem.obstacles if isinstance(one, Obstacle)),
         bounds=problem.bounds,
         margin=problem.margin,
+        durations=admitted_durations(problem),
     )
 
     def sound(motion: PolishedMotion) -> bool:
@@ -209,36 +247,11 @@ def polish_plans(
     return polish_guesses(
         task,
         guesses,
-        stage_cost=_stage_cost(problem),
+        stage_cost=stage_cost,
         time_limit=time_limit,
         most_iterations=most_iterations,
         accepts=sound,
     )
-
-
-def _stage_cost(problem: Problem) -> RunningCost | None:
-    """What a second costs beside the time, in units of its price: effort and length."""
-    cost, model = problem.cost, problem.automaton.model
-    assert isinstance(cost, Cost)
-    if cost.effort == 0.0 and cost.length == 0.0:
-        return None
-    count = len(model.control_names)
-    weight = np.eye(count) if cost.effort_matrix is None else cost.effort_matrix
-    effort, length = cost.effort / cost.time, cost.length / cost.time
-
-    def price(z: Components, u: Components) -> Any:
-        spent: Any = 0.0
-        if effort:
-            spent += effort * sum(
-                float(weight[i, j]) * u[i] * u[j] for i in range(count) for j in range(count)
-            )
-        if length:
-            v_x, v_y, _, *climb = model.velocity(z, u)
-            square = v_x * v_x + v_y * v_y + sum(v * v for v in climb) + 1e-9
-            spent += length * np.sqrt(square)
-        return spent
-
-    return price
 
 
 def _body_parts(problem: Problem) -> tuple[BodyPart, ...]:

@@ -21,6 +21,8 @@ from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control import Guess, SolveStatus
 from maneuver_automaton.optimal_control.polish_values import (
+    LEAST_DURATION,
+    MOST_DURATION,
     Ends,
     Polished,
     PolishSettings,
@@ -38,6 +40,8 @@ DEEP_ITERATIONS = 150  # from a guess inside obstacles, before it is led out of 
 SHUFFLE = 6  # changes of gear from which on gears are fixed first
 FIRST_BUILD = 0.3  # [s] that writing a problem down is expected to take
 LONGER = 3  # times the usual iterations, for free lines: among many obstacles they take so many
+ROOM = 20.0  # times the usual distance from all limits, where closing the end needed more
+EVEN = 1e-9  # [s] by which equal steps may differ
 FINER = 0.6  # share of the step with which the best is solved once more
 
 
@@ -61,6 +65,8 @@ class PolishTask:
         Where the reference point may be.
     margin : float
         Distance to keep from obstacles [m].
+    durations : (2,) tuple
+        Least and greatest duration [s].
     """
 
     model: Model
@@ -72,6 +78,7 @@ class PolishTask:
     obstacles: tuple[Shape, ...] = ()
     bounds: Bounds = field(default_factory=Bounds)
     margin: float = 0.0  # [m]
+    durations: tuple[float, float] = (LEAST_DURATION, MOST_DURATION)  # [s]
 
     def __post_init__(self) -> None:
         freeze(self, "start", last=self.model.group.dof)
@@ -133,7 +140,7 @@ class PolishTask:
         if len(self.goal) > 3 and self.goal[3] is None:
             end[3] = None
         still = (0.0,) * self.start.size
-        return Ends((*still, *self.start_state.tolist()), (*end, *self.goal_state))
+        return Ends((*still, *self.start_state.tolist()), (*end, *self.goal_state), self.durations)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -141,7 +148,7 @@ class Attempt:
     """One call of the solver."""
 
     guess: int  # number of the guess
-    kind: str  # fixed planes | lines | elastic | gears | finer
+    kind: str  # fixed planes | lines | elastic | gears | room | finer
     duration: float  # [s] of the result
     status: str
     iterations: int
@@ -319,11 +326,14 @@ class _Polishing:
     def _lines(self, number: int, rough: Polished) -> None:
         """Solve with free lines from the result of fixed planes, which is kept if that fails."""
         if not self._is_over():
-            found = self._solve("lines", number, rough.as_guess, longer=LONGER)
+            patient = replace(self.settings, max_iterations=LONGER * self.settings.max_iterations)
+            found = self._solve("lines", number, rough.as_guess, settings=patient)
             # An unfinished solve may be sound all the same: it is closed and audited.
             cheaper = found.objective < rough.objective
             unfinished = found.status is SolveStatus.OUT_OF_BUDGET and cheaper
-            if (found.status is SolveStatus.SOLVED or unfinished) and self._consider(found):
+            if (found.status is SolveStatus.SOLVED or unfinished) and self._consider(
+                found, number=number
+            ):
                 return
         if self.best is None:
             self._consider(rough)
@@ -331,7 +341,7 @@ class _Polishing:
     def _finer(self) -> None:
         """The best once more with smaller steps, while there is time for it."""
         raw = self.best_raw
-        if raw is None or self._is_over() or np.ptp(raw.durations) > 1e-9:
+        if raw is None or self._is_over() or np.ptp(raw.durations) > EVEN:
             return
         if not self._room_for([one for one in self.attempts if one.kind != "fixed planes"]):
             return
@@ -357,10 +367,10 @@ class _Polishing:
         elastic: bool = False,
         gears: Array | None = None,
         most: int | None = None,
-        longer: int = 1,
+        settings: PolishSettings | None = None,
     ) -> Polished:
         began = time.monotonic()
-        settings = replace(self.settings, max_iterations=longer * self.settings.max_iterations)
+        settings = settings or self.settings
         work = self._work_left()
         if work is not None:
             most = max(min(work, settings.max_iterations if most is None else most), 1)
@@ -394,8 +404,11 @@ class _Polishing:
             self.reason = f"{kind}: {found.reason}"
         return found
 
-    def _consider(self, found: Polished) -> bool:
-        """Close the motion found, and keep it if it is accepted and better."""
+    def _consider(self, found: Polished, *, number: int = -1, again: bool = True) -> bool:
+        """Close the motion found, and keep it if it is accepted and better.
+
+        Where closing leads beyond a limit, it is solved once more with more room.
+        """
         ends = self.task.ends(float(found.state[-1, 2]))
         ending = closed(
             self.task.model,
@@ -406,7 +419,14 @@ class _Polishing:
         )
         if isinstance(ending, str):
             self.reason = ending
-            return False
+            even = np.ptp(found.durations) <= EVEN
+            if not (again and even and found.status is SolveStatus.SOLVED) or self._is_over():
+                return False
+            roomier = replace(self.settings, tightening=ROOM * self.settings.tightening)
+            roomy = self._solve("room", number, found.as_guess, settings=roomier)
+            if roomy.status is not SolveStatus.SOLVED:
+                return False
+            return self._consider(roomy, number=number, again=False)
         motion = PolishedMotion(
             course=ending.course,
             control=ending.control,

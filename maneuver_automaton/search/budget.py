@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 
+COUNTED = 0.7  # share of the time left that a stage of counted work takes at most: others follow
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Budget:
@@ -15,7 +17,7 @@ class Budget:
     >>> budget = Budget.from_now(10.0, expansions=500)
     >>> budget.is_over, budget.less(400).expansions, budget.less(600).expansions
     (False, 100, 0)
-    >>> budget.part(0.5).deadline < budget.deadline == budget.stage(0.5).deadline
+    >>> budget.part(0.5).deadline < budget.stage(0.5).deadline < budget.deadline
     True
     """
 
@@ -54,12 +56,12 @@ class Budget:
         return Budget.from_now(max(share * self.left, at_least), expansions=self.expansions)
 
     def stage(self, share: float) -> Budget:
-        """What one stage may take: a share of the time left, or all of it where work is counted.
+        """What one stage may take: a share of the time left, a large one where work is counted.
 
-        Counted work ends every stage at the same place at every call, unless the time is over.
+        Counted work ends every stage at the same place at every call, unless the time gets short.
         """
         if self.expansions is not None:
-            return self
+            share = max(share, COUNTED)
         return replace(self, deadline=time.monotonic() + share * self.left)
 
     def less(self, spent: int) -> Budget:

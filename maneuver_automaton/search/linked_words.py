@@ -131,7 +131,7 @@ def scan_linked_words(
     deadline = time.monotonic() + time_limit
     setup = word_setup(problem, goal, most_trims=alphabet)
     expansions = problem.search.max_expansions
-    later = setup.prices_switches or setup.is_mended
+    later = setup.is_mispriced or setup.is_mended
     pads = problem.horizon.time is not None and setup.pad is not None  # rest is a trim more
     most = min(max_trims, LONGEST - int(goal.free_heading)) + int(pads)
     everything = alternatives is None and upper_bound == math.inf
@@ -249,6 +249,7 @@ def _steered(setup: WordSetup, headings: Array) -> Iterator[TimedWord]:
     if not found:
         return
     costs, rows, climbs, times = (np.concatenate(each) for each in zip(*found, strict=True))
+    costs = costs + setup.switch * np.maximum(np.count_nonzero(times > 0.0, axis=1) - 1, 0)
     for k in np.argsort(costs, kind="stable"):
         word = np.append(arrays.words[rows[k]], climbs[k])
         used = word >= 0

@@ -103,10 +103,10 @@ class WordScan:
         self.tables = _tables(setup)
         self._gridded = False
         width = MOST_TRIMS + 1
-        # a user's own price of switches is added afterwards, so nothing is pruned by it
+        # a user's own price of switches is added afterwards: what is cheap now may be dear then
         self.own_prices = not isinstance(problem.cost, Cost)
         if self.own_prices:
-            alternatives, upper_bound = None, math.inf
+            alternatives = None
         self.pruned = alternatives is not None or upper_bound < math.inf
         asked = capacity if alternatives is None else alternatives + 1
         self.candidates = _kernels_problem.Candidates(
@@ -262,7 +262,7 @@ class WordScan:
             time_limit=float(bounded),
             pad=int(pad),
             pad_cost=float(setup.rest_rate * bounded) if pad else 0.0,
-            switch=0.0 if linked else float(getattr(cost, "switch", 0.0)),
+            switch=float(getattr(cost, "switch", 0.0)),
             direction_change=0.0 if linked else float(getattr(cost, "direction_change", 0.0)),
             more_turns=int((fixed_time and not self.spare) or setup.climbs),
             nodes=self.nodes,

@@ -166,6 +166,17 @@ class WordSetup:
         return TimedWord(tuple(trims), times, cost)
 
     @property
+    def switch(self) -> float:
+        """What a word costs for each of its trims but the first, as far as known."""
+        return float(getattr(self.problem.cost, "switch", 0.0))
+
+    @property
+    def is_mispriced(self) -> bool:
+        """Whether words may cost more than their parts and switches: a search has lower bounds."""
+        cost = self.problem.cost
+        return not isinstance(cost, Cost) or cost.direction_change > 0.0
+
+    @property
     def prices_switches(self) -> bool:
         """Whether the cost of a word is more than that of its parts."""
         cost = self.problem.cost
@@ -298,10 +309,22 @@ def word_setup(
 
 @kept_by_first
 def maneuver_prices(automaton: Automaton, cost: StageCost) -> Array:
-    """What every maneuver costs (M,) without the prices of switches."""
+    """What every maneuver costs (M,), with the switches to it and within it as far as known."""
     name, still = automaton.trim_names[0], origin_of(automaton, automaton.trims[0])
     any_problem = Problem(automaton, still, Goal(pose=still, trim=name), cost=cost, start_trim=name)
-    return np.array([any_problem.maneuver_cost(one) for one in automaton.maneuvers])
+    counted = isinstance(cost, Cost) and (cost.switch > 0.0 or cost.direction_change > 0.0)
+    if not counted or not isinstance(cost, Cost):
+        return np.array([any_problem.maneuver_cost(one) for one in automaton.maneuvers])
+    alone = [
+        Plan(
+            still,
+            (automaton[one.source], automaton[one.target]),
+            durations=[0.0, 0.0],
+            maneuvers=(one,),
+        )
+        for one in automaton.maneuvers
+    ]
+    return np.array([any_problem.cost_of(one) for one in alone]) + cost.switch
 
 
 @kept_by_first

@@ -9,23 +9,7 @@ from tests.matrix.vehicles import VEHICLES
 
 # Reason, then features and the vehicles for which they do not work; a cell that begins to work
 # fails until it is taken out.
-FAULTS: dict[str, dict[str, str]] = {
-    "a plan found otherwise is cheaper": {
-        "fixed_time": "second_order_unicycle car_with_trailer user",
-        "stage_cost": "second_order_car car_with_trailer single_track user",
-        "dear_switch": "single_track",
-        "effort": "car_with_trailer",
-        "norm": "user",
-        "zones_crossed": "car_with_trailer helicopter",
-        "heights": "helicopter",
-    },
-    "no alternative is found": {
-        "alternatives_among_obstacles": "glider",
-    },
-    "zones are entered for the whole way or not at all": {
-        "zones_crossed": "hovercraft",
-    },
-}
+FAULTS: dict[str, dict[str, str]] = {}
 GROUPS = {
     "all": list(VEHICLES),
     "inertia": [name for name, vehicle in VEHICLES.items() if vehicle.inertia],

@@ -550,8 +550,20 @@ def zones_crossed(vehicle: Vehicle, engine: Engine) -> None:
     free, inside = found(base(vehicle)).duration, width + 2.0 * vehicle.size
     ideal = free + inside * (1.0 / slow - 1.0 / vehicle.fastest)
     throughout = free * vehicle.fastest / slow
+    share = 0.6 if _goes_on_slowly(vehicle, slow) else 1.0
     if throughout > ideal:
-        no_dearer(result, ideal + 0.6 * (throughout - ideal), "to be slow in the zone alone")
+        known = ideal + share * (throughout - ideal)
+        no_dearer(result, known, "to be slow in the zone, or all the way,", share=SAMPLED)
+
+
+def _goes_on_slowly(vehicle: Vehicle, slow: float) -> bool:
+    """Whether a trim drives ahead so slowly: a zone is then crossed in it, and left at full speed.
+
+    A vehicle whose slow trims only drive back would have to turn round twice.
+    """
+    velocities = vehicle.automaton.body_velocities
+    slowly = np.linalg.norm(velocities[:, :2], axis=1) <= slow
+    return bool((slowly & (velocities[:, 0] > SLOW)).any())
 
 
 @feature(without("bounds"), says="it leaves the bounds")

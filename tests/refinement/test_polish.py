@@ -261,3 +261,23 @@ def test_work_is_counted_in_iterations() -> None:
     again = polish_guesses(swerve(), [wide()] * 4, time_limit=60.0, most_iterations=60)
     kinds = [[(one.kind, one.iterations) for one in run.attempts] for run in (result, again)]
     assert kinds[0] == kinds[1]
+
+
+@pytest.mark.skipif(not has_casadi(), reason="polishing needs CasADi")
+def test_what_closing_leads_beyond_a_limit_is_solved_with_more_room(monkeypatch) -> None:
+    """Controls move a little once the end is closed, and states that follow from them add up."""
+    refused = []
+
+    def close(*args, **values):
+        if not refused:
+            refused.append(True)
+            return "steering exceeds its limit by 2.99e-08 once the end is closed"
+        return closed(*args, **values)
+
+    monkeypatch.setattr("maneuver_automaton.refinement.polish.closed", close)
+    found = polish_guesses(swerve(), [around()], time_limit=60.0)
+    kinds = [attempt.kind for attempt in found.attempts]
+    assert "room" in kinds
+    assert kinds.index("room") == kinds.index("lines") + 1
+    assert found.motion is not None
+    assert found.motion.error < 1e-9

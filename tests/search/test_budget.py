@@ -32,11 +32,13 @@ def test_a_part_has_its_own_begin_and_its_share_of_what_is_left():
     assert over.part(0.5, at_least=0.1).seconds == pytest.approx(0.1)
 
 
-def test_a_stage_takes_a_share_unless_work_is_counted():
+def test_a_stage_takes_a_share_and_leaves_time_for_others_where_work_is_counted():
     timed, counted = Budget.from_now(DAY), Budget.from_now(DAY, expansions=70)
     assert timed.stage(0.5).deadline < timed.deadline
     assert timed.stage(0.5).began == timed.began
-    assert counted.stage(0.5) == counted
+    stage = counted.stage(0.5)
+    assert timed.stage(0.5).deadline < stage.deadline < counted.deadline
+    assert stage.expansions == 70
 
 
 def test_expansions_that_are_spent_are_gone():

@@ -198,3 +198,12 @@ def test_expansions_bound_the_search():
     assert first.counts == second.counts
     assert first.counts["expansions"] <= 5
     assert first.solutions[0].cost == second.solutions[0].cost
+
+
+@pytest.mark.parametrize("switch", [0.3, 20.0])
+def test_prices_of_switches_prune_words_and_miss_none(switch):
+    one = problem([4.0, 1.0, 1.0], cost=Cost(time=1.0, switch=switch))
+    every, cheapest = searched(one, alternatives=None), searched(one)
+    least = min(word.cost for word in every.solutions)
+    assert cheapest.solutions[0].cost == pytest.approx(least, rel=1e-9)
+    assert 2 * cheapest.counts["steering_calls"] < every.counts["steering_calls"]

@@ -1,0 +1,126 @@
+"""What polishing makes least: the price of a problem as far as a solver can be told, and the time.
+
+Whatever it finds is priced once more by the problem itself, so a stand-in costs no honesty.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.optimal_control.polish_values import LEAST_DURATION, MOST_DURATION
+from maneuver_automaton.optimal_control.problem import Components, RunningCost
+from maneuver_automaton.problem import Problem
+
+EARLY = 1e-6  # share of a longest time by which a motion ends before it: closing may add some
+SMOOTHING = 1e-9  # [m^2/s^2] under the root of a speed, which has no slope at zero
+ROUND = 0.03  # of the greatest control, within which a norm is smooth: solvers stall at its tip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PolishedPrice:
+    """What a motion costs per second, without what counts its pieces, which are one.
+
+    Of a user's own cost nothing is known but numbers: the time stands in for it.
+    """
+
+    problem: Problem
+    cost: Cost
+    waiting: float  # per second of the rest that fills a fixed time
+
+    def of(self, plan: Plan) -> float:
+        """What a plan costs at this price."""
+        if self.cost is self.problem.cost:
+            return self.problem.cost_of(plan)
+        return replace(self.problem, cost=self.cost).cost_of(plan)
+
+    def stage_cost(self, known: Plan) -> RunningCost | None:
+        """Cost per second beside 1 for the time; None if there is none.
+
+        The unit is the price of time or, where it has none, what a `known` plan costs per second.
+        """
+        cost, model = self.cost, self.problem.automaton.model
+        unit = cost.time
+        if cost.time <= self.waiting:
+            unit = self.of(known) / known.duration - self.waiting
+        fixed = (cost.time - self.waiting) / unit - 1.0 if unit > 0.0 else 0.0
+        if not unit > 0.0 or (fixed == cost.effort == cost.norm == cost.length == 0.0):
+            return None
+        effort, norm, length = cost.effort / unit, cost.norm / unit, cost.length / unit
+        count = len(model.control_names)
+        weight = np.eye(count) if cost.effort_matrix is None else cost.effort_matrix
+        greatest = np.abs(model.control_limits).max(axis=1)
+        rounded = ROUND * np.where(np.isfinite(greatest), greatest, 1.0)
+
+        def price(z: Components, u: Components) -> Any:
+            spent: Any = fixed
+            if effort:
+                spent += effort * sum(
+                    float(weight[i, j]) * u[i] * u[j] for i in range(count) for j in range(count)
+                )
+            if norm:
+                spent += norm * _norm(u, cost.norm_order, rounded)
+            if length:
+                v_x, v_y, _, *climb = model.velocity(z, u)
+                square = v_x * v_x + v_y * v_y + sum(v * v for v in climb) + SMOOTHING
+                spent += length * np.sqrt(square)
+            return spent
+
+        return price
+
+
+def polished_price(problem: Problem) -> PolishedPrice:
+    """The price at which plans of a problem are polished.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Cost, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (0, 1)})
+    >>> problem = Problem(robot, [0, 0, 0], [5, 0, 0], cost=Cost(time=1.0, switch=9.0))
+    >>> price = polished_price(problem).cost
+    >>> price.time, price.switch
+    (1.0, 0.0)
+    """
+    cost = problem.cost
+    if not isinstance(cost, Cost):
+        return PolishedPrice(problem, Cost(time=1.0), 0.0)
+    rest = problem.automaton.rest
+    pads = problem.horizon.time is not None and rest is not None and rests_at_an_end(problem)
+    waiting = float(problem.rates[rest]) if pads and rest is not None else 0.0
+    counted = cost.switch > 0.0 or cost.direction_change > 0.0
+    per_second = (cost.time, cost.effort, cost.norm, cost.length)
+    if counted:
+        none_is_left = not any(per_second)
+        time = 1.0 if none_is_left else cost.time
+        cost = replace(cost, time=time, switch=0.0, direction_change=0.0)
+    return PolishedPrice(problem, cost, waiting)
+
+
+def admitted_durations(problem: Problem) -> tuple[float, float]:
+    """Least and greatest duration [s] of a polished motion: rest may fill a fixed time."""
+    longest = problem.horizon.time or problem.horizon.max_time
+    if longest is None:
+        return LEAST_DURATION, MOST_DURATION
+    if problem.horizon.time is not None and not rests_at_an_end(problem):
+        return longest, longest
+    return min(LEAST_DURATION, longest), longest * (1.0 - EARLY)
+
+
+def rests_at_an_end(problem: Problem) -> bool:
+    """Whether the vehicle may rest before or after its motion."""
+    return problem.first_trim.is_rest or all(
+        problem.last_trim(goal).is_rest for goal in problem.goals
+    )
+
+
+def _norm(u: Components, order: float, rounded: Array) -> Any:
+    """A smooth norm of controls; that of order 2 stands in for the greatest component."""
+    squares = [u[i] * u[i] for i in range(len(rounded))]
+    if order == 1.0:
+        return sum(np.sqrt(one + by * by) for one, by in zip(squares, rounded, strict=True))
+    return np.sqrt(sum(squares) + float(np.min(rounded)) ** 2)
