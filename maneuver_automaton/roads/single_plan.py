@@ -15,6 +15,7 @@ from maneuver_automaton.roads.judge import RoadVerdict, judged
 from maneuver_automaton.roads.library import tick_of
 from maneuver_automaton.roads.missed import nearest_miss
 from maneuver_automaton.roads.planner import RoadPlanner, road_planner
+from maneuver_automaton.roads.polishing import ROUNDS
 from maneuver_automaton.roads.scene import RoadScene
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
@@ -76,6 +77,7 @@ def plan_road(
                 f" by any of the words searched, {width} at a time{_how_near(planner, found)}"
             )
             continue
+        found = planner.polished(found, rounds=ROUNDS)
         plan = planner.plan_of(planner.start_state, found.controls[: found.lasting])
         verdict = judged(scene, planner.vehicle, plan)
         if not verdict.clean:
