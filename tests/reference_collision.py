@@ -23,10 +23,11 @@ def shapely_world(footprint, obstacles) -> solids.World:
                                 footprint=footprint))  # fmt: skip
 
 
-def world_around(footprint, obstacles, *, keep: float = 0.0) -> World:
+def world_around(footprint, obstacles, *, keep: float = 0.0, present=None) -> World:
     """The world as the kernels see it, from its own frame."""
     listed = tuple(obstacles)
-    return world_of(listed, tuple(footprint), own_frame(listed, np.zeros(3)), keep=keep)
+    frame = own_frame(listed, np.zeros(3))
+    return world_of(listed, tuple(footprint), frame, keep=keep, present=present)
 
 
 def driven(pose, twist, times) -> np.ndarray:

@@ -6,72 +6,12 @@ import math
 
 import numpy as np
 
-from maneuver_automaton._compile import bare_inner_kernel, kernel
-from maneuver_automaton.collision._kernels_gap import (
-    NEAR,
-    SHARP,
-    field_bound,
-    near_step,
-    piece_gap,
-    still_gap,
-)
+from maneuver_automaton._compile import bare_inner_kernel, kernel, merged_kernel
+from maneuver_automaton.collision._kernels_gap import NEAR, field_bound, near_step, still_gap
+from maneuver_automaton.collision._kernels_movers import free_of_movers, mover_gap
 from maneuver_automaton.groups._kernels import coast, compose
 
 FLAT = 1e5  # [m] radius beyond which an arc is not counted from its centre
-
-
-@bare_inner_kernel
-def mover_pose(movers, m, time):
-    """Pose (x, y, heading) of an obstacle that moves, held before its first knot and after."""
-    k_0, k_1 = movers.first_knot[m], movers.first_knot[m + 1]
-    if time <= movers.time[k_0]:
-        return movers.pose[k_0, 0], movers.pose[k_0, 1], movers.pose[k_0, 2]
-    if time >= movers.time[k_1 - 1]:
-        k = k_1 - 1
-        return movers.pose[k, 0], movers.pose[k, 1], movers.pose[k, 2]
-    # A search by halves: recorded traffic has a knot every tenth of a second.
-    low, high = k_0, k_1 - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if movers.time[middle] <= time:
-            low = middle
-        else:
-            high = middle
-    share = (time - movers.time[low]) / (movers.time[high] - movers.time[low])
-    x = movers.pose[low, 0] + share * (movers.pose[high, 0] - movers.pose[low, 0])
-    y = movers.pose[low, 1] + share * (movers.pose[high, 1] - movers.pose[low, 1])
-    heading = movers.pose[low, 2] + share * (movers.pose[high, 2] - movers.pose[low, 2])
-    return x, y, heading
-
-
-@bare_inner_kernel
-def mover_gap(movers, m, body, x, y, heading, time, keep, enough):
-    """Gap to one obstacle that moves, at `time`: a lower bound, not exact above `enough`.
-
-    Exact around the distance `keep` too.
-    """
-    o_x, o_y, o_heading = mover_pose(movers, m, time)
-    c, s = math.cos(o_heading), math.sin(o_heading)
-    d_x, d_y = x - o_x, y - o_y
-    r_x, r_y = c * d_x + s * d_y, c * d_y - s * d_x  # the vehicle seen from the obstacle
-    turn = heading - o_heading
-    c, s = math.cos(turn), math.sin(turn)
-    m_x = r_x + c * body.middle_x - s * body.middle_y - movers.middle[m, 0]
-    m_y = r_y + s * body.middle_x + c * body.middle_y - movers.middle[m, 1]
-    # Discs around both first: an obstacle far away costs neither pieces nor axes.
-    best = math.sqrt(m_x * m_x + m_y * m_y) - body.reach - movers.reach[m]
-    if best > enough:
-        return best
-    best = math.inf
-    # Exact where the distance to keep begins, as in `near_step`.
-    near = NEAR * (body.reach + movers.reach[m]) + keep / SHARP
-    for p in range(movers.first_piece[m], movers.first_piece[m + 1]):
-        for b in range(body.first.shape[0] - 1):
-            gap, _, _ = piece_gap(body, b, r_x, r_y, c, s, movers.solids, p, near, best)
-            best = min(best, gap)
-            if best <= 0.0:
-                return best
-    return best
 
 
 @bare_inner_kernel
@@ -84,11 +24,27 @@ def free_time(
     it is looked at, and more than `keep` in between. The world's time at the start is `clock`; a
     negative `duration` drives, and dates, the motion backwards.
     """
+    free, gap = free_of_solids(
+        world, body, x, y, heading, v_x, v_y, turn_rate, speed, duration, keep, margin
+    )
+    # Where it begins too near to a solid, there is nothing left to prove.
+    if world.movers.speed.shape[0] > 0 and (free > 0.0 or gap > margin):
+        t = free if duration >= 0.0 else -free
+        lasts, nearest = free_of_movers(
+            world.movers, body, x, y, heading, v_x, v_y, turn_rate, speed, t, keep, margin, clock
+        )
+        gap = min(gap, nearest) if lasts == free else nearest
+        free = lasts
+    return free, gap
+
+
+@merged_kernel
+def free_of_solids(world, body, x, y, heading, v_x, v_y, turn_rate, speed, duration, keep, margin):
+    """How long a motion is proven free of all that stands still, as `free_time`; the last gap."""
     # Backwards in time the same poses are passed in the other order: only velocities change their
     # sign, and the clock runs down.
     sign = 1.0 if duration >= 0.0 else -1.0
     length = abs(duration)
-    n_movers = world.movers.speed.shape[0]
     # Where the field says less than this, solids are looked at one by one: a share of the body, but
     # not less than a share of the field's cell, by which the field may be off, nor than twice the
     # margin.
@@ -125,8 +81,7 @@ def free_time(
                 p_x = center_x + (s * v_x + c * v_y) / turn_rate
                 p_y = center_y - (c * v_x - s * v_y) / turn_rate
         # The order of the tests: the field, a few look-ups, decides most poses in the open. Solids
-        # are asked where it does not, moving obstacles last: they are asked at every pose, and only
-        # as exactly as the step that is left needs it.
+        # are asked where it does not.
         gap = field_bound(world.field, body, p_x, p_y, c, s)
         if gap > keep + near:
             nearest = gap - keep
@@ -155,17 +110,6 @@ def free_time(
             )
             if step < 0.0:
                 return t, nearest
-        for m in range(n_movers):
-            # Seen from the obstacle, no point of the body is faster than both together.
-            fast = speed + world.movers.speed[m]
-            time = clock + sign * t
-            enough = keep + margin + fast * step
-            gap = mover_gap(world.movers, m, body, p_x, p_y, p_heading, time, keep, enough) - keep
-            if gap <= margin:
-                return t, gap
-            nearest = min(nearest, gap)
-            if fast > 0.0:
-                step = min(step, gap / fast)
         # The pose at the end was looked at as all others were: only then all of the motion is
         # proven.
         if t >= length or step == math.inf:
@@ -203,7 +147,10 @@ def gaps(world, body, poses, times):
     for k in range(poses.shape[0]):
         x, y, heading = poses[k, 0], poses[k, 1], poses[k, 2]
         best = still_gap(world, body, x, y, math.cos(heading), math.sin(heading))
-        for m in range(world.movers.speed.shape[0]):
+        movers = world.movers
+        for m in range(movers.speed.shape[0]):
+            if not movers.present[m, 0] <= times[k] <= movers.present[m, 1]:
+                continue
             gap = mover_gap(world.movers, m, body, x, y, heading, times[k], 0.0, best)
             best = min(best, gap)
         out[k] = best

@@ -37,6 +37,7 @@ def layer_world(layers, k):
             movers.speed[m_0:m_1],
             movers.middle[m_0:m_1],
             movers.reach[m_0:m_1],
+            movers.present[m_0:m_1],
         ),
     )
 

@@ -202,6 +202,7 @@ def _all_movers(movers: Sequence[Movers], solids: Solids, begins: Sequence[int])
         speed=np.concatenate([one.speed for one in movers]),
         middle=np.concatenate([one.middle for one in movers]),
         reach=np.concatenate([one.reach for one in movers]),
+        present=np.concatenate([one.present for one in movers]),
     )
 
 

@@ -75,6 +75,7 @@ class Movers(NamedTuple):
     speed: Array  # (M,) [m/s] greatest of any of its points
     middle: Array  # (M, 2) of a disc around it, in its frame
     reach: Array  # (M,) radius of that disc
+    present: Array  # (M, 2) [s] it is there from and until; held at its first and last knot beyond
 
 
 class WorldArrays(NamedTuple):
@@ -115,10 +116,12 @@ def world_of(
     frame: tuple[float, ...],
     *,
     keep: float = 0.0,
+    present: tuple[tuple[float, float], ...] | None = None,
 ) -> World:
     """The world of obstacles around a footprint, seen from the pose `frame`.
 
-    A distance `keep` [m] to everything can be asked for later, up to the one given here.
+    A distance `keep` [m] to everything can be asked for later, up to the one given here. Moving
+    obstacles are there at all times, or from and until the times `present` [s], one pair each.
 
     Examples
     --------
@@ -140,7 +143,7 @@ def world_of(
         if isinstance(one, OccupancyMap):
             pieces += [(ring, 0.0) for ring in _cells(one, pose)]
     solids = solids_of(pieces)
-    movers = _movers(moving, pose)
+    movers = _movers(moving, pose, present or ((-math.inf, math.inf),) * len(moving))
     box = _box(solids.plates[:, :4], movers)
     arrays = WorldArrays(
         solids=solids,
@@ -253,7 +256,9 @@ def _buckets(plates: Array, body: Body, keep: float) -> Buckets:
     return Buckets(start, items, float(low[0]), float(low[1]), cell, columns, rows, reach)
 
 
-def _movers(moving: list[Obstacle], frame: Array) -> Movers:
+def _movers(
+    moving: list[Obstacle], frame: Array, present: tuple[tuple[float, float], ...]
+) -> Movers:
     pieces: list[tuple[Array, float]] = []
     first_piece, first_knot = [0], [0]
     times, poses, speeds, middles, reaches = [], [], [], [], []
@@ -281,6 +286,7 @@ def _movers(moving: list[Obstacle], frame: Array) -> Movers:
         speed=np.array(speeds, dtype=np.float64),
         middle=np.array(middles, dtype=np.float64).reshape(-1, 2),
         reach=np.array(reaches, dtype=np.float64),
+        present=np.array(present, dtype=np.float64).reshape(-1, 2),
     )
 
 

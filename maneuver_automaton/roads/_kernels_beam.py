@@ -20,6 +20,7 @@ from maneuver_automaton.roads._kernels_costs import (
     StaticObstacles,
     Weights,
     cost_to_go,
+    rate_at,
     stage_rate,
 )
 from maneuver_automaton.roads._kernels_free import Clearing, free_tick
@@ -60,6 +61,7 @@ class HorizonTask(NamedTuple):
     width: int  # nodes of a level that go on at most
     abreast: int  # of these, in one strip along the route
     greed: float  # weight of the cost-to-go
+    below: float  # a plan to a goal as dear as this is not looked for
 
 
 class BeamArrays(NamedTuple):
@@ -181,6 +183,23 @@ def prove_edge(task, horizon, search, maneuvers, node, tick):
 
 
 @bare_inner_kernel
+def cost_along(task, horizon, search, maneuvers, node, ticks):
+    """Cost to come of a node after so many ticks of the edge into it, the rate taken at each."""
+    pose, links, limits = search.pose, search.links, horizon.limits
+    parent, e = links[node, PARENT], links[node, MANEUVER]
+    speed = task.speed if parent == 0 else horizon.trims.speed[links[parent, TRIM]]
+    x, y, heading, near = pose[parent, 0], pose[parent, 1], pose[parent, 2], links[parent, NEAR]
+    cost = pose[parent, 3] + maneuvers.effort[e] * ticks / limits.ticks
+    for k in range(ticks):
+        d_x, d_y, turn = maneuvers.pose[e, k, 0], maneuvers.pose[e, k, 1], maneuvers.pose[e, k, 2]
+        n_x, n_y, n_heading = compose(x, y, heading, d_x, d_y, turn)
+        speed += maneuvers.control[e, 0] * limits.tick
+        rate, near = rate_at(horizon, n_x, n_y, n_heading, speed, near)
+        cost += limits.tick * rate
+    return cost
+
+
+@bare_inner_kernel
 def word_to(search, first, maneuvers, node, ticks, controls):
     """Write the controls (n, 2), tick by tick, of the word that leads to a node; n."""
     links = search.links
@@ -237,7 +256,7 @@ def begin(task, horizon, search, first):
     for level in range(search.counts.shape[0]):
         search.counts[level] = 0
     for row in (STOPPING, UNSAFE):
-        search.reached[row, COST], search.reached[row, NODE] = math.inf, -1.0
+        search.reached[row, COST], search.reached[row, NODE] = task.below, -1.0
     pose[0, 0], pose[0, 1], pose[0, 2], pose[0, 3] = task.x, task.y, task.heading, 0.0
     m_x = task.x + horizon.clearing.car.ahead * math.cos(task.heading)
     m_y = task.y + horizon.clearing.car.ahead * math.sin(task.heading)
@@ -315,9 +334,14 @@ def search_beam(task, horizon, first, search, shares, controls):
                 continue
             state[CHECKS] += 1
             free, goal_tick = prove_edge(task, horizon, search, maneuvers, node, tick)
-            if free and goal_tick >= 0:
+            if not free:
+                continue
+            # Of a node that goes on, the cost is known as exactly as that of a whole plan.
+            driven = min(goal_tick if goal_tick >= 0 else tick + ticks, task.until) - tick
+            pose[node, 3] = cost_along(task, horizon, search, maneuvers, node, driven)
+            if goal_tick >= 0:
                 note_goal(task, horizon, search, first, node, goal_tick, shares, controls)
-            elif free:
+            elif pose[node, 3] < reached[STOPPING, COST]:
                 search.kept[level, kept] = node
                 search.strips[strip] += 1
                 kept += 1
@@ -340,5 +364,7 @@ def search_beam(task, horizon, first, search, shares, controls):
         if node >= 0:
             n, whole = finish(task, horizon, search, first, node, last, shares, controls)
             return True, n, (whole if row == STOPPING else n)
+    if task.below < math.inf:
+        return False, 0, -1
     n, whole = furthest(task, horizon, search, first, levels, shares, controls)
     return False, n, whole

@@ -54,6 +54,17 @@ def stage_rate(weights, limit, offset, turned, speed):
 
 
 @bare_inner_kernel
+def rate_at(horizon, x, y, heading, speed, guess):
+    """`stage_rate` of a state, and the point of the route that is nearest, near a guess."""
+    ahead = horizon.clearing.car.ahead
+    m_x, m_y = x + ahead * math.cos(heading), y + ahead * math.sin(heading)
+    near = nearest_point(horizon.route, m_x, m_y, guess)
+    _, offset = on_route(horizon.route, m_x, m_y, near)
+    turned = nearest_turn(heading - horizon.route.heading[near])
+    return stage_rate(horizon.weights, horizon.route.limit[near], offset, turned, speed), near
+
+
+@bare_inner_kernel
 def along_to_goal(weights, goals, g, station, speed, least, most):
     """Cost to be at the stations of goal `g` between two times from now [s], and that time [s].
 
@@ -181,25 +192,26 @@ def cost_to_go(horizon, station, offset, turned, speed, tick):
     return best
 
 
+@bare_inner_kernel
+def cost_of_tick(horizon, states, controls, k, guess):
+    """Cost (stage and effort) of tick `k` of a motion, and the nearest point of the route after."""
+    limits = horizon.limits
+    x, y, heading = states[k + 1, 0], states[k + 1, 1], states[k + 1, 2]
+    speed, steering = states[k + 1, 3], states[k + 1, 4]
+    rate, near = rate_at(horizon, x, y, heading, speed, guess)
+    before = states[k, 3] * states[k, 3] * math.tan(states[k, 4]) / limits.wheelbase
+    after = speed * speed * math.tan(steering) / limits.wheelbase
+    jerk = (after - before) / limits.tick
+    rate += limits.weight_along * controls[k, 0] * controls[k, 0]
+    rate += limits.weight_across * after * after + limits.weight_jerk * jerk * jerk
+    return limits.tick * rate, near
+
+
 @bare_kernel
 def price(horizon, states, controls):
     """Cost (stage and effort) of a motion with states (n + 1, 5) and controls (n, 2)."""
-    limits, ahead = horizon.limits, horizon.clearing.car.ahead
-    total = 0.0
-    near = nearest_of_all(horizon.route, states[0, 0], states[0, 1])
-    across = states[0, 3] ** 2 * math.tan(states[0, 4]) / limits.wheelbase
+    total, near = 0.0, nearest_of_all(horizon.route, states[0, 0], states[0, 1])
     for k in range(controls.shape[0]):
-        x, y, heading = states[k + 1, 0], states[k + 1, 1], states[k + 1, 2]
-        speed = states[k + 1, 3]
-        m_x, m_y = x + ahead * math.cos(heading), y + ahead * math.sin(heading)
-        near = nearest_point(horizon.route, m_x, m_y, near)
-        _, offset = on_route(horizon.route, m_x, m_y, near)
-        turned = nearest_turn(heading - horizon.route.heading[near])
-        after = speed**2 * math.tan(states[k + 1, 4]) / limits.wheelbase
-        jerk = (after - across) / limits.tick
-        cost = stage_rate(horizon.weights, horizon.route.limit[near], offset, turned, speed)
-        cost += limits.weight_along * controls[k, 0] ** 2
-        cost += limits.weight_across * after * after + limits.weight_jerk * jerk * jerk
-        total += limits.tick * cost
-        across = after
+        cost, near = cost_of_tick(horizon, states, controls, k, near)
+        total += cost
     return total

@@ -52,9 +52,8 @@ class Limits(NamedTuple):
 
 
 @bare_inner_kernel
-def admitted(limits, speed, steering, target_speed, target_steering):
+def admitted(limits, duration, speed, steering, target_speed, target_steering):
     """Whether a ramp between two states keeps the limits; acceleration, steering rate, effort."""
-    duration = limits.tick * limits.ticks
     acceleration = (target_speed - speed) / duration
     rate = (target_steering - steering) / duration
     slack = 1e-9
@@ -92,13 +91,13 @@ def write_course(limits, speed, steering, acceleration, rate, out):
 @inner_kernel
 def leading_from(limits, trims, speed, steering, low, high, found, control, effort):
     """Trims numbered from `low` to `high` that a ramp from a state reaches; how many."""
-    n = 0
+    n, duration = 0, limits.tick * limits.ticks
     for target in range(low, high):
         change = abs(trims.speed[target] - speed)
         if limits.left_out[0] < change < limits.left_out[1]:
             continue
         possible, acceleration, rate, price = admitted(
-            limits, speed, steering, trims.speed[target], trims.steering[target]
+            limits, duration, speed, steering, trims.speed[target], trims.steering[target]
         )
         if possible:
             found[n], control[n, 0], control[n, 1], effort[n] = target, acceleration, rate, price

@@ -24,6 +24,7 @@ from maneuver_automaton.roads.clearing import clearing_of
 from maneuver_automaton.roads.decision import RoadDecision, RoadSettings
 from maneuver_automaton.roads.library import RoadLibrary, road_library, tick_of
 from maneuver_automaton.roads.plans import plan_of_controls
+from maneuver_automaton.roads.polishing import ROUND, polished_controls
 from maneuver_automaton.roads.route import Route, route_of
 from maneuver_automaton.roads.scene import RoadScene
 from maneuver_automaton.roads.search_arrays import (
@@ -39,6 +40,8 @@ CELL, TURN_CELL, SPEED_CELL = 0.5, 0.06, 2.0  # [m], [rad], [m/s] of equal nodes
 SHARES = (math.nan, 0.0, 0.2, -0.2, 0.5, -0.5, 1.0, -1.0)  # of steering while it stops; nan: held
 SHARE = 0.25  # of the nodes of a level that one strip along the route may hold
 LONGEST_STOP = 12.0  # [s]
+SLACK = 1.2  # of the last plan's cost: a new plan is polished, too, before it is compared
+PASSES = 2  # of polishing a plan that is kept, in each step
 DIGITS = 9  # of the numbers of a scene [m, rad]
 
 
@@ -125,20 +128,38 @@ class RoadPlanner:
         """What to do from a state (5,) at a tick, and whether it is not the tail of the last plan.
 
         The `tail` of the last plan is proven again from where the vehicle is, and kept unless a
-        new plan is better. A motion that is not free is driven only where none is: then braking.
+        new plan is better; what is kept is polished further. A motion that is not free is driven
+        only where none is: then braking.
         """
         old = None if tail is None else self._again(state, tail)
         settled = old is not None and old.reaches
-        new = self.search(state, tick=tick, narrow=settled)
+        # Where the last plan leads to a goal, only nodes that may better it are followed.
+        below = SLACK * self.price(old) if old is not None and settled and old.stops else math.inf
+        new = self.search(state, tick=tick, narrow=settled, below=below)
+        if new is not None:
+            new = self.polished(new)
         if old is None:
             return (self._emergency(state, tick) if new is None else new), True
         if new is None or not self._better(new, old):
-            return old, False
+            kept = self.polished(old, passes=PASSES)
+            return kept, kept is not old
         return new, True
 
-    def search(self, state: Array, *, tick: int, narrow: bool = False) -> RoadDecision | None:
+    def polished(self, plan: RoadDecision, *, passes: int = ROUND, rounds: int = 1) -> RoadDecision:
+        """A plan to a goal made cheaper by `polished_controls`; any other as it is."""
+        if not plan.reaches:
+            return plan
+        controls = polished_controls(self.horizon, plan, passes=passes, rounds=rounds)
+        if controls is None:
+            return plan
+        return self._of_controls(plan.states[0], plan.tick, controls, plan.lasting, reaches=True)
+
+    def search(
+        self, state: Array, *, tick: int, narrow: bool = False, below: float = math.inf
+    ) -> RoadDecision | None:
         """A new plan from a state (5,) with a fail-safe stop after it; None if none was found.
 
+        With a cost `below`, only a plan to a goal that costs less is an answer.
         A vehicle at rest from which no motion is free stands, as long as standing is free.
         """
         library, settings = self.library, self.settings
@@ -161,6 +182,7 @@ class RoadPlanner:
             width=width,
             abreast=max(math.ceil(SHARE * width), 1),
             greed=settings.greed,
+            below=below,
         )
         first = _kernels_library.maneuvers_from(library.limits, library.trims, speed, steering)
         stop = math.ceil(LONGEST_STOP / self.tick)

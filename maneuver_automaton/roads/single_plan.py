@@ -15,6 +15,7 @@ from maneuver_automaton.roads.judge import RoadVerdict, judged
 from maneuver_automaton.roads.library import tick_of
 from maneuver_automaton.roads.missed import nearest_miss
 from maneuver_automaton.roads.planner import RoadPlanner, road_planner
+from maneuver_automaton.roads.polishing import ROUNDS
 from maneuver_automaton.roads.scene import RoadScene
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
@@ -54,48 +55,54 @@ def plan_road(
     *,
     time_limit: float = 10.0,
 ) -> RoadPlanResult:
-    """The first plan that reaches a goal and passes the judge, of searches wider and wider.
+    """A plan to a goal of searches wider and wider: of the first that finds one, or of the next.
 
-    No search begins after `time_limit` [s].
+    It is polished, and passes the judge. No search begins after `time_limit` [s].
     """
     settings = settings or RoadSettings()
     last = scene.last_time - scene.start.time
     tick = tick_of(scene.step)
     horizon = min(max(math.ceil(last / tick - 1e-6) * tick, tick), LONGEST)
-    begin, n = time.perf_counter(), 0
+    begin = time.perf_counter()
     planner = road_planner(scene, vehicle, replace(settings, width=WIDTHS[0], horizon_s=horizon))
-    reason = ""
+    best = RoadPlanResult(
+        planner=planner, decision=None, plan=None, verdict=None, reason="", search_s=0.0
+    )
     for width in WIDTHS:
-        if n and time.perf_counter() - begin > time_limit:
+        if width > WIDTHS[0] and time.perf_counter() - begin > time_limit:
             break
-        planner, n = planner.wider(width), n + 1
-        found = planner.search(planner.start_state, tick=0)
-        if found is None or not found.reaches:
-            reason = (
-                f"no goal is reached until {min(scene.last_time, scene.start.time + horizon):.6g} s"
-                f" by any of the words searched, {width} at a time{_how_near(planner, found)}"
-            )
-            continue
+        found, cost = _searched(planner.wider(width)), best.cost
+        if cost is None or (found.cost is not None and found.cost < cost):
+            best = found
+        if cost is not None:
+            break
+    return replace(best, search_s=time.perf_counter() - begin)
+
+
+def _searched(planner: RoadPlanner) -> RoadPlanResult:
+    """What one search from the start finds, polished and judged."""
+    found = planner.search(planner.start_state, tick=0)
+    plan, verdict, reason = None, None, ""
+    if found is None or not found.reaches:
+        until = planner.time_of(round(planner.settings.horizon_s / planner.tick))
+        reason = (
+            f"no goal is reached until {min(planner.scene.last_time, until):.6g} s by any of the"
+            f" words searched, {planner.settings.width} at a time{_how_near(planner, found)}"
+        )
+    else:
+        found = planner.polished(found, rounds=ROUNDS)
         plan = planner.plan_of(planner.start_state, found.controls[: found.lasting])
-        verdict = judged(scene, planner.vehicle, plan)
+        verdict = judged(planner.scene, planner.vehicle, plan)
         if not verdict.clean:
             reason = "the plan that was found fails the judge"
-            continue
-        return RoadPlanResult(
-            planner=planner,
-            decision=found,
-            plan=plan,
-            verdict=verdict,
-            reason="",
-            search_s=time.perf_counter() - begin,
-        )
+    none = bool(reason)
     return RoadPlanResult(
         planner=planner,
-        decision=None,
-        plan=None,
-        verdict=None,
+        decision=None if none else found,
+        plan=None if none else plan,
+        verdict=None if none else verdict,
         reason=reason,
-        search_s=time.perf_counter() - begin,
+        search_s=0.0,
     )
 
 

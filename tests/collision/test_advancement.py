@@ -225,6 +225,76 @@ def test_by_hand_what_moves_is_met_in_time():
     assert back == pytest.approx(9.0 - 5.75, abs=1e-3)
 
 
+STANDING = Obstacle(Disc(0.5), motion=Motion([0.0], [[3.0, 0.0, 0.0]]))
+
+
+@pytest.mark.parametrize(
+    ("present", "clock", "duration", "free"),
+    [
+        ((-math.inf, math.inf), 0.0, 4.0, 1.5),
+        ((0.0, 1.2), 0.0, 4.0, 4.0),  # gone before it is reached
+        ((2.0, 5.0), 0.0, 4.0, 2.0),  # appears where the vehicle is
+        ((2.0, 5.0), 0.0, 1.9, 1.9),
+        ((6.0, 7.0), 0.0, 6.5, 6.5),  # appears behind it
+        ((2.0, 5.0), -3.0, 9.0, 9.0),  # of a world that is dated later
+        ((-2.5, 9.0), 0.0, -9.0, 9.0),  # driven backwards, away from it
+        ((-4.0, -2.0), 0.0, -9.0, 2.0),  # backwards into what was there
+        ((-9.0, -5.0), 0.0, -9.0, 9.0),
+    ],
+)
+def test_by_hand_what_is_not_there_is_not_met(present, clock, duration, free):
+    # Backwards the vehicle, heading the other way, comes to the same places at negative times.
+    ahead = 1.0 if duration > 0.0 or present[0] == -2.5 else -1.0
+    world = world_around((Box([2.0, 2.0]),), [STANDING], present=(present,))
+    (got,) = free_times(
+        world, world.into(np.zeros((1, 3))), twists=[[ahead, 0.0, 0.0]],
+        durations=[duration], margin=1e-3, times=clock,
+    )  # fmt: skip
+    assert got == pytest.approx(free, abs=2e-3)
+
+
+@pytest.mark.parametrize("name", ["car", "truck", "disc"])
+def test_free_motions_are_free_of_what_is_there(name):
+    rng = np.random.default_rng([6, *name.encode()])
+    footprint, met = scenes.FOOTPRINTS[name], 0
+    for _ in range(6):
+        movers = [scenes.random_mover(rng) for _ in range(4)]
+        windows = tuple((a, a + rng.uniform(0.2, 3.0)) for a in rng.uniform(-2.0, 6.0, 4))
+        world = world_around(footprint, movers, present=windows)
+        alone = [shapely_world(footprint, [one]) for one in movers]
+        poses, twists, durations = motions(rng, 30)
+        clocks = rng.uniform(-1.0, 6.0, 30)
+        free = free_times(world, world.into(poses), twists=twists, durations=durations,
+                          margin=0.005, times=clocks)  # fmt: skip
+        fastest = fastest_points(world.body, twists)
+        for k in range(30):
+            since = np.linspace(0.0, durations[k], 200)
+            times, places = clocks[k] + since, driven(poses[k], twists[k], since)
+            gaps = np.array(
+                [
+                    np.where((a <= times) & (times <= b), one.clearance(places, times), np.inf)
+                    for one, (a, b) in zip(alone, windows, strict=True)
+                ]
+            ).min(axis=0)
+            assert free[k] == 0.0 or (gaps[np.abs(since) <= free[k]] > 0.0).all()
+            if free[k] < abs(durations[k]):
+                met += 1
+                fast = fastest[k] + world.arrays.movers.speed.max()
+                slack = fast * abs(durations[k]) / 199
+                at = np.searchsorted(np.abs(since), free[k])
+                # One that is there for a moment between two samples is not seen by them.
+                seen = gaps[max(at - 1, 0) : at + 2].min()
+                assert seen <= 0.005 + slack or np.isinf(seen)
+    assert met > 10
+
+
+def test_what_appears_on_the_way_is_there_from_then_on():
+    world = world_around((Disc(1.0),), [STANDING], present=((1.0, 2.0),))
+    times = [0.99, 1.0, 2.0, 2.01]
+    gaps = clearances(world, world.into(np.zeros((4, 3))), times=times)
+    assert gaps.tolist() == pytest.approx([math.inf, 1.5, 1.5, math.inf])
+
+
 def test_a_spin_in_place_is_free_for_ever_where_its_circle_is():
     ring = [Obstacle(Disc(0.2, [2.5 * math.cos(a), 2.5 * math.sin(a)])) for a in range(6)]
     world = world_around((Box([4.0, 2.0]),), ring)  # its circle: 2.236 m, the pillars' 2.3 m

@@ -9,14 +9,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from maneuver_automaton._compile import kernel
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap, Polygon
-from maneuver_automaton.collision._kernels_advancement import mover_pose
+from maneuver_automaton.collision._kernels_movers import mover_pose
 from maneuver_automaton.collision.world import own_frame, world_of
 from maneuver_automaton.groups import SE2
 from tests.collision import scenes
 from tests.reference_collision import moved, world_around
 
 BODY = (Box([1.0, 0.5]),)
+
+
+@kernel
+def pose_of(movers, m, time):
+    """`mover_pose`, which only kernels call."""
+    return mover_pose(movers, m, time)
 
 
 def shape_on_a_raster(seed):
@@ -101,7 +108,6 @@ def test_movers_are_where_they_are_said_to_be():
         world = world_around(BODY, [wall, mover])
         times = rng.uniform(-2.0, 9.0, 20)
         seen = world.into(mover.motion.at(times))
-        pose_of = getattr(mover_pose, "py_func", mover_pose)
         got = np.array([pose_of(world.arrays.movers, 0, t) for t in times])
         off = got - seen
         off[:, 2] = np.remainder(off[:, 2] + math.pi, 2 * math.pi) - math.pi
