@@ -22,7 +22,7 @@ from maneuver_automaton.planning.incumbents import Candidate, Incumbents
 from maneuver_automaton.planning.steps import Steps
 from maneuver_automaton.problem import moves
 from maneuver_automaton.refinement.improve import Improved, Patience, improve
-from maneuver_automaton.refinement.maneuver_lattice import quick_word
+from maneuver_automaton.refinement.incumbent_words import quick_word
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
 from maneuver_automaton.refinement.restarts import restarts_of
 from maneuver_automaton.search.budget import Budget

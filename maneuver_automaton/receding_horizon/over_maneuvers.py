@@ -27,7 +27,7 @@ from maneuver_automaton.receding_horizon.settings import EXACT, switches_at_will
 from maneuver_automaton.receding_horizon.shifting import followed_by, moves_on, rested
 from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.refinement.fitting import fitted_plans
-from maneuver_automaton.refinement.maneuver_lattice import maneuver_words
+from maneuver_automaton.refinement.incumbent_words import incumbent_words
 from maneuver_automaton.search.alternatives import TIE
 from maneuver_automaton.search.insertion import search_insertion
 from maneuver_automaton.search.lattice_query import lattice_query
@@ -136,7 +136,7 @@ class OverManeuvers:
             return None
         query = lattice_query(problem, goals)
         best: Candidate | None = None
-        for incumbent in maneuver_words(
+        for incumbent in incumbent_words(
             query, deadline=self.now.deadline, max_expansions=problem.search.max_expansions
         ):
             if incumbent.word is None:

@@ -14,7 +14,7 @@ from maneuver_automaton.models import UserModel
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.improve import Patience, improve
-from maneuver_automaton.refinement.maneuver_lattice import maneuver_words
+from maneuver_automaton.refinement.incumbent_words import incumbent_words
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.ready import smallest_lattice_query
@@ -79,5 +79,5 @@ def load_maneuver_kernels() -> None:
         footprint=(Box([0.4, 0.2]),),
     )
     query = lattice_query(problem, (0,))
-    for _ in maneuver_words(query, max_expansions=EXPANSIONS):
+    for _ in incumbent_words(query, max_expansions=EXPANSIONS):
         pass

@@ -17,8 +17,8 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search.alternatives import in_order
-from maneuver_automaton.search.asked import Asked, Found
 from maneuver_automaton.search.exact_end import corrected, with_fewer_digits
+from maneuver_automaton.search.insertion_task import Found, InsertionTask
 from maneuver_automaton.search.library_arrays import LibraryArrays, library_arrays
 from maneuver_automaton.search.result import SearchResult, SearchStatus
 from maneuver_automaton.search.setup import SearchSetup, search_setup
@@ -44,27 +44,27 @@ CHATTER = 5  # trims of a word in which two may chatter
 LATE = 1e-9  # [s] by which rounding may exceed a time
 
 
-def free_stages(asked: Asked) -> Iterator[SearchResult]:
+def free_stages(task: InsertionTask) -> Iterator[SearchResult]:
     """Words of one class of trims; again with the greatest time as a condition where it binds.
 
     Their certificate is the smallest reduced cost over the whole library and all times.
     """
-    problem = asked.problem
-    setup = search_setup(problem, asked.goal)
+    problem = task.problem
+    setup = search_setup(problem, task.goal)
     if setup.start_is_goal and (problem.horizon.time is None or setup.rest is not None):
         yield resting(problem, setup)
         return
     if not len(setup.trims):  # nothing that words are made of
         yield SearchResult(status=SearchStatus.EXHAUSTED, solutions=())
         return
-    found = Found(problem, asked.alternatives + 1)
-    work = _work(asked, setup)
+    found = Found(problem, task.alternatives + 1)
+    work = _work(task, setup)
     most_time = problem.horizon.max_time
     free = _improved(work)
     found.add(_in_time(free, most_time))
     yield found.result()
     late = not free.solutions or free.solutions[0].duration > _latest(most_time)
-    if most_time is not None and late and not asked.is_over():
+    if most_time is not None and late and not task.is_over():
         library = within_time(work.library, most_time)
         found.add(_in_time(_improved(replace(work, library=library, limit=most_time)), most_time))
         yield found.result()
@@ -81,15 +81,15 @@ def _in_time(found: SearchResult, most_time: float | None) -> SearchResult:
     return replace(found, solutions=kept)
 
 
-def _work(asked: Asked, setup: SearchSetup) -> _Work:
+def _work(task: InsertionTask, setup: SearchSetup) -> _Work:
     """What is searched, from the whole goal on."""
     exact, setup = setup.goal, with_fewer_digits(setup)
     many = len(setup.trims) > FEW
-    seeds = asked.seeds
+    seeds = task.seeds
     if seeds is None:
-        seeds = max(SEEDS_OF_MANY if many else SEEDS, 2 * asked.alternatives + 1)
-    library = library_arrays(asked.problem, setup)
-    return _Work(asked.problem, setup, library, exact, asked, seeds)
+        seeds = max(SEEDS_OF_MANY if many else SEEDS, 2 * task.alternatives + 1)
+    library = library_arrays(task.problem, setup)
+    return _Work(task.problem, setup, library, exact, task, seeds)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,7 +100,7 @@ class _Work:
     setup: SearchSetup
     library: LibraryArrays
     exact: Array  # (4,) the goal with all its digits
-    asked: Asked
+    task: InsertionTask
     seeds: int
     limit: float | None = None  # [s] greatest time, if the library prices it
 
@@ -118,35 +118,35 @@ class _Work:
 
 def _improved(work: _Work) -> SearchResult:
     """Solutions of all seeds and of what insertion makes of them, each word once."""
-    problem, library, asked, most = work.problem, work.library, work.asked, work.most
+    problem, library, task, most = work.problem, work.library, work.task, work.most
     many = len(work.setup.trims) > FEW
     begun = list(_seeds(work))
-    if asked.known is not None:
-        begun = [*_as_seed(work, asked.known), *begun]
+    if task.known is not None:
+        begun = [*_as_seed(work, task.known), *begun]
     counts = {"expansions": 0, "insertions": 0, "seeds": 0}
     limit = problem.search.max_expansions
     words: list[TimedWord] = []
     status = SearchStatus.EXHAUSTED
     rounds = FIRST_ROUNDS_OF_MANY if many else FIRST_ROUNDS
     for seed in begun:
-        if words and (asked.is_over() or (limit is not None and len(words) >= limit)):
+        if words and (task.is_over() or (limit is not None and len(words) >= limit)):
             status = SearchStatus.OUT_OF_BUDGET
             break
         words.append(_with_insertions(library, seed, most, rounds, counts))
     counts["expansions"] = counts["seeds"] = len(words)
     words = sorted((word for word in words if math.isfinite(word.cost)), key=_cost)
-    for k in range(min(len(words), max(FULL_OF_MANY if many else FULL, asked.alternatives + 1))):
-        if words[k].certificate < -ACCURACY * library.scale and not asked.is_over():
+    for k in range(min(len(words), max(FULL_OF_MANY if many else FULL, task.alternatives + 1))):
+        if words[k].certificate < -ACCURACY * library.scale and not task.is_over():
             words[k] = _with_insertions(library, words[k], most, ROUNDS, counts)
     words = [_calmed(library, word) for word in words]
     binding = not words or min(words, key=_cost).certificate < -ACCURACY * library.scale
-    if most < LONGEST and binding and not library.free_heading and not asked.is_over():
+    if most < LONGEST and binding and not library.free_heading and not task.is_over():
         words += _from_longer(library, begun, most, counts)
-    if _prices_switches(problem) and not asked.is_over():
+    if _prices_switches(problem) and not task.is_over():
         words += _with_fewer_switches(library, words)
-    if asked.alternatives > 0:  # the best times of a seed's own word are locally optimal, too
+    if task.alternatives > 0:  # the best times of a seed's own word are locally optimal, too
         words += [_with_insertions(library, seed, most, 0, counts) for seed in begun]
-    if asked.is_over():
+    if task.is_over():
         status = SearchStatus.OUT_OF_BUDGET
     improved = [
         solution
@@ -313,7 +313,7 @@ def _words_of_few(work: _Work, problem: Problem) -> list[TimedWord]:
         problem,
         sub_library(work.setup),
         alternatives=work.seeds - 1,
-        deadline=work.asked.deadline,
+        deadline=work.task.deadline,
         spare=True,
     )
     return [_in_library(work, solution.trims, solution.durations) for solution in solutions]

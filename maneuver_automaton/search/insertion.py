@@ -17,8 +17,8 @@ from dataclasses import replace
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.asked import Asked
 from maneuver_automaton.search.free_insertion import free_stages
+from maneuver_automaton.search.insertion_task import InsertionTask
 from maneuver_automaton.search.linked_insertion import linked_stages
 from maneuver_automaton.search.result import SearchResult, SearchStatus
 
@@ -102,7 +102,7 @@ def insertion_stages(
 
     The parameters are those of `search_insertion`.
     """
-    asked = Asked(
+    task = InsertionTask(
         problem=problem,
         goal=goal,
         alternatives=alternatives,
@@ -113,6 +113,6 @@ def insertion_stages(
     )
     # a trim that has to last a while cannot be priced for an instant
     at_will = problem.automaton.is_kinematic and problem.horizon.min_coast == 0.0
-    for stage in (free_stages if at_will else linked_stages)(asked):
+    for stage in (free_stages if at_will else linked_stages)(task):
         kept = tuple(one for one in stage.solutions if one.cost < upper_bound)[: alternatives + 1]
         yield replace(stage, solutions=kept, status=SearchStatus.FOUND if kept else stage.status)

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.groups import LieGroup
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.asked import Asked, Found
+from maneuver_automaton.search.insertion_task import Found, InsertionTask
 from maneuver_automaton.search.linked_words import (
     EXPANSIONS_A_WORD,
     scan_linked_words,
@@ -43,58 +43,58 @@ SEED_SLACK = 0.1  # share by which words may be dearer than a plan that is known
 SEEDS = 4  # words of three trims that insertion begins with, beside the cheapest one
 
 
-def linked_stages(asked: Asked) -> Iterator[SearchResult]:
+def linked_stages(task: InsertionTask) -> Iterator[SearchResult]:
     """Short words, then longer ones, then what insertion makes of them seed by seed."""
-    problem, goal = asked.problem, asked.goal
+    problem, goal = task.problem, task.goal
     if not problem.automaton.body_velocities.any():  # nothing that words are made of
         yield SearchResult(status=SearchStatus.EXHAUSTED, solutions=())
         return
-    most_seeds = SEEDS if asked.seeds is None else asked.seeds
-    others = max(asked.alternatives, most_seeds - 1)
-    near = asked.upper_bound * (1.0 + SEED_SLACK)
-    found, known = Found(problem, others + 1), _known(asked)
+    most_seeds = SEEDS if task.seeds is None else task.seeds
+    others = max(task.alternatives, most_seeds - 1)
+    near = task.upper_bound * (1.0 + SEED_SLACK)
+    found, known = Found(problem, others + 1), _known(task)
     found.add(SearchResult(status=SearchStatus.EXHAUSTED, solutions=known))
     found.add(
         steer_linked_words(
-            problem, goal, alternatives=others, time_limit=asked.left, upper_bound=near
+            problem, goal, alternatives=others, time_limit=task.left, upper_bound=near
         )
     )
-    yield _so_far(asked, found)
+    yield _so_far(task, found)
     seeds = found.words[:most_seeds]  # they differ more than words of four trims: those are alike
-    if asked.left > 0.0:
+    if task.left > 0.0:
         counted = problem.search.max_expansions is not None
-        cheap = len(found.words) > asked.alternatives
+        cheap = len(found.words) > task.alternatives
         found.add(
             scan_linked_words(
                 problem,
                 goal,
                 alternatives=others,
                 alphabet=SCANNED_TRIMS,
-                time_limit=asked.left if counted else SCAN_SHARE * asked.left,
-                upper_bound=found.words[asked.alternatives].cost if cheap else near,
+                time_limit=task.left if counted else SCAN_SHARE * task.left,
+                upper_bound=found.words[task.alternatives].cost if cheap else near,
             )
         )
-        yield _so_far(asked, found)
+        yield _so_far(task, found)
     most = problem.horizon.max_trims
-    if asked.left > 0.0 and found.words and (most is None or most > CLOSED_FORM):
+    if task.left > 0.0 and found.words and (most is None or most > CLOSED_FORM):
         begun = dict.fromkeys([*known, found.words[0], *seeds])
-        for one in improve_linked_words(problem, goal, list(begun), time_limit=asked.left):
+        for one in improve_linked_words(problem, goal, list(begun), time_limit=task.left):
             found.add(one)
-            yield _so_far(asked, found)
+            yield _so_far(task, found)
 
 
-def _known(asked: Asked) -> tuple[Word, ...]:
+def _known(task: InsertionTask) -> tuple[Word, ...]:
     """The plan that is known as a word, if it is one of the library."""
-    plan = asked.known
-    word = None if plan is None else word_of_plan(asked.problem.automaton, plan)
+    plan = task.known
+    word = None if plan is None else word_of_plan(task.problem.automaton, plan)
     if plan is None or word is None:
         return ()
-    return (replace(word, cost=asked.problem.cost_of(plan)),)
+    return (replace(word, cost=task.problem.cost_of(plan)),)
 
 
-def _so_far(asked: Asked, found: Found) -> SearchResult:
+def _so_far(task: InsertionTask, found: Found) -> SearchResult:
     """What is found, and whether the time is over."""
-    status = SearchStatus.OUT_OF_BUDGET if asked.is_over() else SearchStatus.EXHAUSTED
+    status = SearchStatus.OUT_OF_BUDGET if task.is_over() else SearchStatus.EXHAUSTED
     return replace(found.result(), status=status)
 
 

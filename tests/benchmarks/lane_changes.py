@@ -21,7 +21,7 @@ from maneuver_automaton.planning import plan
 from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.planning.plan import prepare
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.refinement.maneuver_lattice import maneuver_words
+from maneuver_automaton.refinement.incumbent_words import incumbent_words
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.word_plan import plan_of_word
 
@@ -81,7 +81,7 @@ def measured(problem: Problem, seconds: float) -> Row:
     query = lattice_query(problem, (0,))
     first = word = None
     first_s = word_s = np.nan
-    for incumbent in maneuver_words(query, deadline=time.monotonic() + seconds):
+    for incumbent in incumbent_words(query, deadline=time.monotonic() + seconds):
         if incumbent.word is not None:
             word, word_s = incumbent.word, time.perf_counter() - began
             if first is None:

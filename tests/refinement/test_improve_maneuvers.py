@@ -12,14 +12,14 @@ import pytest
 from maneuver_automaton.refinement import improve as improvement
 from maneuver_automaton.refinement import work
 from maneuver_automaton.refinement.improve import Improvement, Patience
-from maneuver_automaton.refinement.maneuver_lattice import maneuver_words
+from maneuver_automaton.refinement.incumbent_words import incumbent_words
 from maneuver_automaton.refinement.restarts import FINER
 from maneuver_automaton.search.word_plan import plan_of_word
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import word_of_steps
+from tests.refinement.test_incumbent_words import GOAL, WALLS, least_gap, off_goal, query
 from tests.search.cases import compiled_only
 from tests.search.maneuver_searches import word_is_free
-from tests.search.test_maneuver_lattice import GOAL, WALLS, least_gap, off_goal, query
 
 pytestmark = compiled_only
 
@@ -27,7 +27,7 @@ pytestmark = compiled_only
 @functools.cache
 def first_word():
     """The first word past the walls, as the lattice finds it."""
-    return next(maneuver_words(query(), max_expansions=600)).word
+    return next(incumbent_words(query(), max_expansions=600)).word
 
 
 def improving(word, **changes):

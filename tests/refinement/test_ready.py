@@ -10,8 +10,8 @@ from maneuver_automaton.refinement import _kernels_improve as attempts
 from maneuver_automaton.refinement import _kernels_points as points
 from maneuver_automaton.refinement.ready import load_maneuver_kernels
 from maneuver_automaton.search import _kernels_lattice as lattice
+from tests.refinement.test_incumbent_words import query
 from tests.search.maneuver_searches import search_maneuvers
-from tests.search.test_maneuver_lattice import query
 
 KERNELS = (
     lattice.begin,

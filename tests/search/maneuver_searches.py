@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from maneuver_automaton._compile import bare_kernel
-from maneuver_automaton.refinement.maneuver_lattice import maneuver_words
+from maneuver_automaton.refinement.incumbent_words import incumbent_words
 from maneuver_automaton.search._kernels_motion import (
     coast_free,
     coast_inside,
@@ -46,7 +46,7 @@ def search_maneuvers(
     max_expansions: int | None = None,
     first_only: bool = False,
 ) -> ManeuverResult:
-    """Words from the start to a goal, each cheaper than the one before: see `maneuver_words`.
+    """Words from the start to a goal, each cheaper than the one before: see `incumbent_words`.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def search_maneuvers(
     begun = time.monotonic()
     found: list[tuple[Word, int, float]] = []
     total, status = 0, SearchStatus.EXHAUSTED
-    for incumbent in maneuver_words(query, deadline=deadline, max_expansions=max_expansions):
+    for incumbent in incumbent_words(query, deadline=deadline, max_expansions=max_expansions):
         total, status = incumbent.expansions, incumbent.status
         if incumbent.word is not None:
             found.append((incumbent.word, total, time.monotonic() - begun))

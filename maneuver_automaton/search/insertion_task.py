@@ -14,7 +14,7 @@ from maneuver_automaton.words.word import Word
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Asked:
+class InsertionTask:
     """One search by insertion; see `insertion_stages`."""
 
     problem: Problem

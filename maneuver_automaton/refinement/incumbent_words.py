@@ -26,7 +26,7 @@ class Incumbent(NamedTuple):
     nearest: float = math.inf  # [m] from a goal to the nearest place that was reached
 
 
-def maneuver_words(
+def incumbent_words(
     query: LatticeQuery,
     *,
     deadline: float = math.inf,
@@ -100,7 +100,7 @@ def quick_word(
     cost alone looks everywhere.
     """
     total = 0
-    for incumbent in maneuver_words(quick, deadline=deadline, max_expansions=max_expansions):
+    for incumbent in incumbent_words(quick, deadline=deadline, max_expansions=max_expansions):
         total = incumbent.expansions
         if incumbent.word is not None and incumbent.word.duration <= query.most_time:
             return with_price(query.library.priced, incumbent.word), total
