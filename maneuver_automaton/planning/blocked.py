@@ -66,6 +66,11 @@ def open_goals(problem: Problem) -> tuple[int, ...]:
     return tuple(k for k, goal in enumerate(problem.goals) if not why_goal_blocked(problem, goal))
 
 
+def goals_left(problem: Problem) -> tuple[int, ...]:
+    """Which goals a plan may end at, of a problem for which `blocked_ends` gave no verdict."""
+    return (0,) if len(problem.goals) == 1 else open_goals(problem)
+
+
 def _part_touched(problem: Problem, trim: str | None, pose: Array, time: float) -> str:
     """What something that the vehicle carries touches, in a trim at a pose; empty if nothing."""
     automaton = problem.automaton

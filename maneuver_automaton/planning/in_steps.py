@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.planning.along_paths import AlongPaths
-from maneuver_automaton.planning.blocked import open_goals
+from maneuver_automaton.planning.blocked import goals_left
 from maneuver_automaton.planning.bounds import bound_along_paths
 from maneuver_automaton.planning.checking import Condition, load_checks
 from maneuver_automaton.planning.free_words import free_words, words_once
@@ -84,7 +84,7 @@ def _free_words(found: Incumbents, steps: Steps) -> Iterator[tuple[Plan, int]]:
     others = max(found.alternatives, most if guarded else 0)
     share = LATER_SHARE if found.plans or steps.at_will else WORDS_SHARE
     for word, index in words_once(
-        free_words(found, open_goals(problem), others=others, share=share)
+        free_words(found, goals_left(problem), others=others, share=share)
     ):
         yield plan_of(problem, word), index
 

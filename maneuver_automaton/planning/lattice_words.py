@@ -13,7 +13,7 @@ import numpy as np
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.same_motion import UNFINISHED, is_new
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.planning.blocked import open_goals
+from maneuver_automaton.planning.blocked import goals_left
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.checking import load_checks
 from maneuver_automaton.planning.detours import with_stones
@@ -133,7 +133,7 @@ def search_lattice(found: Incumbents, steps: Steps) -> LatticeWords:
     where polishing or alternatives come after.
     """
     problem, prepared = found.problem, found.workspace.prepared
-    query = lattice_query(problem, open_goals(problem), prepared=prepared)
+    query = lattice_query(problem, goals_left(problem), prepared=prepared)
     known = query.library.at_will
     table = cost_to_go_table(problem, prepared=prepared) if known else NO_TABLE
     query = query if known else late_at_first(query)
