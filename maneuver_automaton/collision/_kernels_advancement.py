@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,13 +12,30 @@ from maneuver_automaton.collision._kernels_gap import NEAR, field_bound, near_st
 from maneuver_automaton.collision._kernels_movers import free_of_movers, mover_gap
 from maneuver_automaton.groups._kernels import coast, compose
 
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array
+    from maneuver_automaton.collision.body import Body
+    from maneuver_automaton.collision.world import WorldArrays
+
 FLAT = 1e5  # [m] radius beyond which an arc is not counted from its centre
 
 
 @bare_inner_kernel
 def free_time(
-    world, body, x, y, heading, v_x, v_y, turn_rate, speed, duration, keep, margin, clock
-):
+    world: WorldArrays,
+    body: Body,
+    x: float,
+    y: float,
+    heading: float,
+    v_x: float,
+    v_y: float,
+    turn_rate: float,
+    speed: float,
+    duration: float,
+    keep: float,
+    margin: float,
+    clock: float,
+) -> tuple[float, float]:
     """How long the motion from (x, y, heading) is proven free, at most `duration`; the last gap.
 
     No point of the body is faster than `speed`. The clearance is more than `keep + margin` wherever
@@ -39,7 +57,20 @@ def free_time(
 
 
 @merged_kernel
-def free_of_solids(world, body, x, y, heading, v_x, v_y, turn_rate, speed, duration, keep, margin):
+def free_of_solids(
+    world: WorldArrays,
+    body: Body,
+    x: float,
+    y: float,
+    heading: float,
+    v_x: float,
+    v_y: float,
+    turn_rate: float,
+    speed: float,
+    duration: float,
+    keep: float,
+    margin: float,
+) -> tuple[float, float]:
     """How long a motion is proven free of all that stands still, as `free_time`; the last gap."""
     # Backwards in time the same poses are passed in the other order: only velocities change their
     # sign, and the clock runs down.
@@ -118,7 +149,17 @@ def free_of_solids(world, body, x, y, heading, v_x, v_y, turn_rate, speed, durat
 
 
 @kernel
-def free_times(world, body, poses, twists, speeds, durations, keep, margin, clocks):
+def free_times(
+    world: WorldArrays,
+    body: Body,
+    poses: Array,
+    twists: Array,
+    speeds: Array,
+    durations: Array,
+    keep: float,
+    margin: float,
+    clocks: Array,
+) -> Array:
     """`free_time` of many motions (k,)."""
     free = np.empty(durations.shape[0])
     for k in range(durations.shape[0]):
@@ -141,7 +182,7 @@ def free_times(world, body, poses, twists, speeds, durations, keep, margin, cloc
 
 
 @kernel
-def gaps(world, body, poses, times):
+def gaps(world: WorldArrays, body: Body, poses: Array, times: Array) -> Array:
     """Clearance (k,) at poses (k, 3): a lower bound, exact near contact, capped by the field."""
     out = np.empty(poses.shape[0])
     for k in range(poses.shape[0]):

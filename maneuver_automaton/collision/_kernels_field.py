@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from maneuver_automaton._compile import inlined_kernel, inner_kernel, kernel
 from maneuver_automaton.collision._kernels_gap import point_to_segment
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from maneuver_automaton._arrays import Array, IntArray
+
 
 @inner_kernel
-def distance_to_piece(x, y, corners, first, last):
+def distance_to_piece(x: float, y: float, corners: Array, first: int, last: int) -> float:
     """Distance of a point to a convex polygon, its corners counter-clockwise; negative inside."""
     best = math.inf
     # A point is inside if it is on the left of every edge; a line and a disc's middle have no
@@ -28,7 +34,17 @@ def distance_to_piece(x, y, corners, first, last):
 
 
 @kernel
-def write_pieces(distance, origin_x, origin_y, cell, cap, edges, first, plates, n):
+def write_pieces(
+    distance: Array,
+    origin_x: float,
+    origin_y: float,
+    cell: float,
+    cap: float,
+    edges: Array,
+    first: IntArray,
+    plates: Array,
+    n: int,
+) -> None:
     """Lower the field `distance` to that of each of `n` pieces, as far as `cap` reaches."""
     rows, columns = distance.shape
     for p in range(n):
@@ -53,7 +69,7 @@ def write_pieces(distance, origin_x, origin_y, cell, cap, edges, first, plates, 
 
 
 @kernel
-def rows_to(blocked, wanted):
+def rows_to(blocked: NDArray[np.bool_], wanted: bool) -> NDArray[np.int32]:
     """Rows (rows, columns) from each cell to the nearest of its column that is as `wanted`."""
     n_rows, n_columns = blocked.shape
     # As good as infinite: a row that far away is outside of the map, and `to_cells` skips it.
@@ -75,7 +91,14 @@ def rows_to(blocked, wanted):
 
 
 @inner_kernel
-def to_cells(blocked, wanted, away, x, y, most):
+def to_cells(
+    blocked: NDArray[np.bool_],
+    wanted: bool,
+    away: NDArray[np.int32],
+    x: float,
+    y: float,
+    most: float,
+) -> float:
     """Distance of a point, in cells, to the nearest cell that is as `wanted`; at most `most`.
 
     `away` are the rows of `rows_to`. Columns ever further away are looked at, as long as they can
@@ -109,7 +132,19 @@ def to_cells(blocked, wanted, away, x, y, most):
 
 
 @kernel
-def write_map(distance, origin_x, origin_y, cell, cap, blocked, resolution, m_x, m_y, c, s):
+def write_map(
+    distance: Array,
+    origin_x: float,
+    origin_y: float,
+    cell: float,
+    cap: float,
+    blocked: NDArray[np.bool_],
+    resolution: float,
+    m_x: float,
+    m_y: float,
+    c: float,
+    s: float,
+) -> None:
     """Lower the field to the exact distance of a map at (m_x, m_y, c, s), negative inside.
 
     In two passes: along each column the rows to the nearest cell, then the least hypotenuse over
@@ -134,13 +169,22 @@ def write_map(distance, origin_x, origin_y, cell, cap, blocked, resolution, m_x,
 
 
 @inlined_kernel
-def cells_between(low, high, origin, cell, n):
+def cells_between(low: float, high: float, origin: float, cell: float, n: int) -> tuple[int, int]:
     """First cell of a row of `n` that an interval touches, and the one after the last."""
     return max(0, math.floor((low - origin) / cell)), min(n, math.floor((high - origin) / cell) + 1)
 
 
 @kernel
-def count_buckets(start, plates, origin_x, origin_y, cell, columns, rows, reach):
+def count_buckets(
+    start: IntArray,
+    plates: Array,
+    origin_x: float,
+    origin_y: float,
+    cell: float,
+    columns: int,
+    rows: int,
+    reach: float,
+) -> None:
     """How many pieces each bucket holds, one place late: `start[k + 1]`."""
     for p in range(plates.shape[0]):
         plate = plates[p]
@@ -152,7 +196,17 @@ def count_buckets(start, plates, origin_x, origin_y, cell, columns, rows, reach)
 
 
 @kernel
-def fill_buckets(start, items, plates, origin_x, origin_y, cell, columns, rows, reach):
+def fill_buckets(
+    start: IntArray,
+    items: IntArray,
+    plates: Array,
+    origin_x: float,
+    origin_y: float,
+    cell: float,
+    columns: int,
+    rows: int,
+    reach: float,
+) -> None:
     """Write the pieces of each bucket; `start` is moved on by the count, and must be moved back."""
     for p in range(plates.shape[0]):
         plate = plates[p]

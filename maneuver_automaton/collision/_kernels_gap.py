@@ -8,15 +8,23 @@ offset.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
+
+if TYPE_CHECKING:
+    from maneuver_automaton.collision.body import Body
+    from maneuver_automaton.collision.convex import Solids
+    from maneuver_automaton.collision.world import Buckets, Field, WorldArrays
 
 NEAR = 0.1  # share of a body's reach below which solids are looked at one by one
 SHARP = 0.3  # share of that below which gaps to sharp corners are made exact
 
 
 @inlined_kernel
-def from_segment(x, y, ax, ay, bx, by):
+def from_segment(
+    x: float, y: float, ax: float, ay: float, bx: float, by: float
+) -> tuple[float, float]:
     """Vector to a point from the nearest point of a segment."""
     dx, dy = bx - ax, by - ay
     px, py = x - ax, y - ay
@@ -27,14 +35,24 @@ def from_segment(x, y, ax, ay, bx, by):
 
 
 @bare_inner_kernel
-def point_to_segment(x, y, ax, ay, bx, by):
+def point_to_segment(x: float, y: float, ax: float, ay: float, bx: float, by: float) -> float:
     """Squared distance of a point to a segment."""
     ex, ey = from_segment(x, y, ax, ay, bx, by)
     return ex * ex + ey * ey
 
 
 @inlined_kernel
-def separation(body, b, x, y, c, s, solids, p, enough):
+def separation(
+    body: Body,
+    b: int,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    solids: Solids,
+    p: int,
+    enough: float,
+) -> tuple[float, float, float]:
     """Largest separation of two convex cores over the normals of their edges, and that normal.
 
     A lower bound of their distance, not positive only if they touch; -inf without edges. The normal
@@ -78,7 +96,9 @@ def separation(body, b, x, y, c, s, solids, p, enough):
 
 
 @bare_inner_kernel
-def core_distance(body, b, x, y, c, s, solids, p):
+def core_distance(
+    body: Body, b: int, x: float, y: float, c: float, s: float, solids: Solids, p: int
+) -> tuple[float, float, float]:
     """Distance of two convex cores that do not overlap, and its direction towards the body."""
     b_0, b_1 = body.first[b], body.first[b + 1]
     p_0, p_1 = solids.first[p], solids.first[p + 1]
@@ -127,7 +147,18 @@ def core_distance(body, b, x, y, c, s, solids, p):
 
 
 @inlined_kernel
-def piece_gap(body, b, x, y, c, s, solids, p, near, enough):
+def piece_gap(
+    body: Body,
+    b: int,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    solids: Solids,
+    p: int,
+    near: float,
+    enough: float,
+) -> tuple[float, float, float]:
     """Gap of one piece of the body at (x, y, cos, sin) to one solid, and the axis along which.
 
     A lower bound; exact where it is a small share of `near`; at most 0 if they touch. Need not be
@@ -152,7 +183,7 @@ def piece_gap(body, b, x, y, c, s, solids, p, near, enough):
 
 
 @inlined_kernel
-def field_bound(field, body, x, y, c, s):
+def field_bound(field: Field, body: Body, x: float, y: float, c: float, s: float) -> float:
     """Lower bound of the clearance from the distances stored at cell centres, by discs."""
     best = math.inf
     for d in range(body.discs.shape[0]):
@@ -175,7 +206,16 @@ def field_bound(field, body, x, y, c, s):
 
 
 @bare_inner_kernel
-def near_gap(buckets, solids, body, x, y, c, s, near):
+def near_gap(
+    buckets: Buckets,
+    solids: Solids,
+    body: Body,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    near: float,
+) -> float:
     """Gap to the solids near the body, exact below `near`; at most the buckets' reach."""
     m_x = x + c * body.middle_x - s * body.middle_y
     m_y = y + s * body.middle_x + c * body.middle_y
@@ -204,7 +244,7 @@ def near_gap(buckets, solids, body, x, y, c, s, near):
 
 
 @bare_inner_kernel
-def corner_time(a, b, ahead, turn, limit):
+def corner_time(a: float, b: float, ahead: float, turn: float, limit: float) -> float:
     """When a corner comes down to `limit` along an axis, driven by a constant twist.
 
     Without `turn` its height is ``a + ahead t``; with it, it is on a circle, (a, b) along the axis
@@ -228,7 +268,22 @@ def corner_time(a, b, ahead, turn, limit):
 
 
 @inlined_kernel
-def axis_time(body, b, x, y, c, s, center_x, center_y, v_x, v_y, turn, axis_x, axis_y, drop):
+def axis_time(
+    body: Body,
+    b: int,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    center_x: float,
+    center_y: float,
+    v_x: float,
+    v_y: float,
+    turn: float,
+    axis_x: float,
+    axis_y: float,
+    drop: float,
+) -> float:
     """How long a piece of the body stays apart along a fixed axis: until it is nearer by `drop`.
 
     The body turns about the centre, or moves with the world velocity (v_x, v_y).
@@ -260,24 +315,24 @@ def axis_time(body, b, x, y, c, s, center_x, center_y, v_x, v_y, turn, axis_x, a
 
 @bare_inner_kernel
 def near_step(
-    buckets,
-    solids,
-    body,
-    x,
-    y,
-    c,
-    s,
-    center_x,
-    center_y,
-    v_x,
-    v_y,
-    turn,
-    speed,
-    keep,
-    margin,
-    near,
-    most,
-):
+    buckets: Buckets,
+    solids: Solids,
+    body: Body,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    center_x: float,
+    center_y: float,
+    v_x: float,
+    v_y: float,
+    turn: float,
+    speed: float,
+    keep: float,
+    margin: float,
+    near: float,
+    most: float,
+) -> tuple[float, float]:
     """How long the motion that goes on from here stays free of what is near, at most `most` [s].
 
     Every solid keeps apart by its gap over the body's speed, or by the axis between the two for as
@@ -345,7 +400,7 @@ def near_step(
 
 
 @inlined_kernel
-def still_gap(world, body, x, y, c, s):
+def still_gap(world: WorldArrays, body: Body, x: float, y: float, c: float, s: float) -> float:
     """Lower bound of the clearance to all that stands still, at most the field's reach."""
     near = max(NEAR * body.reach, 0.25 * world.field.cell)
     bound = field_bound(world.field, body, x, y, c, s)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.collision.convex import Solids
 from maneuver_automaton.collision.world import Buckets, Field, Movers, WorldArrays
 
+if TYPE_CHECKING:
+    from maneuver_automaton.collision.layers import LayerArrays
+
 
 @bare_inner_kernel
-def layer_world(layers, k):
+def layer_world(layers: LayerArrays, k: int) -> WorldArrays:
     """The planar world of layer `k`; the first is at hand, the others are cut out."""
     if k == 0:
         return layers.first
@@ -43,7 +48,9 @@ def layer_world(layers, k):
 
 
 @bare_inner_kernel
-def times_between(altitude, climb, low, high, duration):
+def times_between(
+    altitude: float, climb: float, low: float, high: float, duration: float
+) -> tuple[float, float]:
     """First and last time of a steady climb between two heights; the last is less for never."""
     if climb == 0.0:
         return 0.0, duration if low <= altitude <= high else -1.0

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from maneuver_automaton._compile import bare_inner_kernel, merged_kernel
 from maneuver_automaton.collision._kernels_gap import NEAR, SHARP, piece_gap
 from maneuver_automaton.groups._kernels import coast, compose
 
+if TYPE_CHECKING:
+    from maneuver_automaton.collision.body import Body
+    from maneuver_automaton.collision.world import Movers
+
 SOON = 1e-11  # [s] a knot that is nearer in time counts as reached: in it nothing moves 1e-9 m
 
 
 @merged_kernel
-def knot_before(movers, m, time):
+def knot_before(movers: Movers, m: int, time: float) -> int:
     """The last knot at or before `time`, which is after the first one and before the last."""
     low, high = movers.first_knot[m], movers.first_knot[m + 1] - 1
     # Recorded traffic has a knot every tenth of a second. Where knots are evenly spaced, the first
@@ -30,7 +35,7 @@ def knot_before(movers, m, time):
 
 
 @merged_kernel
-def mover_pose(movers, m, time):
+def mover_pose(movers: Movers, m: int, time: float) -> tuple[float, float, float]:
     """Pose (x, y, heading) of an obstacle that moves, held before its first knot and after."""
     k_0, k_1 = movers.first_knot[m], movers.first_knot[m + 1]
     if time <= movers.time[k_0]:
@@ -48,7 +53,18 @@ def mover_pose(movers, m, time):
 
 
 @merged_kernel
-def closing_of(movers, m, body, heading, v_x, v_y, turn_rate, time, sign, most):
+def closing_of(
+    movers: Movers,
+    m: int,
+    body: Body,
+    heading: float,
+    v_x: float,
+    v_y: float,
+    turn_rate: float,
+    time: float,
+    sign: float,
+    most: float,
+) -> tuple[float, float]:
     """How fast a body and an obstacle come together at most, and for how long that holds.
 
     It holds to the next knot, no longer than `most` [s]. `sign` is the direction of time.
@@ -83,7 +99,17 @@ def closing_of(movers, m, body, heading, v_x, v_y, turn_rate, time, sign, most):
 
 
 @merged_kernel
-def mover_gap(movers, m, body, x, y, heading, time, keep, enough):
+def mover_gap(
+    movers: Movers,
+    m: int,
+    body: Body,
+    x: float,
+    y: float,
+    heading: float,
+    time: float,
+    keep: float,
+    enough: float,
+) -> float:
     """Gap to one obstacle that moves, at `time`: a lower bound, not exact above `enough`.
 
     Exact around the distance `keep` too.
@@ -122,8 +148,20 @@ def mover_gap(movers, m, body, x, y, heading, time, keep, enough):
 
 @bare_inner_kernel
 def free_of_movers(
-    movers, body, x, y, heading, v_x, v_y, turn_rate, speed, duration, keep, margin, clock
-):
+    movers: Movers,
+    body: Body,
+    x: float,
+    y: float,
+    heading: float,
+    v_x: float,
+    v_y: float,
+    turn_rate: float,
+    speed: float,
+    duration: float,
+    keep: float,
+    margin: float,
+    clock: float,
+) -> tuple[float, float]:
     """How long a motion is proven free of what moves, as `free_time`; the last gap.
 
     Each obstacle is followed by itself, as long as it is there: most are too far away to be met,

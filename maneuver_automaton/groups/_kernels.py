@@ -8,7 +8,7 @@ from maneuver_automaton._compile import inner_kernel
 
 
 @inner_kernel
-def coast(v_x, v_y, turn_rate, duration):
+def coast(v_x: float, v_y: float, turn_rate: float, duration: float) -> tuple[float, float, float]:
     """Pose (x, y, heading) reached from the identity by a constant twist.
 
     Source: Solà, Deray, Atchuthan (2018), Eqs. (156), (158), in half-angle form.
@@ -24,13 +24,15 @@ def coast(v_x, v_y, turn_rate, duration):
 
 
 @inner_kernel
-def compose(x, y, heading, dx, dy, turn):
+def compose(
+    x: float, y: float, heading: float, dx: float, dy: float, turn: float
+) -> tuple[float, float, float]:
     """Do the motion (dx, dy, turn) in the frame of (x, y, heading)."""
     c, s = math.cos(heading), math.sin(heading)
     return x + c * dx - s * dy, y + s * dx + c * dy, heading + turn
 
 
 @inner_kernel
-def nearest_turn(angle):
+def nearest_turn(angle: float) -> float:
     """Angle modulo a full turn, in [-pi, pi]."""
     return angle - 2.0 * math.pi * round(angle / (2.0 * math.pi))

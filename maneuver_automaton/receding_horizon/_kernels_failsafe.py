@@ -19,7 +19,7 @@ once: what comes there later is as good to go on from, to within the cell.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -29,6 +29,12 @@ from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search._kernels_cells import enter
 from maneuver_automaton.search._kernels_distance import pop, push
 from maneuver_automaton.search._kernels_motion import inside_window
+
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import IntArray
+    from maneuver_automaton.collision.body import Body
+    from maneuver_automaton.collision.world import WorldArrays
+    from maneuver_automaton.search.lattice_arrays import LatticeArrays
 
 FULL_TURN = 2.0 * math.pi
 X, Y, HEADING, CLOCK, LASTING, SAFE = range(6)
@@ -69,7 +75,9 @@ class FailSafeArrays(NamedTuple):
 
 
 @bare_inner_kernel
-def is_new(task, cells, x, y, heading, clock):
+def is_new(
+    task: FailSafeTask, cells: IntArray, x: float, y: float, heading: float, clock: float
+) -> bool:
     """Whether the cell of a pose and a time is entered for the first time; marks it."""
     # 16 bits for each place, 9 for the heading, the rest for the time: places 65,536 cells apart
     # share a key, which drops a node and never a proof.
@@ -83,7 +91,16 @@ def is_new(task, cells, x, y, heading, clock):
 
 
 @bare_inner_kernel
-def safe_until(task, lib, world, body, x, y, heading, clock):
+def safe_until(
+    task: FailSafeTask,
+    lib: LatticeArrays,
+    world: WorldArrays,
+    body: Body,
+    x: float,
+    y: float,
+    heading: float,
+    clock: float,
+) -> float:
     """Time of the world until which rest at a pose is free, from a time on."""
     proven, _ = free_time(
         world,
@@ -104,7 +121,18 @@ def safe_until(task, lib, world, body, x, y, heading, clock):
 
 
 @bare_inner_kernel
-def add_node(task, search, x, y, heading, clock, lasting, safe, parent, trim):
+def add_node(
+    task: FailSafeTask,
+    search: FailSafeArrays,
+    x: float,
+    y: float,
+    heading: float,
+    clock: float,
+    lasting: float,
+    safe: float,
+    parent: int,
+    trim: int,
+) -> None:
     """Append a node and queue it; the one that is safe for longest is remembered."""
     nodes, links, state = search.nodes, search.links, search.state
     node = state[N_NODES]
@@ -122,7 +150,9 @@ def add_node(task, search, x, y, heading, clock, lasting, safe, parent, trim):
 
 
 @bare_kernel
-def begin(task, lib, world, body, search):
+def begin(
+    task: FailSafeTask, lib: LatticeArrays, world: WorldArrays, body: Body, search: FailSafeArrays
+) -> None:
     """Push the pose to begin at, into arrays whose cells are free."""
     for k in range(search.state.shape[0]):
         search.state[k] = 0
@@ -135,7 +165,14 @@ def begin(task, lib, world, body, search):
 
 
 @bare_kernel
-def expand(task, lib, world, body, search, n):
+def expand(
+    task: FailSafeTask,
+    lib: LatticeArrays,
+    world: WorldArrays,
+    body: Body,
+    search: FailSafeArrays,
+    n: int,
+) -> int:
     """Expand up to `n` nodes until one is safe for long enough.
 
     Every trim is held as long as it is free, and left at several moments. Returns whether it may go

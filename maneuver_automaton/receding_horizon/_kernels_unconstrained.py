@@ -7,12 +7,15 @@ same wherever it begins, so the nodes of its quadrature are displacements made o
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from maneuver_automaton._compile import inner_kernel, kernel
 from maneuver_automaton.groups._kernels import compose
+
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array, IntArray
 
 
 class IntervalTables(NamedTuple):
@@ -28,7 +31,7 @@ class IntervalTables(NamedTuple):
 
 
 @inner_kernel
-def power(value, order):
+def power(value: float, order: float) -> float:
     """``|value| ** order``, quick where the order is 2 or 4."""
     square = value * value
     if order == 2.0:
@@ -39,14 +42,16 @@ def power(value, order):
 
 
 @inner_kernel
-def pose_rate(tables, x, y, heading):
+def pose_rate(tables: IntervalTables, x: float, y: float, heading: float) -> float:
     """Cost per second of a pose."""
     q, p = tables.pose_weights, tables.pose_orders
     return q[0] * power(x, p[0]) + q[1] * power(y, p[1]) + q[2] * power(heading, p[2])
 
 
 @inner_kernel
-def interval_cost(tables, trim, x, y, heading, c, s):
+def interval_cost(
+    tables: IntervalTables, trim: int, x: float, y: float, heading: float, c: float, s: float
+) -> float:
     """Cost of one interval of a trim from a pose; `c`, `s` are cosine and sine of its heading."""
     total = tables.effort[trim]
     for k in range(tables.weights.size):
@@ -59,14 +64,18 @@ def interval_cost(tables, trim, x, y, heading, c, s):
 
 
 @inner_kernel
-def next_pose(tables, trim, x, y, heading):
+def next_pose(
+    tables: IntervalTables, trim: int, x: float, y: float, heading: float
+) -> tuple[float, float, float]:
     """Pose after one interval of a trim."""
     end = tables.ends[trim]
     return compose(x, y, heading, end[0], end[1], end[2])
 
 
 @kernel
-def roll_out(tables, pose, sequence, poses, costs):
+def roll_out(
+    tables: IntervalTables, pose: Array, sequence: IntArray, poses: Array, costs: Array
+) -> float:
     """Fill `poses` (n + 1, 3) and `costs` (n,) of a sequence (n,) of trims; the total cost."""
     total = 0.0
     poses[0] = pose
@@ -80,7 +89,13 @@ def roll_out(tables, pose, sequence, poses, costs):
 
 
 @inner_kernel
-def tail_cost(tables, sequence, first, pose, limit):
+def tail_cost(
+    tables: IntervalTables,
+    sequence: IntArray,
+    first: int,
+    pose: tuple[float, float, float],
+    limit: float,
+) -> float:
     """Cost of the trims from `first` on, from a pose; inf once it is not below `limit`."""
     x, y, heading = pose
     # Costs are not negative, so a sum that reaches the limit stays there.
@@ -95,7 +110,13 @@ def tail_cost(tables, sequence, first, pose, limit):
 
 
 @inner_kernel
-def best_single(tables, sequence, i, pose, best):
+def best_single(
+    tables: IntervalTables,
+    sequence: IntArray,
+    i: int,
+    pose: tuple[float, float, float],
+    best: float,
+) -> tuple[int, float]:
     """Trim for interval `i` with the least cost of the rest, and that cost, if below `best`."""
     x, y, heading = pose
     c, s = math.cos(heading), math.sin(heading)
@@ -111,7 +132,14 @@ def best_single(tables, sequence, i, pose, best):
 
 
 @inner_kernel
-def best_pair(tables, sequence, i, j, pose, best):
+def best_pair(
+    tables: IntervalTables,
+    sequence: IntArray,
+    i: int,
+    j: int,
+    pose: tuple[float, float, float],
+    best: float,
+) -> tuple[int, int, float]:
     """Similar trims for intervals i < j with the least cost from i on, and it, if below `best`."""
     first = old_i = sequence[i]
     second = old_j = sequence[j]
@@ -127,7 +155,7 @@ def best_pair(tables, sequence, i, j, pose, best):
 
 
 @kernel
-def improve(tables, pose, sequence, gain):
+def improve(tables: IntervalTables, pose: Array, sequence: IntArray, gain: float) -> float:
     """Change `sequence` one or two trims at a time while that gains more than `gain`; its cost.
 
     One interval tries every trim; two intervals try the trims most similar to theirs.
@@ -159,7 +187,7 @@ def improve(tables, pose, sequence, gain):
 
 
 @inner_kernel
-def near_one(poses, count, pose, same):
+def near_one(poses: Array, count: int, pose: Array, same: float) -> bool:
     """Whether one of the first `count` poses is within `same` of `pose` in every component."""
     for k in range(count):
         if (
@@ -172,7 +200,9 @@ def near_one(poses, count, pose, same):
 
 
 @kernel
-def beam(tables, pose, n, width, growth, same):
+def beam(
+    tables: IntervalTables, pose: Array, n: int, width: int, growth: float, same: float
+) -> tuple[IntArray, Array]:
     """Sequences (k, n) of a beam search, k at most `width`, and their costs (k,), cheapest first.
 
     A partial sequence is ranked by its cost and ``min(time left, growth) * rate`` at its end, with

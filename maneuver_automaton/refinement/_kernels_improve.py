@@ -9,7 +9,7 @@ via-point between; `one` and `two`, the candidates of the first and of the secon
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
 from maneuver_automaton.refinement._kernels_word import (
@@ -33,9 +33,18 @@ from maneuver_automaton.refinement._kernels_word import (
 from maneuver_automaton.search._kernels_motion import free_candidate
 from maneuver_automaton.words._kernels_candidates import NO_TRIM, candidates, trim_and_gear
 
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array, IntArray
+    from maneuver_automaton.refinement.work import ImproveTask, Work
+    from maneuver_automaton.search.lattice_arrays import LatticeArrays
+    from maneuver_automaton.search.scene import Scene
+    from maneuver_automaton.words.library import Scratch
+
 
 @bare_inner_kernel
-def spliced(lib, task, work, n, section, m):
+def spliced(
+    lib: LatticeArrays, task: ImproveTask, work: Work, n: int, section: Section, m: int
+) -> int:
     """Write into `work.new_*` the word with the section replaced; its length.
 
     The new middle is the word `work.middle_*` of `m` trims.
@@ -56,7 +65,9 @@ def spliced(lib, task, work, n, section, m):
 
 
 @inlined_kernel
-def put_middle(lib, work, words, scratch, which, m):
+def put_middle(
+    lib: LatticeArrays, work: Work, words: IntArray, scratch: Scratch, which: int, m: int
+) -> int:
     """Append a candidate to the new middle; returns its length.
 
     Between classes a trim counts also where it lasts no time: maneuvers lead to it and on.
@@ -90,7 +101,9 @@ class Section(NamedTuple):
 
 
 @bare_inner_kernel
-def section_price(lib, work, begin, end, first, last):
+def section_price(
+    lib: LatticeArrays, work: Work, begin: float, end: float, first: int, last: int
+) -> float:
     """Price of the word between two times, its transitions included."""
     price = 0.0
     for k in range(first, last + 1):
@@ -105,7 +118,9 @@ def section_price(lib, work, begin, end, first, last):
 
 
 @bare_inner_kernel
-def drawn_section(lib, task, work, n, cost, draw):
+def drawn_section(
+    lib: LatticeArrays, task: ImproveTask, work: Work, n: int, cost: float, draw: Array
+) -> Section:
     """The section of a word of `cost` that six numbers between 0 and 1 draw.
 
     It begins and ends in coasts, where the state is known. A trim that a maneuver leads to has been
@@ -151,7 +166,7 @@ def drawn_section(lib, task, work, n, cost, draw):
 
 
 @inlined_kernel
-def cheapest_of(scratch, n):
+def cheapest_of(scratch: Scratch, n: int) -> float:
     """Least cost of `n` candidates; inf if there are none."""
     least = math.inf
     for k in range(n):
@@ -160,7 +175,7 @@ def cheapest_of(scratch, n):
 
 
 @inlined_kernel
-def words_to(lib, free_heading):
+def words_to(lib: LatticeArrays, free_heading: bool) -> tuple[IntArray, int]:
     """Words of a connection and how many of them are tried."""
     if free_heading:
         return lib.library.free_words, lib.library.free_words.shape[0]
@@ -168,7 +183,20 @@ def words_to(lib, free_heading):
 
 
 @bare_inner_kernel
-def put_free(lib, task, scene, work, words, ends, n, most_cost, most_time, clock, scratch, m):
+def put_free(
+    lib: LatticeArrays,
+    task: ImproveTask,
+    scene: Scene,
+    work: Work,
+    words: IntArray,
+    ends: tuple[tuple[float, float, float, float], int, int],
+    n: int,
+    most_cost: float,
+    most_time: float,
+    clock: float,
+    scratch: Scratch,
+    m: int,
+) -> tuple[int, int]:
     """Append to the new middle, of `m` trims, the cheapest free one of `n` candidates.
 
     `ends` as in `connection_free`. Returns its number and the middle's new length; -1 and -1 if
@@ -182,7 +210,9 @@ def put_free(lib, task, scene, work, words, ends, n, most_cost, most_time, clock
 
 
 @bare_inner_kernel
-def direct_middle(lib, task, scene, work, section):
+def direct_middle(
+    lib: LatticeArrays, task: ImproveTask, scene: Scene, work: Work, section: Section
+) -> int:
     """Write into the new middle a connection that joins the ends of a section.
 
     Returns its length, -1 if there is none that is free and cheap enough; so does `via_middle`.
@@ -223,7 +253,15 @@ def direct_middle(lib, task, scene, work, section):
 
 
 @bare_inner_kernel
-def via_pose(lib, task, work, n, section, size, shift):
+def via_pose(
+    lib: LatticeArrays,
+    task: ImproveTask,
+    work: Work,
+    n: int,
+    section: Section,
+    size: float,
+    shift: Array,
+) -> tuple[tuple[float, float, float, float], tuple[int, int]]:
     """A pose near the middle of a section, and its trim and gear, any where all are of one class.
 
     It is shifted by normal numbers times the spread of `size`.
@@ -240,7 +278,15 @@ def via_pose(lib, task, work, n, section, size, shift):
 
 
 @bare_inner_kernel
-def via_middle(lib, task, scene, work, section, via, there):
+def via_middle(
+    lib: LatticeArrays,
+    task: ImproveTask,
+    scene: Scene,
+    work: Work,
+    section: Section,
+    via: tuple[float, float, float, float],
+    there: tuple[int, int],
+) -> int:
     """Write into the new middle a connection to the pose `via`, and one from there on."""
     x, y, _, _ = section.start
     v_x, v_y, _, _ = via
@@ -303,7 +349,15 @@ def via_middle(lib, task, scene, work, section, via, there):
 
 
 @bare_kernel
-def attempt_all(lib, task, scene, work, state, uniform, normal):
+def attempt_all(
+    lib: LatticeArrays,
+    task: ImproveTask,
+    scene: Scene,
+    work: Work,
+    state: IntArray,
+    uniform: Array,
+    normal: Array,
+) -> float:
     """Cost of the word after one shortcut or via-point per row of the draws has been tried.
 
     The word is changed in place, and its length in `state`.

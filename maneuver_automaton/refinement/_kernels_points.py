@@ -15,6 +15,7 @@ before, or by a connection from any earlier one. Arrays of `work.Work` with a ro
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
 from maneuver_automaton.refinement._kernels_word import (
@@ -36,11 +37,17 @@ from maneuver_automaton.refinement._kernels_word import (
 from maneuver_automaton.search._kernels_motion import free_candidate
 from maneuver_automaton.words._kernels_candidates import NO_TRIM, candidates, trim_and_gear
 
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array, IntArray
+    from maneuver_automaton.refinement.work import ImproveTask, Work
+    from maneuver_automaton.search.lattice_arrays import LatticeArrays
+    from maneuver_automaton.search.scene import Scene
+
 X, Y, HEADING, Z, TIME = range(5)  # columns of the points
 
 
 @bare_inner_kernel
-def put_points(lib, work, n, times):
+def put_points(lib: LatticeArrays, work: Work, n: int, times: Array) -> None:
     """Fill `work.at` and `work.owners` with the word's states at rising times within its coasts."""
     for j in range(times.shape[0]):
         k = owner(work, n, times[j]) if j > 0 else 0
@@ -54,7 +61,7 @@ def put_points(lib, work, n, times):
 
 
 @bare_inner_kernel
-def price_along(lib, work, j):
+def price_along(lib: LatticeArrays, work: Work, j: int) -> float:
     """Price of the word from point `j - 1` to point `j`."""
     begin, end = work.at[j - 1, TIME], work.at[j, TIME]
     first, last = work.owners[j - 1], work.owners[j]
@@ -70,14 +77,24 @@ def price_along(lib, work, j):
 
 
 @inlined_kernel
-def trim_at(lib, work, j):
+def trim_at(lib: LatticeArrays, work: Work, j: int) -> tuple[int, int]:
     """Trim at a point, as the search for connections is told: any where all are of one class."""
     trim = work.trims[work.owners[j]] if lib.library.cost.shape[0] > 1 else NO_TRIM
     return trim_and_gear(trim, 0)
 
 
 @bare_inner_kernel
-def join(lib, task, scene, work, words, n_words, i, j, gain):
+def join(
+    lib: LatticeArrays,
+    task: ImproveTask,
+    scene: Scene,
+    work: Work,
+    words: IntArray,
+    n_words: int,
+    i: int,
+    j: int,
+    gain: float,
+) -> None:
     """Reach point `j` from point `i` by a connection, if that is cheaper by `gain`, and free."""
     start = (work.at[i, X], work.at[i, Y], work.at[i, HEADING], work.at[i, Z])
     goal = (work.at[j, X], work.at[j, Y], work.at[j, HEADING], work.at[j, Z])
@@ -113,7 +130,7 @@ def join(lib, task, scene, work, words, n_words, i, j, gain):
 
 
 @bare_inner_kernel
-def unwound(lib, task, work, n, points):
+def unwound(lib: LatticeArrays, task: ImproveTask, work: Work, n: int, points: int) -> int:
     """Write the cheapest path to the last point into `work.new_*`; its length."""
     j, n_legs = points - 1, 0
     while j > 0:
@@ -144,7 +161,7 @@ def unwound(lib, task, work, n, points):
 
 
 @bare_kernel
-def begin_program(lib, work, state, times):
+def begin_program(lib: LatticeArrays, work: Work, state: IntArray, times: Array) -> float:
     """Cut the word at some times, rising from its begin to its end, all of them within coasts.
 
     Returns its cost. The points are then joined, in order, by `join_points`, and `take_program`
@@ -157,7 +174,16 @@ def begin_program(lib, work, state, times):
 
 
 @bare_kernel
-def join_points(lib, task, scene, work, first, points, n_words, gain):
+def join_points(
+    lib: LatticeArrays,
+    task: ImproveTask,
+    scene: Scene,
+    work: Work,
+    first: int,
+    points: int,
+    n_words: int,
+    gain: float,
+) -> None:
     """Find the cheapest paths to the points from `first` to before `points`.
 
     Connections are the first `n_words` words of the library. One has to save at least `gain`
@@ -175,7 +201,9 @@ def join_points(lib, task, scene, work, first, points, n_words, gain):
 
 
 @bare_kernel
-def take_program(lib, task, scene, work, state, cost):
+def take_program(
+    lib: LatticeArrays, task: ImproveTask, scene: Scene, work: Work, state: IntArray, cost: float
+) -> None:
     """Make the word the cheapest path through its points; as it is where that gains nothing."""
     n = state[LENGTH]
     size = unwound(lib, task, work, n, work.at.shape[0])

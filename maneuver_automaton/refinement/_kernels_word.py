@@ -11,6 +11,8 @@ begins, and when it ends; `times[n]` is the duration of the word. `new_trims`, `
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 from maneuver_automaton.search._kernels_motion import (
     coast_free,
@@ -22,13 +24,21 @@ from maneuver_automaton.search._kernels_motion import (
 )
 from maneuver_automaton.words._kernels_candidates import class_of
 
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array, IntArray
+    from maneuver_automaton.refinement.work import ImproveTask, Work
+    from maneuver_automaton.search.lattice_arrays import LatticeArrays
+    from maneuver_automaton.search.scene import Scene
+
 AT_WILL = -1  # edge of a switch
 GAIN = 1e-9  # relative; a word that is cheaper by less is no gain
 LENGTH = 0  # place of the word's length in `state`
 
 
 @bare_inner_kernel
-def word_cost(lib, trims, durations, edges, n):
+def word_cost(
+    lib: LatticeArrays, trims: IntArray, durations: Array, edges: IntArray, n: int
+) -> float:
     """Cost of a word with the prices of its switches and maneuvers."""
     # `gear` is the sign of the last forward speed: trims without one do not change direction.
     cost, gear = 0.0, 0
@@ -47,7 +57,7 @@ def word_cost(lib, trims, durations, edges, n):
 
 
 @bare_inner_kernel
-def unroll(lib, work, n):
+def unroll(lib: LatticeArrays, work: Work, n: int) -> None:
     """Fill the poses where coasts begin, and the times where they begin and end."""
     pose = (work.start[0], work.start[1], work.start[2], work.start[3])
     time = 0.0
@@ -64,7 +74,7 @@ def unroll(lib, work, n):
 
 
 @inlined_kernel
-def owner(work, n, time):
+def owner(work: Work, n: int, time: float) -> int:
     """Number of the last trim that has begun at a time: its coast, or the maneuver after it."""
     # By halving: `times` rise, and times[low] <= time < times[high], the ends aside.
     low, high = 0, n
@@ -78,7 +88,9 @@ def owner(work, n, time):
 
 
 @inlined_kernel
-def pose_at(lib, work, k, time):
+def pose_at(
+    lib: LatticeArrays, work: Work, k: int, time: float
+) -> tuple[float, float, float, float]:
     """Pose (x, y, heading, z) at a time within trim `k`."""
     t = time - work.times[k]
     begin = (work.poses[k, 0], work.poses[k, 1], work.poses[k, 2], work.poses[k, 3])
@@ -86,7 +98,7 @@ def pose_at(lib, work, k, time):
 
 
 @inlined_kernel
-def price_of_transition(lib, work, k):
+def price_of_transition(lib: LatticeArrays, work: Work, k: int) -> float:
     """Price of what leads to trim `k` from the trim before."""
     if work.edges[k] >= 0:
         return lib.edge_cost[work.edges[k]]
@@ -94,7 +106,7 @@ def price_of_transition(lib, work, k):
 
 
 @inlined_kernel
-def gear_before(lib, work, k):
+def gear_before(lib: LatticeArrays, work: Work, k: int) -> int:
     """Sign of the last forward speed up to trim `k`, that included."""
     gear = 0
     while k >= 0 and gear == 0:
@@ -104,7 +116,7 @@ def gear_before(lib, work, k):
 
 
 @inlined_kernel
-def gear_after(lib, work, n, k):
+def gear_after(lib: LatticeArrays, work: Work, n: int, k: int) -> int:
     """Sign of the first forward speed from trim `k` on."""
     gear = 0
     while k < n and gear == 0:
@@ -118,7 +130,7 @@ def gear_after(lib, work, n, k):
 
 
 @inlined_kernel
-def begun(task, work):
+def begun(task: ImproveTask, work: Work) -> int:
     """Begin the new word: in the trim of the old one, where a word has to begin in a given trim."""
     if not task.given_ends:
         return 0
@@ -127,7 +139,7 @@ def begun(task, work):
 
 
 @bare_inner_kernel
-def put(work, size, edge, trim, t):
+def put(work: Work, size: int, edge: int, trim: int, t: float) -> int:
     """Append a trim, whatever stands before it."""
     if size >= work.new_trims.shape[0] - 1:
         return work.new_trims.shape[0]
@@ -136,7 +148,7 @@ def put(work, size, edge, trim, t):
 
 
 @bare_inner_kernel
-def put_edge(lib, work, size, edge):
+def put_edge(lib: LatticeArrays, work: Work, size: int, edge: int) -> int:
     """Append a maneuver, and the trim that it begins in where the word is in another one."""
     if edge < 0 or size >= work.new_trims.shape[0]:
         return work.new_trims.shape[0]
@@ -147,7 +159,7 @@ def put_edge(lib, work, size, edge):
 
 
 @bare_inner_kernel
-def append(lib, work, size, trim, t):
+def append(lib: LatticeArrays, work: Work, size: int, trim: int, t: float) -> int:
     """Append a coast of the class that the word is in, joined with the last one of its trim."""
     if t < lib.library.shortest or size >= work.new_trims.shape[0]:
         return size
@@ -158,7 +170,7 @@ def append(lib, work, size, trim, t):
 
 
 @bare_inner_kernel
-def append_through(lib, work, size, trim, t):
+def append_through(lib: LatticeArrays, work: Work, size: int, trim: int, t: float) -> int:
     """Append a coast, after the maneuvers that lead to its class."""
     # `via_edge` is the first maneuver of the cheapest chain, so each round is nearer to the class.
     goal = class_of(lib.library, trim)
@@ -171,7 +183,7 @@ def append_through(lib, work, size, trim, t):
 
 
 @bare_inner_kernel
-def append_after(lib, work, size, k, t):
+def append_after(lib: LatticeArrays, work: Work, size: int, k: int, t: float) -> int:
     """Append trim `k` of the old word, for a time, and the maneuver that leads to it there."""
     if work.edges[k] >= 0:
         size = put_edge(lib, work, size, work.edges[k])
@@ -179,7 +191,7 @@ def append_after(lib, work, size, k, t):
 
 
 @inlined_kernel
-def ended(task, work, n, size):
+def ended(task: ImproveTask, work: Work, n: int, size: int) -> int:
     """End the new word: in the trim of the old one, of `n` trims, where that is given."""
     if not task.given_ends or size >= work.new_trims.shape[0]:
         return size
@@ -189,7 +201,7 @@ def ended(task, work, n, size):
 
 
 @bare_inner_kernel
-def admitted(lib, task, work, size):
+def admitted(lib: LatticeArrays, task: ImproveTask, work: Work, size: int) -> bool:
     """Whether the word in `work.new_*` keeps the limits of words."""
     if size > work.new_trims.shape[0] - 1 or (task.most_trims > 0 and size > task.most_trims):
         return False
@@ -205,7 +217,9 @@ def admitted(lib, task, work, size):
 
 
 @bare_inner_kernel
-def still_free(lib, task, scene, work, size, begin):
+def still_free(
+    lib: LatticeArrays, task: ImproveTask, scene: Scene, work: Work, size: int, begin: float
+) -> bool:
     """Whether the word in `work.new_*` is free after `begin` [s], where obstacles move."""
     # What ends before `begin` is driven as before, and was proven then.
     pose = (work.start[0], work.start[1], work.start[2], work.start[3])
@@ -227,7 +241,7 @@ def still_free(lib, task, scene, work, size, begin):
 
 
 @bare_inner_kernel
-def take(work, state, size):
+def take(work: Work, state: IntArray, size: int) -> None:
     """Make the word in `work.new_*` the word."""
     for k in range(size):
         work.trims[k], work.durations[k] = work.new_trims[k], work.new_durations[k]

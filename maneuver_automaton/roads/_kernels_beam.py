@@ -10,7 +10,7 @@ when it is made: of some sixty children of a node one or two are ever popped.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -36,6 +36,9 @@ from maneuver_automaton.roads._kernels_route import (
 from maneuver_automaton.roads._kernels_stops import first_free_stop
 from maneuver_automaton.search._kernels_cells import EMPTY, enter
 from maneuver_automaton.search._kernels_distance import pop, push
+
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array, IntArray
 
 PARENT, MANEUVER, TRIM, NEAR = range(4)  # columns of `links`
 N_NODES, HEAP, KEPT, CHECKS = range(4)  # places of `state`
@@ -101,7 +104,9 @@ class Horizon(NamedTuple):
 
 
 @bare_inner_kernel
-def is_new(task, cells, x, y, heading, speed):
+def is_new(
+    task: HorizonTask, cells: IntArray, x: float, y: float, heading: float, speed: float
+) -> bool:
     """Mark the cell of a node; whether it was free."""
     i = math.floor((x - task.x) / task.cell + 0.5) & 0xFFF
     j = math.floor((y - task.y) / task.cell + 0.5) & 0xFFF
@@ -112,7 +117,7 @@ def is_new(task, cells, x, y, heading, speed):
 
 
 @bare_inner_kernel
-def strip_of(horizon, search, node):
+def strip_of(horizon: Horizon, search: BeamArrays, node: int) -> int:
     """Which strip along the route a node is in."""
     pose, near = search.pose, search.links[node, NEAR]
     _, offset = on_route(horizon.route, pose[node, 0], pose[node, 1], near)
@@ -121,7 +126,16 @@ def strip_of(horizon, search, node):
 
 
 @bare_inner_kernel
-def add_children(task, horizon, search, node, maneuvers, low, high, tick):
+def add_children(
+    task: HorizonTask,
+    horizon: Horizon,
+    search: BeamArrays,
+    node: int,
+    maneuvers: Maneuvers,
+    low: int,
+    high: int,
+    tick: int,
+) -> None:
     """Queue the nodes that maneuvers lead to at a tick, their edges not yet proven.
 
     Those that cost as much as a plan that is known are left out: costs only rise.
@@ -160,7 +174,14 @@ def add_children(task, horizon, search, node, maneuvers, low, high, tick):
 
 
 @bare_inner_kernel
-def prove_edge(task, horizon, search, maneuvers, node, tick):
+def prove_edge(
+    task: HorizonTask,
+    horizon: Horizon,
+    search: BeamArrays,
+    maneuvers: Maneuvers,
+    node: int,
+    tick: int,
+) -> tuple[bool, int]:
     """Prove the edge into a node from `tick` on: whether it is free; tick of a goal on it or -1."""
     pose, links, limits = search.pose, search.links, horizon.limits
     parent, e = links[node, PARENT], links[node, MANEUVER]
@@ -183,7 +204,14 @@ def prove_edge(task, horizon, search, maneuvers, node, tick):
 
 
 @bare_inner_kernel
-def cost_along(task, horizon, search, maneuvers, node, ticks):
+def cost_along(
+    task: HorizonTask,
+    horizon: Horizon,
+    search: BeamArrays,
+    maneuvers: Maneuvers,
+    node: int,
+    ticks: int,
+) -> float:
     """Cost to come of a node after so many ticks of the edge into it, the rate taken at each."""
     pose, links, limits = search.pose, search.links, horizon.limits
     parent, e = links[node, PARENT], links[node, MANEUVER]
@@ -200,7 +228,14 @@ def cost_along(task, horizon, search, maneuvers, node, ticks):
 
 
 @bare_inner_kernel
-def word_to(search, first, maneuvers, node, ticks, controls):
+def word_to(
+    search: BeamArrays,
+    first: Maneuvers,
+    maneuvers: Maneuvers,
+    node: int,
+    ticks: int,
+    controls: Array,
+) -> int:
     """Write the controls (n, 2), tick by tick, of the word that leads to a node; n."""
     links = search.links
     levels, k = 0, node
@@ -219,7 +254,16 @@ def word_to(search, first, maneuvers, node, ticks, controls):
 
 
 @bare_inner_kernel
-def finish(task, horizon, search, first, node, last, shares, controls):
+def finish(
+    task: HorizonTask,
+    horizon: Horizon,
+    search: BeamArrays,
+    first: Maneuvers,
+    node: int,
+    last: int,
+    shares: Array,
+    controls: Array,
+) -> tuple[int, int]:
     """Controls to a node, cut at the tick `last`, and to stop after it; (ticks, ticks in all).
 
     The latter are -1 if no stop is free. The word is driven once more to its end, as the stop
@@ -248,7 +292,7 @@ def finish(task, horizon, search, first, node, last, shares, controls):
 
 
 @bare_inner_kernel
-def begin(task, horizon, search, first):
+def begin(task: HorizonTask, horizon: Horizon, search: BeamArrays, first: Maneuvers) -> None:
     """The node that the vehicle is at, and its children."""
     state, links, pose = search.state, search.links, search.pose
     for k in range(state.shape[0]):
@@ -268,7 +312,15 @@ def begin(task, horizon, search, first):
 
 
 @bare_inner_kernel
-def furthest(task, horizon, search, first, levels, shares, controls):
+def furthest(
+    task: HorizonTask,
+    horizon: Horizon,
+    search: BeamArrays,
+    first: Maneuvers,
+    levels: int,
+    shares: Array,
+    controls: Array,
+) -> tuple[int, int]:
     """The proven node that is latest, then best, and can be stopped after; or to stop at once."""
     for level in range(levels - 1, -1, -1):
         last = min(task.tick + (level + 1) * horizon.limits.ticks, task.until)
@@ -293,7 +345,16 @@ def furthest(task, horizon, search, first, levels, shares, controls):
 
 
 @bare_inner_kernel
-def note_goal(task, horizon, search, first, node, tick, shares, controls):
+def note_goal(
+    task: HorizonTask,
+    horizon: Horizon,
+    search: BeamArrays,
+    first: Maneuvers,
+    node: int,
+    tick: int,
+    shares: Array,
+    controls: Array,
+) -> None:
     """Note a node that meets a goal at a tick, if it is the cheapest with, or without, a stop."""
     _, whole = finish(task, horizon, search, first, node, tick, shares, controls)
     row, cost = (STOPPING if whole >= 0 else UNSAFE), search.pose[node, 3]
@@ -303,7 +364,14 @@ def note_goal(task, horizon, search, first, node, tick, shares, controls):
 
 
 @bare_kernel
-def search_beam(task, horizon, first, search, shares, controls):
+def search_beam(
+    task: HorizonTask,
+    horizon: Horizon,
+    first: Maneuvers,
+    search: BeamArrays,
+    shares: Array,
+    controls: Array,
+) -> tuple[bool, int, int]:
     """Search, level by level, for the cheapest plan to a goal with a stop after it.
 
     Returns whether a goal is reached, the ticks of the plan, and those of the plan and its stop;

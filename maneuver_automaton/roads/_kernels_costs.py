@@ -8,13 +8,18 @@ an estimate, not a bound: the beam search needs an order of nodes, and promises 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.groups._kernels import nearest_turn
 from maneuver_automaton.roads._kernels_route import nearest_of_all, nearest_point, on_route
+
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array
+    from maneuver_automaton.roads._kernels_beam import Horizon
+    from maneuver_automaton.roads._kernels_goals import GoalArrays
 
 IMPOSSIBLE = 1e4  # cost beyond the car's limits, far above any stage cost
 
@@ -43,7 +48,7 @@ class StaticObstacles(NamedTuple):
 
 
 @bare_inner_kernel
-def stage_rate(weights, limit, offset, turned, speed):
+def stage_rate(weights: Weights, limit: float, offset: float, turned: float, speed: float) -> float:
     """Cost per second of being on the road, the effort of the maneuver apart."""
     over = max(speed - limit, 0.0)
     cost = weights.offset * offset * offset + weights.turned * turned * turned
@@ -54,7 +59,9 @@ def stage_rate(weights, limit, offset, turned, speed):
 
 
 @bare_inner_kernel
-def rate_at(horizon, x, y, heading, speed, guess):
+def rate_at(
+    horizon: Horizon, x: float, y: float, heading: float, speed: float, guess: int
+) -> tuple[float, int]:
     """`stage_rate` of a state, and the point of the route that is nearest, near a guess."""
     ahead = horizon.clearing.car.ahead
     m_x, m_y = x + ahead * math.cos(heading), y + ahead * math.sin(heading)
@@ -65,7 +72,15 @@ def rate_at(horizon, x, y, heading, speed, guess):
 
 
 @bare_inner_kernel
-def along_to_goal(weights, goals, g, station, speed, least, most):
+def along_to_goal(
+    weights: Weights,
+    goals: GoalArrays,
+    g: int,
+    station: float,
+    speed: float,
+    least: float,
+    most: float,
+) -> tuple[float, float]:
     """Cost to be at the stations of goal `g` between two times from now [s], and that time [s].
 
     The time is negative if it cannot be: then the cost is the answer.
@@ -102,7 +117,7 @@ def along_to_goal(weights, goals, g, station, speed, least, most):
 
 
 @bare_inner_kernel
-def sideways(weights, acceleration, time):
+def sideways(weights: Weights, acceleration: float, time: float) -> float:
     """Cost of a lateral acceleration that is needed for a time [s]."""
     cost = weights.aside * acceleration * acceleration * time
     if acceleration > weights.lateral:
@@ -111,7 +126,17 @@ def sideways(weights, acceleration, time):
 
 
 @bare_inner_kernel
-def cost_to_goal(weights, goals, g, station, offset, turned, speed, least, most):
+def cost_to_goal(
+    weights: Weights,
+    goals: GoalArrays,
+    g: int,
+    station: float,
+    offset: float,
+    turned: float,
+    speed: float,
+    least: float,
+    most: float,
+) -> float:
     """Estimate of the cost to be at goal `g` between two times from now [s].
 
     Constant accelerations along the route and across it that lead there in the time that suits.
@@ -137,7 +162,16 @@ def cost_to_goal(weights, goals, g, station, offset, turned, speed, least, most)
 
 
 @bare_inner_kernel
-def cost_past_obstacles(weights, obstacles, station, offset, turned, speed, goal, most):
+def cost_past_obstacles(
+    weights: Weights,
+    obstacles: StaticObstacles,
+    station: float,
+    offset: float,
+    turned: float,
+    speed: float,
+    goal: Array,
+    most: float,
+) -> float:
     """Estimate of the cost to get past static obstacles before a station.
 
     Each is taken alone: the vehicle is beside it when it gets there, on the nearer side with road,
@@ -174,7 +208,9 @@ def cost_past_obstacles(weights, obstacles, station, offset, turned, speed, goal
 
 
 @bare_inner_kernel
-def cost_to_go(horizon, station, offset, turned, speed, tick):
+def cost_to_go(
+    horizon: Horizon, station: float, offset: float, turned: float, speed: float, tick: int
+) -> float:
     """Estimate of the cost-to-go, to the goal that is cheapest to reach."""
     goals, weights = horizon.goals, horizon.weights
     best = math.inf
@@ -193,7 +229,9 @@ def cost_to_go(horizon, station, offset, turned, speed, tick):
 
 
 @bare_inner_kernel
-def cost_of_tick(horizon, states, controls, k, guess):
+def cost_of_tick(
+    horizon: Horizon, states: Array, controls: Array, k: int, guess: int
+) -> tuple[float, int]:
     """Cost (stage and effort) of tick `k` of a motion, and the nearest point of the route after."""
     limits = horizon.limits
     x, y, heading = states[k + 1, 0], states[k + 1, 1], states[k + 1, 2]
@@ -208,7 +246,7 @@ def cost_of_tick(horizon, states, controls, k, guess):
 
 
 @bare_kernel
-def price(horizon, states, controls):
+def price(horizon: Horizon, states: Array, controls: Array) -> float:
     """Cost (stage and effort) of a motion with states (n + 1, 5) and controls (n, 2)."""
     total, near = 0.0, nearest_of_all(horizon.route, states[0, 0], states[0, 1])
     for k in range(controls.shape[0]):

@@ -10,13 +10,16 @@ than either distance.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.collision._kernels_advancement import free_of_solids
 from maneuver_automaton.collision._kernels_movers import free_of_movers
 from maneuver_automaton.collision.body import Body
 from maneuver_automaton.collision.world import WorldArrays
+
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array
 
 
 class CarArrays(NamedTuple):
@@ -43,7 +46,16 @@ class Clearing(NamedTuple):
 
 
 @bare_inner_kernel
-def free_tick(clearing, x_0, y_0, h_0, x_1, y_1, h_1, tick):
+def free_tick(
+    clearing: Clearing,
+    x_0: float,
+    y_0: float,
+    h_0: float,
+    x_1: float,
+    y_1: float,
+    h_1: float,
+    tick: int,
+) -> bool:
     """Whether the constant twist between two poses of the car, from `tick` to the next, is free."""
     car, body, duration, margin = clearing.car, clearing.body, clearing.tick, clearing.margin
     c, s = math.cos(h_0), math.sin(h_0)
@@ -72,7 +84,7 @@ def free_tick(clearing, x_0, y_0, h_0, x_1, y_1, h_1, tick):
 
 
 @bare_kernel
-def free_ticks(clearing, states, tick):
+def free_ticks(clearing: Clearing, states: Array, tick: int) -> int:
     """How many ticks of a motion with states (n + 1, 5) at ticks from `tick` on are free."""
     for k in range(states.shape[0] - 1):
         if not free_tick(

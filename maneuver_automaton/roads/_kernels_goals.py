@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
+
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array
+    from maneuver_automaton.roads._kernels_beam import Horizon
 
 
 class GoalArrays(NamedTuple):
@@ -28,7 +32,7 @@ class GoalArrays(NamedTuple):
 
 
 @bare_inner_kernel
-def in_ring(goals, ring, x, y):
+def in_ring(goals: GoalArrays, ring: int, x: float, y: float) -> bool:
     """Whether a place is inside a ring of corners, by the parity of crossings."""
     inside = False
     low, high = goals.ring[ring], goals.ring[ring + 1]
@@ -43,7 +47,7 @@ def in_ring(goals, ring, x, y):
 
 
 @bare_inner_kernel
-def goal_at(horizon, x, y, heading, speed, tick):
+def goal_at(horizon: Horizon, x: float, y: float, heading: float, speed: float, tick: int) -> int:
     """Number of the goal that a state of the rear axle meets at a tick, -1 for none."""
     goals, ahead = horizon.goals, horizon.clearing.car.ahead
     m_x, m_y = x + ahead * math.cos(heading), y + ahead * math.sin(heading)
@@ -66,7 +70,7 @@ def goal_at(horizon, x, y, heading, speed, tick):
 
 
 @bare_kernel
-def first_goal(horizon, states, tick):
+def first_goal(horizon: Horizon, states: Array, tick: int) -> int:
     """First of the states (n, 5) at ticks from `tick` on that meets a goal, -1 if none does."""
     for k in range(states.shape[0]):
         if goal_at(horizon, states[k, 0], states[k, 1], states[k, 2], states[k, 3], tick + k) >= 0:

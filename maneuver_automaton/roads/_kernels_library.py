@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
 from maneuver_automaton.roads._kernels_motion import one_tick
+
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array, IntArray
 
 
 class Maneuvers(NamedTuple):
@@ -52,7 +55,14 @@ class Limits(NamedTuple):
 
 
 @bare_inner_kernel
-def admitted(limits, duration, speed, steering, target_speed, target_steering):
+def admitted(
+    limits: Limits,
+    duration: float,
+    speed: float,
+    steering: float,
+    target_speed: float,
+    target_steering: float,
+) -> tuple[bool, float, float, float]:
     """Whether a ramp between two states keeps the limits; acceleration, steering rate, effort."""
     acceleration = (target_speed - speed) / duration
     rate = (target_steering - steering) / duration
@@ -78,7 +88,9 @@ def admitted(limits, duration, speed, steering, target_speed, target_steering):
 
 
 @inner_kernel
-def write_course(limits, speed, steering, acceleration, rate, out):
+def write_course(
+    limits: Limits, speed: float, steering: float, acceleration: float, rate: float, out: Array
+) -> None:
     """Poses at the ends of the ticks (ticks, 3) of a ramp from the identity."""
     x, y, heading = 0.0, 0.0, 0.0
     for k in range(limits.ticks):
@@ -89,7 +101,17 @@ def write_course(limits, speed, steering, acceleration, rate, out):
 
 
 @inner_kernel
-def leading_from(limits, trims, speed, steering, low, high, found, control, effort):
+def leading_from(
+    limits: Limits,
+    trims: Trims,
+    speed: float,
+    steering: float,
+    low: int,
+    high: int,
+    found: IntArray,
+    control: Array,
+    effort: Array,
+) -> int:
     """Trims numbered from `low` to `high` that a ramp from a state reaches; how many."""
     n, duration = 0, limits.tick * limits.ticks
     for target in range(low, high):
@@ -106,7 +128,7 @@ def leading_from(limits, trims, speed, steering, low, high, found, control, effo
 
 
 @kernel
-def maneuvers_from(limits, trims, speed, steering):
+def maneuvers_from(limits: Limits, trims: Trims, speed: float, steering: float) -> Maneuvers:
     """All maneuvers from one state, which need not be a trim."""
     most = trims.speed.shape[0]
     found = np.empty(most, dtype=np.int64)
@@ -120,7 +142,7 @@ def maneuvers_from(limits, trims, speed, steering):
 
 
 @kernel
-def maneuvers_between(limits, trims, most):
+def maneuvers_between(limits: Limits, trims: Trims, most: int) -> Maneuvers:
     """All maneuvers between trims, at most `most` of them."""
     count = trims.speed.shape[0]
     found = np.empty(most, dtype=np.int64)

@@ -3,16 +3,30 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from maneuver_automaton._compile import bare_inner_kernel, kernel
 
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array
+
 STEPS = 2  # of the quadrature in one tick: 1e-6 m off the equations after 0.5 s at 12 m/s
 
 
 @bare_inner_kernel
-def one_tick(wheelbase, tick, x, y, heading, speed, steering, acceleration, rate):
+def one_tick(
+    wheelbase: float,
+    tick: float,
+    x: float,
+    y: float,
+    heading: float,
+    speed: float,
+    steering: float,
+    acceleration: float,
+    rate: float,
+) -> tuple[float, ...]:
     """State (x, y, heading, speed, steering) a tick later, under constant controls.
 
     The heading is a quadrature of the turn rate and the position one of the heading, both by
@@ -43,7 +57,7 @@ def one_tick(wheelbase, tick, x, y, heading, speed, steering, acceleration, rate
 
 
 @kernel
-def driven(wheelbase, tick, state, controls):
+def driven(wheelbase: float, tick: float, state: Array, controls: Array) -> Array:
     """States (n + 1, 5) at the ticks under controls (n, 2), from a state (5,)."""
     states = np.empty((controls.shape[0] + 1, 5))
     states[0] = state

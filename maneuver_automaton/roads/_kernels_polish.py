@@ -8,7 +8,7 @@ follows is displaced, so it is priced, and proven free, once more, the stop afte
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,10 @@ from maneuver_automaton.roads._kernels_goals import goal_at
 from maneuver_automaton.roads._kernels_library import admitted
 from maneuver_automaton.roads._kernels_motion import one_tick
 from maneuver_automaton.roads._kernels_route import nearest_of_all
+
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array
+    from maneuver_automaton.roads._kernels_beam import Horizon
 
 GAIN = 1e-6  # share of the cost that a move has to save
 LONG = 64  # ticks of a plan from which on a pass leaves places out
@@ -43,7 +47,7 @@ class Course(NamedTuple):
 
 
 @bare_inner_kernel
-def drive_on(horizon, course, begin, lasting, most):
+def drive_on(horizon: Horizon, course: Course, begin: int, lasting: int, most: float) -> bool:
     """Drive the controls from the tick `begin` on; whether limits hold and it costs less.
 
     Costs only rise, so the drive ends where they reach `most`.
@@ -78,7 +82,7 @@ def drive_on(horizon, course, begin, lasting, most):
 
 
 @bare_inner_kernel
-def still_free(horizon, course, begin, tick):
+def still_free(horizon: Horizon, course: Course, begin: int, tick: int) -> bool:
     """Whether a course that starts at a tick is free from its tick `begin` on."""
     states = course.states
     for k in range(begin, course.controls.shape[0]):
@@ -97,7 +101,7 @@ def still_free(horizon, course, begin, tick):
 
 
 @bare_inner_kernel
-def take_over(source, course, begin):
+def take_over(source: Course, course: Course, begin: int) -> None:
     """Copy all of a course from a tick on, the state there included."""
     for k in range(begin, course.states.shape[0]):
         for i in range(5):
@@ -108,7 +112,9 @@ def take_over(source, course, begin):
 
 
 @bare_inner_kernel
-def is_better(horizon, course, trial, begin, lasting, tick):
+def is_better(
+    horizon: Horizon, course: Course, trial: Course, begin: int, lasting: int, tick: int
+) -> bool:
     """Whether a trial, its controls changed from `begin` on, is cheaper, free, and at the goal."""
     if not drive_on(horizon, trial, begin, lasting, (1.0 - GAIN) * course.cost[lasting]):
         return False
@@ -119,7 +125,15 @@ def is_better(horizon, course, trial, begin, lasting, tick):
 
 
 @bare_inner_kernel
-def try_pass(horizon, moves, course, trial, lasting, tick, number):
+def try_pass(
+    horizon: Horizon,
+    moves: Moves,
+    course: Course,
+    trial: Course,
+    lasting: int,
+    tick: int,
+    number: int,
+) -> int:
     """Try one pattern in one size along all of a plan; how many moves were made.
 
     `trial` is equal to `course` before and after.
@@ -144,7 +158,16 @@ def try_pass(horizon, moves, course, trial, lasting, tick, number):
 
 
 @kernel
-def polish(horizon, moves, state, controls, lasting, tick, first, passes):
+def polish(
+    horizon: Horizon,
+    moves: Moves,
+    state: Array,
+    controls: Array,
+    lasting: int,
+    tick: int,
+    first: int,
+    passes: int,
+) -> int:
     """Make a plan to a goal cheaper by moves, controls (m, 2) in place; how many were made.
 
     It starts from a state (5,) at a tick, and is at the goal `lasting` ticks later. Passes from

@@ -24,7 +24,7 @@ class RouteArrays(NamedTuple):
 
 
 @bare_inner_kernel
-def nearest_point(route, x, y, guess):
+def nearest_point(route: RouteArrays, x: float, y: float, guess: int) -> int:
     """Index of the point of the route that is nearest, downhill from a guess."""
     last = route.point.shape[0] - 1
     k = min(max(guess, 0), last)
@@ -40,7 +40,7 @@ def nearest_point(route, x, y, guess):
 
 
 @bare_inner_kernel
-def nearest_of_all(route, x, y):
+def nearest_of_all(route: RouteArrays, x: float, y: float) -> int:
     """Index of the point of the route that is nearest.
 
     Where the route passes a place twice, as at the end of a loop, the first time counts.
@@ -57,7 +57,7 @@ def nearest_of_all(route, x, y):
 
 
 @bare_inner_kernel
-def on_route(route, x, y, near):
+def on_route(route: RouteArrays, x: float, y: float, near: int) -> tuple[float, float]:
     """Station and offset of a place whose nearest point of the route is known."""
     c, s = route.direction[near, 0], route.direction[near, 1]
     d_x, d_y = x - route.point[near, 0], y - route.point[near, 1]

@@ -3,14 +3,30 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.roads._kernels_free import free_tick
 from maneuver_automaton.roads._kernels_motion import one_tick
 
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array
+    from maneuver_automaton.roads._kernels_beam import Horizon
+
 
 @bare_inner_kernel
-def stop_with(horizon, x, y, heading, speed, steering, share, tick, controls, begin):
+def stop_with(
+    horizon: Horizon,
+    x: float,
+    y: float,
+    heading: float,
+    speed: float,
+    steering: float,
+    share: float,
+    tick: int,
+    controls: Array,
+    begin: int,
+) -> int:
     """Try to stop from a state, steering to a share of the sharpest angle; ticks, or -1 if hit.
 
     The share is of the angle that the speed at each moment admits, and the steering follows at its
@@ -41,7 +57,18 @@ def stop_with(horizon, x, y, heading, speed, steering, share, tick, controls, be
 
 
 @bare_inner_kernel
-def first_free_stop(horizon, x, y, heading, speed, steering, tick, shares, controls, begin):
+def first_free_stop(
+    horizon: Horizon,
+    x: float,
+    y: float,
+    heading: float,
+    speed: float,
+    steering: float,
+    tick: int,
+    shares: Array,
+    controls: Array,
+    begin: int,
+) -> int:
     """Ticks of the first of the stops that is free, -1 if none is.
 
     `shares` (n,) are in the order in which stops are tried, the gentle ones first.

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
+
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import IntArray
 
 EMPTY = -1  # no key, in a set of keys
 
 
 @inlined_kernel
-def first_slot(key, mask):
+def first_slot(key: int, mask: int) -> int:
     """Row of a hash table, of `mask` + 1 rows, at which the probes for a key begin.
 
     Source: Knuth (1998), *The art of computer programming 3*, Sec. 6.4, Fibonacci hashing.
@@ -20,7 +25,7 @@ def first_slot(key, mask):
 
 
 @bare_inner_kernel
-def enter(cells, key):
+def enter(cells: IntArray, key: int) -> bool:
     """Add a key to a set of keys (n,), never full; whether it is new."""
     mask = cells.shape[0] - 1
     slot = first_slot(key, mask)

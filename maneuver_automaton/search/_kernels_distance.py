@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, kernel
+
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array, IntArray
+    from maneuver_automaton.collision.world import Field
+    from maneuver_automaton.search.distance_grid import DistanceGrid
 
 BLOCKED, SETTLED, REACHED = 1, 2, 3  # marks of a cell; 0 is one that nothing is known of
 NARROW = 4.0  # how much dearer a cell is whose middle is no place for the vehicle
@@ -14,7 +20,7 @@ QUEUED, N_SETTLED, AT_RIM = range(3)  # places in `grid.state`
 
 
 @bare_inner_kernel
-def push(keys, items, size, key, item):
+def push(keys: Array, items: IntArray, size: int, key: float, item: int) -> None:
     """Put (key, item) into a binary heap in arrays that holds `size`."""
     # The children of place k are 2 k + 1 and 2 k + 2. Parents move down until the key fits in, so
     # that it is written once; of equal keys the one that is there stays above.
@@ -29,7 +35,7 @@ def push(keys, items, size, key, item):
 
 
 @bare_inner_kernel
-def pop(keys, items, size):
+def pop(keys: Array, items: IntArray, size: int) -> int:
     """Take the least out of a binary heap that holds `size`; returns its item."""
     # The last entry is let sink from the top: the lesser child moves up until it fits in.
     top = items[0]
@@ -51,7 +57,7 @@ def pop(keys, items, size):
 
 
 @bare_inner_kernel
-def centre_clearance(grid, field, i, j):
+def centre_clearance(grid: DistanceGrid, field: Field, i: int, j: int) -> float:
     """Clearance of a point in the middle of a cell [m], negative inside a solid."""
     f_i, f_j = i * grid.stride + grid.shift_x, j * grid.stride + grid.shift_y
     if 0 <= f_i < field.distance.shape[1] and 0 <= f_j < field.distance.shape[0]:
@@ -60,7 +66,7 @@ def centre_clearance(grid, field, i, j):
 
 
 @bare_inner_kernel
-def blocked_cell(grid, field, i, j):
+def blocked_cell(grid: DistanceGrid, field: Field, i: int, j: int) -> bool:
     """Whether no reference point can be anywhere in the cell: sound."""
     # `inflation` is the body's inscribed radius less half a diagonal of the cell. No point of the
     # cell is farther than that half from its middle, so its clearance is below the radius.
@@ -68,7 +74,7 @@ def blocked_cell(grid, field, i, j):
 
 
 @bare_inner_kernel
-def distance_at(grid, field, x, y):
+def distance_at(grid: DistanceGrid, field: Field, x: float, y: float) -> float:
     """Distance [m] from the nearest seed to the cell of (x, y); inf if there is no path.
 
     Cells in whose middle the vehicle cannot be count more: an estimate, not a bound. Where a wall
@@ -136,7 +142,7 @@ def distance_at(grid, field, x, y):
 
 
 @bare_kernel
-def seed(grid, points):
+def seed(grid: DistanceGrid, points: Array) -> None:
     """Set the distance of the cells of `points` (n, 2) to 0."""
     for k in range(points.shape[0]):
         i = math.floor((points[k, 0] - grid.origin_x) / grid.cell)
@@ -153,7 +159,7 @@ def seed(grid, points):
 
 
 @kernel
-def distances(grid, field, points):
+def distances(grid: DistanceGrid, field: Field, points: Array) -> Array:
     """`distance_at` (n,) for points (n, 2)."""
     out = np.empty(points.shape[0])
     for k in range(points.shape[0]):

@@ -10,6 +10,7 @@ along a straight. That is Pontryagin's condition over the whole library and all 
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,9 +26,12 @@ from maneuver_automaton.words._kernels_times import (
     newton_feasible,
 )
 
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array, IntArray
+
 
 @inner_kernel
-def price_of_row(rows, p, trim):
+def price_of_row(rows: Array, p: Array, trim: int) -> float:
     """What the linear conditions add to the rate of a trim."""
     value = 0.0
     for r in range(rows.shape[0]):
@@ -36,7 +40,19 @@ def price_of_row(rows, p, trim):
 
 
 @inner_kernel
-def price_positions(twists, rates, rows, n_priced, word, times, n, p, values, trims, moments):
+def price_positions(
+    twists: Array,
+    rates: Array,
+    rows: Array,
+    n_priced: int,
+    word: IntArray,
+    times: Array,
+    n: int,
+    p: Array,
+    values: Array,
+    trims: IntArray,
+    moments: Array,
+) -> int:
     """Smallest reduced cost of all trims within each of the first `n` trims of a word.
 
     Fills `values`, `trims` and `moments` (the time within the trim); returns the position of the
@@ -108,7 +124,7 @@ def price_positions(twists, rates, rows, n_priced, word, times, n, p, values, tr
 
 
 @inner_kernel
-def insert_at(word, times, n, trim, position, time):
+def insert_at(word: IntArray, times: Array, n: int, trim: int, position: int, time: float) -> int:
     """Insert a trim for no time into a word, splitting what it interrupts; the new length."""
     if n == 0:
         word[0], times[0] = trim, 0.0
@@ -129,7 +145,7 @@ def insert_at(word, times, n, trim, position, time):
 
 
 @inner_kernel
-def simplify(twists, word, times, n, free_tail):
+def simplify(twists: Array, word: IntArray, times: Array, n: int, free_tail: int) -> int:
     """Drop trims of no time, merge equal neighbours, move rest to the end; the new length."""
     count = 0
     rest_time, rest = 0.0, -1
@@ -156,7 +172,17 @@ def simplify(twists, word, times, n, free_tail):
 
 
 @inner_kernel
-def solve_word(twists, rates, goal, rows, targets, word, times, n, barrier):
+def solve_word(
+    twists: Array,
+    rates: Array,
+    goal: Array,
+    rows: Array,
+    targets: Array,
+    word: IntArray,
+    times: Array,
+    n: int,
+    barrier: float,
+) -> tuple[int, float, Array]:
     """Best times of a word, in place; (status, cost, multipliers)."""
     m = targets.size
     some = np.empty((n, 4))
@@ -178,7 +204,17 @@ def solve_word(twists, rates, goal, rows, targets, word, times, n, barrier):
 
 
 @inner_kernel
-def refine(twists, rates, goal, rows, targets, word, times, n, cost):
+def refine(
+    twists: Array,
+    rates: Array,
+    goal: Array,
+    rows: Array,
+    targets: Array,
+    word: IntArray,
+    times: Array,
+    n: int,
+    cost: float,
+) -> float:
     """Bring the end back to the goal after trims of next to no time were dropped; the cost."""
     m = targets.size
     some = np.empty((n, 4))
@@ -203,7 +239,9 @@ def refine(twists, rates, goal, rows, targets, word, times, n, cost):
 
 
 @inner_kernel
-def word_multipliers(twists, rates, rows, word, times, n):
+def word_multipliers(
+    twists: Array, rates: Array, rows: Array, word: IntArray, times: Array, n: int
+) -> Array:
     """Multipliers that best explain a word's times as optimal."""
     some = np.empty((n, 4))
     some_rates = np.empty(n)
@@ -219,7 +257,17 @@ def word_multipliers(twists, rates, rows, word, times, n):
 
 
 @inner_kernel
-def lengthen(twists, goal, rows, targets, word, times, n, grown, share):
+def lengthen(
+    twists: Array,
+    goal: Array,
+    rows: Array,
+    targets: Array,
+    word: IntArray,
+    times: Array,
+    n: int,
+    grown: int,
+    share: float,
+) -> float:
     """Give the trim at position `grown` some time and let the others make room, in place.
 
     The first-order change of the times that keeps the end where it is, `share` of the way to the
@@ -263,7 +311,17 @@ def lengthen(twists, goal, rows, targets, word, times, n, grown, share):
 
 
 @kernel
-def price_word(twists, rates, rows, n_priced, word, times, first, last, p):
+def price_word(
+    twists: Array,
+    rates: Array,
+    rows: Array,
+    n_priced: int,
+    word: IntArray,
+    times: Array,
+    first: int,
+    last: int,
+    p: Array,
+) -> tuple[float, int, int, float]:
     """Smallest reduced cost of all trims at any time of a stretch: (value, trim, position, time).
 
     The stretch reaches from the trim at position `first` of the word to the one before `last`.
@@ -281,13 +339,15 @@ def price_word(twists, rates, rows, n_priced, word, times, first, last, p):
 
 
 @kernel
-def multipliers_of_word(twists, rates, rows, word, times):
+def multipliers_of_word(
+    twists: Array, rates: Array, rows: Array, word: IntArray, times: Array
+) -> Array:
     """Multipliers (3 + m,) of a plan."""
     return word_multipliers(twists, rates, rows, word, times, word.size)
 
 
 @inner_kernel
-def alternating_run(word, n, after):
+def alternating_run(word: IntArray, n: int, after: int) -> tuple[int, int]:
     """First run a b a ... of at least three at position `after` or later: (start, end)."""
     for i in range(after, n - 2):
         end = i + 2
@@ -300,8 +360,19 @@ def alternating_run(word, n, after):
 
 @inner_kernel
 def replace_runs(
-    twists, rates, goal, rows, targets, n_priced, free_tail, word, times, n, cost, most
-):
+    twists: Array,
+    rates: Array,
+    goal: Array,
+    rows: Array,
+    targets: Array,
+    n_priced: int,
+    free_tail: int,
+    word: IntArray,
+    times: Array,
+    n: int,
+    cost: float,
+    most: int,
+) -> tuple[int, float]:
     """Replace two trims that chatter by the one between them, if that is cheaper; (length, cost).
 
     Tried are the trims whose reduced cost in the middle of the run is nearest to zero.
@@ -381,7 +452,18 @@ def replace_runs(
 
 
 @inner_kernel
-def calm(twists, rates, goal, rows, targets, free_tail, word, times, n, cost):
+def calm(
+    twists: Array,
+    rates: Array,
+    goal: Array,
+    rows: Array,
+    targets: Array,
+    free_tail: int,
+    word: IntArray,
+    times: Array,
+    n: int,
+    cost: float,
+) -> tuple[int, float]:
     """Shorten runs of two trims that chatter to a b a or a b a b, at next to no cost.
 
     Where the trim between the two is missing, ever more switches gain ever less: the infimum is
@@ -430,7 +512,19 @@ def calm(twists, rates, goal, rows, targets, free_tail, word, times, n, cost):
 
 
 @kernel
-def calm_word(twists, rates, goal, rows, targets, n_priced, free_tail, word, times, n, cost):
+def calm_word(
+    twists: Array,
+    rates: Array,
+    goal: Array,
+    rows: Array,
+    targets: Array,
+    n_priced: int,
+    free_tail: int,
+    word: IntArray,
+    times: Array,
+    n: int,
+    cost: float,
+) -> tuple[int, float, float]:
     """`calm`, and the smallest reduced cost then; (length, cost, smallest reduced cost)."""
     n, cost = calm(twists, rates, goal, rows, targets, free_tail, word, times, n, cost)
     p = word_multipliers(twists, rates, rows, word, times, n)
@@ -445,8 +539,20 @@ def calm_word(twists, rates, goal, rows, targets, n_priced, free_tail, word, tim
 
 @kernel
 def improve_word(
-    twists, rates, goal, rows, targets, n_priced, free_tail, word, times, n, most, accuracy, rounds
-):
+    twists: Array,
+    rates: Array,
+    goal: Array,
+    rows: Array,
+    targets: Array,
+    n_priced: int,
+    free_tail: int,
+    word: IntArray,
+    times: Array,
+    n: int,
+    most: int,
+    accuracy: float,
+    rounds: int,
+) -> tuple[int, float, float, int]:
     """Insert what pays and solve the times again until nothing pays; `word`, `times` in place.
 
     Returns (length, cost, smallest reduced cost, rounds used). A round that gains nothing, or

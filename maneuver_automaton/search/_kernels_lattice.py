@@ -33,6 +33,7 @@ of one connection.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from maneuver_automaton._compile import (
     bare_inner_kernel,
@@ -61,6 +62,16 @@ from maneuver_automaton.words._kernels_candidates import (
     trim_and_gear,
 )
 
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import IntArray
+    from maneuver_automaton.collision.world import Field
+    from maneuver_automaton.search.cost_to_go import CostTable
+    from maneuver_automaton.search.distance_grid import DistanceGrid
+    from maneuver_automaton.search.lattice_arrays import LatticeArrays
+    from maneuver_automaton.search.lattice_memory import SearchArrays
+    from maneuver_automaton.search.lattice_task import Task
+    from maneuver_automaton.search.scene import Scene
+
 FULL_TURN = 2.0 * math.pi
 COASTED, ROOTED = -1, -2  # in place of the maneuver that leads to a node
 NODE_BITS = 0x7FFFFFFF  # of an entry of the hash table: the node; above them the search
@@ -83,7 +94,9 @@ PARENT, TRIM, GEAR, COUNT, ROOT, EDGE, CLOSED = range(7)
 
 
 @inlined_kernel
-def cell_key(task, x, y, heading, z, layer, time, fine):
+def cell_key(
+    task: Task, x: float, y: float, heading: float, z: float, layer: int, time: float, fine: int
+) -> int:
     """Number of the lattice cell a pose is in, seen from the task's own frame.
 
     `task.radix` is the number of cells along a side of the window, a power of two, of headings,
@@ -108,7 +121,7 @@ def cell_key(task, x, y, heading, z, layer, time, fine):
 
 
 @inlined_kernel
-def slot_of(table, generation, key):
+def slot_of(table: IntArray, generation: int, key: int) -> int:
     """Row of a key in the hash table, or the free one where it belongs.
 
     Rows are (key, generation and node); those of another generation are free.
@@ -122,14 +135,16 @@ def slot_of(table, generation, key):
 
 
 @inlined_kernel
-def node_in(table, generation, slot):
+def node_in(table: IntArray, generation: int, slot: int) -> int:
     """Node that a row of the hash table holds; -1 if it is free."""
     entry = table[slot, 1]
     return entry & NODE_BITS if entry >> 31 == generation else -1
 
 
 @inlined_kernel
-def table_value(table, task, aim, x, y, heading):
+def table_value(
+    table: CostTable, task: Task, aim: int, x: float, y: float, heading: float
+) -> float:
     """Cost to go to one aim from a table made without obstacles; 0 where it does not reach.
 
     `table.value` (headings, rows, columns) is the cost from a pose seen from its goal; `table.free`
@@ -158,7 +173,7 @@ def table_value(table, task, aim, x, y, heading):
 
 
 @bare_inner_kernel
-def table_to_go(table, task, x, y, heading):
+def table_to_go(table: CostTable, task: Task, x: float, y: float, heading: float) -> float:
     """Cost to go to the nearest aim by the table; 0 where it does not reach one of them."""
     least = math.inf
     for aim in range(task.aims.shape[0]):
@@ -169,7 +184,14 @@ def table_to_go(table, task, x, y, heading):
 
 
 @inlined_kernel
-def cost_to_go(task, grid, table, field, pose, trim):
+def cost_to_go(
+    task: Task,
+    grid: DistanceGrid,
+    table: CostTable,
+    field: Field,
+    pose: tuple[float, float, float, float],
+    trim: int,
+) -> float:
     """Estimate of the cost from here to the other end; inf if the plane alone forbids it.
 
     The path in the plane or the climb at the least price, or the table made without obstacles; and
@@ -196,7 +218,7 @@ def cost_to_go(task, grid, table, field, pose, trim):
 
 
 @inlined_kernel
-def layer_of(task, lib, trim, gear, n_trims):
+def layer_of(task: Task, lib: LatticeArrays, trim: int, gear: int, n_trims: int) -> int:
     """Number of a node's layer: its class, and the gear, trim and count that prices or limits need.
 
     Nodes of one pose in different layers do not replace each other.
@@ -212,7 +234,15 @@ def layer_of(task, lib, trim, gear, n_trims):
 
 
 @merged_kernel
-def connect_ends(search, task, lib, scene, node, upper_bound, estimate):
+def connect_ends(
+    search: SearchArrays,
+    task: Task,
+    lib: LatticeArrays,
+    scene: Scene,
+    node: int,
+    upper_bound: float,
+    estimate: float,
+) -> None:
     """Analytic expansion: reach the other end by a word; keeps the cheapest plan found.
 
     Only words that cost not much more than the estimate are tried. From a root all words of the
@@ -268,7 +298,9 @@ def connect_ends(search, task, lib, scene, node, upper_bound, estimate):
 
 
 @bare_inner_kernel
-def word_admitted(search, task, lib, words, node, k):
+def word_admitted(
+    search: SearchArrays, task: Task, lib: LatticeArrays, words: IntArray, node: int, k: int
+) -> bool:
     """Whether the word through a node and one candidate keeps the limits of single words.
 
     They are the number of trims, the least time of a trim that moves, and the longest of any. The
@@ -302,13 +334,21 @@ def word_admitted(search, task, lib, words, node, k):
 
 
 @inlined_kernel
-def too_short(task, lib, trim, run):
+def too_short(task: Task, lib: LatticeArrays, trim: int, run: float) -> bool:
     """Whether a trim that moves has begun, and does not yet last as long as it must."""
     return trim != NO_TRIM and 0.0 < run < task.least_coast and not is_still(lib, trim)
 
 
 @merged_kernel
-def add_node(search, weight, slot, key, row, link, estimate):
+def add_node(
+    search: SearchArrays,
+    weight: float,
+    slot: int,
+    key: int,
+    row: tuple[float, ...],
+    link: tuple[int, ...],
+    estimate: float,
+) -> None:
     """Append a node, make it the one of its cell, and push it.
 
     `row` are its columns of `nodes`, `link` those of `links` but the last.
@@ -329,7 +369,14 @@ def add_node(search, weight, slot, key, row, link, estimate):
 
 
 @bare_kernel
-def begin(search, task, lib, scene, grid, table):
+def begin(
+    search: SearchArrays,
+    task: Task,
+    lib: LatticeArrays,
+    scene: Scene,
+    grid: DistanceGrid,
+    table: CostTable,
+) -> None:
     """Push the roots of a search; what was searched before is forgotten."""
     state, found = search.state, search.found
     generation = state[GENERATION] + 1  # which frees all rows of the hash table at once
@@ -352,7 +399,7 @@ def begin(search, task, lib, scene, grid, table):
 
 
 @inlined_kernel
-def open_node(search, task, upper_bound):
+def open_node(search: SearchArrays, task: Task, upper_bound: float) -> int:
     """The most promising node that is open, taken from the heap; -1 if there is none."""
     links, state = search.links, search.state
     # Only where the task says so does a key end the search: with a weight above 1 it is no bound.
@@ -367,7 +414,16 @@ def open_node(search, task, upper_bound):
 
 
 @inlined_kernel
-def relax_coasts(search, task, lib, scene, grid, table, node, upper_bound):
+def relax_coasts(
+    search: SearchArrays,
+    task: Task,
+    lib: LatticeArrays,
+    scene: Scene,
+    grid: DistanceGrid,
+    table: CostTable,
+    node: int,
+    upper_bound: float,
+) -> None:
     """Children of a node by coasts of the trims of its class, shorter ones first.
 
     Tests come in the order of their price: limits and bound, duplicates in the cell, the estimate,
@@ -457,7 +513,16 @@ def relax_coasts(search, task, lib, scene, grid, table, node, upper_bound):
 
 
 @bare_inner_kernel
-def relax_maneuvers(search, task, lib, scene, grid, table, node, upper_bound):
+def relax_maneuvers(
+    search: SearchArrays,
+    task: Task,
+    lib: LatticeArrays,
+    scene: Scene,
+    grid: DistanceGrid,
+    table: CostTable,
+    node: int,
+    upper_bound: float,
+) -> None:
     """Children of a node by the maneuvers that lead out of its class.
 
     Coasts begin at the child, so a maneuver is an edge with a coast of no time. The order of the
@@ -505,7 +570,16 @@ def relax_maneuvers(search, task, lib, scene, grid, table, node, upper_bound):
 
 
 @bare_kernel
-def expand(search, task, lib, scene, grid, table, n, upper_bound):
+def expand(
+    search: SearchArrays,
+    task: Task,
+    lib: LatticeArrays,
+    scene: Scene,
+    grid: DistanceGrid,
+    table: CostTable,
+    n: int,
+    upper_bound: float,
+) -> int:
     """Expand up to `n` nodes; stops at the first connection if the task says so.
 
     Children that cannot lead to less than `upper_bound` are left out. Returns whether it may go on:
@@ -544,7 +618,7 @@ def expand(search, task, lib, scene, grid, table, n, upper_bound):
 
 
 @bare_kernel
-def rehash(table, generation, wide):
+def rehash(table: IntArray, generation: int, wide: IntArray) -> None:
     """Carry the entries of this generation over into a wider hash table."""
     for k in range(table.shape[0]):
         if node_in(table, generation, k) >= 0:

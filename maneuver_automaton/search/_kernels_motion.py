@@ -9,6 +9,7 @@ layer: what it calls free is free between the poses that it looks at, too.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel, merged_kernel
 from maneuver_automaton.collision._kernels_advancement import free_time
@@ -17,9 +18,19 @@ from maneuver_automaton.collision.body import Body
 from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.words._kernels_candidates import class_of
 
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array, IntArray
+    from maneuver_automaton.collision.world import WorldArrays
+    from maneuver_automaton.search.lattice_arrays import LatticeArrays
+    from maneuver_automaton.search.part_motion import BodyArrays
+    from maneuver_automaton.search.scene import Scene
+    from maneuver_automaton.words.library import Scratch
+
 
 @bare_inner_kernel
-def inside_window(window, x, y, heading, v_x, v_y, turn, t):
+def inside_window(
+    window: Array, x: float, y: float, heading: float, v_x: float, v_y: float, turn: float, t: float
+) -> bool:
     """Whether a motion stays inside [low x, low y, high x, high y], seen from the bounds' frame.
 
     `window` (9,) is those four, the frame's (x, y, cos, sin) that take a pose of the world to it,
@@ -69,7 +80,7 @@ def inside_window(window, x, y, heading, v_x, v_y, turn, t):
 
 
 @bare_inner_kernel
-def part_body(bodies, p):
+def part_body(bodies: BodyArrays, p: int) -> Body:
     """One rigid part of the vehicle, cut out of the arrays of all."""
     # The polygons of part p are those from `piece_of[p]` to `piece_of[p + 1]`, its discs those of
     # `disc_of`; `first` says where the edges of each polygon begin, and where the last ones end.
@@ -87,7 +98,18 @@ def part_body(bodies, p):
 
 
 @bare_inner_kernel
-def part_free(world, lib, p, start, twist, speed, t, keep, margin, clock):
+def part_free(
+    world: WorldArrays,
+    lib: LatticeArrays,
+    p: int,
+    start: tuple[float, float, float],
+    twist: Array,
+    speed: float,
+    t: float,
+    keep: float,
+    margin: float,
+    clock: float,
+) -> tuple[float, float]:
     """How long part `p` is free along a constant twist from its pose `start`; the last clearance.
 
     No point of the part is faster than `speed`: the proof of `free_time` rests on that.
@@ -99,7 +121,18 @@ def part_free(world, lib, p, start, twist, speed, t, keep, margin, clock):
 
 
 @bare_inner_kernel
-def part_coast(world, lib, p, trim, place, begin, t, keep, margin, clock):
+def part_coast(
+    world: WorldArrays,
+    lib: LatticeArrays,
+    p: int,
+    trim: int,
+    place: tuple[float, float, float],
+    begin: float,
+    t: float,
+    keep: float,
+    margin: float,
+    clock: float,
+) -> tuple[float, float]:
     """How long part `p` is free while the vehicle, at `place`, coasts a trim; the last clearance.
 
     The stretch that is looked at begins `begin` seconds after `place` and lasts `t`; both are
@@ -116,7 +149,16 @@ def part_coast(world, lib, p, trim, place, begin, t, keep, margin, clock):
 
 
 @bare_inner_kernel
-def part_piece(world, lib, p, k, place, keep, margin, clock):
+def part_piece(
+    world: WorldArrays,
+    lib: LatticeArrays,
+    p: int,
+    k: int,
+    place: tuple[float, float, float],
+    keep: float,
+    margin: float,
+    clock: float,
+) -> tuple[float, float]:
     """How long part `p` is free along piece `k` of a maneuver begun at `place`; the clearance."""
     x, y, heading = place
     pose, twist = lib.piece_pose[k], lib.piece_twist[k]
@@ -126,7 +168,14 @@ def part_piece(world, lib, p, k, place, keep, margin, clock):
 
 
 @inlined_kernel
-def coast_proven(scene, lib, trim, pose, t, clock):
+def coast_proven(
+    scene: Scene,
+    lib: LatticeArrays,
+    trim: int,
+    pose: tuple[float, float, float, float],
+    t: float,
+    clock: float,
+) -> tuple[float, float]:
     """How long coasting a trim from a pose (x, y, heading, z) is proven free; the last clearance.
 
     A negative `t` drives the motion backwards, and the world's clock too. The time that comes back
@@ -155,7 +204,14 @@ def coast_proven(scene, lib, trim, pose, t, clock):
 
 
 @bare_inner_kernel
-def coast_proven_everywhere(scene, lib, trim, pose, t, clock):
+def coast_proven_everywhere(
+    scene: Scene,
+    lib: LatticeArrays,
+    trim: int,
+    pose: tuple[float, float, float, float],
+    t: float,
+    clock: float,
+) -> tuple[float, float]:
     """`coast_proven` for several parts, in every layer that the altitude passes, and among zones.
 
     A layer counts while the altitude is in it, so that a climb is no cylinder.
@@ -207,7 +263,9 @@ def coast_proven_everywhere(scene, lib, trim, pose, t, clock):
 
 
 @inlined_kernel
-def coast_inside(scene, lib, trim, pose, t):
+def coast_inside(
+    scene: Scene, lib: LatticeArrays, trim: int, pose: tuple[float, float, float, float], t: float
+) -> bool:
     """Whether coasting a trim stays inside the window."""
     end = pose[3] + t * lib.library.twists[trim, 3]
     inside = min(pose[3], end) >= scene.lowest and max(pose[3], end) <= scene.highest
@@ -224,7 +282,9 @@ def coast_inside(scene, lib, trim, pose, t):
 
 
 @inlined_kernel
-def coasted(lib, trim, pose, t):
+def coasted(
+    lib: LatticeArrays, trim: int, pose: tuple[float, float, float, float], t: float
+) -> tuple[float, float, float, float]:
     """Pose (x, y, heading, z) after coasting a trim."""
     d_x, d_y, turn = coast(
         lib.library.twists[trim, 0], lib.library.twists[trim, 1], lib.library.twists[trim, 2], t
@@ -234,14 +294,28 @@ def coasted(lib, trim, pose, t):
 
 
 @inlined_kernel
-def coast_free(scene, lib, trim, pose, t, clock):
+def coast_free(
+    scene: Scene,
+    lib: LatticeArrays,
+    trim: int,
+    pose: tuple[float, float, float, float],
+    t: float,
+    clock: float,
+) -> bool:
     """Whether coasting a trim from a pose for `t` is proven free; the world's time is `clock`."""
     free, _ = coast_proven(scene, lib, trim, pose, t, clock)
     return free >= t
 
 
 @bare_inner_kernel
-def may_stay(scene, lib, trim, pose, clock, until):
+def may_stay(
+    scene: Scene,
+    lib: LatticeArrays,
+    trim: int,
+    pose: tuple[float, float, float, float],
+    clock: float,
+    until: float,
+) -> bool:
     """Whether a vehicle that stands as in `trim` from `clock` on is free until a time."""
     # Static obstacles were proven clear along the motion that ends here; without moving obstacles
     # that holds for good.
@@ -267,7 +341,13 @@ def may_stay(scene, lib, trim, pose, clock, until):
 
 
 @bare_inner_kernel
-def edge_proven(scene, lib, edge, pose, clock):
+def edge_proven(
+    scene: Scene,
+    lib: LatticeArrays,
+    edge: int,
+    pose: tuple[float, float, float, float],
+    clock: float,
+) -> float:
     """Least clearance at the end of a maneuver, -1 if it is not proven free.
 
     Each piece of its course moves by one twist. The true motion deviates from it by at most
@@ -318,7 +398,9 @@ def edge_proven(scene, lib, edge, pose, clock):
 
 
 @bare_inner_kernel
-def edge_inside(scene, lib, edge, pose):
+def edge_inside(
+    scene: Scene, lib: LatticeArrays, edge: int, pose: tuple[float, float, float, float]
+) -> bool:
     """Whether a maneuver stays inside the window."""
     x, y, heading, z = pose
     if z + lib.edge_low[edge] < scene.lowest or z + lib.edge_high[edge] > scene.highest:
@@ -335,7 +417,9 @@ def edge_inside(scene, lib, edge, pose):
 
 
 @bare_inner_kernel
-def edge_end(lib, edge, pose):
+def edge_end(
+    lib: LatticeArrays, edge: int, pose: tuple[float, float, float, float]
+) -> tuple[float, float, float, float]:
     """Pose at the end of a maneuver."""
     moved = lib.edge_displacement[edge]
     x, y, heading = compose(pose[0], pose[1], pose[2], moved[0], moved[1], moved[2])
@@ -343,14 +427,27 @@ def edge_end(lib, edge, pose):
 
 
 @bare_inner_kernel
-def edge_free(scene, lib, edge, pose, clock):
+def edge_free(
+    scene: Scene,
+    lib: LatticeArrays,
+    edge: int,
+    pose: tuple[float, float, float, float],
+    clock: float,
+) -> bool:
     """Whether a maneuver from a pose stays inside and is proven free."""
     inside = edge_inside(scene, lib, edge, pose)
     return inside and edge_proven(scene, lib, edge, pose, clock) >= 0.0
 
 
 @bare_inner_kernel
-def transition_free(scene, lib, source, target, pose, clock):
+def transition_free(
+    scene: Scene,
+    lib: LatticeArrays,
+    source: int,
+    target: int,
+    pose: tuple[float, float, float, float],
+    clock: float,
+) -> tuple[bool, tuple[float, float, float, float], float]:
     """Whether the transition between two trims is free; then the pose and time at its end."""
     at, goal = class_of(lib.library, source), class_of(lib.library, target)
     while at != goal:  # within a class the transition is the identity
@@ -364,7 +461,15 @@ def transition_free(scene, lib, source, target, pose, clock):
 
 
 @merged_kernel
-def connection_free(scene, lib, ends, word, climb, times, clock):
+def connection_free(
+    scene: Scene,
+    lib: LatticeArrays,
+    ends: tuple[tuple[float, float, float, float], int, int],
+    word: IntArray,
+    climb: int,
+    times: Array,
+    clock: float,
+) -> bool:
     """Whether a connection is free all the way: three trims, a climb, and the trim of its goal.
 
     `ends` are the pose it begins at, the trim before it, and the trim after it (-1 for any). A trim
@@ -398,7 +503,16 @@ def connection_free(scene, lib, ends, word, climb, times, clock):
 
 
 @merged_kernel
-def free_candidate(scene, lib, words, ends, n, limits, clock, scratch):
+def free_candidate(
+    scene: Scene,
+    lib: LatticeArrays,
+    words: IntArray,
+    ends: tuple[tuple[float, float, float, float], int, int],
+    n: int,
+    limits: tuple[int, float, float],
+    clock: float,
+    scratch: Scratch,
+) -> int:
     """Cheapest of `n` candidates that is proven free; -1 if none of the first few is.
 
     `ends` as in `connection_free`; `limits` are how many are tried, the cost that a candidate has
@@ -422,7 +536,7 @@ def free_candidate(scene, lib, words, ends, n, limits, clock, scratch):
 
 
 @inlined_kernel
-def is_still(lib, trim):
+def is_still(lib: LatticeArrays, trim: int) -> bool:
     """Whether a trim stands still; a rest may be as short as it likes."""
     twist = lib.library.twists[trim]
     return not (twist[0] != 0.0 or twist[1] != 0.0 or twist[2] != 0.0 or twist[3] != 0.0)

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from maneuver_automaton._compile import bare_inner_kernel, kernel
 from maneuver_automaton.search._kernels_distance import blocked_cell, pop, push
 
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array
+    from maneuver_automaton.collision.world import Field
+    from maneuver_automaton.search.distance_grid import DistanceGrid
+
 
 @bare_inner_kernel
-def open_cell(grid, field, i, j):
+def open_cell(grid: DistanceGrid, field: Field, i: int, j: int) -> bool:
     """Whether a pose may be in a cell of the grid; beyond its rim it may."""
     if not (0 <= i < grid.columns and 0 <= j < grid.rows):
         return True
@@ -19,7 +25,7 @@ def open_cell(grid, field, i, j):
 
 
 @kernel
-def corner_path(grid, field, goals, x, y):
+def corner_path(grid: DistanceGrid, field: Field, goals: Array, x: float, y: float) -> float:
     """Length [m] of the shortest octile path between the corners nearest to (x, y) and a goal.
 
     A* over corners, from the goals to the end: along an edge that an open cell touches, and across

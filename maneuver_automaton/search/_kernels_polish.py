@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
@@ -20,12 +22,18 @@ from maneuver_automaton.words._kernels_times import (
     newton_stationary,
 )
 
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array, IntArray
+    from maneuver_automaton.search._kernels_problem import Candidates, Found, Links, WordProblem
+
 NEXT = 0.01  # relative, by which the cost of a start with one time free may be off
 MOMENT = 1e-6  # of the whole time: shorter trims may be due to rounding
 
 
 @bare_inner_kernel
-def place(problem, found, word, n, times, cost):
+def place(
+    problem: WordProblem, found: Found, word: IntArray, n: int, times: Array, cost: float
+) -> None:
     """Record a solution unless the same one is there; keep the list of best costs."""
     count = found.counter[0]
     here = min(count, found.costs.size)  # there is a row more than solutions have room in
@@ -56,7 +64,9 @@ def place(problem, found, word, n, times, cost):
 
 
 @bare_inner_kernel
-def accept(problem, found, word, n, times, max_trims):
+def accept(
+    problem: WordProblem, found: Found, word: IntArray, n: int, times: Array, max_trims: int
+) -> None:
     """Check a polished solution against all limits, and record it."""
     total = 0.0
     cost = 0.0
@@ -86,7 +96,9 @@ def accept(problem, found, word, n, times, max_trims):
 
 
 @inner_kernel
-def accept_with_turns(problem, found, word, n, times, max_trims):
+def accept_with_turns(
+    problem: WordProblem, found: Found, word: IntArray, n: int, times: Array, max_trims: int
+) -> None:
     """Record a solution and, where admitted, the same with whole extra turns."""
     accept(problem, found, word, n, times, max_trims)
     if problem.more_turns == 0 or time_left(problem) == np.inf or problem.targets.size > 0:
@@ -120,7 +132,15 @@ def accept_with_turns(problem, found, word, n, times, max_trims):
 
 
 @inner_kernel
-def polish(problem, found, word, n, times, isolated, max_trims):
+def polish(
+    problem: WordProblem,
+    found: Found,
+    word: IntArray,
+    n: int,
+    times: Array,
+    isolated: int,
+    max_trims: int,
+) -> None:
     """Refine times to machine precision, check that they are locally optimal, and record them.
 
     Without linear conditions, a start with at most one time free lies next to its solution, and
@@ -160,7 +180,7 @@ def polish(problem, found, word, n, times, isolated, max_trims):
 
 
 @inner_kernel
-def is_neighbour(problem, twists, rows, n, times):
+def is_neighbour(problem: WordProblem, twists: Array, rows: Array, n: int, times: Array) -> bool:
     """Whether a solution is one with a trim less, which rounding gives a moment.
 
     Where the conditions are tangent, times wrong by the root of the rounding error meet them to
@@ -189,7 +209,9 @@ def is_neighbour(problem, twists, rows, n, times):
 
 
 @kernel
-def polish_candidates(problem, links, candidates, found, max_trims):
+def polish_candidates(
+    problem: WordProblem, links: Links, candidates: Candidates, found: Found, max_trims: int
+) -> None:
     """Polish all candidates in order, and empty their buffer."""
     linked, width = links.cost.shape[0] > 1, candidates.words.shape[1]
     seen = room_for(problem, width) if linked else problem

@@ -12,13 +12,16 @@ Source: ``D exp(xi) = exp(Ad(D) xi) D``; Solà, Deray, Atchuthan (2018), Eq. (30
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, merged_kernel
 from maneuver_automaton.groups._kernels import compose
 from maneuver_automaton.words._kernels_candidates import back_from
+
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array, IntArray
 
 PARALLEL = 1e-9  # sine of the angle between twists below which they span one line
 
@@ -99,13 +102,13 @@ class Found(NamedTuple):
 
 
 @bare_inner_kernel
-def word_extra(problem, word, n):
+def word_extra(problem: WordProblem, word: IntArray, n: int) -> float:
     """Price of the switches and transitions of a word."""
     return problem.fixed[COST] + switch_prices(problem, word, n)
 
 
 @merged_kernel
-def switch_prices(problem, word, n):
+def switch_prices(problem: WordProblem, word: IntArray, n: int) -> float:
     """Price of the switches of a word.
 
     A problem with transitions has none: a conjugated twist has no gear.
@@ -123,13 +126,15 @@ def switch_prices(problem, word, n):
 
 
 @bare_inner_kernel
-def time_left(problem):
+def time_left(problem: WordProblem) -> float:
     """What the coasting times of a word may add up to."""
     return problem.time_limit - problem.fixed[TIME]
 
 
 @bare_inner_kernel
-def write(problem, word, n, times, trims, lasting):
+def write(
+    problem: WordProblem, word: IntArray, n: int, times: Array, trims: IntArray, lasting: Array
+) -> int:
     """Fill `trims` and `lasting` with `n` rows as a word of the whole problem; its size.
 
     Rows of a word that is seen are the positions of its trims. A position that is not among them
@@ -146,7 +151,9 @@ def write(problem, word, n, times, trims, lasting):
 
 
 @bare_inner_kernel
-def propose(problem, candidates, word, n, times):
+def propose(
+    problem: WordProblem, candidates: Candidates, word: IntArray, n: int, times: Array
+) -> None:
     """Add a starting point for Newton; beyond the capacity it is counted, not kept."""
     count = candidates.counter[0]
     if count < candidates.words.shape[0]:
@@ -158,13 +165,13 @@ def propose(problem, candidates, word, n, times):
 
 
 @bare_inner_kernel
-def is_straight(problem, trim):
+def is_straight(problem: WordProblem, trim: int) -> bool:
     """Whether a trim does not turn."""
     return problem.twists[trim, 2] == 0.0
 
 
 @bare_inner_kernel
-def condition(problem, word, n, r, times):
+def condition(problem: WordProblem, word: IntArray, n: int, r: int, times: Array) -> float:
     """Left-hand side of linear condition r."""
     value = 0.0
     for i in range(n):
@@ -173,7 +180,7 @@ def condition(problem, word, n, r, times):
 
 
 @bare_inner_kernel
-def transitions_cost(links, word, n, tail):
+def transitions_cost(links: Links, word: IntArray, n: int, tail: int) -> float:
     """What the transitions of a word cost: a lower bound, since coasting costs something too.
 
     inf where one is missing, or where a trim follows itself.
@@ -191,7 +198,7 @@ def transitions_cost(links, word, n, tail):
 
 
 @inner_kernel
-def room_for(problem, n):
+def room_for(problem: WordProblem, n: int) -> WordProblem:
     """A problem of `n` rows as yet empty, in which words of so many trims are seen."""
     m = problem.targets.size
     return WordProblem(
@@ -224,7 +231,9 @@ def room_for(problem, n):
 
 
 @merged_kernel
-def look_ahead(problem, links, seen, word, n):
+def look_ahead(
+    problem: WordProblem, links: Links, seen: WordProblem, word: IntArray, n: int
+) -> None:
     """Fill in what the transitions of a word leave to its trims, which takes no pose.
 
     Most words are too dear already then.
@@ -252,7 +261,7 @@ def look_ahead(problem, links, seen, word, n):
 
 
 @merged_kernel
-def class_after(problem, links, word, n, i):
+def class_after(problem: WordProblem, links: Links, word: IntArray, n: int, i: int) -> int:
     """Class of trims that the transition before position `i` leads to; -1 for no transition.
 
     The turn of a free heading comes after the last transition, and has none after it.
@@ -265,7 +274,9 @@ def class_after(problem, links, word, n, i):
 
 
 @merged_kernel
-def look(problem, links, seen, word, n, rows):
+def look(
+    problem: WordProblem, links: Links, seen: WordProblem, word: IntArray, n: int, rows: IntArray
+) -> None:
     """Fill `seen` with a word as it looks from before its transitions, and `rows` with its rows."""
     x, y, heading, rise = 0.0, 0.0, 0.0, 0.0  # product of the displacements so far
     seen.size[0] = n
@@ -295,7 +306,7 @@ def look(problem, links, seen, word, n, rows):
 
 
 @merged_kernel
-def copy_row(problem, trim, seen, row):
+def copy_row(problem: WordProblem, trim: int, seen: WordProblem, row: int) -> None:
     """What a search knows of a trim, as a row of the problem that is seen."""
     seen.trims[row] = trim
     for k in range(4):
@@ -311,7 +322,7 @@ def copy_row(problem, trim, seen, row):
 
 
 @bare_inner_kernel
-def conjugate(twist, x, y, heading):
+def conjugate(twist: Array, x: float, y: float, heading: float) -> None:
     """See a twist from before the displacement (x, y, heading), in place: ``Ad(d) xi``."""
     c, s = math.cos(heading), math.sin(heading)
     v, u, w = twist[0], twist[1], twist[2]
@@ -320,7 +331,7 @@ def conjugate(twist, x, y, heading):
 
 
 @bare_inner_kernel
-def is_parallel(one, other):
+def is_parallel(one: Array, other: Array) -> bool:
     """Whether two twists span one line only, altitude aside."""
     size = math.sqrt(
         (one[0] * one[0] + one[1] * one[1] + one[2] * one[2])

@@ -8,6 +8,7 @@ are continuous, so a change of sign is a root.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,11 +27,17 @@ from maneuver_automaton.search._kernels_problem import (
 from maneuver_automaton.words._kernels_steering import steer, unit
 from maneuver_automaton.words._kernels_times import assign, end_and_columns
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from maneuver_automaton._arrays import Array, IntArray
+    from maneuver_automaton.search._kernels_problem import Candidates, WordProblem
+
 NONE_LEFT = 1e-9  # [m] that only rounding leaves
 
 
 @bare_inner_kernel
-def choose_triple(problem, word, n, triple):
+def choose_triple(problem: WordProblem, word: IntArray, n: int, triple: IntArray) -> bool:
     """Fill `triple` with the positions solved in closed form, the last ones that fit.
 
     False if none fit: parallel neighbours cannot both be solved for, nor three straights. Two
@@ -55,7 +62,9 @@ def choose_triple(problem, word, n, triple):
 
 
 @bare_inner_kernel
-def moved(pose, velocity, turn_rate, time):
+def moved(
+    pose: tuple[complex, float], velocity: complex, turn_rate: float, time: float
+) -> tuple[complex, float]:
     """A complex pose after coasting."""
     position, heading = pose
     half = 0.5 * turn_rate * time
@@ -64,7 +73,14 @@ def moved(pose, velocity, turn_rate, time):
 
 
 @bare_inner_kernel
-def solve_triple(steering, word, n, triple, times, out):
+def solve_triple(
+    steering: tuple[Array, Array, float, IntArray],
+    word: IntArray,
+    n: int,
+    triple: IntArray,
+    times: Array,
+    out: Array,
+) -> None:
     """Both branches (2, 3) of the times at `triple`, the other `times` being given.
 
     It takes what it needs, twists, goal, tolerance and the counter of its calls, and not the
@@ -117,7 +133,9 @@ def solve_triple(steering, word, n, triple, times, out):
 
 
 @inner_kernel
-def scratch_for(problem, word, n, n_free):
+def scratch_for(
+    problem: WordProblem, word: IntArray, n: int, n_free: int
+) -> tuple[Array, Array, Array, Array]:
     """Room for one word: branches (2, 3), columns (n, 3), gradients (1 + m, d), twists (n, 4)."""
     twists = np.empty((n, 4))
     for i in range(n):
@@ -126,7 +144,14 @@ def scratch_for(problem, word, n, n_free):
 
 
 @bare_inner_kernel
-def reduced_gradient(problem, word, triple, times, free, scratch):
+def reduced_gradient(
+    problem: WordProblem,
+    word: IntArray,
+    triple: IntArray,
+    times: Array,
+    free: IntArray,
+    scratch: tuple[Array, Array, Array, Array],
+) -> bool:
     """Fill the gradients of `scratch`: of the cost, and each linear condition, by the free times.
 
     The three solved times follow; row 0 is the cost, row 1 + r condition r. False if singular.
@@ -168,7 +193,9 @@ def reduced_gradient(problem, word, triple, times, free, scratch):
 
 
 @bare_inner_kernel
-def unwrap(problem, word, triple, reference, times):
+def unwrap(
+    problem: WordProblem, word: IntArray, triple: IntArray, reference: Array, times: Array
+) -> None:
     """Shift the solved turning times by whole turns to lie nearest to `reference`, in place."""
     for s in range(3):
         i = triple[s]
@@ -178,7 +205,16 @@ def unwrap(problem, word, triple, reference, times):
 
 
 @bare_inner_kernel
-def levels(problem, candidates, word, n, start, low, high, span):
+def levels(
+    problem: WordProblem,
+    candidates: Candidates,
+    word: IntArray,
+    n: int,
+    start: Array,
+    low: Array,
+    high: Array,
+    span: Array,
+) -> None:
     """Propose `start` for all whole turns with which the linear conditions can be met.
 
     `low` and `high` bound the times in a cell, unwrapped; `span` (m, 2) the conditions' values.
@@ -228,7 +264,17 @@ def levels(problem, candidates, word, n, start, low, high, span):
 
 
 @bare_inner_kernel
-def take_branch(problem, word, n, triple, free, branch, scratch, times, values):
+def take_branch(
+    problem: WordProblem,
+    word: IntArray,
+    n: int,
+    triple: IntArray,
+    free: IntArray,
+    branch: int,
+    scratch: tuple[Array, Array, Array, Array],
+    times: Array,
+    values: Array,
+) -> bool:
     """Fill `times` and `values` from one branch of `solve_triple`; False if it is empty.
 
     values[0] is what must vanish besides the linear conditions: the reduced gradient by the first
@@ -253,7 +299,18 @@ def take_branch(problem, word, n, triple, free, branch, scratch, times, values):
 
 
 @bare_inner_kernel
-def evaluate(problem, candidates, word, n, triple, free, times, branch, scratch, values):
+def evaluate(
+    problem: WordProblem,
+    candidates: Candidates,
+    word: IntArray,
+    n: int,
+    triple: IntArray,
+    free: IntArray,
+    times: Array,
+    branch: int,
+    scratch: tuple[Array, Array, Array, Array],
+    values: Array,
+) -> bool:
     """Solve one branch at given free times, and take it."""
     steering = (problem.twists, problem.goal, problem.tolerance, candidates.counter)
     solve_triple(steering, word, n, triple, times, scratch[0])
@@ -261,7 +318,9 @@ def evaluate(problem, candidates, word, n, triple, free, times, branch, scratch,
 
 
 @bare_inner_kernel
-def affordable(problem, word, n, trim, upper_bound):
+def affordable(
+    problem: WordProblem, word: IntArray, n: int, trim: int, upper_bound: float
+) -> float:
     """How long one trim of a word may last before it alone costs more than `upper_bound`."""
     reach = problem.reaches[trim]
     if problem.rates[trim] > 0.0:
@@ -271,14 +330,22 @@ def affordable(problem, word, n, trim, upper_bound):
 
 
 @bare_inner_kernel
-def copy_branches(target, source):
+def copy_branches(target: Array, source: Array) -> None:
     """Copy what `solve_triple` filled in."""
     for branch in range(2):
         assign(target[branch], source[branch])
 
 
 @inner_kernel
-def scan_one(problem, candidates, word, n, triple, free, upper_bound):
+def scan_one(
+    problem: WordProblem,
+    candidates: Candidates,
+    word: IntArray,
+    n: int,
+    triple: IntArray,
+    free: IntArray,
+    upper_bound: float,
+) -> None:
     """Words with one free time: roots of a scalar function along both branches."""
     q = free[0]
     m = problem.targets.size
@@ -352,7 +419,15 @@ def scan_one(problem, candidates, word, n, triple, free, upper_bound):
 
 
 @merged_kernel
-def any_node_may_do(problem, candidates, word, n, triple, room, upper_bound):
+def any_node_may_do(
+    problem: WordProblem,
+    candidates: Candidates,
+    word: IntArray,
+    n: int,
+    triple: IntArray,
+    room: tuple[Array, Array, Array],
+    upper_bound: float,
+) -> bool:
     """Whether a word with one free time may have a solution, as far as its nodes show.
 
     At one of them it costs little more than the upper bound and, where a time is to be met, at one
@@ -396,7 +471,7 @@ def any_node_may_do(problem, candidates, word, n, triple, room, upper_bound):
 
 
 @merged_kernel
-def nearly_cheap(problem, word, n, upper_bound):
+def nearly_cheap(problem: WordProblem, word: IntArray, n: int, upper_bound: float) -> float:
     """What the trims of a word may cost at a node for it to be looked at."""
     if problem.slack == np.inf:
         return np.inf
@@ -405,7 +480,7 @@ def nearly_cheap(problem, word, n, upper_bound):
 
 
 @bare_inner_kernel
-def may_be_cheap(one, other, most):
+def may_be_cheap(one: float, other: float, most: float) -> bool:
     """Whether a branch that costs `one` and `other` at two nodes may cost less between them.
 
     Less than `most`, if it falls no more than it does from one to the other. NaN where it is not at
@@ -418,7 +493,9 @@ def may_be_cheap(one, other, most):
 
 
 @merged_kernel
-def coasting_cost(problem, word, triple, free, time, solved):
+def coasting_cost(
+    problem: WordProblem, word: IntArray, triple: IntArray, free: int, time: float, solved: Array
+) -> float:
     """What the trims of a word cost: one for a given time, three for the times of a branch.
 
     A negative time, of a straight, costs as much as a positive one: so far it is from admissible.
@@ -430,7 +507,7 @@ def coasting_cost(problem, word, triple, free, time, solved):
 
 
 @merged_kernel
-def least_per_metre(problem, word, n, left_out):
+def least_per_metre(problem: WordProblem, word: IntArray, n: int, left_out: int) -> float:
     """Best price per metre among the trims of a word but one; -inf where one of them pays."""
     price = np.inf
     for i in range(n):
@@ -442,7 +519,7 @@ def least_per_metre(problem, word, n, left_out):
 
 
 @merged_kernel
-def least_after(problem, trim, time, per_metre):
+def least_after(problem: WordProblem, trim: int, time: float, per_metre: float) -> float:
     """Lower bound of what coasting costs in a word whose first trim lasts `time`.
 
     From where it ends, and the transition before it began, the rest of the word has to lead to the
@@ -459,7 +536,9 @@ def least_after(problem, trim, time, per_metre):
 
 
 @merged_kernel
-def is_met_nearby(problem, word, triple, lack, before):
+def is_met_nearby(
+    problem: WordProblem, word: IntArray, triple: IntArray, lack: float, before: float
+) -> bool:
     """Whether what a condition lacks at a node is next to nothing, or whole turns can make it up.
 
     Somewhere it lacks nothing if that changes its sign since the node `before`: NaN for none.
@@ -478,7 +557,19 @@ def is_met_nearby(problem, word, triple, lack, before):
 
 
 @inner_kernel
-def fold(problem, candidates, word, n, triple, free, edge, beyond, branch, scratch, values):
+def fold(
+    problem: WordProblem,
+    candidates: Candidates,
+    word: IntArray,
+    n: int,
+    triple: IntArray,
+    free: IntArray,
+    edge: Array,
+    beyond: float,
+    branch: int,
+    scratch: tuple[Array, Array, Array, Array],
+    values: Array,
+) -> float:
     """Move `edge` along its branch as far towards `beyond` as the branch goes; its value there."""
     q = free[0]
     trial = np.empty(edge.size)
@@ -498,7 +589,18 @@ def fold(problem, candidates, word, n, triple, free, edge, beyond, branch, scrat
 
 
 @inner_kernel
-def bisect(problem, candidates, word, n, triple, free, branch, scratch, values, stack):
+def bisect(
+    problem: WordProblem,
+    candidates: Candidates,
+    word: IntArray,
+    n: int,
+    triple: IntArray,
+    free: IntArray,
+    branch: int,
+    scratch: tuple[Array, Array, Array, Array],
+    values: Array,
+    stack: tuple[Array, Array, Array],
+) -> None:
     """Halve the interval on the stack where its bend leaves room for a root; propose the roots."""
     lows, highs, numbers = stack
     q = free[0]
@@ -569,22 +671,22 @@ def bisect(problem, candidates, word, n, triple, free, branch, scratch, values, 
 
 @bare_inner_kernel
 def secant(
-    problem,
-    candidates,
-    word,
-    n,
-    triple,
-    free,
-    branch,
-    scratch,
-    values,
-    low,
-    value_low,
-    high,
-    value_high,
-    middle,
-    span,
-):
+    problem: WordProblem,
+    candidates: Candidates,
+    word: IntArray,
+    n: int,
+    triple: IntArray,
+    free: IntArray,
+    branch: int,
+    scratch: tuple[Array, Array, Array, Array],
+    values: Array,
+    low: Array,
+    value_low: float,
+    high: Array,
+    value_high: float,
+    middle: Array,
+    span: Array,
+) -> None:
     """Narrow down where the reduced gradient rises through zero, and propose it."""
     q = free[0]
     left, right = low[q], high[q]
@@ -607,7 +709,15 @@ def secant(
 
 
 @inner_kernel
-def scan_two(problem, candidates, word, n, triple, free, upper_bound):
+def scan_two(
+    problem: WordProblem,
+    candidates: Candidates,
+    word: IntArray,
+    n: int,
+    triple: IntArray,
+    free: IntArray,
+    upper_bound: float,
+) -> None:
     """Words with two free times: cells of a grid in which both functions change sign."""
     reaches = np.empty(2)
     counts = np.empty(2, dtype=np.int64)
@@ -648,7 +758,18 @@ def scan_two(problem, candidates, word, n, triple, free, upper_bound):
 
 
 @inner_kernel
-def cell(problem, candidates, word, n, triple, there, node_times, node_values, i, j):
+def cell(
+    problem: WordProblem,
+    candidates: Candidates,
+    word: IntArray,
+    n: int,
+    triple: IntArray,
+    there: NDArray[np.bool_],
+    node_times: Array,
+    node_values: Array,
+    i: int,
+    j: int,
+) -> None:
     """Propose a start in a cell if what must vanish can vanish in it."""
     m = problem.targets.size
     first_i, first_j = -1, -1

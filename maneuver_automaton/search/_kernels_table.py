@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,11 +11,16 @@ from maneuver_automaton._compile import inlined_kernel, kernel
 from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search._kernels_distance import pop, push
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from maneuver_automaton._arrays import Array
+
 FULL_TURN = 2.0 * math.pi
 
 
 @inlined_kernel
-def cell_of(x, y, heading, cell, half, n_headings):
+def cell_of(x: float, y: float, heading: float, cell: float, half: int, n_headings: int) -> int:
     """Number of the cell of a pose, of all headings, rows and columns; -1 outside."""
     i = math.floor(x / cell + 0.5) + half
     j = math.floor(y / cell + 0.5) + half
@@ -27,7 +33,15 @@ def cell_of(x, y, heading, cell, half, n_headings):
 
 
 @kernel
-def fill_table(twists, rates, edge_durations, cell, half, n_headings, mirrored):
+def fill_table(
+    twists: Array,
+    rates: Array,
+    edge_durations: Array,
+    cell: float,
+    half: int,
+    n_headings: int,
+    mirrored: bool,
+) -> NDArray[np.float32]:
     """Cost (headings, rows, columns) from each cell to the goal in the middle; inf if not reached.
 
     Dijkstra over cells that each hold the exact pose of the cheapest path found. Where the library

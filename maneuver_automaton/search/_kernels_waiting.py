@@ -7,16 +7,29 @@ may stand there.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from maneuver_automaton._compile import bare_kernel
 from maneuver_automaton.search._kernels_motion import coast_free, coasted, may_stay
+
+if TYPE_CHECKING:
+    from maneuver_automaton.search.lattice_arrays import LatticeArrays
+    from maneuver_automaton.search.scene import Scene
+    from maneuver_automaton.search.waiting import PathArrays
 
 UNREACHED = -1
 WAITED = -2  # the vehicle has stood since the tick before
 
 
 @bare_kernel
-def earliest_arrival(lib, scene, clocks, path, rest, tick):
+def earliest_arrival(
+    lib: LatticeArrays,
+    scene: Scene,
+    clocks: tuple[float, float, float],
+    path: PathArrays,
+    rest: int,
+    tick: float,
+) -> tuple[int, int, float]:
     """Joint and tick of the last departure, and when it arrives; the joint is -1 if none does.
 
     Fills `path.before` with how each state is reached. `path.trims`, `path.durations`

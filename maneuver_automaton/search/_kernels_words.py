@@ -7,6 +7,7 @@ form, longer ones are scanned; words that cannot span the plane have closed form
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -37,12 +38,24 @@ from maneuver_automaton.search._kernels_scan import (
 from maneuver_automaton.words._kernels_steering import phase, unit
 from maneuver_automaton.words._kernels_times import least_squares
 
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array, IntArray
+    from maneuver_automaton.search._kernels_problem import Candidates, Links, WordProblem
+
 ON_THE_WAY = 1e-9  # relative: chains of transitions of one price are one
 NONE_LEFT = 1e-9  # [m, s] of a linear condition: transitions leave no more than rounding
 
 
 @bare_inner_kernel
-def closed_form_words(problem, candidates, word, n, triple, room, upper_bound):
+def closed_form_words(
+    problem: WordProblem,
+    candidates: Candidates,
+    word: IntArray,
+    n: int,
+    triple: IntArray,
+    room: tuple[Array, Array, Array],
+    upper_bound: float,
+) -> None:
     """Words of three trims: isolated solutions."""
     times, out, span = room
     steering = (problem.twists, problem.goal, problem.tolerance, candidates.counter)
@@ -66,7 +79,7 @@ def closed_form_words(problem, candidates, word, n, triple, room, upper_bound):
 
 
 @inner_kernel
-def low_rank_word(problem, candidates, word, n):
+def low_rank_word(problem: WordProblem, candidates: Candidates, word: IntArray, n: int) -> None:
     """Words that cannot reach every pose: one or two subgroups, or straights only.
 
     The goal must lie where they can go. What each subgroup contributes follows in closed form;
@@ -166,7 +179,18 @@ def low_rank_word(problem, candidates, word, n):
 
 
 @bare_inner_kernel
-def passing_words(links, seen, candidates, word, rows, n, tail, less, room, upper_bound):
+def passing_words(
+    links: Links,
+    seen: WordProblem,
+    candidates: Candidates,
+    word: IntArray,
+    rows: IntArray,
+    n: int,
+    tail: int,
+    less: IntArray,
+    room: tuple[Array, Array, Array],
+    upper_bound: float,
+) -> None:
     """Words of four trims that pass through one of them: the other three follow in closed form.
 
     Its transitions alone turn and move a vehicle on, which may be all that is wanted of a trim.
@@ -191,7 +215,7 @@ def passing_words(links, seen, candidates, word, rows, n, tail, less, room, uppe
 
 
 @merged_kernel
-def first_of_class(links, wanted):
+def first_of_class(links: Links, wanted: int) -> int:
     """The first trim of a class."""
     for trim in range(links.class_of.size):
         if links.class_of[trim] == wanted:
@@ -200,7 +224,9 @@ def first_of_class(links, wanted):
 
 
 @merged_kernel
-def promising(problem, left, word, n, upper_bound):
+def promising(
+    problem: WordProblem, left: WordProblem, word: IntArray, n: int, upper_bound: float
+) -> bool:
     """Whether a word can be cheaper than the dearest of the solutions asked for.
 
     Lower bounds that hold for any times, of what its transitions have `left` to its trims: way and
@@ -238,7 +264,15 @@ def promising(problem, left, word, n, upper_bound):
 
 
 @kernel
-def scan_words(problem, links, candidates, n, first, last, upper_bound):
+def scan_words(
+    problem: WordProblem,
+    links: Links,
+    candidates: Candidates,
+    n: int,
+    first: int,
+    last: int,
+    upper_bound: float,
+) -> int:
     """Propose starts for words of `n` trims, at most one time free, number `first` to `last`.
 
     Returns the number of the word to go on with: before `last` when the buffer is full.
@@ -279,7 +313,15 @@ def scan_words(problem, links, candidates, n, first, last, upper_bound):
 
 
 @kernel
-def scan_flat_words(problem, links, candidates, n, first, last, upper_bound):
+def scan_flat_words(
+    problem: WordProblem,
+    links: Links,
+    candidates: Candidates,
+    n: int,
+    first: int,
+    last: int,
+    upper_bound: float,
+) -> int:
     """`scan_words` for words that cannot span the plane."""
     linked = links.cost.shape[0] > 1
     seen = room_for(problem, n) if linked else problem
@@ -306,7 +348,15 @@ def scan_flat_words(problem, links, candidates, n, first, last, upper_bound):
 
 
 @kernel
-def scan_long_words(problem, links, candidates, n, first, last, upper_bound):
+def scan_long_words(
+    problem: WordProblem,
+    links: Links,
+    candidates: Candidates,
+    n: int,
+    first: int,
+    last: int,
+    upper_bound: float,
+) -> int:
     """`scan_words` for words that span and have two times free."""
     linked = links.cost.shape[0] > 1
     seen = room_for(problem, n) if linked else problem
@@ -333,7 +383,7 @@ def scan_long_words(problem, links, candidates, n, first, last, upper_bound):
 
 
 @bare_inner_kernel
-def spell(n_trims, word, n, number, tail):
+def spell(n_trims: int, word: IntArray, n: int, number: int, tail: int) -> None:
     """Fill `word` with the digits of its number, and with the turn of a free heading.
 
     It takes few arguments, as does the price of the transitions: for most words with transitions
@@ -349,7 +399,14 @@ def spell(n_trims, word, n, number, tail):
 
 
 @merged_kernel
-def prepare_word(problem, candidates, word, n, triple, upper_bound):
+def prepare_word(
+    problem: WordProblem,
+    candidates: Candidates,
+    word: IntArray,
+    n: int,
+    triple: IntArray,
+    upper_bound: float,
+) -> int:
     """Fill `triple`: 0 nothing to do, 1 a word that cannot span, 2 one that can.
 
     The word is one that is seen: whether its trims span, and what its transitions leave of the way,
@@ -367,7 +424,7 @@ def prepare_word(problem, candidates, word, n, triple, upper_bound):
 
 
 @inner_kernel
-def others(n, triple):
+def others(n: int, triple: IntArray) -> IntArray:
     """Positions of a word that are not among the three of `triple`."""
     free = np.empty(n - 3, dtype=np.int64)
     count = 0
@@ -379,7 +436,7 @@ def others(n, triple):
 
 
 @bare_inner_kernel
-def word_blocks(problem, word, n):
+def word_blocks(problem: WordProblem, word: IntArray, n: int) -> int:
     """Number of runs of parallel trims; negative where the word cannot span, 0 where it is useless.
 
     Without linear conditions two parallel neighbours are never better than one of them.

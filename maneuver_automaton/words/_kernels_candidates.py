@@ -9,6 +9,7 @@ and every word is steered from the same pose to the same pose.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,12 +17,16 @@ from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel, inner
 from maneuver_automaton.groups._kernels import coast, compose, nearest_turn
 from maneuver_automaton.words._kernels_steering import phase, steer, turn_time, two_lines, unit
 
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array, IntArray
+    from maneuver_automaton.words.library import LibraryArrays, Scratch
+
 NO_TRIM = -1
 WHOLE = 1e-9  # share of a full turn that counts as none
 
 
 @inlined_kernel
-def price_of_switch(lib, before, gear, trim):
+def price_of_switch(lib: LibraryArrays, before: int, gear: int, trim: int) -> float:
     """Price of going on with `trim` after `before`, in `gear` the last that drove."""
     price = 0.0
     if before != NO_TRIM and before != trim:
@@ -32,48 +37,50 @@ def price_of_switch(lib, before, gear, trim):
 
 
 @inlined_kernel
-def class_of(lib, trim):
+def class_of(lib: LibraryArrays, trim: int) -> int:
     """Class of a trim; of none the first, to which a kinematic vehicle's trims belong."""
     return lib.class_of[trim] if trim >= 0 else 0
 
 
 @inlined_kernel
-def displacement_of(lib, before, after):
+def displacement_of(lib: LibraryArrays, before: int, after: int) -> tuple[float, float, float]:
     """Displacement (x, y, heading) of the transition between two trims."""
     a, b = class_of(lib, before), class_of(lib, after)
     return lib.displacement[a, b, 0], lib.displacement[a, b, 1], lib.displacement[a, b, 2]
 
 
 @inlined_kernel
-def rise_of(lib, before, after):
+def rise_of(lib: LibraryArrays, before: int, after: int) -> float:
     """Altitude that the transition between two trims gains."""
     return lib.displacement[class_of(lib, before), class_of(lib, after), 3]
 
 
 @inlined_kernel
-def cost_between(lib, before, after):
+def cost_between(lib: LibraryArrays, before: int, after: int) -> float:
     """Cost of the transition between two trims; inf where there is none."""
     return lib.cost[class_of(lib, before), class_of(lib, after)]
 
 
 @inlined_kernel
-def time_between(lib, before, after):
+def time_between(lib: LibraryArrays, before: int, after: int) -> float:
     """Duration of the transition between two trims."""
     return lib.time[class_of(lib, before), class_of(lib, after)]
 
 
 @inner_kernel
-def trim_and_gear(trim, gear):
+def trim_and_gear(trim: int, gear: int) -> tuple[int, int]:
     """The trim and gear at an end of a word, as whole numbers of one type.
 
     Numbers that are known when a kernel is compiled have types of their own, and every mixture of
     them would compile `candidates` once more.
     """
-    return np.int64(trim), np.int64(gear)
+    return np.int64(trim), np.int64(gear)  # type: ignore[return-value]
 
 
 @inner_kernel
-def back_from(x, y, heading, d_x, d_y, turn):
+def back_from(
+    x: float, y: float, heading: float, d_x: float, d_y: float, turn: float
+) -> tuple[float, float, float]:
     """Pose from which the motion (d_x, d_y, turn) leads to (x, y, heading)."""
     before = heading - turn
     c, s = math.cos(before), math.sin(before)
@@ -81,20 +88,22 @@ def back_from(x, y, heading, d_x, d_y, turn):
 
 
 @inner_kernel
-def seen(x, y, heading, to_x, to_y, to_heading):
+def seen(
+    x: float, y: float, heading: float, to_x: float, to_y: float, to_heading: float
+) -> tuple[complex, float]:
     """A pose seen from another, as a displacement (complex place, heading)."""
     place = complex(to_x - x, to_y - y) * complex(math.cos(heading), -math.sin(heading))
     return place, to_heading - heading
 
 
 @inner_kernel
-def straight_time(way, velocity):
+def straight_time(way: complex, velocity: complex) -> float:
     """Time after which a straight trim is nearest to the end of `way`."""
     return (way * velocity.conjugate()).real / (velocity * velocity.conjugate()).real
 
 
 @bare_inner_kernel
-def steer_one(trim, goal, out):
+def steer_one(trim: tuple[complex, float], goal: tuple[complex, float], out: Array) -> None:
     """Fill `out` (3,) with the time of one trim that may meet `goal`; NaN if none can."""
     v, w = trim
     z, heading = goal
@@ -106,7 +115,14 @@ def steer_one(trim, goal, out):
 
 
 @bare_inner_kernel
-def steer_two(a, step, b, goal, tolerance, out):
+def steer_two(
+    a: tuple[complex, float],
+    step: tuple[complex, float],
+    b: tuple[complex, float],
+    goal: tuple[complex, float],
+    tolerance: float,
+    out: Array,
+) -> None:
     """Fill `out` (3,) with times of two trims that may meet `goal`; NaN if none can."""
     v_a, w_a = a
     d, e = step
@@ -134,7 +150,16 @@ def steer_two(a, step, b, goal, tolerance, out):
 
 
 @bare_inner_kernel
-def climb_time(lib, word, last, goal_trim, climb, start_trim, altitude, times):
+def climb_time(
+    lib: LibraryArrays,
+    word: IntArray,
+    last: int,
+    goal_trim: int,
+    climb: int,
+    start_trim: int,
+    altitude: float,
+    times: Array,
+) -> float:
     """Time of the vertical trim `climb` that ends at the altitude; 0 where the library has none.
 
     `altitude` is that of the goal above the start; without a climb it has to fit already.
@@ -153,7 +178,9 @@ def climb_time(lib, word, last, goal_trim, climb, start_trim, altitude, times):
 
 
 @bare_inner_kernel
-def before_climb(lib, end, last, climb, t):
+def before_climb(
+    lib: LibraryArrays, end: tuple[float, float, float], last: int, climb: int, t: float
+) -> tuple[float, float, float]:
     """Pose from which the transition to a climb, and the climb for `t`, lead to `end`."""
     x, y, heading = end
     if t > 0.0:
@@ -164,7 +191,7 @@ def before_climb(lib, end, last, climb, t):
 
 
 @inner_kernel
-def is_level(lib, word):
+def is_level(lib: LibraryArrays, word: IntArray) -> bool:
     """Whether no trim of a word climbs."""
     level = True
     for n in range(3):
@@ -173,7 +200,13 @@ def is_level(lib, word):
 
 
 @bare_inner_kernel
-def word_misses(lib, word, start, goal, times):
+def word_misses(
+    lib: LibraryArrays,
+    word: IntArray,
+    start: tuple[float, float, float],
+    goal: tuple[float, float, float],
+    times: Array,
+) -> float:
     """How far a word of fewer than three trims ends from the goal [m, rad], both poses folded."""
     x, y, heading = start
     before = NO_TRIM
@@ -194,20 +227,20 @@ def word_misses(lib, word, start, goal, times):
 
 
 @inner_kernel
-def motion_of(lib, trim):
+def motion_of(lib: LibraryArrays, trim: int) -> tuple[complex, float]:
     """A trim as a planar velocity and a turn rate."""
     return complex(lib.twists[trim, 0], lib.twists[trim, 1]), lib.twists[trim, 2]
 
 
 @inner_kernel
-def step_of(lib, before, trim):
+def step_of(lib: LibraryArrays, before: int, trim: int) -> tuple[complex, float]:
     """The transition between two trims as a planar displacement."""
     d_x, d_y, turn = displacement_of(lib, before, trim)
     return complex(d_x, d_y), turn
 
 
 @inner_kernel
-def way_cost(lib, way, a, b, c):
+def way_cost(lib: LibraryArrays, way: float, a: int, b: int, c: int) -> float:
     """Least cost of coasting a distance by these trims: what transitions do not make of it."""
     left, price = way, math.inf
     if a >= 0:
@@ -222,7 +255,17 @@ def way_cost(lib, way, a, b, c):
 
 
 @bare_inner_kernel
-def candidates(lib, words, n_words, start, before, goal, after, upper_bound, scratch):
+def candidates(
+    lib: LibraryArrays,
+    words: IntArray,
+    n_words: int,
+    start: tuple[float, float, float, float],
+    before: tuple[int, int],
+    goal: tuple[float, float, float, float],
+    after: tuple[int, int],
+    upper_bound: float,
+    scratch: Scratch,
+) -> int:
     """Fill `scratch` with the words that lead from one pose and trim to another; how many.
 
     The first `n_words` rows of `words` are tried. `start` and `goal` are (x, y, heading, z);
@@ -423,7 +466,16 @@ def candidates(lib, words, n_words, start, before, goal, after, upper_bound, scr
 
 
 @kernel
-def candidate_batch(lib, n_words, starts, start_trim, goals, goal_trim, upper_bound, scratch):
+def candidate_batch(
+    lib: LibraryArrays,
+    n_words: int,
+    starts: Array,
+    start_trim: int,
+    goals: Array,
+    goal_trim: int,
+    upper_bound: float,
+    scratch: Scratch,
+) -> int:
     """Candidates of each of many pairs of poses (n, 4); how many the last pair has, for timing."""
     count = 0
     for k in range(starts.shape[0]):

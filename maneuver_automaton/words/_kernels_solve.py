@@ -7,6 +7,7 @@ exact second derivatives (Nocedal, Wright, Numerical Optimization, 2nd ed., Sec.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,11 +23,14 @@ from maneuver_automaton.words._kernels_times import (
     residual,
 )
 
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array, IntArray
+
 SOLVED, FEASIBLE, FAILED = 0, 1, 2
 
 
 @inner_kernel
-def merit(rates, times, barrier, gap, weight):
+def merit(rates: Array, times: Array, barrier: float, gap: Array, weight: float) -> float:
     """Cost with a logarithmic barrier and an exact penalty."""
     value = 0.0
     for i in range(times.size):
@@ -37,7 +41,16 @@ def merit(rates, times, barrier, gap, weight):
 
 
 @inner_kernel
-def interior_point(rates, twists, goal, rows, targets, times, barrier, iterations):
+def interior_point(
+    rates: Array,
+    twists: Array,
+    goal: Array,
+    rows: Array,
+    targets: Array,
+    times: Array,
+    barrier: float,
+    iterations: int,
+) -> tuple[bool, Array]:
     """Primal-dual Newton from `times` > 0, in place; returns (converged, slack of each bound)."""
     n = times.size
     n_rows = 3 + targets.size
@@ -151,7 +164,9 @@ def interior_point(rates, twists, goal, rows, targets, times, barrier, iteration
 
 
 @inner_kernel
-def levenberg_marquardt(twists, goal, rows, targets, times, iterations):
+def levenberg_marquardt(
+    twists: Array, goal: Array, rows: Array, targets: Array, times: Array, iterations: int
+) -> float:
     """Feasible times near `times`, in place, by projected Levenberg-Marquardt; what is violated."""
     n = times.size
     n_rows = 3 + targets.size
@@ -205,7 +220,16 @@ def levenberg_marquardt(twists, goal, rows, targets, times, iterations):
 
 
 @inner_kernel
-def finish(rates, twists, goal, rows, targets, times, slack, keep):
+def finish(
+    rates: Array,
+    twists: Array,
+    goal: Array,
+    rows: Array,
+    targets: Array,
+    times: Array,
+    slack: Array,
+    keep: IntArray,
+) -> tuple[float, float, Array]:
     """Set vanishing times to zero and refine the others, in place.
 
     Returns (largest violation, largest stationarity violated, multipliers).
@@ -258,7 +282,15 @@ def finish(rates, twists, goal, rows, targets, times, slack, keep):
 
 
 @inner_kernel
-def solve_from(rates, twists, goal, rows, targets, times, barrier):
+def solve_from(
+    rates: Array,
+    twists: Array,
+    goal: Array,
+    rows: Array,
+    targets: Array,
+    times: Array,
+    barrier: float,
+) -> tuple[int, Array, float]:
     """Interior point, then refinement; `times` in place. Returns (status, multipliers, slope)."""
     n = times.size
     start = np.empty(n)
@@ -286,7 +318,15 @@ def solve_from(rates, twists, goal, rows, targets, times, barrier):
 
 
 @kernel
-def solve_times(rates, twists, goal, rows, targets, starts, best_times):
+def solve_times(
+    rates: Array,
+    twists: Array,
+    goal: Array,
+    rows: Array,
+    targets: Array,
+    starts: Array,
+    best_times: Array,
+) -> tuple[int, float, Array, float]:
     """Best of several starts (k, n), into `best_times`; returns (status, cost, multipliers, slope).
 
     Stops at the first start that is solved; later ones are restarts.

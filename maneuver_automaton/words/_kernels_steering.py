@@ -7,26 +7,30 @@ Planar motions are complex numbers: a trim is ``(velocity, turn rate)``, a displ
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from maneuver_automaton._compile import inlined_kernel, inner_kernel, kernel
 
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array, IntArray
+
 
 @inner_kernel
-def unit(angle):
+def unit(angle: float) -> complex:
     """Complex number of length one."""
     return complex(math.cos(angle), math.sin(angle))
 
 
 @inner_kernel
-def phase(z):
+def phase(z: complex) -> float:
     """Angle of a complex number."""
     return math.atan2(z.imag, z.real)
 
 
 @inner_kernel
-def turn_time(angle, turn_rate):
+def turn_time(angle: float, turn_rate: float) -> float:
     """Time in [0, one turn) that turns by `angle` modulo a full turn."""
     full = 2.0 * math.pi
     angle = math.copysign(1.0, turn_rate) * angle
@@ -35,7 +39,9 @@ def turn_time(angle, turn_rate):
 
 
 @inner_kernel
-def two_circles(a, b, d, tolerance):
+def two_circles(
+    a: complex, b: complex, d: complex, tolerance: float
+) -> tuple[float, float, float, float]:
     """Angles (alpha+, beta+, alpha-, beta-) with ``a e^{i alpha} + b e^{i beta} = d``; NaN if none.
 
     The half-angle of the triangle with sides |a|, |b|, |d|, exact near both tangencies.
@@ -63,7 +69,9 @@ def two_circles(a, b, d, tolerance):
 
 
 @inner_kernel
-def line_and_circle(point, velocity, radius, tolerance):
+def line_and_circle(
+    point: complex, velocity: complex, radius: float, tolerance: float
+) -> tuple[float, float]:
     """Times (later, earlier) at which ``|point - velocity t| = radius``; NaN if never."""
     # The foot of the perpendicular on the line, then half the chord on either side of it.
     speed = abs(velocity)
@@ -79,7 +87,9 @@ def line_and_circle(point, velocity, radius, tolerance):
 
 
 @inner_kernel
-def two_lines(point, first, second, tolerance):
+def two_lines(
+    point: complex, first: complex, second: complex, tolerance: float
+) -> tuple[float, float]:
     """Times (s, t) with ``first s + second t = point``; NaN if the two are parallel."""
     area = (first.conjugate() * second).imag
     if abs(area) <= tolerance * abs(first) * abs(second):
@@ -88,7 +98,16 @@ def two_lines(point, first, second, tolerance):
 
 
 @inlined_kernel
-def steer(a, gap_ab, b, gap_bc, c, goal, tolerance, out):
+def steer(
+    a: tuple[complex, float],
+    gap_ab: tuple[complex, float],
+    b: tuple[complex, float],
+    gap_bc: tuple[complex, float],
+    c: tuple[complex, float],
+    goal: tuple[complex, float],
+    tolerance: float,
+    out: Array,
+) -> None:
     """Fill `out` (2, 3) with the coasting times that carry the identity to `goal`, NaN where none.
 
     Row 0 and row 1 are two branches, each continuous in all arguments. Turning times lie in
@@ -196,7 +215,9 @@ def steer(a, gap_ab, b, gap_bc, c, goal, tolerance, out):
 
 
 @kernel
-def steer_batch(twists, triples, gaps, goals, tolerance):
+def steer_batch(
+    twists: Array, triples: IntArray, gaps: Array, goals: Array, tolerance: float
+) -> Array:
     """Both branches (k, 2, 3) of `steer`: k rows of trims, gaps (k, 2, 3), goals (k, 3)."""
     k = triples.shape[0]
     times = np.empty((k, 2, 3))

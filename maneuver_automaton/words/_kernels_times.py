@@ -9,22 +9,26 @@ the goal as seen from before all maneuvers (see `switching_times.conjugated`). L
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from maneuver_automaton._compile import inner_kernel
 from maneuver_automaton.groups._kernels import coast, compose, nearest_turn
 
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array
+
 
 @inner_kernel
-def assign(target, source):
+def assign(target: Array, source: Array) -> None:
     """``target[:] = source`` in one dimension, as a loop: quicker to compile."""
     for i in range(target.size):
         target[i] = source[i]
 
 
 @inner_kernel
-def end_and_columns(twists, times, columns):
+def end_and_columns(twists: Array, times: Array, columns: Array) -> tuple[float, float, float]:
     """End pose (x, y, heading) of a word; fills `columns` (n, 3) with its derivatives by the times.
 
     A trim that lasts longer turns all that follows about its own instantaneous centre:
@@ -49,7 +53,7 @@ def end_and_columns(twists, times, columns):
 
 
 @inner_kernel
-def lagrangian_hessian(columns, p_x, p_y, hessian):
+def lagrangian_hessian(columns: Array, p_x: float, p_y: float, hessian: Array) -> None:
     """Fill `hessian` (n, n) with second derivatives of ``p . end position`` by the times.
 
     For i <= j it is ``w_i (p x column_j)``: the earlier trim turns the later one's column.
@@ -63,7 +67,7 @@ def lagrangian_hessian(columns, p_x, p_y, hessian):
 
 
 @inner_kernel
-def least_squares(matrix, rhs, relative_tolerance):
+def least_squares(matrix: Array, rhs: Array, relative_tolerance: float) -> tuple[Array, int]:
     """Basic least-squares solution of ``matrix x = rhs`` and the rank; both arguments are spoilt.
 
     Householder QR with column pivoting (Golub, Van Loan, Matrix Computations, Alg. 5.4.1).
@@ -127,7 +131,15 @@ def least_squares(matrix, rhs, relative_tolerance):
 
 
 @inner_kernel
-def residual(twists, times, goal, rows, targets, columns, out):
+def residual(
+    twists: Array,
+    times: Array,
+    goal: Array,
+    rows: Array,
+    targets: Array,
+    columns: Array,
+    out: Array,
+) -> float:
     """Fill `out` (3 + m,) with end minus goal and the linear conditions; returns its largest entry.
 
     The heading is compared modulo a full turn.
@@ -148,7 +160,7 @@ def residual(twists, times, goal, rows, targets, columns, out):
 
 
 @inner_kernel
-def jacobian(columns, rows):
+def jacobian(columns: Array, rows: Array) -> Array:
     """Derivatives (3 + m, n) of all conditions by the times."""
     n = columns.shape[0]
     matrix = np.empty((3 + rows.shape[0], n))
@@ -162,7 +174,7 @@ def jacobian(columns, rows):
 
 
 @inner_kernel
-def multipliers(matrix, rates):
+def multipliers(matrix: Array, rates: Array) -> Array:
     """Multipliers (3 + m,) that best make ``rates + matrix^T multipliers`` vanish."""
     m, n = matrix.shape
     transposed = np.empty((n, m))
@@ -175,7 +187,15 @@ def multipliers(matrix, rates):
 
 
 @inner_kernel
-def newton_stationary(rates, twists, goal, rows, targets, times, iterations):
+def newton_stationary(
+    rates: Array,
+    twists: Array,
+    goal: Array,
+    rows: Array,
+    targets: Array,
+    times: Array,
+    iterations: int,
+) -> tuple[Array, float, float]:
     """Newton on ``rates + J^T p = 0, conditions = 0`` without bounds, from `times`, in place.
 
     Returns the multipliers (3 + m,), the largest condition violated and the largest
@@ -228,7 +248,9 @@ def newton_stationary(rates, twists, goal, rows, targets, times, iterations):
 
 
 @inner_kernel
-def newton_feasible(twists, goal, rows, targets, times, iterations):
+def newton_feasible(
+    twists: Array, goal: Array, rows: Array, targets: Array, times: Array, iterations: int
+) -> float:
     """Gauss-Newton on the conditions alone, from `times`, in place; the largest one violated."""
     n = times.size
     columns = np.empty((n, 3))
@@ -257,7 +279,9 @@ def newton_feasible(twists, goal, rows, targets, times, iterations):
 
 
 @inner_kernel
-def curvature(rates, twists, goal, rows, targets, times, p):
+def curvature(
+    rates: Array, twists: Array, goal: Array, rows: Array, targets: Array, times: Array, p: Array
+) -> float:
     """Smallest pivot of the Lagrangian's Hessian on the null space of the conditions.
 
     Positive: no small feasible change of the times is cheaper. `inf` where nothing can change.
@@ -294,7 +318,7 @@ def curvature(rates, twists, goal, rows, targets, times, p):
 
 
 @inner_kernel
-def null_space(matrix):
+def null_space(matrix: Array) -> Array:
     """Basis (n, n - rank) of what `matrix` (m, n) maps to zero; Gauss-Jordan, full pivoting."""
     m, n = matrix.shape
     work = np.empty((m, n))
