@@ -8,6 +8,7 @@ so slowly throughout.
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -29,6 +30,8 @@ from maneuver_automaton.planning.polishing import (
 )
 from maneuver_automaton.planning.result import Answer
 from maneuver_automaton.planning.workspace import Workspace
+from maneuver_automaton.primitives import Trim
+from maneuver_automaton.primitives.turning import HEADING_TOLERANCE
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.admission import piece_is_admitted
 from maneuver_automaton.search.budget import Budget
@@ -94,6 +97,15 @@ def coasts_through(problem: Problem, known: Plan) -> list[Plan]:
     return coasts
 
 
+def _has_heading(problem: Problem, trim: Trim, heading: float) -> bool:
+    """Whether the vehicle may be in a trim at a heading [rad]: where headings belong to trims."""
+    model = problem.automaton.translated
+    if model is None:
+        return True
+    off = math.remainder(heading - model.heading(trim.reduced_state), 2.0 * math.pi)
+    return abs(off) <= HEADING_TOLERANCE
+
+
 def _coast(problem: Problem, zones: list[Zone], begin: Array, end: Array) -> Plan | None:
     """A coast through zones from a pose, in the trim that leads most nearly to another pose."""
     group = problem.automaton.model.group
@@ -102,7 +114,9 @@ def _coast(problem: Problem, zones: list[Zone], begin: Array, end: Array) -> Pla
     trims = [
         trim
         for trim in problem.automaton.trims
-        if trim.body_velocity[:2].any() and all(piece_is_admitted(zone, trim) for zone in zones)
+        if trim.body_velocity[:2].any()
+        and all(piece_is_admitted(zone, trim) for zone in zones)
+        and _has_heading(problem, trim, float(begin[2]))
     ]
     if not trims or not chord > 0.0:
         return None

@@ -14,7 +14,13 @@ from dataclasses import replace
 import numpy as np
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.planning.tracking import Tracked, clearance_at, stands_free, track
+from maneuver_automaton.planning.tracking import (
+    LITTLE,
+    Tracked,
+    clearance_at,
+    stands_free,
+    track,
+)
 from maneuver_automaton.problem import Bounds, Horizon, Problem, moves
 from maneuver_automaton.receding_horizon.candidates import Candidate, allowed
 from maneuver_automaton.receding_horizon.failsafe import predicted
@@ -22,12 +28,14 @@ from maneuver_automaton.receding_horizon.log import Deed, Origin
 from maneuver_automaton.receding_horizon.mitigation import Mitigation, mitigate
 from maneuver_automaton.receding_horizon.shifting import moves_on
 from maneuver_automaton.receding_horizon.situation import Situation
+from maneuver_automaton.refinement.improve import Patience
 from maneuver_automaton.search.inside import outside
 from maneuver_automaton.search.limits import closed_bound
 
 SEARCHING = 0.6  # share of a step's budget after which no plan to the goal is searched
 LATE = 0.8  # after which no path to the goal is; the rest is for a fail-safe trajectory
 MOST_EXPANSIONS = 4_000  # of such a search, among moving obstacles
+ANEW = Patience(attempts=8_000, passes=6)  # where there is no plan to go on from
 MOMENT = 1e-9  # [s]
 SHARES = (1.0, 0.5, 0.25)  # of a step that a path to the goal is followed before it is left
 
@@ -71,8 +79,15 @@ class AmongObstacles:
         self, problem: Problem, known: Plan | None = None, *, share: float = SEARCHING
     ) -> Tracked:
         left = self.now.began + share * self.settings.time_limit - time.monotonic()
-        most = MOST_EXPANSIONS if self.here.moves else None
-        return track(problem, time_limit=max(left, 1e-6), known=known, max_expansions=most)
+        moving = self.here.moves
+        return track(
+            problem,
+            time_limit=max(left, 1e-6),
+            known=known,
+            max_expansions=MOST_EXPANSIONS if moving else None,
+            # a first plan decides on which side what moves is passed
+            patience=ANEW if moving and known is None else LITTLE,
+        )
 
     def _candidate(self, found: Tracked) -> Candidate | None:
         """The plan found; it is proven free, but among moving obstacles its end may not stay so."""

@@ -15,6 +15,7 @@ from maneuver_automaton.primitives import Trajectory
 from maneuver_automaton.primitives.driving import drive, drive_all
 
 STEPS = 5  # of Newton's method
+DIVERGED = 100.0  # times the least miss so far
 EXACT = 1e-13  # [m, rad, units of z], over the size of the motion, at which it is over
 PROBE = 1e-5  # of central differences, in units of each variable
 INSIDE = 1e-12  # limits may be exceeded by rounding
@@ -79,6 +80,8 @@ def closed(
         last = np.concatenate([course.pose[-1], course.reduced_state[-1]])
         miss = aim - last[wanted]
         error = float(np.abs(miss).max(initial=0.0))
+        if best is not None and error > DIVERGED * best.error:
+            break  # no step comes back from there, and to follow such motions may take minutes
         if best is None or error < best.error:
             best = Closed(control=u, durations=h, course=course, error=error)
         if error <= EXACT * max(1.0, float(np.abs(course.pose).max())):

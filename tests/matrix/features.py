@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 
@@ -1157,9 +1158,9 @@ def resume_among_obstacles(vehicle: Vehicle, engine: Engine) -> None:
 
 
 def _unpolished(problem: Problem, **options: Any) -> PlanResult:
-    """A planner that takes obstacles for such with heights, which are not polished around."""
-    solid = [replace(one, height=(-1e3, 1e3)) for one in problem.obstacles]  # type: ignore[type-var]
-    return plan(replace(problem, obstacles=solid), **options)
+    """A planner that leaves what it finds as it is."""
+    with patch("maneuver_automaton.planning.in_steps.polish_found", lambda *_: None):
+        return plan(problem, **options)
 
 
 @feature(
