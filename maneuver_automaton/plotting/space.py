@@ -97,7 +97,12 @@ def draw_space(ax: Axes3D, result: PlanResult) -> SpaceArtists:
         inner.append(color)
         rims.append((*color, 1.0))
     collection = Poly3DCollection(
-        faces, facecolors=inner, edgecolors=rims, linewidths=RIM, zsort="average", clip_on=False
+        _as_long_as_the_longest(faces),
+        facecolors=inner,
+        edgecolors=rims,
+        linewidths=RIM,
+        zsort="average",
+        clip_on=False,
     )
     if faces:
         ax.add_collection3d(collection)
@@ -239,6 +244,16 @@ def _ribbon(places: Array, width: float) -> Array:
     length = float(np.linalg.norm(aside))
     aside = 0.5 * width * aside / length if length > 0.0 else np.zeros(3)
     return np.array([places[0] - aside, places[1] - aside, places[1] + aside, places[0] + aside])
+
+
+def _as_long_as_the_longest(faces: list[Array]) -> list[Array]:
+    """Faces (k, 3) with as many corners each; a shorter one stays in its last corner.
+
+    Matplotlib fills shorter ones up with what its memory held, and takes that for corners when it
+    looks for the limits of the axes.
+    """
+    longest = max((len(face) for face in faces), default=0)
+    return [np.pad(face, ((0, longest - len(face)), (0, 0)), mode="edge") for face in faces]
 
 
 def _prism(obstacle: Obstacle, bottom: float, top: float) -> list[tuple[Array, float]]:

@@ -1,10 +1,12 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d import art3d
 
 from maneuver_automaton.automaton.stock import load_stock_library
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Polygon
@@ -36,6 +38,13 @@ def flight(obstacles=TOWN, plan=None):
 def test_flights_are_written(obstacles, tmp_path):
     save_space_figure(flight(obstacles), tmp_path / "plan_3d.png")
     assert_picture(tmp_path / "plan_3d.png")
+
+
+def test_what_memory_held_is_no_corner(monkeypatch, tmp_path):
+    """Roofs have more corners than walls, and memory that nobody wrote may hold any number."""
+    held = {**vars(np), "empty": lambda shape: np.resize([-1e308, 1e308], shape)}
+    monkeypatch.setattr(art3d, "np", SimpleNamespace(**held))
+    save_space_figure(flight(), tmp_path / "plan_3d.png")
 
 
 def test_a_flight_without_a_plan_is_written(tmp_path):
