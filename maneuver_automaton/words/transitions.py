@@ -65,32 +65,31 @@ def transitions_of(automaton: Automaton, prices: Array) -> Transitions:
     targets = np.array([automaton.index_of(one.target) for one in automaton.maneuvers], dtype=int)
     class_of = automaton.trim_classes
     n = int(class_of.max()) + 1
-    before = _predecessors(n, class_of[sources], class_of[targets], prices)
+    first = _firsts(n, class_of[sources], class_of[targets], prices)
     gained, lasting = np.zeros((len(prices), 4)), np.zeros(len(prices))
     for k, maneuver in enumerate(automaton.maneuvers):
         gained[k, : maneuver.displacement.size] = maneuver.displacement
         lasting[k] = maneuver.duration
-    first = np.full((n, n), SWITCH)
     cost, time, displacement = np.full((n, n), np.inf), np.zeros((n, n)), np.zeros((n, n, 4))
     np.fill_diagonal(cost, 0.0)
-    # A chain is known once the chain to its last but one class is: short chains come first.
-    rows, columns = np.nonzero(before >= 0)
+    # A chain is its first maneuver and the chain from there on, which is how it is followed: of
+    # equally cheap chains that lead elsewhere, both are the same one. Short chains come first.
+    rows, columns = np.nonzero(first >= 0)
     while rows.size:
-        last = before[rows, columns]
-        middle = class_of[sources[last]]
-        known = np.isfinite(cost[rows, middle])
-        i, j, k, via = rows[known], columns[known], last[known], middle[known]
-        first[i, j] = np.where(i == via, k, first[i, via])
-        cost[i, j] = cost[i, via] + prices[k]
-        time[i, j] = time[i, via] + lasting[k]
-        displacement[i, j] = _composed(displacement[i, via], gained[k])
+        begin = first[rows, columns]
+        middle = class_of[targets[begin]]
+        known = np.isfinite(cost[middle, columns])
+        i, j, k, via = rows[known], columns[known], begin[known], middle[known]
+        cost[i, j] = prices[k] + cost[via, j]
+        time[i, j] = lasting[k] + time[via, j]
+        displacement[i, j] = _composed(gained[k], displacement[via, j])
         rows, columns = rows[~known], columns[~known]
     return Transitions(
         class_of=class_of,
         displacement=displacement,
         cost=cost,
         time=time,
-        first=np.asarray(first, dtype=np.int64),
+        first=first,
         sources=np.asarray(sources, dtype=np.int64),
         targets=np.asarray(targets, dtype=np.int64),
     )
@@ -118,8 +117,8 @@ def identities(automaton: Automaton) -> Transitions:
     )
 
 
-def _predecessors(n: int, sources: IntArray, targets: IntArray, prices: Array) -> IntArray:
-    """Last maneuver (n, n) of the cheapest chain from class to class; -1 for none."""
+def _firsts(n: int, sources: IntArray, targets: IntArray, prices: Array) -> IntArray:
+    """First maneuver (n, n) of the cheapest chain from class to class; -1 for none."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import dijkstra
 
@@ -136,9 +135,10 @@ def _predecessors(n: int, sources: IntArray, targets: IntArray, prices: Array) -
     graph = csr_array((weights[direct], (sources[direct], targets[direct])), shape=(n, n))
     edge = np.full((n, n), -1)
     edge[sources[direct], targets[direct]] = direct
-    _, before = dijkstra(graph, return_predecessors=True)
-    rows, columns = np.nonzero(before >= 0)
-    best[rows, columns] = edge[before[rows, columns], columns]
+    # Against the edges, from each class: what is before a class there is after it on the way back.
+    _, after = dijkstra(graph.T.tocsr(), return_predecessors=True)
+    rows, columns = np.nonzero(after.T >= 0)
+    best[rows, columns] = edge[rows, after.T[rows, columns]]
     return best
 
 

@@ -9,11 +9,7 @@ from tests.matrix.vehicles import VEHICLES
 
 # Reason, then features and the vehicles for which they do not work; a cell that begins to work
 # fails until it is taken out.
-FAULTS: dict[str, dict[str, str]] = {
-    "every plan found is refused: it does not end at the goal": {
-        "moving_obstacles": "second_order_car",
-    },
-}
+FAULTS: dict[str, dict[str, str]] = {}
 GROUPS = {
     "all": list(VEHICLES),
     "inertia": [name for name, vehicle in VEHICLES.items() if vehicle.inertia],

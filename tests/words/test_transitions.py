@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
+import operator
 
 import networkx
 import numpy as np
@@ -99,11 +101,36 @@ def test_chains_cost_what_networkx_says_and_lead_where_their_maneuvers_do():
             assert known.displacement[pair][:3] == pytest.approx(pose.pose, abs=1e-12)
 
 
-def test_of_equally_cheap_chains_the_shorter_one():
+def test_of_equally_cheap_chains_the_one_that_is_followed_is_the_one_that_is_composed():
+    """From the middle of a chain, and from its begin, others of the same cost might be cheapest."""
+    rng = np.random.default_rng(3)
+    kinds = range(14)
     trims = tuple(
-        Trim(name=f"t{k}", body_velocity=[float(k), 0, 0], control=[0, 0], reduced_state=[float(k)])
-        for k in range(3)
+        Trim(name=f"{k}", body_velocity=[1.0 + k, 0, 0], control=[0, 0], reduced_state=[float(k)])
+        for k in kinds
     )
-    maneuvers = (stop("t0", "t1"), stop("t1", "t2"), stop("t0", "t2", turn=0.1))
-    known = transitions_of(Automaton(model_of_kinds(), trims, maneuvers), np.array([1.0, 1.0, 2.0]))
-    assert known.chain(0, 2) == ((2, 2),)
+    pairs = [pair for pair in itertools.permutations(kinds, 2) if rng.random() < 0.25]
+    prices = rng.integers(1, 4, len(pairs)) * 0.1
+    moves = rng.uniform(-1.0, 1.0, (len(pairs), 3))
+    maneuvers = tuple(
+        Maneuver(name=f"{a}-{b}", source=f"{a}", target=f"{b}", displacement=move, duration=price)
+        for (a, b), price, move in zip(pairs, prices, moves, strict=True)
+    )
+    known = transitions_of(Automaton(model_of_kinds(), trims, maneuvers), prices)
+    for a, b in pairs_of(kinds, known):
+        chain = [maneuver for maneuver, _ in known.chain(a, b)]
+        pose = functools.reduce(operator.matmul, [SE2(moves[k]) for k in chain])
+        at = (known.class_of[a], known.class_of[b])
+        assert known.cost[at] == pytest.approx(prices[chain].sum())
+        np.testing.assert_allclose(known.displacement[at][:3], pose.pose, atol=1e-12)
+
+
+def pairs_of(kinds, known):
+    """Trims between which a chain leads."""
+    linked_pairs = [
+        (a, b)
+        for a, b in itertools.permutations(kinds, 2)
+        if np.isfinite(known.cost[known.class_of[a], known.class_of[b]])
+    ]
+    assert len(linked_pairs) > 100
+    return linked_pairs
