@@ -40,7 +40,9 @@ def moved(obstacles, by: SE2):
 
 
 @kernel
-def _free_times_and_gaps(world, body, poses, twists, speeds, durations, keep, margin, clocks, out):
+def _free_times_and_clearances(
+    world, body, poses, twists, speeds, durations, keep, margin, clocks, out
+):
     for k in range(durations.shape[0]):
         out[k, 0], out[k, 1] = free_time(
             world,
@@ -59,7 +61,9 @@ def _free_times_and_gaps(world, body, poses, twists, speeds, durations, keep, ma
         )
 
 
-def free_times_and_gaps(world: World, poses, twists, durations, *, margin, keep=0.0, times=0.0):
+def free_times_and_clearances(
+    world: World, poses, twists, durations, *, margin, keep=0.0, times=0.0
+):
     """What `free_time` returns (k, 2): proven time, and a bound of the last clearance."""
     twists = np.array(twists, dtype=np.float64)
     n = len(twists)
@@ -67,7 +71,7 @@ def free_times_and_gaps(world: World, poses, twists, durations, *, margin, keep=
     durations = np.array(np.broadcast_to(np.asarray(durations, dtype=np.float64), n))
     clocks = np.array(np.broadcast_to(np.asarray(times, dtype=np.float64), n))
     speeds = fastest_points(world.body, twists)
-    _free_times_and_gaps(world.arrays, world.body, np.array(poses), twists, speeds, durations,
+    _free_times_and_clearances(world.arrays, world.body, np.array(poses), twists, speeds, durations,
                          keep, margin, clocks, out)  # fmt: skip
     return out
 

@@ -187,7 +187,7 @@ def random_scene(seed: int) -> Problem:
     )
 
 
-def moving_scene(seed: int, *, movers: int = 12, side: float = 20.0) -> Problem:
+def moving_scene(seed: int, *, moving: int = 12, side: float = 20.0) -> Problem:
     """A robot, a disc of 0.3 m, crosses a square area that others cross too, for 60 s at most.
 
     Discs and boxes, straight at one speed, on a broken line, or to and fro; up to four boxes stand
@@ -205,12 +205,12 @@ def moving_scene(seed: int, *, movers: int = 12, side: float = 20.0) -> Problem:
             rng.uniform(-math.pi, math.pi),
         ]
         goal = [rng.uniform(side - 3.0, side - 1.0), rng.uniform(1.0, side - 1.0), 0.0]
-        moving = [_mover(rng, side) for _ in range(movers)]
+        traffic = [_moving_obstacle(rng, side) for _ in range(moving)]
         problem = Problem(
             automaton,
             start,
             Goal(pose=goal, free_heading=True),
-            obstacles=[*still, *moving],
+            obstacles=[*still, *traffic],
             footprint=robot,
             bounds=bounds,
         )
@@ -410,7 +410,7 @@ def _goal_walled_in(rng: np.random.Generator) -> Problem:
     return Problem(reeds_shepp(), start, goal, obstacles=court, footprint=CAR_BODY)
 
 
-def _mover(rng: np.random.Generator, side: float) -> Obstacle:
+def _moving_obstacle(rng: np.random.Generator, side: float) -> Obstacle:
     """Crosses the area, there and then gone, or goes to and fro for a minute."""
     shape: Shape = Disc(float(rng.uniform(0.2, 0.7)))
     if rng.random() < 0.5:

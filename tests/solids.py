@@ -84,7 +84,7 @@ class World:
                 solids += list(shapely.polygons(map_boxes(cells) - self.origin))
         self.tree = shapely.STRtree(solids)
         self.discs = [(shape.at(here)[0], shape.radius) for shape in shapes if shape.radius]
-        self.movers = [
+        self.moving = [
             (Rounded.of(obstacle.shape), obstacle.motion)
             for obstacle in problem.obstacles
             if isinstance(obstacle, Obstacle) and obstacle.motion is not None
@@ -93,30 +93,30 @@ class World:
     def clearance(self, poses: np.ndarray, times: np.ndarray | None = None) -> np.ndarray:
         """Distance (n,) [m] of the body at `poses` (n, 3), relative to the origin, from all else.
 
-        At most 0 where they touch or overlap, inf where there is nothing; movers stand where they
-        are at `times` (n,) [s].
+        At most 0 where they touch or overlap, inf where there is nothing; moving obstacles are
+        where they are at `times` (n,) [s].
         """
         least = np.full(len(poses), np.inf)
         for part in self.parts:
             bodies = part.at(poses)
-            gaps = [shapely.distance(bodies, center) - radius for center, radius in self.discs]
+            distances = [shapely.distance(bodies, center) - radius for center, radius in self.discs]
             if len(self.tree):
-                gaps.append(self._nearest(bodies))
+                distances.append(self._nearest(bodies))
             if times is not None:
-                for shape, motion in self.movers:
+                for shape, motion in self.moving:
                     placed = motion.at(times) - np.append(self.origin, 0.0)
-                    gaps.append(shapely.distance(bodies, shape.at(placed)) - shape.radius)
-            for gap in gaps:
-                least = np.minimum(least, gap - part.radius)
+                    distances.append(shapely.distance(bodies, shape.at(placed)) - shape.radius)
+            for distance in distances:
+                least = np.minimum(least, distance - part.radius)
         return least
 
     def _nearest(self, bodies: np.ndarray) -> np.ndarray:
         (rows, _), distances = self.tree.query_nearest(
             bodies, return_distance=True, all_matches=False
         )
-        gaps = np.full(len(bodies), np.inf)
-        gaps[rows] = distances
-        return gaps
+        every = np.full(len(bodies), np.inf)
+        every[rows] = distances
+        return every
 
 
 def clearance_at(problem: Problem, pose: Sequence[float] | np.ndarray) -> float:

@@ -77,16 +77,16 @@ def test_moving_scenes_start_free():
 
 def test_degenerate_scenes_are_degenerate():
     by_kind = [scenes.random_scene(9 + 10 * kind) for kind in range(9)]
-    gaps = [clearance_at(problem, problem.start) for problem in by_kind]
+    clearances = [clearance_at(problem, problem.start) for problem in by_kind]
     at_goal = [clearance_at(problem, problem.goals[0].pose) for problem in by_kind]
     assert by_kind[0].obstacles == ()
     assert np.array_equal(by_kind[1].start, by_kind[1].goals[0].pose)
-    assert gaps[2] <= 0.0
+    assert clearances[2] <= 0.0
     assert at_goal[2] <= 0.0
     assert by_kind[4].start[0] > 9e8
-    assert gaps[5] == 0.0
+    assert clearances[5] == 0.0
     assert at_goal[6] == 0.0
-    assert gaps[7] > 0.0
+    assert clearances[7] > 0.0
     assert at_goal[8] > 0.0
 
 
@@ -130,16 +130,16 @@ def test_solids_are_solid():
     court = Polygon(5.0 * ring, [3.0 * ring])
     robot = scenes.differential_robot()
 
-    def gap(place, body, obstacle):
+    def clearance(place, body, obstacle):
         problem = Problem(robot, [0, 0, 0], [0, 0, 0], obstacles=obstacle, footprint=body)
         return clearance_at(problem, [*place, 0.0])
 
-    assert gap([0, 0], Disc(1.0), court) == pytest.approx(2.0)
-    assert gap([4, 0], Disc(0.1), court) < 0.0
-    assert gap([0, 0], Polygon(9.0 * ring), court) <= 0.0
-    assert gap([0, 0], Polygon(9.0 * ring, [6.0 * ring]), court) == pytest.approx(1.0)
-    assert gap([3, 4], (), Disc(1.0)) == pytest.approx(4.0)
-    assert gap([7, 0], Polygon(2.0 * ring), court) == 0.0
+    assert clearance([0, 0], Disc(1.0), court) == pytest.approx(2.0)
+    assert clearance([4, 0], Disc(0.1), court) < 0.0
+    assert clearance([0, 0], Polygon(9.0 * ring), court) <= 0.0
+    assert clearance([0, 0], Polygon(9.0 * ring, [6.0 * ring]), court) == pytest.approx(1.0)
+    assert clearance([3, 4], (), Disc(1.0)) == pytest.approx(4.0)
+    assert clearance([7, 0], Polygon(2.0 * ring), court) == 0.0
 
 
 def test_map_boxes_cover_the_blocked_cells_and_no_more():

@@ -141,7 +141,7 @@ def _distances(plan: Plan, scene: Scene, around: Around) -> tuple[Callable[[Arra
         poses, clock = scene.seen(plan, times), scene.clock + times
         apart = [one.nearest(body, poses, clock).distance for one in near]
         altitudes = scene.altitudes(plan, times)
-        over = [layer.gap(altitudes, scene.height) for layer in layers]
+        over = [layer.clearance(altitudes, scene.height) for layer in layers]
         return np.asarray(np.min(np.hypot(apart, over), axis=0))
 
     return distances, max(one.speed for one in near)
@@ -172,7 +172,7 @@ def what_is_hit(plan: Plan, scene: Scene, time: float) -> str:
     near = [
         obstacle
         for layer in scene.layers(plan)
-        if layer.gap(scene.altitudes(plan, at), scene.height)[0] <= scene.margin
+        if layer.clearance(scene.altitudes(plan, at), scene.height)[0] <= scene.margin
         for obstacle in layer.obstacles
     ]
     what = touched_near(

@@ -8,8 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from maneuver_automaton._compile import bare_inner_kernel, kernel, merged_kernel
-from maneuver_automaton.collision._kernels_gap import NEAR, field_bound, near_step, still_gap
-from maneuver_automaton.collision._kernels_movers import free_of_movers, mover_gap
+from maneuver_automaton.collision._kernels_clearance import (
+    NEAR,
+    field_bound,
+    near_step,
+    static_clearance,
+)
+from maneuver_automaton.collision._kernels_moving import free_of_moving, moving_clearance
 from maneuver_automaton.groups._kernels import coast, compose
 
 if TYPE_CHECKING:
@@ -36,28 +41,28 @@ def free_time(
     margin: float,
     clock: float,
 ) -> tuple[float, float]:
-    """How long the motion from (x, y, heading) is proven free, at most `duration`; the last gap.
+    """How long a motion from a pose is proven free, at most `duration`; and the last clearance.
 
     No point of the body is faster than `speed`. The clearance is more than `keep + margin` wherever
     it is looked at, and more than `keep` in between. The world's time at the start is `clock`; a
     negative `duration` drives, and dates, the motion backwards.
     """
-    free, gap = free_of_solids(
+    free, clearance = free_of_static(
         world, body, x, y, heading, v_x, v_y, turn_rate, speed, duration, keep, margin
     )
     # Where it begins too near to a solid, there is nothing left to prove.
-    if world.movers.speed.shape[0] > 0 and (free > 0.0 or gap > margin):
+    if world.moving.speed.shape[0] > 0 and (free > 0.0 or clearance > margin):
         t = free if duration >= 0.0 else -free
-        lasts, nearest = free_of_movers(
-            world.movers, body, x, y, heading, v_x, v_y, turn_rate, speed, t, keep, margin, clock
+        lasts, nearest = free_of_moving(
+            world.moving, body, x, y, heading, v_x, v_y, turn_rate, speed, t, keep, margin, clock
         )
-        gap = min(gap, nearest) if lasts == free else nearest
+        clearance = min(clearance, nearest) if lasts == free else nearest
         free = lasts
-    return free, gap
+    return free, clearance
 
 
 @merged_kernel
-def free_of_solids(
+def free_of_static(
     world: WorldArrays,
     body: Body,
     x: float,
@@ -71,7 +76,7 @@ def free_of_solids(
     keep: float,
     margin: float,
 ) -> tuple[float, float]:
-    """How long a motion is proven free of all that stands still, as `free_time`; the last gap."""
+    """How long a motion is proven free of static obstacles, as `free_time`; the last clearance."""
     # Backwards in time the same poses are passed in the other order: only velocities change their
     # sign, and the clock runs down.
     sign = 1.0 if duration >= 0.0 else -1.0
@@ -94,8 +99,8 @@ def free_of_solids(
     if flat and turn_rate != 0.0:
         turning = math.inf
     # The state of the loop: all before time `t` is proven; (p_x, p_y, p_heading) with cosine and
-    # sine (c, s) is the pose at `t`; `nearest` is the least bound of the gap met so far at the last
-    # pose.
+    # sine (c, s) is the pose at `t`; `nearest` is the least bound of the clearance met so far at
+    # the last pose.
     t, nearest = 0.0, math.inf
     p_x, p_y, p_heading = x, y, heading
     while True:
@@ -113,9 +118,9 @@ def free_of_solids(
                 p_y = center_y - (c * v_x - s * v_y) / turn_rate
         # The order of the tests: the field, a few look-ups, decides most poses in the open. Solids
         # are asked where it does not.
-        gap = field_bound(world.field, body, p_x, p_y, c, s)
-        if gap > keep + near:
-            nearest = gap - keep
+        clearance = field_bound(world.field, body, p_x, p_y, c, s)
+        if clearance > keep + near:
+            nearest = clearance - keep
             # The proof of this step: no point of the body is faster than `speed`, so none comes
             # closer than `keep` for as long as that takes.
             step = nearest / speed if speed > 0.0 else math.inf
@@ -182,17 +187,17 @@ def free_times(
 
 
 @kernel
-def gaps(world: WorldArrays, body: Body, poses: Array, times: Array) -> Array:
+def clearances(world: WorldArrays, body: Body, poses: Array, times: Array) -> Array:
     """Clearance (k,) at poses (k, 3): a lower bound, exact near contact, capped by the field."""
     out = np.empty(poses.shape[0])
     for k in range(poses.shape[0]):
         x, y, heading = poses[k, 0], poses[k, 1], poses[k, 2]
-        best = still_gap(world, body, x, y, math.cos(heading), math.sin(heading))
-        movers = world.movers
-        for m in range(movers.speed.shape[0]):
-            if not movers.present[m, 0] <= times[k] <= movers.present[m, 1]:
+        best = static_clearance(world, body, x, y, math.cos(heading), math.sin(heading))
+        moving = world.moving
+        for m in range(moving.speed.shape[0]):
+            if not moving.present[m, 0] <= times[k] <= moving.present[m, 1]:
                 continue
-            gap = mover_gap(world.movers, m, body, x, y, heading, times[k], 0.0, best)
-            best = min(best, gap)
+            clearance = moving_clearance(moving, m, body, x, y, heading, times[k], 0.0, best)
+            best = min(best, clearance)
         out[k] = best
     return out

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from maneuver_automaton._compile import inlined_kernel, inner_kernel, kernel
-from maneuver_automaton.collision._kernels_gap import point_to_segment
+from maneuver_automaton.collision._kernels_clearance import point_to_segment
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -159,10 +159,10 @@ def write_map(
             w_x = origin_x + (i + 0.5) * cell
             d_x, d_y = w_x - m_x, w_y - m_y
             x, y = (c * d_x + s * d_y) / resolution, (c * d_y - s * d_x) / resolution
-            # Nothing further away than what is known already is looked for.
+            # Cells further away than the distance known already are not looked for.
             most = max(distance[j, i], 0.0) / resolution
             value = to_cells(blocked, True, to_blocked, x, y, most)
-            if value <= 0.0:  # inside: the way out, over the rim of the map too
+            if value <= 0.0:  # inside: to the nearest free cell, or out over the rim of the map
                 most = min(min(x, n_columns - x), min(y, n_rows - y))
                 value = -to_cells(blocked, False, to_free, x, y, max(most, 0.0))
             distance[j, i] = min(distance[j, i], resolution * value)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.collision.convex import Solids
-from maneuver_automaton.collision.world import Buckets, Field, Movers, WorldArrays
+from maneuver_automaton.collision.world import Buckets, Field, MovingObstacles, WorldArrays
 
 if TYPE_CHECKING:
     from maneuver_automaton.collision.layers import LayerArrays
@@ -17,9 +17,9 @@ def layer_world(layers: LayerArrays, k: int) -> WorldArrays:
     """The planar world of layer `k`; the first is at hand, the others are cut out."""
     if k == 0:
         return layers.first
-    m_0, m_1 = layers.first_mover[k], layers.first_mover[k + 1]
+    m_0, m_1 = layers.first_moving[k], layers.first_moving[k + 1]
     sizes, counts = layers.sizes, layers.counts
-    movers = layers.movers
+    moving = layers.moving
     return WorldArrays(
         Solids(layers.solids.edges, layers.solids.first, layers.solids.plates),
         Buckets(
@@ -33,16 +33,16 @@ def layer_world(layers: LayerArrays, k: int) -> WorldArrays:
             sizes[k, 3],
         ),
         Field(layers.distance[k], sizes[k, 4], sizes[k, 5], sizes[k, 6], sizes[k, 7]),
-        Movers(
+        MovingObstacles(
             layers.solids,
-            movers.first_piece[m_0 : m_1 + 1],
-            movers.first_knot[m_0 : m_1 + 1],
-            movers.time,
-            movers.pose,
-            movers.speed[m_0:m_1],
-            movers.middle[m_0:m_1],
-            movers.reach[m_0:m_1],
-            movers.present[m_0:m_1],
+            moving.first_piece[m_0 : m_1 + 1],
+            moving.first_knot[m_0 : m_1 + 1],
+            moving.time,
+            moving.pose,
+            moving.speed[m_0:m_1],
+            moving.middle[m_0:m_1],
+            moving.reach[m_0:m_1],
+            moving.present[m_0:m_1],
         ),
     )
 

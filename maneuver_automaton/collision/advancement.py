@@ -88,5 +88,7 @@ def clearances(world: World, poses: ArrayLike, *, times: ArrayLike = 0.0) -> Arr
     """
     places = np.atleast_2d(as_array("poses", poses, last=3))
     clocks = np.array(np.broadcast_to(as_array("times", times), len(places)))
-    gaps: Array = _kernels_advancement.gaps(world.arrays, world.body, np.array(places), clocks)
-    return gaps
+    found: Array = _kernels_advancement.clearances(
+        world.arrays, world.body, np.array(places), clocks
+    )
+    return found

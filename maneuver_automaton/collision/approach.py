@@ -102,8 +102,8 @@ def least_over_poses(
     last distance less that is no smaller than the least, none is measured.
     """
     bound = -math.inf
-    for here, there, way in zip(poses, others, moved, strict=True):
-        bound -= way
+    for here, there, closer in zip(poses, others, moved, strict=True):
+        bound -= closer
         if bound < least:
             bound = distance(here, there)
             least = min(least, bound)
@@ -119,6 +119,6 @@ def travel(poses: Array, middle: Array, reach: float) -> Array:
     [0.0, 5.0]
     """
     places = SE2(poses).act(middle)
-    ways = np.hypot(*np.diff(places, axis=0).T)
+    steps = np.hypot(*np.diff(places, axis=0).T)
     turns = 2.0 * reach * np.abs(np.sin(0.5 * np.diff(poses[:, 2])))
-    return np.concatenate([[0.0], ways + turns])
+    return np.concatenate([[0.0], steps + turns])

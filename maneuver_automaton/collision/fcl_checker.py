@@ -1,7 +1,7 @@
 """FCL, the authority: every motion of a finished plan is checked here.
 
-A motion is free if the solids its slices sweep touch nothing. Where one does, the pose in its
-middle decides that it is hit, or else halves of it are tried, until they stand out by less than
+A motion is free if the solids its slices sweep are collision-free. Where one is not, the pose in
+its middle decides that it is hit, or else halves of it are tried, until they stand out by less than
 what counts.
 """
 
@@ -52,8 +52,8 @@ _ONE_AT_A_TIME = threading.Lock()  # objects are shared, and moved before they a
 class FclChecker:
     """A body among obstacles, by the Flexible Collision Library; a `CollisionChecker`.
 
-    What touches an obstacle, or comes closer to it than `margin`, is never reported free. What is
-    reported as hit comes closer than ``margin + proven``.
+    A motion that touches an obstacle, or comes closer to it than `margin`, is never reported free.
+    One that is reported as hit comes closer than ``margin + proven``.
 
     Parameters
     ----------
@@ -217,8 +217,8 @@ class FclChecker:
         for one in moving:
             others = one.path.at(clock)
             both = moved + travel(others, np.zeros(2), one.path.reach)
-            gap = functools.partial(_distance, _standing(self._bare), one.object)
-            least = least_over_poses(gap, seen, others, moved=both, least=least)
+            distance = functools.partial(_distance, _standing(self._bare), one.object)
+            least = least_over_poses(distance, seen, others, moved=both, least=least)
         return least
 
     def _seen(self, name: str, poses: ArrayLike) -> Array:
@@ -276,9 +276,9 @@ class FclChecker:
         center = coasting.center(coasting.at(0.5 * duration))
         for one in self._ground.moving:
             path = one.path.from_time(time)
-            gap = functools.partial(_distance, _standing(body), one.object)
+            distance = functools.partial(_distance, _standing(body), one.object)
             if may_meet(coasting, path, duration=duration, center=center) and meet(
-                coasting, path, duration=duration, distance=gap, contact=0.5 * self.proven
+                coasting, path, duration=duration, distance=distance, contact=0.5 * self.proven
             ):
                 return one.owner
         return None

@@ -1,7 +1,7 @@
 """Obstacles in space: upright prisms, grouped by the heights between which they stand.
 
 A body is upright too, so two of them touch exactly if they touch in the plane and overlap in
-height: their distance is the root of the squares of both gaps.
+height: their clearance is the hypotenuse of the planar and the vertical one.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ class Layer(NamedTuple):
     obstacles: tuple[AnyObstacle, ...]
     numbers: tuple[int, ...]  # where they are among all obstacles
 
-    def gap(self, altitude: Array, body: tuple[float, float]) -> Array:
-        """Vertical distance (n,) [m] to a body that reaches from low to high about its altitude.
+    def clearance(self, altitude: Array, body: tuple[float, float]) -> Array:
+        """Vertical clearance (n,) [m] to a body that reaches from low to high about its altitude.
 
         Examples
         --------
-        >>> Layer(0.0, 10.0, (), ()).gap(np.array([5.0, 12.0]), (-1.0, 1.0)).tolist()
+        >>> Layer(0.0, 10.0, (), ()).clearance(np.array([5.0, 12.0]), (-1.0, 1.0)).tolist()
         [0.0, 1.0]
         """
         above = altitude + body[0] - self.high

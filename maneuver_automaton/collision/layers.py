@@ -13,7 +13,7 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.convex import Solids
 from maneuver_automaton.collision.heights import Layer, layers_of
 from maneuver_automaton.collision.shapes import AnyObstacle
-from maneuver_automaton.collision.world import Field, Movers, World, WorldArrays
+from maneuver_automaton.collision.world import Field, MovingObstacles, World, WorldArrays
 
 MOST_LAYERS = 24  # more are joined, the thinnest first
 ROUNDED = 1e-8  # [m] by which heights may be off
@@ -31,8 +31,8 @@ class LayerArrays(NamedTuple):
     sizes: Array  # (L, 8) numbers of buckets and field, as `layer_world` puts them together
     counts: IntArray  # (L, 2)
     distance: Array  # (L, rows, columns)
-    movers: Movers
-    first_mover: IntArray  # (L + 1,)
+    moving: MovingObstacles
+    first_moving: IntArray  # (L + 1,)
     plane: Field  # of what blocks every altitude
     flat: bool  # whether heights do not matter
 
@@ -64,7 +64,7 @@ def bands_of(obstacles: tuple[AnyObstacle, ...], *, in_space: bool) -> tuple[Lay
 
 
 def always(bands: Sequence[Layer], *, low: float, high: float) -> tuple[AnyObstacle, ...]:
-    """Obstacles that stand at every height between two, so that no way leads over or under them.
+    """Obstacles that stand at every height between two, so that no path leads over or under them.
 
     Examples
     --------
@@ -96,7 +96,9 @@ def layer_arrays(worlds: Sequence[World], *, low: Array, high: Array, plane: Wor
             plane=plane.arrays.field,
             flat=bool(np.isinf(low).all() and np.isinf(high).all()),
         )
-    solids, still, moving = _concatenated([(one.solids, one.movers.solids) for one in arrays])
+    solids, of_static, of_moving = _concatenated(
+        [(one.solids, one.moving.solids) for one in arrays]
+    )
     shapes = np.array([one.field.distance.shape for one in arrays])
     distance = np.zeros((len(arrays), *shapes.max(axis=0)))
     most = max(len(one.buckets.start) for one in arrays)
@@ -110,7 +112,7 @@ def layer_arrays(worlds: Sequence[World], *, low: Array, high: Array, plane: Wor
         offset = sum(len(part) for part in items)
         start[k, :known] = one.buckets.start + offset
         start[k, known:] = start[k, known - 1]
-        items.append(one.buckets.items + still[k])
+        items.append(one.buckets.items + of_static[k])
     sizes = [
         (
             *(one.buckets.origin_x, one.buckets.origin_y, one.buckets.cell, one.buckets.reach),
@@ -129,8 +131,8 @@ def layer_arrays(worlds: Sequence[World], *, low: Array, high: Array, plane: Wor
         sizes=np.array(sizes, dtype=np.float64),
         counts=np.array(counts, dtype=np.int64),
         distance=distance,
-        movers=_all_movers([one.movers for one in arrays], solids, moving),
-        first_mover=np.cumsum([0, *(len(one.movers.speed) for one in arrays)]),
+        moving=_all_moving([one.moving for one in arrays], solids, of_moving),
+        first_moving=np.cumsum([0, *(len(one.moving.speed) for one in arrays)]),
         plane=plane.arrays.field,
         flat=bool(np.isinf(low).all() and np.isinf(high).all()),
     )
@@ -155,8 +157,8 @@ def single_layer(world: World) -> LayerArrays:
         sizes=np.array([sizes], dtype=np.float64),
         counts=np.array([(buckets.columns, buckets.rows)], dtype=np.int64),
         distance=field.distance[None],
-        movers=only.movers,
-        first_mover=np.array([0, len(only.movers.speed)]),
+        moving=only.moving,
+        first_moving=np.array([0, len(only.moving.speed)]),
         plane=field,
         flat=True,
     )
@@ -190,19 +192,21 @@ def _concatenated(pairs: Sequence[tuple[Solids, Solids]]) -> tuple[Solids, list[
     )
 
 
-def _all_movers(movers: Sequence[Movers], solids: Solids, begins: Sequence[int]) -> Movers:
+def _all_moving(
+    moving: Sequence[MovingObstacles], solids: Solids, begins: Sequence[int]
+) -> MovingObstacles:
     """Moving obstacles, layer by layer, its pieces and knots among those of all layers."""
-    knots = np.cumsum([0, *(len(one.time) for one in movers)]).tolist()
-    return Movers(
+    knots = np.cumsum([0, *(len(one.time) for one in moving)]).tolist()
+    return MovingObstacles(
         solids=solids,
-        first_piece=_offset([one.first_piece for one in movers], begins),
-        first_knot=_offset([one.first_knot for one in movers], knots[:-1]),
-        time=np.concatenate([one.time for one in movers]),
-        pose=np.concatenate([one.pose for one in movers]),
-        speed=np.concatenate([one.speed for one in movers]),
-        middle=np.concatenate([one.middle for one in movers]),
-        reach=np.concatenate([one.reach for one in movers]),
-        present=np.concatenate([one.present for one in movers]),
+        first_piece=_offset([one.first_piece for one in moving], begins),
+        first_knot=_offset([one.first_knot for one in moving], knots[:-1]),
+        time=np.concatenate([one.time for one in moving]),
+        pose=np.concatenate([one.pose for one in moving]),
+        speed=np.concatenate([one.speed for one in moving]),
+        middle=np.concatenate([one.middle for one in moving]),
+        reach=np.concatenate([one.reach for one in moving]),
+        present=np.concatenate([one.present for one in moving]),
     )
 
 

@@ -1,4 +1,4 @@
-"""Shapes as values: bodies of vehicles, obstacles, occupancy maps, things that move.
+"""Shapes as values: bodies of vehicles, obstacles, occupancy maps, motions.
 
 All are solids, and closed: to touch one is to collide with it.
 """

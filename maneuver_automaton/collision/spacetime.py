@@ -1,8 +1,8 @@
-"""Obstacles that move: advance in time by no more than the distance allows.
+"""Moving obstacles: advance in time by no more than the distance allows.
 
 From the exact distance at one time, the time at which two bodies can touch at the earliest; from
 there again, until they are closer than what counts as contact or the motion is over. Nothing is
-missed between, whatever turns, and what is reported is no further than that.
+missed between, whatever turns, and two bodies reported to meet are no further apart than that.
 
 Solids in (x, y, c t) are the other sound way. Where all move straight they are exact, and a query
 takes 5 us. But the solid of what turns stands out by ``reach * turn / 2``, of the obstacle too,
@@ -68,7 +68,7 @@ class MovingBody(NamedTuple):
         )
 
     def from_time(self, time: float) -> MovingBody:
-        """The same, with the clock at zero at `time` [s]."""
+        """A copy whose clock is at zero at `time` [s]."""
         return self._replace(knots=self.knots - time)
 
     def at(self, time: ArrayLike) -> Array:
@@ -91,8 +91,8 @@ class MovingBody(NamedTuple):
 def may_meet(body: CoastingBody, other: MovingBody, *, duration: float, center: complex) -> bool:
     """False where both are too far and too slow; `center` is the body's after half the time."""
     x, y = (float(np.interp(0.5 * duration, other.knots, other.poses[:, k])) for k in range(2))
-    way = 0.5 * duration * (abs(body.velocity) + other.speed)
-    return abs(center - complex(x, y)) <= way + body.reach + other.reach
+    covered = 0.5 * duration * (abs(body.velocity) + other.speed)
+    return abs(center - complex(x, y)) <= covered + body.reach + other.reach
 
 
 def meet(
@@ -115,11 +115,11 @@ def meet(
     --------
     >>> still = CoastingBody(np.zeros(3), (0.0, 0.0, 0.0), 0j, 0.5)
     >>> crossing = MovingBody.of(Motion([0.0, 4.0], [[-4.0, 0, 0], [4.0, 0, 0]]), 0.5)
-    >>> def gap(one, other):
+    >>> def distance(one, other):
     ...     return max(0.0, math.hypot(*(one - other)[:2]) - 1.0)
-    >>> meet(still, crossing, duration=1.0, distance=gap, contact=1e-3)
+    >>> meet(still, crossing, duration=1.0, distance=distance, contact=1e-3)
     False
-    >>> meet(still, crossing, duration=2.0, distance=gap, contact=1e-3)
+    >>> meet(still, crossing, duration=2.0, distance=distance, contact=1e-3)
     True
     """
     turning = abs(body.twist[2]) * body.reach
@@ -129,17 +129,17 @@ def meet(
     time = 0.0
     while True:
         here, there = body.at(time), other.at(time)
-        gap = abs(body.center(here) - complex(there[0], there[1])) - body.reach - other.reach
-        if gap <= near:
-            gap = distance(here, there)
-            if gap <= contact:
+        clearance = abs(body.center(here) - complex(there[0], there[1])) - body.reach - other.reach
+        if clearance <= near:
+            clearance = distance(here, there)
+            if clearance <= contact:
                 return True
         velocity, turn_rate, until = other.rates(time)
         closing = abs(_direction(here) * body.velocity - velocity)
         closing += turning + abs(turn_rate) * other.reach
-        speed = closing + math.sqrt(closing * closing + 2.0 * bend * gap)
-        same_rates = min(time + 2.0 * gap / speed, until) if speed > 0.0 else until
-        after = max(same_rates, time + gap / fastest) if fastest > 0.0 else math.inf
+        speed = closing + math.sqrt(closing * closing + 2.0 * bend * clearance)
+        same_rates = min(time + 2.0 * clearance / speed, until) if speed > 0.0 else until
+        after = max(same_rates, time + clearance / fastest) if fastest > 0.0 else math.inf
         if after > duration or time >= duration:
             return False
         time = after

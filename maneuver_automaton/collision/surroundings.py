@@ -81,7 +81,7 @@ class Surroundings:
     speed: float  # [m/s] no point of an obstacle is faster
 
     def nearest(self, body: Sequence[Part], poses: Array, times: Array) -> Nearest:
-        """What is nearest to a body at poses (n, 3) and times (n,) [s]."""
+        """Distance to the nearest obstacle, and which, at poses (n, 3) and times (n,) [s]."""
         best = Nearest(np.full(len(poses), math.inf), np.full(len(poses), -1))
         for part in body:
             if len(self.owners):
@@ -102,14 +102,16 @@ class Surroundings:
 
         cores, centers = part.at(poses), SE2(poses).act(part.middle)
         frames = [single.motion.at(times) for single in self.singles]
-        ways = [
+        between = [
             np.hypot(*(SE2(frame).act(single.part.middle) - centers).T)
             for single, frame in zip(self.singles, frames, strict=True)
         ]
         reaches = np.array([part.reach + single.part.reach for single in self.singles])
-        limit = np.minimum(best.distance, (np.array(ways).T + reaches).min(axis=1))
-        for single, frame, way, reach in zip(self.singles, frames, ways, reaches, strict=True):
-            rows = np.flatnonzero(way - reach <= np.minimum(limit, best.distance))
+        limit = np.minimum(best.distance, (np.array(between).T + reaches).min(axis=1))
+        for single, frame, middles, reach in zip(
+            self.singles, frames, between, reaches, strict=True
+        ):
+            rows = np.flatnonzero(middles - reach <= np.minimum(limit, best.distance))
             away = np.full(len(poses), math.inf)
             apart = shapely.distance(cores[rows], single.part.at(frame[rows]))
             away[rows] = np.maximum(apart - part.radius - single.part.radius, 0.0)

@@ -82,7 +82,7 @@ def slice_hulls(body: GrownBody, twist: Twist, duration: float) -> list[Array]:
     """Convex polygons (m, 2) that hold every point of the body at every time of a short coast.
 
     A corner runs along an arc, which lies in the triangle of its ends and the point where the
-    tangents there meet; what is between corners, between such triangles.
+    tangents there meet; points between corners are between such triangles.
 
     Examples
     --------
@@ -161,7 +161,7 @@ def slice_excess(body: GrownBody, twist: Twist, duration: float) -> float:
     """No point of the hulls is further than this [m] from where the body passes.
 
     A point of a hull is a mean of corners seen at several times. Hold the same mean of corners
-    against it at the mean time: the common velocity cancels, and what is left is the turning,
+    against it at the mean time: the common velocity cancels, and the turning remains,
     at most ``reach * |turn| / 2``, the curvature of the arcs, and the tips of the triangles.
     """
     v_x, v_y, turn_rate = twist
@@ -198,7 +198,7 @@ def windows(twist: Twist, duration: float) -> Windows:
 
 
 def halves(parts: Windows) -> Windows:
-    """The same time in slices half as long."""
+    """Slices half as long that cover the time of `parts`."""
     begins = parts.begins[:, None] + [0.0, 0.5 * parts.length]
     return Windows(parts.level + 1, begins.reshape(-1))
 

@@ -64,7 +64,7 @@ class Buckets(NamedTuple):
     reach: float  # [m]
 
 
-class Movers(NamedTuple):
+class MovingObstacles(NamedTuple):
     """Moving obstacles: each a range of solids in its own frame, and knots in time."""
 
     solids: Solids
@@ -84,7 +84,7 @@ class WorldArrays(NamedTuple):
     solids: Solids
     buckets: Buckets
     field: Field
-    movers: Movers
+    moving: MovingObstacles
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -95,7 +95,7 @@ class World:
     body: Body
     arrays: WorldArrays
     box: Array  # (4,) [low x, low y, high x, high y] of static obstacles, and where moving ones go
-    last_event: float  # [s] after it all obstacles stand
+    last_event: float  # [s] after it no obstacle moves
 
     def into(self, pose: Array) -> Array:
         """A pose (..., 3) seen from the world's frame: places first, so that no digit is lost."""
@@ -126,7 +126,7 @@ def world_of(
     Examples
     --------
     >>> world = world_of((Obstacle(Box([1.0, 1.0])),), (Disc(0.5),), (0.0, 0.0, 0.0))
-    >>> len(world.arrays.solids.plates), world.arrays.movers.speed.size
+    >>> len(world.arrays.solids.plates), world.arrays.moving.speed.size
     (1, 0)
     """
     body = body_of(footprint)
@@ -143,20 +143,21 @@ def world_of(
         if isinstance(one, OccupancyMap):
             pieces += [(ring, 0.0) for ring in _cells(one, pose)]
     solids = solids_of(pieces)
-    movers = _movers(moving, pose, present or ((-math.inf, math.inf),) * len(moving))
-    box = _box(solids.plates[:, :4], movers)
+    always = ((-math.inf, math.inf),) * len(moving)
+    moving_arrays = _moving_obstacles(moving, pose, present or always)
+    box = _box(solids.plates[:, :4], moving_arrays)
     arrays = WorldArrays(
         solids=solids,
         buckets=_buckets(solids.plates, body, keep),
         field=_field(solids, listed, maps, body, keep),
-        movers=movers,
+        moving=moving_arrays,
     )
     return World(
         frame=pose,
         body=body,
         arrays=arrays,
         box=box,
-        last_event=float(movers.time.max()) if movers.time.size else -math.inf,
+        last_event=float(moving_arrays.time.max()) if moving_arrays.time.size else -math.inf,
     )
 
 
@@ -196,12 +197,12 @@ def _cells(one: OccupancyMap, frame: Array) -> Array:
     return seen_from(turned + shift, np.array([0.0, 0.0, frame[2]]))
 
 
-def _box(boxes: Array, movers: Movers) -> Array:
+def _box(boxes: Array, moving: MovingObstacles) -> Array:
     rows = [boxes] if len(boxes) else []
-    for k in range(len(movers.speed)):
-        knots = movers.pose[movers.first_knot[k] : movers.first_knot[k + 1]]
-        middles = np.asarray(SE2(knots).act(movers.middle[k]))
-        rows.append(np.hstack([middles - movers.reach[k], middles + movers.reach[k]]))
+    for k in range(len(moving.speed)):
+        knots = moving.pose[moving.first_knot[k] : moving.first_knot[k + 1]]
+        middles = np.asarray(SE2(knots).act(moving.middle[k]))
+        rows.append(np.hstack([middles - moving.reach[k], middles + moving.reach[k]]))
     if not rows:
         return np.array([math.inf, math.inf, -math.inf, -math.inf])
     every = np.concatenate(rows)
@@ -256,9 +257,9 @@ def _buckets(plates: Array, body: Body, keep: float) -> Buckets:
     return Buckets(start, items, float(low[0]), float(low[1]), cell, columns, rows, reach)
 
 
-def _movers(
+def _moving_obstacles(
     moving: list[Obstacle], frame: Array, present: tuple[tuple[float, float], ...]
-) -> Movers:
+) -> MovingObstacles:
     pieces: list[tuple[Array, float]] = []
     first_piece, first_knot = [0], [0]
     times, poses, speeds, middles, reaches = [], [], [], [], []
@@ -277,7 +278,7 @@ def _movers(
         middles.append(middle)
         reaches.append(max(float(np.hypot(*(ring - middle).T).max()) + r for ring, r in own))
         speeds.append(_speed(motion, own))
-    return Movers(
+    return MovingObstacles(
         solids=solids_of(pieces),
         first_piece=np.array(first_piece, dtype=np.int64),
         first_knot=np.array(first_knot, dtype=np.int64),

@@ -182,7 +182,7 @@ def _fastest(point: Point) -> float:
 def _margins(program: Program, point: Point, pairs: Pairs, lines: Lines) -> Array:
     """Margins (n,) [m] at the nodes for what the corners swing out between them."""
     reach = reaches_at(program, point, pairs, lines)
-    return program.settings.gap + SWING * (reach.between - reach.nodes)
+    return program.settings.clearance + SWING * (reach.between - reach.nodes)
 
 
 def _depth(program: Program, point: Point, pairs: Pairs, lines: Lines) -> float:
@@ -194,7 +194,7 @@ def _depth(program: Program, point: Point, pairs: Pairs, lines: Lines) -> float:
 def _kept(program: Program, point: Point, pairs: Pairs, lines: Lines) -> bool:
     """Whether every path keeps half of the margin to its piece."""
     reach = reaches_at(program, point, pairs, lines)
-    return bool((reach.between - reach.piece <= -0.5 * program.settings.gap).all())
+    return bool((reach.between - reach.piece <= -0.5 * program.settings.clearance).all())
 
 
 def held(control: Array, count: int) -> Array:

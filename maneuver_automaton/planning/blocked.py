@@ -95,15 +95,15 @@ def where_touched(problem: Problem, pose: Array, time: float) -> str:
     The kernels prove most poses free; where they do not, shapely decides.
     """
     beside = _beside(problem, pose)
-    still = tuple(obstacle for obstacle in beside if not moves(obstacle))
-    obstacles = beside if math.isfinite(time) else still
+    static = tuple(obstacle for obstacle in beside if not moves(obstacle))
+    obstacles = beside if math.isfinite(time) else static
     if not obstacles:
         return ""
     at = time if math.isfinite(time) else 0.0
     if obstacles == problem.obstacles:
         world = world_around(problem)
-        (gap,) = clearances(world, world.into(pose[:3]), times=at)
-        if gap > problem.margin + CLEARLY:
+        (clearance,) = clearances(world, world.into(pose[:3]), times=at)
+        if clearance > problem.margin + CLEARLY:
             return ""
     return touched(
         problem.footprint,
@@ -122,7 +122,7 @@ def _beside(problem: Problem, pose: Array) -> tuple[AnyObstacle, ...]:
     near = [
         number
         for layer in layers_of(problem.obstacles, in_space=True)
-        if layer.gap(pose[3:], problem.body_height)[0] <= problem.margin
+        if layer.clearance(pose[3:], problem.body_height)[0] <= problem.margin
         for number in layer.numbers
     ]
     return tuple(problem.obstacles[number] for number in sorted(near))

@@ -132,7 +132,7 @@ def _what_hits(checker: FclChecker, plan: Plan, layer: Layer, problem: Problem) 
     """Which primitive hits what of a layer, while its altitude is within reach of it."""
     if not plan.primitives:
         height = plan.start[3:].sum(keepdims=True)
-        if layer.gap(height, problem.body_height)[0] > problem.margin:
+        if layer.clearance(height, problem.body_height)[0] > problem.margin:
             return ""
         hit = checker.pose_hit(plan.start[:3], time=plan.start_time)
         return "" if hit is None else f"obstacle {layer.numbers[hit]} is hit at the start"
@@ -186,7 +186,7 @@ def _within_reach(
     if math.isinf(layer.high) or start.size == 3:
         return [_Stretch(time, pose[:, :3])]
     step = float(np.abs(np.diff(pose[:, 3])).max(initial=0.0))  # so that no run is a sample
-    near = layer.gap(start[3] + pose[:, 3], problem.body_height) <= problem.margin + step
+    near = layer.clearance(start[3] + pose[:, 3], problem.body_height) <= problem.margin + step
     runs = np.flatnonzero(np.diff(np.concatenate([[False], near, [False]]).astype(np.int8)))
     return [
         _Stretch(time[first:last], pose[first:last, :3])

@@ -109,7 +109,7 @@ def stands_free(
 
 
 def clearance_at(problem: Problem, poses: Array, times: Array) -> Array:
-    """Distance (n,) [m] to what is nearest at poses (n, 3) and times (n,): a lower bound.
+    """Clearance (n,) [m] to the nearest obstacle at poses (n, 3) and times (n,): a lower bound.
 
     Exact near contact, at most what the kernels look for, not positive on contact.
 
@@ -118,8 +118,8 @@ def clearance_at(problem: Problem, poses: Array, times: Array) -> Array:
     >>> from maneuver_automaton import Automaton, Disc, Unicycle
     >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "spin": (0.0, 1.0)})
     >>> problem = Problem(robot, [0, 0, 0], [9, 0, 0], obstacles=Disc(1.0, [1.5, 0]))
-    >>> (gap,) = clearance_at(problem, np.zeros((1, 3)), np.zeros(1))
-    >>> bool(0.0 < gap <= 0.5)
+    >>> (clearance,) = clearance_at(problem, np.zeros((1, 3)), np.zeros(1))
+    >>> bool(0.0 < clearance <= 0.5)
     True
     """
     world = world_around(problem)
@@ -211,7 +211,7 @@ def word_of_plan(query: LatticeQuery, plan: Plan) -> Word | None:
     if any(trim.name not in numbers for trim in trims):
         return None
     ends = [problem.goals[index].off(np.asarray(plan.end[:3])) for index in query.goal_index]
-    reached = [k for k, (way, turn) in enumerate(ends) if way < 1e-7 and turn < 1e-7]
+    reached = [k for k, (distance, turn) in enumerate(ends) if distance < 1e-7 and turn < 1e-7]
     if not reached:
         return None
     return Word(

@@ -30,9 +30,9 @@ MOST_STEPS = 5  # between the times at which moving obstacles are shown
 class ObstacleArtists:
     """What `draw_obstacles` has drawn."""
 
-    still: PathCollection  # one path per static shape
+    static: PathCollection  # one path per static shape
     maps: tuple[PathCollection, ...]  # blocked cells, one collection per map
-    movers: PathCollection  # one path per time and moving shape, time by time
+    moving: PathCollection  # one path per time and moving shape, time by time
     tracks: LineCollection  # where the middle of each goes in between
 
 
@@ -88,7 +88,7 @@ def draw_obstacles(
     >>> from maneuver_automaton.collision import Box, Disc
     >>> there = Obstacle(Disc(0.3), motion=Motion([0.0, 1.0], [[0, 0, 0], [2, 0, 0]]))
     >>> artists = draw_obstacles(Figure().add_subplot(), [Box([1.0, 2.0]), there], time=[0.0, 0.5])
-    >>> len(artists.still.get_paths()), len(artists.movers.get_paths())
+    >>> len(artists.static.get_paths()), len(artists.moving.get_paths())
     (1, 2)
     """
     known = as_obstacles(obstacles)
@@ -103,14 +103,14 @@ def draw_obstacles(
         tracks = [one.track(float(times[0]), float(times[-1])) for one in moving]
         colors = [color for color in moment_colors(len(times)) for _ in moving]
     artists = ObstacleArtists(
-        still=_solid([shape_path(one.shape) for one in static_shapes(known)]),
+        static=_solid([shape_path(one.shape) for one in static_shapes(known)]),
         maps=tuple(_solid(map_paths(one)) for one in known if isinstance(one, OccupancyMap)),
-        movers=moving_collection(shown, colors),
+        moving=moving_collection(shown, colors),
         tracks=LineCollection(
             tracks, colors=[(*MOVING, 0.45)], linewidths=0.8, linestyles=[(0, (4, 2))], zorder=1.3
         ),
     )
-    for part in (artists.still, *artists.maps, artists.movers, artists.tracks):
+    for part in (artists.static, *artists.maps, artists.moving, artists.tracks):
         ax.add_collection(part, autolim=False)
     return artists
 

@@ -44,12 +44,12 @@ class Stage:
     figure: Figure
     ax: Axes
     traffic: PathCollection
-    movers: list[MovingShape]
+    moving: list[MovingShape]
     clock: Text
 
     def show(self, time: float) -> None:
         """Put moving obstacles where they are at `time` [s]."""
-        self.traffic.set_paths([one.at(time) for one in self.movers])
+        self.traffic.set_paths([one.at(time) for one in self.moving])
 
 
 def stage_of(
@@ -70,8 +70,8 @@ def stage_of(
     return Stage(
         figure=figure,
         ax=ax,
-        traffic=obstacles.movers,
-        movers=moving_shapes(scene.obstacles),
+        traffic=obstacles.moving,
+        moving=moving_shapes(scene.obstacles),
         clock=figure.text(
             LEFT / WIDTH, 1.0 - 0.14 / figure.get_size_inches()[1], "", fontsize=10.0, color=INK,
             va="top", parse_math=False,

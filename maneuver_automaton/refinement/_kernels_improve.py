@@ -368,7 +368,7 @@ def attempt_all(
     n = state[LENGTH]
     cost = word_cost(lib, work.trims, work.durations, work.edges, n)
     unroll(lib, work, n)
-    changes = scene.layers.movers.speed.shape[0] > 0
+    changes = scene.layers.moving.speed.shape[0] > 0
     for row in range(uniform.shape[0]):
         if n == 0 or not work.times[n] > 0.0:
             return cost

@@ -213,6 +213,6 @@ def take_program(
     if not new_cost < cost - GAIN * cost:
         return
     # Trims that stay are driven at other times: among moving obstacles all is proven once more.
-    moves = scene.layers.movers.speed.shape[0] > 0
+    moves = scene.layers.moving.speed.shape[0] > 0
     if not moves or still_free(lib, task, scene, work, size, 0.0):
         take(work, state, size)

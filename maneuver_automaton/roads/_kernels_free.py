@@ -1,8 +1,8 @@
 """Proof that a motion on the road is free, tick by tick.
 
-Land beside the road, static obstacles on it and those that move are a `World`, and the proof along
+Land beside the road, static and moving obstacles on it are a `World`, and the proof along
 a tick is that of `free_time` in the collision room, for the constant twist between its ends, but
-with distances of their own to what stands and to what moves. The car leaves that twist by at most
+with distances of their own to static and to moving obstacles. The car leaves that twist by at most
 an eighth of its acceleration times the square of the tick (9 m/s^2 and 0.1 s: 11 mm), which is less
 than either distance.
 """
@@ -13,8 +13,8 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
-from maneuver_automaton.collision._kernels_advancement import free_of_solids
-from maneuver_automaton.collision._kernels_movers import free_of_movers
+from maneuver_automaton.collision._kernels_advancement import free_of_static
+from maneuver_automaton.collision._kernels_moving import free_of_moving
 from maneuver_automaton.collision.body import Body
 from maneuver_automaton.collision.world import WorldArrays
 
@@ -37,9 +37,9 @@ class Clearing(NamedTuple):
 
     car: CarArrays
     body: Body  # the same rectangle, for `world`
-    world: WorldArrays  # land beside the road, static obstacles on it, and what moves
+    world: WorldArrays  # land beside the road, static and moving obstacles on it
     off_static: float  # [m] kept all the way from land and static obstacles
-    off_traffic: float  # [m] from what moves, each there as long as it was recorded
+    off_traffic: float  # [m] from moving obstacles, each there as long as it was recorded
     margin: float  # [m] besides, where the motion is looked at: the edge is simplified by as much
     start: float  # [s] time of the world at tick 0
     tick: float  # [s]
@@ -71,14 +71,14 @@ def free_tick(
     fastest = math.hypot(abs(v_x) + abs(w) * car.half_width, abs(v_y) + abs(w) * front)
     off, traffic = clearing.off_static, clearing.off_traffic
     # Static obstacles first: their proof costs the same however much moves on the road.
-    lasts, _ = free_of_solids(
+    lasts, _ = free_of_static(
         clearing.world, body, x_0, y_0, h_0, v_x, v_y, w, fastest, duration, off, margin
     )
     if lasts < duration:  # proven is what lasts for the duration itself
         return False
-    movers, clock = clearing.world.movers, clearing.start + tick * duration
-    lasts, _ = free_of_movers(
-        movers, body, x_0, y_0, h_0, v_x, v_y, w, fastest, duration, traffic, margin, clock
+    moving, clock = clearing.world.moving, clearing.start + tick * duration
+    lasts, _ = free_of_moving(
+        moving, body, x_0, y_0, h_0, v_x, v_y, w, fastest, duration, traffic, margin, clock
     )
     return lasts >= duration
 

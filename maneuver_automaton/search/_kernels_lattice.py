@@ -441,7 +441,7 @@ def relax_coasts(
     limit = min(upper_bound, search.found[0])
     # Clearance known from before spares a test, unless obstacles move, since it is that of an
     # earlier time, or there are zones, which it does not count.
-    known = scene.layers.movers.speed.shape[0] == 0 and scene.zone_trims.shape[0] == 0
+    known = scene.layers.moving.speed.shape[0] == 0 and scene.zone_trims.shape[0] == 0
     cos, sin = math.cos(heading), math.sin(heading)
     held = class_of(lib.library, before)
     for place in range(lib.first_trim[held], lib.first_trim[held + 1]):
@@ -536,7 +536,7 @@ def relax_maneuvers(
     if too_short(task, lib, before, nodes[node, RUN]):
         return
     limit = min(upper_bound, search.found[0])
-    known = scene.layers.movers.speed.shape[0] == 0 and scene.zone_trims.shape[0] == 0
+    known = scene.layers.moving.speed.shape[0] == 0 and scene.zone_trims.shape[0] == 0
     held = class_of(lib.library, before)
     for edge in range(lib.first_edge[held], lib.first_edge[held + 1]):
         target = lib.edge_target[edge]

@@ -319,8 +319,8 @@ def may_stay(
     """Whether a vehicle that stands as in `trim` from `clock` on is free until a time."""
     # Static obstacles were proven clear along the motion that ends here; without moving obstacles
     # that holds for good.
-    movers = scene.layers.movers.speed.shape[0]
-    if not until > clock or movers == 0:
+    n_moving = scene.layers.moving.speed.shape[0]
+    if not until > clock or n_moving == 0:
         return True
     x, y, heading, z = pose
     for k in range(scene.layers.low.shape[0] - scene.zone_trims.shape[0]):

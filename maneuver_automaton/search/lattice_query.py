@@ -99,7 +99,7 @@ class LatticeQuery:
     @property
     def moves(self) -> bool:
         """Whether an obstacle moves."""
-        return bool(self.world.arrays.movers.speed.size)
+        return bool(self.world.arrays.moving.speed.size)
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -240,7 +240,7 @@ def _end_clearances(
             there = (SE2(there) @ SE2(offsets)).pose
         for band, world in zip(worlds.bands, worlds.between, strict=True):
             aside = clearances(replace(world, body=body_of(part.shapes)), there, times=times)
-            found.append(np.maximum(aside, band.gap(altitudes, problem.body_height)))
+            found.append(np.maximum(aside, band.clearance(altitudes, problem.body_height)))
     least: Array = np.min(found, axis=0)
     return least - problem.margin
 

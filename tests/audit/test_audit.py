@@ -342,7 +342,7 @@ def test_against_many_poses(footprint):
 
     rng = np.random.default_rng(8)
     for _ in range(8):
-        obstacles = tuple(o.moved(SE2([3.0, 1.0, 0.0])) for o in random_scene(rng, movers=1))
+        obstacles = tuple(o.moved(SE2([3.0, 1.0, 0.0])) for o in random_scene(rng, moving=1))
         audit = audited(AROUND, *obstacles, footprint=footprint)
         times = np.linspace(0.0, AROUND.duration, 250)
         least = min(
@@ -378,7 +378,7 @@ def test_a_moved_plan_has_the_same_clearance():
     from tests.collision.scenes import random_scene
 
     for _ in range(5):
-        obstacles = random_scene(rng, movers=1)
+        obstacles = random_scene(rng, moving=1)
         by = SE2([*rng.uniform(-50.0, 50.0, 2), rng.uniform(-5.0, 5.0)])
         one = audited(AROUND, *obstacles)
         other = audited(AROUND.moved(by), *(o.moved(by) for o in obstacles))

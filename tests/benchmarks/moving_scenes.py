@@ -1,4 +1,4 @@
-"""Two hundred closed loops among twelve movers, judged by an exhaustive search in space and time.
+"""Closed loops among twelve moving obstacles, judged by an exhaustive search in space and time.
 
 ``python tests/benchmarks/moving_scenes.py [--scenes N] [--step S] [--time-limit S] [--cell M]``:
 the judge asks whether, from the start, waiting or evading was possible at all: a robot on a grid
@@ -34,7 +34,7 @@ KEPT = 0.01  # [m] the judge's robot keeps from everything
 CHECK_M = 0.01  # between poses at which a driven loop is checked
 
 
-class Movers(NamedTuple):
+class MovingObstacles(NamedTuple):
     """Shapes with a motion each: discs have a radius and no size."""
 
     half: np.ndarray  # (n, 2) [m] half the size of a box
@@ -44,12 +44,12 @@ class Movers(NamedTuple):
     pose: np.ndarray  # (n, k, 3) of the middle [m, m, rad]
 
 
-def movers(problem: Problem) -> Movers:
+def moving_obstacles(problem: Problem) -> MovingObstacles:
     """All obstacles of a problem, those that stand still as motions of one pose."""
     obstacles = [o for o in problem.obstacles if isinstance(o, Obstacle)]
     knots = [1 if o.motion is None else o.motion.time.size for o in obstacles]
     n, k = len(obstacles), max(knots)
-    found = Movers(np.zeros((n, 2)), np.zeros(n), np.array(knots), np.zeros((n, k)),
+    found = MovingObstacles(np.zeros((n, 2)), np.zeros(n), np.array(knots), np.zeros((n, k)),
                    np.zeros((n, k, 3)))  # fmt: skip
     for row, obstacle in enumerate(obstacles):
         shape = obstacle.shape
@@ -83,14 +83,14 @@ def escape_possible(problem: Problem, *, cell: float, horizon: float = HORIZON) 
     robot = problem.footprint[0].radius + KEPT
     return bool(
         _survives(
-            movers(problem), low, cell, counts[0], counts[1], begin, goal, robot, tick,
+            moving_obstacles(problem), low, cell, counts[0], counts[1], begin, goal, robot, tick,
             spin_ticks, math.ceil(horizon / tick),
         )
     )  # fmt: skip
 
 
 @kernel
-def _survives(movers, low, cell, columns, rows, begin, goal, robot, tick, spin_ticks, ticks):
+def _survives(moving, low, cell, columns, rows, begin, goal, robot, tick, spin_ticks, ticks):
     """Layer by layer in time: which (heading, column, row) can be occupied without contact.
 
     `begin` is heading, column, row, and the ticks it takes to turn to that heading. A spin by an
@@ -101,24 +101,27 @@ def _survives(movers, low, cell, columns, rows, begin, goal, robot, tick, spin_t
     alive = np.zeros((layers, 8, columns, rows), dtype=np.bool_)
     free = np.zeros((layers, columns, rows), dtype=np.bool_)
     wide = np.zeros((layers, columns, rows), dtype=np.bool_)  # so clear that no step can touch
-    slack = 5.0 * cell  # what robot and mover come closer in two ticks, the mover 1.5 times as fast
+    # robot and obstacle come closer by this in two ticks, the obstacle 1.5 times as fast
+    slack = 5.0 * cell
     for layer in range(layers):
-        _mark_clear(free[layer], movers, low, cell, robot, layer * tick)
-        _mark_clear(wide[layer], movers, low, cell, robot + slack, layer * tick)
+        _mark_clear(free[layer], moving, low, cell, robot, layer * tick)
+        _mark_clear(wide[layer], moving, low, cell, robot + slack, layer * tick)
     heading, column, row, turning = begin
     for layer in range(turning + 1):
         if not free[layer, column, row]:
             return False
     alive[turning, heading, column, row] = True
-    count = len(movers.radius)
-    at = np.empty((2, 3, count, 3))  # poses of movers at the quarters of one and of two ticks
+    count = len(moving.radius)
+    at = np.empty(
+        (2, 3, count, 3)
+    )  # poses of the obstacles at the quarters of one and of two ticks
     for now in range(ticks):
         here = now % layers
         for took in range(1, 3):
             for quarter in range(3):
                 for m in range(count):
                     later = (now + 0.25 * (quarter + 1) * took) * tick
-                    _pose_at(movers, m, later, at[took - 1, quarter, m])
+                    _pose_at(moving, m, later, at[took - 1, quarter, m])
         for h in range(8):
             dx, dy = round(math.cos(h * math.pi / 4)), round(math.sin(h * math.pi / 4))
             took = 2 if dx != 0 and dy != 0 else 1
@@ -144,73 +147,73 @@ def _survives(movers, low, cell, columns, rows, begin, goal, robot, tick, spin_t
                         if alive[arrive, h, p, q]:
                             continue
                         alive[arrive, h, p, q] = wide[here, i, j] or _step_free(
-                            movers, low, cell, robot, i, j, p, q, at[took - 1]
+                            moving, low, cell, robot, i, j, p, q, at[took - 1]
                         )
         alive[here] = False
         if not alive.any():
             return False
         again = (now + layers) * tick
-        _mark_clear(free[here], movers, low, cell, robot, again)
-        _mark_clear(wide[here], movers, low, cell, robot + slack, again)
+        _mark_clear(free[here], moving, low, cell, robot, again)
+        _mark_clear(wide[here], moving, low, cell, robot + slack, again)
     return True
 
 
 @kernel
-def _mark_clear(clear, movers, low, cell, kept, time):
-    """Mark the cells further than `kept` from all movers at a time."""
+def _mark_clear(clear, moving, low, cell, kept, time):
+    """Mark the cells further than `kept` from all moving obstacles at a time."""
     columns, rows = clear.shape
     clear[:] = True
     at = np.empty(3)
-    for m in range(len(movers.radius)):
-        _pose_at(movers, m, time, at)
-        reach = kept + movers.radius[m] + math.hypot(movers.half[m, 0], movers.half[m, 1])
+    for m in range(len(moving.radius)):
+        _pose_at(moving, m, time, at)
+        reach = kept + moving.radius[m] + math.hypot(moving.half[m, 0], moving.half[m, 1])
         first_i = max(0, math.floor((at[0] - reach - low[0]) / cell))
         last_i = min(columns - 1, math.ceil((at[0] + reach - low[0]) / cell))
         first_j = max(0, math.floor((at[1] - reach - low[1]) / cell))
         last_j = min(rows - 1, math.ceil((at[1] + reach - low[1]) / cell))
         for i in range(first_i, last_i + 1):
             for j in range(first_j, last_j + 1):
-                if _gap(movers, m, at, low[0] + i * cell, low[1] + j * cell) <= kept:
+                if _distance(moving, m, at, low[0] + i * cell, low[1] + j * cell) <= kept:
                     clear[i, j] = False
 
 
 @kernel
-def _step_free(movers, low, cell, robot, i, j, p, q, at):
+def _step_free(moving, low, cell, robot, i, j, p, q, at):
     """Whether a step from (i, j) to (p, q) is clear at its quarters; the ends are known."""
     for quarter in range(3):
         share = 0.25 * (quarter + 1)
         x = low[0] + (i + share * (p - i)) * cell
         y = low[1] + (j + share * (q - j)) * cell
-        for m in range(len(movers.radius)):
-            if _gap(movers, m, at[quarter, m], x, y) <= robot:
+        for m in range(len(moving.radius)):
+            if _distance(moving, m, at[quarter, m], x, y) <= robot:
                 return False
     return True
 
 
 @kernel
-def _pose_at(movers, m, time, at):
-    """Pose of mover `m` at a time, linear between its knots, still before and after."""
-    last = movers.knots[m] - 1
+def _pose_at(moving, m, time, at):
+    """Pose of moving obstacle `m` at a time, linear between its knots, still before and after."""
+    last = moving.knots[m] - 1
     k = 0
-    while k < last and movers.time[m, k + 1] < time:
+    while k < last and moving.time[m, k + 1] < time:
         k += 1
     share = 0.0
     if k < last:
-        share = (time - movers.time[m, k]) / (movers.time[m, k + 1] - movers.time[m, k])
+        share = (time - moving.time[m, k]) / (moving.time[m, k + 1] - moving.time[m, k])
         share = min(max(share, 0.0), 1.0)
     for axis in range(3):
-        after = movers.pose[m, min(k + 1, last), axis]
-        at[axis] = movers.pose[m, k, axis] + share * (after - movers.pose[m, k, axis])
+        after = moving.pose[m, min(k + 1, last), axis]
+        at[axis] = moving.pose[m, k, axis] + share * (after - moving.pose[m, k, axis])
 
 
 @kernel
-def _gap(movers, m, at, x, y):
-    """Distance from a point to mover `m` at a pose, 0 inside a box."""
+def _distance(moving, m, at, x, y):
+    """Distance from a point to moving obstacle `m` at a pose, 0 inside a box."""
     dx, dy = x - at[0], y - at[1]
     cos, sin = math.cos(at[2]), math.sin(at[2])
-    along = max(abs(cos * dx + sin * dy) - movers.half[m, 0], 0.0)
-    across = max(abs(cos * dy - sin * dx) - movers.half[m, 1], 0.0)
-    return math.hypot(along, across) - movers.radius[m]
+    along = max(abs(cos * dx + sin * dy) - moving.half[m, 0], 0.0)
+    across = max(abs(cos * dy - sin * dx) - moving.half[m, 1], 0.0)
+    return math.hypot(along, across) - moving.radius[m]
 
 
 def close_loop(problem: Problem, *, step: float, time_limit: float) -> ClosedLoop:
@@ -233,9 +236,9 @@ def least_clearance(problem: Problem, loop: ClosedLoop) -> tuple[float, float]:
         pieces.append((times, np.repeat(stands[None], len(times), axis=0)))
     least, when = math.inf, 0.0
     for times, poses in pieces:
-        gaps = world.clearance(poses, times)
-        if gaps.min(initial=math.inf) < least:
-            least, when = float(gaps.min()), float(times[gaps.argmin()])
+        clearances = world.clearance(poses, times)
+        if clearances.min(initial=math.inf) < least:
+            least, when = float(clearances.min()), float(times[clearances.argmin()])
     return least, when
 
 
@@ -248,7 +251,7 @@ def main() -> None:
     parser.add_argument("--cell", type=float, default=0.1, help="[m] of the judge's grid")
     options = parser.parse_args()
     counts = {(escape, hit): 0 for escape in (True, False) for hit in (True, False)}
-    reached, solves, gaps, notes, judging = 0, [], [], [], 0.0
+    reached, solves, clearances, notes, judging = 0, [], [], [], 0.0
     deeds: Counter[str] = Counter()
     for seed in range(options.first, options.first + options.scenes):
         problem = moving_scene(seed)
@@ -256,23 +259,23 @@ def main() -> None:
         escape = escape_possible(problem, cell=options.cell)
         judging += time.perf_counter() - began
         loop = close_loop(problem, step=options.step, time_limit=options.time_limit)
-        gap, when = least_clearance(problem, loop)
-        hit = gap <= 0.0
+        clearance, when = least_clearance(problem, loop)
+        hit = clearance <= 0.0
         counts[escape, hit] += 1
         reached += loop.reached
         deeds.update(step.deed.value for step in loop.steps)
-        gaps.append(gap)
+        clearances.append(clearance)
         solves += (1e3 * loop.solve_s).tolist()
         if hit or not escape or not loop.reached:
-            notes.append(f"scene {seed}: clearance {gap:.3f} m at {when:.2f} s, {loop.status} "
-                         f"{loop.reason}"
+            notes.append(f"scene {seed}: clearance {clearance:.3f} m at {when:.2f} s, "
+                         f"{loop.status} {loop.reason}"
                          f"{'' if escape else '; the judge sees no escape'}")  # fmt: skip
     show(["escape was possible", "without collision", "with collision"],
          [["yes", counts[True, False], counts[True, True]],
           ["not seen", counts[False, False], counts[False, True]]])  # fmt: skip
     print(f"goal reached: {reached} of {options.scenes}; steps [ms]: {spread(solves)}")
     print("what the steps did: " + ", ".join(f"{n} {deed}" for deed, n in deeds.most_common()))
-    print(f"least clearance [m]: {min(gaps):.3f}; judging a scene: "
+    print(f"least clearance [m]: {min(clearances):.3f}; judging a scene: "
           f"{judging / options.scenes:.2f} s")  # fmt: skip
     for note in notes:
         print(note)

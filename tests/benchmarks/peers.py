@@ -245,7 +245,7 @@ def packed_world(problem: Problem) -> np.ndarray:
 
 
 def _pieces(problem: Problem) -> tuple[list[np.ndarray], list[float]]:
-    """Corners and radii of convex pieces of all obstacles that stand still."""
+    """Corners and radii of convex pieces of all static obstacles."""
     pieces: list[tuple[np.ndarray, float]] = []
     for obstacle in problem.obstacles:
         if isinstance(obstacle, OccupancyMap):
@@ -321,7 +321,7 @@ def is_free(x, y, yaw, world):
 @kernel
 def _apart(moved, n, radius, world, shape):
     """Whether an axis separates a convex part (n corners of `moved`) from a convex shape."""
-    m, gap = int(world[shape]), radius + world[shape + 1]
+    m, kept = int(world[shape]), radius + world[shape + 1]
     corners = world[shape + 5 : shape + 5 + 2 * m].reshape(m, 2)
     for side in range(2):
         count = n if side == 0 else m
@@ -333,7 +333,7 @@ def _apart(moved, n, radius, world, shape):
                 ax, ay = moved[k, 1] - moved[after, 1], moved[after, 0] - moved[k, 0]
             else:
                 ax, ay = corners[k, 1] - corners[after, 1], corners[after, 0] - corners[k, 0]
-            if _axis_gap(moved, n, corners, m, ax, ay) > gap:
+            if _axis_clearance(moved, n, corners, m, ax, ay) > kept:
                 return True
     if n > 1 and m > 1:
         return False
@@ -344,12 +344,12 @@ def _apart(moved, n, radius, world, shape):
             dx, dy = moved[k, 0] - corners[i, 0], moved[k, 1] - corners[i, 1]
             if dx * dx + dy * dy < best:
                 best, ax, ay = dx * dx + dy * dy, dx, dy
-    return _axis_gap(moved, n, corners, m, ax, ay) > gap
+    return _axis_clearance(moved, n, corners, m, ax, ay) > kept
 
 
 @kernel
-def _axis_gap(moved, n, corners, m, ax, ay):
-    """Gap between two sets of corners seen along an axis, negative where they overlap."""
+def _axis_clearance(moved, n, corners, m, ax, ay):
+    """Clearance between two sets of corners seen along an axis, negative where they overlap."""
     length = math.hypot(ax, ay)
     if length == 0.0:
         return -math.inf
@@ -374,8 +374,8 @@ def main() -> None:
     began = time.perf_counter()
     free = [is_free(x, y, yaw, packed) for x, y, yaw in rows]
     micros = 1e6 * (time.perf_counter() - began) / len(rows)
-    gaps = world.clearance(poses - np.append(world.origin, 0.0))
-    wrong = int(((gaps > 1e-9) != np.array(free)).sum())
+    clearances = world.clearance(poses - np.append(world.origin, 0.0))
+    wrong = int(((clearances > 1e-9) != np.array(free)).sum())
     print(f"compiled test: {micros:.2f} us a pose, {np.mean(free):.0%} free, "
           f"{wrong} of {len(rows)} judged otherwise by shapely")  # fmt: skip
 

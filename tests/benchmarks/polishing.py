@@ -212,9 +212,9 @@ def row(
     if result.motion is None:
         return [*cells, "-", aim, "-", "-", "-", result.reason]
     motion = result.motion
-    off, gap, over = checked(task, motion)
-    verdict = "clean" if gap > 0.0 and over <= 0.0 else "TOUCHES OR EXCEEDS"
-    return [*cells, motion.duration, aim, motion.error, off, 1e3 * gap, verdict]
+    off, clearance, over = checked(task, motion)
+    verdict = "clean" if clearance > 0.0 and over <= 0.0 else "TOUCHES OR EXCEEDS"
+    return [*cells, motion.duration, aim, motion.error, off, 1e3 * clearance, verdict]
 
 
 def checked(task: PolishTask, motion: PolishedMotion) -> tuple[float, float, float]:
@@ -226,14 +226,14 @@ def checked(task: PolishTask, motion: PolishedMotion) -> tuple[float, float, flo
     place = task.start[:2]
     around = shapely.union_all(shapely.transform(shapes, lambda points: points - place))
     near = poses - np.array([*place, 0.0])
-    gap = math.inf
+    clearance = math.inf
     for part in task.parts:
         for pose, state in zip(near, states, strict=True):
             frame = SE2(pose)
             if part.pose is not None:
                 frame = frame @ SE2(np.array(part.pose(state[3:]), dtype=np.float64))
             for corners, _ in part.solids:
-                gap = min(gap, shapely.Polygon(frame.act(corners)).distance(around))
+                clearance = min(clearance, shapely.Polygon(frame.act(corners)).distance(around))
     ends = task.ends(float(states[-1, 2])).end
     off = max(abs(a - b) for a, b in zip(states[-1], ends, strict=True) if b is not None)
     excess = [motion.control - model.control_limits[:, 1],
@@ -243,7 +243,7 @@ def checked(task: PolishTask, motion: PolishedMotion) -> tuple[float, float, flo
     for axis, pair in enumerate((task.bounds.x, task.bounds.y)):
         if pair is not None:
             excess += [pair[0] - 1e-9 - poses[:, axis], poses[:, axis] - pair[1] - 1e-9]
-    return off, gap, max(float(rows.max()) for rows in excess)
+    return off, clearance, max(float(rows.max()) for rows in excess)
 
 
 def driven(task: PolishTask, motion: PolishedMotion) -> np.ndarray:
@@ -276,7 +276,7 @@ def main() -> None:
     parser.add_argument("--long-limit", type=float, default=30.0, help="[s] of a dynobench problem")
     options = parser.parse_args()
     head = ["case", "plans", "search [s]", "polish [s]", "clock [s]", "duration [s]", "aim [s]",
-            "closed to", "driven again", "gap [mm]", ""]  # fmt: skip
+            "closed to", "driven again", "clearance [mm]", ""]  # fmt: skip
     rows: list[list[Any]] = []
     if cases.present("tpcap") and options.tpcap:
         problems = cases.tpcap()

@@ -38,9 +38,9 @@ def expected(problem: Problem) -> tuple[str, ...]:
     def blocked(poses: np.ndarray) -> tuple[bool, ...]:
         """Whether none of the poses is free; both answers where it is a matter of rounding."""
         times = np.full(len(poses), problem.start_time)
-        gaps = world.clearance(poses - np.append(world.origin, 0.0), times) - problem.margin
-        gaps = np.where(outside(problem, poses[:, :2]) > 0.0, -np.inf, gaps)
-        best = float(gaps.max())
+        clearances = world.clearance(poses - np.append(world.origin, 0.0), times) - problem.margin
+        clearances = np.where(outside(problem, poses[:, :2]) > 0.0, -np.inf, clearances)
+        best = float(clearances.max())
         return (True, False) if abs(best) <= TOUCHING else (best < 0.0,)
 
     at_start = blocked(problem.start[None])

@@ -31,8 +31,8 @@ def slow_distance(footprint, obstacles, pose, time=0.0):
     body = [_core(shape) for shape in (part.moved(SE2(pose)) for part in footprint)]
     body = body or [(shapely.Point(pose[:2]), 0.0)]
     others = [core for obstacle in obstacles for core in _cores(obstacle, time)]
-    gaps = [max(0.0, a.distance(b) - r - s) for a, r in body for b, s in others]
-    return min(gaps, default=math.inf)
+    distances = [max(0.0, a.distance(b) - r - s) for a, r in body for b, s in others]
+    return min(distances, default=math.inf)
 
 
 def _cores(obstacle, time):
@@ -83,7 +83,7 @@ def random_map(rng):
     return OccupancyMap(cells, resolution=0.4, origin=origin)
 
 
-def random_mover(rng):
+def random_moving_obstacle(rng):
     n = rng.integers(1, 5)
     time = np.cumsum(rng.uniform(0.3, 2.0, n)) - 1.0
     pose = np.column_stack([rng.uniform(-6, 6, (n, 2)), rng.uniform(-4, 4, n)])
@@ -93,12 +93,12 @@ def random_mover(rng):
     return Obstacle(shapes[rng.integers(4)], motion=Motion(time, pose))
 
 
-def random_scene(rng, *, movers=0):
-    still = tuple(Obstacle(random_shape(rng)) for _ in range(rng.integers(1, 4)))
+def random_scene(rng, *, moving=0):
+    static = tuple(Obstacle(random_shape(rng)) for _ in range(rng.integers(1, 4)))
     maps = (random_map(rng),) if rng.random() < 0.2 else ()
-    moving = tuple(random_mover(rng) for _ in range(movers))
-    order = rng.permutation(len(still) + len(maps) + len(moving))
-    every = (*still, *maps, *moving)
+    traffic = tuple(random_moving_obstacle(rng) for _ in range(moving))
+    order = rng.permutation(len(static) + len(maps) + len(traffic))
+    every = (*static, *maps, *traffic)
     return tuple(every[k] for k in order)
 
 

@@ -16,7 +16,7 @@ from maneuver_automaton.groups import SE2
 from tests.collision import scenes
 from tests.reference_collision import (
     driven,
-    free_times_and_gaps,
+    free_times_and_clearances,
     moved,
     shapely_world,
     world_around,
@@ -41,8 +41,8 @@ def sampled(exact, pose, twist, duration, clock, fastest, *, step=0.04):
     """Times, exact clearances, and by how much these can change from sample to sample."""
     n = 2 + min(int(abs(duration) * fastest / step), 400)
     since = np.linspace(0.0, duration, n)
-    gaps = exact.clearance(driven(pose, twist, since), clock + since)
-    return np.abs(since), np.maximum(gaps, 0.0), fastest * abs(duration) / (n - 1)
+    distances = exact.clearance(driven(pose, twist, since), clock + since)
+    return np.abs(since), np.maximum(distances, 0.0), fastest * abs(duration) / (n - 1)
 
 
 def assert_bracketed(free, samples, *, keep, margin, short=1.0):
@@ -64,27 +64,29 @@ def motions(rng, n):
     return poses, twists, rng.uniform(-6.0, 6.0, n)
 
 
-def check_random(name, *, seed, movers, keep, margin, worlds=5, n=24, short=1.0):
+def check_random(name, *, seed, moving, keep, margin, worlds=5, n=24, short=1.0):
     rng = np.random.default_rng([seed, *name.encode()])
     footprint = scenes.FOOTPRINTS[name]
     begun = 0
     for _ in range(worlds):
-        obstacles = scenes.random_scene(rng, movers=movers)
+        obstacles = scenes.random_scene(rng, moving=moving)
         world = world_around(footprint, obstacles, keep=keep)
         exact = shapely_world(footprint, obstacles)
         poses, twists, durations = motions(rng, n)
         clocks = rng.uniform(-1.0, 8.0, n)
-        free, last = free_times_and_gaps(
+        free, last = free_times_and_clearances(
             world, world.into(poses), twists, durations, margin=margin, keep=keep, times=clocks
         ).T
         assert ((free >= 0.0) & (free <= np.abs(durations))).all()
         signed = np.copysign(free, durations)
         at_end = np.maximum(exact.clearance(ends(poses, twists, signed), clocks + signed), 0.0)
         whole = free == np.abs(durations)
-        assert (last[whole] <= at_end[whole] - keep + ROUNDED).all(), "the last gap is no bound"
+        assert (last[whole] <= at_end[whole] - keep + ROUNDED).all(), (
+            "the last clearance is no bound"
+        )
         assert (last[~whole] <= margin).all()
         assert (at_end[free == 0.0] <= short * (keep + margin) + ROUNDED).all()
-        fastest = fastest_points(world.body, twists) + world.arrays.movers.speed.max(initial=0.0)
+        fastest = fastest_points(world.body, twists) + world.arrays.moving.speed.max(initial=0.0)
         for k in np.flatnonzero(free > 0.0):
             begun += 1
             samples = sampled(exact, poses[k], twists[k], durations[k], clocks[k], fastest[k])
@@ -99,24 +101,24 @@ def ends(poses, twists, times):
 
 @pytest.mark.parametrize("name", scenes.FOOTPRINTS)
 def test_free_motions_are_free(name):
-    check_random(name, seed=1, movers=0, keep=0.0, margin=0.005)
+    check_random(name, seed=1, moving=0, keep=0.0, margin=0.005)
 
 
 @pytest.mark.parametrize("name", scenes.FOOTPRINTS)
 def test_free_motions_are_free_of_what_moves(name):
-    check_random(name, seed=2, movers=2, keep=0.0, margin=0.005)
+    check_random(name, seed=2, moving=2, keep=0.0, margin=0.005)
 
 
 @pytest.mark.parametrize("name", ["car", "disc"])
 def test_a_distance_is_kept_and_no_more(name):
-    for movers in (0, 1, 2):
-        check_random(name, seed=3, movers=movers, keep=0.3, margin=0.002)
+    for moving in (0, 1, 2):
+        check_random(name, seed=3, moving=moving, keep=0.3, margin=0.002)
 
 
 @pytest.mark.parametrize("name", ["car", "disc"])
 def test_a_distance_is_kept(name):
-    for movers in (0, 1, 2):
-        check_random(name, seed=3, movers=movers, keep=0.3, margin=0.002, short=math.inf)
+    for moving in (0, 1, 2):
+        check_random(name, seed=3, moving=moving, keep=0.3, margin=0.002, short=math.inf)
 
 
 def test_by_hand_a_distance_is_kept_between_two_corners():
@@ -137,12 +139,12 @@ def test_a_distance_is_kept_between_faces():
 
 
 @pytest.mark.parametrize("name", ["car", "truck", "disc"])
-@pytest.mark.parametrize("movers", [0, 2])
-def test_driven_in_two_parts_it_is_as_free_as_in_one(name, movers):
-    rng = np.random.default_rng([4, movers, *name.encode()])
+@pytest.mark.parametrize("moving", [0, 2])
+def test_driven_in_two_parts_it_is_as_free_as_in_one(name, moving):
+    rng = np.random.default_rng([4, moving, *name.encode()])
     footprint, margin = scenes.FOOTPRINTS[name], 1e-3
     for _ in range(6):
-        obstacles = scenes.random_scene(rng, movers=movers)
+        obstacles = scenes.random_scene(rng, moving=moving)
         world, exact = world_around(footprint, obstacles), shapely_world(footprint, obstacles)
         poses, twists, durations = motions(rng, 20)
         clocks = rng.uniform(-1.0, 8.0, 20)
@@ -155,7 +157,7 @@ def test_driven_in_two_parts_it_is_as_free_as_in_one(name, movers):
             world, after, durations=durations - first, times=clocks + first, **shared
         )
         parts = np.where(begun < np.abs(first), begun, np.abs(first) + gone_on)
-        fastest = fastest_points(world.body, twists) + world.arrays.movers.speed.max(initial=0.0)
+        fastest = fastest_points(world.body, twists) + world.arrays.moving.speed.max(initial=0.0)
         for k in np.flatnonzero(np.abs(parts - whole) > 2e-3):
             samples = sampled(exact, poses[k], twists[k], durations[k], clocks[k], fastest[k])
             for free in (parts[k], whole[k]):  # it grazes something: both answers are right
@@ -168,7 +170,7 @@ def test_moved_worlds_give_the_same_answer(name):
     footprint = scenes.FOOTPRINTS[name]
     compared = differing = 0
     for _ in range(6):
-        obstacles = scenes.random_scene(rng, movers=int(rng.integers(0, 3)))
+        obstacles = scenes.random_scene(rng, moving=int(rng.integers(0, 3)))
         by = SE2([*rng.uniform(-40.0, 40.0, 2), rng.uniform(-9.0, 9.0)])
         poses, twists, durations = motions(rng, 30)
         shared = {"twists": twists, "durations": durations, "margin": 0.005, "times": 1.0}
@@ -179,8 +181,8 @@ def test_moved_worlds_give_the_same_answer(name):
             for world, (_, seen) in zip(worlds, frames, strict=True)
         )
         exact = shapely_world(footprint, obstacles)
-        movers = worlds[0].arrays.movers.speed.max(initial=0.0)
-        fastest = fastest_points(worlds[0].body, twists) + movers
+        moving = worlds[0].arrays.moving.speed.max(initial=0.0)
+        fastest = fastest_points(worlds[0].body, twists) + moving
         differs = np.flatnonzero(np.abs(here - there) > 1e-6)
         compared += len(poses)
         differing += len(differs)
@@ -193,20 +195,20 @@ def test_moved_worlds_give_the_same_answer(name):
 
 @given(
     speed=st.floats(0.05, 5.0),
-    gap=st.floats(0.1, 5.0),
+    ahead=st.floats(0.1, 5.0),
     margin=st.floats(1e-6, 0.05),
     backwards=st.booleans(),
 )
 @settings(max_examples=60)
-def test_by_hand_towards_a_wall(speed, gap, margin, backwards):
-    wall = [Obstacle(Box([1.0, 40.0], [0.5 + gap + 1.0, 0.0]))]
+def test_by_hand_towards_a_wall(speed, ahead, margin, backwards):
+    wall = [Obstacle(Box([1.0, 40.0], [0.5 + ahead + 1.0, 0.0]))]
     world = world_around((Box([2.0, 1.0]),), wall)
     sign = -1.0 if backwards else 1.0
     (free,) = free_times(
         world, world.into(np.zeros((1, 3))), twists=[[sign * speed, 0.0, 0.0]],
         durations=[sign * 200.0], margin=margin,
     )  # fmt: skip
-    assert (gap - margin) / speed - 1e-6 <= free <= gap / speed + 1e-6
+    assert (ahead - margin) / speed - 1e-6 <= free <= ahead / speed + 1e-6
 
 
 def test_by_hand_what_moves_is_met_in_time():
@@ -258,10 +260,10 @@ def test_free_motions_are_free_of_what_is_there(name):
     rng = np.random.default_rng([6, *name.encode()])
     footprint, met = scenes.FOOTPRINTS[name], 0
     for _ in range(6):
-        movers = [scenes.random_mover(rng) for _ in range(4)]
+        moving = [scenes.random_moving_obstacle(rng) for _ in range(4)]
         windows = tuple((a, a + rng.uniform(0.2, 3.0)) for a in rng.uniform(-2.0, 6.0, 4))
-        world = world_around(footprint, movers, present=windows)
-        alone = [shapely_world(footprint, [one]) for one in movers]
+        world = world_around(footprint, moving, present=windows)
+        alone = [shapely_world(footprint, [one]) for one in moving]
         poses, twists, durations = motions(rng, 30)
         clocks = rng.uniform(-1.0, 6.0, 30)
         free = free_times(world, world.into(poses), twists=twists, durations=durations,
@@ -270,20 +272,20 @@ def test_free_motions_are_free_of_what_is_there(name):
         for k in range(30):
             since = np.linspace(0.0, durations[k], 200)
             times, places = clocks[k] + since, driven(poses[k], twists[k], since)
-            gaps = np.array(
+            measured = np.array(
                 [
                     np.where((a <= times) & (times <= b), one.clearance(places, times), np.inf)
                     for one, (a, b) in zip(alone, windows, strict=True)
                 ]
             ).min(axis=0)
-            assert free[k] == 0.0 or (gaps[np.abs(since) <= free[k]] > 0.0).all()
+            assert free[k] == 0.0 or (measured[np.abs(since) <= free[k]] > 0.0).all()
             if free[k] < abs(durations[k]):
                 met += 1
-                fast = fastest[k] + world.arrays.movers.speed.max()
+                fast = fastest[k] + world.arrays.moving.speed.max()
                 slack = fast * abs(durations[k]) / 199
                 at = np.searchsorted(np.abs(since), free[k])
                 # One that is there for a moment between two samples is not seen by them.
-                seen = gaps[max(at - 1, 0) : at + 2].min()
+                seen = measured[max(at - 1, 0) : at + 2].min()
                 assert seen <= 0.005 + slack or np.isinf(seen)
     assert met > 10
 
@@ -291,8 +293,8 @@ def test_free_motions_are_free_of_what_is_there(name):
 def test_what_appears_on_the_way_is_there_from_then_on():
     world = world_around((Disc(1.0),), [STANDING], present=((1.0, 2.0),))
     times = [0.99, 1.0, 2.0, 2.01]
-    gaps = clearances(world, world.into(np.zeros((4, 3))), times=times)
-    assert gaps.tolist() == pytest.approx([math.inf, 1.5, 1.5, math.inf])
+    measured = clearances(world, world.into(np.zeros((4, 3))), times=times)
+    assert measured.tolist() == pytest.approx([math.inf, 1.5, 1.5, math.inf])
 
 
 def test_a_spin_in_place_is_free_for_ever_where_its_circle_is():

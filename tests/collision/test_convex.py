@@ -116,13 +116,15 @@ def test_normals_and_plates_of_solids():
 @pytest.mark.parametrize("off", [1e-16, 1e-12, 3e-10])
 def test_corners_that_all_but_coincide(off):
     ring = [[0, 0], [1, 0], [1, 1], [0, 1], [off, 0.3 * off]]
-    gaps = world_gaps([Obstacle(Polygon(ring))])
-    assert gaps == pytest.approx(world_gaps([Obstacle(Box([1.0, 1.0], [0.5, 0.5]))]), abs=1e-8)
+    found = world_clearances([Obstacle(Polygon(ring))])
+    assert found == pytest.approx(
+        world_clearances([Obstacle(Box([1.0, 1.0], [0.5, 0.5]))]), abs=1e-8
+    )
 
 
 def test_a_needle_thinner_than_what_coordinates_are_rounded_to():
-    gaps = world_gaps([Obstacle(Box([3.0, 1e-10]))])
-    assert gaps == pytest.approx(world_gaps([Obstacle(Box([3.0, 1e-7]))]), abs=1e-6)
+    found = world_clearances([Obstacle(Box([3.0, 1e-10]))])
+    assert found == pytest.approx(world_clearances([Obstacle(Box([3.0, 1e-7]))]), abs=1e-6)
 
 
 @pytest.mark.parametrize("size", [5e-9, 2e-8, 1e-7])
@@ -133,7 +135,7 @@ def test_a_corner_cut_off_by_nanometres(size):
         ring = np.array([[a, 0], [3, 0], [3, 3], [0, 3], [0, b]])
         by = SE2([*rng.uniform(-5, 5, 2), rng.uniform(-4, 4)])
         whole = [Obstacle(Box([3.0, 3.0], [1.5, 1.5]).moved(by))]
-        assert_below(world_gaps([Obstacle(Polygon(ring).moved(by))]), whole, atol=3e-8)
+        assert_below(world_clearances([Obstacle(Polygon(ring).moved(by))]), whole, atol=3e-8)
 
 
 @pytest.mark.parametrize(
@@ -151,17 +153,17 @@ def test_tiny_edges_on_an_arc_hide_nothing(size):
         angles = np.sort(np.concatenate([angles, angles + size * rng.uniform(0.5, 1.0, 12)]))
         ring = 2.0 * np.stack([np.cos(angles), np.sin(angles)], 1)
         block = Polygon(ring).moved(SE2([*rng.uniform(-5, 5, 2), rng.uniform(-4, 4)]))
-        assert_below(world_gaps([Obstacle(block)]), [Obstacle(block)], atol=3e-8)
+        assert_below(world_clearances([Obstacle(block)]), [Obstacle(block)], atol=3e-8)
 
 
 PLACES = np.array([scenes.random_pose(np.random.default_rng(k)) for k in range(60)])
 
 
-def world_gaps(obstacles):
+def world_clearances(obstacles):
     world = world_around((Box([1.0, 0.5]),), obstacles)
     return clearances(world, world.into(PLACES))
 
 
-def assert_below(gaps, obstacles, *, atol):
+def assert_below(found, obstacles, *, atol):
     exact = shapely_world((Box([1.0, 0.5]),), obstacles).clearance(PLACES)
-    assert (gaps <= np.maximum(exact, 0.0) + atol).all()
+    assert (found <= np.maximum(exact, 0.0) + atol).all()

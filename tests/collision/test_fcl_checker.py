@@ -58,19 +58,19 @@ def test_poses_against_shapely(name):
     rng = np.random.default_rng(len(name))
     footprint, hits = FOOTPRINTS[name], 0
     for _ in range(12):
-        obstacles = random_scene(rng, movers=rng.integers(2))
+        obstacles = random_scene(rng, moving=rng.integers(2))
         checker = FclChecker(footprint, obstacles)
         for _ in range(25):
             pose, time = random_pose(rng), rng.uniform(-2.0, 6.0)
-            gap = slow_distance(footprint, obstacles, pose, time)
+            exact = slow_distance(footprint, obstacles, pose, time)
             hit = checker.pose_hit(pose, time=time)
             if hit is None:
-                assert gap > 0.0
+                assert exact > 0.0
             else:
                 hits += 1
                 assert slow_distance(footprint, (obstacles[hit],), pose, time) <= 0.5 * PROVEN
             clearance = checker.clearance(pose, times=[time])
-            assert gap - 0.5 * PROVEN - 1e-8 <= clearance <= gap + 1e-8
+            assert exact - 0.5 * PROVEN - 1e-8 <= clearance <= exact + 1e-8
     assert hits > 3
 
 
@@ -104,7 +104,7 @@ def test_motions_among_moving_obstacles_against_shapely(name):
     rng = np.random.default_rng(200 + len(name))
     footprint, counts = FOOTPRINTS[name], [0, 0]
     for _ in range(14):
-        obstacles = random_scene(rng, movers=3)
+        obstacles = random_scene(rng, moving=3)
         checker = FclChecker(footprint, obstacles)
         for _ in range(4):
             start, twist = random_pose(rng), TWISTS[rng.integers(len(TWISTS))]
@@ -130,7 +130,7 @@ def test_motions_among_moving_obstacles_against_shapely(name):
 )
 def test_a_moved_scene_gives_the_same_answers(seed, by):
     rng, moved = np.random.default_rng(seed), SE2(np.array(by))
-    obstacles = random_scene(rng, movers=1)
+    obstacles = random_scene(rng, moving=1)
     there = tuple(obstacle.moved(moved) for obstacle in obstacles)
     origin = tuple(rng.uniform(-60.0, 60.0, 2))
     one, other = FclChecker((CAR,), obstacles), FclChecker((CAR,), there, origin=origin)
@@ -243,9 +243,9 @@ def test_whole_turns_of_the_heading_do_not_count(turns):
 def test_a_narrow_miss_is_refined():
     # around (0, 4.093) the far front corner runs on a circle; a post stands just outside it
     radius = math.hypot(3.75, 4.093 + 0.95)
-    for gap, hit in ((1.5e-3, None), (-1e-6, 0)):
+    for distance, hit in ((1.5e-3, None), (-1e-6, 0)):
         angle = -0.2
-        place = (radius + gap) * np.array([math.cos(angle), math.sin(angle)]) + [0.0, 4.093]
+        place = (radius + distance) * np.array([math.cos(angle), math.sin(angle)]) + [0.0, 4.093]
         post = (Obstacle(Box([1e-6, 1e-6], center=place)),)
         twist = [1.0, 0.0, 1.0 / 4.093]
         checker = FclChecker((CAR,), post)

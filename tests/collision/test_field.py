@@ -31,7 +31,7 @@ def out_of(world, places):
 def random_worlds(seed, footprint, n, *, keep=0.0):
     rng = np.random.default_rng(seed)
     for _ in range(n):
-        obstacles = scenes.random_scene(rng, movers=1)
+        obstacles = scenes.random_scene(rng, moving=1)
         if still(obstacles):
             yield obstacles, world_around(footprint, obstacles, keep=keep)
 
@@ -45,7 +45,7 @@ def assert_distances(values, exact, depth, *, most):
 
 
 def solid_union(obstacles):
-    """All that stands still as one geometry, discs as polygons around them."""
+    """All static obstacles as one geometry, discs as polygons around them."""
     solids = []
     for obstacle in still(obstacles):
         if isinstance(obstacle, OccupancyMap):

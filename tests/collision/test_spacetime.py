@@ -22,7 +22,7 @@ def offset_disc(pose, aside):
     return pose[..., :2] + aside * np.stack([-np.sin(turn), np.cos(turn)], axis=-1)
 
 
-def gap(here, there):
+def clearance(here, there):
     """Distance of two discs of radius 0.3, one a metre beside the origin of its frame."""
     apart = offset_disc(np.asarray(there), 1.0) - np.asarray(here)[..., :2]
     return np.maximum(np.hypot(apart[..., 0], apart[..., 1]) - 0.6, 0.0)
@@ -37,31 +37,31 @@ def gap(here, there):
 )
 def test_against_dense_times(start, twist, knots, begin, duration):
     motion = Motion(begin + np.arange(len(knots)) * 0.8, knots)
-    rover, mover = CoastingBody(np.array(start), twist, 0j, 0.3), MovingBody.of(motion, 1.3)
+    rover, other = CoastingBody(np.array(start), twist, 0j, 0.3), MovingBody.of(motion, 1.3)
     times = np.linspace(0.0, duration, 400)
-    gaps = gap(np.array([rover.at(time) for time in times]), mover.at(times))
+    clearances = clearance(np.array([rover.at(time) for time in times]), other.at(times))
     found = meet(
-        rover, mover, duration=duration, distance=lambda a, b: float(gap(a, b)), contact=1e-3
+        rover, other, duration=duration, distance=lambda a, b: float(clearance(a, b)), contact=1e-3
     )
-    rate = math.hypot(*twist[:2]) + mover.speed + mover.turn_rate * 1.3
+    rate = math.hypot(*twist[:2]) + other.speed + other.turn_rate * 1.3
     if found:
-        assert gaps.min() <= 1e-3 + rate * duration / 399 / 2 + 1e-12
+        assert clearances.min() <= 1e-3 + rate * duration / 399 / 2 + 1e-12
         center = rover.center(rover.at(0.5 * duration))
-        assert may_meet(rover, mover, duration=duration, center=center)
+        assert may_meet(rover, other, duration=duration, center=center)
     else:
-        assert gaps.min() > 0.0
+        assert clearances.min() > 0.0
 
 
 def test_rates_by_hand():
-    mover = MovingBody.of(Motion([1.0, 3.0, 4.0], [[0, 0, 0], [4, 2, 1], [4, 2, 7]]), 1.0)
-    assert mover.rates(0.0) == (0j, 0.0, 1.0)
-    assert mover.rates(1.0) == (2 + 1j, 0.5, 3.0)
-    assert mover.rates(3.5) == (0j, 6.0, 4.0)
-    assert mover.rates(4.0) == (0j, 0.0, math.inf)
-    assert mover.speed == pytest.approx(math.sqrt(5.0))
-    assert mover.turn_rate == 6.0
-    assert mover.from_time(1.0).at(1.0).tolist() == [2.0, 1.0, 0.5]
-    assert mover.at([-9.0, 9.0]).tolist() == [[0.0, 0.0, 0.0], [4.0, 2.0, 7.0]]
+    body = MovingBody.of(Motion([1.0, 3.0, 4.0], [[0, 0, 0], [4, 2, 1], [4, 2, 7]]), 1.0)
+    assert body.rates(0.0) == (0j, 0.0, 1.0)
+    assert body.rates(1.0) == (2 + 1j, 0.5, 3.0)
+    assert body.rates(3.5) == (0j, 6.0, 4.0)
+    assert body.rates(4.0) == (0j, 0.0, math.inf)
+    assert body.speed == pytest.approx(math.sqrt(5.0))
+    assert body.turn_rate == 6.0
+    assert body.from_time(1.0).at(1.0).tolist() == [2.0, 1.0, 0.5]
+    assert body.at([-9.0, 9.0]).tolist() == [[0.0, 0.0, 0.0], [4.0, 2.0, 7.0]]
 
 
 def test_a_convoy_takes_few_steps():

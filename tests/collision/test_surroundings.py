@@ -17,7 +17,7 @@ def test_against_every_pair(name):
     rng = np.random.default_rng(len(name))
     footprint = FOOTPRINTS[name]
     for _ in range(12):
-        obstacles = random_scene(rng, movers=rng.integers(3))
+        obstacles = random_scene(rng, moving=rng.integers(3))
         poses = np.array([random_pose(rng) for _ in range(12)])
         times = rng.uniform(-2.0, 6.0, 12)
         around = surroundings_of(obstacles, (0.0, 0.0))

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from maneuver_automaton._compile import kernel
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap, Polygon
-from maneuver_automaton.collision._kernels_movers import mover_pose
+from maneuver_automaton.collision._kernels_moving import obstacle_pose
 from maneuver_automaton.collision.world import own_frame, world_of
 from maneuver_automaton.groups import SE2
 from tests.collision import scenes
@@ -21,9 +21,9 @@ BODY = (Box([1.0, 0.5]),)
 
 
 @kernel
-def pose_of(movers, m, time):
-    """`mover_pose`, which only kernels call."""
-    return mover_pose(movers, m, time)
+def pose_of(moving, m, time):
+    """`obstacle_pose`, which only kernels call."""
+    return obstacle_pose(moving, m, time)
 
 
 def shape_on_a_raster(seed):
@@ -46,9 +46,9 @@ def shape_on_a_raster(seed):
 
 def arrays_of(world):
     parts = world.arrays
-    movers = parts.movers
+    moving = parts.moving
     return [parts.solids.edges, parts.solids.plates, parts.field.distance, parts.buckets.items,
-            movers.time, movers.pose, movers.speed, world.box]  # fmt: skip
+            moving.time, moving.pose, moving.speed, world.box]  # fmt: skip
 
 
 @given(seeds=st.lists(st.integers(0, 10**6), min_size=1, max_size=5), far=st.integers(0, 30))
@@ -91,52 +91,52 @@ def test_by_hand_a_world_from_its_own_frame():
 
 def test_which_frame_is_taken():
     other = np.array([1.0, 2.0, 0.5])
-    disc, mover = Obstacle(Disc(1.0)), Obstacle(Box([1, 1]), motion=Motion([0], [[5, 5, 1]]))
+    disc, moving = Obstacle(Disc(1.0)), Obstacle(Box([1, 1]), motion=Motion([0], [[5, 5, 1]]))
     cells = OccupancyMap([[1]], resolution=1.0, origin=[3.0, 4.0, 0.2])
-    assert own_frame((disc, mover), other) == (1.0, 2.0, 0.5)
-    assert own_frame((disc, mover, cells), other) == (3.0, 4.0, 0.2)
+    assert own_frame((disc, moving), other) == (1.0, 2.0, 0.5)
+    assert own_frame((disc, moving, cells), other) == (3.0, 4.0, 0.2)
     assert own_frame((Obstacle(Box([1, 1], [7, 7], 0.3)), cells), other) == (7.0, 7.0, 0.3)
     ring = Obstacle(Polygon([[1, 1], [1, 4], [0, 1]]))
     assert own_frame((ring,), other) == pytest.approx((1.0, 1.0, math.atan2(-3, -1)))
 
 
-def test_movers_are_where_they_are_said_to_be():
+def test_moving_obstacles_are_where_they_are_said_to_be():
     rng = np.random.default_rng(1)
     for _ in range(10):
-        mover = scenes.random_mover(rng)
+        obstacle = scenes.random_moving_obstacle(rng)
         wall = Obstacle(Box([1.0, 1.0], rng.uniform(-5, 5, 2), rng.uniform(-3, 3)))
-        world = world_around(BODY, [wall, mover])
+        world = world_around(BODY, [wall, obstacle])
         times = rng.uniform(-2.0, 9.0, 20)
-        seen = world.into(mover.motion.at(times))
-        got = np.array([pose_of(world.arrays.movers, 0, t) for t in times])
+        seen = world.into(obstacle.motion.at(times))
+        got = np.array([pose_of(world.arrays.moving, 0, t) for t in times])
         off = got - seen
         off[:, 2] = np.remainder(off[:, 2] + math.pi, 2 * math.pi) - math.pi
         assert np.abs(off).max() < 5e-9
-        assert world.last_event == mover.motion.time[-1]
+        assert world.last_event == obstacle.motion.time[-1]
 
 
-def test_no_point_of_a_mover_is_faster():
+def test_no_point_of_a_moving_obstacle_is_faster():
     rng = np.random.default_rng(2)
     for _ in range(10):
-        mover = scenes.random_mover(rng)
-        world = world_around(BODY, [mover])
+        obstacle = scenes.random_moving_obstacle(rng)
+        world = world_around(BODY, [obstacle])
         corners = (
-            np.array([[mover.shape.radius, 0.0]]) if isinstance(mover.shape, Disc)
-            else mover.shape.corners
+            np.array([[obstacle.shape.radius, 0.0]]) if isinstance(obstacle.shape, Disc)
+            else obstacle.shape.corners
         )  # fmt: skip
-        times = np.linspace(mover.motion.time[0], mover.motion.time[-1], 400)
-        if len(mover.motion.time) < 2:
-            assert world.arrays.movers.speed.tolist() == [0.0]
+        times = np.linspace(obstacle.motion.time[0], obstacle.motion.time[-1], 400)
+        if len(obstacle.motion.time) < 2:
+            assert world.arrays.moving.speed.tolist() == [0.0]
             continue
-        places = SE2(mover.motion.at(times)[:, None]).act(corners)
+        places = SE2(obstacle.motion.at(times)[:, None]).act(corners)
         speed = np.hypot(*np.diff(places, axis=0).transpose(2, 0, 1)) / np.diff(times)[:, None]
-        assert speed.max() <= world.arrays.movers.speed[0] * (1.0 + 1e-9)
+        assert speed.max() <= world.arrays.moving.speed[0] * (1.0 + 1e-9)
 
 
 def test_the_box_holds_everything_all_the_time():
     rng = np.random.default_rng(3)
     for _ in range(10):
-        obstacles = scenes.random_scene(rng, movers=1)
+        obstacles = scenes.random_scene(rng, moving=1)
         world = world_around(BODY, obstacles)
         times = np.linspace(-2.0, 12.0, 50)
         for obstacle in obstacles:

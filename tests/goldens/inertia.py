@@ -86,7 +86,7 @@ def _inertia() -> Iterator[Scene]:
         for seed in range(2):
             yield _scene(f"{name}/box/{seed}", of(sent, name, seed, blocked=True))
     effort = Cost(time=1.0, effort=0.3)
-    mover = Obstacle(Disc(0.4), motion=Motion([0.0, 8.0], [[2.5, -3.0, 0.0], [2.5, 3.0, 0.0]]))
+    crossing = Obstacle(Disc(0.4), motion=Motion([0.0, 8.0], [[2.5, -3.0, 0.0], [2.5, 3.0, 0.0]]))
     beside = [Box([0.5, 1.5], [2.5, 0.5])]
     yield from (
         _scene(f"robot/{name}", make, name in ("effort", "moving"))
@@ -105,7 +105,7 @@ def _inertia() -> Iterator[Scene]:
             ),
             "box": of(robot, 10, obstacles=beside, footprint=Box([0.4, 0.3])),
             "bounds": of(robot, 11, bounds=Bounds(y=(-2.5, 2.5)), obstacles=beside),
-            "moving": of(robot, 12, obstacles=[mover], footprint=Disc(0.3)),
+            "moving": of(robot, 12, obstacles=[crossing], footprint=Disc(0.3)),
             "zone": of(robot, 13, zones=[Zone(shape=Box([1.0, 20.0], [2.5, 0.0]), max_speed=0.9)]),
             "grid": of(robot, 14, automaton=inertial_unicycle()),
             "margin": of(robot, 15, obstacles=beside, footprint=Disc(0.2), margin=0.2),

@@ -16,7 +16,7 @@ from tests.goldens.inertia import sent
 from tests.goldens.scenes import SCENARIOS, glider, grid, platform, strip
 from tests.inertia import car_automaton, unicycle_automaton
 from tests.receding_horizon.loops import NEAR, parking_loop, straight
-from tests.receding_horizon.scenes import among, crossing, door, mover, on_the_goal
+from tests.receding_horizon.scenes import among, crossing, door, moving_obstacle, on_the_goal
 from tests.scenes import reeds_shepp
 
 WORK = SearchSettings(max_expansions=800)
@@ -103,7 +103,7 @@ def _kinematic() -> Iterator[Loop]:
     yield Loop(name="door", make=lambda: among(*door(4.0)), step=0.5)
     yield Loop(
         name="overtaken",
-        make=lambda: among(mover([0.0, 8.0], [(-3.0, 0.2), (5.0, 0.2)])),
+        make=lambda: among(moving_obstacle([0.0, 8.0], [(-3.0, 0.2), (5.0, 0.2)])),
         step=0.5,
     )
     yield Loop(name="cost of effort", make=lambda: among(box, cost=Cost(time=1.0, effort=0.5)),

@@ -629,7 +629,7 @@ def _just_beside(vehicle: Vehicle, pose: np.ndarray, bodies: Bodies, side: float
     """A small disc beside a pose which all bodies of a course just miss, if there is one."""
     for offset in np.linspace(0.1, 2.0, 96) * vehicle.size:
         disc = Disc(0.05 * vehicle.size, pose[:2] + side * offset * _left(float(pose[2])))
-        if float(bodies.gap(*outside.solid(disc)).min()) > 0.005 * vehicle.size:
+        if float(bodies.clearance(*outside.solid(disc)).min()) > 0.005 * vehicle.size:
             yield disc
             return
 

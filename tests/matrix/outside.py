@@ -161,7 +161,7 @@ class Bodies:
     shapes: np.ndarray  # (n, k) geometries
     radii: np.ndarray  # (k,) [m], zero but for discs
 
-    def gap(self, thing: shapely.Geometry | np.ndarray, radius: float = 0.0) -> np.ndarray:
+    def clearance(self, thing: shapely.Geometry | np.ndarray, radius: float = 0.0) -> np.ndarray:
         """Distance (n,) [m] of each to a geometry, or its own one, with a radius; 0 if it meets."""
         things = thing[:, None] if isinstance(thing, np.ndarray) else thing
         apart = shapely.distance(self.shapes, things) - self.radii - radius
@@ -237,23 +237,25 @@ def clearances(
     least = np.full(len(course.time), np.inf)
     for obstacle in obstacles:
         if isinstance(obstacle, OccupancyMap):
-            least = np.minimum(least, around.gap(_blocked(obstacle)))
+            least = np.minimum(least, around.clearance(_blocked(obstacle)))
             continue
         corners, radius = core(obstacle.shape)
         if obstacle.motion is None:
-            gap = around.gap(_geometries(corners).item(), radius)
+            clearance = around.clearance(_geometries(corners).item(), radius)
         else:
             place = [
                 np.interp(course.time, obstacle.motion.time, obstacle.motion.pose[:, k])
                 for k in range(3)
             ]
-            gap = around.gap(_geometries(_placed(corners, np.stack(place, axis=-1))), radius)
+            clearance = around.clearance(
+                _geometries(_placed(corners, np.stack(place, axis=-1))), radius
+            )
         if obstacle.height is not None:
             low, high = obstacle.height
             z = course.pose[:, 3] if course.pose.shape[1] > 3 else 0.0
             apart = (z + body_height[0] > high) | (z + body_height[1] < low)
-            gap = np.where(apart, np.inf, gap)
-        least = np.minimum(least, gap)
+            clearance = np.where(apart, np.inf, clearance)
+        least = np.minimum(least, clearance)
     return least
 
 
@@ -272,8 +274,8 @@ def inside(around: Bodies, shape: Shape, *, depth: float = 0.0) -> np.ndarray:
     """Whether any part of each body is in a shape, by more than `depth` [m]: (n,)."""
     zone, radius = solid(shape)
     if radius:
-        return around.gap(zone, radius - depth) == 0.0
-    return around.gap(zone.buffer(-depth)) == 0.0
+        return around.clearance(zone, radius - depth) == 0.0
+    return around.clearance(zone.buffer(-depth)) == 0.0
 
 
 def outside_bounds(course: Course, bounds: Bounds) -> float:

@@ -113,8 +113,10 @@ def test_a_disc_is_passed_as_it_is() -> None:
     found = polish(ROBOT, at_rest(4.0), scene, guess(aside=0.8))
     assert found.status is SolveStatus.SOLVED
     around = shapely.Point(2.0, 0.0).buffer(0.3, quad_segs=64)
-    gap = touched(found.state, found.control, found.durations, shapely.get_coordinates(around))
-    assert 0.0 < gap < 0.01
+    clearance = touched(
+        found.state, found.control, found.durations, shapely.get_coordinates(around)
+    )
+    assert 0.0 < clearance < 0.01
 
 
 def test_a_guess_inside_is_led_out() -> None:
@@ -181,12 +183,12 @@ def test_a_trailer_is_part_of_the_body() -> None:
     found = polish(truck, ends, Scene(parts=(car, trailer), pieces=((box, 0.0),)), first)
     alone = polish(truck, ends, Scene(parts=(car,), pieces=((box, 0.0),)), first)
     assert (found.status, alone.status) == (SolveStatus.SOLVED, SolveStatus.SOLVED)
-    gap = min(part_gap(row, box) for row in found.state)
-    assert gap >= 0.0
+    clearance = min(part_clearance(row, box) for row in found.state)
+    assert clearance >= 0.0
     assert found.duration >= alone.duration - 1e-3
 
 
-def part_gap(state: np.ndarray, box: np.ndarray) -> float:
+def part_clearance(state: np.ndarray, box: np.ndarray) -> float:
     """Distance of the trailer from a box."""
     x, y, heading, hitch = state
     back = heading - hitch

@@ -437,7 +437,7 @@ def test_far_away(exponent):
 def test_among_what_moves():
     rng = np.random.default_rng(4)
     for seed in range(4):
-        problem = quick(scenes.moving_scene(seed, movers=5), n=1000)
+        problem = quick(scenes.moving_scene(seed, moving=5), n=1000)
         by = SE2([*rng.integers(-99, 99, 2).astype(float), 0.0])
         assert_moved(problem, by)
 

@@ -35,16 +35,16 @@ def test_verdicts_agree_with_shapely(first):
     for seed in range(first, first + 50):
         problem = scenes.random_scene(seed)
         said = blocked_ends(problem)
-        gap = clearance_at(problem, problem.start)
+        clearance = clearance_at(problem, problem.start)
         least = max(problem.margin, 0.0)
         outside = is_outside(problem, problem.start)
-        if outside or gap < least - CONTACT or gap <= 0.0:
+        if outside or clearance < least - CONTACT or clearance <= 0.0:
             assert said is not None
             assert said.status is PlanStatus.START_BLOCKED
             assert said.reason.startswith("the start is outside" if outside else "at the start ")
             met.add("start")
             continue
-        if gap < least + CONTACT:
+        if clearance < least + CONTACT:
             continue  # a matter of the last digit
         assert said is None or said.status is PlanStatus.GOAL_BLOCKED
         still = replace(problem, obstacles=tuple(

@@ -90,8 +90,8 @@ def test_an_occupancy_map_and_a_moving_obstacle():
     result = found(replace(BASE, obstacles=(Obstacle(Disc(0.5), motion=motion),)))
     times = np.linspace(0.0, result.plan.duration, 4000)
     middle = np.stack([np.full_like(times, 4.0), np.interp(times, [0, 8], [-4, 4])], axis=1)
-    gap = np.hypot(*(result.plan.pose_at(times)[:, :2] - middle).T).min() - 0.5 - RADIUS
-    assert gap > 0.0
+    clearance = np.hypot(*(result.plan.pose_at(times)[:, :2] - middle).T).min() - 0.5 - RADIUS
+    assert clearance > 0.0
 
 
 def test_zones_hold_in_space():

@@ -1,4 +1,4 @@
-"""Plans among what moves: it waits or evades, and what is passed was not there at the time."""
+"""Plans among moving obstacles: the vehicle waits or evades, and passes where none is then."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def test_with_a_fixed_time_it_does_not_rest_where_something_comes():
 @pytest.mark.parametrize("seed", range(6))
 def test_lively_places(seed):
     problem = replace(
-        scenes.moving_scene(seed, movers=6), search=SearchSettings(max_expansions=900)
+        scenes.moving_scene(seed, moving=6), search=SearchSettings(max_expansions=900)
     )
     result = planned(problem)
     if result.plan is not None:

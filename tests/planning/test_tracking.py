@@ -54,9 +54,9 @@ def test_standing_is_free_until_something_comes():
 def test_clearance_by_hand():
     poses = np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 1.0]])
     times = np.array([0.0, 0.0])
-    gaps = clearance_at(problem(PASSING), poses, times)
-    assert gaps[1] == pytest.approx(2.2)
-    assert gaps[0] <= np.hypot(3.0, 3.0) - 0.8 + 1e-9
+    clearances = clearance_at(problem(PASSING), poses, times)
+    assert clearances[1] == pytest.approx(2.2)
+    assert clearances[0] <= np.hypot(3.0, 3.0) - 0.8 + 1e-9
 
 
 class TestTrack:

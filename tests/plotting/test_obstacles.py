@@ -98,7 +98,7 @@ def test_thin_walls_of_a_fine_map_stay_visible():
 
 def test_what_moves_is_where_it_is_at_the_time():
     _, artists = drawn(Obstacle(Box([1.0, 0.5]), motion=AROUND), time=1.0)
-    (path,) = artists.movers.get_paths()
+    (path,) = artists.moving.get_paths()
     expected = Box([1.0, 0.5], [2.0, 0.0], np.pi / 4).corners
     np.testing.assert_allclose(np.sort(path.vertices[:4], 0), np.sort(expected, 0), atol=1e-12)
 
@@ -106,8 +106,8 @@ def test_what_moves_is_where_it_is_at_the_time():
 def test_several_times_go_from_pale_to_dark_over_the_track():
     moving = [Obstacle(Disc(0.2, [0.0, y]), motion=AROUND) for y in (0.0, 1.0)]
     _, artists = drawn(moving, time=[0.5, 1.0, 1.5])
-    assert len(artists.movers.get_paths()) == 6
-    light = artists.movers.get_facecolor()[:, :3].sum(axis=1)
+    assert len(artists.moving.get_paths()) == 6
+    light = artists.moving.get_facecolor()[:, :3].sum(axis=1)
     assert light[0] == light[1] > light[2] == light[3] > light[4] == light[5]
     track = artists.tracks.get_segments()[1]
     for row, time in ((0, 0.5), (-1, 1.5)):
@@ -117,7 +117,7 @@ def test_several_times_go_from_pale_to_dark_over_the_track():
 def test_without_a_time_it_stands_where_the_motion_begins():
     _, artists = drawn(Obstacle(Disc(0.2), motion=AROUND))
     np.testing.assert_allclose(
-        artists.movers.get_paths()[0].get_extents().get_points(), [[-0.2, -0.2], [0.2, 0.2]]
+        artists.moving.get_paths()[0].get_extents().get_points(), [[-0.2, -0.2], [0.2, 0.2]]
     )
     np.testing.assert_allclose(artists.tracks.get_segments()[0][[0, -1]], AROUND.pose[:, :2])
 
@@ -125,7 +125,7 @@ def test_without_a_time_it_stands_where_the_motion_begins():
 def test_what_stands_and_what_moves_have_different_colours():
     _, artists = drawn([Disc(1.0), Obstacle(Disc(0.2), motion=AROUND)])
     still, moving = (
-        np.array(to_rgb(part.get_facecolor()[0])) for part in (artists.still, artists.movers)
+        np.array(to_rgb(part.get_facecolor()[0])) for part in (artists.static, artists.moving)
     )
     assert np.ptp(still) < 0.1
     assert np.ptp(moving) > 0.3
@@ -138,7 +138,7 @@ def test_the_limits_stay_as_they_are():
 
 def test_no_obstacle_is_no_artist():
     _, artists = drawn(())
-    assert artists.still.get_paths() == artists.movers.get_paths() == []
+    assert artists.static.get_paths() == artists.moving.get_paths() == []
     assert artists.maps == ()
 
 

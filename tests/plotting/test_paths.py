@@ -157,8 +157,8 @@ def test_a_moved_problem_has_a_moved_picture(by):
     _, here = drawn(plan, problem=problem)
     _, there = drawn(plan.moved(move), problem=problem.moved(move))
     pairs = [(here.obstacles.maps[0], there.obstacles.maps[0])]
-    pairs += [(here.obstacles.still, there.obstacles.still)]
-    pairs += [(here.obstacles.movers, there.obstacles.movers)]
+    pairs += [(here.obstacles.static, there.obstacles.static)]
+    pairs += [(here.obstacles.moving, there.obstacles.moving)]
     pairs += [(here.moment_bodies, there.moment_bodies)]
     for before, after in pairs:
         for path, moved in zip(before.get_paths(), after.get_paths(), strict=True):
@@ -185,7 +185,7 @@ def test_the_problem_gives_body_goals_and_obstacles():
     assert edges == [GREY, INK, GREY]  # the one that is reached stands out
     assert len(outlines(artists.goal_bodies)) == 1  # not reached, with a heading
     assert artists.ends.headings.N == 3  # of the start, and of the goals with a heading
-    assert len(artists.obstacles.still.get_paths()) == 3
+    assert len(artists.obstacles.static.get_paths()) == 3
     shown = names(artists.legend)
     assert shown[1:5] == ["start", "goal", "any heading", "other goal"]
     assert shown[5:8] == ["goal tolerance", "swept by the body", "obstacle"]
@@ -204,7 +204,7 @@ def test_the_body_and_what_moves_have_the_colours_of_their_time():
     plan = parking_plan()
     _, artists = drawn(plan, problem=slalom_problem(plan))
     bodies = artists.moment_bodies.get_facecolor()[:, :3]
-    np.testing.assert_array_equal(bodies, artists.obstacles.movers.get_facecolor()[:, :3])
+    np.testing.assert_array_equal(bodies, artists.obstacles.moving.get_facecolor()[:, :3])
     assert len(np.unique(bodies, axis=0)) == len(bodies) == 5
     middles = [outline[:4].mean(axis=0) for outline in outlines(artists.moment_bodies)]
     np.testing.assert_allclose(middles, plan.pose_at([0, 2, 4, 6, 8])[:, :2], atol=1e-3)

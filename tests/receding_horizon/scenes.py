@@ -1,4 +1,4 @@
-"""Small scenes for closed loops: a robot of 0.3 m among what stands and what moves."""
+"""Small scenes for closed loops: a robot of 0.3 m among static and moving obstacles."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def among(*obstacles, start=(0.0, 0.0, 0.0), goal=FREE_GOAL, robot=None, **chang
     return Problem(automaton, start, goal, obstacles=obstacles, **settings)
 
 
-def mover(times, poses, shape=None) -> Obstacle:
+def moving_obstacle(times, poses, shape=None) -> Obstacle:
     """A disc of 0.5 m, or another shape, at places (x, y) in time."""
     turned = [[x, y, 0.0] for x, y in poses]
     return Obstacle(shape or Disc(0.5), motion=Motion(times, turned))
@@ -31,18 +31,20 @@ def mover(times, poses, shape=None) -> Obstacle:
 
 def crossing() -> Obstacle:
     """Through the way at its middle, when the robot would be there."""
-    return mover([0.0, 6.0], [(3.0, -3.0), (3.0, 3.0)])
+    return moving_obstacle([0.0, 6.0], [(3.0, -3.0), (3.0, 3.0)])
 
 
 def on_the_goal(until: float = 12.0) -> Obstacle:
     """Stands on the goal, then leaves at 1 m/s."""
-    return mover([0.0, until, until + 6.0], [(6.0, 0.0), (6.0, 0.0), (6.0, 6.0)])
+    return moving_obstacle([0.0, until, until + 6.0], [(6.0, 0.0), (6.0, 0.0), (6.0, 6.0)])
 
 
 def door(opens: float = 8.0) -> tuple[Obstacle, ...]:
     """A wall across the way with a door in it that slides aside."""
     posts = [Obstacle(Box([0.2, 9.0], [3.0, side * 5.25])) for side in (1, -1)]
-    leaf = mover([0.0, opens, opens + 2.0], [(3.0, 0.0), (3.0, 0.0), (3.0, 1.6)], Box([0.1, 1.5]))
+    leaf = moving_obstacle(
+        [0.0, opens, opens + 2.0], [(3.0, 0.0), (3.0, 0.0), (3.0, 1.6)], Box([0.1, 1.5])
+    )
     return (*posts, leaf)
 
 
@@ -54,8 +56,8 @@ def cannot_stop() -> Automaton:
 def clearances(loop: ClosedLoop, problem: Problem | None = None) -> Array:
     """Least distance (n,) [m] of every piece driven from the problem's obstacles, by shapely."""
     world = World(problem or loop.problem)
-    gaps = []
+    clearances = []
     for piece in loop.driven:
         times, poses = driven(piece, world.origin, step_m=0.02, step_rad=0.05)
-        gaps.append(float(world.clearance(poses, times).min()))
-    return np.array(gaps)
+        clearances.append(float(world.clearance(poses, times).min()))
+    return np.array(clearances)

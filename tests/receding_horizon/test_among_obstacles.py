@@ -1,4 +1,4 @@
-"""Closed loops among obstacles that stand still: every guarantee holds, as in the open."""
+"""Closed loops among static obstacles: every guarantee holds, as in the open."""
 
 from __future__ import annotations
 

@@ -10,11 +10,11 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds
 from maneuver_automaton.receding_horizon import search_fail_safe
 from maneuver_automaton.receding_horizon.mitigation import mitigate
-from tests.receding_horizon.scenes import among, cannot_stop, crossing, mover
+from tests.receding_horizon.scenes import among, cannot_stop, crossing, moving_obstacle
 from tests.scenes import moving_scene
 from tests.solids import World, driven, outside
 
-COMING = mover([0.0, 12.0], [(-6.0, 0.0), (6.0, 0.0)])
+COMING = moving_obstacle([0.0, 12.0], [(-6.0, 0.0), (6.0, 0.0)])
 
 LANE = Bounds(x=(-9.0, 6.5), y=(-0.4, 0.4))
 
@@ -61,8 +61,11 @@ def test_anywhere_and_at_any_time_in_a_moving_scene(seed):
 
 
 def test_the_best_there_is_where_nothing_is_free_for_long_enough():
-    squeezed = [mover([0.0, 9.0], [(0.0, side * 4.0), (0.0, -side * 5.0)], Box([40.0, 1.0]))
-                for side in (1, -1)]  # fmt: skip
+    wall = Box([40.0, 1.0])
+    squeezed = [
+        moving_obstacle([0.0, 9.0], [(0.0, side * 4.0), (0.0, -side * 5.0)], wall)
+        for side in (1, -1)
+    ]
     found = search_fail_safe(among(*squeezed), until=9.0)
     assert not found.complete
     assert found.free_until == pytest.approx(3.2, abs=0.05)  # where it stands
@@ -88,7 +91,7 @@ def test_a_moved_scene_has_the_moved_trajectory():
 class TestMitigation:
     def test_the_contact_that_comes_last(self):
         # a wall 40 m wide at 2 m/s: driving away at 1 m/s gains as long as it lasts
-        wall = mover([0.0, 9.0], [(-4.0, 0.0), (14.0, 0.0)], Box([0.2, 40.0]))
+        wall = moving_obstacle([0.0, 9.0], [(-4.0, 0.0), (14.0, 0.0)], Box([0.2, 40.0]))
         found = mitigate(among(wall), step=0.5, until=9.0)
         assert set(found.plan.word) == {"ahead"}
         assert found.contact == pytest.approx(3.6, abs=1e-2)

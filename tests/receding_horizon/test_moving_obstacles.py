@@ -26,7 +26,7 @@ from tests.receding_horizon.scenes import (
     clearances,
     crossing,
     door,
-    mover,
+    moving_obstacle,
     on_the_goal,
 )
 from tests.scenes import moving_scene
@@ -71,7 +71,7 @@ class TestWaitingAndEvading:
 
     def test_the_goal_is_left_to_what_passes_over_it(self):
         # it could be there after 6 s, and 1.2 s later would be hit
-        passing = mover([0.0, 7.0, 13.0], [(6.0, -7.0), (6.0, -1.0), (6.0, 5.0)])
+        passing = moving_obstacle([0.0, 7.0, 13.0], [(6.0, -7.0), (6.0, -1.0), (6.0, 5.0)])
         loop = simulate(among(passing), step=0.5)
         assert loop.reached
         assert_free(loop)
@@ -80,12 +80,12 @@ class TestWaitingAndEvading:
         assert np.hypot(*(passing.motion.at(loop.times[-1]) - loop.poses[-1])[:2]) > 0.8
 
     def test_a_goal_that_need_not_stay_free_is_taken_at_once(self):
-        passing = mover([0.0, 7.6, 14.0], [(6.0, -7.6), (6.0, -1.0), (6.0, 5.0)])
+        passing = moving_obstacle([0.0, 7.6, 14.0], [(6.0, -7.6), (6.0, -1.0), (6.0, 5.0)])
         loop = simulate(among(passing), step=0.5, stand=0.5)
         assert loop.times[-1] == pytest.approx(6.0)
 
     def test_at_the_goal_it_makes_room_and_comes_back(self):
-        passing = mover([0.0, 14.0, 22.0], [(6.0, -9.0), (6.0, -4.0), (6.0, 4.0)])
+        passing = moving_obstacle([0.0, 14.0, 22.0], [(6.0, -9.0), (6.0, -4.0), (6.0, 4.0)])
         loop = simulate(among(passing), step=0.5, steps=60, stay=True)
         assert loop.reached
         assert_free(loop)
@@ -94,7 +94,7 @@ class TestWaitingAndEvading:
 
     @pytest.mark.parametrize("places", [[(8.0, 0.0), (-8.0, 0.0)], [(4.0, -5.0), (2.0, 5.0)]])
     def test_what_cannot_stop_evades(self, places):
-        loop = simulate(among(mover([0.0, 8.0], places), robot=cannot_stop()), step=0.5)
+        loop = simulate(among(moving_obstacle([0.0, 8.0], places), robot=cannot_stop()), step=0.5)
         assert loop.reached
         assert_free(loop)
 
@@ -121,7 +121,7 @@ class TestWaitingAndEvading:
     def test_with_noise_nothing_is_hit(self):
         upset = Disturbance(position_m=0.01, heading_rad=0.02, seed=4)
         goal = Goal(pose=[6.0, 0.0, 0.0], tolerance_m=0.1, free_heading=True)
-        # what moves keeps moving; a step's noise is less than the margin
+        # moving obstacles keep moving; a step's noise is less than the margin
         loop = simulate(among(crossing(), goal=goal, margin=0.1), step=0.5, disturbance=upset)
         assert loop.reached
         assert_free(loop)
@@ -130,7 +130,7 @@ class TestWaitingAndEvading:
 class TestPredictions:
     def test_one_that_turns_out_wrong_is_flagged_and_evaded(self):
         problem = among(crossing())
-        away = mover([0.0, 9.0], [(3.0, -3.0), (3.0, -12.0)])
+        away = moving_obstacle([0.0, 9.0], [(3.0, -3.0), (3.0, -12.0)])
         loop = simulate(
             problem, step=0.5, obstacles=lambda k: [away] if k < 4 else problem.obstacles
         )
@@ -162,7 +162,9 @@ class TestPredictions:
         assert fourth.value < third.value - 0.5
 
     def test_the_time_of_the_world_goes_on(self):
-        late = replace(among(mover([50.0, 56.0], [(3.0, -3.0), (3.0, 3.0)])), start_time=50.0)
+        late = replace(
+            among(moving_obstacle([50.0, 56.0], [(3.0, -3.0), (3.0, 3.0)])), start_time=50.0
+        )
         one, two = simulate(among(crossing()), step=0.5), simulate(late, step=0.5)
         assert two.times - 50.0 == pytest.approx(one.times)
         assert two.poses == pytest.approx(one.poses, abs=1e-6)
@@ -170,7 +172,7 @@ class TestPredictions:
 
 class TestHarm:
     def test_what_cannot_be_evaded_is_flagged(self):
-        wall = mover([0.0, 1.0], [(0.0, -3.0), (0.0, 3.0)], Box([20.0, 0.2]))
+        wall = moving_obstacle([0.0, 1.0], [(0.0, -3.0), (0.0, 3.0)], Box([20.0, 0.2]))
         loop = simulate(among(wall), step=0.5)
         assert loop.reached
         assert deeds(loop)[0] is Deed.MITIGATED
@@ -181,7 +183,7 @@ class TestHarm:
         assert deeds(loop)[-1] is not Deed.MITIGATED
 
     def test_it_is_put_off_as_long_as_can_be(self):
-        faster = mover([0.0, 9.0], [(-4.0, 0.0), (14.0, 0.0)], Box([0.2, 40.0]))
+        faster = moving_obstacle([0.0, 9.0], [(-4.0, 0.0), (14.0, 0.0)], Box([0.2, 40.0]))
         loop = simulate(among(faster, goal=[-9.0, 0.0, 0.0]), step=0.5, steps=6)
         assert set(deeds(loop)) == {Deed.MITIGATED}
         assert loop.poses[-1] == pytest.approx([3.0, 0.0, 0.0])
@@ -213,7 +215,7 @@ def test_a_loop_goes_on_from_its_file(tmp_path, after):
     assert rest.cost == whole.cost
 
 
-def test_retimed_plans_among_movers_are_refused():
+def test_retimed_plans_among_moving_obstacles_are_refused():
     settings = {"cost": Cost(effort=1.0), "horizon": Horizon(time=20.0)}
     with pytest.raises(ValueError, match="retimed plans meet what moves at other times"):
         RecedingHorizon(among(crossing(), **settings), step=1.0, retimed=True)

@@ -17,7 +17,7 @@ from maneuver_automaton.refinement.restarts import FINER
 from maneuver_automaton.search.word_plan import plan_of_word
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import word_of_steps
-from tests.refinement.test_incumbent_words import GOAL, WALLS, least_gap, off_goal, query
+from tests.refinement.test_incumbent_words import GOAL, WALLS, least_clearance, off_goal, query
 from tests.search.cases import compiled_only
 from tests.search.maneuver_searches import word_is_free
 
@@ -40,7 +40,7 @@ def assert_sound(word):
     here = query()
     plan = plan_of_word(here, word)
     assert off_goal(plan, GOAL) < 1e-12
-    assert least_gap(plan, WALLS) > 0.0
+    assert least_clearance(plan, WALLS) > 0.0
     assert word_is_free(here, word)
     assert plan.trims[0].name == plan.trims[-1].name == "0 0"
     assert plan.duration == pytest.approx(word.duration, abs=1e-6)

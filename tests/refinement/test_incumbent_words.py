@@ -56,7 +56,7 @@ def query(start=START, goal=GOAL, **changes):
     return posed(unicycle(), start, goal, **settings)
 
 
-def least_gap(plan, obstacles, *, model=None, carried=()):
+def least_clearance(plan, obstacles, *, model=None, carried=()):
     """Least distance of dense poses from the obstacles, by shapely, at the times of the plan."""
     times = np.linspace(0.0, plan.duration, 4000)
     poses = plan.pose_at(times)
@@ -66,7 +66,7 @@ def least_gap(plan, obstacles, *, model=None, carried=()):
         state = np.interp(times, samples.time, samples.reduced_state[:, 0])[:, None]
         there = (SE2(poses) @ SE2(model.part_poses(state)[:, 0])).pose
         vehicles.append(outlines(there, carried[0]))
-    gap = np.inf
+    clearance = np.inf
     for obstacle in obstacles:
         box = obstacle.shape
         place = SE2([*box.center, box.heading]).pose[None]
@@ -75,8 +75,8 @@ def least_gap(plan, obstacles, *, model=None, carried=()):
             columns = [np.interp(now, knots.time, knots.pose[:, k]) for k in range(3)]
             place = (SE2(np.stack(columns, axis=1)) @ SE2(place)).pose
         solid = outlines(place, Box(box.size))
-        gap = min(gap, *(float(shapely.distance(one, solid).min()) for one in vehicles))
-    return gap
+        clearance = min(clearance, *(float(shapely.distance(one, solid).min()) for one in vehicles))
+    return clearance
 
 
 def outlines(poses, box):
@@ -103,7 +103,7 @@ def test_plans_are_exact_free_inside_and_cheaper_one_by_one():
         assert off_goal(plan, GOAL) < 1e-12
         assert plan.duration == pytest.approx(word.cost, abs=1e-6)
         assert plan.trims[0].name == plan.trims[-1].name == "0 0"
-        assert least_gap(plan, WALLS) > 0.0
+        assert least_clearance(plan, WALLS) > 0.0
         poses = plan.sample(max_step_m=0.005).pose
         assert poses[:, 0].min() >= -0.5
         assert poses[:, 1].max() <= 2.5
@@ -178,7 +178,7 @@ def test_what_moves_is_let_pass():
         plan = plan_of_word(here, word)
         assert off_goal(plan, [4.0, 0.0, 0.0]) < 1e-12
         assert word_is_free(here, word)
-        assert least_gap(plan, (crossing,)) > 0.0
+        assert least_clearance(plan, (crossing,)) > 0.0
 
 
 def test_a_trailer_stays_free_too():
@@ -195,7 +195,8 @@ def test_a_trailer_stays_free_too():
         assert off_goal(plan, goal) < 1e-12
         assert abs(plan.sample().reduced_state[-1, 0]) < 1e-9
         assert (
-            least_gap(plan, here.problem.obstacles, model=automaton.model, carried=(trailer,)) > 0.0
+            least_clearance(plan, here.problem.obstacles, model=automaton.model, carried=(trailer,))
+            > 0.0
         )
 
 
@@ -249,8 +250,8 @@ def test_a_switch_at_rest_proves_nothing():
     automaton, trailer = truck_with_trailer(levels=3), Box([0.3, 0.25])
     incumbents = 0
     for side in (-0.4, 0.4):
-        for gap in (0.02, 0.1, 0.25):
-            wall = Obstacle(Box([0.3, 0.6], [0.25 + 0.15 + gap, 0.5 * side]))
+        for distance in (0.02, 0.1, 0.25):
+            wall = Obstacle(Box([0.3, 0.6], [0.25 + 0.15 + distance, 0.5 * side]))
             query = posed(
                 automaton,
                 [0.0, 0.0, 0.0],

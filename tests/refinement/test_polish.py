@@ -177,7 +177,7 @@ def test_a_polished_motion_is_exact_clean_and_inside_its_limits() -> None:
     assert np.abs(motion.course.reduced_state[-1]).max() < 1e-12
     assert (np.abs(motion.control) <= [1.0, 0.5]).all()
     assert (np.abs(motion.course.reduced_state) <= [2.5, 0.75]).all()
-    assert least_gap(motion.course.pose, Box([3.0, 2.0], [8.4, -0.4])) > 0.0
+    assert least_clearance(motion.course.pose, Box([3.0, 2.0], [8.4, -0.4])) > 0.0
     assert motion.duration < around().duration * 1.2
     stroke = motion.maneuver("polished", source="rest", target="rest")
     assert stroke.duration == motion.duration
@@ -218,7 +218,7 @@ def test_gear_sequences_differ_and_come_in_order() -> None:
     assert all(SE2(one.plan.end).pose == pytest.approx([0.0, 0.0, 0.0], abs=1e-9) for one in drives)
 
 
-def least_gap(poses: np.ndarray, obstacle: Box) -> float:
+def least_clearance(poses: np.ndarray, obstacle: Box) -> float:
     """Least distance of the body from an obstacle."""
     ring = shapely.Polygon(obstacle.corners)
     return min(shapely.Polygon(SE2(p).act(BODY.corners)).distance(ring) for p in poses)

@@ -62,9 +62,9 @@ def states_of(x, y, heading, speed, steering, controls):
     return _kernels_motion.driven(VEHICLE.model.wheelbase, TICK, state, np.array(controls))
 
 
-def slow_gap(states, control, tick):
+def slow_clearance(states, control, tick):
     """Least distance to anybody, and to the edge (negative outside), within one tick."""
-    gaps, edges = [], []
+    clearances, edges = [], []
     for share in np.linspace(0.0, 1.0, 11):
         state = states
         if share > 0.0:
@@ -77,10 +77,10 @@ def slow_gap(states, control, tick):
                 if isinstance(shape, Disc)
                 else shapely.Polygon(shape.corners)
             )
-            gaps.append(body.distance(other))
+            clearances.append(body.distance(other))
         inside = AREA.covers(body)
         edges.append(AREA.boundary.distance(body) if inside else -1.0)
-    return min(gaps, default=np.inf), min(edges)
+    return min(clearances, default=np.inf), min(edges)
 
 
 drives = st.tuples(
@@ -105,19 +105,19 @@ def test_what_is_proven_free_is_free_and_what_is_not_is_near_something(drive):
     acceleration = max(acceleration, -speed / TICK)
     control = np.array([acceleration, rate])
     states = states_of(x, y, heading, speed, steering, [control])
-    gap, edge = slow_gap(states[0], control, tick)
-    if edge < 0.0 and slow_gap(states[0], np.zeros(2), tick)[1] < 0.0:
+    clearance, edge = slow_clearance(states[0], control, tick)
+    if edge < 0.0 and slow_clearance(states[0], np.zeros(2), tick)[1] < 0.0:
         return  # begins outside, which is never asked
     if _kernels_free.free_ticks(CLEARING, states, tick):
-        assert gap > 0.0
+        assert clearance > 0.0
         assert edge > 0.0
     else:
-        assert gap < 0.8 or edge < 0.25
+        assert clearance < 0.8 or edge < 0.25
 
 
 def test_who_is_gone_is_not_hit():
     states = states_of(36.0, 4.0, 0.4, 0.0, 0.0, [[0.0, 0.0]])
-    assert slow_gap(states[0], np.zeros(2), 20)[0] < 0.05
+    assert slow_clearance(states[0], np.zeros(2), 20)[0] < 0.05
     assert _kernels_free.free_ticks(CLEARING, states, 18) == 0
     assert _kernels_free.free_ticks(CLEARING, states, 20) == 0
     assert _kernels_free.free_ticks(CLEARING, states, 21) == 1
@@ -148,7 +148,7 @@ def test_obstacles_are_kept_away_from_as_far_as_said(shape, off_traffic, moves):
     found = clearing_of(
         scene, VEHICLE, tick=TICK, last_tick=5, off_edge=0.03, off_traffic=off_traffic
     )
-    assert len(found.world.movers.speed) == moves
+    assert len(found.world.moving.speed) == moves
     outline = shapely.Polygon(shape.corners) if not isinstance(shape, Disc) else (
         shapely.Point(shape.center).buffer(shape.radius, quad_segs=64)
     )  # fmt: skip

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from maneuver_automaton.collision import Box, Disc, Obstacle, OccupancyMap, Polygon
-from maneuver_automaton.collision._kernels_gap import NEAR, SHARP
+from maneuver_automaton.collision._kernels_clearance import NEAR, SHARP
 from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.groups import SE2
 from tests.collision import scenes
@@ -20,7 +20,7 @@ ROUNDED = 1e-8  # [m] coordinates are rounded to 1e-9
 
 
 def compare(footprint, obstacles, poses, times=0.0):
-    """Check the gaps at poses; returns them with the exact ones."""
+    """Check the clearances at poses; returns them with the exact ones."""
     world = world_around(footprint, obstacles)
     times = np.broadcast_to(np.asarray(times, dtype=float), len(poses))
     got = clearances(world, world.into(poses), times=times)
@@ -39,7 +39,7 @@ def poses_around(rng, n, *, reach=7.0):
 
 
 @pytest.mark.parametrize("name", scenes.FOOTPRINTS)
-def test_gaps_among_random_solids(name):
+def test_clearances_among_random_solids(name):
     rng = np.random.default_rng([1, *name.encode()])
     touching = 0
     for _ in range(12):
@@ -50,10 +50,10 @@ def test_gaps_among_random_solids(name):
 
 
 @pytest.mark.parametrize("name", ["car", "disc", "truck", "point"])
-def test_gaps_to_what_moves(name):
+def test_clearances_to_moving_obstacles(name):
     rng = np.random.default_rng([2, *name.encode()])
     for _ in range(10):
-        obstacles = scenes.random_scene(rng, movers=2)
+        obstacles = scenes.random_scene(rng, moving=2)
         poses = poses_around(rng, 150)
         compare(scenes.FOOTPRINTS[name], obstacles, poses, rng.uniform(-2.0, 9.0, len(poses)))
 
@@ -67,36 +67,36 @@ def needles(rng):
 
 
 @pytest.mark.parametrize("name", ["car", "frame", "disc", "point"])
-def test_gaps_to_slivers(name):
+def test_clearances_to_slivers(name):
     rng = np.random.default_rng([3, *name.encode()])
     for _ in range(5):
         compare(scenes.FOOTPRINTS[name], needles(rng), poses_around(rng, 200))
 
 
 @pytest.mark.parametrize("name", ["car", "disc", "point"])
-def test_gaps_to_maps_with_yaw(name):
+def test_clearances_to_maps_with_yaw(name):
     rng = np.random.default_rng([4, *name.encode()])
     for _ in range(6):
         maps = [scenes.random_map(rng) for _ in range(2)]
         compare(scenes.FOOTPRINTS[name], maps, poses_around(rng, 200))
 
 
-def test_gaps_in_contact_to_the_last_digits():
-    # pushed together along the way between the nearest points, until just before contact
+def test_clearances_in_contact_to_the_last_digits():
+    # pushed together along the path between the nearest points, until just before contact
     rng = np.random.default_rng(5)
     box, body = Box([2.0, 1.0]), (Box([4.7, 1.9], [1.4, 0.0]),)
     world, slow = world_around(body, [Obstacle(box)]), shapely_world(body, [Obstacle(box)])
     for _ in range(60):
         far, near = np.array([*(7.0 * rng.standard_normal(2)), rng.uniform(-4, 4)]), None
-        way = -far * [1.0, 1.0, 0.0]
+        path = -far * [1.0, 1.0, 0.0]
         low, high = 0.0, 1.0
         if slow.clearance(far[None])[0] <= 0.0:
             continue
         for _ in range(50):
             middle = 0.5 * (low + high)
-            free = slow.clearance((far + middle * way)[None])[0] > 1e-5
+            free = slow.clearance((far + middle * path)[None])[0] > 1e-5
             low, high = (middle, high) if free else (low, middle)
-        near = (far + low * way)[None]
+        near = (far + low * path)[None]
         assert clearances(world, world.into(near)) == pytest.approx(slow.clearance(near), abs=2e-9)
 
 
@@ -123,8 +123,8 @@ def test_nothing_is_lost_far_away(far):
     by = SE2([far, -far, 0.0])
     there = world_around((Box([1.0, 0.5]),), moved(obstacles, by))
     shifted = (by @ SE2(poses)).pose
-    gaps = clearances(here, here.into(poses))
-    assert np.array_equal(gaps, clearances(there, there.into(shifted)))
+    got = clearances(here, here.into(poses))
+    assert np.array_equal(got, clearances(there, there.into(shifted)))
 
 
 @pytest.mark.parametrize("far", [1e6, 1e9])
@@ -137,9 +137,9 @@ def test_nothing_of_a_map_is_lost_far_away(far):
     for obstacles in ([cells], [wall, cells], [cells, wall]):
         here = world_around((Disc(0.1),), obstacles)
         there = world_around((Disc(0.1),), moved(obstacles, by))
-        gaps = clearances(here, here.into(poses))
+        got = clearances(here, here.into(poses))
         shifted = clearances(there, there.into((by @ SE2(poses)).pose))
-        assert shifted == pytest.approx(gaps, abs=2e-9)
+        assert shifted == pytest.approx(got, abs=2e-9)
 
 
 def test_nothing_in_the_way_is_infinitely_far():
@@ -170,9 +170,9 @@ def test_diagonal_neighbours_in_a_map():
     assert got[2] > 0.4
 
 
-def test_a_gap_to_a_flat_tail_is_not_cut_off():
+def test_a_clearance_to_a_flat_tail_is_not_cut_off():
     # a ring with a spike: shapely makes it a square and a line
     tail = [Obstacle(Polygon([[0, 0], [2, 0], [2, 2], [0, 2], [0, 0], [-3, 0]]))]
     world = world_around((), tail)
-    gaps = clearances(world, world.into(np.array([[-2.0, 0.05, 0.0], [-3.1, 0.0, 0.0]])))
-    assert gaps == pytest.approx([0.05, 0.1])
+    got = clearances(world, world.into(np.array([[-2.0, 0.05, 0.0], [-3.1, 0.0, 0.0]])))
+    assert got == pytest.approx([0.05, 0.1])

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.collision.world import Buckets, Field, WorldArrays
 
 NEAR = 0.1  # share of a body's reach below which solids are looked at one by one
-SHARP = 0.3  # share of that below which gaps to sharp corners are made exact
+SHARP = 0.3  # share of that below which clearances to sharp corners are made exact
 
 
 @inlined_kernel
@@ -72,9 +72,9 @@ def separation(
             for j in range(b_0, b_1):
                 value = m_x * body.edges[j, 0] + m_y * body.edges[j, 1]
                 least = min(least, value)
-            gap = least + n_x * x + n_y * y - solids.edges[k, 4]
-            if gap > best:
-                best, axis_x, axis_y = gap, n_x, n_y
+            apart = least + n_x * x + n_y * y - solids.edges[k, 4]
+            if apart > best:
+                best, axis_x, axis_y = apart, n_x, n_y
                 if best > enough:
                     break
     # The body's own normals only where those of the solid have not shown enough: most solids that
@@ -87,9 +87,9 @@ def separation(
             for j in range(p_0, p_1):
                 value = n_x * solids.edges[j, 0] + n_y * solids.edges[j, 1]
                 least = min(least, value)
-            gap = least - n_x * x - n_y * y - body.edges[k, 4]
-            if gap > best:
-                best, axis_x, axis_y = gap, -n_x, -n_y
+            apart = least - n_x * x - n_y * y - body.edges[k, 4]
+            if apart > best:
+                best, axis_x, axis_y = apart, -n_x, -n_y
                 if best > enough:
                     break
     return best, axis_x, axis_y
@@ -147,7 +147,7 @@ def core_distance(
 
 
 @inlined_kernel
-def piece_gap(
+def piece_clearance(
     body: Body,
     b: int,
     x: float,
@@ -159,15 +159,16 @@ def piece_gap(
     near: float,
     enough: float,
 ) -> tuple[float, float, float]:
-    """Gap of one piece of the body at (x, y, cos, sin) to one solid, and the axis along which.
+    """Clearance of one piece of the body at (x, y, cos, sin) to one solid, and its direction.
 
     A lower bound; exact where it is a small share of `near`; at most 0 if they touch. Need not be
     exact above `enough`.
     """
-    # A rounded polygon is a core that is grown by a radius, so the gap of two is that of their
-    # cores less both radii. `enough` is asked of the rounded ones, so the cores are asked for more.
+    # A rounded polygon is a core that is grown by a radius, so the clearance of two is the distance
+    # of their cores less both radii. `enough` is asked of the rounded ones, so the cores are asked
+    # for more.
     rounding = body.radius[b] + solids.plates[p, 4]
-    gap, axis_x, axis_y = separation(body, b, x, y, c, s, solids, p, enough + rounding)
+    distance, axis_x, axis_y = separation(body, b, x, y, c, s, solids, p, enough + rounding)
     # In front of a corner the separation of two cores is less than their distance. For sharp
     # corners that vanishes on contact; rounded cores are a radius apart there, so what they lose
     # does not, and they are made exact from further away.
@@ -176,10 +177,10 @@ def piece_gap(
     # `core_distance` knows no depth, so it is asked only where the cores do not overlap: an axis
     # parts them, or both are points, which have no axis. Of a point and a line it is right in any
     # case, and needed: no normal parts the line from a point beyond its end.
-    apart = not -math.inf < gap <= 0.0 or corners <= 3  # two points, or a point and a line
-    if apart and gap - rounding <= min(exact, enough):
-        gap, axis_x, axis_y = core_distance(body, b, x, y, c, s, solids, p)
-    return gap - rounding, axis_x, axis_y
+    apart = not -math.inf < distance <= 0.0 or corners <= 3  # two points, or a point and a line
+    if apart and distance - rounding <= min(exact, enough):
+        distance, axis_x, axis_y = core_distance(body, b, x, y, c, s, solids, p)
+    return distance - rounding, axis_x, axis_y
 
 
 @inlined_kernel
@@ -189,8 +190,9 @@ def field_bound(field: Field, body: Body, x: float, y: float, c: float, s: float
     for d in range(body.discs.shape[0]):
         q_x, q_y = body.discs[d, 0], body.discs[d, 1]
         # The field holds the distance at the middle of its cell. Distance is 1-Lipschitz, so less
-        # the way from there it is a lower bound at the disc's middle, and less its radius one for
-        # all of the disc. The discs cover the body: the least of their bounds holds for all of it.
+        # how far the disc's middle is from there it is a lower bound at that middle, and less the
+        # radius one for all of the disc. The discs cover the body: the least of their bounds holds
+        # for all of it.
         at_x = (x + c * q_x - s * q_y - field.origin_x) / field.cell
         at_y = (y + s * q_x + c * q_y - field.origin_y) / field.cell
         i, j = math.floor(at_x), math.floor(at_y)
@@ -206,7 +208,7 @@ def field_bound(field: Field, body: Body, x: float, y: float, c: float, s: float
 
 
 @bare_inner_kernel
-def near_gap(
+def near_clearance(
     buckets: Buckets,
     solids: Solids,
     body: Body,
@@ -216,10 +218,10 @@ def near_gap(
     s: float,
     near: float,
 ) -> float:
-    """Gap to the solids near the body, exact below `near`; at most the buckets' reach."""
+    """Clearance to the solids near the body, exact below `near`; at most the buckets' reach."""
     m_x = x + c * body.middle_x - s * body.middle_y
     m_y = y + s * body.middle_x + c * body.middle_y
-    # What is in no list of this cell is at least that far away from a body whose middle is here.
+    # A solid in no list of this cell is at least that far away from a body whose middle is here.
     best = buckets.reach
     i = math.floor((m_x - buckets.origin_x) / buckets.cell)
     j = math.floor((m_y - buckets.origin_y) / buckets.cell)
@@ -236,8 +238,8 @@ def near_gap(
         if d_x * d_x + d_y * d_y >= away * away:
             continue
         for b in range(body.first.shape[0] - 1):
-            gap, _, _ = piece_gap(body, b, x, y, c, s, solids, p, near, best)
-            best = min(best, gap)
+            clearance, _, _ = piece_clearance(body, b, x, y, c, s, solids, p, near, best)
+            best = min(best, clearance)
             if best <= 0.0:
                 return best
     return best
@@ -293,9 +295,9 @@ def axis_time(
     m_x, m_y = c * axis_x + s * axis_y, c * axis_y - s * axis_x
     for k in range(b_0, b_1):
         lowest = min(lowest, m_x * body.edges[k, 0] + m_y * body.edges[k, 1])
-    # The gap along a fixed axis is the height of the lowest corner over the solid. As long as no
-    # corner is lower by more than `drop` than the lowest is now, the gap is at least what it was
-    # less `drop`.
+    # The clearance along a fixed axis is the height of the lowest corner over the solid. As long as
+    # no corner is lower by more than `drop` than the lowest is now, the clearance is less than now
+    # by `drop` at most.
     limit = lowest - drop  # heights are counted from the pose
     time = math.inf
     for k in range(b_0, b_1):
@@ -335,20 +337,20 @@ def near_step(
 ) -> tuple[float, float]:
     """How long the motion that goes on from here stays free of what is near, at most `most` [s].
 
-    Every solid keeps apart by its gap over the body's speed, or by the axis between the two for as
-    long as that axis parts them (not asked for if `turn` is inf). Also a lower bound of the gap.
-    The time is -1 if a gap is at most `margin`.
+    Every solid keeps apart for its clearance over the body's speed, or for as long as the axis
+    between the two parts them (not asked for if `turn` is inf). Also a lower bound of the
+    clearance. The time is -1 if a clearance is at most `margin`.
     """
     m_x = x + c * body.middle_x - s * body.middle_y
     m_y = y + s * body.middle_x + c * body.middle_y
-    near_enough = near + keep / SHARP  # for gaps to be exact where the distance to keep begins
+    near_enough = near + keep / SHARP  # clearances are exact where the distance to keep begins
     # Solids that are in no list of this cell are further away than this.
     nearest = buckets.reach - keep
     if nearest <= margin:  # the distance to keep is beyond what the buckets know
         return -1.0, nearest
     speed = max(speed, 1e-12)  # a body at rest
     # The step may at first be longer than the motion, so that solids up to `near` are looked at and
-    # the bound of the gap that is returned means something at the end of a motion, too.
+    # the bound of the clearance that is returned means something at the end of a motion, too.
     step = min(max(most, near / speed), nearest / speed)
     i = math.floor((m_x - buckets.origin_x) / buckets.cell)
     j = math.floor((m_y - buckets.origin_y) / buckets.cell)
@@ -365,17 +367,19 @@ def near_step(
             continue
         for b in range(body.first.shape[0] - 1):
             enough = step * speed + keep
-            gap, axis_x, axis_y = piece_gap(body, b, x, y, c, s, solids, p, near_enough, enough)
-            gap -= keep
-            nearest = min(nearest, gap)
+            clearance, axis_x, axis_y = piece_clearance(
+                body, b, x, y, c, s, solids, p, near_enough, enough
+            )
+            clearance -= keep
+            nearest = min(nearest, clearance)
             # Too near at this pose: the proof ends here.
-            if gap <= margin:
-                return -1.0, gap
-            # The proof of the step. No point of the body is faster than `speed`, so the gap lasts
-            # this long. The axis that parts the two now may part them longer, say along a wall,
-            # where the gap hardly changes: until the lowest corner has come down by what the gap is
-            # above the margin.
-            lasts = gap / speed
+            if clearance <= margin:
+                return -1.0, clearance
+            # The proof of the step. No point of the body is faster than `speed`, so the clearance
+            # lasts this long. The axis that parts the two now may part them longer, say along a
+            # wall, where the clearance hardly changes: until the lowest corner has come down by
+            # the clearance above the margin.
+            lasts = clearance / speed
             if lasts < step and turn < math.inf:
                 along = axis_time(
                     body,
@@ -391,7 +395,7 @@ def near_step(
                     turn,
                     axis_x,
                     axis_y,
-                    gap - margin,
+                    clearance - margin,
                 )
                 lasts = max(lasts, along)
             step = min(step, lasts)
@@ -400,11 +404,13 @@ def near_step(
 
 
 @inlined_kernel
-def still_gap(world: WorldArrays, body: Body, x: float, y: float, c: float, s: float) -> float:
-    """Lower bound of the clearance to all that stands still, at most the field's reach."""
+def static_clearance(
+    world: WorldArrays, body: Body, x: float, y: float, c: float, s: float
+) -> float:
+    """Lower bound of the clearance to all static obstacles, at most the field's reach."""
     near = max(NEAR * body.reach, 0.25 * world.field.cell)
     bound = field_bound(world.field, body, x, y, c, s)
     if bound <= near:
-        exact = near_gap(world.buckets, world.solids, body, x, y, c, s, near)
+        exact = near_clearance(world.buckets, world.solids, body, x, y, c, s, near)
         bound = exact if exact <= 0.0 else max(bound, exact)
     return bound

@@ -1,4 +1,4 @@
-"""Certified conservative advancement among obstacles that move, each as long as it is there."""
+"""Certified conservative advancement among moving obstacles, each as long as it is there."""
 
 from __future__ import annotations
 
@@ -6,28 +6,28 @@ import math
 from typing import TYPE_CHECKING
 
 from maneuver_automaton._compile import bare_inner_kernel, merged_kernel
-from maneuver_automaton.collision._kernels_gap import NEAR, SHARP, piece_gap
+from maneuver_automaton.collision._kernels_clearance import NEAR, SHARP, piece_clearance
 from maneuver_automaton.groups._kernels import coast, compose
 
 if TYPE_CHECKING:
     from maneuver_automaton.collision.body import Body
-    from maneuver_automaton.collision.world import Movers
+    from maneuver_automaton.collision.world import MovingObstacles
 
 SOON = 1e-11  # [s] a knot that is nearer in time counts as reached: in it nothing moves 1e-9 m
 
 
 @merged_kernel
-def knot_before(movers: Movers, m: int, time: float) -> int:
+def knot_before(moving: MovingObstacles, m: int, time: float) -> int:
     """The last knot at or before `time`, which is after the first one and before the last."""
-    low, high = movers.first_knot[m], movers.first_knot[m + 1] - 1
+    low, high = moving.first_knot[m], moving.first_knot[m + 1] - 1
     # Recorded traffic has a knot every tenth of a second. Where knots are evenly spaced, the first
     # one that is looked at is right; where they are not, a search by halves goes on from there.
-    share = (time - movers.time[low]) / (movers.time[high] - movers.time[low])
+    share = (time - moving.time[low]) / (moving.time[high] - moving.time[low])
     middle = min(low + int(share * (high - low)), high - 1)
     while True:
-        if movers.time[middle] > time:
+        if moving.time[middle] > time:
             high = middle
-        elif movers.time[middle + 1] <= time:
+        elif moving.time[middle + 1] <= time:
             low = middle + 1
         else:
             return middle
@@ -35,26 +35,26 @@ def knot_before(movers: Movers, m: int, time: float) -> int:
 
 
 @merged_kernel
-def mover_pose(movers: Movers, m: int, time: float) -> tuple[float, float, float]:
-    """Pose (x, y, heading) of an obstacle that moves, held before its first knot and after."""
-    k_0, k_1 = movers.first_knot[m], movers.first_knot[m + 1]
-    if time <= movers.time[k_0]:
-        return movers.pose[k_0, 0], movers.pose[k_0, 1], movers.pose[k_0, 2]
-    if time >= movers.time[k_1 - 1]:
+def obstacle_pose(moving: MovingObstacles, m: int, time: float) -> tuple[float, float, float]:
+    """Pose (x, y, heading) of a moving obstacle, held before its first knot and after."""
+    k_0, k_1 = moving.first_knot[m], moving.first_knot[m + 1]
+    if time <= moving.time[k_0]:
+        return moving.pose[k_0, 0], moving.pose[k_0, 1], moving.pose[k_0, 2]
+    if time >= moving.time[k_1 - 1]:
         k = k_1 - 1
-        return movers.pose[k, 0], movers.pose[k, 1], movers.pose[k, 2]
-    low = knot_before(movers, m, time)
+        return moving.pose[k, 0], moving.pose[k, 1], moving.pose[k, 2]
+    low = knot_before(moving, m, time)
     high = low + 1
-    share = (time - movers.time[low]) / (movers.time[high] - movers.time[low])
-    x = movers.pose[low, 0] + share * (movers.pose[high, 0] - movers.pose[low, 0])
-    y = movers.pose[low, 1] + share * (movers.pose[high, 1] - movers.pose[low, 1])
-    heading = movers.pose[low, 2] + share * (movers.pose[high, 2] - movers.pose[low, 2])
+    share = (time - moving.time[low]) / (moving.time[high] - moving.time[low])
+    x = moving.pose[low, 0] + share * (moving.pose[high, 0] - moving.pose[low, 0])
+    y = moving.pose[low, 1] + share * (moving.pose[high, 1] - moving.pose[low, 1])
+    heading = moving.pose[low, 2] + share * (moving.pose[high, 2] - moving.pose[low, 2])
     return x, y, heading
 
 
 @merged_kernel
 def closing_of(
-    movers: Movers,
+    moving: MovingObstacles,
     m: int,
     body: Body,
     heading: float,
@@ -69,21 +69,21 @@ def closing_of(
 
     It holds to the next knot, no longer than `most` [s]. `sign` is the direction of time.
     """
-    k_0, last = movers.first_knot[m], movers.first_knot[m + 1] - 1
+    k_0, last = moving.first_knot[m], moving.first_knot[m + 1] - 1
     m_x, m_y, m_turn = 0.0, 0.0, 0.0
     # A knot that is reached just now belongs to what comes next, in either direction.
     now = time + sign * SOON
-    if now <= movers.time[k_0]:
-        until = movers.time[k_0] - time if sign > 0.0 else math.inf
-    elif now >= movers.time[last]:
-        until = math.inf if sign > 0.0 else time - movers.time[last]
+    if now <= moving.time[k_0]:
+        until = moving.time[k_0] - time if sign > 0.0 else math.inf
+    elif now >= moving.time[last]:
+        until = math.inf if sign > 0.0 else time - moving.time[last]
     else:
-        k = knot_before(movers, m, now)
-        rate = sign / (movers.time[k + 1] - movers.time[k])
-        m_x = rate * (movers.pose[k + 1, 0] - movers.pose[k, 0])
-        m_y = rate * (movers.pose[k + 1, 1] - movers.pose[k, 1])
-        m_turn = rate * (movers.pose[k + 1, 2] - movers.pose[k, 2])
-        until = movers.time[k + 1] - time if sign > 0.0 else time - movers.time[k]
+        k = knot_before(moving, m, now)
+        rate = sign / (moving.time[k + 1] - moving.time[k])
+        m_x = rate * (moving.pose[k + 1, 0] - moving.pose[k, 0])
+        m_y = rate * (moving.pose[k + 1, 1] - moving.pose[k, 1])
+        m_turn = rate * (moving.pose[k + 1, 2] - moving.pose[k, 2])
+        until = moving.time[k + 1] - time if sign > 0.0 else time - moving.time[k]
     lasting = min(until + SOON, most)
     # Two points of the two come together no faster than their frames do, and both turns, and as far
     # as the body's velocity turns until then. Of two that drive side by side one hardly moves, seen
@@ -91,7 +91,7 @@ def closing_of(
     c, s = math.cos(heading), math.sin(heading)
     w_x, w_y = sign * (c * v_x - s * v_y), sign * (s * v_x + c * v_y)
     far = body.reach + abs(body.middle_x) + abs(body.middle_y)
-    m_far = movers.reach[m] + abs(movers.middle[m, 0]) + abs(movers.middle[m, 1])
+    m_far = moving.reach[m] + abs(moving.middle[m, 0]) + abs(moving.middle[m, 1])
     closing = math.hypot(w_x - m_x, w_y - m_y) + abs(m_turn) * m_far
     if turn_rate != 0.0:
         closing += abs(turn_rate) * (far + lasting * math.hypot(v_x, v_y))
@@ -99,8 +99,8 @@ def closing_of(
 
 
 @merged_kernel
-def mover_gap(
-    movers: Movers,
+def moving_clearance(
+    moving: MovingObstacles,
     m: int,
     body: Body,
     x: float,
@@ -110,14 +110,14 @@ def mover_gap(
     keep: float,
     enough: float,
 ) -> float:
-    """Gap to one obstacle that moves, at `time`: a lower bound, not exact above `enough`.
+    """Clearance to one moving obstacle at `time`: a lower bound, not exact above `enough`.
 
     Exact around the distance `keep` too.
     """
-    o_x, o_y, o_heading = mover_pose(movers, m, time)
+    o_x, o_y, o_heading = obstacle_pose(moving, m, time)
     d_x, d_y = x - o_x, y - o_y
     # Discs around both frames first: an obstacle far away costs no cosine.
-    far = movers.reach[m] + abs(movers.middle[m, 0]) + abs(movers.middle[m, 1])
+    far = moving.reach[m] + abs(moving.middle[m, 0]) + abs(moving.middle[m, 1])
     far += body.reach + abs(body.middle_x) + abs(body.middle_y)
     square = d_x * d_x + d_y * d_y
     if square > (far + enough) * (far + enough):
@@ -126,29 +126,29 @@ def mover_gap(
     r_x, r_y = c * d_x + s * d_y, c * d_y - s * d_x  # the vehicle seen from the obstacle
     turn = heading - o_heading
     c, s = math.cos(turn), math.sin(turn)
-    m_x = r_x + c * body.middle_x - s * body.middle_y - movers.middle[m, 0]
-    m_y = r_y + s * body.middle_x + c * body.middle_y - movers.middle[m, 1]
+    m_x = r_x + c * body.middle_x - s * body.middle_y - moving.middle[m, 0]
+    m_y = r_y + s * body.middle_x + c * body.middle_y - moving.middle[m, 1]
     # Discs around both: an obstacle far away costs neither pieces nor axes.
-    best = math.sqrt(m_x * m_x + m_y * m_y) - body.reach - movers.reach[m]
+    best = math.sqrt(m_x * m_x + m_y * m_y) - body.reach - moving.reach[m]
     if best > enough:
         return best
     best = math.inf
     # Exact where the distance to keep begins, as in `near_step`.
-    near = NEAR * (body.reach + movers.reach[m]) + keep / SHARP
-    for p in range(movers.first_piece[m], movers.first_piece[m + 1]):
+    near = NEAR * (body.reach + moving.reach[m]) + keep / SHARP
+    for p in range(moving.first_piece[m], moving.first_piece[m + 1]):
         for b in range(body.first.shape[0] - 1):
-            gap, _, _ = piece_gap(
-                body, b, r_x, r_y, c, s, movers.solids, p, near, min(best, enough)
+            clearance, _, _ = piece_clearance(
+                body, b, r_x, r_y, c, s, moving.solids, p, near, min(best, enough)
             )
-            best = min(best, gap)
+            best = min(best, clearance)
             if best <= 0.0:
                 return best
     return best
 
 
 @bare_inner_kernel
-def free_of_movers(
-    movers: Movers,
+def free_of_moving(
+    moving: MovingObstacles,
     body: Body,
     x: float,
     y: float,
@@ -162,22 +162,22 @@ def free_of_movers(
     margin: float,
     clock: float,
 ) -> tuple[float, float]:
-    """How long a motion is proven free of what moves, as `free_time`; the last gap.
+    """How long a motion is proven free of moving obstacles, as `free_time`; the last clearance.
 
     Each obstacle is followed by itself, as long as it is there: most are too far away to be met,
     which one look shows.
     """
     sign = 1.0 if duration >= 0.0 else -1.0
     free, nearest = abs(duration), math.inf
-    for m in range(movers.speed.shape[0]):
-        begin, end = movers.present[m, 0] - clock, movers.present[m, 1] - clock
+    for m in range(moving.speed.shape[0]):
+        begin, end = moving.present[m, 0] - clock, moving.present[m, 1] - clock
         if sign < 0.0:
             begin, end = -end, -begin
         if end < 0.0 or begin > free:
             continue
         t, end = max(begin, 0.0), min(end, free)
         # Seen from the obstacle, no point of the body is faster than both together.
-        fast = speed + movers.speed[m]
+        fast = speed + moving.speed[m]
         while True:
             p_x, p_y, p_heading = x, y, heading
             if t > 0.0:
@@ -186,21 +186,23 @@ def free_of_movers(
             time, left = clock + sign * t, end - t
             shrinks = fast * left if fast > 0.0 else 0.0  # until the end, at most
             enough = keep + margin + shrinks
-            gap = mover_gap(movers, m, body, p_x, p_y, p_heading, time, keep, enough) - keep
-            if gap <= margin:
-                free, nearest = t, gap
+            clearance = moving_clearance(moving, m, body, p_x, p_y, p_heading, time, keep, enough)
+            clearance -= keep
+            if clearance <= margin:
+                free, nearest = t, clearance
                 break
-            if gap - shrinks <= margin:
+            if clearance - shrinks <= margin:
                 closing, lasting = closing_of(
-                    movers, m, body, p_heading, v_x, v_y, turn_rate, time, sign, left
+                    moving, m, body, p_heading, v_x, v_y, turn_rate, time, sign, left
                 )
                 shrinks = closing * left if closing > 0.0 else 0.0
-                if lasting < left or gap - shrinks <= margin:
-                    step = min(gap / closing, lasting) if closing > 0.0 else lasting
-                    t = min(t + max(step, gap / fast), end)  # the end is looked at as every pose
+                if lasting < left or clearance - shrinks <= margin:
+                    step = min(clearance / closing, lasting) if closing > 0.0 else lasting
+                    # The end is looked at as every pose.
+                    t = min(t + max(step, clearance / fast), end)
                     continue
             # All of the rest is proven, and the clearance at the end.
             if end == free:
-                nearest = min(nearest, gap - shrinks)
+                nearest = min(nearest, clearance - shrinks)
             break
     return free, nearest
