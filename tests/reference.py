@@ -39,10 +39,10 @@ def matrix_of(pose: ArrayLike) -> Array:
     return matrix
 
 
-def word_end(twists: ArrayLike, times: ArrayLike, gaps: ArrayLike | None = None) -> Array:
-    """End (dof,) of a word, gaps after each trim, by matrix exponentials; heading in [-pi, pi]."""
+def word_end(twists: ArrayLike, times: ArrayLike, displacements: ArrayLike | None = None) -> Array:
+    """End (dof,) of a word by matrix exponentials, its heading in [-pi, pi]."""
     rows = np.asarray(twists, dtype=np.float64)
-    moves = np.zeros_like(rows) if gaps is None else np.asarray(gaps, dtype=np.float64)
+    moves = np.zeros_like(rows) if displacements is None else np.array(displacements, float)
     matrix = np.eye(rows.shape[1] if rows.shape[1] == 3 else 4)
     for i, time in enumerate(np.asarray(times, dtype=np.float64)):
         matrix = matrix @ expm(time * hat(rows[i]))
@@ -59,10 +59,10 @@ def off_goal(end: ArrayLike, goal: ArrayLike) -> Array:
     return off
 
 
-def plain_end(twists: ArrayLike, times: ArrayLike, gaps: ArrayLike | None = None) -> Array:
+def plain_end(twists: ArrayLike, times: ArrayLike, displacements: ArrayLike | None = None) -> Array:
     """`word_end` in complex numbers, heading not wrapped: quick enough for differences."""
     rows = np.asarray(twists, dtype=np.float64)
-    moves = np.zeros_like(rows) if gaps is None else np.asarray(gaps, dtype=np.float64)
+    moves = np.zeros_like(rows) if displacements is None else np.array(displacements, float)
     place, heading, altitude = 0j, 0.0, 0.0
     for i, time in enumerate(np.asarray(times, dtype=np.float64)):
         half = 0.5 * rows[i, 2] * time
@@ -78,27 +78,32 @@ def plain_end(twists: ArrayLike, times: ArrayLike, gaps: ArrayLike | None = None
 
 
 def jacobian(
-    twists: ArrayLike, times: ArrayLike, gaps: ArrayLike | None = None, *, step: float = 1e-5
+    twists: ArrayLike,
+    times: ArrayLike,
+    displacements: ArrayLike | None = None,
+    *,
+    step: float = 1e-5,
 ) -> Array:
     """Derivatives (dof, n) of the end by the times, by central differences."""
     t = np.asarray(times, dtype=np.float64)
     columns = []
     for shift in step * np.eye(t.size):
-        later, earlier = plain_end(twists, t + shift, gaps), plain_end(twists, t - shift, gaps)
+        later = plain_end(twists, t + shift, displacements)
+        earlier = plain_end(twists, t - shift, displacements)
         columns.append((later - earlier) / (2.0 * step))
     return np.array(columns).T
 
 
 def hessian(
-    twists: ArrayLike, times: ArrayLike, price: ArrayLike, gaps: ArrayLike | None = None
+    twists: ArrayLike, times: ArrayLike, price: ArrayLike, displacements: ArrayLike | None = None
 ) -> Array:
     """Second derivatives (n, n) of ``price . end`` by the times, by differences of differences."""
     t = np.asarray(times, dtype=np.float64)
     p, step = np.asarray(price, dtype=np.float64), 1e-4
     rows = []
     for shift in step * np.eye(t.size):
-        later = jacobian(twists, t + shift, gaps, step=step)
-        earlier = jacobian(twists, t - shift, gaps, step=step)
+        later = jacobian(twists, t + shift, displacements, step=step)
+        earlier = jacobian(twists, t - shift, displacements, step=step)
         rows.append(p @ (later - earlier) / (2.0 * step))
     return np.array(rows)
 
@@ -244,7 +249,7 @@ def brute_force(
 def steering_roots(
     twists: ArrayLike,
     goal: ArrayLike,
-    gaps: ArrayLike | None = None,
+    displacements: ArrayLike | None = None,
     *,
     starts: int,
     longest: float,
@@ -258,9 +263,9 @@ def steering_roots(
     found: list[Array] = []
     for _ in range(starts):
         solved = least_squares(
-            lambda t: off_goal(plain_end(rows, t, gaps), goal),
+            lambda t: off_goal(plain_end(rows, t, displacements), goal),
             rng.uniform(0.0, 1.0, len(rows)) * reach,
-            jac=lambda t: jacobian(rows, t, gaps),
+            jac=lambda t: jacobian(rows, t, displacements),
             xtol=1e-15,
             ftol=1e-15,
             gtol=1e-15,

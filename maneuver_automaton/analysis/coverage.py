@@ -75,10 +75,10 @@ def settings_for(automaton: Automaton, *, measure: str = "time") -> CoverageSett
     Words may cost four of the dearest maneuvers, or eight edges of half a second or metre.
     """
     spans = [m.duration if measure == "time" else path_length(m) for m in automaton.maneuvers]
-    ways = [float(np.linalg.norm(m.displacement[:2])) for m in automaton.maneuvers]
+    distances = [float(np.linalg.norm(m.displacement[:2])) for m in automaton.maneuvers]
     edge_cost = 0.5
     most = max(4.0 * max(spans, default=0.0), 8.0 * edge_cost)
-    radius = 2.0 * max(ways, default=0.0) or 2.0
+    radius = 2.0 * max(distances, default=0.0) or 2.0
     body = automaton.model
     cell = body.resolution / 4.0 if isinstance(body, LatticeBody) else radius / 100.0
     reach = ReachSettings(measure=measure, most=most, edge_cost=edge_cost, same_m=cell)
@@ -121,11 +121,11 @@ def dispersion(
     settings = settings or CoverageSettings()
     words = _at_rest(automaton, reached(automaton, start=start, settings=settings.reach))
     samples = poses_in_ball(settings.radius, settings.samples, seed=settings.seed)
-    gaps, _ = _nearest(words.poses, samples, settings.metres_per_radian)
-    worst = int(gaps.argmax())
+    distances, _ = _nearest(words.poses, samples, settings.metres_per_radian)
+    worst = int(distances.argmax())
     return Dispersion(
-        largest=float(gaps[worst]),
-        mean=float(gaps.mean()),
+        largest=float(distances[worst]),
+        mean=float(distances.mean()),
         pose=samples[worst],
         reached=len(words.poses),
         most=float(words.costs.max()),
@@ -200,7 +200,7 @@ def spanning_factor(
 
 
 def straight_line(automaton: Automaton, *, measure: str = "time") -> Reference:
-    """The least cost of a body that could drive and turn any way, as fast as the library does.
+    """The least cost of a body that drives and turns in all directions as fast as the library does.
 
     It is a lower bound for every vehicle: the distance, or the longer of the times for the distance
     and for the turn.
@@ -229,8 +229,8 @@ def straight_line(automaton: Automaton, *, measure: str = "time") -> Reference:
             return distance
         turn = abs(math.remainder(pose[2], 2.0 * math.pi))
         times = [
-            way / rate if rate else (math.inf if way else 0.0)
-            for way, rate in ((distance, speed), (turn, turn_rate))
+            amount / rate if rate else (math.inf if amount else 0.0)
+            for amount, rate in ((distance, speed), (turn, turn_rate))
         ]
         return max(times)
 
@@ -288,7 +288,7 @@ def _shown(pose: Array) -> Array:
 
 
 def _at_rest(automaton: Automaton, words: Reached) -> Reached:
-    """Those words that end where the vehicle can stand."""
+    """The words that end where the vehicle can stand."""
     ends = np.isin(words.classes, list(rest_classes(automaton)))
     return replace(
         words, poses=words.poses[ends], costs=words.costs[ends], classes=words.classes[ends]
@@ -303,5 +303,5 @@ def _nearest(poses: Array, samples: Array, length: float) -> tuple[Array, IntArr
     places = np.stack([poses[:, 0], poses[:, 1], np.mod(length * poses[:, 2], turn)], axis=-1)
     around = np.concatenate([places + np.array([0.0, 0.0, k * turn]) for k in (-1.0, 0.0, 1.0)])
     asked = np.stack([samples[:, 0], samples[:, 1], np.mod(length * samples[:, 2], turn)], axis=-1)
-    gaps, rows = cKDTree(around).query(asked)
-    return np.asarray(gaps), np.asarray(rows, dtype=np.int64) % len(poses)
+    distances, rows = cKDTree(around).query(asked)
+    return np.asarray(distances), np.asarray(rows, dtype=np.int64) % len(poses)

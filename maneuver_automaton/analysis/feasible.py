@@ -29,8 +29,8 @@ class FeasibleSet:
     """Least times from a grid of start poses to the goal of a problem.
 
     Where `exhaustive`, every admitted word was searched for every pose, and the times are the
-    least. Otherwise they are those of the best plans found: what is in the set is feasible, what
-    is not may be.
+    least. Otherwise they are those of the best plans found: a pose in the set is feasible, and one
+    outside may be, too.
     """
 
     problem: Problem

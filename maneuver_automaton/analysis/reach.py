@@ -91,7 +91,7 @@ def rest_classes(automaton: Automaton) -> frozenset[int]:
 
 
 def path_length(maneuver: Maneuver) -> float:
-    """Way of the reference point during a maneuver [m]; the straight line where it is not known."""
+    """Length of the path of a maneuver [m]; of the straight line where the path is not known."""
     poses = None if maneuver.course is None else maneuver.course.pose
     if poses is None:
         return float(np.linalg.norm(maneuver.displacement[:2]))

@@ -1,4 +1,4 @@
-"""Turnpikes: the longer the way, the longer the best motion stays near a trim."""
+"""Turnpikes: the longer the path, the longer the best motion stays near a trim."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class TurnpikeCase:
-    """One way: what the automaton pays for it, and the best motion between the same ends."""
+    """One path: what the automaton pays for it, and the best motion between the same ends."""
 
     coast: float  # [s] in the trim, in the automaton's plan
     duration: float  # [s] of both
@@ -43,7 +43,7 @@ class TurnpikeCase:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Turnpike:
-    """The same trim over longer and longer ways."""
+    """A trim held over longer and longer paths, and the optimum for each of them."""
 
     trim: Trim
     reduced_names: tuple[str, ...]
@@ -68,9 +68,9 @@ def turnpike(
 ) -> Turnpike:
     """Hold the word (maneuver up, trim, maneuver down) against the full optimal control problem.
 
-    The goal is where the automaton comes to, after as long as it takes. If the trim is the best
-    way to get on, the optimum follows it but for a while at either end that does not grow with
-    the way, and the automaton pays more by a sum that does not grow either.
+    The goal is where the automaton comes to, after as long as it takes. If the trim
+    gets on at the least cost, the optimum follows it but for a while at either end that does not
+    grow with the path, and the automaton pays more by a sum that does not grow either.
 
     Source: Faulwasser, Flaßkamp, Ober-Blöbaum, Worthmann (2019), *Towards velocity turnpikes in
     optimal control of mechanical systems*; the paper, Sec. 5.

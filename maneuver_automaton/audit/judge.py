@@ -69,10 +69,10 @@ def audit_plan(
     Returns
     -------
     Audit
-        ``passed`` if no sample is further than 1e-7 (relative to the way driven) from the solver's,
-        the last pose is within 1e-9 of the goal, reduced states and controls keep the model's
-        limits, no obstacle is touched or closer than the margin, to within 1 mm, and no zone is
-        entered with a motion that it does not admit.
+        ``passed`` if no sample is further than 1e-7 (relative to the path driven) from the
+        solver's, the last pose is within 1e-9 of the goal, reduced states and controls keep the
+        model's limits, no obstacle is touched or closer than the margin, to within 1 mm, and no
+        zone is entered with a motion that it does not admit.
         ``min_clearance_m`` is the least distance measured, between poses it is at most a tenth
         less; None without obstacles.
     """

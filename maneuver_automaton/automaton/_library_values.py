@@ -21,7 +21,7 @@ def rows_of(document: Mapping[str, Any], key: str) -> list[Any]:
 
 
 def check_keys(label: str, entry: Any, *, known: Sequence[str], needed: Sequence[str]) -> None:
-    """Refuse what is no object, has an unknown key, or lacks one."""
+    """Refuse an entry that is no object, has an unknown key, or lacks one."""
     if not isinstance(entry, dict):
         raise InvalidLibrary(f"{label}: got {entry!r:.60}, need an object")
     for key in entry:

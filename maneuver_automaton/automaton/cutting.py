@@ -19,7 +19,7 @@ NOTHING = 1e-9  # [s] what lasts no longer has passed, or has not begun
 
 
 def with_samples_at(plan: Plan, times: ArrayLike, model: Model) -> Plan:
-    """The same plan, its maneuvers sampled at `times` (n,) [s] too: there it can be cut exactly.
+    """A plan whose maneuvers have samples at `times` (n,) [s] too, where it can be cut exactly.
 
     Raises
     ------

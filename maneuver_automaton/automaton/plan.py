@@ -281,7 +281,7 @@ class Plan:
         )
 
     def moved(self, by: LieGroup) -> Plan:
-        """The same word from a start moved by the group element `by`: the law of the project."""
+        """A plan of the same word from the start moved by `by`: the law of the project."""
         return replace(self, start=(by @ type(by)(self.start)).pose)
 
 
@@ -321,8 +321,8 @@ def _finer(course: Trajectory, max_step_m: float, max_step_rad: float) -> Trajec
     """The course with poses between its samples where these are too far apart."""
     steps = np.abs(np.diff(course.pose, axis=0))
     places = [0, 1, *range(3, steps.shape[1])]
-    ways = np.linalg.norm(steps[:, places], axis=1)
-    parts = np.ceil(np.maximum(ways / max_step_m, steps[:, 2] / max_step_rad) - 1e-9)
+    lengths = np.linalg.norm(steps[:, places], axis=1)
+    parts = np.ceil(np.maximum(lengths / max_step_m, steps[:, 2] / max_step_rad) - 1e-9)
     count = np.maximum(parts, 1.0).astype(np.int64)
     if not (count > 1).any():
         return course

@@ -34,7 +34,7 @@ UNDECIDED = (PlanStatus.NO_PLAN, PlanStatus.OUT_OF_BUDGET)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """One line of the report; `holds` is None for what is told but not judged."""
+    """One line of the report; `holds` is None for a fact that is not judged."""
 
     what: str
     holds: bool | None

@@ -123,7 +123,7 @@ def _loop(path: Path, scenario: Scenario, settings: Settings) -> ClosedLoop:
 
 
 def _statistics(path: Path, scenario: Scenario, out: Path, settings: Settings) -> int:
-    """The same loop with seed after seed: a table, and statistics.json."""
+    """Drive the loop with seed after seed; print a table and write statistics.json."""
     from maneuver_automaton.formats.statistics_json import save_statistics
     from maneuver_automaton.receding_horizon import simulate_many
 

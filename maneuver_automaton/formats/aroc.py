@@ -124,10 +124,10 @@ def wheelbase_of(primitives: tuple[ArocPrimitive, ...]) -> float:
         mean = 0.5 * (one.states[:-1, 3] + one.states[1:, 3])
         crossed.append(mean * np.tan(control[:, 1]) * spans)
         turned.append(np.diff(one.states[:, 2]))
-    way, turn = np.concatenate(crossed), np.concatenate(turned)
-    if not abs(float(way @ turn)) > 0.0:
+    length, turn = np.concatenate(crossed), np.concatenate(turned)
+    if not abs(float(length @ turn)) > 0.0:
         raise InvalidLibrary(f"{LIST}: no primitive turns, so nothing tells the wheelbase")
-    return float(way @ way / (way @ turn))
+    return float(length @ length / (length @ turn))
 
 
 def automaton_of_aroc(

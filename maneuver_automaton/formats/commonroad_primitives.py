@@ -178,7 +178,7 @@ def vehicle_of(file: RoadPrimitives) -> SecondOrderCar:
     """
     if (known := VEHICLES.get(file.vehicle or "")) is not None:
         return known
-    crossed, turned = _ways_and_turns(file)
+    crossed, turned = _lengths_and_turns(file)
     if not np.abs(turned).max() > 0.0:
         raise InvalidLibrary(
             f"vehicle: {file.vehicle or 'an older file, which names none'}; no primitive turns, so "
@@ -344,7 +344,7 @@ def _escaped(text: str) -> str:
     return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
 
-def _ways_and_turns(file: RoadPrimitives) -> tuple[Array, Array]:
+def _lengths_and_turns(file: RoadPrimitives) -> tuple[Array, Array]:
     """For every step: the integral of speed times tan(steering) [m], and the turn [rad]."""
     nodes, weights = np.polynomial.legendre.leggauss(8)
     share, weights = 0.5 * (nodes + 1.0), 0.5 * weights
@@ -419,7 +419,7 @@ def _stated(car: SecondOrderCar, maneuver: Maneuver) -> RoadPrimitive:
 
 
 def _driven_through(car: SecondOrderCar, course: Trajectory, times: Array) -> Trajectory:
-    """The same motion with samples at `times` too."""
+    """The motion along a course with samples at `times` too."""
     marks = np.unique(np.concatenate([course.time, times[:-1]]).round(12))
     spans = np.diff(marks)
     middle = marks[:-1] + 0.5 * spans

@@ -25,7 +25,7 @@ KINDS = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Place:
-    """A value of a document, and the way to it."""
+    """A value of a document, and the path of keys to it."""
 
     value: Any
     file: str

@@ -59,7 +59,7 @@ def is_nav2_map(document: Document) -> bool:
 
 
 def load_nav2_map(path: Path, *, unknown: Unknown = "blocked") -> OccupancyMap:
-    """The map of a YAML file; `unknown` says what cells are of which it knows nothing.
+    """The map of a YAML file; `unknown` says how to read cells of which it knows nothing.
 
     Raises
     ------

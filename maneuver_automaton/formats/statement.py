@@ -22,7 +22,7 @@ class MapFile:
 
     map: OccupancyMap
     path: Path  # of the YAML
-    unknown: Unknown = "blocked"  # what cells are of which the file knows nothing
+    unknown: Unknown = "blocked"  # how cells are read of which the file knows nothing
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

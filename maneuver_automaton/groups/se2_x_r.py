@@ -45,7 +45,7 @@ class SE2xR:
 
     @property
     def planar(self) -> SE2:
-        """The same poses seen from above."""
+        """The planar poses, without their height."""
         return SE2(self.pose[..., :3])
 
     def inverse(self) -> SE2xR:

@@ -168,7 +168,7 @@ class InWorld:
         return [*z[:k], np.arctan2(sin, cos), *z[k + 2 :]], cos, sin
 
     def _stated_rows(self, reduced_state: Array) -> tuple[Array, Array, Array]:
-        """The same on arrays with components last."""
+        """The stated reduced states, cosines and sines, as arrays with components last."""
         k = self._place
         z = np.asarray(reduced_state, dtype=np.float64)
         if k is None:

@@ -20,9 +20,9 @@ class LatticeBody:
 
     Files of lattice primitives state poses, no vehicle: their motions hold on one grid, from one
     heading of a few to another. Such a grid has the symmetry of translations alone, so a heading
-    belongs to what is left of the state when the group is taken out. It stands here beside the
-    pose of SE(2), which has it too: primitives that begin at a heading then join those that end
-    there, and no others, and every plan stays on the grid.
+    is part of the reduced state. It stands here beside the pose of SE(2), which has it too:
+    primitives that begin at a heading then join those that end there, and no others, and every plan
+    stays on the grid.
 
     Source: Pivtoraiko, Kelly (2005), *Efficient constrained path planning via search in state
     lattices*, i-SAIRAS, for primitives that are fixed to their headings.
@@ -60,7 +60,7 @@ class LatticeBody:
 
     @property
     def reduced_limits(self) -> Array:
-        """Those of a cosine and a sine: (2, 2)."""
+        """Limits of a cosine and a sine: (2, 2)."""
         return np.tile([-1.0, 1.0], (2, 1))
 
     def heading(self, reduced_state: Array) -> float:

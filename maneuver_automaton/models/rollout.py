@@ -1,4 +1,4 @@
-"""Simulation by an ODE solver: the slow, independent way to where a model goes."""
+"""Simulation by an ODE solver: slow, and independent of all closed forms."""
 
 from __future__ import annotations
 

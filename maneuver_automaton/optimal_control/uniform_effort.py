@@ -26,7 +26,7 @@ START, END, DURATION_S = (0.1, 1.0, 0.8), (0.0, 0.0, 0.0), 50.0
 NORM_WEIGHT = 0.1
 END_NODES = 2  # at each end, which the trapezoidal rule spoils
 SMOOTHING = 1e-6  # of the norm, which has a kink at zero; least |u| of the optimum: 3e-2
-SOFT = 1e-2  # smoothing for the way there
+SOFT = 1e-2  # of the first solve, whose optimum is the guess of the next
 
 # controls that are not zero, where the norm has its kink
 EVEN_PACE = Guess(

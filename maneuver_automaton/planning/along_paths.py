@@ -26,7 +26,7 @@ from maneuver_automaton.search.budget import Budget
 FIRST_SHARE = 0.8  # of the time limit, for a first path
 IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
 AT_ONCE = Patience(attempts=0, passes=0)
-WAITS = 9  # at rest, before a path is followed among obstacles that move
+WAITS = 9  # at rest, before a path is followed among moving obstacles
 
 
 @dataclass(slots=True, eq=False)
@@ -64,7 +64,7 @@ class AlongPaths:
 
 
 def _stopping(found: Incumbents, path: Plan, goal_index: int) -> Iterator[tuple[Plan, int]]:
-    """Stop and steer along a path, once obstacles that move let it.
+    """Stop and steer along a path, once moving obstacles let it pass.
 
     The path was free at the pace of the simpler vehicle. This one is slower, so that it meets
     moving obstacles elsewhere: it waits before it starts, as long as it takes, or does not go.

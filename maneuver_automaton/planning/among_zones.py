@@ -34,7 +34,7 @@ from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.admission import admitted_stretches, piece_is_admitted
 from maneuver_automaton.search.budget import Budget
 
-MOST_QUESTIONS = 8  # ways to enter some zones and go around others
+MOST_QUESTIONS = 8  # choices of zones to enter and zones to go around
 CROSSED_SHARE = 0.5  # of the time left, for a plan from zone to zone
 LEAST_TIME = 1e-3  # [s] for each question, also where the time is over
 STEP = 0.02  # [m, rad] between places where a trim may be replaced by a faster one
@@ -164,7 +164,7 @@ def _limited(model: Model, zone: Zone) -> Model:
 
 
 def quickened(problem: Problem, plan: Plan) -> Plan | None:
-    """The same path with cheaper trims wherever the zones admit them; None if there is no gain.
+    """A plan along the same path with cheaper trims where zones admit them; None without a gain.
 
     A trim is replaced by others of a parallel twist, as from a slow one to a fast one where a
     speed limit ends. Only for vehicles that switch at will.

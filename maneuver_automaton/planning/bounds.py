@@ -20,7 +20,7 @@ from maneuver_automaton.words.library import moving_trims
 def lattice_bound(query: LatticeQuery) -> float:
     """No plan is cheaper, whatever its word: the largest of the bounds that hold.
 
-    The closed bounds hold without obstacles too; the way in the plane knows those that stand still.
+    The closed bounds hold without obstacles too; the path in the plane knows the static ones.
     """
     problem = query.problem
     closed = min(closed_bound(problem, problem.goals[k]) for k in query.goal_index)
@@ -36,15 +36,15 @@ def lattice_bound(query: LatticeQuery) -> float:
 
 
 def speed_bound(problem: Problem) -> float:
-    """No plan of whatever kind is cheaper: the straight way at the greatest speed of the model."""
+    """No plan of whatever kind is cheaper: the straight line at the greatest speed of the model."""
     cost, fastest = problem.cost, greatest_speed(problem.automaton.model)
     if not isinstance(cost, Cost):
         return 0.0
-    return _least_way(problem) * (cost.time / fastest + cost.length)
+    return _least_distance(problem) * (cost.time / fastest + cost.length)
 
 
 def word_bound(problem: Problem) -> float:
-    """No word of the library is cheaper: the straight way at its best price per metre.
+    """No word of the library is cheaper: the straight line at its best price per metre.
 
     A maneuver leads as far as its displacement, so it has a price per metre like a trim.
     """
@@ -53,16 +53,17 @@ def word_bound(problem: Problem) -> float:
     speeds, rates = np.linalg.norm(velocities, axis=1), problem.rates
     prices = (rates[speeds > 0.0] / speeds[speeds > 0.0]).tolist()
     for maneuver in automaton.maneuvers:
-        way = float(np.linalg.norm(maneuver.displacement[[0, 1, *range(3, problem.start.size)]]))
-        if way > 0.0:
-            prices.append(problem.maneuver_cost(maneuver) / way)
-    return _least_way(problem) * max(0.0, min(prices, default=0.0))
+        moved = maneuver.displacement[[0, 1, *range(3, problem.start.size)]]
+        distance = float(np.linalg.norm(moved))
+        if distance > 0.0:
+            prices.append(problem.maneuver_cost(maneuver) / distance)
+    return _least_distance(problem) * max(0.0, min(prices, default=0.0))
 
 
 def bound_along_paths(problem: Problem) -> float:
-    """No plan is cheaper: the shortest way, driven from rest to rest at the limits.
+    """No plan is cheaper: the shortest path, driven from rest to rest at the limits.
 
-    A way that the kinematic vehicle needs B seconds for at full speed v takes ``B + v / a`` with
+    A path that the kinematic vehicle needs B seconds for at full speed v takes ``B + v / a`` with
     the acceleration a, or ``2 sqrt(B v / a)`` where v is not reached.
     """
     model, cost = problem.automaton.model, problem.cost
@@ -79,10 +80,10 @@ def bound_along_paths(problem: Problem) -> float:
     return max(known, cost.time * duration + cost.length * least * fastest)
 
 
-def _least_way(problem: Problem) -> float:
-    """Straight way from the start to the tolerance of the nearest goal [m]."""
+def _least_distance(problem: Problem) -> float:
+    """Distance from the start to the tolerance of the nearest goal [m]."""
 
-    def way(goal: Goal) -> float:
+    def distance(goal: Goal) -> float:
         return max(0.0, goal.off(problem.start)[0] - goal.tolerance_m)
 
-    return min(way(goal) for goal in problem.goals)
+    return min(distance(goal) for goal in problem.goals)

@@ -23,8 +23,8 @@ def free_words(
 
     Each search may take a `share` of the time that is left, and finds `others` words beside the
     cheapest; None asks for all there are. Words with maneuvers count their work where the problem
-    limits it, and then may take all the time. Where only the cheapest of these counts, what is
-    known already bounds its cost.
+    limits it, and then may take all the time. Where only the cheapest of these counts, the
+    best plan known bounds its cost.
     """
     problem = found.problem
     for index in goals:

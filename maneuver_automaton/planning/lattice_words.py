@@ -37,14 +37,14 @@ from maneuver_automaton.words.word import Word
 AT_ONCE = Patience(attempts=0, passes=0)
 SOME = Patience(attempts=400, passes=0)  # of a plan beside a stone
 BRIEF = Patience(attempts=1000, passes=3)  # of the path among static obstacles
-MOST_WAYS = 4  # that are tried with rests
-QUICK = 1500  # expansions in space and time before a way with rests is tried
+MOST_PATHS = 4  # among static obstacles that are tried with rests
+QUICK = 1500  # expansions in space and time before a path with rests is tried
 PASSING_SHARE = 0.3  # of the time that is left, for paths that let moving obstacles pass
 BEFORE_POLISHING = 0.2  # share of what is left that the lattice gets, once there is a plan
 FOR_THE_BEST = 0.6  # the same where alternatives are asked for
 FREE_WORDS = 4  # words of free space that are looked at for every alternative
 FREE_WORDS_SHARE = 0.3  # of the time that is left for alternatives
-MOST_DETOURS = 8  # known ways beside which others are looked for
+MOST_DETOURS = 8  # known paths beside which others are looked for
 
 
 @dataclass(slots=True, eq=False)
@@ -63,7 +63,7 @@ class LatticeWords:
 
     @property
     def budget(self) -> Budget:
-        """What is left."""
+        """The budget that remains."""
         return self.limit.less(self.spent)
 
     @property
@@ -145,7 +145,7 @@ def search_lattice(found: Incumbents, steps: Steps) -> LatticeWords:
 
 
 def _first(lattice: LatticeWords) -> FirstPlan | None:
-    """The first plan; where something moves, a way that lets it pass if a quick look finds none."""
+    """The first plan; where obstacles move, one with rests if a quick search finds none."""
     query, limit = lattice.query, lattice.limit
     if not lattice.knows_all and _needs_quick_word(query) and _quick(lattice):
         return None
@@ -154,8 +154,8 @@ def _first(lattice: LatticeWords) -> FirstPlan | None:
         if first.word is not None:
             lattice.gained(with_cost(first.word, query))
             return first
-        way = lattice.first_plan(_among_what_stands(query), limit)
-        timed = None if way.word is None else with_waits(query, way.word)
+        path = lattice.first_plan(_among_static(query), limit)
+        timed = None if path.word is None else with_waits(query, path.word)
         if timed is not None:
             lattice.gained(timed)
             return first
@@ -180,10 +180,10 @@ def _quick(lattice: LatticeWords) -> bool:
 
 
 def late_at_first(query: LatticeQuery) -> LatticeQuery:
-    """The query with no longest time where what costs less is what lasts less.
+    """The query with no longest time where the cheaper of two words is the quicker one.
 
-    There a first word may be late, and what shortcuts and polishing make of it is in time; whatever
-    stays late is refused.
+    There a first word may be late, since shortcuts and polishing make it quicker; a word that stays
+    late is refused.
     """
     edges, trims = query.library.arrays, query.library.arrays.library
     rates = trims.rates[: trims.n_trims]  # the last row is the turn of a free heading
@@ -234,25 +234,25 @@ def _for_the_best(lattice: LatticeWords) -> Budget:
 
 def _let_pass(lattice: LatticeWords) -> None:
     """Take note of the cheapest path among static obstacles, with rests that let others pass."""
-    query, calm = lattice.query, _among_what_stands(lattice.query)
+    query, calm = lattice.query, _among_static(lattice.query)
     soon = lattice.limit.part(PASSING_SHARE)
     found = lattice.first_plan(calm, soon)
     if found.word is None:
         return
     better = lattice.improve(calm, found.word, replace(soon, expansions=None), patience=BRIEF)
-    ways = sorted([found.word, better.word, *better.others], key=lambda one: one.cost)
-    distinct = {tuple(way.trims.tolist()): way for way in reversed(ways)}
-    for way in list(distinct.values())[::-1][:MOST_WAYS]:
-        timed = with_waits(query, way)
+    paths = sorted([found.word, better.word, *better.others], key=lambda one: one.cost)
+    distinct = {tuple(path.trims.tolist()): path for path in reversed(paths)}
+    for path in list(distinct.values())[::-1][:MOST_PATHS]:
+        timed = with_waits(query, path)
         if timed is not None and timed.cost < lattice.words[-1].cost:
             lattice.gained(timed)
 
 
-def _among_what_stands(query: LatticeQuery) -> LatticeQuery:
+def _among_static(query: LatticeQuery) -> LatticeQuery:
     """The query without moving obstacles."""
     problem = query.problem
-    still = tuple(obstacle for obstacle in problem.obstacles if not moves(obstacle))
-    return lattice_query(replace(problem, obstacles=still), _goals(query), prepared=query.prepared)
+    static = tuple(obstacle for obstacle in problem.obstacles if not moves(obstacle))
+    return lattice_query(replace(problem, obstacles=static), _goals(query), prepared=query.prepared)
 
 
 def _goals(query: LatticeQuery) -> list[int]:
@@ -274,7 +274,7 @@ def _free_words(lattice: LatticeWords) -> Iterator[Candidate]:
 
 
 def _detours(lattice: LatticeWords, best: Word, most: int) -> Iterator[Candidate]:
-    """Up to `most` plans on other ways round the obstacles: a stone closes each known way."""
+    """Up to `most` plans round other sides of the obstacles: a stone closes each known path."""
     query = lattice.query
     known: list[Plan] = [plan_of_word(query, best)]
     for n_th in range(MOST_DETOURS):

@@ -57,7 +57,7 @@ def plan(problem: Problem, *, time_limit: float = 5.0, alternatives: int = 0) ->
 def plan_in(
     workspace: Workspace, problem: Problem, *, time_limit: float, alternatives: int
 ) -> PlanResult:
-    """As `plan`, with what was prepared for the problem's map."""
+    """Plan as `plan` does, with arrays prepared for the problem's map."""
     if not time_limit > 0.0:
         raise ValueError(f"time_limit must be positive, got {time_limit} s")
     if alternatives < 0:

@@ -120,7 +120,7 @@ class Planner:
         start_time: float = 0.0,
         start_trim: str | None = None,
     ) -> PlanResult:
-        """As `plan` of the problem from `start` (dof,) to `goals`, at `start_time` [s].
+        """Plan as `plan` does for the problem from `start` (dof,) to `goals`, at `start_time` [s].
 
         It starts in `start_trim`, or else in the planner's own; a `Goal` names the last trim.
         """
@@ -130,5 +130,5 @@ class Planner:
     def with_obstacles(
         self, obstacles: AnyObstacle | Shape | Sequence[AnyObstacle | Shape]
     ) -> Planner:
-        """The same planner on another map."""
+        """A planner like this one on another map."""
         return replace(self, obstacles=as_obstacles(obstacles))

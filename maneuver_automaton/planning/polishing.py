@@ -85,7 +85,7 @@ def load_polishing(problem: Problem) -> None:
 
 
 def polish_found(found: Incumbents, paths: Sequence[Aimed]) -> None:
-    """Polish kinematic plans of different gears, and what has been found; keep what is cheaper.
+    """Polish kinematic plans of different gears, and the plans found; keep those that are cheaper.
 
     `paths` are guesses along kinematic plans that are known already.
     """
@@ -97,7 +97,7 @@ def polish_found(found: Incumbents, paths: Sequence[Aimed]) -> None:
     known = [*cheapest, *(one for one in quickest if one not in cheapest)]
     horizon = problem.horizon
     if not known and (horizon.max_time or horizon.time or horizon.max_trims):
-        # what is late may be made quicker, and of too many trims one maneuver
+        # a plan that is late may be made quicker, and one maneuver of too many trims
         known = sorted(found.misfits, key=lambda one: one[0].duration)[:1]
     if not known or budget.is_over or why_not_polished(problem):
         return

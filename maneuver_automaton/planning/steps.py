@@ -27,7 +27,7 @@ from maneuver_automaton.search.linked_words import load_linked_words
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Steps:
-    """What is done for a problem, in this order."""
+    """The steps of planning for a problem, in their order."""
 
     along_paths: bool  # stop and steer along the paths of a kinematic vehicle
     words: bool  # offer words of free space before the lattice is searched
@@ -41,8 +41,8 @@ def steps_of(problem: Problem) -> Steps:
     """The steps that lead to plans of a problem.
 
     Where nothing is in the way, words come before the lattice: they are found sooner, and keep to
-    every condition of the horizon. Among obstacles the lattice alone finds its way round; but in
-    space, where it has one more dimension, a word that passes above or below is found sooner.
+    every condition of the horizon. Among obstacles the lattice alone finds a path round them; but
+    in space, where it has one more dimension, a word that passes above or below is found sooner.
     """
     method, automaton = problem.search.method, problem.automaton
     searched = method in ("auto", "lattice")
@@ -74,11 +74,11 @@ def has_inertia(problem: Problem) -> bool:
 
 
 def uses_lattice(problem: Problem) -> bool:
-    """Whether the lattice is what plans: it was asked for, or there is something in the way.
+    """Whether the lattice plans: it was asked for, or there is something in the way.
 
     In the plane it needs trims of which one turns, or two that lead to different sides where none
     does and the heading never changes; and a rest where the time is fixed. Otherwise words are
-    searched, and what is in the way sorts them out.
+    searched, and those that meet obstacles are refused.
     """
     if climbs_among_obstacles(problem):
         return True

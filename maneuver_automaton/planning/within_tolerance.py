@@ -112,15 +112,15 @@ def _poses_within(
     """Poses (dof,) within the tolerance of a goal, those nearer to the start first."""
     far, turned = ((1.0 - INSIDE) * value for value in (goal.tolerance_m, goal.tolerance_rad))
     places = [0, 1, *range(3, start.size)]
-    way = start[places] - goal.pose[places]
-    distance = float(np.linalg.norm(way))
+    offset = start[places] - goal.pose[places]
+    distance = float(np.linalg.norm(offset))
     turn = float(wrapped(start[2] - goal.pose[2]))
     if distance <= far and (goal.free_heading or abs(turn) <= turned):
         yield np.array(start)  # it is there already
-    if goal.free_heading or abs(turn) <= turned:  # straight ahead: some libraries know no other way
+    if goal.free_heading or abs(turn) <= turned:  # straight ahead: some libraries lead nowhere else
         ahead = np.array([math.cos(start[2]), math.sin(start[2])])
         foot = np.array(start)
-        foot[:2] -= (way[:2] @ ahead) * ahead
+        foot[:2] -= (offset[:2] @ ahead) * ahead
         if np.linalg.norm(foot[places] - goal.pose[places]) <= far:
             yield foot
     turns = [0.0]
@@ -129,8 +129,8 @@ def _poses_within(
         turns = list(dict.fromkeys(turns))
     shifts = [np.zeros(len(places))]
     if far:
-        towards = math.atan2(way[1], way[0])
-        shifts = [way * min(1.0, far / distance)] if distance > 0.0 else []
+        towards = math.atan2(offset[1], offset[0])
+        shifts = [offset * min(1.0, far / distance)] if distance > 0.0 else []
         for share in rings:
             for k in range(1 if shifts else 0, directions):
                 angle = towards + k * 2.0 * math.pi / directions
@@ -178,9 +178,9 @@ def _goals_met(problem: Problem, plan: Plan) -> Iterator[int]:
     """Goals within whose tolerance a plan ends, the nearest first."""
     off = [goal.off(plan.end) for goal in problem.goals]
     for index in sorted(range(len(off)), key=lambda k: sum(off[k])):
-        goal, (way, turn) = problem.goals[index], off[index]
+        goal, (distance, turn) = problem.goals[index], off[index]
         slack = 1e-9 * (1.0 + float(np.abs(plan.end).max()))
-        if way <= goal.tolerance_m + slack and turn <= goal.tolerance_rad + slack:
+        if distance <= goal.tolerance_m + slack and turn <= goal.tolerance_rad + slack:
             yield index
 
 

@@ -18,9 +18,9 @@ from maneuver_automaton.search.admission import admitted_stretches, piece_is_adm
 def what_zone_forbids(problem: Problem, plan: Plan, origin: tuple[float, float]) -> str:
     """The first motion of a plan that a zone does not admit where it is driven; empty if none.
 
-    A trim that a zone does not admit must not touch it, neither with the body nor with what is
-    carried; of a maneuver, what it does not admit of its course. Zones are counted from `origin`
-    [m], so that no digit is lost.
+    A trim that a zone does not admit must not touch it, neither with the body nor with a carried
+    part; of a maneuver, the stretches of its course that are not admitted. Zones are counted from
+    `origin` [m], so that no digit is lost.
     """
     model = problem.automaton.model
     bodies = [(plan, problem.footprint)]

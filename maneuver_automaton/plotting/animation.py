@@ -68,10 +68,10 @@ def _film(plan: Plan, problem: Problem | None, footprint: Any) -> Film:
     colors = trim_colors(track.twists)
     marks = mark_size(scene, box, size=size)
     stage = stage_of(scene, track, colors=colors, box=box, size=marks)
-    way = LineCollection([track.pose[:, :2]], colors=[(*GREY, 0.7)], linewidths=0.9, zorder=1.8)
+    line = LineCollection([track.pose[:, :2]], colors=[(*GREY, 0.7)], linewidths=0.9, zorder=1.8)
     trail = LineCollection([], linewidths=2.8, capstyle="butt", zorder=3.0)
     vehicle = PolyCollection([], edgecolors=[INK], linewidths=1.2, zorder=6.0)
-    for part in (way, trail, vehicle):
+    for part in (line, trail, vehicle):
         stage.ax.add_collection(part, autolim=False)
 
     def show(time: float) -> None:

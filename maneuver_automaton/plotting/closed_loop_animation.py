@@ -58,7 +58,7 @@ def save_closed_loop_animation(
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Scene:
-    """What moves, and what it is taken from."""
+    """The parts of a film that change, and the loop that they show."""
 
     loop: ClosedLoop
     body: list[Array]

@@ -52,10 +52,10 @@ def draw_maneuvers(ax: Axes, maneuvers: Sequence[Maneuver]) -> ManeuverArtists:
     1
     """
     center, half = _frame_of(maneuvers)
-    ways = [_way(maneuver) for maneuver in maneuvers]
+    courses = [_poses(maneuver) for maneuver in maneuvers]
     colors = [_color(maneuver) for maneuver in maneuvers]
     paths = LineCollection(
-        [way[:, :2] for way in ways], colors=colors, linewidths=1.3, zorder=3.0,
+        [poses[:, :2] for poses in courses], colors=colors, linewidths=1.3, zorder=3.0,
         linestyles=["solid" if one.course is not None else (0, (3, 2)) for one in maneuvers],
     )  # fmt: skip
     ax.add_collection(paths)
@@ -145,7 +145,7 @@ def _count(automaton: Automaton) -> str:
     return f"{maneuvers} maneuver{plural} between {trims} trim{'s' if trims > 1 else ''}"
 
 
-def _way(maneuver: Maneuver) -> Array:
+def _poses(maneuver: Maneuver) -> Array:
     """Poses (n, dof) from the origin."""
     if maneuver.course is not None:
         return maneuver.course.pose
@@ -174,7 +174,7 @@ def _color(maneuver: Maneuver) -> Color:
 
 def _frame_of(maneuvers: Sequence[Maneuver]) -> tuple[Array, float]:
     """Centre (2,) and half the width [m] of a square around the origin and all paths."""
-    points = np.concatenate([np.zeros((1, 2)), *(_way(one)[:, :2] for one in maneuvers)])
+    points = np.concatenate([np.zeros((1, 2)), *(_poses(one)[:, :2] for one in maneuvers)])
     low, high = points.min(axis=0), points.max(axis=0)
     return 0.5 * (low + high), 0.5 * ROOM * float((high - low).max()) or 1.0
 

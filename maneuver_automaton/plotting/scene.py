@@ -104,7 +104,7 @@ def view_box(scene: Scene, points: Array, *, size: float) -> Array:
 def mark_size(scene: Scene, box: Array, *, size: float) -> float:
     """Size of a path [m] that the marks of a picture suit.
 
-    The path's own, but smaller for a small body on a long way, and larger where obstacles take
+    The path's own, but smaller for a small body on a long path, and larger where obstacles take
     most of the picture.
     """
     if scene.body:

@@ -44,7 +44,7 @@ LIGHT = np.array([0.42, -0.76, 0.5])  # direction from which walls are lit
 BUILDING: Color = (0.72, 0.74, 0.78)
 START: Color = (0.10, 0.55, 0.25)
 GOAL: Color = (0.78, 0.16, 0.10)
-STORY = 4.0  # [m] of walls drawn in one piece: what is behind what is told piece by piece
+STORY = 4.0  # [m] of walls drawn in one piece: each piece is before or behind others as a whole
 STROKE = 1.0  # [m] of the path in one piece
 BROAD, SHADOW, POST = 0.0055, 0.0022, 0.0012  # of the scene's size: widths of what is drawn
 RIM = 0.3  # [pt] one for all: nearer faces are drawn later, line widths would not follow
@@ -169,7 +169,7 @@ def _figure(result: PlanResult) -> Figure:
 def _draw_flat(
     ax: Axes, result: PlanResult, track: Track, *, across: int, low: Array, high: Array
 ) -> None:
-    """The same scene along x and another axis: 1 for y, from above, or 2 for the altitude."""
+    """Draw the scene along x and another axis: 1 for y, from above, or 2 for the altitude."""
     places = [0, 1, 3]
     standing = sorted(_standing(result.problem), key=lambda one: (_height(one) or (0, math.inf))[1])
     if across == 2:
@@ -224,14 +224,14 @@ def _strokes(
 
 
 def _parts(places: Array) -> list[Array]:
-    """The way in short parts that share their ends."""
+    """A path in short parts that share their ends."""
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
     if not steps.sum() > 0.0:
         return []
-    way = np.concatenate([[0.0], np.cumsum(steps)])
-    count = max(2, math.ceil(way[-1] / STROKE) + 1)
-    at = np.linspace(0.0, way[-1], count)
-    even = np.stack([np.interp(at, way, column) for column in places.T], axis=1)
+    driven = np.concatenate([[0.0], np.cumsum(steps)])
+    count = max(2, math.ceil(driven[-1] / STROKE) + 1)
+    at = np.linspace(0.0, driven[-1], count)
+    even = np.stack([np.interp(at, driven, column) for column in places.T], axis=1)
     return [even[k : k + 2] for k in range(count - 1)]
 
 

@@ -117,12 +117,12 @@ class Track:
     def spread(self, count: int, *, reach: float) -> Array:
         """Poses (m, dof), about `count`, evenly along the path; `reach` [m] weighs the heading."""
         steps = np.abs(np.diff(self.pose, axis=0))
-        driven = np.hypot(steps[:, 0], steps[:, 1]) + reach * steps[:, 2]
-        way = np.concatenate([[0.0], np.cumsum(driven)])
-        if not way[-1] > 0.0:
+        each = np.hypot(steps[:, 0], steps[:, 1]) + reach * steps[:, 2]
+        driven = np.concatenate([[0.0], np.cumsum(each)])
+        if not driven[-1] > 0.0:
             return self.pose[:0]
-        at = np.linspace(0.0, way[-1], count + 2)[1:-1]
-        return np.stack([np.interp(at, way, column) for column in self.pose.T], axis=-1)
+        at = np.linspace(0.0, driven[-1], count + 2)[1:-1]
+        return np.stack([np.interp(at, driven, column) for column in self.pose.T], axis=-1)
 
 
 def track_of_plan(plan: Plan) -> Track:
@@ -239,9 +239,9 @@ def _sampled(name: str, kind: str, samples: _Samples) -> list[Piece]:
 
 def _turning_points(samples: _Samples) -> list[int]:
     """Where the direction of travel changes, among the samples."""
-    ways = np.diff(samples.pose[:, :2], axis=0)
+    steps = np.diff(samples.pose[:, :2], axis=0)
     heading = samples.pose[:-1, 2]
-    ahead = np.cos(heading) * ways[:, 0] + np.sin(heading) * ways[:, 1]
+    ahead = np.cos(heading) * steps[:, 0] + np.sin(heading) * steps[:, 1]
     driven = np.flatnonzero(np.abs(ahead) > TURNING_M)
     changes = np.flatnonzero(np.diff(np.sign(ahead[driven])))
     return [int(driven[k + 1]) for k in changes]

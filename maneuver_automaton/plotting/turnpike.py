@@ -1,4 +1,4 @@
-"""Draw turnpikes: speeds over time for longer and longer ways, costs, and time away."""
+"""Draw turnpikes: speeds over time for longer and longer paths, costs, and time away."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from maneuver_automaton.plotting.controls import TIME_LABEL
 from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
 from maneuver_automaton.plotting.style import corner_legend, tidy
 
-WIDEST = 2.4  # line of the shortest way, which the longer ones would hide
+WIDEST = 2.4  # line of the shortest path, which the longer ones would hide
 
 
 def save_turnpike_figure(study: Turnpike, path: str | Path) -> None:
-    """Write the picture of a trim over longer and longer ways.
+    """Write the picture of a trim over longer and longer paths.
 
     Left, a component of the reduced state over time; in the middle, what the automaton and the
     optimum cost beyond the trim's rate; right, how long the optimum is away from the trim.
@@ -39,7 +39,7 @@ def save_turnpike_figure(study: Turnpike, path: str | Path) -> None:
 
 
 def draw_turnpike_states(ax: Axes, study: Turnpike, *, component: int = 0) -> list[Line2D]:
-    """Draw a component of the reduced state over time, one line for each way, and the trim's."""
+    """Draw a component of the reduced state over time, one line for each path, and the trim's."""
     lines, points = [], []
     for k, case in enumerate(study.cases):
         time = case.optimum.time

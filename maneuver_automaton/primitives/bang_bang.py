@@ -89,7 +89,7 @@ def connect_bang_bang(
 
 
 def differing(maneuvers: Sequence[Maneuver], others: Sequence[Maneuver]) -> tuple[Maneuver, ...]:
-    """Those of `others` that lead elsewhere than the maneuver at their place, or another way.
+    """The `others` that lead elsewhere than the maneuver at their place, or along another path.
 
     Late maneuvers are the early ones again where one component changes or both take equally long.
     """

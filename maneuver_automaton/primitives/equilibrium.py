@@ -122,7 +122,7 @@ def _twist_names(model: Model) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Balance:
-    """The equations of one trim; the unknowns are reduced state and control, less what is given."""
+    """The equations of one trim; the unknowns are those of state and control not given."""
 
     model: Model
     given: Array  # (n_z + n_u,) nan where it is unknown
@@ -148,7 +148,7 @@ class _Balance:
         return everything
 
     def missed(self, unknown: Array) -> Array:
-        """What is out of balance (n_equations,); not finite outside of what the model can bear."""
+        """Residuals (n_equations,) of the balance; not finite where the model is not defined."""
         everything = self.completed(unknown)
         z, u = np.split(everything, [len(self.model.reduced_names)])
         with np.errstate(all="ignore"):
@@ -246,7 +246,7 @@ def _slopes(missed: Callable[[Array], Array], x: Array) -> Array:
 
 
 def _inside(balance: _Balance, low: Array, high: Array) -> Array:
-    """What is nearest to balance within the limits."""
+    """The unknowns within the limits that are nearest to balance."""
     from scipy.optimize import least_squares
 
     high = np.maximum(high, low + 1e-9)

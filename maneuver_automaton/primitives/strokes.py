@@ -19,7 +19,7 @@ from maneuver_automaton.primitives.trim import Trim
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ramp:
-    """The quickest way over a length from rest to rest: times of its three parts."""
+    """The quickest motion over a length from rest to rest: times of its three parts."""
 
     peak: float  # greatest speed, signed as the length [m/s, or rad/s]
     speed_up: float  # [s]
@@ -42,7 +42,7 @@ def ramp_of(
     Parameters
     ----------
     length : float
-        Way to go, negative in reverse [m, or rad].
+        Distance or angle, negative in reverse [m, or rad].
     max_speed, acceleration : float
         Greatest speed and rate of the speed, positive [m/s, m/s^2; or rad].
     deceleration : float, optional
@@ -76,7 +76,7 @@ def ramp_of(
 def strokes(
     model: Model, rests: Sequence[Trim], lengths: Sequence[float], *, max_speed: float | None = None
 ) -> tuple[Maneuver, ...]:
-    """The quickest ways of every length [m] from every rest, each a maneuver back to the same rest.
+    """The quickest motions of every length [m] from rest to the same rest, as maneuvers.
 
     What else the reduced state holds, such as the steering angle, stays: an arc of a circle.
     Negative lengths are driven backwards.
@@ -100,7 +100,7 @@ def strokes(
     ([-10.0, 0.0, 0.0], 6.5)
     """
     return _whole(
-        model, [_swing(model, r, way, "speed", max_speed) for r in rests for way in lengths]
+        model, [_swing(model, r, length, "speed", max_speed) for r in rests for length in lengths]
     )
 
 
@@ -113,7 +113,8 @@ def turns(
 ) -> tuple[Maneuver, ...]:
     """Turns on the spot by every angle at every rest, each as one maneuver to the same rest."""
     return _whole(
-        model, [_swing(model, r, way, "turn_rate", max_turn_rate) for r in rests for way in angles]
+        model,
+        [_swing(model, r, angle, "turn_rate", max_turn_rate) for r in rests for angle in angles],
     )
 
 
@@ -126,27 +127,27 @@ class _Swing(NamedTuple):
     ramp: Ramp
 
 
-def _swing(model: Model, rest: Trim, way: float, component: str, limit: float | None) -> _Swing:
-    """The one whose integral is `way`."""
+def _swing(model: Model, rest: Trim, length: float, component: str, limit: float | None) -> _Swing:
+    """The one whose integral is `length` [m, or rad]."""
     check_limited_rates(model)
     _check_rest(rest)
     if component not in model.reduced_names:
         raise ValueError(f"stroke: the {model.name} has no {component}, need one of limited rate")
     k = model.reduced_names.index(component)
     (slow, fast), (least, greatest) = model.control_limits[k], model.reduced_limits[k]
-    up, down, most = (fast, -slow, greatest) if way > 0.0 else (-slow, fast, -least)
-    if way == 0.0 or not most > 0.0:
+    up, down, most = (fast, -slow, greatest) if length > 0.0 else (-slow, fast, -least)
+    if length == 0.0 or not most > 0.0:
         raise ValueError(
-            f"stroke: got {way}, but the {component} of the {model.name} is within "
+            f"stroke: got {length}, but the {component} of the {model.name} is within "
             f"[{least:.6g}, {greatest:.6g}]; need a way that is not 0 and leads there"
         )
     ramp = ramp_of(
-        way,
+        length,
         max_speed=float(most) if limit is None else min(float(most), limit),
         acceleration=float(up),
         deceleration=float(down),
     )
-    return _Swing(f"{rest.name}, {component} over {way:.6g}", rest, k, ramp)
+    return _Swing(f"{rest.name}, {component} over {length:.6g}", rest, k, ramp)
 
 
 def _whole(model: Model, swings: Sequence[_Swing]) -> tuple[Maneuver, ...]:

@@ -85,7 +85,7 @@ class AmongObstacles:
             time_limit=max(left, 1e-6),
             known=known,
             max_expansions=MOST_EXPANSIONS if moving else None,
-            # a first plan decides on which side what moves is passed
+            # a first plan decides on which side moving obstacles are passed
             patience=ANEW if moving and known is None else LITTLE,
         )
 

@@ -50,7 +50,7 @@ class RecedingHorizon:
     ----------
     problem : Problem
         From a trim to a trim, rest if none is named; its horizon is fixed or free. A fixed time is
-        prolonged by rest at every step; where no plan may end in a rest, it is what is left of it.
+        prolonged by rest at every step; where no plan may end in a rest, it runs down.
     step : float
         delta [s]: the loop closes every so often.
     margin : float

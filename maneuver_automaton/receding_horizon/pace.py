@@ -19,7 +19,7 @@ UNIFORM = 1e-9  # relative spread of an effort that counts as uniform
 
 
 def at_best_pace(problem: Problem, plan: Plan) -> Plan:
-    """The same path in the same time with uniform effort, as far as limits allow.
+    """A plan retimed to uniform effort in the same time, as far as limits allow.
 
     Source: the paper, Prop. 15 and Cor. 19.
     """

@@ -185,7 +185,7 @@ def _in_time(
 
 
 def quickest(problem: Problem) -> Problem:
-    """The same problem in least time, whatever time it takes."""
+    """The problem in least time, without a limit of time."""
     return replace(
         problem,
         cost=Cost(time=1.0),

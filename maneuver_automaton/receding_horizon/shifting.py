@@ -110,7 +110,7 @@ def _same(one: Trim, other: Trim) -> bool:
 
 
 def costliest_first(plan: Plan, rates: Array) -> Plan:
-    """The same motion with trims that commute ordered by falling cost per second, rest last.
+    """A plan whose trims that commute are ordered by falling cost per second, rest last.
 
     The order of trims that share a centre, or are all straight, does not change where they lead.
     Among these orders this one costs most early on, which the paper's tie rule asks for: with the

@@ -53,7 +53,7 @@ def fitted_plans(problem: Problem, plan: Plan, goal: Goal) -> Iterator[Plan]:
 
 
 def with_best_times(problem: Problem, plan: Plan, goal: Goal) -> Plan | None:
-    """The same word with its best times to a goal, say of any heading; None if none are found."""
+    """A plan's word with its best times to a goal; None if none are found that are cheaper."""
     longest = np.array([trim.max_duration for trim in plan.trims])
     again = _solved(problem, plan, goal, np.zeros(len(longest)), longest)
     return None if again is None or problem.cost_of(again) >= problem.cost_of(plan) else again

@@ -36,11 +36,10 @@ def incumbent_words(
 ) -> Iterator[Incumbent]:
     """Words from the start to a goal as they are found, each cheaper than the one before.
 
-    Where cost is time, the first words may last longer than the query admits: what they are
-    improved to need not. Passes of greater weight come first; every word is shortened, and later
-    passes are pruned by the best. What is found in a number of expansions is the same at every
-    call; shortcuts are rounds that are not counted. The last incumbent has no word: it says how
-    the search ended.
+    Where cost is time, the first words may last longer than the query admits: improved ones need
+    not. Passes of greater weight come first; every word is shortened, and later passes are pruned
+    by the best. The same number of expansions finds the same words at every call; shortcuts are
+    rounds that are not counted. The last incumbent has no word: it says how the search ended.
 
     Parameters
     ----------

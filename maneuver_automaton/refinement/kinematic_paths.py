@@ -24,7 +24,7 @@ def follows_paths(model: Model) -> bool:
 def kinematic_problem(
     problem: Problem, *, switch: float = SWITCH_SHARE, direction_change: float = 0.0
 ) -> Problem:
-    """The same start, goals and obstacles for the kinematic vehicle at its greatest speeds.
+    """The problem of the kinematic vehicle at its greatest speeds between the same obstacles.
 
     Its cost is time; `switch` and `direction_change` are prices in units of the time that the
     vehicle with inertia takes to change its reduced state from one limit to the other.

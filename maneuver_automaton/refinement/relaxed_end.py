@@ -28,7 +28,7 @@ RANK = 1e-9  # singular values below this, relative, count as none
 def with_relaxed_end(
     problem: Problem, plan: Plan, goal: Goal, *, share: float = 1.0, first: int = 0
 ) -> Plan | None:
-    """The same word with the cheapest coasting times that end within the tolerance of a goal.
+    """A plan's word with the cheapest coasting times that end within the tolerance of a goal.
 
     Parameters
     ----------

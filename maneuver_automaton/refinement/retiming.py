@@ -1,4 +1,4 @@
-"""The same path at the best pace: the timing that makes the control effort uniform.
+"""Retiming: a path at its best pace, which makes the control effort uniform.
 
 A driftless vehicle runs the same path at another pace if its control is scaled: ``a u`` for
 ``tau / a`` instead of ``u`` for ``tau``. The quadratic effort of a given total time is then least
@@ -54,7 +54,7 @@ class Retiming:
 def retime(
     plan: Plan, model: Model, *, cost: Cost | None = None, limits: ArrayLike | None = None
 ) -> Retiming:
-    """The same path in the same total time at the pace that costs least.
+    """A plan retimed along its path: the same total time, at the pace that costs least.
 
     Each trim is scaled by one factor, its time by the inverse. Without limits every trim gets the
     same effort c; trims that a limit would keep below c run at their limit, and the others share
@@ -252,7 +252,7 @@ def _fastest(trim: Trim, box: Array, model: Model) -> float:
 
 
 def _scaled(trim: Trim, pace: float, box: Array) -> Trim:
-    """The same path at another pace, with a name that tells it."""
+    """A trim scaled to another pace along its path, with a name that tells it."""
     if abs(pace - 1.0) <= UNCHANGED:
         return trim
     return Trim(

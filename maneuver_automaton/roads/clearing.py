@@ -74,7 +74,7 @@ def clearing_of(
 
 
 def land_around(scene: RoadScene, *, far: float) -> tuple[Obstacle, ...]:
-    """What is no road, as static obstacles, no further than `far` [m] from the start.
+    """Land beside the road as static obstacles, no further than `far` [m] from the start.
 
     A strip along the edge is enough: a body that starts on the road has to cross it.
     """

@@ -1,7 +1,8 @@
 """What a drive was, by the audit: contacts, distances, the road left, equations and limits.
 
 Nothing of the planner is used. The body is measured by shapely against all other road users while
-they are there, and against what is no road; the equations are driven once more by an ODE solver.
+they are there, and against the land beside the road; the equations are driven once more by an ODE
+solver.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ def judged(scene: RoadScene, vehicle: RoadVehicle, plan: Plan) -> RoadVerdict:
 
 
 def land_beside(lanelets: Sequence[Lanelet], plan: Plan) -> tuple[Obstacle, ...]:
-    """What is no road within `BESIDE` [m] of a plan's path, as static obstacles.
+    """Land beside the road as static obstacles, within `BESIDE` [m] of a plan's path.
 
     Examples
     --------

@@ -102,7 +102,7 @@ class RoadPlanner:
         )
 
     def wider(self, width: int) -> RoadPlanner:
-        """The same planner with another width of its search."""
+        """A planner like this one with another width of its search."""
         settings = replace(self.settings, width=width)
         return replace(self, settings=settings, room=beam_arrays(settings, self.library))
 
@@ -128,7 +128,7 @@ class RoadPlanner:
         """What to do from a state (5,) at a tick, and whether it is not the tail of the last plan.
 
         The `tail` of the last plan is proven again from where the vehicle is, and kept unless a
-        new plan is better; what is kept is polished further. A motion that is not free is driven
+        new plan is better; then it is polished further. A motion that is not free is driven
         only where none is: then braking.
         """
         old = None if tail is None else self._again(state, tail)

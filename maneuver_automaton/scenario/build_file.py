@@ -269,7 +269,7 @@ def _made_at_once(asked: BuildFile) -> Automaton:
 
 
 def _check_maneuvers(document: Document, asked: BuildFile) -> None:
-    """What is only for one way of joining trims is refused in the other."""
+    """Refuse keys that belong to the other method of joining trims."""
     part, given = asked.maneuvers, asked.maneuvers.model_fields_set
     if not asked.at_once:
         for key in ("late", "strokes_m", "turns_rad"):

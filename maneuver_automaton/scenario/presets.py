@@ -108,13 +108,13 @@ def _parking(model: SecondOrderUnicycle | SecondOrderCar) -> Automaton:
     low, high = model.control_limits[0]
     reverse = [share * least for share in reversed(SLOW_TO_FAST[1:]) if least < 0.0]
     speeds = [*reverse, *(share * greatest for share in SLOW_TO_FAST)]
-    ways = [float(high * t * t) for t in STROKES_S]
+    ahead = [float(high * t * t) for t in STROKES_S]
     back = [float(low * t * t) for t in STROKES_S if least < 0.0]
     turn = model.reduced_names[1]
     return Automaton.of_model(
         model,
         {"speed": speeds, turn: [share * sharpest for share in SHARPNESS]},
-        strokes=[*ways, *back],
+        strokes=[*ahead, *back],
         turns=(-math.pi / 4, math.pi / 4) if turn == "turn_rate" else (),
     )
 

@@ -144,8 +144,8 @@ def polish(
     """Refine times to machine precision, check that they are locally optimal, and record them.
 
     Without linear conditions, a start with at most one time free lies next to its solution, and
-    Newton changes its cost by next to nothing. What is much dearer there than all that is asked
-    for need not be refined: that is where most of the time would go.
+    Newton changes its cost by next to nothing. A start much dearer than all words asked for
+    need not be refined: most of the time would go there.
     """
     m = problem.targets.size
     if n <= 4 and m == 0:
@@ -224,7 +224,7 @@ def polish_candidates(
         times = np.empty(size)
         n = 0
         for i in range(size):
-            # of a word with transitions, what is passed through for no time is no row
+            # in a word with transitions, a trim that is passed through for no time has no row
             if not linked or candidates.times[k, i] != 0.0:
                 rows[n], times[n] = i if linked else word[i], candidates.times[k, i]
                 n += 1

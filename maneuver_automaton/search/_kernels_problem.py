@@ -61,9 +61,9 @@ class WordProblem(NamedTuple):
 
 # Places in `fixed`:
 COST, TIME = 0, 1  # of the transitions
-WAY, TURN = 2, 3  # that is left to the trims at least
+DISTANCE, TURN = 2, 3  # that are left to the trims at least
 FIRST = 4  # x and y of the place after the first transition
-FOLLOWING = 6  # way of the transitions after the first, at most
+FOLLOWING = 6  # distance that the transitions after the first cover, at most
 AIM = 7  # x and y of the goal itself
 
 
@@ -234,9 +234,9 @@ def room_for(problem: WordProblem, n: int) -> WordProblem:
 def look_ahead(
     problem: WordProblem, links: Links, seen: WordProblem, word: IntArray, n: int
 ) -> None:
-    """Fill in what the transitions of a word leave to its trims, which takes no pose.
+    """Fill in the distance, turn and conditions that a word's transitions leave to its trims.
 
-    Most words are too dear already then.
+    That takes no pose, and most words are too dear already then.
     """
     for k in range(seen.fixed.size):
         seen.fixed[k] = problem.fixed[k]
@@ -248,13 +248,13 @@ def look_ahead(
         if after < 0:
             break
         step = links.displacement[before, after]
-        way = math.hypot(step[0], step[1])
+        distance = math.hypot(step[0], step[1])
         seen.fixed[COST] += links.cost[before, after]
         seen.fixed[TIME] += links.time[before, after]
-        seen.fixed[WAY] -= way
+        seen.fixed[DISTANCE] -= distance
         seen.fixed[TURN] -= abs(step[2])
         if i > 0:
-            seen.fixed[FOLLOWING] += way
+            seen.fixed[FOLLOWING] += distance
         for r in range(problem.targets.size):
             seen.targets[r] -= links.gains[r, before, after]
         before = after

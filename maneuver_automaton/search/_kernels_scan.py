@@ -92,17 +92,17 @@ def solve_triple(
     counter[2] += 1
     pose = (0j, 0.0)
     lead = pose
-    gap_1 = pose
-    gap_2 = pose
+    between_1 = pose
+    between_2 = pose
     stage = 0
     for i in range(n):
         if stage < 3 and i == triple[stage]:
             if stage == 0:
                 lead = pose
             elif stage == 1:
-                gap_1 = pose
+                between_1 = pose
             else:
-                gap_2 = pose
+                between_2 = pose
             pose = (0j, 0.0)
             stage += 1
         else:
@@ -122,9 +122,9 @@ def solve_triple(
     a, b, c = word[triple[0]], word[triple[1]], word[triple[2]]
     steer(
         (complex(twists[a, 0], twists[a, 1]), twists[a, 2]),
-        gap_1,
+        between_1,
         (complex(twists[b, 0], twists[b, 1]), twists[b, 2]),
-        gap_2,
+        between_2,
         (complex(twists[c, 0], twists[c, 1]), twists[c, 2]),
         (z, heading),
         tolerance,
@@ -528,8 +528,8 @@ def least_after(problem: WordProblem, trim: int, time: float, per_metre: float) 
     v, u, w = problem.twists[trim, 0], problem.twists[trim, 1], problem.twists[trim, 2]
     dx, dy, heading = coast(v, u, w, time)
     x, y, _ = compose(dx, dy, heading, problem.fixed[FIRST], problem.fixed[FIRST + 1], 0.0)
-    way = math.hypot(problem.fixed[AIM] - x, problem.fixed[AIM + 1] - y)
-    left = way - problem.fixed[FOLLOWING]
+    distance = math.hypot(problem.fixed[AIM] - x, problem.fixed[AIM + 1] - y)
+    left = distance - problem.fixed[FOLLOWING]
     if per_metre < 0.0:
         return math.nan
     return problem.rates[trim] * time + (left * per_metre if left > NONE_LEFT else 0.0)

@@ -14,8 +14,8 @@ import numpy as np
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel, merged_kernel
 from maneuver_automaton.search._kernels_problem import (
     COST,
+    DISTANCE,
     TURN,
-    WAY,
     condition,
     is_straight,
     look,
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from maneuver_automaton._arrays import Array, IntArray
     from maneuver_automaton.search._kernels_problem import Candidates, Links, WordProblem
 
-ON_THE_WAY = 1e-9  # relative: chains of transitions of one price are one
+SAME_PRICE = 1e-9  # relative: chains of transitions of one price are one
 NONE_LEFT = 1e-9  # [m, s] of a linear condition: transitions leave no more than rounding
 
 
@@ -206,7 +206,7 @@ def passing_words(
         if first_of_class(links, through) != word[passed]:
             continue  # the same transitions lead through another trim of its class
         around = links.cost[before, through] + links.cost[through, after]
-        if around <= links.cost[before, after] * (1.0 + ON_THE_WAY):
+        if around <= links.cost[before, after] * (1.0 + SAME_PRICE):
             continue  # the cheapest chain passes through it by itself
         for i in range(n - 1):
             kept[i] = rows[i] if i < passed else rows[i + 1]
@@ -229,8 +229,8 @@ def promising(
 ) -> bool:
     """Whether a word can be cheaper than the dearest of the solutions asked for.
 
-    Lower bounds that hold for any times, of what its transitions have `left` to its trims: way and
-    turn at the best price per metre and radian, each linear condition at the best per unit.
+    Lower bounds that hold for any times, of what its transitions have `left` to its trims: distance
+    and turn at the best price per metre and radian, each linear condition at the best per unit.
     """
     if upper_bound == np.inf:
         return True
@@ -242,8 +242,8 @@ def promising(
     if per_second < 0.0:
         return True
     bound = 0.0
-    if left.fixed[WAY] > 0.0:
-        bound = max(bound, left.fixed[WAY] * per_metre)
+    if left.fixed[DISTANCE] > 0.0:
+        bound = max(bound, left.fixed[DISTANCE] * per_metre)
     if left.fixed[TURN] > 0.0:
         bound = max(bound, left.fixed[TURN] * per_radian)
     for r in range(left.targets.size):
@@ -409,8 +409,8 @@ def prepare_word(
 ) -> int:
     """Fill `triple`: 0 nothing to do, 1 a word that cannot span, 2 one that can.
 
-    The word is one that is seen: whether its trims span, and what its transitions leave of the way,
-    shows only there. The lower bound of its cost comes before all that is dear.
+    The word is one that is seen: whether its trims span, and what its transitions leave of the
+    distance, shows only there. The lower bound of its cost comes before all that is dear.
     """
     blocks = word_blocks(problem, word, n)
     if blocks == 0 or not time_left(problem) > 0.0:

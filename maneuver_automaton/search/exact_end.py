@@ -1,4 +1,4 @@
-"""The same search for a moved problem, to the last bit, and the exact goal at its end.
+"""Goals rounded so that a moved problem has the same search, and words closed exactly after it.
 
 Start and goal seen from each other are the same for a moved problem but for rounding, and rounding
 decides where insertion has a choice among equals. So it searches for a goal with fewer digits, and

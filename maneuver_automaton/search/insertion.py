@@ -4,8 +4,8 @@ A kinematic vehicle has one class of trims, which switch at will: a trim is inse
 and its price tells exactly what that saves; see `free_insertion`. Between classes lead transitions
 of finite size, so that another word has to be tried; see `linked_insertion`. Trying words would do
 for one class, too, without a certificate and in 250 times the time: 545 ms in place of 2 for 81
-trims, 11.7 s in place of 7 ms for 441. So each improves words in its own way; what they are asked,
-what they begin with and what becomes of it is the same.
+trims, 11.7 s in place of 7 ms for 441. So each improves words in its own way, and both have the
+question, the first words and the answer in common.
 """
 
 from __future__ import annotations

@@ -135,8 +135,8 @@ def _enclosed(query: LatticeQuery, grids: Grids) -> str:
     ):
         if not grid.columns:
             continue
-        way = distances(grid, query.world.arrays.field, np.ascontiguousarray(far[:, :2]))
-        if np.isinf(way).all() and (query.bounded or not grid.state[2]):
+        lengths = distances(grid, query.world.arrays.field, np.ascontiguousarray(far[:, :2]))
+        if np.isinf(lengths).all() and (query.bounded or not grid.state[2]):
             return f"obstacles enclose the {name}"
     return ""
 

@@ -43,7 +43,7 @@ def search_arrays(library: LibraryArrays) -> SearchArrays:
 
 
 def with_room(search: SearchArrays, nodes: int) -> SearchArrays:
-    """The same search in arrays that hold at least so many nodes."""
+    """A copy of a search in arrays that hold at least so many nodes; itself if it has room."""
     n = len(search.nodes)
     if nodes <= n:
         return search

@@ -17,7 +17,7 @@ from maneuver_automaton.search.setup import SearchSetup, search_setup
 from maneuver_automaton.words.library import moving_trims
 
 MISSED = 1e-6  # [m, rad] for a goal a metre away: what is nearer may be met
-HARDLY_TURNING = 1e-6  # turn rate, as a share of a twist, that is too small to measure a way by
+HARDLY_TURNING = 1e-6  # turn rate, as a share of a twist, that is too small to measure a path by
 
 
 def why_impossible(problem: Problem) -> str:
@@ -43,10 +43,10 @@ def _impossible(problem: Problem, goal: Goal, setup: SearchSetup) -> str:
         return "all trims of the library move along one and the same curve, which misses the goal"
     limit = problem.horizon.time or problem.horizon.max_time
     if limit is not None:
-        way = _way_to(setup, goal)
+        distance = _distance_to(setup, goal)
         speed = float(np.linalg.norm(setup.twists[:, [0, 1, 3]], axis=1).max())
         turning = float(np.abs(setup.twists[:, 2]).max())
-        least = max(way / speed if way else 0.0, turn / turning if turn else 0.0)
+        least = max(distance / speed if distance else 0.0, turn / turning if turn else 0.0)
         if least > limit * (1.0 + 1e-9):
             return (
                 f"the goal cannot be reached in {limit:g} s: "
@@ -55,8 +55,8 @@ def _impossible(problem: Problem, goal: Goal, setup: SearchSetup) -> str:
     return ""
 
 
-def _way_to(setup: SearchSetup, goal: Goal) -> float:
-    """Straight way to the nearest place within the tolerance of a goal [m]."""
+def _distance_to(setup: SearchSetup, goal: Goal) -> float:
+    """Distance to the nearest place within the tolerance of a goal [m]."""
     return max(0.0, float(np.linalg.norm(setup.goal[[0, 1, 3]])) - goal.tolerance_m)
 
 
@@ -70,8 +70,9 @@ def _turn_to(setup: SearchSetup, goal: Goal) -> float:
 def _misses(directions: Array, goal: Array) -> bool:
     """Whether the one curve that trims of parallel twists (n, 4) follow is proven to miss a goal.
 
-    The goal's turn, or its way where the curve is straight, or its height where that changes, says
-    how far along the curve it would lie. A circle is closed, other curves may lead one way only.
+    The goal's turn, or its distance where the curve is straight, or its height where that changes,
+    says how far along the curve it would lie. A circle is closed; trims may follow other
+    curves in one direction only.
     """
     along = directions[0]
     turn_rate, climb = float(along[2]), float(along[3])
@@ -95,9 +96,10 @@ def _misses(directions: Array, goal: Array) -> bool:
 def closed_bound(problem: Problem, goal: Goal) -> float:
     """No plan that ends within the tolerance of `goal` is cheaper, whatever its word.
 
-    The largest of: the way at the best price per metre, the turn at the best price per radian, a
-    fixed time at the best price per second, and, for a fixed time T, ``k (way^2 + turn^2) / T``
-    with the largest k for which no trim costs less than ``k (speed^2 + turn rate^2)`` per second.
+    The largest of: the distance at the best price per metre, the turn at the best price per radian,
+    a fixed time at the best price per second, and, for a fixed time T,
+    ``k (distance^2 + turn^2) / T`` with the largest k for which no trim costs less than
+    ``k (speed^2 + turn rate^2)`` per second.
     The last one is the paper's bound on the effort, with k = c1 lambda_min(R) for the unicycle.
 
     Source: the paper, Appendix; Cauchy-Schwarz.
@@ -122,14 +124,14 @@ def closed_bound(problem: Problem, goal: Goal) -> float:
     prices = _prices(problem.automaton, problem.cost, pads)
     if prices is None:
         return 0.0
-    way, turn = _way_to(setup, goal), _turn_to(setup, goal)
+    distance, turn = _distance_to(setup, goal), _turn_to(setup, goal)
     bound = max(
-        way * prices.per_metre if way > 0.0 else 0.0,
+        distance * prices.per_metre if distance > 0.0 else 0.0,
         turn * prices.per_radian if turn > 0.0 else 0.0,
     )
     padded = 0.0
     if limit is not None:
-        bound = max(bound, prices.per_square * (way * way + turn * turn) / limit)
+        bound = max(bound, prices.per_square * (distance * distance + turn * turn) / limit)
         if pads:
             padded = setup.rest_rate * limit
         else:

@@ -2,7 +2,7 @@
 
 A trim that needs maneuvers to be entered and left changes the end of the word by a jump. So its
 price, the momentum of Pontryagin's condition times that jump, only says which changes to try first;
-each is tried with its best times. What no change makes cheaper is a local optimum.
+each is tried with its best times. A word that no change makes cheaper is a local optimum.
 """
 
 from __future__ import annotations

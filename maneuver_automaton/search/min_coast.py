@@ -29,9 +29,9 @@ def search_with_least_times(
 ) -> SearchResult:
     """Words in which every moving trim lasts at least ``horizon.min_coast``.
 
-    What must be coasted at least is a fixed displacement after each trim; what is coasted beyond
-    it is solved for. Each word is solved from several starts, so solutions may be missed. Of a
-    large library only the trims that reach far are combined.
+    The least time of each trim gives a fixed displacement after it; the time beyond is solved for.
+    Each word is solved from several starts, so solutions may be missed. Of a large library only the
+    trims that reach far are combined.
 
     Examples
     --------

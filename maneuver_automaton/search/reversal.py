@@ -27,7 +27,7 @@ from maneuver_automaton.words.word import Word
 
 
 def reversed_query(query: LatticeQuery) -> LatticeQuery | None:
-    """The same question asked from the goal; None where obstacles move, or with several goals."""
+    """The query from goal to start; None where obstacles move, or with several goals."""
     if query.moves or len(query.goals) > 1:
         return None
     problem = query.problem

@@ -65,7 +65,7 @@ def scene_of(
 
 
 def for_library(scene: Scene, problem: Problem, library: LatticeLibrary) -> Scene:
-    """The same scene for another library of the same trims."""
+    """A scene for another library of the same trims."""
     edge_window = scene.window.copy()
     edge_window[8] -= library.worst_error
     return scene._replace(edge_window=edge_window, zone_pieces=_admitted_pieces(problem, library))

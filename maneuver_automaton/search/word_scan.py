@@ -237,7 +237,8 @@ class WordScan:
             rates = rates - setup.rest_rate * weights
             prices = prices - setup.rest_rate * known.time
         linked = len(prices) > 1
-        way, turn = math.hypot(*setup.goal[:2]), abs(math.remainder(setup.goal[2], FULL_TURN))
+        distance = math.hypot(*setup.goal[:2])
+        turn = abs(math.remainder(setup.goal[2], FULL_TURN))
         bounded = math.inf if limit is None else limit
         fixed_time = self.problem.horizon.time is not None
         problem = WordProblem(
@@ -258,7 +259,7 @@ class WordScan:
             parallel=tables.parallel,
             weights=weights,
             goal=np.array(setup.goal),
-            fixed=np.array([0.0, 0.0, way, turn, 0.0, 0.0, 0.0, *setup.goal[:2]]),
+            fixed=np.array([0.0, 0.0, distance, turn, 0.0, 0.0, 0.0, *setup.goal[:2]]),
             time_limit=float(bounded),
             pad=int(pad),
             pad_cost=float(setup.rest_rate * bounded) if pad else 0.0,
@@ -354,15 +355,15 @@ def _tables(setup: SearchSetup) -> _Tables:
 
 
 def _reaches(setup: SearchSetup, twists: Array, periods: Array) -> Array:
-    """Longest time of interest per trim: a full turn, or a way well beyond the goal."""
+    """Longest time of interest per trim: a full turn, or a path well beyond the goal."""
     turning = twists[:, 2] != 0.0
     speeds = np.sqrt(twists[:, 0] ** 2 + twists[:, 1] ** 2)
     radii = speeds[turning] / np.abs(twists[turning, 2])
     place = math.hypot(float(setup.goal[0]), float(setup.goal[1]))
-    way = 2.0 * (place + 4.0 * radii.max(initial=0.0)) + abs(setup.goal[3])
+    length = 2.0 * (place + 4.0 * radii.max(initial=0.0)) + abs(setup.goal[3])
     pace = np.maximum(speeds, np.abs(twists[:, 3]))
     with np.errstate(divide="ignore"):
-        straight = np.where(pace > 0.0, max(way, 1e-3) / pace, 0.0)
+        straight = np.where(pace > 0.0, max(length, 1e-3) / pace, 0.0)
     return np.where(turning, periods, straight)
 
 

@@ -1,7 +1,7 @@
 """Words of at most three trims that carry a pose and trim exactly to another, with what they cost.
 
 A word begins and ends in given trims: the transitions out of the first and into the last are folded
-into the two poses, what is left is the steering function with displacements between its trims. A
+into the two poses, and the steering function takes the displacements between its trims. A
 vehicle whose trims are all of one class has the identity for every transition: nothing is folded,
 and every word is steered from the same pose to the same pose.
 """
@@ -97,9 +97,9 @@ def seen(
 
 
 @inner_kernel
-def straight_time(way: complex, velocity: complex) -> float:
-    """Time after which a straight trim is nearest to the end of `way`."""
-    return (way * velocity.conjugate()).real / (velocity * velocity.conjugate()).real
+def straight_time(goal: complex, velocity: complex) -> float:
+    """Time after which a straight trim is nearest to the place `goal`."""
+    return (goal * velocity.conjugate()).real / (velocity * velocity.conjugate()).real
 
 
 @bare_inner_kernel
@@ -131,9 +131,9 @@ def steer_two(
     out[0], out[1], out[2] = math.nan, math.nan, 0.0
     if w_a != 0.0 and w_b != 0.0:
         r_a, r_b = -1j * v_a / w_a, -1j * v_b / w_b
-        arm, way = r_a + d - r_b * unit(e), z + r_a - r_b * unit(heading)
+        arm, aim = r_a + d - r_b * unit(e), z + r_a - r_b * unit(heading)
         if abs(arm) > tolerance * (abs(r_a) + abs(r_b) + abs(d)):
-            angle = phase(way) - phase(arm)
+            angle = phase(aim) - phase(arm)
             out[0] = turn_time(angle, w_a)
             out[1] = turn_time(heading - e - angle, w_b)
     elif w_a != 0.0 and abs(v_b) > 0.0:
@@ -240,9 +240,9 @@ def step_of(lib: LibraryArrays, before: int, trim: int) -> tuple[complex, float]
 
 
 @inner_kernel
-def way_cost(lib: LibraryArrays, way: float, a: int, b: int, c: int) -> float:
+def distance_cost(lib: LibraryArrays, distance: float, a: int, b: int, c: int) -> float:
     """Least cost of coasting a distance by these trims: what transitions do not make of it."""
-    left, price = way, math.inf
+    left, price = distance, math.inf
     if a >= 0:
         price = lib.per_metre[a]
     if b >= 0:
@@ -271,7 +271,7 @@ def candidates(
     The first `n_words` rows of `words` are tried. `start` and `goal` are (x, y, heading, z);
     `before` and `after` are the (trim, gear) there, NO_TRIM and 0 where any will do. What costs
     `upper_bound` or more is left out: first by what the transitions cost, then by the least cost of
-    the way, and only then is a word steered.
+    the distance, and only then is a word steered.
     """
     x, y, heading, z = start
     g_x, g_y, g_heading, g_z = goal
@@ -289,15 +289,15 @@ def candidates(
     for climbing in range(-1, lib.climbs.shape[0]):
         climb = lib.climbs[climbing] if climbing >= 0 else NO_TRIM
         first_before, last_before = -2, -2
-        way_in, way_out = 0.0, 0.0
+        cost_in, cost_out = 0.0, 0.0
         # What a word is steered between: from s, the start after the transition into its first
         # trim, to e, the goal before the transition out of its last one; h is e before a climb is
-        # taken off. `rel` is e seen from s, `way` its distance.
+        # taken off. `rel` is e seen from s, `distance` how far away.
         s_x, s_y, s_heading = x, y, heading
         e_x, e_y, e_heading = g_x, g_y, g_heading
         h_x, h_y, h_heading = g_x, g_y, g_heading
         rel = seen(s_x, s_y, s_heading, e_x, e_y, e_heading)
-        way = abs(rel[0])
+        distance = abs(rel[0])
         for row in range(n_words):
             a, b, c = words[row, 0], words[row, 1], words[row, 2]
             n_trims = 3 if c >= 0 else 2 if b >= 0 else 1 if a >= 0 else 0
@@ -305,11 +305,11 @@ def candidates(
             # Rows are sorted by first and last trim, so the ends are folded once for many words.
             if not one_class and (a != first_before or last != last_before):
                 first_before, last_before = a, last
-                way_in = cost_between(lib, start_trim, a) if n_trims else 0.0
-                way_out = cost_between(lib, last, goal_trim)
+                cost_in = cost_between(lib, start_trim, a) if n_trims else 0.0
+                cost_out = cost_between(lib, last, goal_trim)
                 if climb >= 0:
-                    way_out = cost_between(lib, last, climb) + cost_between(lib, climb, goal_trim)
-                if not way_in + way_out < upper_bound:
+                    cost_out = cost_between(lib, last, climb) + cost_between(lib, climb, goal_trim)
+                if not cost_in + cost_out < upper_bound:
                     continue
                 s_x, s_y, s_heading = x, y, heading
                 if n_trims:
@@ -321,8 +321,8 @@ def candidates(
                 if climb >= 0:
                     e_x, e_y, e_heading = before_climb(lib, (h_x, h_y, h_heading), last, climb, 0.0)
                 rel = seen(s_x, s_y, s_heading, e_x, e_y, e_heading)
-                way = abs(rel[0])
-            fixed = way_in + way_out
+                distance = abs(rel[0])
+            fixed = cost_in + cost_out
             slope = 0.0
             if climbing >= lib.n_upright:  # it drives as it climbs: its time is known before
                 if not fixed < upper_bound or not is_level(lib, words[row]):
@@ -336,21 +336,21 @@ def candidates(
                     continue
                 e_x, e_y, e_heading = before_climb(lib, (h_x, h_y, h_heading), last, climb, slope)
                 rel = seen(s_x, s_y, s_heading, e_x, e_y, e_heading)
-                way = abs(rel[0])
+                distance = abs(rel[0])
                 fixed += slope * lib.rates[climb]
             # A word costs at least the distance at the price per metre of its cheapest trim: what
             # cannot be cheaper than the bound is left out before it is steered. For one class this
             # is the hot test of the search, so it knows no transition.
             if one_class and n_trims == 3:
                 price = min(lib.per_metre[a], lib.per_metre[b], lib.per_metre[c])
-                if way > lib.met and not way * price < upper_bound:
+                if distance > lib.met and not distance * price < upper_bound:
                     continue
             else:
                 if n_trims >= 2:
                     fixed += cost_between(lib, a, b)
                 if n_trims == 3:
                     fixed += cost_between(lib, b, c)
-                if not fixed + way_cost(lib, way, a, b, c) < upper_bound:
+                if not fixed + distance_cost(lib, distance, a, b, c) < upper_bound:
                     continue
             branches = scratch.branches
             n_branches = 1

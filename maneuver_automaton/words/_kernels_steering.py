@@ -100,9 +100,9 @@ def two_lines(
 @inlined_kernel
 def steer(
     a: tuple[complex, float],
-    gap_ab: tuple[complex, float],
+    step_ab: tuple[complex, float],
     b: tuple[complex, float],
-    gap_bc: tuple[complex, float],
+    step_bc: tuple[complex, float],
     c: tuple[complex, float],
     goal: tuple[complex, float],
     tolerance: float,
@@ -114,9 +114,9 @@ def steer(
     [0, one turn); straight times may be negative, which the caller rejects.
     """
     v_a, w_a = a
-    d_1, e_1 = gap_ab
+    d_1, e_1 = step_ab
     v_b, w_b = b
-    d_2, e_2 = gap_bc
+    d_2, e_2 = step_bc
     v_c, w_c = c
     z, heading = goal
     for row in range(2):
@@ -131,7 +131,7 @@ def steer(
     r_c = -1j * v_c / w_c if w_c != 0.0 else 0j
     # The end of the word, with the centres collected: ``at_1 e^{i h_1} + at_2 e^{i h_2}`` plus what
     # straights add is `d`, h_1 and h_2 the headings after the first trim and after the second one.
-    # A known heading turns its term into a known point; what is left is two circles, a line and a
+    # A known heading turns its term into a known point, which leaves two circles, a line and a
     # circle, or two lines.
     d = z + r_a - r_c * turn_3
     at_1 = r_a + d_1 - r_b * turn_1  # multiplies e^{i heading after a}
@@ -216,18 +216,19 @@ def steer(
 
 @kernel
 def steer_batch(
-    twists: Array, triples: IntArray, gaps: Array, goals: Array, tolerance: float
+    twists: Array, triples: IntArray, displacements: Array, goals: Array, tolerance: float
 ) -> Array:
-    """Both branches (k, 2, 3) of `steer`: k rows of trims, gaps (k, 2, 3), goals (k, 3)."""
+    """Both branches (k, 2, 3) of `steer` for k rows; displacements are (k, 2, 3), goals (k, 3)."""
     k = triples.shape[0]
     times = np.empty((k, 2, 3))
     for row in range(k):
         i, j, l = triples[row, 0], triples[row, 1], triples[row, 2]  # noqa: E741
+        first, second = displacements[row, 0], displacements[row, 1]
         steer(
             (complex(twists[i, 0], twists[i, 1]), twists[i, 2]),
-            (complex(gaps[row, 0, 0], gaps[row, 0, 1]), gaps[row, 0, 2]),
+            (complex(first[0], first[1]), first[2]),
             (complex(twists[j, 0], twists[j, 1]), twists[j, 2]),
-            (complex(gaps[row, 1, 0], gaps[row, 1, 1]), gaps[row, 1, 2]),
+            (complex(second[0], second[1]), second[2]),
             (complex(twists[l, 0], twists[l, 1]), twists[l, 2]),
             (complex(goals[row, 0], goals[row, 1]), goals[row, 2]),
             tolerance,

@@ -34,7 +34,7 @@ class EndConditions:
     targets: Array = field(default_factory=lambda: np.zeros(0))  # (m,)
 
     def missing(self, times: Array) -> tuple[Array, Array]:
-        """What is missing of each condition (dof + m,), and how it follows the times (.., n)."""
+        """Residuals (dof + m,) of the conditions, and the derivatives (.., n) of their values."""
         twists, places = self.twists, np.array(self.start)
         plane = [0, 1, *range(3, places.size)]  # places, not the heading
         places[plane] -= self.goal[plane]  # seen from the goal's place no digit is lost

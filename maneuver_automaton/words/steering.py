@@ -60,7 +60,7 @@ def steer(
     displacements : (2, 3) or (3, 4) array_like, optional
         Displacement (x, y, heading(, z)) of the maneuver between each two trims; none if omitted.
     longest : float, optional
-        Longest time of the fourth trim [s]; if omitted, a full turn or a way well beyond the goal.
+        Longest time of the fourth trim [s]; if omitted, a full turn or a path well beyond the goal.
     nodes : int
         Intervals of the scan of the fourth trim's time.
     tolerance : float
@@ -165,9 +165,9 @@ class _Climb:
         turning = self.rows[:, 2] != 0.0
         radius = (speeds[turning] / np.abs(self.rows[turning, 2])).max(initial=0.0)
         jumps = np.linalg.norm(self.steps[:, :2], axis=1).sum()
-        way = np.linalg.norm(self.goal[:2]) + jumps + 4.0 * radius
+        length = np.linalg.norm(self.goal[:2]) + jumps + 4.0 * radius
         height = abs(self.goal[3]) + np.abs(self.steps[:, 3]).sum()
-        return float(max(2.0 * way + height, 1e-3) / max(speeds[3], abs(self.rows[3, 3])))
+        return float(max(2.0 * length + height, 1e-3) / max(speeds[3], abs(self.rows[3, 3])))
 
     def roots(self, branch: int, reach: float, nodes: int) -> Iterator[Array]:
         """Times (4,) at which a branch has the altitude of the goal."""

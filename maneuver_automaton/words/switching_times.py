@@ -3,7 +3,7 @@
 A word with maneuvers is a word without them: with D_i the product of all displacements before trim
 i, ``prod exp(tau_i xi_i) d_i = prod exp(tau_i Ad(D_i) xi_i) D_n``. So the trims are seen from
 where their maneuvers have led, the goal from before all of them, and one solver serves every
-vehicle. What a trim must last at least is a displacement like any other.
+vehicle. The least time of a trim gives a displacement like any other.
 """
 
 from __future__ import annotations
@@ -191,19 +191,21 @@ class _ConjugatedWord:
             return _failed(n)
         if not chosen.size and not len(self.turn):
             return self._as_it_is(rates, beyond)
-        ways = [_Ending(self.turn[:0], 0.0), *(_Ending(self.turn, turn) for turn in TURNS)]
+        endings = [_Ending(self.turn[:0], 0.0), *(_Ending(self.turn, turn) for turn in TURNS)]
         solved = min(
             (
                 _solved(
-                    np.vstack([self.twists[chosen], way.turn]),
-                    np.append(rates[chosen], 0.0 * way.first),
+                    np.vstack([self.twists[chosen], ending.turn]),
+                    np.append(rates[chosen], 0.0 * ending.first),
                     self.goal,
                     beyond,
-                    np.append(np.ones(chosen.size), 0.0 * way.first),
-                    [np.append(self._beyond(one)[chosen], way.first) for one in guesses],
+                    np.append(np.ones(chosen.size), 0.0 * ending.first),
+                    [np.append(self._beyond(one)[chosen], ending.first) for one in guesses],
                     restarts,
                 )
-                for way in (ways[:1] if not len(self.turn) else ways[int(not chosen.size) :])
+                for ending in (
+                    endings[:1] if not len(self.turn) else endings[int(not chosen.size) :]
+                )
             ),
             key=lambda one: one.cost,
         )

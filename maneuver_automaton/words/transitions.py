@@ -135,7 +135,7 @@ def _firsts(n: int, sources: IntArray, targets: IntArray, prices: Array) -> IntA
     graph = csr_array((weights[direct], (sources[direct], targets[direct])), shape=(n, n))
     edge = np.full((n, n), -1)
     edge[sources[direct], targets[direct]] = direct
-    # Against the edges, from each class: what is before a class there is after it on the way back.
+    # Against the edges, from each class: a predecessor there is the next class along the edges.
     _, after = dijkstra(graph.T.tocsr(), return_predecessors=True)
     rows, columns = np.nonzero(after.T >= 0)
     best[rows, columns] = edge[rows, after.T[rows, columns]]

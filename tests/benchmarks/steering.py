@@ -51,12 +51,12 @@ def triples(n: int, repeats: int) -> None:
     twists, times, goals = planted(rng, n, 3)
     flat = twists.reshape(3 * n, 3)
     rows = np.arange(3 * n).reshape(n, 3)
-    gaps = np.zeros((n, 2, 3))
-    steer_batch(flat, rows, gaps, goals, 1e-12)
+    displacements = np.zeros((n, 2, 3))
+    steer_batch(flat, rows, displacements, goals, 1e-12)
     laps = []
     for _ in range(repeats):
         began = time.perf_counter()
-        steer_batch(flat, rows, gaps, goals, 1e-12)
+        steer_batch(flat, rows, displacements, goals, 1e-12)
         laps.append((time.perf_counter() - began) / n)
     kernel = statistics.median(laps)
     found, laps = [], []

@@ -46,26 +46,27 @@ def solved_and_free(matrix, rhs):
 
 @st.composite
 def words(draw, dof=4, least=1):
-    """Twists (n, dof), times (n,) and gaps (n, dof) of up to six trims."""
+    """Twists (n, dof), times (n,) and displacements (n, dof) of up to six trims."""
     n = draw(st.integers(least, 6))
     numbers = EVERYDAY | TINY | SPECIAL
     twists = draw(arrays(np.float64, (n, dof), elements=numbers))
     times = draw(arrays(np.float64, n, elements=st.floats(0.0, 4.0) | st.just(0.0)))
-    gaps = draw(arrays(np.float64, (n, dof), elements=EVERYDAY | st.just(0.0)))
-    return twists, times, gaps
+    displacements = draw(arrays(np.float64, (n, dof), elements=EVERYDAY | st.just(0.0)))
+    return twists, times, displacements
 
 
 @settings(max_examples=50)
 @given(words())
 def test_kernel_agrees_on_the_end_with_displacements(word):
-    twists, times, gaps = word
-    seen, product = conjugated(twists, gaps)
+    twists, times, displacements = word
+    seen, product = conjugated(twists, displacements)
     end, _, _ = derivatives(seen, times, 0.0, 0.0)
     whole = (SE2(np.array(end)) @ SE2(product[:3])).pose
-    off = whole - reference.word_end(twists[:, :3], times, gaps[:, :3])
+    off = whole - reference.word_end(twists[:, :3], times, displacements[:, :3])
     off[2] = wrapped(off[2])
     assert np.abs(off).max() < 1e-10
-    off = reference.plain_end(twists, times, gaps) - reference.word_end(twists, times, gaps)
+    exact = reference.word_end(twists, times, displacements)
+    off = reference.plain_end(twists, times, displacements) - exact
     off[2] = wrapped(off[2])
     assert np.abs(off).max() < 1e-11
 

@@ -25,13 +25,13 @@ SIZEABLE = st.sampled_from([-1.0, 0.0, 1.0]) | st.floats(0.1, 2.0) | st.floats(-
 KINDS = [kind for kind in itertools.product((1.0, 0.0), repeat=3) if any(kind)]
 
 
-def planted(rng, kinds, *, sideways, gaps):
-    """Random trims (n, 3), times and gaps (n, 2, 3) for each row of `kinds`, and their ends."""
+def planted(rng, kinds, *, sideways, displaced):
+    """Random trims (n, 3), times, displacements (n, 2, 3) and ends for each row of `kinds`."""
     n = len(kinds)
     twists = rng.uniform(0.2, 2.0, (n, 3, 3)) * rng.choice([-1.0, 1.0], (n, 3, 3))
     twists[:, :, 1] *= sideways
     twists[:, :, 2] *= kinds
-    between = gaps * rng.uniform(-1.0, 1.0, (n, 2, 3))
+    between = displaced * rng.uniform(-1.0, 1.0, (n, 2, 3))
     with np.errstate(divide="ignore"):
         longest = np.minimum(TURN / np.abs(twists[:, :, 2]), 4.0)
     times = rng.uniform(0.02, 0.98, (n, 3)) * longest
@@ -43,16 +43,16 @@ def planted(rng, kinds, *, sideways, gaps):
     return twists, between, times, end.pose
 
 
-@pytest.mark.parametrize("gaps", [0.0, 1.0], ids=["joined", "gaps"])
+@pytest.mark.parametrize("displaced", [0.0, 1.0], ids=["joined", "displaced"])
 @pytest.mark.parametrize("sideways", [0.0, 1.0], ids=["ahead", "sideways"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_planted_times_are_found(kind, sideways, gaps):
-    if sum(kind) == 1.0 and not (gaps or sideways) and kind != (0.0, 1.0, 0.0):
+def test_planted_times_are_found(kind, sideways, displaced):
+    if sum(kind) == 1.0 and not (displaced or sideways) and kind != (0.0, 1.0, 0.0):
         pytest.skip("neighbouring straights ahead are parallel: no isolated solution")
     rng = np.random.default_rng(1)
     n = 400
     twists, between, times, goals = planted(
-        rng, np.tile(kind, (n, 1)), sideways=sideways, gaps=gaps
+        rng, np.tile(kind, (n, 1)), sideways=sideways, displaced=displaced
     )
     found = np.array(
         [
@@ -68,14 +68,14 @@ def test_planted_times_are_found(kind, sideways, gaps):
 def test_every_triple_of_times_ends_at_the_goal(kind):
     rng = np.random.default_rng(2)
     n = 12
-    twists, between, times, goals = planted(rng, np.tile(kind, (n, 1)), sideways=1.0, gaps=1.0)
-    for row, gap, known, goal in zip(twists, between, times, goals, strict=True):
-        found = steer(row, goal, displacements=gap)
+    twists, between, times, goals = planted(rng, np.tile(kind, (n, 1)), sideways=1.0, displaced=1.0)
+    for row, steps, known, goal in zip(twists, between, times, goals, strict=True):
+        found = steer(row, goal, displacements=steps)
         assert 1 <= len(found) <= 2
         assert np.abs(found - known).max(axis=1).min() < 1e-6
         for solution in found:
             assert solution.min() >= 0.0
-            end = reference.word_end(row, solution, gap)
+            end = reference.word_end(row, solution, steps)
             assert np.abs(reference.off_goal(end, goal)).max() < 1e-9
 
 
@@ -94,10 +94,10 @@ def test_whatever_is_returned_ends_at_the_goal(twists, goal):
 @pytest.mark.parametrize("kind", KINDS)
 def test_root_finding_from_many_starts_finds_nothing_else(kind):
     rng = np.random.default_rng(4)
-    twists, between, _, goals = planted(rng, np.tile(kind, (3, 1)), sideways=1.0, gaps=1.0)
-    for row, gap, goal in zip(twists, between, goals, strict=True):
-        found = steer(row, goal, displacements=gap)
-        for root in reference.steering_roots(row, goal, gap, starts=12, longest=8.0, rng=rng):
+    twists, between, _, goals = planted(rng, np.tile(kind, (3, 1)), sideways=1.0, displaced=1.0)
+    for row, steps, goal in zip(twists, between, goals, strict=True):
+        found = steer(row, goal, displacements=steps)
+        for root in reference.steering_roots(row, goal, steps, starts=12, longest=8.0, rng=rng):
             assert np.abs(found - root).max(axis=1).min() < 1e-4
 
 
@@ -123,11 +123,12 @@ def test_a_moved_start_and_goal_have_the_same_times(twists, start, goal, by):
 def test_moved_problems_have_the_same_times_to_nine_digits():
     rng = np.random.default_rng(6)
     kinds = np.array(KINDS)[rng.integers(len(KINDS), size=100)]
-    twists, between, _, goals = planted(rng, kinds, sideways=1.0, gaps=1.0)
-    for row, gap, goal in zip(twists, between, goals, strict=True):
+    twists, between, _, goals = planted(rng, kinds, sideways=1.0, displaced=1.0)
+    for row, steps, goal in zip(twists, between, goals, strict=True):
         by, start = SE2(rng.uniform(-20, 20, 3)), SE2(rng.uniform(-5, 5, 3))
         moved = (by @ start).inverse() @ (by @ start @ SE2(goal))
-        here, there = steer(row, goal, displacements=gap), steer(row, moved.pose, displacements=gap)
+        here = steer(row, goal, displacements=steps)
+        there = steer(row, moved.pose, displacements=steps)
         assert there == pytest.approx(here, abs=1e-9)
 
 
@@ -240,33 +241,33 @@ def climbing(rng, *, fourth):
         twists[3, :3] = 0.0
     elif fourth == "straight":
         twists[3, 2] = 0.0
-    gaps = rng.uniform(-1.0, 1.0, (3, 4)) * rng.integers(2)
+    displacements = rng.uniform(-1.0, 1.0, (3, 4)) * rng.integers(2)
     with np.errstate(divide="ignore"):
         longest = np.minimum(TURN / np.abs(twists[:, 2]), 3.0)
     times = rng.uniform(0.05, 0.95, 4) * longest
-    return twists, gaps, times, reference.word_end(twists, times, gaps)
+    return twists, displacements, times, reference.word_end(twists, times, displacements)
 
 
 @pytest.mark.parametrize("fourth", ["vertical", "straight", "turn"])
 def test_planted_climbs_are_found(fourth):
     rng = np.random.default_rng(10)
     for _ in range(25):
-        twists, gaps, times, goal = climbing(rng, fourth=fourth)
-        found = steer(twists, goal, displacements=gaps)
+        twists, displacements, times, goal = climbing(rng, fourth=fourth)
+        found = steer(twists, goal, displacements=displacements)
         assert np.abs(found - times).max(axis=1).min() < 1e-6
         for solution in found:
             assert solution.min() >= 0.0
-            end = reference.word_end(twists, solution, gaps)
+            end = reference.word_end(twists, solution, displacements)
             assert np.abs(reference.off_goal(end, goal)).max() < 1e-9
 
 
 def test_a_moved_climb_has_the_same_times():
     rng = np.random.default_rng(11)
-    twists, gaps, _, goal = climbing(rng, fourth="turn")
+    twists, displacements, _, goal = climbing(rng, fourth="turn")
     for _ in range(5):
         by = SE2xR(rng.uniform(-20, 20, 4))
         moved = (by.inverse() @ (by @ SE2xR(goal))).pose
-        here, there = (steer(twists, end, displacements=gaps) for end in (goal, moved))
+        here, there = (steer(twists, end, displacements=displacements) for end in (goal, moved))
         assert there == pytest.approx(here, abs=1e-9)
 
 

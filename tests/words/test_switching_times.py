@@ -96,12 +96,12 @@ def test_climbing_words_meet_the_altitude():
 
 
 def test_gaps_are_kept_even_beside_a_trim_of_no_time():
-    twists, gaps = [AHEAD, SPIN, AHEAD], np.zeros((3, 4))
-    gaps[0] = 0.5, 0.25, 0.0, 0.0
-    goal = reference.word_end(twists, [1.0, 0.0, 2.0], gaps[:, :3])
-    solved = solve_switching_times(twists, [1, 1, 1], goal, displacements=gaps[:, :3])
+    twists, displacements = [AHEAD, SPIN, AHEAD], np.zeros((3, 4))
+    displacements[0] = 0.5, 0.25, 0.0, 0.0
+    goal = reference.word_end(twists, [1.0, 0.0, 2.0], displacements[:, :3])
+    solved = solve_switching_times(twists, [1, 1, 1], goal, displacements=displacements[:, :3])
     assert solved.status is TimesStatus.OPTIMAL
-    end = reference.word_end(twists, solved.durations, gaps[:, :3])
+    end = reference.word_end(twists, solved.durations, displacements[:, :3])
     assert reference.off_goal(end, goal) == pytest.approx(np.zeros(3), abs=1e-9)
     assert solved.durations[1] < 1e-6
     assert solved.durations.sum() == pytest.approx(3.0, abs=1e-6)
@@ -111,14 +111,14 @@ def test_gaps_of_random_words_are_met():
     rng = np.random.default_rng(5)
     for _ in range(20):
         twists = rng.uniform(-1, 1, (4, 3))
-        gaps = np.pad(rng.uniform(-1, 1, (4, 3)), [(0, 0), (0, 1)])
+        displacements = np.pad(rng.uniform(-1, 1, (4, 3)), [(0, 0), (0, 1)])
         times = rng.uniform(0.2, 1.5, 4)
-        goal = reference.word_end(twists, times, gaps[:, :3])
+        goal = reference.word_end(twists, times, displacements[:, :3])
         solved = solve_switching_times(
-            twists, np.ones(4), goal, displacements=gaps[:, :3], guesses=[times]
+            twists, np.ones(4), goal, displacements=displacements[:, :3], guesses=[times]
         )
         assert solved.status is not TimesStatus.FAILED
-        end = reference.word_end(twists, solved.durations, gaps[:, :3])
+        end = reference.word_end(twists, solved.durations, displacements[:, :3])
         assert np.abs(reference.off_goal(end, goal)).max() < 1e-9
         assert solved.durations.min() >= 0.0
         assert solved.cost < times.sum() + 1e-6
