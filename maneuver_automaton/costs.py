@@ -1,4 +1,4 @@
-"""What a plan costs: a rate for every trim, and a price for every switch."""
+"""Costs of plans: a rate for every trim, and a price for every switch."""
 
 from __future__ import annotations
 

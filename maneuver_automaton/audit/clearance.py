@@ -39,7 +39,7 @@ Around: TypeAlias = Callable[[tuple[AnyObstacle, ...], tuple[float, float]], Sur
 
 
 class Scene(NamedTuple):
-    """What a plan must not touch."""
+    """Obstacles around the place of a plan, and the body that keeps clear of them."""
 
     footprint: tuple[Shape, ...]
     obstacles: tuple[AnyObstacle, ...]

@@ -54,7 +54,7 @@ def audit_plan(
     parts : mapping of str to tuple of Shape, optional
         What the vehicle carries, by name, each in its own frame.
     obstacles : tuple of Obstacle or OccupancyMap
-        What it must not touch.
+        Obstacles that it must not touch.
     body_height : (float, float)
         From where to where the body reaches about its altitude [m].
     margin : float

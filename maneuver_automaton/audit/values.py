@@ -1,4 +1,4 @@
-"""What an audit finds, and how far a plan ends from its goal."""
+"""Findings of an audit, and how far a plan ends from its goal."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class TerminalError:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Audit:
-    """What the audit of one plan found."""
+    """Findings of the audit of one plan."""
 
     passed: bool
     max_dynamics_defect: float  # [m, rad, model's units] worst difference to the ODE solver

@@ -283,7 +283,7 @@ def _signed_limits(model: Model, source: Trim, target: Trim, keep_sign: Sequence
 
 @contextlib.contextmanager
 def _lines(journal: Path | None) -> Iterator[Callable[[Entry], None]]:
-    """What writes an entry to the journal, or nothing where there is none."""
+    """Function that writes an entry to the journal, or does nothing where there is none."""
     if journal is None:
         yield lambda entry: None
         return

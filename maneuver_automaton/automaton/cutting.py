@@ -74,7 +74,7 @@ def head_of(plan: Plan, until: float) -> Plan:
 
 
 def tail_of(plan: Plan, after: float, *, start: Array | None = None) -> Plan:
-    """What remains of a plan `after` seconds, from `start`; of a maneuver under way, its end.
+    """The rest of a plan `after` seconds, from `start`; of a maneuver under way, its end.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def _all_between(plan: Plan) -> tuple[Maneuver | None, ...]:
 
 
 def _between(plan: Plan, k: int) -> Maneuver | None:
-    """What stands before trim `k`."""
+    """The maneuver before trim `k`; None for a switch."""
     return plan.maneuvers[k - 1] if plan.maneuvers else None
 
 

@@ -56,7 +56,7 @@ def journal_path(library: Path) -> Path:
 
 
 def build_key(model: Model, objective: ManeuverObjective, settings: TransferSettings) -> str:
-    """What maneuvers are made from, trims apart: a hash.
+    """Hash of all that maneuvers are made from, trims apart.
 
     A model is known by its names, its limits and its rates at a few states, so that a change of
     a user's formulas is noticed as well.
@@ -81,7 +81,7 @@ def build_key(model: Model, objective: ManeuverObjective, settings: TransferSett
 
 
 def pair_key(build: str, source: Trim, target: Trim, *, keep_sign: Sequence[str] = ()) -> str:
-    """What one maneuver is made from: a hash; the names of the trims do not count."""
+    """Hash of all that one maneuver is made from; the names of the trims do not count."""
     ends = [[trim.reduced_state.tolist(), trim.control.tolist()] for trim in (source, target)]
     return _hash([build, *ends, *sorted(keep_sign)])
 

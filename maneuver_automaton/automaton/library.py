@@ -203,7 +203,7 @@ def _check_trims(automaton: Automaton) -> None:
 
 
 def _content(automaton: Automaton, inputs: Sequence[Inputs | None]) -> dict[str, Any]:
-    """What a file says of an automaton; inputs of maneuvers whose course is not driven yet."""
+    """Content of the file of an automaton; inputs of maneuvers whose course is not driven yet."""
     return {
         "model": model_entry(automaton.model),
         "trims": [_trim_entry(trim) for trim in automaton.trims],

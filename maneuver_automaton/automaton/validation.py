@@ -22,7 +22,7 @@ PARALLEL = 1e-9  # below this share of its size, a difference of twists or cente
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AutomatonReport:
-    """What `validate` found; names of trims, in the order of the automaton."""
+    """Findings of `validate`; names of trims, in the order of the automaton."""
 
     components: tuple[tuple[str, ...], ...]  # trims that can reach each other, largest first
     dead_ends: tuple[str, ...]  # trims that cannot be left, though there are others elsewhere

@@ -184,7 +184,7 @@ def _print_more(count: int) -> None:
 
 
 def report_lines(report: AutomatonReport) -> list[str]:
-    """What validation found, in words."""
+    """Findings of the validation, in words."""
     lines = [EVERY_POSE if report.controllable else report.reason]
     if not report.connected:
         sizes = ", ".join(str(len(component)) for component in report.components)

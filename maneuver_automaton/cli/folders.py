@@ -72,7 +72,7 @@ def _ending(path: Path) -> str:
 
 
 def _document(path: Path) -> Document | None:
-    """What a YAML file says; None if it cannot be read, which is told when it is planned."""
+    """Document of a YAML file; None if it cannot be read, which is told when it is planned."""
     try:
         return parse(read_text(path), name=str(path))
     except InvalidScenario:

@@ -1,4 +1,4 @@
-"""What `mpc` prints."""
+"""Tables that `mpc` prints."""
 
 from __future__ import annotations
 

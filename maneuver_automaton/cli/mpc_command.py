@@ -172,7 +172,7 @@ def _statistics(path: Path, scenario: Scenario, out: Path, settings: Settings) -
 
 
 def _all_well(statistics: Statistics) -> bool:
-    """Whether every loop reached the goal, and hit nothing."""
+    """Whether every loop reached the goal, and none collided."""
     return all(one.reached and not any(one.collisions) for one in statistics.outcomes)
 
 

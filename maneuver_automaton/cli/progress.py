@@ -9,7 +9,7 @@ from typing import Protocol
 
 
 class Advance(Protocol):
-    """What to call after each piece of work, or after several."""
+    """Function to call after each piece of work, or after several."""
 
     def __call__(self, n: int = 1) -> None:
         """Move the bar on by `n` pieces."""

@@ -1,4 +1,4 @@
-"""What the commands print: values in, rich tables out."""
+"""Tables that the commands print: values in, rich tables out."""
 
 from __future__ import annotations
 

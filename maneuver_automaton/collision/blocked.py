@@ -24,7 +24,7 @@ def touched(
     margin: float = 0.0,
     origin: tuple[float, float] = (0.0, 0.0),
 ) -> str:
-    """What a footprint at a pose (3,) and a time [s] touches or is too close to; empty if free.
+    """Sentence on the obstacle that a footprint at a pose (3,) and a time [s] touches; else empty.
 
     Exact, by shapely; obstacles and pose are counted from `origin` [m], so that no digit is lost.
 

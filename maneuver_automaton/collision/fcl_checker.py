@@ -60,7 +60,7 @@ class FclChecker:
     footprint : tuple of Shape
         Parts of the body; empty for a point.
     obstacles : tuple of Obstacle or OccupancyMap
-        What the body must not touch.
+        Obstacles that the body must not touch.
     margin : float
         Distance to keep [m].
     origin : (2,) sequence
@@ -307,7 +307,7 @@ class _Ground(NamedTuple):
 
 
 class _Sliced(NamedTuple):
-    """What a body sweeps in one slice."""
+    """Solid that a body sweeps in one slice."""
 
     object: Any
     excess: float  # [m]

@@ -20,7 +20,7 @@ ROUNDED = 1e-8  # [m] by which heights may be off
 
 
 class LayerArrays(NamedTuple):
-    """What the kernels see; a body is concerned by those layers in which its altitude is."""
+    """Arrays of all layers for the kernels; a body meets the layers in which its altitude is."""
 
     low: Array  # (L,) [m] altitudes of a pose
     high: Array  # (L,)

@@ -60,7 +60,7 @@ class MovingBody(NamedTuple):
 
     @classmethod
     def of(cls, motion: Motion, reach: float) -> MovingBody:
-        """What follows a motion and has no point further than `reach` [m] from its frame."""
+        """Body that follows a motion and has no point further than `reach` [m] from its frame."""
         rates = np.diff(motion.pose, axis=0) / np.diff(motion.time)[:, None]
         speed = float(np.hypot(rates[:, 0], rates[:, 1]).max(initial=0.0))
         return cls(

@@ -55,7 +55,7 @@ class Nearest(NamedTuple):
 
 
 class _Single(NamedTuple):
-    """What the tree does not hold: a disc, or a part of a moving obstacle."""
+    """An obstacle that the tree does not hold: a disc, or a part of a moving one."""
 
     part: Part
     motion: Motion

@@ -1,4 +1,4 @@
-"""What surrounds a vehicle, prepared once for one body: solids, buckets, a field of distances.
+"""Obstacles around one body, prepared once: solids, buckets, a field of distances.
 
 Everything is seen from a frame that moves with the obstacles, so that a moved world is the same
 world to the last bit (coordinates are rounded to 1e-9 m, far below every proven margin).
@@ -79,7 +79,7 @@ class MovingObstacles(NamedTuple):
 
 
 class WorldArrays(NamedTuple):
-    """What the kernels see."""
+    """Arrays of a world for the kernels."""
 
     solids: Solids
     buckets: Buckets

@@ -27,7 +27,7 @@ LEAST_GUESS_S = 0.1  # a first guess of the duration is not shorter
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ManeuverObjective:
-    """What a maneuver costs: a price of time, one of effort, and a little of restlessness.
+    """Cost of a maneuver: a price of time, one of effort, and a little of restlessness.
 
     Least time alone leaves the inputs open that are not in a hurry, and solvers fill them with
     chatter; a small price of the changes of the input makes them unique.
@@ -97,7 +97,7 @@ class TransferProgram:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Transfer:
-    """What the solver found, whatever the status: inputs in equal intervals, and their duration."""
+    """Answer of the solver, whatever its status: inputs in equal intervals, and their duration."""
 
     status: SolveStatus
     reason: str  # the solver's own word

@@ -1,4 +1,4 @@
-"""What polishing is given and what it returns, as values."""
+"""Input and output of polishing, as values."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Ends(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Polished:
-    """What the solver found: states at nodes, controls and durations between them."""
+    """Answer of the solver: states at nodes, controls and durations between them."""
 
     status: SolveStatus
     reason: str  # the solver's own word

@@ -211,7 +211,7 @@ def _row(casadi: Any, value: Any, count: int) -> Any:
 
 
 def ipopt_options(settings: SolverSettings) -> dict[str, Any]:
-    """What IPOPT is told."""
+    """Options of IPOPT."""
     options: dict[str, Any] = {
         "print_time": False,
         "error_on_fail": False,

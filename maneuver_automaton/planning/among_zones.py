@@ -84,7 +84,7 @@ def plan_among_zones(
 
 
 def _plans(problem: Problem, result: PlanResult) -> Iterator[tuple[Plan, int]]:
-    """What a search found, the best first, and the same quickened outside of the zones."""
+    """Plans of a result, the best first, each also quickened outside of the zones."""
     if result.plan is None or result.goal_index is None:
         return
     found = [result.plan, *(other.plan for other in result.alternatives)]
@@ -124,7 +124,7 @@ def _questions(problem: Problem) -> Iterator[Problem]:
 
 
 def admitted_automaton(automaton: Automaton, zones: tuple[Zone, ...]) -> Automaton | None:
-    """What of an automaton all of these zones admit; None if nothing of it moves.
+    """The part of an automaton that all of these zones admit; None if no trim of it moves.
 
     The limits of a vehicle with inertia become those of the zones, as far as it states them.
     """

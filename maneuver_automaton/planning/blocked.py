@@ -72,7 +72,7 @@ def goals_left(problem: Problem) -> tuple[int, ...]:
 
 
 def _part_touched(problem: Problem, trim: str | None, pose: Array, time: float) -> str:
-    """What something that the vehicle carries touches, in a trim at a pose; empty if nothing."""
+    """Sentence on the obstacle that a carried part touches in a trim at a pose; empty if none."""
     automaton = problem.automaton
     if not problem.parts or (trim is None and automaton.rest is None):
         return ""
@@ -90,7 +90,7 @@ def _part_touched(problem: Problem, trim: str | None, pose: Array, time: float) 
 
 
 def where_touched(problem: Problem, pose: Array, time: float) -> str:
-    """What the vehicle touches at a pose and a time; inf: only static obstacles count.
+    """Sentence on the obstacle that the vehicle touches at a pose and time; inf: static ones only.
 
     The kernels prove most poses free; where they do not, shapely decides.
     """

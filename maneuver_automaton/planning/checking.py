@@ -31,7 +31,7 @@ PROVEN = (1e-3, 2e-5)  # [m] a hit counts if it is one for the finer cover of ro
 
 
 class Condition(enum.Enum):
-    """What a plan may break, in the order in which it is checked."""
+    """Conditions that a plan may break, in the order of the checks."""
 
     WORD = "word"  # the horizon, the number of trims, and how long each of them lasts
     BOUNDS = "bounds"
@@ -41,7 +41,7 @@ class Condition(enum.Enum):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Checked:
-    """What the checks of one plan found."""
+    """Findings of the checks of one plan."""
 
     audit: Audit | None  # None if an earlier check failed
     broken: Condition | None = None  # the first that is broken

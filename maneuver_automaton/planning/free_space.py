@@ -50,7 +50,7 @@ def plan_by_words(
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Listed:
-    """What the searches for all goals came to."""
+    """Candidates from the searches for all goals, and how these ended."""
 
     candidates: list[Candidate]  # cheapest first, of equals the shortest
     exhausted: bool  # no search was cut short

@@ -19,7 +19,7 @@ LEAST_TIME = 1e-3  # [s] for each goal, also where the time is over
 def free_words(
     found: Incumbents, goals: Iterable[int], *, others: int | None, share: float = 1.0
 ) -> Iterator[tuple[int, SearchResult]]:
-    """What the searches for words to some goals found, stage by stage, each with its goal.
+    """Results of the searches for words to some goals, stage by stage, each with its goal.
 
     Each search may take a `share` of the time that is left, and finds `others` words beside the
     cheapest; None asks for all there are. Words with maneuvers count their work where the problem

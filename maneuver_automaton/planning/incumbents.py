@@ -51,7 +51,7 @@ class Candidate:
 
 @dataclass(slots=True, eq=False)
 class Incumbents:
-    """What was found for a problem, cheapest first: checked, each motion once, with its cost.
+    """Plans found for a problem, cheapest first: checked, each motion once, with its cost.
 
     This is the one place where a plan is refused, and a plan that breaks any condition of the
     problem is: horizon, limits of its trims, bounds, obstacles, zones, goal and dynamics.

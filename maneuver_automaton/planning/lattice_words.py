@@ -223,7 +223,7 @@ def improved(lattice: LatticeWords) -> list[Candidate]:
 
 
 def _for_the_best(lattice: LatticeWords) -> Budget:
-    """What the improvement of the best plan may take."""
+    """Budget for the improvement of the best plan."""
     left = lattice.budget
     if lattice.steps.polishes:
         return left.stage(BEFORE_POLISHING)
@@ -266,7 +266,7 @@ def _candidate(query: LatticeQuery, word: Word) -> Candidate:
 
 
 def _free_words(lattice: LatticeWords) -> Iterator[Candidate]:
-    """Words that are locally optimal in free space: those that hit nothing are so here, too."""
+    """Words that are locally optimal in free space: collision-free ones are so here, too."""
     found, goals = lattice.found, _goals(lattice.query)
     others = FREE_WORDS * found.alternatives
     for word, index in words_once(free_words(found, goals, others=others, share=FREE_WORDS_SHARE)):

@@ -1,4 +1,4 @@
-"""What polishing makes least: the price of a problem as far as a solver can be told, and the time.
+"""The cost that polishing minimises: that of a problem as far as a solver can be told, or time.
 
 Whatever it finds is priced once more by the problem itself, so a stand-in costs no honesty.
 """
@@ -24,7 +24,7 @@ ROUND = 0.03  # of the greatest control, within which a norm is smooth: solvers 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PolishedPrice:
-    """What a motion costs per second, without what counts its pieces, which are one.
+    """Cost of a motion per second, without prices per piece, since it is one piece.
 
     Of a user's own cost nothing is known but numbers: the time stands in for it.
     """
@@ -34,7 +34,7 @@ class PolishedPrice:
     waiting: float  # per second of the rest that fills a fixed time
 
     def of(self, plan: Plan) -> float:
-        """What a plan costs at this price."""
+        """Cost of a plan at this price."""
         if self.cost is self.problem.cost:
             return self.problem.cost_of(plan)
         return replace(self.problem, cost=self.cost).cost_of(plan)

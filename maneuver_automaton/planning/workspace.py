@@ -1,4 +1,4 @@
-"""What all plans on one map share, made once and held in the open."""
+"""Arrays and tables that all plans on one map share, made once and held in the open."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ DASHES: tuple[tuple[float, Sequence[float]] | Literal["-"], ...] = (
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class AlternativesArtists:
-    """What `draw_alternatives` has drawn."""
+    """Artists of `draw_alternatives`."""
 
     paths: tuple[Line2D, ...]  # in the order of the plans
     bodies: tuple[PolyCollection, ...]  # at the switching times, if there is a footprint

@@ -31,7 +31,7 @@ SPIN_SIZE = 0.45  # of a node, for turns on the spot
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class AutomatonArtists:
-    """What `draw_automaton` has drawn; a graph has no `points`, points have `switches` besides."""
+    """Artists of `draw_automaton`; a graph has no `points`, points have `switches` besides."""
 
     nodes: PolyCollection | None = None  # a disc for each trim
     motions: LineCollection | None = None  # one second of each trim, in its disc

@@ -25,7 +25,7 @@ FEW_BODIES, LEAST_ALPHA = 8, 0.3  # more bodies than that are fainter, but not m
 
 
 def swept_area(track: Track, scene: Scene) -> PathCollection:
-    """What the body covers along a track; empty where it is not known."""
+    """Area that the body covers along a track; empty where the body is not known."""
     region = swept_region(track, scene.body) if scene.body and track.pieces else []
     return PathCollection(
         [region_path(region)] if region else [], facecolors=[(*SWEPT, SWEPT_ALPHA)],

@@ -50,7 +50,7 @@ JUMP_STYLE, NEW_STYLE = (0, (1.0, 1.2)), (0, (5.0, 2.0))
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ClosedLoopArtists:
-    """What `draw_closed_loop` has drawn; `path` has one segment per trim that drives."""
+    """Artists of `draw_closed_loop`; `path` has one segment per trim that drives."""
 
     path: LineCollection
     plans: LineCollection  # one per step, thin and pale

@@ -24,7 +24,7 @@ SHORTEST_S = 1e-6  # what a clock may have missed, for the logarithm
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ValueArtists:
-    """What `draw_value` has drawn."""
+    """Artists of `draw_value`."""
 
     value: Line2D
     spent: Line2D  # cost accumulated
@@ -37,7 +37,7 @@ class ValueArtists:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SolveArtists:
-    """What `draw_solve_times` has drawn."""
+    """Artists of `draw_solve_times`."""
 
     times: Line2D
     replanned: PathCollection

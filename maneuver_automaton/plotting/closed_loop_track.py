@@ -36,7 +36,7 @@ def loop_colors(loop: ClosedLoop) -> dict[str, Color]:
 
 
 def driven_track(loop: ClosedLoop) -> Track:
-    """What was driven in a `loop`; a trim that goes on in the next step is one piece."""
+    """Track driven in a `loop`; a trim that goes on in the next step is one piece."""
     pieces: list[Piece] = []
     for plan in loop.driven:
         for piece in track_of_plan(plan).pieces:

@@ -29,7 +29,7 @@ TIME_LABEL = "time [s]"
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class StepArtists:
-    """What was drawn of one quantity over time."""
+    """Artists of one quantity over time."""
 
     steps: LineCollection  # one segment per trim, in its colour
     jumps: LineCollection  # from trim to trim

@@ -46,7 +46,7 @@ MOST_COLUMNS, GAP, TITLE = 4, 0.16, 0.26  # panels in a row; [in] between them, 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SliceArtists:
-    """What `draw_feasible_slice` has drawn; a line is None where nothing in the window has it."""
+    """Artists of `draw_feasible_slice`; a line is None where nothing in the window has it."""
 
     cells: QuadMesh
     levels: ContourSet | None  # of equal least time

@@ -32,7 +32,7 @@ DART_SIZE = 0.075  # of the side of a panel
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ManeuverArtists:
-    """What `draw_maneuvers` has drawn: a path for each maneuver, darts at start and ends."""
+    """Artists of `draw_maneuvers`: a path for each maneuver, darts at start and ends."""
 
     paths: LineCollection
     darts: PolyCollection

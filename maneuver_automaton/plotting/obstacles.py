@@ -28,7 +28,7 @@ MOST_STEPS = 5  # between the times at which moving obstacles are shown
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ObstacleArtists:
-    """What `draw_obstacles` has drawn."""
+    """Artists of `draw_obstacles`."""
 
     static: PathCollection  # one path per static shape
     maps: tuple[PathCollection, ...]  # blocked cells, one collection per map

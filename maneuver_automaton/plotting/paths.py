@@ -55,7 +55,7 @@ RING, CLIMB, SINK = "o", "^", "v"
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PlanArtists:
-    """What `draw_plan` has drawn; `path` has one segment per trim that drives."""
+    """Artists of `draw_plan`; `path` has one segment per trim that drives."""
 
     path: LineCollection
     halo: LineCollection  # white, below the path

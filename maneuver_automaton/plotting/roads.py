@@ -36,7 +36,7 @@ HAZE = 0.75  # of the first of them
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RoadArtists:
-    """What `draw_road` has drawn."""
+    """Artists of `draw_road`."""
 
     lanes: PolyCollection
     goals: PathCollection

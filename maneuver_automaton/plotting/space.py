@@ -55,7 +55,7 @@ HIDDEN = 0.3  # opacity of the path where a building is before it
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SpaceArtists:
-    """What `draw_space` has drawn."""
+    """Artists of `draw_space`."""
 
     faces: Poly3DCollection  # walls, roofs, and strokes of the path, nearer ones above
     ends: tuple[Line2D, ...]

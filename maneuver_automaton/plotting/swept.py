@@ -1,4 +1,4 @@
-"""What a body sweeps along a track, as one region of the plane."""
+"""Area that a body sweeps along a track, as one region of the plane."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ class RoadDecision:
         return not self.lasting and not self.reaches and bool(self.states[0, 3] <= AT_REST)
 
     def tail(self) -> RoadDecision:
-        """What remains of it a tick later."""
+        """The rest of the plan a tick later."""
         return RoadDecision(
             tick=self.tick + 1,
             states=self.states[1:],

@@ -26,7 +26,7 @@ BESIDE = 30.0  # [m] from the path: the edge of the road is not looked for furth
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RoadVerdict:
-    """What was found along a drive."""
+    """Findings along a drive."""
 
     audit: Audit  # of the vehicle's equations and limits
     hit: tuple[str, ...]  # road users that the body touches

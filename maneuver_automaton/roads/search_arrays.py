@@ -1,4 +1,4 @@
-"""What the beam search sees of a scene, laid out once: goals, static obstacles, weights, room."""
+"""Arrays of a scene for the beam search, laid out once: goals, static obstacles, weights, room."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def _turned(goal: GoalRegion, extent: Array, route: Route) -> tuple[float, float
 
 
 def weights_of(scene: RoadScene, vehicle: RoadVehicle) -> Weights:
-    """What the drive costs per second; without a place to go it keeps the speed it has."""
+    """Weights of the cost per second; without a place to go the drive keeps its speed."""
     placed = any(goal.places is not None for goal in scene.goals)
     return Weights(
         offset=0.05,

@@ -80,7 +80,7 @@ def plan_road(
 
 
 def _searched(planner: RoadPlanner) -> RoadPlanResult:
-    """What one search from the start finds, polished and judged."""
+    """Result of one search from the start, polished and judged."""
     found = planner.search(planner.start_state, tick=0)
     plan, verdict, reason = None, None, ""
     if found is None or not found.reaches:

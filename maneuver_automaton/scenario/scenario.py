@@ -124,7 +124,7 @@ def scenario_of_document(
 
 
 class _Bodies(NamedTuple):
-    """What must not touch anything."""
+    """The bodies of a vehicle and its parts, which must stay collision-free."""
 
     vehicle: tuple[Shape, ...]
     parts: Mapping[str, tuple[Shape, ...]]  # what it carries, by name

@@ -1,4 +1,4 @@
-"""What may be spent on a search: time by one clock, and expansions."""
+"""Budget of a search: time by one clock, and expansions."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Budget:
         return Budget.from_now(max(share * self.left, at_least), expansions=self.expansions)
 
     def stage(self, share: float) -> Budget:
-        """What one stage may take: a share of the time left, a large one where work is counted.
+        """Budget of one stage: a share of the time left, a large one where work is counted.
 
         Counted work ends every stage at the same place at every call, unless the time gets short.
         """
@@ -65,7 +65,7 @@ class Budget:
         return replace(self, deadline=time.monotonic() + share * self.left)
 
     def less(self, spent: int) -> Budget:
-        """What is left of it after so many expansions."""
+        """The budget that remains after so many expansions."""
         if self.expansions is None:
             return self
         return replace(self, expansions=max(0, self.expansions - spent))

@@ -76,13 +76,13 @@ def _latest(most_time: float | None) -> float:
 
 
 def _in_time(found: SearchResult, most_time: float | None) -> SearchResult:
-    """What was found, as far as it ends in time."""
+    """The solutions that end in time."""
     kept = tuple(one for one in found.solutions if one.duration <= _latest(most_time))
     return replace(found, solutions=kept)
 
 
 def _work(task: InsertionTask, setup: SearchSetup) -> _Work:
-    """What is searched, from the whole goal on."""
+    """The work of a search for the goal of a task."""
     exact, setup = setup.goal, with_fewer_digits(setup)
     many = len(setup.trims) > FEW
     seeds = task.seeds
@@ -106,7 +106,7 @@ class _Work:
 
     @property
     def total(self) -> float | None:
-        """What the times of a word add up to, rest or unused time included; None if free [s]."""
+        """Sum of the times of a word, rest or unused time included; None if free [s]."""
         return self.problem.horizon.time if self.limit is None else self.limit
 
     @property
@@ -171,7 +171,7 @@ def compile_calming(problem: Problem) -> None:
 def _from_longer(
     library: LibraryArrays, begun: list[TimedWord], most: int, counts: dict[str, int]
 ) -> Iterator[TimedWord]:
-    """What becomes of the cheapest seed if it may grow first, and is shortened afterwards."""
+    """The word of the cheapest seed that may grow first, and is shortened afterwards."""
     grown = [
         _calmed(library, _with_insertions(library, seed, LONGEST, ROUNDS, counts))
         for seed in begun[:GROWN]
@@ -269,7 +269,7 @@ def _with_room(word: TimedWord) -> tuple[IntArray, Array]:
 
 
 def _solutions(work: _Work, word: TimedWord) -> Iterator[Word]:
-    """What a word under work has come to, ending at the goal itself; none if it cannot."""
+    """The solution from a word under work, closed at the exact goal; none if it cannot be."""
     problem, library = work.problem, work.library
     numbers = word.numbers
     times = corrected(library, numbers, word.durations, work.exact)

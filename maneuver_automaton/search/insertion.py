@@ -98,7 +98,7 @@ def insertion_stages(
     known: Plan | None = None,
     upper_bound: float = math.inf,
 ) -> Iterator[SearchResult]:
-    """What is found so far after each stage; the last one is the answer of `search_insertion`.
+    """Results so far after each stage; the last one is the answer of `search_insertion`.
 
     The parameters are those of `search_insertion`.
     """

@@ -1,4 +1,4 @@
-"""What a search by insertion is asked, and what it has found so far."""
+"""The task of a search by insertion, and the words that it has found so far."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Found:
     status: SearchStatus = SearchStatus.EXHAUSTED  # of the last search
 
     def add(self, more: SearchResult) -> None:
-        """What another search came to."""
+        """Take note of the result of another search."""
         both = [*self.words, *more.solutions]
         self.words = list(distinct(self.problem, both, most=self.most))
         for name, value in more.counts.items():

@@ -1,4 +1,4 @@
-"""What can be said without searching: goals out of reach, and bounds that hold for every plan."""
+"""Limits known without searching: goals out of reach, and bounds that hold for every plan."""
 
 from __future__ import annotations
 

@@ -93,7 +93,7 @@ def _known(task: InsertionTask) -> tuple[Word, ...]:
 
 
 def _so_far(task: InsertionTask, found: Found) -> SearchResult:
-    """What is found, and whether the time is over."""
+    """The result so far, and whether the time is over."""
     status = SearchStatus.OUT_OF_BUDGET if task.is_over() else SearchStatus.EXHAUSTED
     return replace(found.result(), status=status)
 

@@ -208,7 +208,7 @@ def _result(
     complete: bool = False,
     counts: dict[str, int],
 ) -> SearchResult:
-    """What was found and asked for, cheapest first; `none` is the status if that is nothing."""
+    """Result with the words asked for, cheapest first; `none` is its status if there are none."""
     kept = [one for one in found if one.cost <= upper_bound * (1.0 + TIE)]
     kept.sort(key=lambda one: (one.cost, len(one.trims), one.trims))
     asked = kept if alternatives is None else kept[: alternatives + 1]

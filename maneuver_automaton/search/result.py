@@ -1,4 +1,4 @@
-"""What a search returns."""
+"""Results of searches."""
 
 from __future__ import annotations
 
@@ -31,5 +31,5 @@ class SearchResult:
 
 
 def plan_of(problem: Problem, word: Word) -> Plan:
-    """What a search found, as a plan from the problem's start."""
+    """The plan of a word from the problem's start."""
     return plan_of_word(problem.automaton, word, problem.start, start_time=problem.start_time)

@@ -42,7 +42,7 @@ class SearchSetup:
 
 
 def search_setup(problem: Problem, goal: Goal) -> SearchSetup:
-    """What every search for one goal starts from."""
+    """Arrays from which every search for one goal starts."""
     library = moving_trims(problem.automaton, problem.cost)
     relative = goal_from_start(problem, goal)
     return SearchSetup(

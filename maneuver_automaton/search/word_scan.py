@@ -285,7 +285,7 @@ class WordScan:
         return problem, links
 
     def solutions(self) -> Iterator[Word]:
-        """What was found by rising cost, rest last; if pruned, what was asked for, and ties."""
+        """Words found by rising cost, rest last; if pruned, those asked for, and ties."""
         yield from [self._padded(word) for word in self.timed()]
 
     def timed(self) -> Iterator[TimedWord]:
@@ -318,7 +318,7 @@ class WordScan:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Tables:
-    """What a kernel needs of every trim, the turn of a free heading last."""
+    """Tables of every trim for kernels, the turn of a free heading last."""
 
     twists: Array  # (M, 4)
     rates: Array  # (M,)

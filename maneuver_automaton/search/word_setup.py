@@ -83,7 +83,7 @@ class WordSetup:
         return bool(self.limit or least > 0.0 or (longest < math.inf).any())
 
     def as_search(self) -> SearchSetup:
-        """What an exhaustive search starts from: the alphabet, and the transitions between it."""
+        """Arrays for an exhaustive search: the alphabet, and the transitions within it."""
         rows, arrays, problem = list(self.alphabet), self.library.arrays, self.problem
         known, relative = self.library.transitions, goal_from_start(problem, self.goal)
         waiting = _waiting_rate(problem)
@@ -167,7 +167,7 @@ class WordSetup:
 
     @property
     def switch(self) -> float:
-        """What a word costs for each of its trims but the first, as far as known."""
+        """Cost of a word for each of its trims but the first, as far as known."""
         return float(getattr(self.problem.cost, "switch", 0.0))
 
     @property
@@ -282,7 +282,7 @@ def word_setup(
     also: Sequence[int] = (),
     steers: bool = False,
 ) -> WordSetup:
-    """What every search over words with maneuvers starts from.
+    """Library and alphabet from which every search over words with maneuvers starts.
 
     Words are made of the trims that differ most where the library has more than `most_trims`; the
     first trim, the last, and those of the indices `also` are among them. Where it
@@ -309,7 +309,7 @@ def word_setup(
 
 @kept_by_first
 def maneuver_prices(automaton: Automaton, cost: StageCost) -> Array:
-    """What every maneuver costs (M,), with the switches to it and within it as far as known."""
+    """Cost of every maneuver (M,), with the switches to it and within it as far as known."""
     name, still = automaton.trim_names[0], origin_of(automaton, automaton.trims[0])
     any_problem = Problem(automaton, still, Goal(pose=still, trim=name), cost=cost, start_trim=name)
     counted = isinstance(cost, Cost) and (cost.switch > 0.0 or cost.direction_change > 0.0)

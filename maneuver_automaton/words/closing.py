@@ -20,7 +20,7 @@ EXACT = 1e-15  # nothing is left to be closed
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class EndConditions:
-    """What the times of a word of n trims must meet: its end, and `rows` @ times = `targets`.
+    """Conditions on the times of a word of n trims: its end, and `rows` @ times = `targets`.
 
     The twists are seen from before all displacements of the word, whose product is `product`.
     """

@@ -30,7 +30,7 @@ MET = 1e-9  # [m, rad] by which a word with fewer times than the goal has coordi
 
 
 class LibraryArrays(NamedTuple):
-    """What kernels see of m trims in C classes; row m is the turn in place of a free heading.
+    """Arrays for kernels of m trims in C classes; row m is the turn in place of a free heading.
 
     Where there are several classes, `displacement`, `cost`, `time` and `length` are indexed by the
     classes of two trims. A kinematic vehicle has one, and its transition is the identity.

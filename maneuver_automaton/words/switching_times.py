@@ -216,7 +216,7 @@ class _ConjugatedWord:
         return replace(solved, durations=times, cost=float(rates @ times))
 
     def _beyond(self, times: Array) -> Array:
-        """What times (n,) are beyond the least ones."""
+        """Times (n,) beyond the least ones."""
         return np.maximum(times - self.floors, 0.0)
 
     def _as_it_is(self, rates: Array, beyond: float | None) -> SwitchingTimes:

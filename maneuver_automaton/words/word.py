@@ -18,7 +18,7 @@ from maneuver_automaton.words.transitions import SWITCH
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Word:
-    """What every search finds, until it becomes a plan.
+    """Trims, coasting times and transitions: the answer of every search, until it is a plan.
 
     A transition is a maneuver of the automaton, or SWITCH where the vehicle changes trims at will.
     Trims between two maneuvers may last no time. A word of a kinematic vehicle has switches only.
