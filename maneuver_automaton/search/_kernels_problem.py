@@ -331,6 +331,12 @@ def conjugate(twist: Array, x: float, y: float, heading: float) -> None:
 
 
 @bare_inner_kernel
+def moves_in_plane(twist: Array) -> bool:
+    """Whether a trim drives or turns: one that only climbs, or rests, is parallel to any other."""
+    return twist[0] != 0.0 or twist[1] != 0.0 or twist[2] != 0.0
+
+
+@bare_inner_kernel
 def is_parallel(one: Array, other: Array) -> bool:
     """Whether two twists span one line only, altitude aside."""
     size = math.sqrt(

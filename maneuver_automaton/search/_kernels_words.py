@@ -20,6 +20,7 @@ from maneuver_automaton.search._kernels_problem import (
     is_straight,
     look,
     look_ahead,
+    moves_in_plane,
     propose,
     room_for,
     switch_prices,
@@ -87,20 +88,26 @@ def low_rank_word(problem: WordProblem, candidates: Candidates, word: IntArray, 
     """
     m = problem.targets.size
     straight = True
+    # Positions of the first trim of either subgroup; n: no trim is of it. One that only climbs or
+    # rests is of none: it would be taken for parallel to any.
+    begin, split = n, n
     for i in range(n):
         if not is_straight(problem, word[i]):
             straight = False
-    split = n  # first position of the second block
-    for i in range(1, n):
-        if not problem.parallel[word[0], word[i]]:
+        if not moves_in_plane(problem.twists[word[i]]):
+            continue
+        if begin == n:
+            begin = i
+        elif split == n and not problem.parallel[word[begin], word[i]]:
             split = i
-            break
+    rank = (begin < n) + (split < n)
+    if n > rank + m:
+        return
     z = complex(problem.goal[0], problem.goal[1])
     heading = problem.goal[2]
     full = 2.0 * math.pi
     if straight:
-        rank = 2 if split < n else 1
-        if n > rank + m or abs(heading - full * round(heading / full)) > 1e-9:
+        if abs(heading - full * round(heading / full)) > 1e-9:
             return
         matrix = np.empty((2 + m, n))
         rhs = np.empty(2 + m)
@@ -116,12 +123,9 @@ def low_rank_word(problem: WordProblem, candidates: Candidates, word: IntArray, 
         if found_rank == n:
             propose(problem, candidates, word, n, times)
         return
-    rank = 2 if split < n else 1
-    if n > rank + m:
-        return
     blocks = np.zeros(2)
-    w_1, w_2 = problem.twists[word[0], 2], 0.0
-    v_1 = complex(problem.twists[word[0], 0], problem.twists[word[0], 1])
+    w_1, w_2 = problem.twists[word[begin], 2], 0.0
+    v_1 = complex(problem.twists[word[begin], 0], problem.twists[word[begin], 1])
     if rank == 1:
         blocks[0] = heading
     else:
@@ -156,7 +160,7 @@ def low_rank_word(problem: WordProblem, candidates: Candidates, word: IntArray, 
                 rhs[1] = blocks[1] + full * turns_2
             for i in range(n):
                 block = 0 if i < split else 1
-                head = word[0] if i < split else word[split]
+                head = word[begin] if i < split else word[split]
                 twist = problem.twists[word[i]]
                 if problem.twists[head, 2] != 0.0:
                     matrix[block, i] = twist[2]
@@ -441,15 +445,18 @@ def word_blocks(problem: WordProblem, word: IntArray, n: int) -> int:
 
     Without linear conditions two parallel neighbours are never better than one of them.
     """
-    blocks = 1
+    blocks = 0
     straights = 0
+    last = -1  # the last trim that moves in the plane
     for i in range(n):
         straights += is_straight(problem, word[i])
         if i > 0:
             if word[i] == word[i - 1]:
                 return 0
-            if not problem.parallel[word[i], word[i - 1]]:
-                blocks += 1
-            elif problem.targets.size == 0:
+            if problem.targets.size == 0 and problem.parallel[word[i], word[i - 1]]:
                 return 0
-    return -blocks if blocks <= 2 or straights == n else blocks
+        if moves_in_plane(problem.twists[word[i]]):
+            if last < 0 or not problem.parallel[word[i], last]:
+                blocks += 1
+            last = word[i]
+    return -max(blocks, 1) if blocks <= 2 or straights == n else blocks

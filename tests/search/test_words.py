@@ -441,6 +441,18 @@ def test_climbing_words_end_at_the_altitude():
         assert word.cost(again) == pytest.approx(solution.cost, abs=1e-6)
 
 
+def test_a_climb_may_come_first():
+    """A trim that only climbs leaves the plane to the others, wherever it stands in the word."""
+    craft = helicopter()
+    turn = craft.trims[craft.index_of("left")]
+    end = turn.coast(SE2xR([0.0, 0.0, 0.0, 0.0]), 1.2).pose + np.array([0.0, 0.0, 0.0, 2.0])
+    problem = Problem(craft, [0, 0, 0, 0], end, horizon=Horizon(max_trims=2))
+    first, second = search(problem, alternatives=2).solutions[:2]
+    assert (names(problem, first), names(problem, second)) == (("left", "lift"), ("lift", "left"))
+    assert second.durations == pytest.approx([2.0, 1.2])
+    assert_valid(problem, second)
+
+
 @compiled_only
 def test_a_climb_in_a_fixed_time():
     problem = Problem(
