@@ -56,13 +56,21 @@ def carried(plan: Plan, model: Model, part: str) -> Plan:
         seen = frame(trim.reduced_state).inverse().adjoint() @ trim.body_velocity
         return replace(trim, body_velocity=seen)
 
-    start = group(plan.start) @ frame(plan.trims[0].reduced_state)
+    start = group(plan.start) @ frame(_first_state(plan))
     return replace(
         plan,
         start=start.pose,
         trims=tuple(trim_of(trim) for trim in plan.trims),
         maneuvers=tuple(None if m is None else _maneuver(m, frame) for m in plan.maneuvers),
     )
+
+
+def _first_state(plan: Plan) -> Array:
+    """Reduced state at the begin of a plan, which may be cut within a maneuver."""
+    first = plan.primitives[0] if plan.primitives else plan.trims[0]
+    if isinstance(first, Trim) or first.course is None:
+        return plan.trims[0].reduced_state
+    return first.course.reduced_state[0]
 
 
 def _maneuver(maneuver: Maneuver, frame: Callable[[Array], LieGroup]) -> Maneuver:

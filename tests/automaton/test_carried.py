@@ -7,6 +7,7 @@ import pytest
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.carried import carried
+from maneuver_automaton.automaton.cutting import tail_of, with_samples_at
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.driving import drive
@@ -54,6 +55,17 @@ def test_a_trailer_is_pulled_along_its_own_axis():
     middle = 0.5 * (poses[1:, 2] + poses[:-1, 2])
     sideways = -np.sin(middle) * ways[:, 0] + np.cos(middle) * ways[:, 1]
     assert np.abs(sideways).max() < 2e-6
+
+
+@pytest.mark.parametrize("after", [0.4, 1.0, 1.5, 2.5])
+def test_what_is_left_of_a_plan_carries_the_trailer_to_the_same_places(after):
+    """Within the maneuver the hitch angle is no more that of the trim before it."""
+    plan = plan_with_trailer()
+    plan = with_samples_at(plan, [plan.start_time + after], TRAILER)
+    times = np.linspace(plan.start_time + after, plan.start_time + plan.duration, 50)
+    behind = carried(plan, TRAILER, "trailer").pose_at(times)
+    left = tail_of(plan, after)
+    np.testing.assert_allclose(carried(left, TRAILER, "trailer").pose_at(times), behind, atol=1e-9)
 
 
 def test_a_moved_plan_carries_the_moved_trailer():
