@@ -99,6 +99,11 @@ class InWorld:
         names = self.stated.reduced_names
         return names.index(HEADING) if HEADING in names else None
 
+    @property
+    def follows_pose(self) -> tuple[int, ...]:
+        """Numbers of the reduced states that the pose determines: the heading's cosine and sine."""
+        return () if self._place is None else (self._place, self._place + 1)
+
     def heading(self, reduced_state: Array) -> float:
         """Heading [rad] in a reduced state (n_z,); 0 if it is constant."""
         if self._place is None:

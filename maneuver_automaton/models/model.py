@@ -113,6 +113,11 @@ class OnlyTranslated(Model, Protocol):
         """The vehicle on its group of translations."""
         ...
 
+    @property
+    def follows_pose(self) -> tuple[int, ...]:
+        """Numbers of the reduced states that the pose determines."""
+        ...
+
     def heading(self, reduced_state: Array) -> float:
         """Heading [rad] of the body in a reduced state (n_z,)."""
         ...

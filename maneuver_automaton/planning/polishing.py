@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -21,6 +22,7 @@ from maneuver_automaton.optimal_control.problem import Components, RunningCost
 from maneuver_automaton.optimal_control.separation import BodyPart
 from maneuver_automaton.planning.incumbents import Incumbents
 from maneuver_automaton.planning.polished_price import admitted_durations, polished_price
+from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem, moves
 from maneuver_automaton.refinement.gear_sequences import (
     car_library,
@@ -50,6 +52,7 @@ POINT = ((np.zeros((1, 2)), 0.0),)  # the body of a vehicle without a footprint
 SAMPLES = 500  # of a plan that passes above or below obstacles
 EXPANSIONS_AN_ITERATION = 4  # of the lattice, in place of one iteration of polishing
 FEWEST_ITERATIONS = 100  # however few expansions are allowed: one guess to its end
+NEAR_HEADING = 1.0  # [rad] from the heading of a plan, to which its motion is a guess
 TURNS = (1.0, 0.8)  # of the greatest curvature, with which they turn
 
 
@@ -105,6 +108,7 @@ def polish_found(found: Incumbents, paths: Sequence[Aimed]) -> None:
         return  # it is there already
     solid = _without_passed(problem, known[0][0])
     aimed = [Aimed(guess_of_plan(plan), goal_index) for plan, goal_index in known]
+    aimed += _other_headings(problem, aimed[0])
     if rests_at_both_ends(problem):
         along = list(guesses_along_paths(problem, time_limit=budget.left))
         aimed = along or [*paths, *aimed]
@@ -128,6 +132,18 @@ def polish_found(found: Incumbents, paths: Sequence[Aimed]) -> None:
         found.counts.update(polished=len(polished.attempts))
         if work is not None:
             work -= sum(attempt.iterations for attempt in polished.attempts)
+
+
+def _other_headings(problem: Problem, known: Aimed) -> list[Aimed]:
+    """A guess aimed at the other goals at its place, those of the nearest headings first."""
+    aim = problem.goals[known.goal_index].pose
+    turns = [abs(math.remainder(goal.pose[2] - aim[2], 2.0 * math.pi)) for goal in problem.goals]
+    return [
+        Aimed(known.guess, k)
+        for k in np.argsort(turns, kind="stable").tolist()
+        if 0.0 < turns[k] <= NEAR_HEADING
+        and np.array_equal(np.delete(problem.goals[k].pose, 2), np.delete(aim, 2))
+    ]
 
 
 def iterations_within(budget: Budget) -> int | None:
@@ -224,7 +240,7 @@ def polish_plans(
         start=problem.start,
         start_state=first.reduced_state,
         goal=tuple(pose),
-        goal_state=tuple(last.reduced_state.tolist()),
+        goal_state=_end_state(problem.automaton, last),
         parts=_body_parts(problem),
         obstacles=tuple(one.shape for one in problem.obstacles if isinstance(one, Obstacle)),
         bounds=problem.bounds,
@@ -252,6 +268,16 @@ def polish_plans(
         most_iterations=most_iterations,
         accepts=sound,
     )
+
+
+def _end_state(automaton: Automaton, last: Trim) -> tuple[float | None, ...]:
+    """The reduced state of a last trim; None for what follows from the last pose.
+
+    To ask for both would be to ask for one thing twice, which is more than a solver can keep.
+    """
+    follows = () if automaton.translated is None else automaton.translated.follows_pose
+    values = last.reduced_state.tolist()
+    return tuple(None if k in follows else value for k, value in enumerate(values))
 
 
 def _body_parts(problem: Problem) -> tuple[BodyPart, ...]:

@@ -121,8 +121,11 @@ def simulate(
     random = itertools.islice(draws(upset, problem.start.size), begin, None)  # after those used
     track = _track(problem, upset, last)
     stops = controller.arrival is None and at_will  # where it likes
-    stands = at_will or problem.first_trim.is_rest
-    arrived = track.inside[-1] and (stands if last is None else _arrives(last, stops=stops))
+    arrived = track.inside[-1] and (
+        _arrives(last, stops=stops)
+        if last is not None  # within a maneuver, maybe, where there is no first trim
+        else at_will or problem.first_trim.is_rest
+    )
     for number in range(begin, begin + steps):
         if arrived and not stay:
             break
