@@ -68,9 +68,10 @@ def carried(plan: Plan, model: Model, part: str) -> Plan:
 def _first_state(plan: Plan) -> Array:
     """Reduced state at the begin of a plan, which may be cut within a maneuver."""
     first = plan.primitives[0] if plan.primitives else plan.trims[0]
-    if isinstance(first, Trim) or first.course is None:
-        return plan.trims[0].reduced_state
-    return first.course.reduced_state[0]
+    if isinstance(first, Maneuver) and first.course is not None:
+        begin: Array = first.course.reduced_state[0]
+        return begin
+    return plan.trims[0].reduced_state
 
 
 def _maneuver(maneuver: Maneuver, frame: Callable[[Array], LieGroup]) -> Maneuver:

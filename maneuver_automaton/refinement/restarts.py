@@ -27,6 +27,10 @@ IN_SPACE: tuple[Resolution, ...] = (
     Resolution(scale=4.0, durations=2.0, weight=1.1, most=100000),
     Resolution(scale=6.0, durations=2.0, weight=1.0, most=100000),
 )
+ABOVE: tuple[Resolution, ...] = (
+    Resolution(scale=6.0, durations=2.0, weight=1.0, most=100000, straight=True),
+    Resolution(weight=1.0, most=60000, straight=True),
+)
 LATER: tuple[Resolution, ...] = (
     Resolution(weight=1.5),
     Resolution(weight=1.2),
@@ -80,9 +84,13 @@ def _random(query: LatticeQuery, rng: np.random.Generator) -> Iterator[Restart]:
 
 def _finer(query: LatticeQuery, rng: np.random.Generator) -> Iterator[Restart]:
     """Searches of falling weight and size, each to its end below the cost of the best word."""
-    coarse = IN_SPACE if query.problem.start.size > 3 else ()
     later = (*as_wide_as_turns(query.library), *LATER)
-    for resolutions, all_words in ((coarse, False), (later, True)):
+    rounds: tuple[tuple[tuple[Resolution, ...], bool], ...] = ((later, True),)
+    if query.problem.start.size > 3:
+        # Above obstacles a path is as short as a straight line. Estimates from cell to cell are
+        # longer and end a search early, which is quick; the last ones do without.
+        rounds = ((IN_SPACE, False), (later, True), (ABOVE, True))
+    for resolutions, all_words in rounds:
         for one in resolutions:
             resolution = replace(one, stop=False, ends_early=True)
             yield Restart(resolution, FIRST_CHUNK, all_words=all_words)
