@@ -28,14 +28,11 @@ from maneuver_automaton.search._kernels_problem import (
     transitions_cost,
     word_extra,
 )
-from maneuver_automaton.search._kernels_scan import (
-    any_node_may_do,
-    choose_triple,
-    levels,
-    scan_one,
-    scan_two,
-    solve_triple,
-)
+from maneuver_automaton.search._kernels_scan_costs import any_node_may_do
+from maneuver_automaton.search._kernels_scan_one import scan_one
+from maneuver_automaton.search._kernels_scan_two import scan_two
+from maneuver_automaton.search._kernels_triple import choose_triple, solve_triple
+from maneuver_automaton.search._kernels_turns import levels
 from maneuver_automaton.words._kernels_steering import phase, unit
 from maneuver_automaton.words._kernels_times import least_squares
 

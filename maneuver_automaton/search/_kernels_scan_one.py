@@ -1,0 +1,275 @@
+"""Words with one free time: scan it, bracket the roots, and halve the brackets.
+
+What vanishes at an optimum (the reduced gradient) or at a solution (a linear condition) is
+bracketed between neighbouring nodes; Newton refines it later. Both branches of the closed form
+are continuous, so a change of sign is a root.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from maneuver_automaton._compile import bare_inner_kernel, inner_kernel
+from maneuver_automaton.search._kernels_problem import condition
+from maneuver_automaton.search._kernels_scan_costs import (
+    affordable,
+    coasting_cost,
+    may_be_cheap,
+    nearly_cheap,
+)
+from maneuver_automaton.search._kernels_triple import (
+    evaluate,
+    scratch_for,
+    solve_triple,
+    take_branch,
+)
+from maneuver_automaton.search._kernels_turns import levels, unwrap
+from maneuver_automaton.words._kernels_times import assign
+
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array, IntArray
+    from maneuver_automaton.search._kernels_problem import Candidates, WordProblem
+
+
+@inner_kernel
+def scan_one(
+    problem: WordProblem,
+    candidates: Candidates,
+    word: IntArray,
+    n: int,
+    triple: IntArray,
+    free: IntArray,
+    upper_bound: float,
+) -> None:
+    """Words with one free time: roots of a scalar function along both branches."""
+    q = free[0]
+    m = problem.targets.size
+    reach = affordable(problem, word, n, word[q], upper_bound)
+    if not reach > 0.0:
+        return
+    nodes = max(8, math.ceil(problem.nodes * reach / problem.reaches[word[q]]))
+    scratch = scratch_for(problem, word, n, 1)
+    values = np.zeros(2)
+    both = np.empty((2, 3))
+    times = np.zeros(n)
+    there = np.zeros((2, nodes + 1), dtype=np.bool_)
+    node_times = np.zeros((2, nodes + 1, n))
+    node_values = np.zeros((2, nodes + 1))
+    costs = np.zeros((2, nodes + 1))
+    steering = (problem.twists, problem.goal, problem.tolerance, candidates.counter)
+    most = nearly_cheap(problem, word, n, upper_bound)
+    for j in range(nodes + 1):
+        times[q] = reach * j / nodes
+        solve_triple(steering, word, n, triple, times, both)
+        for branch in range(2):
+            costs[branch, j] = coasting_cost(problem, word, triple, q, times[q], both[branch])
+            copy_branches(scratch[0], both)
+            if take_branch(problem, word, n, triple, free, branch, scratch, times, values):
+                there[branch, j] = True
+                assign(node_times[branch, j], times)
+                if m == 0:
+                    node_values[branch, j] = values[0]
+                elif j > 0 and there[branch, j - 1]:  # continuous from node to node
+                    unwrap(problem, word, triple, node_times[branch, j - 1], times)
+                    step = condition(problem, word, n, m - 1, times)
+                    step -= condition(problem, word, n, m - 1, node_times[branch, j - 1])
+                    node_values[branch, j] = node_values[branch, j - 1] + step
+                else:
+                    node_values[branch, j] = condition(problem, word, n, m - 1, times)
+    stack = (np.zeros((24, n)), np.zeros((24, n)), np.zeros((24, 4)))
+    for branch in range(2):
+        for j in range(nodes):
+            if not may_be_cheap(costs[branch, j], costs[branch, j + 1], most):
+                continue
+            if not (there[branch, j] or there[branch, j + 1]):
+                continue
+            bend = np.inf
+            if j > 0 and j + 2 <= nodes and there[branch, j] and there[branch, j + 1]:
+                bend = 0.0
+                for k in range(j, j + 2):
+                    if there[branch, k - 1] and there[branch, k + 1]:
+                        second = node_values[branch, k - 1] - 2.0 * node_values[branch, k]
+                        bend = max(bend, 0.5 * abs(second + node_values[branch, k + 1]))
+                    else:
+                        bend = np.inf
+            low, high, numbers = stack
+            assign(low[0], node_times[branch, j])
+            assign(high[0], node_times[branch, j + 1])
+            low[0, q], high[0, q] = reach * j / nodes, reach * (j + 1) / nodes
+            numbers[0, 0], numbers[0, 1] = node_values[branch, j], node_values[branch, j + 1]
+            numbers[0, 2], numbers[0, 3] = bend, 0.0
+            if not there[branch, j + 1]:  # the branch ends in between
+                assign(high[0], low[0])
+                numbers[0, 1] = fold(
+                    problem, candidates, word, n, triple, free, high[0], reach * (j + 1) / nodes,
+                    branch, scratch, values,
+                )  # fmt: skip
+            elif not there[branch, j]:
+                assign(low[0], high[0])
+                numbers[0, 0] = fold(
+                    problem, candidates, word, n, triple, free, low[0], reach * j / nodes,
+                    branch, scratch, values,
+                )  # fmt: skip
+            bisect(problem, candidates, word, n, triple, free, branch, scratch, values, stack)
+
+
+@bare_inner_kernel
+def copy_branches(target: Array, source: Array) -> None:
+    """Copy what `solve_triple` filled in."""
+    for branch in range(2):
+        assign(target[branch], source[branch])
+
+
+@inner_kernel
+def fold(
+    problem: WordProblem,
+    candidates: Candidates,
+    word: IntArray,
+    n: int,
+    triple: IntArray,
+    free: IntArray,
+    edge: Array,
+    beyond: float,
+    branch: int,
+    scratch: tuple[Array, Array, Array, Array],
+    values: Array,
+) -> float:
+    """Move `edge` along its branch as far towards `beyond` as the branch goes; its value there."""
+    q = free[0]
+    trial = np.empty(edge.size)
+    assign(trial, edge)
+    evaluate(problem, candidates, word, n, triple, free, trial, branch, scratch, values)
+    value = values[0]
+    good = edge[q]
+    for _ in range(30):
+        trial[q] = 0.5 * (good + beyond)
+        if evaluate(problem, candidates, word, n, triple, free, trial, branch, scratch, values):
+            good = trial[q]
+            assign(edge, trial)
+            value = values[0]
+        else:
+            beyond = trial[q]
+    return value
+
+
+@inner_kernel
+def bisect(
+    problem: WordProblem,
+    candidates: Candidates,
+    word: IntArray,
+    n: int,
+    triple: IntArray,
+    free: IntArray,
+    branch: int,
+    scratch: tuple[Array, Array, Array, Array],
+    values: Array,
+    stack: tuple[Array, Array, Array],
+) -> None:
+    """Halve the interval on the stack where its bend leaves room for a root; propose the roots."""
+    lows, highs, numbers = stack
+    q = free[0]
+    m = problem.targets.size
+    middle = np.empty(n)
+    ends = np.empty((2, n))
+    span = np.empty((m, 2))
+    top = 0
+    while top >= 0:
+        low, high = lows[top], highs[top]
+        value_low, value_high, bend, depth = (
+            numbers[top, 0], numbers[top, 1], numbers[top, 2], numbers[top, 3],
+        )  # fmt: skip
+        top -= 1
+        for i in range(n):
+            middle[i] = 0.5 * (low[i] + high[i])
+        if m == 0:
+            change = abs(value_high - value_low)
+            possible = min(abs(value_low), abs(value_high)) <= bend or value_low * value_high <= 0.0
+            if max(abs(value_low), abs(value_high)) < 1e-9:
+                possible = False  # flat: all these times cost the same
+            settled = bend <= 0.5 * change
+            if possible and settled and value_low < 0.0 <= value_high:
+                secant(problem, candidates, word, n, triple, free, branch, scratch, values,
+                       low, value_low, high, value_high, middle, span)  # fmt: skip
+        else:
+            unwrap(problem, word, triple, low, high)
+            at_low = condition(problem, word, n, m - 1, low)
+            at_high = condition(problem, word, n, m - 1, high)
+            change = abs(at_high - at_low)
+            wide = bend if bend < np.inf else 1e300
+            span[0, 0], span[0, 1] = min(at_low, at_high) - wide, max(at_low, at_high) + wide
+            for i in range(n):
+                middle[i] = 0.5 * (low[i] + high[i])
+            settled = bend <= 0.5 * change
+            before = candidates.counter[0]
+            for i in range(n):
+                ends[0, i], ends[1, i] = min(low[i], high[i]), max(low[i], high[i])
+            levels(problem, candidates, word, n, middle, ends[0], ends[1], span)
+            possible = candidates.counter[0] > before
+            if bend > 0.0:  # that was with room for the bend: only what is left counts
+                candidates.counter[0] = before
+                if possible and (settled or depth >= 8.0):
+                    span[0, 0], span[0, 1] = min(at_low, at_high), max(at_low, at_high)
+                    levels(problem, candidates, word, n, middle, ends[0], ends[1], span)
+        if not possible or depth >= 8.0 or (settled and bend <= 0.25 * change):
+            continue
+        middle[q] = 0.5 * (low[q] + high[q])
+        if not evaluate(
+            problem, candidates, word, n, triple, free, middle, branch, scratch, values
+        ):
+            continue
+        if m == 0:
+            off = abs(values[0] - 0.5 * (value_low + value_high))
+        else:
+            unwrap(problem, word, triple, low, middle)
+            off = abs(condition(problem, word, n, m - 1, middle) - 0.5 * (at_low + at_high))
+        # upper half first onto the stack: it overwrites the interval that was taken off
+        assign(lows[top + 2], middle)
+        assign(highs[top + 2], high)
+        assign(highs[top + 1], middle)
+        numbers[top + 2, 0], numbers[top + 2, 1] = values[0], value_high
+        numbers[top + 1, 0], numbers[top + 1, 1] = value_low, values[0]
+        for k in range(1, 3):
+            numbers[top + k, 2], numbers[top + k, 3] = off, depth + 1.0
+        top += 2
+
+
+@bare_inner_kernel
+def secant(
+    problem: WordProblem,
+    candidates: Candidates,
+    word: IntArray,
+    n: int,
+    triple: IntArray,
+    free: IntArray,
+    branch: int,
+    scratch: tuple[Array, Array, Array, Array],
+    values: Array,
+    low: Array,
+    value_low: float,
+    high: Array,
+    value_high: float,
+    middle: Array,
+    span: Array,
+) -> None:
+    """Narrow down where the reduced gradient rises through zero, and propose it."""
+    q = free[0]
+    left, right = low[q], high[q]
+    for step in range(12):
+        share = 0.5
+        if step % 3 != 2 and value_high > value_low:
+            share = min(0.9, max(0.1, -value_low / (value_high - value_low)))
+        middle[q] = left + share * (right - left)
+        if not evaluate(
+            problem, candidates, word, n, triple, free, middle, branch, scratch, values
+        ):
+            return
+        if values[0] < 0.0:
+            left, value_low = middle[q], values[0]
+        else:
+            right, value_high = middle[q], values[0]
+        if right - left < 1e-3:
+            break
+    levels(problem, candidates, word, n, middle, middle, middle, span)
