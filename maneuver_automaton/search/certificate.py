@@ -77,7 +77,7 @@ class PricedWord:
 
         The column says how the end and the conditions move, and comes with the trim's rate.
         """
-        from maneuver_automaton.search import _kernels_insertion as kernels
+        from maneuver_automaton.search import _kernels_price as kernels
 
         best, where = np.inf, (self.stretches[0], 0, 0, 0.0)
         n = self.times.size
@@ -123,7 +123,7 @@ class PricedWord:
 
 def smallest_reduced_cost(word: PricedWord) -> float:
     """`certificate` of a word that is prepared for it."""
-    from maneuver_automaton.search import _kernels_insertion as kernels
+    from maneuver_automaton.search import _kernels_price as kernels
 
     lasting = np.flatnonzero(word.times > 0.0)
     p = kernels.multipliers_of_word(

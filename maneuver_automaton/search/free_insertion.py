@@ -246,7 +246,7 @@ def _seen_by_kernels(library: LibraryArrays) -> tuple[Array, Array, Array, Array
 
 def _calmed(library: LibraryArrays, word: TimedWord) -> TimedWord:
     """The word with its runs of trims that chatter shortened."""
-    from maneuver_automaton.search import _kernels_insertion as kernels
+    from maneuver_automaton.search import _kernels_chatter as kernels
 
     if len(word.trims) - library.tail < CHATTER:
         return word

@@ -1,0 +1,169 @@
+"""The price of every trim of a library at every moment of a plan: its reduced cost.
+
+The multipliers of the switching-time problem are the price (p_x, p_y, p_turn) of the end pose. A
+trim j that is inserted for an instant at the pose (x, y, heading) moves the end by its twist, so
+it saves unless ``rate_j + price of time + p_turn(t) w_j + a(t) v_j + b(t) u_j >= 0``. Along a
+trim the momentum (a, b, p_turn) moves by the coadjoint action: sines along an arc, straight lines
+along a straight. That is Pontryagin's condition over the whole library and all times.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from maneuver_automaton._compile import inner_kernel, kernel
+from maneuver_automaton.groups._kernels import coast, compose
+from maneuver_automaton.words._kernels_times import assign, end_and_columns, jacobian, multipliers
+
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array, IntArray
+
+
+@inner_kernel
+def price_of_row(rows: Array, p: Array, trim: int) -> float:
+    """What the linear conditions add to the rate of a trim."""
+    value = 0.0
+    for r in range(rows.shape[0]):
+        value += p[3 + r] * rows[r, trim]
+    return value
+
+
+@inner_kernel
+def price_positions(
+    twists: Array,
+    rates: Array,
+    rows: Array,
+    n_priced: int,
+    word: IntArray,
+    times: Array,
+    n: int,
+    p: Array,
+    values: Array,
+    trims: IntArray,
+    moments: Array,
+) -> int:
+    """Smallest reduced cost of all trims within each of the first `n` trims of a word.
+
+    Fills `values`, `trims` and `moments` (the time within the trim); returns the position of the
+    least. A turn on the spot that follows does not move the end's position.
+    """
+    some = np.empty((n, 4))
+    for i in range(n):
+        assign(some[i], twists[word[i]])
+    columns = np.empty((n, 3))
+    end_x, end_y, _ = end_and_columns(some, times[:n], columns)
+    least_position = 0
+    base = np.empty(n_priced)
+    for j in range(n_priced):
+        base[j] = rates[j] + price_of_row(rows, p, j)
+    x, y, heading = 0.0, 0.0, 0.0
+    for i in range(max(n, 1)):
+        c, s = math.cos(heading), math.sin(heading)
+        a = p[0] * c + p[1] * s
+        b = p[1] * c - p[0] * s
+        turn = p[2] - p[0] * (end_y - y) + p[1] * (end_x - x)
+        v_i, u_i, w_i, time = 0.0, 0.0, 0.0, 0.0
+        best, best_trim, best_time = np.inf, -1, 0.0
+        if n > 0:
+            v_i, u_i, w_i, time = some[i, 0], some[i, 1], some[i, 2], times[i]
+        if w_i == 0.0:
+            # a and b stay, the momentum of turning runs linearly: an end is the least
+            slope = u_i * a - v_i * b
+            late = turn + slope * time
+            for j in range(n_priced):
+                level = base[j] + twists[j, 0] * a + twists[j, 1] * b
+                early_value = level + twists[j, 2] * turn
+                late_value = level + twists[j, 2] * late
+                if early_value < best:
+                    best, best_trim, best_time = early_value, j, 0.0
+                if late_value < best:
+                    best, best_trim, best_time = late_value, j, time
+        else:
+            angle = w_i * time
+            cos_end, sin_end = math.cos(angle), math.sin(angle)
+            centre = turn + (a * v_i + b * u_i) / w_i
+            for j in range(n_priced):
+                ratio = twists[j, 2] / w_i
+                along = twists[j, 0] - ratio * v_i
+                aside = twists[j, 1] - ratio * u_i
+                level = base[j] + twists[j, 2] * centre
+                cosine = along * a + aside * b
+                sine = along * b - aside * a
+                if level - abs(cosine) - abs(sine) >= best:
+                    continue
+                if level + cosine < best:
+                    best, best_trim, best_time = level + cosine, j, 0.0
+                value = level + cosine * cos_end + sine * sin_end
+                if value < best:
+                    best, best_trim, best_time = value, j, time
+                least = level - math.hypot(cosine, sine)
+                if least < best:
+                    where = math.atan2(-sine, -cosine) / w_i
+                    period = 2.0 * math.pi / abs(w_i)
+                    where -= period * math.floor(where / period)
+                    if where < time:
+                        best, best_trim, best_time = least, j, where
+        values[i], trims[i], moments[i] = best, best_trim, best_time
+        if best < values[least_position]:
+            least_position = i
+        if n > 0:
+            dx, dy, dh = coast(v_i, u_i, w_i, time)
+            x, y, heading = compose(x, y, heading, dx, dy, dh)
+    return least_position
+
+
+@inner_kernel
+def word_multipliers(
+    twists: Array, rates: Array, rows: Array, word: IntArray, times: Array, n: int
+) -> Array:
+    """Multipliers that best explain a word's times as optimal."""
+    some = np.empty((n, 4))
+    some_rates = np.empty(n)
+    some_rows = np.empty((rows.shape[0], n))
+    for i in range(n):
+        assign(some[i], twists[word[i]])
+        some_rates[i] = rates[word[i]]
+        for r in range(rows.shape[0]):
+            some_rows[r, i] = rows[r, word[i]]
+    columns = np.empty((n, 3))
+    end_and_columns(some, times[:n], columns)
+    return multipliers(jacobian(columns, some_rows), some_rates)
+
+
+@kernel
+def price_word(
+    twists: Array,
+    rates: Array,
+    rows: Array,
+    n_priced: int,
+    word: IntArray,
+    times: Array,
+    first: int,
+    last: int,
+    p: Array,
+) -> tuple[float, int, int, float]:
+    """Smallest reduced cost of all trims at any time of a stretch: (value, trim, position, time).
+
+    The stretch reaches from the trim at position `first` of the word to the one before `last`.
+    """
+    n = word.size
+    values = np.empty(n)
+    trims = np.empty(n, dtype=np.int64)
+    moments = np.empty(n)
+    price_positions(twists, rates, rows, n_priced, word, times, n, p, values, trims, moments)
+    k = first
+    for i in range(first, last):
+        if values[i] < values[k]:
+            k = i
+    return values[k], trims[k], k, moments[k]
+
+
+@kernel
+def multipliers_of_word(
+    twists: Array, rates: Array, rows: Array, word: IntArray, times: Array
+) -> Array:
+    """Multipliers (3 + m,) of a plan."""
+    return word_multipliers(twists, rates, rows, word, times, word.size)
