@@ -28,7 +28,7 @@ from maneuver_automaton.collision._kernels_advancement import free_time
 from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search._kernels_cells import enter
 from maneuver_automaton.search._kernels_distance import pop, push
-from maneuver_automaton.search._kernels_motion import inside_window
+from maneuver_automaton.search._kernels_window import inside_window
 
 if TYPE_CHECKING:
     from maneuver_automaton._arrays import IntArray
@@ -60,7 +60,7 @@ class FailSafeTask(NamedTuple):
     tick: float  # [s] size of a cell in time
     longest: float  # [s] that a trim which moves is held, if the vehicle can rest
     impatience: float  # seconds of safety that a second of driving is worth
-    window: np.ndarray  # as in `_kernels_motion.inside_window`
+    window: np.ndarray  # as in `_kernels_window.inside_window`
 
 
 class FailSafeArrays(NamedTuple):

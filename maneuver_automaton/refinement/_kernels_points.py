@@ -34,7 +34,7 @@ from maneuver_automaton.refinement._kernels_word import (
     unroll,
     word_cost,
 )
-from maneuver_automaton.search._kernels_motion import free_candidate
+from maneuver_automaton.search._kernels_connection import free_candidate
 from maneuver_automaton.words._kernels_candidates import NO_TRIM, candidates, trim_and_gear
 
 if TYPE_CHECKING:

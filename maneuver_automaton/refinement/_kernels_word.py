@@ -14,14 +14,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
-from maneuver_automaton.search._kernels_motion import (
-    coast_free,
-    coasted,
-    edge_end,
-    edge_proven,
-    is_still,
-    may_stay,
-)
+from maneuver_automaton.search._kernels_coast import coast_free, coasted, is_still, may_stay
+from maneuver_automaton.search._kernels_maneuver import edge_end, edge_proven
 from maneuver_automaton.words._kernels_candidates import class_of
 
 if TYPE_CHECKING:

@@ -42,18 +42,16 @@ from maneuver_automaton._compile import (
     merged_kernel,
 )
 from maneuver_automaton.search._kernels_cells import first_slot
-from maneuver_automaton.search._kernels_distance import distance_at, pop, push
-from maneuver_automaton.search._kernels_motion import (
+from maneuver_automaton.search._kernels_coast import (
     coast_inside,
     coast_proven,
     coasted,
-    edge_end,
-    edge_inside,
-    edge_proven,
-    free_candidate,
     is_still,
     may_stay,
 )
+from maneuver_automaton.search._kernels_connection import free_candidate
+from maneuver_automaton.search._kernels_distance import distance_at, pop, push
+from maneuver_automaton.search._kernels_maneuver import edge_end, edge_inside, edge_proven
 from maneuver_automaton.words._kernels_candidates import (
     NO_TRIM,
     candidates,

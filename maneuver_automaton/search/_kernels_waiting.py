@@ -10,7 +10,7 @@ import math
 from typing import TYPE_CHECKING
 
 from maneuver_automaton._compile import bare_kernel
-from maneuver_automaton.search._kernels_motion import coast_free, coasted, may_stay
+from maneuver_automaton.search._kernels_coast import coast_free, coasted, may_stay
 
 if TYPE_CHECKING:
     from maneuver_automaton.search.lattice_arrays import LatticeArrays

@@ -73,7 +73,7 @@ class LatticeQuery:
 
     @property
     def window(self) -> Array:
-        """Window (9,) as in `_kernels_motion.inside_window`."""
+        """Window (9,) as in `_kernels_window.inside_window`."""
         return self.around.window
 
     @property

@@ -17,7 +17,7 @@ def window_of(
 ) -> tuple[Array, Array, bool]:
     """The window to search: the bounds, and where there are none, a box around everything.
 
-    A box (4,) in the world's frame, a window as in `_kernels_motion.inside_window`, and whether
+    A box (4,) in the world's frame, a window as in `_kernels_window.inside_window`, and whether
     the window's rim is a wall on every side. `poses` (n, 3 or more) lie inside.
     """
     pad = 4.0 * radius + 4.0 * world.body.reach

@@ -24,7 +24,7 @@ class Scene(NamedTuple):
     keep: float  # [m] distance kept from obstacles ...
     margin: float  # [m] ... and the clearance beyond it that a proof needs
     far: float  # [m] clearance where no obstacle is near
-    window: Array  # (9,) as in `_kernels_motion.inside_window`
+    window: Array  # (9,) as in `_kernels_window.inside_window`
     edge_window: Array  # (9,) narrower by the deviation of the courses of maneuvers
     lowest: float  # [m] altitudes within the bounds
     highest: float

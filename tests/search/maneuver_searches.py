@@ -10,13 +10,8 @@ import numpy as np
 
 from maneuver_automaton._compile import bare_kernel
 from maneuver_automaton.refinement.incumbent_words import incumbent_words
-from maneuver_automaton.search._kernels_motion import (
-    coast_free,
-    coast_inside,
-    coasted,
-    edge_end,
-    edge_free,
-)
+from maneuver_automaton.search._kernels_coast import coast_free, coast_inside, coasted
+from maneuver_automaton.search._kernels_maneuver import edge_end, edge_free
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.words.transitions import SWITCH
