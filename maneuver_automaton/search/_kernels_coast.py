@@ -14,9 +14,11 @@ from maneuver_automaton.collision._kernels_layers import layer_world, times_betw
 from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search._kernels_parts import part_body, part_coast
 from maneuver_automaton.search._kernels_window import inside_window
+from maneuver_automaton.words._kernels_candidates import NO_TRIM
 
 if TYPE_CHECKING:
     from maneuver_automaton.search.lattice_arrays import LatticeArrays
+    from maneuver_automaton.search.lattice_task import Task
     from maneuver_automaton.search.scene import Scene
 
 
@@ -198,3 +200,9 @@ def is_still(lib: LatticeArrays, trim: int) -> bool:
     """Whether a trim stands still; a rest may be as short as it likes."""
     twist = lib.library.twists[trim]
     return not (twist[0] != 0.0 or twist[1] != 0.0 or twist[2] != 0.0 or twist[3] != 0.0)
+
+
+@inlined_kernel
+def too_short(task: Task, lib: LatticeArrays, trim: int, run: float) -> bool:
+    """Whether a trim that moves has begun, and does not yet last as long as it must."""
+    return trim != NO_TRIM and 0.0 < run < task.least_coast and not is_still(lib, trim)

@@ -10,7 +10,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.search import _kernels_lattice as kernels
+from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.distance_grid import DistanceGrid, distance_grid
 from maneuver_automaton.search.lattice_pass import Pass, both_ends, pass_of
@@ -145,9 +145,9 @@ def _expanded(query: LatticeQuery, passes: list[Pass]) -> Array:
     """Poses (n, 4) of the nodes that were expanded, in the problem's frame, and their costs."""
     rows = []
     for one in passes:
-        n = int(one.arrays.state[kernels.N_NODES])
-        closed = one.arrays.links[:n, kernels.CLOSED] == 1
-        shown = [kernels.X, kernels.Y, kernels.HEADING, kernels.COST]
+        n = int(one.arrays.state[layout.N_NODES])
+        closed = one.arrays.links[:n, layout.CLOSED] == 1
+        shown = [layout.X, layout.Y, layout.HEADING, layout.COST]
         rows.append(one.arrays.nodes[:n][closed][:, shown])
     nodes = np.concatenate(rows)
     turned = SE2(np.array([0.0, 0.0, query.world.frame[2]])) @ SE2(nodes[:, :3])

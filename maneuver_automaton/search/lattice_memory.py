@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.search import _kernels_lattice as kernels
+from maneuver_automaton.search import _kernels_nodes as kernels
 from maneuver_automaton.words.library import LibraryArrays, Scratch, scratch_of
 
 SMALLEST = 2048  # nodes
 
 
 class SearchArrays(NamedTuple):
-    """Nodes, their hash table, the heap, and a few numbers, as in `_kernels_lattice`."""
+    """Nodes, their hash table, the heap, and a few numbers, as in `_kernels_nodes`."""
 
     nodes: Array  # (n, 9)
     links: NDArray[np.int32]  # (n, 7)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from maneuver_automaton.search import _kernels_lattice as kernels
+from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.distance_grid import DistanceGrid
 from maneuver_automaton.search.lattice_arrays import LatticeArrays, moves_of
@@ -24,7 +25,7 @@ from maneuver_automaton.words.word import Word, with_price
 FIRST_CHUNK = 64  # expansions
 TIMELY = 256  # expansions between two looks at the clock
 LONGER = 1.6  # times a least coasting time, for the longer of two coasts
-NO_EDGE = kernels.COASTED
+NO_EDGE = layout.COASTED
 LEAST = 1e-5  # share of the cost that a better word has to save
 
 
@@ -46,12 +47,12 @@ class Pass:
     @property
     def expansions(self) -> int:
         """Nodes expanded so far."""
-        return int(self.arrays.state[kernels.EXPANSIONS])
+        return int(self.arrays.state[layout.EXPANSIONS])
 
     @property
     def queries(self) -> int:
         """Motions and connections whose collisions were asked for."""
-        return int(self.arrays.state[kernels.QUERIES])
+        return int(self.arrays.state[layout.QUERIES])
 
     @property
     def may_go_on(self) -> bool:
@@ -61,7 +62,7 @@ class Pass:
     @property
     def nearest(self) -> float:
         """Distance [m] from the nearest place that was reached to where the search leads."""
-        places = self.arrays.nodes[: int(self.arrays.state[kernels.N_NODES]), :2]
+        places = self.arrays.nodes[: int(self.arrays.state[layout.N_NODES]), :2]
         least = math.inf
         for aim in self.task.aims:
             if len(places):
@@ -72,7 +73,7 @@ class Pass:
         """Expand up to `n` more nodes; a plan, if one was found that costs less than the bound."""
         left = self.expansions + n
         while self.alive and self.expansions < left and time.monotonic() < deadline:
-            used = int(self.arrays.state[kernels.N_NODES])
+            used = int(self.arrays.state[layout.N_NODES])
             step = min(left - self.expansions, TIMELY)
             room = used + self.library.most_children * (step + 1) + 2
             self.arrays = with_room(self.arrays, room)
@@ -88,11 +89,11 @@ class Pass:
                     upper_bound,
                 )
             )
-            if self.task.stop_at_first and self.arrays.state[kernels.FOUND]:
+            if self.task.stop_at_first and self.arrays.state[layout.FOUND]:
                 break
             if self.task.ends_early and self.arrays.found[0] < upper_bound * (1.0 - LEAST):
                 break
-        return _word(self) if self.arrays.state[kernels.FOUND] else None
+        return _word(self) if self.arrays.state[layout.FOUND] else None
 
 
 def pass_of(
@@ -157,22 +158,22 @@ def _word(one: Pass) -> Word:
     arrays, library, query = one.arrays, one.library, one.query
     state = arrays.state
     numbered = library.library
-    words = numbered.free_words if state[kernels.FREE] else numbered.words
-    row = [*words[state[kernels.ROW]].tolist(), int(state[kernels.CLIMB])]
+    words = numbered.free_words if state[layout.FREE] else numbered.words
+    row = [*words[state[layout.ROW]].tolist(), int(state[layout.CLIMB])]
     connection = [
         (NO_EDGE, trim, t)
         for trim, t in zip(row, arrays.found[1:5].tolist(), strict=True)
         if 0 <= trim < numbered.n_trims
     ]
     path: list[tuple[int, int, float]] = []
-    node = int(state[kernels.NODE])
-    while arrays.links[node, kernels.PARENT] >= 0:
+    node = int(state[layout.NODE])
+    while arrays.links[node, layout.PARENT] >= 0:
         link = arrays.links[node]
-        edge, t = int(link[kernels.EDGE]), float(arrays.nodes[node, kernels.COAST])
-        path.append((edge, int(link[kernels.TRIM]), t))
-        node = int(link[kernels.PARENT])
-    root = int(arrays.links[node, kernels.ROOT])
-    goal = int(state[kernels.GOAL])
+        edge, t = int(link[layout.EDGE]), float(arrays.nodes[node, layout.COAST])
+        path.append((edge, int(link[layout.TRIM]), t))
+        node = int(link[layout.PARENT])
+    root = int(arrays.links[node, layout.ROOT])
+    goal = int(state[layout.GOAL])
     if one.task.sign < 0.0:
         goal = goal_of_root(query, root)
         return query.word_of(_with_maneuvers(query, connection + path, NO_TRIM), goal)

@@ -17,7 +17,7 @@ from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyM
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.search import _kernels_lattice as kernels
+from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search.lattice import distance_grids, first_plan
 from maneuver_automaton.search.lattice_memory import search_arrays, with_room
 from maneuver_automaton.search.lattice_pass import both_ends, with_cost
@@ -75,7 +75,7 @@ def grown(problem, *, sign=1.0, one=None, n=EXPANSIONS):
     resolution = Resolution(stop=False) if one is None else one
     (one,) = both_ends(query, resolution, grids=distance_grids(query), ends=(sign,))
     one.run(n, math.inf)
-    used = int(one.arrays.state[kernels.N_NODES])
+    used = int(one.arrays.state[layout.N_NODES])
     return one, one.arrays.nodes[:used], one.arrays.links[:used]
 
 
@@ -100,7 +100,7 @@ def test_nodes_are_ends_of_free_ways(name, resolution, sign):
     library, query = one.query.library.arrays.library, one.query
     children = np.flatnonzero(links[:, PARENT] >= 0)
     if not (
-        one.arrays.state[kernels.FOUND] or problem.horizon.max_trims
+        one.arrays.state[layout.FOUND] or problem.horizon.max_trims
     ):  # what is dearer than a connection is left out
         assert len(children) > (40 if COMPILED else 5)
     elif not len(children):
@@ -243,7 +243,7 @@ def test_in_chunks_it_is_the_same_as_at_once():
         (one,) = both_ends(query, Resolution(stop=False), grids=distance_grids(query), ends=(1.0,))
         for n in chunks:
             one.run(n, math.inf)
-        nodes.append(one.arrays.nodes[: int(one.arrays.state[kernels.N_NODES])])
+        nodes.append(one.arrays.nodes[: int(one.arrays.state[layout.N_NODES])])
     assert nodes[0].shape == nodes[1].shape
     assert np.array_equal(nodes[0], nodes[1])
 
@@ -258,7 +258,7 @@ def test_arrays_grow_and_forget_nothing():
     one.arrays = wide
     one.run(20, math.inf)
     other, _, _ = grown(PROBLEMS["car"], n=min(EXPANSIONS, 400) + 20)
-    more = int(wide.state[kernels.N_NODES])
+    more = int(wide.state[layout.N_NODES])
     assert np.array_equal(wide.nodes[:more], other.arrays.nodes[:more])
 
 

@@ -1,0 +1,179 @@
+"""Nodes of the lattice: the arrays they are kept in, the table of their cells, the open list.
+
+A node is a row of two arrays, filled in by `add_node`. Columns of `nodes` (n, 9):
+
+    X, Y, HEADING, Z   the pose, exact: composed edge by edge, never rounded to the cell
+    COST, TIME         from the root to here
+    COAST              [s] of the coast that leads here, 0 after a maneuver
+    RUN                [s] that its trim lasts already, over several coasts
+    CLEARANCE          [m] proven here: a motion shorter than that needs no test
+
+and of `links` (n, 7): PARENT (-1 for a root), TRIM (NO_TRIM where any will do), GEAR (sign of the
+last forward speed), COUNT (of trims), ROOT, EDGE (the maneuver that leads here, COASTED for none),
+and CLOSED (1 once it was expanded, or replaced by a cheaper node of its cell).
+
+The hash table `table` (4 n, 2) holds the cheapest node of each cell: the key of the cell, and the
+number of the search with the node below it. So a new search need not clear the table. It is never
+more than a quarter full, so that a probe ends soon.
+
+The open list is a binary heap in `heap_key` and `heap_node` (n,), ordered by the cost plus the
+weighted cost to go. A node is pushed once, when it is made. A cheaper node of its cell closes it,
+and leaves it in the heap; it is passed over when it is popped.
+
+`state` (12,) are the numbers named below; `found` (5,) is the cost of the cheapest plan found, then
+the durations of the three trims of its connection and of the climb. `scratch` holds the candidates
+of one connection.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from maneuver_automaton._compile import bare_kernel, inlined_kernel, merged_kernel
+from maneuver_automaton.search._kernels_cells import first_slot
+from maneuver_automaton.search._kernels_distance import pop, push
+from maneuver_automaton.words._kernels_candidates import class_of
+
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import IntArray
+    from maneuver_automaton.search.lattice_arrays import LatticeArrays
+    from maneuver_automaton.search.lattice_memory import SearchArrays
+    from maneuver_automaton.search.lattice_task import Task
+
+FULL_TURN = 2.0 * math.pi
+COASTED, ROOTED = -1, -2  # in place of the maneuver that leads to a node
+NODE_BITS = 0x7FFFFFFF  # of an entry of the hash table: the node; above them the search
+X, Y, HEADING, Z, COST, TIME, COAST, RUN, CLEARANCE = range(9)
+PARENT, TRIM, GEAR, COUNT, ROOT, EDGE, CLOSED = range(7)
+(
+    N_NODES,  # nodes in use
+    HEAP,  # entries of the open list
+    GENERATION,  # number of this search, which its rows of the hash table carry
+    EXPANSIONS,  # nodes expanded
+    INTERVAL,  # expansions until the next analytic expansion
+    FOUND,  # 1 once a connection is found; the next five say which is the cheapest:
+    NODE,  # it leads from this node, ...
+    GOAL,  # to this aim, ...
+    ROW,  # by this row of the words, ...
+    CLIMB,  # with this trim that climbs at its end, ...
+    FREE,  # and whether the words are those of a free heading
+    QUERIES,  # motions and connections that were tested
+) = range(12)
+
+
+@inlined_kernel
+def cell_key(
+    task: Task, x: float, y: float, heading: float, z: float, layer: int, time: float, fine: int
+) -> int:
+    """Number of the lattice cell a pose is in, seen from the task's own frame.
+
+    `task.radix` is the number of cells along a side of the window, a power of two, of headings,
+    levels of altitude and ticks of the clock; the last two are 1 where they make no difference.
+    """
+    # The grid is fixed to the first goal, so a moved problem has the moved cells.
+    d_x, d_y = x - task.frame_x, y - task.frame_y
+    c, s = task.frame_cos, task.frame_sin
+    cell = task.fine_cell if fine else task.cell
+    n_headings = task.fine_headings if fine else task.headings
+    sides, turns, levels, ticks = task.radix
+    i = math.floor((c * d_x + s * d_y) / cell + 0.5) & (sides - 1)
+    j = math.floor((c * d_y - s * d_x) / cell + 0.5) & (sides - 1)
+    turn = (heading - task.frame_heading) / FULL_TURN
+    k = math.floor((turn - math.floor(turn)) * n_headings + 0.5) % n_headings
+    level = math.floor(z / task.rise + 0.5) & (levels - 1) if levels > 1 else 0
+    tick = math.floor(time / task.tick) & (ticks - 1) if task.tick > 0.0 else 0
+    # Digits of one number, the least last. Cells `sides` apart along an axis share a number, as do
+    # times `ticks` apart: that drops a node, and never a proof.
+    above = ((layer * 2 + fine) * ticks + tick) * levels + level
+    return ((above * turns + k) * sides + j) * sides + i
+
+
+@inlined_kernel
+def layer_of(task: Task, lib: LatticeArrays, trim: int, gear: int, n_trims: int) -> int:
+    """Number of a node's layer: its class, and the gear, trim and count that prices or limits need.
+
+    Nodes of one pose in different layers do not replace each other.
+    """
+    layer = class_of(lib.library, trim)
+    if task.by_gear:
+        layer = layer * 3 + gear + 1
+    if task.by_trim:
+        layer = layer * (lib.library.n_trims + 1) + trim + 1
+    if task.by_count:
+        layer = layer * 16 + min(n_trims, 15)
+    return layer
+
+
+@inlined_kernel
+def slot_of(table: IntArray, generation: int, key: int) -> int:
+    """Row of a key in the hash table, or the free one where it belongs.
+
+    Rows are (key, generation and node); those of another generation are free.
+    """
+    # Linear probing: nothing is ever deleted within a search, so the first free row ends it.
+    mask = table.shape[0] - 1
+    slot = first_slot(key, mask)
+    while table[slot, 1] >> 31 == generation and table[slot, 0] != key:
+        slot = (slot + 1) & mask
+    return slot
+
+
+@inlined_kernel
+def node_in(table: IntArray, generation: int, slot: int) -> int:
+    """Node that a row of the hash table holds; -1 if it is free."""
+    entry = table[slot, 1]
+    return entry & NODE_BITS if entry >> 31 == generation else -1
+
+
+@merged_kernel
+def add_node(
+    search: SearchArrays,
+    weight: float,
+    slot: int,
+    key: int,
+    row: tuple[float, ...],
+    link: tuple[int, ...],
+    estimate: float,
+) -> None:
+    """Append a node, make it the one of its cell, and push it.
+
+    `row` are its columns of `nodes`, `link` those of `links` but the last.
+    """
+    nodes, links, state = search.nodes, search.links, search.state
+    node = state[N_NODES]
+    for k in range(9):
+        nodes[node, k] = row[k]
+    parent, trim, gear, count, root, edge = link
+    links[node, PARENT], links[node, TRIM], links[node, GEAR] = parent, trim, gear
+    links[node, COUNT], links[node, ROOT], links[node, EDGE] = count, root, edge
+    links[node, CLOSED] = 0
+    state[N_NODES] = node + 1
+    search.table[slot, 0] = key
+    search.table[slot, 1] = (state[GENERATION] << 31) | node
+    push(search.heap_key, search.heap_node, state[HEAP], row[COST] + weight * estimate, node)
+    state[HEAP] += 1
+
+
+@inlined_kernel
+def open_node(search: SearchArrays, task: Task, upper_bound: float) -> int:
+    """The most promising node that is open, taken from the heap; -1 if there is none."""
+    links, state = search.links, search.state
+    # Only where the task says so does a key end the search: with a weight above 1 it is no bound.
+    most = min(upper_bound, search.found[0]) if task.ends_early else math.inf
+    node = -1
+    while node < 0 and state[HEAP] > 0 and not search.heap_key[0] >= most:
+        node = pop(search.heap_key, search.heap_node, state[HEAP])
+        state[HEAP] -= 1
+        if links[node, CLOSED]:
+            node = -1
+    return node
+
+
+@bare_kernel
+def rehash(table: IntArray, generation: int, wide: IntArray) -> None:
+    """Carry the entries of this generation over into a wider hash table."""
+    for k in range(table.shape[0]):
+        if node_in(table, generation, k) >= 0:
+            slot = slot_of(wide, generation, table[k, 0])
+            wide[slot, 0], wide[slot, 1] = table[k, 0], table[k, 1]
