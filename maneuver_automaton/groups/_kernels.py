@@ -33,6 +33,16 @@ def compose(
 
 
 @inner_kernel
+def back_from(
+    x: float, y: float, heading: float, d_x: float, d_y: float, turn: float
+) -> tuple[float, float, float]:
+    """Pose from which the motion (d_x, d_y, turn) leads to (x, y, heading)."""
+    before = heading - turn
+    c, s = math.cos(before), math.sin(before)
+    return x - c * d_x + s * d_y, y - s * d_x - c * d_y, before
+
+
+@inner_kernel
 def nearest_turn(angle: float) -> float:
     """Angle modulo a full turn, in [-pi, pi]."""
     return angle - 2.0 * math.pi * round(angle / (2.0 * math.pi))

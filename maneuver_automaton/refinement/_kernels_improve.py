@@ -31,7 +31,8 @@ from maneuver_automaton.refinement._kernels_word import (
     word_cost,
 )
 from maneuver_automaton.search._kernels_connection import free_candidate
-from maneuver_automaton.words._kernels_candidates import NO_TRIM, candidates, trim_and_gear
+from maneuver_automaton.words._kernels_candidates import candidates, trim_and_gear
+from maneuver_automaton.words._kernels_library import NO_TRIM
 
 if TYPE_CHECKING:
     from maneuver_automaton._arrays import Array, IntArray

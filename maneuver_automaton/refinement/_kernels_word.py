@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 from maneuver_automaton.search._kernels_coast import coast_free, coasted, is_still, may_stay
 from maneuver_automaton.search._kernels_maneuver import edge_end, edge_proven
-from maneuver_automaton.words._kernels_candidates import class_of
+from maneuver_automaton.words._kernels_library import class_of
 
 if TYPE_CHECKING:
     from maneuver_automaton._arrays import Array, IntArray

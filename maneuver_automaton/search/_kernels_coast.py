@@ -14,7 +14,7 @@ from maneuver_automaton.collision._kernels_layers import layer_world, times_betw
 from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search._kernels_parts import part_body, part_coast
 from maneuver_automaton.search._kernels_window import inside_window
-from maneuver_automaton.words._kernels_candidates import NO_TRIM
+from maneuver_automaton.words._kernels_library import NO_TRIM
 
 if TYPE_CHECKING:
     from maneuver_automaton.search.lattice_arrays import LatticeArrays

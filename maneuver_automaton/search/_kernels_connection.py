@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from maneuver_automaton._compile import bare_inner_kernel, merged_kernel
 from maneuver_automaton.search._kernels_coast import coast_free, coast_inside, coasted
 from maneuver_automaton.search._kernels_maneuver import edge_end, edge_free
-from maneuver_automaton.words._kernels_candidates import class_of
+from maneuver_automaton.words._kernels_library import class_of
 
 if TYPE_CHECKING:
     from maneuver_automaton._arrays import Array, IntArray

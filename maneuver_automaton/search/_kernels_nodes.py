@@ -33,7 +33,7 @@ from typing import TYPE_CHECKING
 from maneuver_automaton._compile import bare_kernel, inlined_kernel, merged_kernel
 from maneuver_automaton.search._kernels_cells import first_slot
 from maneuver_automaton.search._kernels_distance import pop, push
-from maneuver_automaton.words._kernels_candidates import class_of
+from maneuver_automaton.words._kernels_library import class_of
 
 if TYPE_CHECKING:
     from maneuver_automaton._arrays import IntArray

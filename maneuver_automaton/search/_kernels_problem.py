@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, merged_kernel
-from maneuver_automaton.groups._kernels import compose
-from maneuver_automaton.words._kernels_candidates import back_from
+from maneuver_automaton.groups._kernels import back_from, compose
 
 if TYPE_CHECKING:
     from maneuver_automaton._arrays import Array, IntArray

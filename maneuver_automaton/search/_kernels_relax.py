@@ -32,7 +32,7 @@ from maneuver_automaton.search._kernels_nodes import (
     node_in,
     slot_of,
 )
-from maneuver_automaton.words._kernels_candidates import class_of, price_of_switch
+from maneuver_automaton.words._kernels_library import class_of, price_of_switch
 
 if TYPE_CHECKING:
     from maneuver_automaton.search.cost_to_go import CostTable

@@ -13,58 +13,27 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel, inner_kernel, kernel
-from maneuver_automaton.groups._kernels import coast, compose, nearest_turn
-from maneuver_automaton.words._kernels_steering import phase, steer, turn_time, two_lines, unit
+from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
+from maneuver_automaton.groups._kernels import back_from, coast, compose, nearest_turn
+from maneuver_automaton.words._kernels_library import (
+    NO_TRIM,
+    cost_between,
+    displacement_of,
+    distance_cost,
+    is_level,
+    motion_of,
+    price_of_switch,
+    rise_of,
+    step_of,
+    time_between,
+)
+from maneuver_automaton.words._kernels_steering import steer, steer_one, steer_two
 
 if TYPE_CHECKING:
     from maneuver_automaton._arrays import Array, IntArray
     from maneuver_automaton.words.library import LibraryArrays, Scratch
 
-NO_TRIM = -1
 WHOLE = 1e-9  # share of a full turn that counts as none
-
-
-@inlined_kernel
-def price_of_switch(lib: LibraryArrays, before: int, gear: int, trim: int) -> float:
-    """Price of going on with `trim` after `before`, in `gear` the last that drove."""
-    price = 0.0
-    if before != NO_TRIM and before != trim:
-        price += lib.switch
-    if gear * lib.gears[trim] < 0:
-        price += lib.direction_change
-    return price
-
-
-@inlined_kernel
-def class_of(lib: LibraryArrays, trim: int) -> int:
-    """Class of a trim; of none the first, to which a kinematic vehicle's trims belong."""
-    return lib.class_of[trim] if trim >= 0 else 0
-
-
-@inlined_kernel
-def displacement_of(lib: LibraryArrays, before: int, after: int) -> tuple[float, float, float]:
-    """Displacement (x, y, heading) of the transition between two trims."""
-    a, b = class_of(lib, before), class_of(lib, after)
-    return lib.displacement[a, b, 0], lib.displacement[a, b, 1], lib.displacement[a, b, 2]
-
-
-@inlined_kernel
-def rise_of(lib: LibraryArrays, before: int, after: int) -> float:
-    """Altitude that the transition between two trims gains."""
-    return lib.displacement[class_of(lib, before), class_of(lib, after), 3]
-
-
-@inlined_kernel
-def cost_between(lib: LibraryArrays, before: int, after: int) -> float:
-    """Cost of the transition between two trims; inf where there is none."""
-    return lib.cost[class_of(lib, before), class_of(lib, after)]
-
-
-@inlined_kernel
-def time_between(lib: LibraryArrays, before: int, after: int) -> float:
-    """Duration of the transition between two trims."""
-    return lib.time[class_of(lib, before), class_of(lib, after)]
 
 
 @inner_kernel
@@ -78,75 +47,12 @@ def trim_and_gear(trim: int, gear: int) -> tuple[int, int]:
 
 
 @inner_kernel
-def back_from(
-    x: float, y: float, heading: float, d_x: float, d_y: float, turn: float
-) -> tuple[float, float, float]:
-    """Pose from which the motion (d_x, d_y, turn) leads to (x, y, heading)."""
-    before = heading - turn
-    c, s = math.cos(before), math.sin(before)
-    return x - c * d_x + s * d_y, y - s * d_x - c * d_y, before
-
-
-@inner_kernel
 def seen(
     x: float, y: float, heading: float, to_x: float, to_y: float, to_heading: float
 ) -> tuple[complex, float]:
     """A pose seen from another, as a displacement (complex place, heading)."""
     place = complex(to_x - x, to_y - y) * complex(math.cos(heading), -math.sin(heading))
     return place, to_heading - heading
-
-
-@inner_kernel
-def straight_time(goal: complex, velocity: complex) -> float:
-    """Time after which a straight trim is nearest to the place `goal`."""
-    return (goal * velocity.conjugate()).real / (velocity * velocity.conjugate()).real
-
-
-@bare_inner_kernel
-def steer_one(trim: tuple[complex, float], goal: tuple[complex, float], out: Array) -> None:
-    """Fill `out` (3,) with the time of one trim that may meet `goal`; NaN if none can."""
-    v, w = trim
-    z, heading = goal
-    out[0], out[1], out[2] = math.nan, 0.0, 0.0
-    if w != 0.0:
-        out[0] = turn_time(heading, w)
-    elif abs(v) > 0.0:
-        out[0] = straight_time(z, v)
-
-
-@bare_inner_kernel
-def steer_two(
-    a: tuple[complex, float],
-    step: tuple[complex, float],
-    b: tuple[complex, float],
-    goal: tuple[complex, float],
-    tolerance: float,
-    out: Array,
-) -> None:
-    """Fill `out` (3,) with times of two trims that may meet `goal`; NaN if none can."""
-    v_a, w_a = a
-    d, e = step
-    v_b, w_b = b
-    z, heading = goal
-    out[0], out[1], out[2] = math.nan, math.nan, 0.0
-    if w_a != 0.0 and w_b != 0.0:
-        r_a, r_b = -1j * v_a / w_a, -1j * v_b / w_b
-        arm, aim = r_a + d - r_b * unit(e), z + r_a - r_b * unit(heading)
-        if abs(arm) > tolerance * (abs(r_a) + abs(r_b) + abs(d)):
-            angle = phase(aim) - phase(arm)
-            out[0] = turn_time(angle, w_a)
-            out[1] = turn_time(heading - e - angle, w_b)
-    elif w_a != 0.0 and abs(v_b) > 0.0:
-        angle = heading - e
-        r_a = -1j * v_a / w_a
-        out[0] = turn_time(angle, w_a)
-        out[1] = straight_time(z - r_a * (unit(angle) - 1.0) - d * unit(angle), v_b * unit(heading))
-    elif w_b != 0.0 and abs(v_a) > 0.0:
-        r_b = -1j * v_b / w_b
-        out[0] = straight_time(z - d - r_b * (unit(heading) - unit(e)), v_a)
-        out[1] = turn_time(heading - e, w_b)
-    elif w_a == 0.0 and w_b == 0.0 and abs(v_a) > 0.0 and abs(v_b) > 0.0:
-        out[0], out[1] = two_lines(z - d, v_a, v_b * unit(heading), tolerance)
 
 
 @bare_inner_kernel
@@ -190,15 +96,6 @@ def before_climb(
     return back_from(x, y, heading, d_x, d_y, turn)
 
 
-@inner_kernel
-def is_level(lib: LibraryArrays, word: IntArray) -> bool:
-    """Whether no trim of a word climbs."""
-    level = True
-    for n in range(3):
-        level = level and (word[n] < 0 or lib.twists[word[n], 3] == 0.0)
-    return level
-
-
 @bare_inner_kernel
 def word_misses(
     lib: LibraryArrays,
@@ -224,34 +121,6 @@ def word_misses(
         before = trim
     g_x, g_y, g_heading = goal
     return max(abs(x - g_x), abs(y - g_y), abs(nearest_turn(heading - g_heading)))
-
-
-@inner_kernel
-def motion_of(lib: LibraryArrays, trim: int) -> tuple[complex, float]:
-    """A trim as a planar velocity and a turn rate."""
-    return complex(lib.twists[trim, 0], lib.twists[trim, 1]), lib.twists[trim, 2]
-
-
-@inner_kernel
-def step_of(lib: LibraryArrays, before: int, trim: int) -> tuple[complex, float]:
-    """The transition between two trims as a planar displacement."""
-    d_x, d_y, turn = displacement_of(lib, before, trim)
-    return complex(d_x, d_y), turn
-
-
-@inner_kernel
-def distance_cost(lib: LibraryArrays, distance: float, a: int, b: int, c: int) -> float:
-    """Least cost of coasting a distance by these trims: what transitions do not make of it."""
-    left, price = distance, math.inf
-    if a >= 0:
-        price = lib.per_metre[a]
-    if b >= 0:
-        left -= lib.length[class_of(lib, a), class_of(lib, b)]
-        price = min(price, lib.per_metre[b])
-    if c >= 0:
-        left -= lib.length[class_of(lib, b), class_of(lib, c)]
-        price = min(price, lib.per_metre[c])
-    return left * price if left > lib.met else 0.0
 
 
 @bare_inner_kernel

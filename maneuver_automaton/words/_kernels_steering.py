@@ -1,4 +1,4 @@
-"""The steering function: three coasting times in closed form.
+"""The steering function: one, two or three coasting times in closed form.
 
 Planar motions are complex numbers: a trim is ``(velocity, turn rate)``, a displacement
 ``(position, heading)``.
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from maneuver_automaton._compile import inlined_kernel, inner_kernel, kernel
+from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel, inner_kernel, kernel
 
 if TYPE_CHECKING:
     from maneuver_automaton._arrays import Array, IntArray
@@ -95,6 +95,59 @@ def two_lines(
     if abs(area) <= tolerance * abs(first) * abs(second):
         return math.nan, math.nan
     return (point.conjugate() * second).imag / area, (first.conjugate() * point).imag / area
+
+
+@inner_kernel
+def straight_time(goal: complex, velocity: complex) -> float:
+    """Time after which a straight trim is nearest to the place `goal`."""
+    return (goal * velocity.conjugate()).real / (velocity * velocity.conjugate()).real
+
+
+@bare_inner_kernel
+def steer_one(trim: tuple[complex, float], goal: tuple[complex, float], out: Array) -> None:
+    """Fill `out` (3,) with the time of one trim that may meet `goal`; NaN if none can."""
+    v, w = trim
+    z, heading = goal
+    out[0], out[1], out[2] = math.nan, 0.0, 0.0
+    if w != 0.0:
+        out[0] = turn_time(heading, w)
+    elif abs(v) > 0.0:
+        out[0] = straight_time(z, v)
+
+
+@bare_inner_kernel
+def steer_two(
+    a: tuple[complex, float],
+    step: tuple[complex, float],
+    b: tuple[complex, float],
+    goal: tuple[complex, float],
+    tolerance: float,
+    out: Array,
+) -> None:
+    """Fill `out` (3,) with times of two trims that may meet `goal`; NaN if none can."""
+    v_a, w_a = a
+    d, e = step
+    v_b, w_b = b
+    z, heading = goal
+    out[0], out[1], out[2] = math.nan, math.nan, 0.0
+    if w_a != 0.0 and w_b != 0.0:
+        r_a, r_b = -1j * v_a / w_a, -1j * v_b / w_b
+        arm, aim = r_a + d - r_b * unit(e), z + r_a - r_b * unit(heading)
+        if abs(arm) > tolerance * (abs(r_a) + abs(r_b) + abs(d)):
+            angle = phase(aim) - phase(arm)
+            out[0] = turn_time(angle, w_a)
+            out[1] = turn_time(heading - e - angle, w_b)
+    elif w_a != 0.0 and abs(v_b) > 0.0:
+        angle = heading - e
+        r_a = -1j * v_a / w_a
+        out[0] = turn_time(angle, w_a)
+        out[1] = straight_time(z - r_a * (unit(angle) - 1.0) - d * unit(angle), v_b * unit(heading))
+    elif w_b != 0.0 and abs(v_a) > 0.0:
+        r_b = -1j * v_b / w_b
+        out[0] = straight_time(z - d - r_b * (unit(heading) - unit(e)), v_a)
+        out[1] = turn_time(heading - e, w_b)
+    elif w_a == 0.0 and w_b == 0.0 and abs(v_a) > 0.0 and abs(v_b) > 0.0:
+        out[0], out[1] = two_lines(z - d, v_a, v_b * unit(heading), tolerance)
 
 
 @inlined_kernel

@@ -23,7 +23,7 @@ from maneuver_automaton.search.altitude_ranges import altitude_ranges
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.search.word_plan import plan_of_word
-from maneuver_automaton.words._kernels_candidates import NO_TRIM
+from maneuver_automaton.words._kernels_library import NO_TRIM
 from maneuver_automaton.words.library import library_of
 from tests.reference_words import candidates
 from tests.search.cases import compiled_only
