@@ -56,23 +56,29 @@ def one_tick(
     return x, y, heading, speed, steering
 
 
+@bare_inner_kernel
+def drive_tick(wheelbase: float, tick: float, states: Array, controls: Array, k: int) -> None:
+    """Fill in the state after tick `k` (row k + 1), from the state and the controls of row k."""
+    x, y, heading, speed, steering = one_tick(
+        wheelbase,
+        tick,
+        states[k, 0],
+        states[k, 1],
+        states[k, 2],
+        states[k, 3],
+        states[k, 4],
+        controls[k, 0],
+        controls[k, 1],
+    )
+    states[k + 1, 0], states[k + 1, 1], states[k + 1, 2] = x, y, heading
+    states[k + 1, 3], states[k + 1, 4] = speed, steering
+
+
 @kernel
 def driven(wheelbase: float, tick: float, state: Array, controls: Array) -> Array:
     """States (n + 1, 5) at the ticks under controls (n, 2), from a state (5,)."""
     states = np.empty((controls.shape[0] + 1, 5))
     states[0] = state
     for k in range(controls.shape[0]):
-        x, y, heading, speed, steering = one_tick(
-            wheelbase,
-            tick,
-            states[k, 0],
-            states[k, 1],
-            states[k, 2],
-            states[k, 3],
-            states[k, 4],
-            controls[k, 0],
-            controls[k, 1],
-        )
-        states[k + 1, 0], states[k + 1, 1], states[k + 1, 2] = x, y, heading
-        states[k + 1, 3], states[k + 1, 4] = speed, steering
+        drive_tick(wheelbase, tick, states, controls, k)
     return states

@@ -17,7 +17,7 @@ from maneuver_automaton.roads._kernels_costs import cost_of_tick
 from maneuver_automaton.roads._kernels_free import free_tick
 from maneuver_automaton.roads._kernels_goals import goal_at
 from maneuver_automaton.roads._kernels_library import admitted
-from maneuver_automaton.roads._kernels_motion import one_tick
+from maneuver_automaton.roads._kernels_motion import drive_tick
 from maneuver_automaton.roads._kernels_route import nearest_of_all
 
 if TYPE_CHECKING:
@@ -54,21 +54,10 @@ def drive_on(horizon: Horizon, course: Course, begin: int, lasting: int, most: f
     """
     limits, states, controls = horizon.limits, course.states, course.controls
     for k in range(begin, controls.shape[0]):
-        x, y, heading, speed, steering = one_tick(
-            limits.wheelbase,
-            limits.tick,
-            states[k, 0],
-            states[k, 1],
-            states[k, 2],
-            states[k, 3],
-            states[k, 4],
-            controls[k, 0],
-            controls[k, 1],
-        )
-        states[k + 1, 0], states[k + 1, 1], states[k + 1, 2] = x, y, heading
-        states[k + 1, 3], states[k + 1, 4] = speed, steering
+        drive_tick(limits.wheelbase, limits.tick, states, controls, k)
         if k >= lasting:
             continue  # the stop keeps its speeds and angles, and costs nothing
+        speed, steering = states[k + 1, 3], states[k + 1, 4]
         if speed < 0.0 or abs(steering) > limits.sharpest:
             return False
         possible, _, _, _ = admitted(
