@@ -9,7 +9,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from tests.matrix.features import FEATURES, Dearer, Feature, Nothing
+from tests.matrix.features import FEATURES
+from tests.matrix.measuring import Dearer, Nothing
+from tests.matrix.rows import Feature
 from tests.matrix.vehicles import VEHICLES, Vehicle
 
 WORKS, NOTHING, IGNORED, ERROR, REFUSED, DEARER, SENSELESS = (".", "F", "I", "E", "R", "p", "-")
