@@ -222,7 +222,7 @@ class RecedingHorizon:
             self.most_steps += 1
         plan = with_samples_at(last.plan, [last.time + passed], self.problem.automaton.model)
         if passed == last.applied:
-            return replace(last, plan=plan)
+            return last if plan is last.plan else replace(last, plan=plan)
         spent = cost_until(self.problem, plan, passed)
         return replace(last, plan=plan, applied=passed, applied_cost=spent)
 
@@ -257,7 +257,7 @@ class RecedingHorizon:
         )
         self._count(step, now)
         broken = (*now.violations, *self._broken(step, now))
-        return replace(step, violations=broken)
+        return replace(step, violations=broken) if broken else step
 
     def _count(self, step: Step, now: Situation) -> None:
         """Bound the number of steps, from here on if something disturbed."""

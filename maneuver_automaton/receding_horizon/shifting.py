@@ -54,9 +54,13 @@ def rested(plan: Plan, pad: Trim, duration: float) -> Plan:
     """The plan with `duration` more seconds of rest: of the one it ends in, otherwise of `pad`."""
     if not duration > NOTHING:
         return plan
-    rest = plan.trims[-1] if plan.trims and plan.trims[-1].is_rest else pad
-    # What follows is joined on: its own start is not asked, so the plan's end is not worked out.
-    return followed_by(plan, Plan(plan.start, (rest,), durations=[duration]))
+    times, between = plan.durations.tolist(), plan.maneuvers
+    if plan.trims and plan.trims[-1].is_rest:
+        word, times[-1] = plan.trims, times[-1] + duration
+    else:
+        word, times = (*plan.trims, pad), [*times, duration]
+        between = (*between, None) if between else ()
+    return without_nothing(replace(plan, trims=word, durations=times, maneuvers=between))
 
 
 def followed_by(first: Plan, second: Plan) -> Plan:
