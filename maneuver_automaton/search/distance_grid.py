@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.world import World
 from maneuver_automaton.search import _kernels_distance
+from maneuver_automaton.search.prepared import RECENT, Prepared
 
 MOST_CELLS = 1_000_000
 DETOUR = 4.0  # [sides of the grid] that are preferred to a path through a wall thinner than a cell
@@ -41,7 +42,9 @@ class DistanceGrid(NamedTuple):
     aim_j: int
 
 
-def distance_grid(world: World, box: Array, seeds: Array, aim: Array) -> DistanceGrid:
+def distance_grid(
+    world: World, box: Array, seeds: Array, aim: Array, *, prepared: Prepared = RECENT
+) -> DistanceGrid:
     """Distances from `seeds` (n, 2 or more) inside `box` (4,), grown towards `aim` (2 or more,).
 
     Source of the inflation: a pose in a cell is at most half its diagonal from the centre, and a
@@ -67,11 +70,11 @@ def distance_grid(world: World, box: Array, seeds: Array, aim: Array) -> Distanc
     half_diagonal = float(cell) * math.sqrt(0.5)
     aim_i, aim_j = (int(k) for k in np.floor((aim[:2] - start) / cell))
     grid = DistanceGrid(
-        value=np.empty(n),  # memory that is not touched costs nothing
-        rank=np.empty(n),
+        value=prepared.room(n, np.float64),
+        rank=prepared.room(n, np.float64),
         mark=np.zeros(n, dtype=np.uint8),
-        keys=np.empty(8 * n + 8),
-        items=np.empty(8 * n + 8, dtype=np.int64),
+        keys=prepared.room(8 * n + 8, np.float64),
+        items=prepared.room(8 * n + 8, np.int64),
         state=np.zeros(3, dtype=np.int64),
         origin_x=float(start[0]),
         origin_y=float(start[1]),

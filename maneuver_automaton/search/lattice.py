@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import time
 from dataclasses import dataclass, replace
@@ -120,9 +121,8 @@ def _begun(
 
 def distance_grids(query: LatticeQuery) -> Grids:
     """Distances to the goals and to the start."""
-    to_goal = distance_grid(query.plane, query.box, query.goals, query.start)
-    to_start = distance_grid(query.plane, query.box, query.start[None], query.goals[0])
-    return to_goal, to_start
+    grid = functools.partial(distance_grid, query.plane, query.box, prepared=query.prepared)
+    return grid(query.goals, query.start), grid(query.start[None], query.goals[0])
 
 
 def _enclosed(query: LatticeQuery, grids: Grids) -> str:

@@ -21,7 +21,7 @@ def plane_bound(query: LatticeQuery) -> float:
     Source: Bailey, Tovey, Uras, Koenig, Nash (2015), *Path planning on grids: the effect of vertex
     placement on path length*.
     """
-    grid = distance_grid(query.world, query.box, query.goals, query.start)
+    grid = distance_grid(query.world, query.box, query.goals, query.start, prepared=query.prepared)
     if not grid.columns:
         return 0.0
     length: float = _kernels_plane.corner_path(

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import functools
+import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, ParamSpec, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
+from maneuver_automaton._arrays import Array
+
 MOST = 16  # values of each kind
+LARGEST = 1 << 21  # numbers in a block of memory that is kept, 16 MiB
 
 _T = TypeVar("_T")
 _P = ParamSpec("_P")
+_Number = TypeVar("_Number", np.float64, np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,6 +38,7 @@ class Prepared:
     """
 
     _makers: dict[Callable[..., Any], Callable[..., Any]] = field(default_factory=dict, init=False)
+    _blocks: list[Array] = field(default_factory=list, init=False)  # that nobody uses now
 
     def once(self, make: Callable[_P, _T], *args: _P.args, **more: _P.kwargs) -> _T:
         """The result of `make` for these arguments, which are values: made at the first call."""
@@ -38,6 +47,33 @@ class Prepared:
             self._makers[make] = functools.lru_cache(MOST)(maker)
         made: _T = self._makers[make](*args, **more)
         return made
+
+    def room(self, n: int, kind: type[_Number]) -> NDArray[_Number]:
+        """An array (n,) of numbers that mean nothing, in memory that is used again after it.
+
+        The system hands out fresh memory page by page, which for the arrays of a first plan takes
+        longer than a millisecond. The memory is free again once the array is gone: a view of it
+        must not outlive it. A number of its `kind` has 64 bits.
+
+        Examples
+        --------
+        >>> prepared = Prepared()
+        >>> one = prepared.room(1000, np.float64)
+        >>> where = one.ctypes.data
+        >>> del one
+        >>> prepared.room(500, np.int64).ctypes.data == where
+        True
+        """
+        try:
+            block = self._blocks.pop()
+        except IndexError:  # asked for before, another thread might take the last one
+            block = np.empty(0)
+        if block.size < n:
+            block = np.empty(n)
+        array = block.view(kind)[:n]
+        if n <= LARGEST:
+            weakref.finalize(array, self._blocks.append, block).atexit = False
+        return array
 
 
 RECENT = Prepared()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+
+import numpy as np
 import pytest
 
 from maneuver_automaton.search import prepared
@@ -45,3 +48,14 @@ def test_the_oldest_is_forgotten(made):
     for number in (1, 2, 3, 1):
         holder.once(make, number)
     assert made == [1, 2, 3, 1]
+
+
+def test_memory_in_use_is_nobody_elses():
+    prepared = Prepared()
+    arrays = [prepared.room(n, kind) for n in (10, 1000, 10) for kind in (np.float64, np.int64)]
+    for one, other in itertools.combinations(arrays, 2):
+        assert not np.shares_memory(one, other)
+    kept = arrays.pop()
+    del arrays, one, other
+    again = [prepared.room(5, np.float64) for _ in range(9)]
+    assert not any(np.shares_memory(kept, one) for one in again)
