@@ -64,7 +64,7 @@ VEHICLES: dict[str, tuple[Rates, Rates | None]] = {
     "boat": (lambda z, u: np.stack([u[:, 0], -0.3 * u[:, 0] * u[:, 1], u[:, 1]], axis=1), none),
     "glider": (lambda z, u: np.stack([u[:, 0], 0 * u[:, 0], u[:, 1], u[:, 2]], axis=1), none),
     "omni": (lambda z, u: u[:, :3], none),
-    "stage": (lambda z, u: u[:, :2], none),
+    "stage": (lambda z, u: np.stack([u[:, 0], u[:, 1], 0 * u[:, 0]], axis=1), none),
     "second_order_unicycle": (
         lambda z, u: np.stack([z[:, 0], 0 * z[:, 0], z[:, 1]], axis=1), same,
     ),
@@ -82,8 +82,6 @@ VEHICLES: dict[str, tuple[Rates, Rates | None]] = {
 
 def pose_rates(pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
     """Rates of poses (n, d) at body velocities (n, d)."""
-    if pose.shape[1] == 2:  # translations only
-        return velocity
     c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
     rates = velocity.copy()
     rates[:, 0] = c * velocity[:, 0] - s * velocity[:, 1]
