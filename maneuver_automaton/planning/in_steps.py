@@ -55,7 +55,10 @@ def plan_in_steps(
         searched = budget.elapsed if lattice.knows_all else None
         found.offer_in_turn(improved(lattice))
     if steps.polishes:
+        known = found.cost
         polish_found(found, paths.guesses)
+        if lattice and lattice.words and found.cost == known and not budget.is_over:
+            lattice.offer_best_times()
     _count_refused(found, lattice)
     nodes = lattice.first.nodes if lattice and lattice.first else None
     if not found.plans:

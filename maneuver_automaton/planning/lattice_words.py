@@ -40,7 +40,8 @@ BRIEF = Patience(attempts=1000, passes=3)  # of the path among static obstacles
 MOST_PATHS = 4  # among static obstacles that are tried with rests
 QUICK = 1500  # expansions in space and time before a path with rests is tried
 PASSING_SHARE = 0.3  # of the time that is left, for paths that let moving obstacles pass
-BEFORE_POLISHING = 0.2  # share of what is left that the lattice gets, once there is a plan
+BEFORE_POLISHING = 0.2  # share of what is left that the lattice gets, where there was a plan
+ALONE_BEFORE_POLISHING = 0.4  # the same for better words where its own was the first
 FOR_THE_BEST = 0.6  # the same where alternatives are asked for
 FREE_WORDS = 4  # words of free space that are looked at for every alternative
 FREE_WORDS_SHARE = 0.3  # of the time that is left for alternatives
@@ -55,6 +56,7 @@ class LatticeWords:
     table: CostTable
     found: Incumbents
     steps: Steps
+    alone: bool  # no other step has found a plan
     limit: Budget
     words: list[Word] = field(default_factory=list)
     spent: int = 0  # expansions of first plans and improvements
@@ -81,10 +83,15 @@ class LatticeWords:
         if self.knows_all:
             self.found.note(word.cost + self.query.padding)
             return
-        problem, index = self.query.problem, self.query.goal_index[word.goal]
-        plan = plan_of_word(self.query, word)
-        self.found.offer(plan, index)
-        better = with_relaxed_end(problem, plan, problem.goals[index])
+        self.found.offer(plan_of_word(self.query, word), self.query.goal_index[word.goal])
+        if not self.steps.polishes:  # which finds better times, and takes what time there is
+            self.offer_best_times()
+
+    def offer_best_times(self) -> None:
+        """Offer the cheapest word with the best of its coasting times."""
+        word, problem = self.words[-1], self.query.problem
+        index = self.query.goal_index[word.goal]
+        better = with_relaxed_end(problem, plan_of_word(self.query, word), problem.goals[index])
         if better is not None:
             self.found.offer(better, index, proven=False)  # it ends its coasts elsewhere
 
@@ -137,8 +144,9 @@ def search_lattice(found: Incumbents, steps: Steps) -> LatticeWords:
     known = query.library.at_will
     table = cost_to_go_table(problem, prepared=prepared) if known else NO_TABLE
     query = query if known else late_at_first(query)
-    share = BEFORE_POLISHING if steps.polishes and found.plans else 1.0
-    lattice = LatticeWords(query, table, found, steps, found.budget.stage(share))
+    alone = not found.plans
+    share = BEFORE_POLISHING if steps.polishes and not alone else 1.0
+    lattice = LatticeWords(query, table, found, steps, alone, found.budget.stage(share))
     lattice.first = _first(lattice)
     lattice.bound = lattice_bound(query) if steps.at_will else 0.0
     return lattice
@@ -226,7 +234,7 @@ def _for_the_best(lattice: LatticeWords) -> Budget:
     """Budget for the improvement of the best plan."""
     left = lattice.budget
     if lattice.steps.polishes:
-        return left.stage(BEFORE_POLISHING)
+        return left.stage(ALONE_BEFORE_POLISHING if lattice.alone else BEFORE_POLISHING)
     share = FOR_THE_BEST if lattice.knows_all and lattice.found.alternatives else 1.0
     most = None if left.expansions is None else int(share * left.expansions)
     return replace(left.part(share), expansions=most)
