@@ -55,6 +55,7 @@ LIBRARIES: dict[str, Callable[[], Automaton]] = {
     "library_platform": platform,
     "library_unicycle_with_inertia": lambda: unicycle_automaton(((0.0, 0.0), (1.0, 0.0))),
     "library_car_with_inertia": lambda: car_automaton((1.0,), (-0.6, 0.0)),
+    "library_slope": lambda: SLOPE.automaton,
 }
 
 
@@ -108,8 +109,14 @@ def of_library(library: Automaton) -> dict[str, Any]:
 
 
 def resumed(name: str) -> ClosedLoop:
-    """The rest of a loop that was stopped, from its file."""
+    """The rest of a loop that was stopped, from its file.
+
+    A library of maneuvers is that of a file too: driven anew, its last digits depend on the
+    processor, and the loop would be one of another library.
+    """
     problem, options = LOOPS[name]
+    if problem.automaton.maneuvers:
+        problem = replace(problem, automaton=ma.load_library(FILES / "library_slope.json"))
     steps, poses = load_steps(FILES / f"{name}.json", problem.automaton)
     there = replace(problem, start=poses[-1])
     return simulate(there, last=steps[-1], **options)
