@@ -26,10 +26,14 @@ def free_space(vehicle: Vehicle, engine: Engine) -> None:
     applies=lambda vehicle: vehicle.has_heading,
 )
 def free_heading(vehicle: Vehicle, engine: Engine) -> None:
-    result = asked(vehicle, engine, goals=vehicle.target(free_heading=True))
+    pose = np.array(vehicle.goal)
+    if not vehicle.rotates:  # it has few headings, and the one of its goal is the best of them
+        pose[2] += np.pi
+    goal = vehicle.target(pose=pose, free_heading=True)
+    result = asked(vehicle, engine, goals=goal)
     known = base(vehicle).cost
     no_dearer(result, known, "the plan with the heading")
-    _, turn = outside.off_goal(result.plan.end, vehicle.target())
+    _, turn = outside.off_goal(result.plan.end, goal)
     assert turn > SAME or result.cost < known * (1.0 - SAME), "the heading is not used"
 
 
