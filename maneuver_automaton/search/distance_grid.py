@@ -14,6 +14,7 @@ from maneuver_automaton.search import _kernels_distance
 from maneuver_automaton.search.prepared import RECENT, Prepared
 
 MOST_CELLS = 1_000_000
+OCTILE = 1.0823922002923938  # 1 / cos(pi / 8): most of a path along cells over a straight one
 DETOUR = 4.0  # [sides of the grid] that are preferred to a path through a wall thinner than a cell
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.search.distance_grid import OCTILE
 from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.search.lattice_query import LatticeQuery
 
@@ -24,7 +25,6 @@ INTERVAL = 0.25  # [cost of a length scale] to go for each expansion between con
 RISE = 0.25  # [length scales] of altitude that make another cell
 BACK_OFF = 0.01  # [half widths of the body] kept before contact
 SHORTEST_TRUNCATED = 0.03  # [half widths] of an edge that ends there
-LONGEST_DETOUR = 1.0 / math.cos(math.pi / 8.0)  # of a path from cell to cell, over a straight line
 SAMPLED_HEADINGS = 16  # roots at a goal whose heading is free
 ROUNDING = 1e-12  # relative, by which a coast may fall short of the least one
 MOST_SIDES, MOST_LEVELS, MOST_TICKS = 1 << 15, 1 << 8, 1 << 11  # cells that have numbers of theirs
@@ -135,7 +135,7 @@ def task_of(query: LatticeQuery, resolution: Resolution, *, sign: float = 1.0) -
         tick=tick,
         radix=_radix(query, resolution.fine * cell, max(headings, FINE_HEADINGS), tick, layers),
         weight=float(resolution.weight),
-        per_metre=float(library.per_metre) / (LONGEST_DETOUR if resolution.straight else 1.0),
+        per_metre=float(library.per_metre) / (OCTILE if resolution.straight else 1.0),
         per_climb=float(library.per_climb),
         # The path to the goal says how long to wait, unless no trim moves: then nothing is solved
         # for, and the node that ends at the goal must not be missed.

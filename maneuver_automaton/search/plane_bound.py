@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from maneuver_automaton.search import _kernels_plane
-from maneuver_automaton.search.distance_grid import distance_grid
+from maneuver_automaton.search.distance_grid import OCTILE, distance_grid
 from maneuver_automaton.search.lattice_query import LatticeQuery
-
-FACTOR = 1.0823922002923938  # by which an octile path may be longer than the shortest one
 
 
 def plane_bound(query: LatticeQuery) -> float:
@@ -34,4 +32,4 @@ def plane_bound(query: LatticeQuery) -> float:
     if not np.isfinite(length):
         return 0.0
     beside = max(query.problem.goals[k].tolerance_m for k in query.goal_index)
-    return max(0.0, length / FACTOR - grid.cell * float(np.sqrt(2.0)) - beside)
+    return max(0.0, length / OCTILE - grid.cell * float(np.sqrt(2.0)) - beside)
