@@ -232,7 +232,7 @@ def _rows(problem: Problem, poses: Array) -> Iterator[tuple[float, bool]]:
         here = replace(problem, start=pose)
         least, exhaustive = math.inf, True
         for goal in problem.goals:
-            results = search_goal(here, goal, alternatives=0, time_limit=math.inf)
+            results = search_goal(here, goal, alternatives=0)
             exhaustive &= any(result.exhaustive for result in results)
             costs = (solution.cost for result in results for solution in result.solutions[:1])
             least = min(least, *costs, math.inf)

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import functools
 import math
-import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.optimal_control.polish_program import Program
 from maneuver_automaton.optimal_control.polish_values import Answer, Point, PolishSettings
 from maneuver_automaton.optimal_control.separation import Lines, Pairs, line_rows
 from maneuver_automaton.optimal_control.solution import SolveStatus
+from maneuver_automaton.optimal_control.stopping import asked_between_iterations
 from maneuver_automaton.optimal_control.transcription import STATUS
 
 WARM = {"ipopt.mu_init": 1e-5}
+NODE_S = 2.5e-5  # [s] for each node of an expression, to differentiate it: measured, generous
 
 
 class Solver(NamedTuple):
@@ -25,15 +27,16 @@ class Solver(NamedTuple):
 
     function: Any
     warm: Callable[[], Any]  # the same with a smaller barrier, for another solve from nearby
+    budget: Budget  # that every iteration asks
     bounds: Array  # (variables, 2)
     limits: Array  # (rows, 2)
     fixed: bool
 
 
 def solver_of(
-    program: Program, pairs: Pairs, *, fixed: bool, price: float, seconds: float
-) -> Solver:
-    """The program with lines for some pairs.
+    program: Program, pairs: Pairs, *, fixed: bool, price: float, budget: Budget
+) -> Solver | float:
+    """The program with lines for some pairs; where no time is left to build it, what it takes [s].
 
     Parameters
     ----------
@@ -43,8 +46,8 @@ def solver_of(
         Whether the lines stand still.
     price : float
         Of being inside obstacles, per metre and interval; infinite: it must not be.
-    seconds : float
-        For each call [s].
+    budget : Budget
+        Every iteration asks it: a solve ends with what it has once the time is over.
     """
     casadi, written, scene = program.casadi, program.written, program.scene
     variables = [casadi.vec(written.state), casadi.vec(written.control), written.duration]
@@ -82,14 +85,22 @@ def solver_of(
         "g": constraints,
     }
     most = program.settings.fixed_iterations if fixed else program.settings.max_iterations
-    options = _options(program.settings, most, seconds)
+    given_names = [functions["x"], functions["p"]], [objective, constraints]
+    takes = NODE_S * casadi.Function("size", *given_names).n_nodes()
+    if takes > budget.left:
+        return float(takes)
+    options = _options(program.settings, most)
+    asked = asked_between_iterations(
+        budget, n_variables=functions["x"].numel(), n_rows=constraints.numel(), n_given=4 * count
+    )
+    options["iteration_callback"] = asked
     solver = casadi.nlpsol("solver", "ipopt", functions, options)
 
     @functools.cache
     def warm() -> Any:
         return casadi.nlpsol("again", "ipopt", functions, options | WARM | _derivatives(solver))
 
-    return Solver(solver, warm, np.vstack(bounds), limits, fixed)
+    return Solver(solver, warm, budget, np.vstack(bounds), limits, fixed)
 
 
 def _derivatives(solver: Any) -> dict[str, Any]:
@@ -115,7 +126,7 @@ def solve_from(
         first += [lines.angle, np.zeros(lines.angle.size)]
     first.append(np.zeros(len(solver.bounds) - sum(map(len, first))))  # how deep inside
     given = np.column_stack([margins, lines.anchor, lines.angle])
-    began = time.perf_counter()
+    began = solver.budget.elapsed
     bounds = solver.bounds.copy()
     if math.isfinite(trust):
         n_x = state.shape[1]
@@ -132,7 +143,7 @@ def solve_from(
         lbg=solver.limits[:, 0],
         ubg=solver.limits[:, 1],
     )
-    solving = time.perf_counter() - began
+    solving = solver.budget.elapsed - began
     stats = function.stats()
     values = np.asarray(answer["x"].full(), dtype=np.float64).ravel()
     if not solver.fixed:
@@ -165,7 +176,7 @@ def _point_of(program: Program, values: Array) -> Point:
     return Point(state, control, durations)
 
 
-def _options(settings: PolishSettings, most: int, seconds: float) -> dict[str, Any]:
+def _options(settings: PolishSettings, most: int) -> dict[str, Any]:
     return {
         "print_time": False,
         "error_on_fail": False,
@@ -178,5 +189,4 @@ def _options(settings: PolishSettings, most: int, seconds: float) -> dict[str, A
         "ipopt.acceptable_tol": settings.acceptable,
         "ipopt.acceptable_iter": settings.acceptable_iterations,
         "ipopt.max_iter": most,
-        "ipopt.max_wall_time": seconds,
     }

@@ -6,11 +6,11 @@ Solver success proves nothing: what comes out is to be simulated and audited by 
 from __future__ import annotations
 
 import math
-import time
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control.polish_program import (
     Program,
@@ -19,7 +19,11 @@ from maneuver_automaton.optimal_control.polish_program import (
     program_of,
     reaches_at,
 )
-from maneuver_automaton.optimal_control.polish_solver import Solver, solve_from, solver_of
+from maneuver_automaton.optimal_control.polish_solver import (
+    Solver,
+    solve_from,
+    solver_of,
+)
 from maneuver_automaton.optimal_control.polish_values import (
     Answer,
     Ends,
@@ -50,7 +54,7 @@ def polish(
     fixed_planes: bool = False,
     elastic: bool = False,
     gears: Array | None = None,
-    max_seconds: float = 10.0,
+    budget: Budget = UNLIMITED,
 ) -> Polished:
     """A local optimum among obstacles near a guess.
 
@@ -75,8 +79,8 @@ def polish(
         out may still touch, and is a guess itself.
     gears : (n - 1,) array, optional
         Sign of the speed ahead in every interval; stretches of one sign take their own time.
-    max_seconds : float
-        For all there is to do [s].
+    budget : Budget
+        Its time is for all there is to do; every iteration of the solver asks it.
 
     Raises
     ------
@@ -84,7 +88,7 @@ def polish(
         If CasADi is not installed.
     """
     settings = settings or PolishSettings()
-    began = time.perf_counter()
+    began = budget.elapsed
     program = program_of(model, ends, scene, settings, stage_cost, gears, guess)
     point = Point(
         resampled(guess.state, program.n_intervals + 1),
@@ -98,18 +102,24 @@ def polish(
     lines = lines_at(program, point, pairs)
     total = Answer(SolveStatus.OUT_OF_BUDGET, "lines were missing to the end", math.inf, 0, 0.0)
     solver: Solver | None = None
+    needed = 0.0  # [s] to build a program that was not built
     margins, again, trust = np.zeros(len(pairs.interval)), False, math.inf
     if fixed_planes and _depth(program, point, pairs, lines) > TOO_DEEP * reach:
         total = total._replace(reason="the guess is too deep inside obstacles for fixed planes")
-        return _polished(point, total, began)
+        return _polished(point, total, budget.elapsed - began)
     for _ in range(settings.rounds):
-        left = began + max_seconds - time.perf_counter()
-        if left <= 0.0:
+        if budget.is_over:
             total = total._replace(status=SolveStatus.OUT_OF_BUDGET, reason="no time was left")
             break
         if solver is None:
             price = PRICE * guess.duration / reach if elastic else math.inf
-            solver = solver_of(program, pairs, fixed=fixed_planes, price=price, seconds=left)
+            built = solver_of(program, pairs, fixed=fixed_planes, price=price, budget=budget)
+            if isinstance(built, float):
+                reason = f"no time was left: to build the program would take {built:.2g} s"
+                total = total._replace(status=SolveStatus.OUT_OF_BUDGET, reason=reason)
+                needed = built
+                break
+            solver = built
         if fixed_planes:
             lines = lines.shifted(reaches_at(program, point, pairs, lines).piece)
         margins = np.maximum(margins, _margins(program, point, pairs, lines))
@@ -144,10 +154,10 @@ def polish(
         elif far < 0.99 * trust and _kept(program, point, pairs, lines):
             total = total._replace(status=answer.status, reason=answer.reason)
             break
-    return _polished(point, total, began)
+    return _polished(point, total, max(budget.elapsed - began, needed))
 
 
-def _polished(point: Point, total: Answer, began: float) -> Polished:
+def _polished(point: Point, total: Answer, seconds: float) -> Polished:
     return Polished(
         status=total.status,
         reason=total.reason,
@@ -156,7 +166,7 @@ def _polished(point: Point, total: Answer, began: float) -> Polished:
         durations=point.durations,
         objective=total.objective,
         iterations=total.iterations,
-        build_s=time.perf_counter() - began - total.seconds,
+        build_s=seconds - total.seconds,
         solve_s=total.seconds,
     )
 

@@ -38,6 +38,7 @@ STATUS = {
     "Maximum_Iterations_Exceeded": SolveStatus.OUT_OF_BUDGET,
     "Maximum_CpuTime_Exceeded": SolveStatus.OUT_OF_BUDGET,
     "Maximum_WallTime_Exceeded": SolveStatus.OUT_OF_BUDGET,
+    "User_Requested_Stop": SolveStatus.OUT_OF_BUDGET,  # by what is asked between iterations
 }
 
 

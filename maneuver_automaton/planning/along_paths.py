@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.planning.checking import what_is_hit
 from maneuver_automaton.planning.incumbents import Incumbents
@@ -21,7 +22,6 @@ from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.improve import Patience
 from maneuver_automaton.refinement.kinematic_paths import kinematic_problem
 from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
-from maneuver_automaton.search.budget import Budget
 
 FIRST_SHARE = 0.8  # of the time limit, for a first path
 IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
@@ -58,7 +58,7 @@ class AlongPaths:
     def _track(self, problem: Problem, budget: Budget, **more: Any) -> Tracked:
         """A path of the simpler vehicle; what it takes is counted."""
         prepared = self.found.workspace.prepared
-        path = track(problem, time_limit=budget.left, prepared=prepared, **more)
+        path = track(problem, budget=budget, prepared=prepared, **more)
         self.found.counts.update(expansions=path.expansions, collision_queries=path.queries)
         return path
 
@@ -85,6 +85,8 @@ def _stopping(found: Incumbents, path: Plan, goal_index: int) -> Iterator[tuple[
         if isinstance(one, Obstacle) and one.motion is not None
     )
     for wait in np.linspace(0.0, max(settled - problem.start_time, 0.0), WAITS):
+        if wait > 0.0 and found.budget.is_over:
+            return
         durations = plan.durations.copy()
         durations[0] += wait
         later = replace(plan, durations=durations)

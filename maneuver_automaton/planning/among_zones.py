@@ -20,6 +20,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Obstacle, Zone
 from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.collision.surroundings import fastest_point, parts_of, surroundings_of
@@ -32,7 +33,6 @@ from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.admission import admitted_stretches, piece_is_admitted
-from maneuver_automaton.search.budget import Budget
 
 MOST_QUESTIONS = 8  # choices of zones to enter and zones to go around
 CROSSED_SHARE = 0.5  # of the time left, for a plan from zone to zone
@@ -56,20 +56,21 @@ def plan_among_zones(
     questions = [free, *itself, *(one for one in _questions(problem) if blocked_ends(one) is None)]
     first: PlanResult | None = None
     for k, question in enumerate(questions):
-        if budget.is_over and found.plans:
+        if budget.is_over and first is not None:
             break
         part = budget.part(1.0 / (len(questions) - k), at_least=LEAST_TIME)
         result = search(question, part, workspace, alternatives=alternatives)
         first = first or result
         found.counts.update(result.counts)
         for plan, goal_index in _plans(problem, result):
-            found.offer(plan, goal_index)
+            if found.may_check:
+                found.offer(plan, goal_index)
         if k == 0 and found.plans and result.plan is found.plans[0].plan and not alternatives:
             return replace(result, problem=problem)
-        if k == 0 and itself and result.plan is not None:
+        if k == 0 and itself and result.plan is not None and not budget.is_over:
             part = budget.part(CROSSED_SHARE, at_least=LEAST_TIME)
             crossed = crossed_slowly(problem, result.plan, search, part, workspace)
-            if crossed is not None:
+            if crossed is not None and found.may_check:
                 found.offer(*crossed)
         elif k > 0 and question is not problem and first.plan is not None:
             polish_slowed(found, question, first.plan, budget)

@@ -6,7 +6,10 @@ import math
 
 import numpy as np
 
-from maneuver_automaton.costs import Cost
+from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.automaton.headings import origin_of
+from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.models.greatest_speed import greatest_speed
 from maneuver_automaton.planning.polishing import rests_at_both_ends, why_not_polished
 from maneuver_automaton.problem import Goal, Problem
@@ -48,16 +51,22 @@ def word_bound(problem: Problem) -> float:
 
     A maneuver leads as far as its displacement, so it has a price per metre like a trim.
     """
-    automaton = problem.automaton
-    velocities = automaton.body_velocities[:, [0, 1, *range(3, problem.start.size)]]
-    speeds, rates = np.linalg.norm(velocities, axis=1), problem.rates
-    prices = (rates[speeds > 0.0] / speeds[speeds > 0.0]).tolist()
+    return _least_distance(problem) * least_price_per_metre(problem.automaton, problem.cost)
+
+
+@kept_by_first
+def least_price_per_metre(automaton: Automaton, cost: StageCost) -> float:
+    """Cost per metre of a library's cheapest trim or maneuver; at least 0."""
+    still, name = origin_of(automaton, automaton.trims[0]), automaton.trim_names[0]
+    priced = Problem(automaton, still, Goal(pose=still, trim=name), cost=cost, start_trim=name)
+    places = [0, 1, *range(3, still.size)]
+    speeds = np.linalg.norm(automaton.body_velocities[:, places], axis=1)
+    prices = (priced.rates[speeds > 0.0] / speeds[speeds > 0.0]).tolist()
     for maneuver in automaton.maneuvers:
-        moved = maneuver.displacement[[0, 1, *range(3, problem.start.size)]]
-        distance = float(np.linalg.norm(moved))
+        distance = float(np.linalg.norm(maneuver.displacement[places]))
         if distance > 0.0:
-            prices.append(problem.maneuver_cost(maneuver) / distance)
-    return _least_distance(problem) * max(0.0, min(prices, default=0.0))
+            prices.append(priced.maneuver_cost(maneuver) / distance)
+    return max(0.0, min(prices, default=0.0))
 
 
 def bound_along_paths(problem: Problem) -> float:

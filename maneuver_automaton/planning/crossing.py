@@ -18,6 +18,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.automaton.cutting import joined
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Obstacle, Zone
 from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.collision.surroundings import parts_of, surroundings_of
@@ -34,7 +35,6 @@ from maneuver_automaton.primitives import Trim
 from maneuver_automaton.primitives.turning import HEADING_TOLERANCE
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.admission import piece_is_admitted
-from maneuver_automaton.search.budget import Budget
 
 CLEAR = 0.02  # [m] between body and zone where a coast through the zone begins
 LEAST_TIME = 1e-3  # [s] for each stretch, also where the time is over
@@ -176,7 +176,7 @@ def polish_slowed(found: Incumbents, question: Problem, known: Plan, budget: Bud
             [slowed],
             goal_index,
             None,
-            time_limit=budget.left,
+            budget=budget,
             most_iterations=iterations_within(budget),
             accepts=functools.partial(found.offer, goal_index=goal_index),
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.checking import Condition
 from maneuver_automaton.planning.free_words import free_words, word_candidate
@@ -12,7 +13,6 @@ from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search import SearchStatus
-from maneuver_automaton.search.budget import Budget
 from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.choose import search_goal
 from maneuver_automaton.search.inside import outside
@@ -104,7 +104,7 @@ def _why_none(found: Incumbents, listed: _Listed) -> tuple[PlanStatus, str]:
         return PlanStatus.UNREACHABLE, impossible
     if any(goal.tolerance_m or goal.tolerance_rad for goal in problem.goals):
         return PlanStatus.NO_PLAN, "no word was found to end within the tolerance of the goal"
-    too_short = _least_time(problem)
+    too_short = _least_time(problem, found.budget)
     if too_short is not None:
         return too_short
     limit = problem.horizon.max_trims
@@ -115,10 +115,10 @@ def _why_none(found: Incumbents, listed: _Listed) -> tuple[PlanStatus, str]:
     return PlanStatus.NO_PLAN, "no word of this library was found to end at the goal"
 
 
-def _least_time(problem: Problem) -> tuple[PlanStatus, str] | None:
+def _least_time(problem: Problem, budget: Budget) -> tuple[PlanStatus, str] | None:
     """Verdict where the time is what stands in the way: the least time to any goal is named."""
     limit = problem.horizon.time or problem.horizon.max_time
-    if limit is None:
+    if limit is None or budget.is_over:
         return None
     hurry = replace(
         problem, cost=Cost(time=1.0), horizon=Horizon(max_trims=problem.horizon.max_trims)
@@ -126,7 +126,7 @@ def _least_time(problem: Problem) -> tuple[PlanStatus, str] | None:
     quickest: list[float] = []
     proven = True
     for goal in problem.goals:
-        results = search_goal(hurry, goal, alternatives=0, time_limit=5.0)
+        results = search_goal(hurry, goal, alternatives=0, budget=budget)
         # Only a search over all admitted words is a proof: a certificate is but necessary.
         proven = proven and any(result.exhaustive for result in results)
         quickest += [one.duration for result in results for one in result.solutions]

@@ -30,15 +30,15 @@ def free_words(
     for index in goals:
         goal = problem.goals[index]
         if problem.automaton.is_kinematic:
-            seconds = max(share * found.budget.left, LEAST_TIME)
-            for result in search_goal(problem, goal, alternatives=others, time_limit=seconds):
+            part = found.budget.part(share, at_least=LEAST_TIME)
+            for result in search_goal(problem, goal, alternatives=others, budget=part):
                 yield index, result
             continue
         for result in insertion_stages(
             problem,
             goal,
             alternatives=others or 0,
-            time_limit=max(found.budget.stage(share).left, LEAST_TIME),
+            budget=found.budget.stage(share),
             upper_bound=math.inf if others else found.cost,
         ):
             yield index, result

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Iterator
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.along_paths import AlongPaths
 from maneuver_automaton.planning.blocked import goals_left
 from maneuver_automaton.planning.bounds import bound_along_paths
@@ -18,7 +19,6 @@ from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.planning.steps import Steps, steps_of
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.budget import Budget
 from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.limits import why_impossible
 from maneuver_automaton.search.result import plan_of
@@ -74,6 +74,8 @@ def plan_in_steps(
 def _offer(found: Incumbents, plans: Iterable[tuple[Plan, int]], *, proven: bool = True) -> None:
     """Offer plans to goals as they are found, until the time is over; `proven` as there."""
     for plan, goal_index in plans:
+        if not found.may_check:
+            return
         found.offer(plan, goal_index, proven=proven)
         if found.budget.is_over:
             return

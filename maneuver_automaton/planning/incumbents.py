@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
@@ -12,16 +11,20 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.audit import Audit, TerminalError, terminal_error
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.same_motion import CONVERGED, Likeness, is_new, same_motion
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.checking import Condition, check_plan
 from maneuver_automaton.planning.result import Alternative, PlanResult, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.conditions import broken_condition
 from maneuver_automaton.refinement.fitting import fitted_plans, padded
-from maneuver_automaton.search.budget import Budget
 
 CHEAPER = 1e-7  # share of a cost that closing the end of a plan may change it by
 LATE = 8  # plans that may be refused once the time is over, before no other is checked
+LATE_S, LATE_SHARE = 0.01, 0.05  # [s], and of the time, in which they are
+OTHERS_SHARE = 0.1  # of the time, that is kept back for the checks of alternatives
+CHECK_S = 0.01  # [s] a check takes that nothing is known of yet
+LONGER = 1.3  # times the longest check so far, that the next one may take
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -70,11 +73,33 @@ class Incumbents:
     misfits: list[tuple[Plan, int]] = field(default_factory=list)  # of no times that would do
     least_cost: float = math.inf  # cost of the cheapest plan that a search took to be free
     checking: float = 0.0  # [s] that the checks took
+    longest_check: float = CHECK_S  # [s] of all so far
 
     @property
     def cost(self) -> float:
         """Cost of the cheapest plan, an upper bound; inf if there is none."""
         return self.plans[0].cost if self.plans else math.inf
+
+    @property
+    def for_better(self) -> Budget:
+        """The budget for better plans: the time to check what is found is kept back."""
+        others = OTHERS_SHARE * self.budget.seconds if self.alternatives else 0.0
+        return self.budget.before(LONGER * self.longest_check + others)
+
+    @property
+    def for_first(self) -> Budget:
+        """The budget for a first plan, before which there is nothing to return."""
+        return self.budget.before(LONGER * (self.longest_check - CHECK_S))
+
+    @property
+    def may_check(self) -> bool:
+        """Whether there is time to check one more plan; always where there is none yet."""
+        return not self.plans or self.budget.left + self._moment >= self.longest_check
+
+    @property
+    def _moment(self) -> float:
+        """Time [s] by which the checks of an answer may exceed the limit."""
+        return LATE_SHARE * self.budget.seconds + LATE_S
 
     @property
     def why_refused(self) -> str:
@@ -110,25 +135,32 @@ class Incumbents:
     def offer_in_turn(self, candidates: Iterable[Candidate]) -> None:
         """Check candidates, in the order given, until there are as many plans as are asked for.
 
-        The checks of an answer come after the time limit, so they go on once the time is over; but
-        only a few plans may then be refused.
+        Once the time is over they are checked only until there is a plan at all: at least one of
+        them, and a few more if they take no more than a moment.
         """
         late = 0
         for one in candidates:
-            if len(self.plans) > self.alternatives or late == LATE:
+            if len(self.plans) > self.alternatives or not self.may_check:
+                return
+            if late and (self.plans or self._is_late(late)):
                 return
             plan = one.plan()
-            if not is_new(plan, (other.plan for other in self.plans), self.likeness):
-                continue
-            if not self.offer(plan, one.goal_index, proven=one.proven):
-                late += one.proven and self.budget.is_over
+            if is_new(plan, (other.plan for other in self.plans), self.likeness):
+                self.offer(plan, one.goal_index, proven=one.proven)
+            late += self.budget.is_over
+
+    def _is_late(self, late: int) -> bool:
+        """Whether no other plan is checked after so many that were late."""
+        return late >= LATE or self.budget.elapsed > self.budget.seconds + self._moment
 
     def _keep(self, plan: Plan, goal_index: int, *, proven: bool) -> bool:
         """Keep a plan if it passes the checks; of one motion only the cheapest plan stays."""
-        begin = time.monotonic()
+        begin = self.budget.elapsed
         goal = self.problem.goals[goal_index]
         checked = check_plan(self.problem, plan, goal, self.workspace)
-        self.checking += time.monotonic() - begin
+        took = self.budget.elapsed - begin
+        self.checking += took
+        self.longest_check = max(self.longest_check, took)
         if checked.broken is not None or checked.audit is None:
             if proven:
                 self._refuse(checked.broken or Condition.AUDIT, checked.reason)

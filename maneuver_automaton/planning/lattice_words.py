@@ -12,20 +12,19 @@ import numpy as np
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.same_motion import UNFINISHED, is_new
-from maneuver_automaton.costs import Cost
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.blocked import goals_left
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.checking import load_checks
 from maneuver_automaton.planning.detours import with_stones
 from maneuver_automaton.planning.free_words import free_words, word_candidate, words_once
 from maneuver_automaton.planning.incumbents import Candidate, Incumbents
-from maneuver_automaton.planning.steps import Steps
+from maneuver_automaton.planning.steps import BY_TIME, Steps
 from maneuver_automaton.problem import moves
 from maneuver_automaton.refinement.improve import Improved, Patience, improve
 from maneuver_automaton.refinement.incumbent_words import quick_word
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
 from maneuver_automaton.refinement.restarts import restarts_of
-from maneuver_automaton.search.budget import Budget
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable, cost_to_go_table
 from maneuver_automaton.search.lattice import FirstPlan, first_plan
 from maneuver_automaton.search.lattice_pass import with_cost
@@ -69,6 +68,12 @@ class LatticeWords:
         return self.limit.less(self.spent)
 
     @property
+    def for_others(self) -> Budget:
+        """The budget that remains, less the time to check what is found."""
+        left, better = self.budget, self.found.for_better
+        return replace(left, deadline=min(left.deadline, better.deadline))
+
+    @property
     def knows_all(self) -> bool:
         """Whether the lattice knows every condition and price, so that its words are plans.
 
@@ -83,8 +88,12 @@ class LatticeWords:
         if self.knows_all:
             self.found.note(word.cost + self.query.padding)
             return
+        if not self.found.may_check:
+            return
         self.found.offer(plan_of_word(self.query, word), self.query.goal_index[word.goal])
-        if not self.steps.polishes:  # which finds better times, and takes what time there is
+        if (
+            not self.steps.polishes and not self.found.budget.is_over
+        ):  # which finds better times, and takes what time there is
             self.offer_best_times()
 
     def offer_best_times(self) -> None:
@@ -100,12 +109,8 @@ class LatticeWords:
     ) -> FirstPlan:
         """A first plan for a query, its expansions counted."""
         limits = [one for one in (most, budget.expansions) if one is not None]
-        found = first_plan(
-            query,
-            deadline=budget.deadline,
-            max_expansions=min(limits, default=None),
-            table=self.table,
-        )
+        counted = replace(budget, expansions=min(limits, default=None))
+        found = first_plan(query, budget=counted, table=self.table)
         self._count(found.expansions, found.queries, searches=1)
         return found
 
@@ -116,8 +121,7 @@ class LatticeWords:
         found = improve(
             query,
             word,
-            deadline=budget.deadline,
-            max_expansions=budget.expansions,
+            budget=budget,
             patience=patience,
             table=self.table,
             restarts=restarts_of(query.library),
@@ -146,7 +150,7 @@ def search_lattice(found: Incumbents, steps: Steps) -> LatticeWords:
     query = query if known else late_at_first(query)
     alone = not found.plans
     share = BEFORE_POLISHING if steps.polishes and not alone else 1.0
-    lattice = LatticeWords(query, table, found, steps, alone, found.budget.stage(share))
+    lattice = LatticeWords(query, table, found, steps, alone, found.for_first.stage(share))
     lattice.first = _first(lattice)
     lattice.bound = lattice_bound(query) if steps.at_will else 0.0
     return lattice
@@ -176,11 +180,9 @@ def _first(lattice: LatticeWords) -> FirstPlan | None:
 def _quick(lattice: LatticeWords) -> bool:
     """Whether a search at the price of time alone found a word in time."""
     query, limit = lattice.query, lattice.limit
-    in_time = replace(query.problem, cost=Cost(time=1.0))
+    in_time = replace(query.problem, cost=BY_TIME)
     quick = lattice_query(in_time, _goals(query), prepared=query.prepared)
-    known, more = quick_word(
-        query, late_at_first(quick), deadline=limit.deadline, max_expansions=limit.expansions
-    )
+    known, more = quick_word(query, late_at_first(quick), budget=limit)
     lattice.found.counts.update(expansions=more)
     if known is not None:
         lattice.gained(known)
@@ -224,7 +226,7 @@ def improved(lattice: LatticeWords) -> list[Candidate]:
     if not lattice.knows_all:
         return []
     candidates = [_candidate(query, word) for word in (*lattice.words, *better.others)]
-    if found.alternatives:
+    if found.alternatives and not lattice.for_others.is_over:
         candidates += _free_words(lattice)
         candidates += _detours(lattice, better.word, 2 * found.alternatives)
     return sorted(candidates, key=lambda one: one.cost)
@@ -232,7 +234,7 @@ def improved(lattice: LatticeWords) -> list[Candidate]:
 
 def _for_the_best(lattice: LatticeWords) -> Budget:
     """Budget for the improvement of the best plan."""
-    left = lattice.budget
+    left = lattice.for_others
     if lattice.steps.polishes:
         return left.stage(ALONE_BEFORE_POLISHING if lattice.alone else BEFORE_POLISHING)
     share = FOR_THE_BEST if lattice.knows_all and lattice.found.alternatives else 1.0
@@ -251,6 +253,8 @@ def _let_pass(lattice: LatticeWords) -> None:
     paths = sorted([found.word, better.word, *better.others], key=lambda one: one.cost)
     distinct = {tuple(path.trims.tolist()): path for path in reversed(paths)}
     for path in list(distinct.values())[::-1][:MOST_PATHS]:
+        if soon.is_over:
+            return
         timed = with_waits(query, path)
         if timed is not None and timed.cost < lattice.words[-1].cost:
             lattice.gained(timed)
@@ -286,19 +290,19 @@ def _detours(lattice: LatticeWords, best: Word, most: int) -> Iterator[Candidate
     query = lattice.query
     known: list[Plan] = [plan_of_word(query, best)]
     for n_th in range(MOST_DETOURS):
-        if n_th >= len(known) or len(known) > most:
+        if n_th >= len(known) or len(known) > most or lattice.for_others.is_over:
             return
         for problem in with_stones(query.problem, known[n_th]):
-            if lattice.budget.is_over or lattice.budget.expansions == 0:
+            if lattice.for_others.is_over or lattice.for_others.expansions == 0:
                 return
             closed = lattice_query(problem, _goals(query), prepared=query.prepared)
-            first = lattice.first_plan(closed, lattice.budget)
+            first = lattice.first_plan(closed, lattice.for_others)
             if first.word is None:
                 continue
             word = with_cost(first.word, closed)
             for where in (closed, query):  # away from the stone, then without it
                 patience = SOME if where is closed else AT_ONCE
-                word = lattice.improve(where, word, lattice.budget, patience=patience).word
+                word = lattice.improve(where, word, lattice.for_others, patience=patience).word
             plan = plan_of_word(query, word)
             if is_new(plan, known, UNFINISHED):
                 known.append(plan)

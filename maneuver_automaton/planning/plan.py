@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.among_zones import plan_among_zones
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.checking import load_checks
@@ -14,7 +15,6 @@ from maneuver_automaton.planning.within_tolerance import has_tolerance, plan_wit
 from maneuver_automaton.planning.workspace import Workspace, workspace_of
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.ready import load_lattice
-from maneuver_automaton.search.budget import Budget
 from maneuver_automaton.search.choose import load_search
 from maneuver_automaton.search.lattice_query import lattice_query
 
@@ -26,7 +26,8 @@ def plan(problem: Problem, *, time_limit: float = 5.0, alternatives: int = 0) ->
     ----------
     problem : Problem
     time_limit : float
-        [s] for search and refinement; the audit comes after it.
+        [s] for the whole call: searches end early enough for the checks of what they find.
+        Compiling and loading what all problems of a vehicle share do not count.
     alternatives : int
         How many dearer plans to return beside the cheapest, as far as there are so many.
 
@@ -66,6 +67,13 @@ def plan_in(
     if alternatives and uses_lattice(problem):
         load_search(problem)
     budget = Budget.from_now(time_limit, expansions=problem.search.max_expansions)
+    return plan_within(problem, budget, workspace, alternatives=alternatives)
+
+
+def plan_within(
+    problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
+) -> PlanResult:
+    """The answer to a problem within a budget, the checks included; kernels are loaded already."""
     if has_tolerance(problem):
         return plan_within_tolerance(
             problem, _answered, budget, workspace, alternatives=alternatives

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.collision.convex import convex_pieces
@@ -45,7 +46,6 @@ from maneuver_automaton.refinement.polish import (
     PolishTask,
     polish_guesses,
 )
-from maneuver_automaton.search.budget import Budget
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
 
 POINT = ((np.zeros((1, 2)), 0.0),)  # the body of a vehicle without a footprint
@@ -92,7 +92,7 @@ def polish_found(found: Incumbents, paths: Sequence[Aimed]) -> None:
 
     `paths` are guesses along kinematic plans that are known already.
     """
-    problem, budget = found.problem, found.budget
+    problem, budget = found.problem, found.for_better
     price = polished_price(problem)
     known = [(one.plan, one.goal_index) for one in found.plans]
     cheapest = sorted(known, key=lambda one: price.of(one[0]))[:1]
@@ -110,7 +110,7 @@ def polish_found(found: Incumbents, paths: Sequence[Aimed]) -> None:
     aimed = [Aimed(guess_of_plan(plan), goal_index) for plan, goal_index in known]
     aimed += _other_headings(problem, aimed[0])
     if rests_at_both_ends(problem):
-        along = list(guesses_along_paths(problem, time_limit=budget.left))
+        along = list(guesses_along_paths(problem, budget))
         aimed = along or [*paths, *aimed]
     work = iterations_within(budget)
     for goal_index in dict.fromkeys(one.goal_index for one in aimed):
@@ -122,7 +122,7 @@ def polish_found(found: Incumbents, paths: Sequence[Aimed]) -> None:
                 [one.guess for one in aimed if one.goal_index == goal_index],
                 goal_index,
                 price.stage_cost(known[0][0]),
-                time_limit=budget.left,
+                budget=budget,
                 most_iterations=work,
                 accepts=functools.partial(found.offer, goal_index=goal_index),
             )
@@ -182,7 +182,7 @@ def rests_at_both_ends(problem: Problem) -> bool:
     )
 
 
-def guesses_along_paths(problem: Problem, *, time_limit: float) -> Iterator[Aimed]:
+def guesses_along_paths(problem: Problem, budget: Budget) -> Iterator[Aimed]:
     """Guesses from kinematic plans whose gears differ, the most promising first.
 
     None for a vehicle that does not follow the paths of a kinematic one.
@@ -195,7 +195,7 @@ def guesses_along_paths(problem: Problem, *, time_limit: float) -> Iterator[Aime
         kinematic_problem(problem, switch=0.0),
         libraries,
         lambda plan: timed(plan, pace).duration,
-        time_limit=time_limit,
+        budget=budget,
     ):
         if drive.plan.duration > 0.0:
             yield guess_along(problem, drive.plan)
@@ -222,7 +222,7 @@ def polish_plans(
     goal_index: int,
     stage_cost: RunningCost | None,
     *,
-    time_limit: float,
+    budget: Budget,
     most_iterations: int | None = None,
     accepts: Callable[[Plan], bool],
 ) -> PolishResult:
@@ -264,7 +264,7 @@ def polish_plans(
         task,
         guesses,
         stage_cost=stage_cost,
-        time_limit=time_limit,
+        budget=budget,
         most_iterations=most_iterations,
         accepts=sound,
     )

@@ -9,9 +9,9 @@ from typing import Protocol
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.audit import Audit, TerminalError
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.budget import Budget
 
 
 class PlanStatus(enum.Enum):

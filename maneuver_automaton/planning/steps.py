@@ -5,11 +5,13 @@ The order of the steps and all that they share is the same for every vehicle.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from maneuver_automaton.automaton.same_motion import POLISHED, UNFINISHED, Likeness
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.planning.bounds import least_price_per_metre
 from maneuver_automaton.planning.checking import load_checking
 from maneuver_automaton.planning.polishing import (
     load_polishing,
@@ -22,7 +24,11 @@ from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinemat
 from maneuver_automaton.refinement.ready import load_lattice, load_maneuver_kernels
 from maneuver_automaton.search.choose import load_search
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
+from maneuver_automaton.search.lattice_library import lattice_library
 from maneuver_automaton.search.linked_words import load_linked_words
+from maneuver_automaton.search.ready import load_times_kernels
+
+BY_TIME = Cost(time=1.0)  # one value: what is prepared for it is found again
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,8 +133,20 @@ def load_steps(problem: Problem, workspace: Workspace) -> None:
             load_polishing(problem)
     if problem.automaton.maneuvers:
         load_maneuver_kernels()
+        load_times_kernels()
+        if steps.lattice:
+            _load_libraries(problem, workspace)
         if _suits_words(problem) or steps.words:
             load_linked_words()
+
+
+def _load_libraries(problem: Problem, workspace: Workspace) -> None:
+    """Have the libraries ready of the lattice over maneuvers, at the prices that it needs."""
+    goals, horizon = range(len(problem.goals)), problem.horizon
+    least_price_per_metre(problem.automaton, problem.cost)
+    library = lattice_library(problem, goals, prepared=workspace.prepared)
+    if horizon.time or horizon.max_time or library.per_metre == 0.0:
+        lattice_library(replace(problem, cost=BY_TIME), goals, prepared=workspace.prepared)
 
 
 def _suits_words(problem: Problem) -> bool:

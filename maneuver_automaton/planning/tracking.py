@@ -7,13 +7,13 @@ it is applied.
 from __future__ import annotations
 
 import math
-import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.advancement import clearances, free_times
 from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.problem import Problem
@@ -129,20 +129,20 @@ def clearance_at(problem: Problem, poses: Array, times: Array) -> Array:
 def track(
     problem: Problem,
     *,
-    time_limit: float,
+    budget: Budget,
     known: Plan | None = None,
     patience: Patience = LITTLE,
     max_expansions: int | None = None,
     prepared: Prepared = RECENT,
 ) -> Tracked:
-    """A plan to any goal within `time_limit` [s]; `known` is improved if it is free.
+    """A plan to any goal within a `budget`; `known` is improved if it is free.
 
     Parameters
     ----------
     problem : Problem
         From the vehicle's pose, at its time.
-    time_limit : float
-        [s] for all of it.
+    budget : Budget
+        Its time is for all of it.
     known : Plan, optional
         A plan from the problem's start that ends at one of its goals, of trims of its library.
     patience : Patience
@@ -157,12 +157,11 @@ def track(
     >>> from maneuver_automaton import Automaton, Disc, Unicycle
     >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "spin": (0.0, 1.0)})
     >>> problem = Problem(robot, [0, 0, 0], [9, 0, 0], obstacles=Disc(1.0, [5, 4]))
-    >>> track(problem, time_limit=5.0).cost
+    >>> track(problem, budget=Budget.from_now(5.0)).cost
     9.0
     """
     load_lattice()
     table = cost_to_go_table(problem, prepared=prepared)
-    deadline = time.monotonic() + time_limit
     goals = open_goals(problem)
     if not goals:
         return Tracked(plan=None, goal_index=None, cost=math.inf, reason="every goal is blocked")
@@ -171,7 +170,7 @@ def track(
     expansions = queries = 0
     if word is None:
         most = max_expansions or problem.search.max_expansions
-        found = first_plan(query, deadline=deadline, max_expansions=most, table=table)
+        found = first_plan(query, budget=replace(budget, expansions=most), table=table)
         word, expansions, queries = found.word, found.expansions, found.queries
         if word is None:
             return Tracked(
@@ -183,7 +182,8 @@ def track(
                 queries=queries,
                 enclosed=bool(found.enclosed),
             )
-    better = improve(query, word, deadline=deadline, patience=patience, table=table)
+    timed = replace(budget, expansions=None)
+    better = improve(query, word, budget=timed, patience=patience, table=table)
     plan = plan_of_word(query, better.word)
     return Tracked(
         plan=plan,

@@ -16,13 +16,13 @@ import numpy as np
 from maneuver_automaton._arrays import Array, wrapped
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.headings import trim_headings
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.incumbents import Incumbents
 from maneuver_automaton.planning.result import Answer, PlanResult, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
-from maneuver_automaton.search.budget import Budget
 from maneuver_automaton.search.limits import closed_bound, why_impossible
 
 INSIDE = 1e-6  # share of a tolerance by which poses that are aimed at stay within it
@@ -50,6 +50,8 @@ def plan_within_tolerance(
     asked = list(_questions(problem))
     results: list[PlanResult] = []
     for k, question in enumerate(asked):
+        if results and budget.is_over:
+            break
         part = budget.part(1.0 if k == len(asked) - 1 else LATER[k], at_least=LEAST_TIME)
         part = replace(part, expansions=question.search.max_expansions)
         result = answer(question, part, workspace, alternatives=SPARE * alternatives)
@@ -152,13 +154,15 @@ def _offer_loosened(found: Incumbents, plan: Plan) -> None:
 
     Its own end, where no other is better.
     """
-    for index in _goals_met(found.problem, plan):
-        for candidate in _with_loose_ends(found.problem, plan, found.problem.goals[index]):
-            if found.offer(candidate, index):
+    problem = found.problem
+    for index in _goals_met(problem, plan):
+        loose = _with_loose_ends(problem, plan, problem.goals[index], found.for_better)
+        for candidate in loose:
+            if not found.may_check or found.offer(candidate, index):
                 return
 
 
-def _with_loose_ends(problem: Problem, plan: Plan, goal: Goal) -> list[Plan]:
+def _with_loose_ends(problem: Problem, plan: Plan, goal: Goal, budget: Budget) -> list[Plan]:
     """The plan with other coasting times, all of them or the last ones, the cheapest first.
 
     Where nothing is in the way the times of the whole word are the best there are.
@@ -170,6 +174,7 @@ def _with_loose_ends(problem: Problem, plan: Plan, goal: Goal) -> list[Plan]:
         with_relaxed_end(problem, plan, goal, share=share, first=first)
         for first in firsts
         for share in (SHARES if guarded else SHARES[:1])
+        if not budget.is_over
     ]
     return sorted([plan, *(one for one in loose if one is not None)], key=problem.cost_of)
 

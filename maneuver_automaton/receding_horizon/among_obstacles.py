@@ -7,7 +7,6 @@ waits or evades; where nothing is free, the motion whose first contact is latest
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -50,7 +49,7 @@ class AmongObstacles:
         self.now = now
         self.here = now.here
         self.settings = now.settings
-        self.predicted = predicted(now.here, now.settings, deadline=now.deadline)
+        self.predicted = predicted(now.here, now.settings, budget=now.budget)
         self.unsafe: list[Plan] = []  # free plans that end where the vehicle cannot stay
         self.tried: tuple[Plan, ...] = ()  # motions that are not free for long enough
 
@@ -78,11 +77,10 @@ class AmongObstacles:
     def _tracked(
         self, problem: Problem, known: Plan | None = None, *, share: float = SEARCHING
     ) -> Tracked:
-        left = self.now.began + share * self.settings.time_limit - time.monotonic()
         moving = self.here.moves
         return track(
             problem,
-            time_limit=max(left, 1e-6),
+            budget=self.now.budget.before((1.0 - share) * self.settings.time_limit),
             known=known,
             max_expansions=MOST_EXPANSIONS if moving else None,
             # a first plan decides on which side moving obstacles are passed

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -13,6 +12,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING, with_samples_at
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import AnyObstacle, Shape, as_obstacles
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.receding_horizon.candidates import cost_until, is_rest_of
@@ -191,7 +191,7 @@ class RecedingHorizon:
             self.problem = replace(self.problem, obstacles=as_obstacles(obstacles))
             self.settings.check(self.problem)
             load_search(self.problem)
-        began = time.monotonic()
+        budget = Budget.from_now(self.settings.time_limit)
         last = self.last
         passed = 0.0 if last is None else (last.applied if elapsed is None else elapsed)
         if not 0.0 <= passed < math.inf:
@@ -201,7 +201,7 @@ class RecedingHorizon:
         at = self.problem.start_time if last is None else last.time + passed
         here = replace(self.problem, start=pose, start_time=at, horizon=self._horizon(at))
         now, search = started(
-            self.settings, here, last, passed=passed, began=began, changed=changed
+            self.settings, here, last, passed=passed, budget=budget, changed=changed
         )
         self.last = self._logged(decide(now, search), search, now)
         control = self.last.control
@@ -249,7 +249,7 @@ class RecedingHorizon:
             off_plan=now.off_plan,
             lower_bound=min(value, bound),
             exhaustive=now.exhaustive,
-            solve_s=time.monotonic() - now.began,
+            solve_s=now.budget.elapsed,
             number=0 if last is None else last.number + 1,
             arrived=chosen.arrived,
             deed=deed,

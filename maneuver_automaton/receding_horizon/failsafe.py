@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.planning.tracking import free_until, stands_free
 from maneuver_automaton.problem import Problem
@@ -25,7 +26,7 @@ class Prediction:
     here: Problem
     stand: float  # [s] that the goal must stay free after arrival
     until: float  # [s] of the world's clock
-    deadline: float  # [s] as `time.monotonic` counts
+    budget: Budget  # of the step
 
     def is_free(self, plan: Plan) -> bool:
         """Whether all of a plan is free."""
@@ -55,7 +56,7 @@ class Prediction:
         """A motion from a pose and a time that is free for as long as is looked ahead."""
         there = replace(self.here, start=pose, start_time=time)
         return search_fail_safe(
-            there, until=max(self.until, time + LEAST_AHEAD), deadline=self.deadline
+            there, until=max(self.until, time + LEAST_AHEAD), budget=self.budget
         )
 
     def continued(self, plan: Plan, after: float) -> Plan | None:
@@ -67,7 +68,7 @@ class Prediction:
         return followed_by(piece, then.plan) if then.complete else None
 
 
-def predicted(here: Problem, settings: Settings, *, deadline: float) -> Prediction:
+def predicted(here: Problem, settings: Settings, *, budget: Budget) -> Prediction:
     """How far to look ahead: as far as is asked for, or until all obstacles are static."""
     until = here.start_time + settings.look_ahead
     if here.moves and settings.pad is not None:
@@ -76,7 +77,7 @@ def predicted(here: Problem, settings: Settings, *, deadline: float) -> Predicti
         here=here,
         stand=max(settings.stand, settings.step),
         until=max(until, here.start_time + settings.step),
-        deadline=deadline,
+        budget=budget,
     )
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import functools
 import math
-import time
 from dataclasses import dataclass
 
 import numpy as np
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.planning.tracking import stands_free
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon import _kernels_failsafe as kernels
@@ -40,7 +40,7 @@ def search_fail_safe(
     problem: Problem,
     *,
     until: float,
-    deadline: float = math.inf,
+    budget: Budget = UNLIMITED,
     max_expansions: int = MOST_EXPANSIONS,
 ) -> FailSafe:
     """A motion from the problem's start that is free of its obstacles until a time, if possible.
@@ -54,8 +54,8 @@ def search_fail_safe(
         Its goals do not matter.
     until : float
         [s] of the world's clock.
-    deadline : float
-        As `time.monotonic` counts [s].
+    budget : Budget
+        Its time ends the search with what it has.
     max_expansions : int
         Poses to go on from.
 
@@ -81,7 +81,7 @@ def search_fail_safe(
     left = max_expansions
     while left > 0 and kernels.expand(task, library, *around, min(TIMELY, left)):
         left -= TIMELY
-        if time.monotonic() >= deadline:
+        if budget.is_over:
             break
     state = search.state
     node = int(state[kernels.BEST])

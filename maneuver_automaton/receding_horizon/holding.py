@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.problem import Goal, Horizon, Problem
 from maneuver_automaton.receding_horizon.candidates import Candidate, candidate, within
 from maneuver_automaton.receding_horizon.log import Origin
@@ -42,7 +43,7 @@ def holding(here: Problem, settings: Settings, goal_index: int) -> Candidate | N
             search=replace(here.search, method="insertion"),
         )
         results = search_goal(
-            near, middle, alternatives=ALTERNATIVES, time_limit=settings.time_limit
+            near, middle, alternatives=ALTERNATIVES, budget=Budget.from_now(settings.time_limit)
         )
         found = [
             candidate(

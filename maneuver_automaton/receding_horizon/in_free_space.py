@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.receding_horizon.candidates import Candidate, allowed, bounded
 from maneuver_automaton.receding_horizon.log import Deed, Guarantee, Origin
 from maneuver_automaton.receding_horizon.mitigation import Mitigation
@@ -44,10 +44,9 @@ class InFreeSpace:
         now.exhaustive = True
         alternatives = PACES if self.settings.retimed else 0
         for index, goal in enumerate(here.goals):
-            left = now.deadline - time.monotonic()
             same_goal = now.last is None or index == now.last.goal_index
             known = kept.plan if kept is not None and same_goal else None
-            if left <= 0.0 and (kept is not None or found):
+            if now.budget.is_over and (kept is not None or found):
                 now.exhaustive = False
                 self._over_budget()
                 break
@@ -55,7 +54,7 @@ class InFreeSpace:
                 here,
                 goal,
                 alternatives=None if bounded(here) else alternatives,
-                time_limit=max(left, 1e-6),
+                budget=now.budget,
                 known=None if self.settings.retimed else known,
                 ties=True,
                 second_opinion=SECOND_OPINION,
@@ -87,9 +86,8 @@ class InFreeSpace:
         found: list[Candidate] = []
         for index, goal in enumerate(here.goals):
             plans = list(rejoining(hurry, now.planned(), goal, pad=None))
-            for result in search_goal(
-                hurry, goal, alternatives=0, time_limit=self.settings.time_limit
-            ):
+            again = Budget.from_now(self.settings.time_limit)
+            for result in search_goal(hurry, goal, alternatives=0, budget=again):
                 plans += [plan_of(here, solution) for solution in result.solutions]
             found += [
                 now.candidate(now.padded(plan), index, Origin.SEARCHED)

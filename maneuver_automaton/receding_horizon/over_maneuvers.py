@@ -7,7 +7,6 @@ zones, heights of obstacles, a fixed time that no rest fills.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -91,13 +90,12 @@ class OverManeuvers:
         guarded = bool(here.obstacles or here.zones) or bounded(here)
         found: list[Candidate] = []
         for index, goal in enumerate(problem.goals):
-            left = now.deadline - time.monotonic()
-            if left <= 0.0:
+            if now.budget.is_over:
                 break
             words = search_insertion(
                 problem,
                 goal,
-                time_limit=(FIRST_SHARE if now.last is None else 1.0) * left,
+                budget=now.budget.part(FIRST_SHARE if now.last is None else 1.0),
                 alternatives=OTHERS if guarded else 0,
                 upper_bound=upper - committed,
             )
@@ -137,7 +135,7 @@ class OverManeuvers:
         query = lattice_query(problem, goals)
         best: Candidate | None = None
         for incumbent in incumbent_words(
-            query, deadline=self.now.deadline, max_expansions=problem.search.max_expansions
+            query, budget=replace(self.now.budget, expansions=problem.search.max_expansions)
         ):
             if incumbent.word is None:
                 continue
@@ -156,7 +154,7 @@ class OverManeuvers:
         now, limit, problem = self.now, self.now.longest, self._onward()
         if problem is None:
             return None
-        result = planned(problem, time_limit=max(now.deadline - time.monotonic(), 1e-3))
+        result = planned(problem, time_limit=max(now.budget.left, 1e-3))
         if result.plan is None or result.goal_index is None:
             self.reason = f": {result.reason}"
             return None

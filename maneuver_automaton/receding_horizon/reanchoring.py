@@ -10,6 +10,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Horizon, Problem
@@ -161,7 +162,7 @@ def _connections(problem: Problem, goal: Goal) -> Iterator[Plan]:
         return
     small = sub_library(setup)
     solutions = search_setup_words(
-        problem, small, alternatives=FIRST - 1, deadline=math.inf, spare=True
+        problem, small, alternatives=FIRST - 1, budget=UNLIMITED, spare=True
     )
     for solution in solutions:
         yield plan_of(problem, solution)

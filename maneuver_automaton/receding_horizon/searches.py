@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon.among_obstacles import AmongObstacles, as_it_stands
 from maneuver_automaton.receding_horizon.decision import StepSearch
@@ -28,7 +29,7 @@ def started(
     last: Step | None,
     *,
     passed: float,
-    began: float,
+    budget: Budget,
     changed: bool,
 ) -> tuple[Situation, StepSearch]:
     """A step under way, and where its plans come from; the parameters are those of `Situation`."""
@@ -37,7 +38,7 @@ def started(
         here = with_trims_at_ends(here)
     elif here.obstacles:
         here, broken = as_it_stands(here)
-    now = Situation(settings, here, last, passed=passed, began=began, changed=changed)
+    now = Situation(settings, here, last, passed=passed, budget=budget, changed=changed)
     if broken:
         now.flag(Guarantee.SAFETY, broken)
     if maneuvers:

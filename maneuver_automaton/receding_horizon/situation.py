@@ -11,6 +11,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING, committed, head_of, joined
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.candidates import Candidate, candidate, within
@@ -52,8 +53,8 @@ class Situation:
         The last step, as it was driven.
     passed : float
         [s] since the last step.
-    began : float
-        [s] when this step began, as `time.monotonic` counts.
+    budget : Budget
+        Its time is for all of this step.
     changed : bool
         Whether other obstacles are seen than at the last step.
     """
@@ -65,13 +66,13 @@ class Situation:
         last: Step | None,
         *,
         passed: float,
-        began: float,
+        budget: Budget,
         changed: bool,
     ) -> None:
         self.settings = settings
         self.here = here
         self.last = last
-        self.began = began
+        self.budget = budget
         self.passed = passed
         self.changed = changed
         self.violations: list[Violation] = []
@@ -89,11 +90,6 @@ class Situation:
     def size(self) -> float:
         """The size [m or rad] that errors of rounding grow with."""
         return 1.0 + float(np.abs(self.here.start).max())
-
-    @property
-    def deadline(self) -> float:
-        """When the time for this step is over [s], as `time.monotonic` counts."""
-        return self.began + self.settings.time_limit
 
     @cached_property
     def head(self) -> Plan | None:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -18,6 +17,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Car, Unicycle
 from maneuver_automaton.problem import Problem
@@ -101,7 +101,7 @@ def gear_sequences(
     libraries: Sequence[Automaton],
     estimate: Estimate,
     *,
-    time_limit: float = 2.0,
+    budget: Budget,
     keep: int = 6,
 ) -> tuple[Drive, ...]:
     """Kinematic plans that differ, those first that are estimated to take the least time.
@@ -114,21 +114,20 @@ def gear_sequences(
         Kinematic ones, from `car_library` or `unicycle_library`.
     estimate : callable
         Duration of a plan; see `timed`.
-    time_limit : float
-        For all searches together [s]; they are counted in expansions and attempts, so it only cuts
-        them short.
+    budget : Budget
+        Its time is for all searches together; they are counted in expansions and attempts, so it
+        only cuts them short.
     keep : int
         How many plans to return at most.
     """
-    deadline = time.monotonic() + time_limit
     found: list[Drive] = []
     for (turning, switching), library in itertools.product(PRICES, libraries):
-        if time.monotonic() >= deadline:
+        if budget.is_over:
             break
         unit = _unit(library)
         cost = Cost(time=1.0, direction_change=turning * unit, switch=switching * unit)
         variant = replace(problem, automaton=library, cost=cost)
-        for plan in _plans(variant, deadline):
+        for plan in _plans(variant, budget):
             drive = Drive(plan=plan, estimate=estimate(plan), strokes=_strokes(plan))
             if any(drive.resembles(other) and drive.estimate >= other.estimate for other in found):
                 continue
@@ -136,15 +135,16 @@ def gear_sequences(
     return tuple(sorted(found, key=lambda one: one.estimate)[:keep])
 
 
-def _plans(problem: Problem, deadline: float) -> Iterator[Plan]:
+def _plans(problem: Problem, budget: Budget) -> Iterator[Plan]:
     """Plans of one search: its first one improved, and the others that it found."""
     query = lattice_query(problem, tuple(range(len(problem.goals))))
     table = cost_to_go_table(problem)
     most = min(MOST, problem.search.max_expansions or MOST)  # the clock decides nothing
-    first = first_plan(query, deadline=deadline, max_expansions=most, table=table)
+    first = first_plan(query, budget=replace(budget, expansions=most), table=table)
     if first.word is None:
         return
-    improved = improve(query, first.word, deadline=deadline, patience=BRIEF, table=table)
+    timed = replace(budget, expansions=None)
+    improved = improve(query, first.word, budget=timed, patience=BRIEF, table=table)
     for word in (improved.word, *improved.others[:OTHERS]):
         yield plan_of_word(query, word)
 

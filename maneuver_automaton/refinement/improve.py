@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import functools
 import math
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
 import numpy as np
 
+from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.refinement._kernels_improve import attempt_all
 from maneuver_automaton.refinement.restarts import RANDOM, Restart, Restarts
 from maneuver_automaton.refinement.work import improve_task, shortcut, word_of, work_of
@@ -36,7 +36,8 @@ NEAR = 1.01  # share of the best cost that is near
 MOST_CHUNK = 16384  # expansions between two looks at the word of a search
 SEED = 20_09  # of the random draws
 MOST_OTHERS = 50  # words kept beside the best
-TIMELY = 400  # attempts between two looks at the clock
+DRAWN = 400  # attempts whose random numbers are drawn at once
+TIMELY, TIMELY_LINKED = 400, 40  # attempts between two looks at the clock: some ms
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -68,7 +69,7 @@ def improve(
     query: LatticeQuery,
     word: Word,
     *,
-    deadline: float,
+    budget: Budget = UNLIMITED,
     patience: Patience,
     better: Better = lambda word: None,
     **more: Any,
@@ -78,7 +79,7 @@ def improve(
     See `Improvement` for the other settings.
     """
     grids = functools.partial(distance_grids, query)
-    one = Improvement(query, word, grids=grids, deadline=deadline, patience=patience, **more)
+    one = Improvement(query, word, grids=grids, budget=budget, patience=patience, **more)
     for gain in one.gains():
         better(gain)
     return one.result()
@@ -92,10 +93,9 @@ class Improvement:
     best: Word
     _: KW_ONLY
     grids: Grids  # distances to the goals, and to the start where searches begin at the goals
-    deadline: float
+    budget: Budget
     patience: Patience
     floor: float = -math.inf  # it ends when no word can be cheaper than this allows
-    max_expansions: int | None = None
     table: CostTable = NO_TABLE
     restarts: Restarts = RANDOM
     meanwhile: Callable[[], None] = lambda: None  # to prepare once the first gains are made
@@ -112,6 +112,8 @@ class Improvement:
         restarts = self.restarts.of(self.query, self.rng)
         first = next(restarts)
         self.best = with_cost(self.best, self.query)
+        if self.budget.is_over:
+            return
         yield from self._considered(self._shortened(self.best, first, SLICE))
         restart: Restart | None = first
         grids = self.grids()
@@ -156,9 +158,9 @@ class Improvement:
         return self._late() or self.best.cost <= self.floor * (1.0 + 1e-12)
 
     def _late(self) -> bool:
-        if self.max_expansions is not None and self.expansions >= self.max_expansions:
+        if self.budget.expansions is not None and self.expansions >= self.budget.expansions:
             return True
-        return time.monotonic() >= self.deadline
+        return self.budget.is_over
 
     def _considered(self, candidate: Word) -> Iterator[Word]:
         """The candidate, if it is the best."""
@@ -182,9 +184,9 @@ class Improvement:
         while one.may_go_on and not self._over():
             done, asked = one.expansions, one.queries
             most = min(one.chunk, restart.resolution.most - done)
-            if self.max_expansions is not None:
-                most = min(most, self.max_expansions - self.expansions)
-            word = one.run(most, restart.prune * self.best.cost, deadline=self.deadline)
+            if self.budget.expansions is not None:
+                most = min(most, self.budget.expansions - self.expansions)
+            word = one.run(most, restart.prune * self.best.cost, budget=self.budget)
             self.expansions += one.expansions - done
             self.queries += one.queries - asked
             one.chunk = min(2 * one.chunk, MOST_CHUNK)
@@ -214,10 +216,10 @@ class Improvement:
         most = len(arrays.words) if restart.all_words else arrays.n_few
         for n_words in sorted({arrays.n_few, most}):
             for n in range(rounds):
-                if n > 0 and time.monotonic() >= self.deadline:
+                if n > 0 and self.budget.is_over:
                     return word
                 before, cut = word.cost, (GOLDEN * n) % 1.0
-                word = shortcut(self.query, word, n_words=n_words, cut=cut, deadline=self.deadline)
+                word = shortcut(self.query, word, n_words=n_words, cut=cut, budget=self.budget)
                 if n > 0 and before - word.cost < WORTH * before:
                     break
         return self._attempted(word, attempts)
@@ -229,10 +231,15 @@ class Improvement:
         task, scene = improve_task(query, word), query.scene()
         done = 0
         while done < attempts:
-            n = min(TIMELY, attempts - done)
+            n = min(DRAWN, attempts - done)
             uniform, normal = self.rng.random((n, 6)), self.rng.standard_normal((n, 3))
-            if time.monotonic() < self.deadline:
-                attempt_all(query.library.arrays, task, scene, work, state, uniform, normal)
-                self.attempts += n
+            few = TIMELY if query.library.at_will else TIMELY_LINKED
+            for first in range(0, n, few):
+                if self.budget.is_over:
+                    break
+                some = slice(first, first + few)
+                draws = uniform[some], normal[some]
+                attempt_all(query.library.arrays, task, scene, work, state, *draws)
+                self.attempts += len(draws[0])
             done += n
         return word_of(work, state, word, query)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
+from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.refinement.improve import Improvement, Patience
 from maneuver_automaton.refinement.restarts import FINER
 from maneuver_automaton.search.lattice import distance_grids, first_plan
@@ -29,8 +30,7 @@ class Incumbent(NamedTuple):
 def incumbent_words(
     query: LatticeQuery,
     *,
-    deadline: float = math.inf,
-    max_expansions: int | None = None,
+    budget: Budget = UNLIMITED,
     better_share: float = 1.0,
     known: Word | None = None,
 ) -> Iterator[Incumbent]:
@@ -44,40 +44,36 @@ def incumbent_words(
     Parameters
     ----------
     query : LatticeQuery
-    deadline : float
-        Of `time.monotonic()` [s].
-    max_expansions : int, optional
-        Nodes of all passes together.
+    budget : Budget
+        Its expansions are those of all passes together.
     better_share : float
         Of the time that is left when the first word is found: so much is for better ones.
     known : Word, optional
         A word that is free, with its cost: better ones are searched at once.
     """
-    room = 2**62 if max_expansions is None else max_expansions
+    room = 2**62 if budget.expansions is None else budget.expansions
 
     def ended(total: int) -> SearchStatus:
-        over = time.monotonic() >= deadline or total >= room
+        over = budget.is_over or total >= room
         return SearchStatus.OUT_OF_BUDGET if over else SearchStatus.EXHAUSTED
 
     grids = distance_grids(query)
     word, first, nearest = known, 0, 0.0
     if word is None:
-        found = first_plan(query, deadline=deadline, max_expansions=max_expansions, grids=grids)
+        found = first_plan(query, budget=budget, grids=grids)
         word, first, nearest = found.word, found.expansions, found.nearest
     total = first
     if word is not None:
         if known is None:
             yield Incumbent(word, first, SearchStatus.FOUND)
         if better_share < 1.0:
-            now = time.monotonic()
-            deadline = now + better_share * (deadline - now)
+            budget = replace(budget, deadline=budget.part(better_share).deadline)
         one = Improvement(
             query,
             word,
             grids=lambda: grids,
-            deadline=deadline,
+            budget=replace(budget, expansions=room - first),
             patience=TO_THE_END,
-            max_expansions=room - first,
             restarts=FINER,
         )
         for better in one.gains():
@@ -90,8 +86,7 @@ def quick_word(
     query: LatticeQuery,
     quick: LatticeQuery,
     *,
-    deadline: float = math.inf,
-    max_expansions: int | None = None,
+    budget: Budget = UNLIMITED,
 ) -> tuple[Word | None, int]:
     """The first word in time for `quick`, the same at the price of time, and expansions.
 
@@ -99,7 +94,7 @@ def quick_word(
     cost alone looks everywhere.
     """
     total = 0
-    for incumbent in incumbent_words(quick, deadline=deadline, max_expansions=max_expansions):
+    for incumbent in incumbent_words(quick, budget=budget):
         total = incumbent.expansions
         if incumbent.word is not None and incumbent.word.duration <= query.most_time:
             return with_price(query.library.priced, incumbent.word), total

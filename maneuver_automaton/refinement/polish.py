@@ -8,13 +8,13 @@ the others only those that come close to the best. Whatever is found is closed: 
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.collision import Shape
 from maneuver_automaton.collision.convex import pieces_seen_from
 from maneuver_automaton.groups import group_of
@@ -200,7 +200,7 @@ def polish_guesses(
     *,
     stage_cost: RunningCost | None = None,
     settings: PolishSettings | None = None,
-    time_limit: float = 8.0,
+    budget: Budget = UNLIMITED,
     most_iterations: int | None = None,
     accepts: Accepts = lambda motion: True,
 ) -> PolishResult:
@@ -214,8 +214,8 @@ def polish_guesses(
     stage_cost : callable, optional
         Cost per second ``l(z, u)`` on top of 1 for the time.
     settings : PolishSettings, optional
-    time_limit : float
-        [s].
+    budget : Budget
+        Its time; every iteration of the solver asks it.
     most_iterations : int, optional
         Of the solver, over all guesses: the attempts then do not depend on the clock, unless the
         time is over before.
@@ -228,9 +228,8 @@ def polish_guesses(
         If CasADi is not installed.
     """
     settings = settings or PolishSettings()
-    deadline = time.monotonic() + time_limit
     return _Polishing(
-        task, task.scene, guesses, stage_cost, settings, deadline, most_iterations, accepts
+        task, task.scene, guesses, stage_cost, settings, budget, most_iterations, accepts
     ).run()
 
 
@@ -243,7 +242,7 @@ class _Polishing:
     guesses: Sequence[Guess]
     stage_cost: RunningCost | None
     settings: PolishSettings
-    deadline: float
+    budget: Budget
     most_iterations: int | None  # None: the clock alone says when to stop
     accepts: Accepts
     best: PolishedMotion | None = None
@@ -273,7 +272,7 @@ class _Polishing:
 
     def _left(self) -> float:
         """Time for a solver [s]: the time left less that to write a problem down."""
-        return self.deadline - time.monotonic() - self.building
+        return self.budget.left - self.building
 
     def _work_left(self) -> int | None:
         """Iterations that are left; None if they are not counted."""
@@ -303,9 +302,11 @@ class _Polishing:
             found = self._solve("fixed planes", number, guess, fixed_planes=True)
             if found.status is SolveStatus.SOLVED:
                 return found
+            if not self._left() > 0.0:
+                return None
             found = self._solve("lines", number, guess, most=DEEP_ITERATIONS)
             unfinished.append(found)
-            if found.status is not SolveStatus.SOLVED:
+            if found.status is not SolveStatus.SOLVED and self._left() > 0.0:
                 out = self._solve("elastic", number, guess, elastic=True)
                 if out.status is SolveStatus.SOLVED:
                     found = self._solve("lines", number, out.as_guess)
@@ -313,12 +314,13 @@ class _Polishing:
             if found.status is SolveStatus.SOLVED:
                 self._consider(found)
                 return None
-        found = self._solve("gears", number, guess, gears=gears)
-        if found.status is SolveStatus.SOLVED:
-            self._consider(found)
-            return None
+        if self._left() > 0.0:
+            unfinished.append(self._solve("gears", number, guess, gears=gears))
+            if unfinished[-1].status is SolveStatus.SOLVED:
+                self._consider(unfinished[-1])
+                return None
         # None is solved; a result near enough to a motion is closed and audited all the same.
-        for one in [*unfinished, found]:
+        for one in unfinished:
             if self.best is None and one.status is SolveStatus.OUT_OF_BUDGET and one.iterations:
                 self._consider(one)
         return None
@@ -369,7 +371,7 @@ class _Polishing:
         most: int | None = None,
         settings: PolishSettings | None = None,
     ) -> Polished:
-        began = time.monotonic()
+        began = self.budget.elapsed
         settings = settings or self.settings
         work = self._work_left()
         if work is not None:
@@ -387,7 +389,7 @@ class _Polishing:
             fixed_planes=fixed_planes,
             elastic=elastic,
             gears=gears,
-            max_seconds=max(self._left(), 0.05),
+            budget=self.budget,
         )
         self.building = max(self.building, found.build_s)
         self.attempts.append(
@@ -397,7 +399,7 @@ class _Polishing:
                 duration=found.duration,
                 status=found.status.value,
                 iterations=found.iterations,
-                seconds=time.monotonic() - began,
+                seconds=self.budget.elapsed - began,
             )
         )
         if found.status is not SolveStatus.SOLVED and self.best is None:

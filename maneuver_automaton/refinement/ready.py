@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import functools
-import math
+from dataclasses import replace
 
 import numpy as np
 
 from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.collision import Box, Obstacle
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import UserModel
@@ -27,10 +28,10 @@ EXPANSIONS = 20
 def load_lattice() -> None:
     """Have the kernels of the lattice ready, and those that improve its plans."""
     query = smallest_lattice_query()
-    found = first_plan(query, deadline=math.inf)
+    found = first_plan(query)
     assert found.word is not None
     with_waits(query, found.word)
-    improve(query, found.word, deadline=math.inf, patience=Patience(attempts=1, passes=1))
+    improve(query, found.word, patience=Patience(attempts=1, passes=1))
 
 
 @functools.cache
@@ -79,5 +80,5 @@ def load_maneuver_kernels() -> None:
         footprint=(Box([0.4, 0.2]),),
     )
     query = lattice_query(problem, (0,))
-    for _ in incumbent_words(query, max_expansions=EXPANSIONS):
+    for _ in incumbent_words(query, budget=replace(UNLIMITED, expansions=EXPANSIONS)):
         pass

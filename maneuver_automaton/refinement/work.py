@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import time
 from typing import NamedTuple
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.refinement._kernels_points import begin_program, join_points, take_program
 from maneuver_automaton.refinement._kernels_word import AT_WILL, GAIN, LENGTH
 from maneuver_automaton.search.lattice_pass import with_cost
@@ -21,7 +21,7 @@ from maneuver_automaton.words.word import Word, word_of_steps
 POINTS = 40  # of the dynamic program, at equal times
 VIA = 0.6  # share of attempts with a via-point
 SNAP = 0.25  # chance of an end to snap to a switch
-TIMELY_WORDS = 1_000_000  # words of connections between two looks at the clock
+TIMELY_WORDS = 200_000  # words of connections between two looks at the clock
 
 
 class Work(NamedTuple):
@@ -70,7 +70,9 @@ class ImproveTask(NamedTuple):
     free_heading: bool
 
 
-def shortcut(query: LatticeQuery, word: Word, *, n_words: int, cut: float, deadline: float) -> Word:
+def shortcut(
+    query: LatticeQuery, word: Word, *, n_words: int, cut: float, budget: Budget = UNLIMITED
+) -> Word:
     """The word after one round of the dynamic program over its points."""
     times = point_times(query, word, cut)
     points = len(times)
@@ -81,7 +83,7 @@ def shortcut(query: LatticeQuery, word: Word, *, n_words: int, cut: float, deadl
     cost = begin_program(arrays, work, state, times)
     part = max(1, TIMELY_WORDS // (n_words * points))
     for first in range(1, points, part):
-        if first > 1 and time.monotonic() >= deadline:
+        if first > 1 and budget.is_over:
             return word
         join_points(arrays, task, scene, work, first, first + part, n_words, GAIN * cost)
     take_program(arrays, task, scene, work, state, cost)

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.same_motion import is_new
+from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.words.word import Word
@@ -39,11 +40,16 @@ def in_order(words: Iterable[Word]) -> Iterator[Word]:
     yield from sorted(equal, key=_simplicity)
 
 
-def distinct(problem: Problem, words: Iterable[Word], *, most: int) -> Iterator[Word]:
-    """The `most` cheapest motions, each with the word that comes first."""
+def distinct(
+    problem: Problem, words: Iterable[Word], *, most: int, budget: Budget = UNLIMITED
+) -> Iterator[Word]:
+    """The `most` cheapest motions, each with the word that comes first.
+
+    Once the time of a `budget` is over only the cheapest one comes.
+    """
     known: list[Plan] = []
     for word in in_order(words):
-        if len(known) == most:
+        if len(known) == most or (known and budget.is_over):
             return
         plan = plan_of(problem, word)
         if is_new(plan, known):

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.insertion import search_insertion
 from maneuver_automaton.search.min_coast import search_with_least_times
@@ -29,9 +30,12 @@ def load_search(problem: Problem) -> None:
         return
     affordable = all(_affordable(problem, goal) for goal in problem.goals)
     if problem.search.method == "words" or (problem.search.method == "auto" and affordable):
-        load_word_kernels(min(problem.horizon.max_trims or MOST_TRIMS, MOST_TRIMS))
+        tail = int(any(goal.free_heading for goal in problem.goals))
+        load_word_kernels(min((problem.horizon.max_trims or MOST_TRIMS) + tail, MOST_TRIMS))
     else:
-        load_word_kernels(4)
+        more = problem.start.size > 3 or problem.horizon.time or problem.horizon.max_time
+        turned = any(goal.free_heading for goal in problem.goals)
+        load_word_kernels(MOST_TRIMS if more or turned else 4)
         load_insertion_kernels()
 
 
@@ -40,7 +44,7 @@ def search_goal(
     goal: Goal,
     *,
     alternatives: int | None,
-    time_limit: float,
+    budget: Budget = UNLIMITED,
     known: Plan | None = None,
     ties: bool = False,
     second_opinion: float = AFFORDABLE,
@@ -54,8 +58,8 @@ def search_goal(
         One of the problem's goals.
     alternatives : int, optional
         How many solutions beside the cheapest; None asks for the complete list.
-    time_limit : float
-        [s] after which the search ends with what it has.
+    budget : Budget
+        The search ends with what it has once its time is over.
     known : Plan, optional
         A plan from the problem's start to the goal. Exhaustive search then lists only what is at
         least as cheap (it may find nothing); insertion improves it beside its own seeds.
@@ -71,9 +75,7 @@ def search_goal(
     """
     method = problem.search.method
     if problem.horizon.min_coast > 0.0:
-        return [
-            search_with_least_times(problem, goal, alternatives=alternatives, time_limit=time_limit)
-        ]
+        return [search_with_least_times(problem, goal, alternatives=alternatives, budget=budget)]
     upper_bound = math.inf if known is None else problem.cost_of(known)
     if method == "words" or (method == "auto" and _affordable(problem, goal)):
         return [
@@ -81,7 +83,7 @@ def search_goal(
                 problem,
                 goal,
                 alternatives=alternatives,
-                time_limit=time_limit,
+                budget=budget,
                 upper_bound=upper_bound,
                 ties=ties,
             )
@@ -91,7 +93,7 @@ def search_goal(
             problem,
             goal,
             alternatives=10 if alternatives is None else alternatives,
-            time_limit=time_limit,
+            budget=budget,
             known=known,
         )
     ]
@@ -105,7 +107,7 @@ def search_goal(
                 few,
                 goal,
                 alternatives=alternatives,
-                time_limit=time_limit,
+                budget=budget,
                 upper_bound=upper_bound,
                 ties=ties,
             )

@@ -57,14 +57,14 @@ def free_stages(task: InsertionTask) -> Iterator[SearchResult]:
     if not len(setup.trims):  # nothing that words are made of
         yield SearchResult(status=SearchStatus.EXHAUSTED, solutions=())
         return
-    found = Found(problem, task.alternatives + 1)
+    found = Found(problem, task.alternatives + 1, task.budget)
     work = _work(task, setup)
     most_time = problem.horizon.max_time
     free = _improved(work)
     found.add(_in_time(free, most_time))
     yield found.result()
     late = not free.solutions or free.solutions[0].duration > _latest(most_time)
-    if most_time is not None and late and not task.is_over():
+    if most_time is not None and late and not task.budget.is_over:
         library = within_time(work.library, most_time)
         found.add(_in_time(_improved(replace(work, library=library, limit=most_time)), most_time))
         yield found.result()
@@ -129,33 +129,43 @@ def _improved(work: _Work) -> SearchResult:
     status = SearchStatus.EXHAUSTED
     rounds = FIRST_ROUNDS_OF_MANY if many else FIRST_ROUNDS
     for seed in begun:
-        if words and (task.is_over() or (limit is not None and len(words) >= limit)):
+        if words and (task.budget.is_over or (limit is not None and len(words) >= limit)):
             status = SearchStatus.OUT_OF_BUDGET
             break
         words.append(_with_insertions(library, seed, most, rounds, counts))
     counts["expansions"] = counts["seeds"] = len(words)
     words = sorted((word for word in words if math.isfinite(word.cost)), key=_cost)
     for k in range(min(len(words), max(FULL_OF_MANY if many else FULL, task.alternatives + 1))):
-        if words[k].certificate < -ACCURACY * library.scale and not task.is_over():
+        if words[k].certificate < -ACCURACY * library.scale and not task.budget.is_over:
             words[k] = _with_insertions(library, words[k], most, ROUNDS, counts)
     words = [_calmed(library, word) for word in words]
     binding = not words or min(words, key=_cost).certificate < -ACCURACY * library.scale
-    if most < LONGEST and binding and not library.free_heading and not task.is_over():
+    if most < LONGEST and binding and not library.free_heading and not task.budget.is_over:
         words += _from_longer(library, begun, most, counts)
-    if _prices_switches(problem) and not task.is_over():
+    if _prices_switches(problem) and not task.budget.is_over:
         words += _with_fewer_switches(library, words)
-    if task.alternatives > 0:  # the best times of a seed's own word are locally optimal, too
+    if (
+        task.alternatives > 0 and not task.budget.is_over
+    ):  # the best times of a seed's own word are locally optimal, too
         words += [_with_insertions(library, seed, most, 0, counts) for seed in begun]
-    if task.is_over():
+    if task.budget.is_over:
         status = SearchStatus.OUT_OF_BUDGET
-    improved = [
-        solution
-        for word in words
-        if len(word.trims) - library.tail <= most
-        for solution in _solutions(work, word)
-        if solution.trims.size <= (problem.horizon.max_trims or LONGEST)
-    ]
-    return SearchResult(status=status, solutions=tuple(in_order(improved)), counts=counts)
+    return SearchResult(
+        status=status, solutions=tuple(in_order(_closed(work, words))), counts=counts
+    )
+
+
+def _closed(work: _Work, words: Sequence[TimedWord]) -> list[Word]:
+    """The solutions of words; once the time is over, that of the cheapest word that has one."""
+    over = work.task.budget.is_over
+    solutions: list[Word] = []
+    for word in sorted(words, key=_cost) if over else words:
+        if solutions and work.task.budget.is_over:
+            break
+        if len(word.trims) - work.library.tail <= work.most:
+            most = work.problem.horizon.max_trims or LONGEST
+            solutions += [one for one in _solutions(work, word) if one.trims.size <= most]
+    return solutions
 
 
 def _cost(word: TimedWord) -> float:
@@ -313,7 +323,7 @@ def _words_of_few(work: _Work, problem: Problem) -> list[TimedWord]:
         problem,
         sub_library(work.setup),
         alternatives=work.seeds - 1,
-        deadline=work.task.deadline,
+        budget=work.task.budget,
         spare=True,
     )
     return [_in_library(work, solution.trims, solution.durations) for solution in solutions]

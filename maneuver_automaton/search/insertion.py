@@ -11,11 +11,11 @@ question, the first words and the answer in common.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.free_insertion import free_stages
 from maneuver_automaton.search.insertion_task import InsertionTask
@@ -29,7 +29,7 @@ def search_insertion(
     *,
     alternatives: int = 0,
     seeds: int | None = None,
-    time_limit: float = math.inf,
+    budget: Budget = UNLIMITED,
     known: Plan | None = None,
     upper_bound: float = math.inf,
 ) -> SearchResult:
@@ -46,9 +46,9 @@ def search_insertion(
     seeds : int, optional
         How many short words to start from; by default 4, or 10 for small libraries whose trims
         switch at will.
-    time_limit : float
-        [s] after which no further seed is begun. Where the problem limits its expansions, every
-        stage counts its work, and the time only ends it earlier.
+    budget : Budget
+        No further seed is begun once its time is over. Where the problem limits its expansions,
+        every stage counts its work, and the time only ends it earlier.
     known : Plan, optional
         A plan of this library from start to goal, improved before any seed.
     upper_bound : float
@@ -81,7 +81,7 @@ def search_insertion(
         goal,
         alternatives=alternatives,
         seeds=seeds,
-        time_limit=time_limit,
+        budget=budget,
         known=known,
         upper_bound=upper_bound,
     )
@@ -94,7 +94,7 @@ def insertion_stages(
     *,
     alternatives: int = 0,
     seeds: int | None = None,
-    time_limit: float = math.inf,
+    budget: Budget = UNLIMITED,
     known: Plan | None = None,
     upper_bound: float = math.inf,
 ) -> Iterator[SearchResult]:
@@ -108,7 +108,7 @@ def insertion_stages(
         alternatives=alternatives,
         seeds=seeds,
         known=known,
-        deadline=time.monotonic() + time_limit,
+        budget=budget,
         upper_bound=upper_bound,
     )
     # a trim that has to last a while cannot be priced for an instant

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass, field
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.alternatives import distinct
 from maneuver_automaton.search.result import SearchResult, SearchStatus
@@ -22,17 +22,8 @@ class InsertionTask:
     alternatives: int = 0
     seeds: int | None = None
     known: Plan | None = None
-    deadline: float = math.inf  # on the monotonic clock [s]
+    budget: Budget = UNLIMITED
     upper_bound: float = math.inf
-
-    @property
-    def left(self) -> float:
-        """Time that is left [s]."""
-        return self.deadline - time.monotonic()
-
-    def is_over(self) -> bool:
-        """Whether no time is left."""
-        return time.monotonic() > self.deadline
 
 
 @dataclass(slots=True, eq=False)
@@ -41,6 +32,7 @@ class Found:
 
     problem: Problem
     most: int  # motions that are kept
+    budget: Budget = UNLIMITED  # of comparing them
     words: list[Word] = field(default_factory=list)
     counts: dict[str, int] = field(default_factory=dict)
     status: SearchStatus = SearchStatus.EXHAUSTED  # of the last search
@@ -48,7 +40,7 @@ class Found:
     def add(self, more: SearchResult) -> None:
         """Take note of the result of another search."""
         both = [*self.words, *more.solutions]
-        self.words = list(distinct(self.problem, both, most=self.most))
+        self.words = list(distinct(self.problem, both, most=self.most, budget=self.budget))
         for name, value in more.counts.items():
             self.counts[name] = self.counts.get(name, 0) + value
         self.status = more.status

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import functools
 import math
-import time
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
@@ -40,8 +40,7 @@ class FirstPlan:
 def first_plan(
     query: LatticeQuery,
     *,
-    deadline: float,
-    max_expansions: int | None = None,
+    budget: Budget = UNLIMITED,
     table: CostTable = NO_TABLE,
     grids: Grids | None = None,
 ) -> FirstPlan:
@@ -51,17 +50,15 @@ def first_plan(
     ----------
     query : LatticeQuery
         Its library says which resolutions are tried, and when.
-    deadline : float
-        Of `time.monotonic()` [s].
-    max_expansions : int, optional
-        Of all searches together.
+    budget : Budget
+        Its expansions are those of all searches together.
     table : CostTable
     grids : tuple of DistanceGrid, optional
         Distances to the goals and to the start, if they are known.
     """
     schedule = schedule_of(query.library)
     grids = distance_grids(query) if grids is None else grids
-    room = 2**62 if max_expansions is None else max_expansions
+    room = 2**62 if budget.expansions is None else budget.expansions
     (_, coarse), *stages = schedule.stages
     if query.settings.weight is not None:
         coarse = tuple(replace(one, weight=query.settings.weight) for one in coarse)
@@ -69,10 +66,10 @@ def first_plan(
     word, proof, total = None, "", 0
     while word is None:
         for one in passes:
-            if not one.alive or total >= room or time.monotonic() >= deadline:
+            if not one.alive or total >= room or budget.is_over:
                 continue
             before = one.expansions
-            word = one.run(min(one.chunk, room - total), math.inf, deadline=deadline)
+            word = one.run(min(one.chunk, room - total), math.inf, budget=budget)
             total += one.expansions - before
             one.chunk = min(2 * one.chunk, schedule.most_chunk)
             if word is not None:
@@ -80,7 +77,7 @@ def first_plan(
                 break
         alive = any(one.alive for one in passes)
         proof = "" if alive or word is not None else _enclosed(query, grids)
-        if word is not None or total >= room or time.monotonic() >= deadline or proof:
+        if word is not None or total >= room or budget.is_over or proof:
             break
         if stages and (not alive or total >= stages[0][0]):
             passes += _begun(query, schedule, stages.pop(0)[1], grids, table)

@@ -8,7 +8,6 @@ each is tried with its best times. A word that no change makes cheaper is a loca
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.groups import LieGroup
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.insertion_task import Found, InsertionTask
@@ -52,16 +52,14 @@ def linked_stages(task: InsertionTask) -> Iterator[SearchResult]:
     most_seeds = SEEDS if task.seeds is None else task.seeds
     others = max(task.alternatives, most_seeds - 1)
     near = task.upper_bound * (1.0 + SEED_SLACK)
-    found, known = Found(problem, others + 1), _known(task)
+    found, known = Found(problem, others + 1, task.budget), _known(task)
     found.add(SearchResult(status=SearchStatus.EXHAUSTED, solutions=known))
     found.add(
-        steer_linked_words(
-            problem, goal, alternatives=others, time_limit=task.left, upper_bound=near
-        )
+        steer_linked_words(problem, goal, alternatives=others, budget=task.budget, upper_bound=near)
     )
     yield _so_far(task, found)
     seeds = found.words[:most_seeds]  # they differ more than words of four trims: those are alike
-    if task.left > 0.0:
+    if not task.budget.is_over:
         counted = problem.search.max_expansions is not None
         cheap = len(found.words) > task.alternatives
         found.add(
@@ -70,15 +68,15 @@ def linked_stages(task: InsertionTask) -> Iterator[SearchResult]:
                 goal,
                 alternatives=others,
                 alphabet=SCANNED_TRIMS,
-                time_limit=task.left if counted else SCAN_SHARE * task.left,
+                budget=task.budget if counted else task.budget.part(SCAN_SHARE),
                 upper_bound=found.words[task.alternatives].cost if cheap else near,
             )
         )
         yield _so_far(task, found)
     most = problem.horizon.max_trims
-    if task.left > 0.0 and found.words and (most is None or most > CLOSED_FORM):
+    if not task.budget.is_over and found.words and (most is None or most > CLOSED_FORM):
         begun = dict.fromkeys([*known, found.words[0], *seeds])
-        for one in improve_linked_words(problem, goal, list(begun), time_limit=task.left):
+        for one in improve_linked_words(problem, goal, list(begun), budget=task.budget):
             found.add(one)
             yield _so_far(task, found)
 
@@ -94,7 +92,7 @@ def _known(task: InsertionTask) -> tuple[Word, ...]:
 
 def _so_far(task: InsertionTask, found: Found) -> SearchResult:
     """The result so far, and whether the time is over."""
-    status = SearchStatus.OUT_OF_BUDGET if task.is_over() else SearchStatus.EXHAUSTED
+    status = SearchStatus.OUT_OF_BUDGET if task.budget.is_over else SearchStatus.EXHAUSTED
     return replace(found.result(), status=status)
 
 
@@ -103,14 +101,14 @@ def improve_linked_words(
     goal: Goal,
     seeds: Sequence[Word],
     *,
-    time_limit: float = math.inf,
+    budget: Budget = UNLIMITED,
     most_tries: int = MOST_TRIES,
 ) -> Iterator[SearchResult]:
     """Insert, replace, split and delete trims of words with maneuvers while that gains.
 
     Yields the solution of each seed in turn, a local optimum: none of up to `most_tries` changes of
     it, those of the least prices, is cheaper. With maneuvers of finite size no reduced cost
-    certifies more than that. `time_limit` is in seconds; ``search.max_expansions`` of the problem
+    certifies more than that. The `budget` limits the time; ``search.max_expansions`` of the problem
     limits the number of words that are solved for instead, the same at every call.
 
     Examples
@@ -127,7 +125,7 @@ def improve_linked_words(
     (['ahead'], 3.0)
     """
     setup = word_setup(problem, goal, most_trims=MOST_TRIMS, also=_used(seeds))
-    climb = _Climb(setup, time.monotonic() + time_limit, most_tries)
+    climb = _Climb(setup, budget, most_tries)
     for seed in seeds:
         solved, changes = climb.solved, climb.changes
         timed = setup.timed(seed)
@@ -155,7 +153,7 @@ class _Climb:
     """A local search, with what it has tried."""
 
     setup: WordSetup
-    deadline: float
+    budget: Budget
     most_tries: int
     solved: int = 0
     changes: int = 0
@@ -164,7 +162,7 @@ class _Climb:
         """Whether no time is left, or as many words were solved for as the problem admits."""
         most = self.setup.problem.search.max_expansions
         work = EXPANSIONS_A_WORD * self.solved
-        return time.monotonic() > self.deadline or (most is not None and work >= most)
+        return self.budget.is_over or (most is not None and work >= most)
 
     def top(self, word: TimedWord) -> TimedWord:
         """The word that no change makes cheaper, from this one on."""

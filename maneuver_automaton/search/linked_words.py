@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import functools
 import math
-import time
 from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.alternatives import TIE, in_order
 from maneuver_automaton.search.result import SearchResult, SearchStatus
@@ -33,13 +33,15 @@ SLACK = 0.1  # share by which a word may be dearer than what is asked for before
 WORDS_AN_EXPANSION = 16  # that are looked at in the time of one expansion of the lattice
 EXPANSIONS_A_WORD = 8  # in place of solving one word for its times
 
+LATE_WORDS = 8  # that are made good once the time is over, where none has been before
+
 
 def steer_linked_words(
     problem: Problem,
     goal: Goal,
     *,
     alternatives: int = 0,
-    time_limit: float = math.inf,
+    budget: Budget = UNLIMITED,
     upper_bound: float = math.inf,
     alphabet: int = ALPHABET,
 ) -> SearchResult:
@@ -60,20 +62,19 @@ def steer_linked_words(
     >>> [robot.trim_names[k] for k in best.trims], round(best.cost, 4)
     (['left', 'ahead', 'right'], 3.1754)
     """
-    deadline = time.monotonic() + time_limit
     setup = word_setup(problem, goal, most_trims=alphabet, steers=True)
     # the times of so few trims follow from the pose: to meet a time exactly is left to the scan
     headings = _headings(goal)[: 0 if setup.exactly else None]
     refined = bool(goal.free_heading or setup.limit or problem.horizon.min_coast)
     found = _made_good(
-        setup, _steered(setup, headings), alternatives, upper_bound, deadline, refined=refined
+        setup, _steered(setup, headings), alternatives, upper_bound, budget, refined=refined
     )
     return _result(
         setup,
         found,
         alternatives,
         upper_bound,
-        none=SearchStatus.OUT_OF_BUDGET if time.monotonic() > deadline else SearchStatus.EXHAUSTED,
+        none=SearchStatus.OUT_OF_BUDGET if budget.is_over else SearchStatus.EXHAUSTED,
         counts={"expansions": len(headings)},
     )
 
@@ -83,7 +84,7 @@ def scan_linked_words(
     goal: Goal,
     *,
     alternatives: int | None = 0,
-    time_limit: float = math.inf,
+    budget: Budget = UNLIMITED,
     upper_bound: float = math.inf,
     max_trims: int = LONGEST,
     alphabet: int = ALPHABET,
@@ -101,9 +102,9 @@ def scan_linked_words(
     goal : Goal
     alternatives : int, optional
         How many solutions beside the cheapest. None: all that are found, nothing is pruned.
-    time_limit : float
-        [s] after which the search ends with what it has; ``search.max_expansions`` of the problem
-        limits it by the number of words instead: the same at every call.
+    budget : Budget
+        The search ends with what it has once its time is over; ``search.max_expansions`` of the
+        problem limits it by the number of words instead: the same at every call.
     upper_bound : float
         Cost of a plan that is known: what is dearer may be left out.
     max_trims : int
@@ -128,7 +129,6 @@ def scan_linked_words(
     >>> [robot.trim_names[k] for k in best.trims], round(best.cost, 4)
     (['left', 'ahead', 'right'], 3.1754)
     """
-    deadline = time.monotonic() + time_limit
     setup = word_setup(problem, goal, most_trims=alphabet)
     expansions = problem.search.max_expansions
     later = setup.is_mispriced or setup.is_mended
@@ -144,11 +144,11 @@ def scan_linked_words(
         nodes=NODES,
         spare=pads,
         slack=math.inf if everything else SLACK,
-        deadline=deadline,
+        budget=budget,
         most_words=None if expansions is None else WORDS_AN_EXPANSION * expansions,
     )
     found = _made_good(
-        setup, scan.timed(), alternatives, upper_bound, deadline, refined=setup.is_mended
+        setup, scan.timed(), alternatives, upper_bound, budget, refined=setup.is_mended
     )
     return _result(
         setup,
@@ -169,7 +169,7 @@ def _made_good(
     rough: Iterable[TimedWord],
     alternatives: int | None,
     upper_bound: float,
-    deadline: float,
+    budget: Budget,
     *,
     refined: bool,
 ) -> Iterator[TimedWord]:
@@ -185,7 +185,9 @@ def _made_good(
         dearest = upper_bound
         if alternatives is not None and len(prices) > alternatives:
             dearest = min(upper_bound, sorted(prices)[alternatives])
-        if found.cost > dearest * slack or (prices and time.monotonic() > deadline):
+        if found.cost > dearest * slack:
+            return
+        if budget.is_over and (prices or n >= LATE_WORDS):
             return
         if most is not None and EXPANSIONS_A_WORD * n > most:
             return

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import itertools
-import math
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.alternatives import in_order
 from maneuver_automaton.search.result import SearchResult, SearchStatus
@@ -25,7 +24,7 @@ RESTARTS = 3  # starts of each word beside the first
 
 
 def search_with_least_times(
-    problem: Problem, goal: Goal, *, alternatives: int | None = 0, time_limit: float = math.inf
+    problem: Problem, goal: Goal, *, alternatives: int | None = 0, budget: Budget = UNLIMITED
 ) -> SearchResult:
     """Words in which every moving trim lasts at least ``horizon.min_coast``.
 
@@ -45,7 +44,6 @@ def search_with_least_times(
     >>> bool((best.durations >= 0.5).all()), round(best.cost, 4)
     (True, 4.3623)
     """
-    deadline = time.monotonic() + time_limit
     setup = search_setup(problem, goal)
     if setup.start_is_goal and (problem.horizon.time is None or setup.rest is not None):
         return resting(problem, setup)
@@ -56,7 +54,7 @@ def search_with_least_times(
     status = SearchStatus.EXHAUSTED
     reaching = np.flatnonzero(np.isin(setup.trims, sub_library(setup).trims)).tolist()
     for word in _words(reaching, most):
-        if time.monotonic() > deadline or words == problem.search.max_expansions:
+        if budget.is_over or words == problem.search.max_expansions:
             status = SearchStatus.OUT_OF_BUDGET
             break
         words += 1

@@ -6,7 +6,6 @@ Words with transitions are scanned as they are seen from before them; see `_kern
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.alternatives import tied
@@ -40,7 +40,7 @@ def scanned(
     alternatives: int | None,
     upper_bound: float,
     nodes: int,
-    deadline: float,
+    budget: Budget,
     spare: bool = False,
     slack: float = math.inf,
     most_words: int | None,
@@ -59,7 +59,7 @@ def scanned(
             slack=slack,
             upper_bound=upper_bound,
         )
-        finished = scan.run(deadline, most_words)
+        finished = scan.run(budget, most_words)
         if scan.n_found <= capacity:
             return scan, finished
         capacity = 2 * scan.n_found
@@ -146,7 +146,7 @@ class WordScan:
         """Calls of the steering function."""
         return int(self.candidates.counter[2])
 
-    def run(self, deadline: float, max_words: int | None) -> bool:
+    def run(self, budget: Budget, max_words: int | None) -> bool:
         """Scan and polish, shorter words first; False if a limit ended it."""
         modes = list(self.modes())
         tail = 1 if self.setup.free_heading else 0
@@ -156,7 +156,7 @@ class WordScan:
                     continue
                 calls = self.n_steering
                 for scan, chunk in self._scans(n + tail, mode):
-                    if not self._scan_all(scan, chunk, mode, n, deadline, max_words):
+                    if not self._scan_all(scan, chunk, mode, n, budget, max_words):
                         return False
                 if n + tail > 4 and self.n_steering > calls:
                     self._gridded = True
@@ -168,7 +168,7 @@ class WordScan:
         chunk: int,
         mode: Mode,
         n: int,
-        deadline: float,
+        budget: Budget,
         max_words: int | None,
     ) -> bool:
         """Scan all words of `n` trims with one kernel, `chunk` at a time; False at a limit."""
@@ -183,7 +183,7 @@ class WordScan:
             )
             if self.candidates.counter[0]:
                 self.polish(*mode.kernel_problem, self.candidates, self.found, self.most)
-            if time.monotonic() > deadline:
+            if budget.is_over:
                 return False
             if max_words is not None and self.n_words >= max_words:
                 return False

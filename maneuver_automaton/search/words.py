@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-import time
 
 import numpy as np
 
+from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.alternatives import in_order, tied
 from maneuver_automaton.search.result import SearchResult, SearchStatus
@@ -22,7 +22,7 @@ def search_words(
     goal: Goal,
     *,
     alternatives: int | None = 0,
-    time_limit: float = math.inf,
+    budget: Budget = UNLIMITED,
     nodes: int = NODES,
     upper_bound: float = math.inf,
     ties: bool = False,
@@ -41,8 +41,8 @@ def search_words(
     alternatives : int, optional
         How many solutions beside the cheapest; bounds prune what cannot be among them. None asks
         for the complete list, and nothing is pruned.
-    time_limit : float
-        [s] after which the search ends with what it has.
+    budget : Budget
+        The search ends with what it has once its time is over.
     nodes : int
         Grid nodes per scanned time.
     upper_bound : float
@@ -71,7 +71,6 @@ def search_words(
     >>> [robot.trim_names[k] for k in best.trims], round(best.cost, 4)
     (['left', 'ahead', 'right'], 2.985)
     """
-    deadline = time.monotonic() + time_limit
     setup = search_setup(problem, goal)
     most = problem.horizon.max_trims
     limit = MOST_TRIMS - (1 if setup.free_heading else 0)
@@ -90,7 +89,7 @@ def search_words(
         alternatives=alternatives,
         upper_bound=upper_bound,
         nodes=nodes,
-        deadline=deadline,
+        budget=budget,
         most_words=problem.search.max_expansions,
     )
     solutions = tuple(in_order(job.solutions()))
@@ -136,7 +135,7 @@ def search_setup_words(
     setup: SearchSetup,
     *,
     alternatives: int,
-    deadline: float,
+    budget: Budget,
     spare: bool,
 ) -> list[Word]:
     """Cheapest words of as few trims as the conditions need, from the trims of `setup` alone.
@@ -150,7 +149,7 @@ def search_setup_words(
     job = WordScan(
         problem, setup, most + int(padded), alternatives, nodes=SEED_NODES, spare=spare and padded
     )
-    job.run(deadline, None)
+    job.run(budget, None)
     return list(in_order(job.solutions()))[: alternatives + 1]
 
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from maneuver_automaton.automaton.stock import load_stock_library
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.optimal_control import Grid, OptimalControlProblem, moving_frame, solve
 from maneuver_automaton.planning import plan
 from maneuver_automaton.planning.checking import check_plan
@@ -81,7 +82,7 @@ def measured(problem: Problem, seconds: float) -> Row:
     query = lattice_query(problem, (0,))
     first = word = None
     first_s = word_s = np.nan
-    for incumbent in incumbent_words(query, deadline=time.monotonic() + seconds):
+    for incumbent in incumbent_words(query, budget=Budget.from_now(seconds)):
         if incumbent.word is not None:
             word, word_s = incumbent.word, time.perf_counter() - began
             if first is None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,7 @@ import yaml
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Box, Obstacle
 from maneuver_automaton.problem import Bounds, Goal, Problem
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
@@ -73,7 +73,7 @@ def main() -> None:
     rows = []
     for name in PROBLEMS:
         query = query_of(name, known)
-        result = search_maneuvers(query, deadline=time.monotonic() + options.time_limit)
+        result = search_maneuvers(query, budget=Budget.from_now(options.time_limit))
         first, best = result.words[0], result.words[-1]
         off = plan_of_word(query, best).end - query.goal_poses[best.goal]
         off[2] = np.remainder(off[2] + np.pi, 2.0 * np.pi) - np.pi

@@ -25,6 +25,7 @@ import yaml
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Box
 from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.groups import SE2
@@ -199,14 +200,14 @@ def row(
         return timed(plan, vehicle.pace).duration
 
     drives = gear_sequences(
-        problem, vehicle.libraries, estimate, time_limit=SEARCH * limit, keep=KEEP
+        problem, vehicle.libraries, estimate, budget=Budget.from_now(SEARCH * limit), keep=KEEP
     )
     searched = time.process_time()
     guesses: list[Guess] = [
         vehicle.guess(replace(drive.plan, start=np.zeros(3))) for drive in drives
     ]
     left = max(limit - (time.monotonic() - clock), 0.1)
-    result = polish_guesses(task, guesses, settings=SETTINGS, time_limit=left)
+    result = polish_guesses(task, guesses, settings=SETTINGS, budget=Budget.from_now(left))
     polished = time.process_time()
     cells = [name, len(drives), searched - began, polished - searched, time.monotonic() - clock]
     if result.motion is None:

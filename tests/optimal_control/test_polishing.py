@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 import shapely
 
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.models import CarWithTrailer, SecondOrderUnicycle
 from maneuver_automaton.optimal_control import Guess, SolveStatus
 from maneuver_automaton.optimal_control.polish_values import Ends, PolishSettings, Scene
@@ -230,3 +233,23 @@ def touched(
         body = shapely.Polygon(0.4 * SQUARE @ turn.T + [x, y])
         least = min(least, body.distance(obstacle))
     return float(least)
+
+
+def test_a_solve_ends_between_two_iterations_once_the_time_is_over() -> None:
+    """A clock that ticks at every look: the solver has some iterations, and asks at each."""
+    scene = Scene(parts=(BODY,), pieces=((SQUARE * [1.0, 0.6] + [2.0, 0.0], 0.0),))
+    ticks = itertools.count(0.0)
+    budget = Budget(began=0.0, deadline=20.0, clock=lambda: next(ticks))
+    found = polish(ROBOT, at_rest(4.0), scene, guess(aside=0.8), budget=budget)
+    assert (found.status, found.reason) == (SolveStatus.OUT_OF_BUDGET, "User_Requested_Stop")
+    assert 0 < found.iterations < 20
+    assert next(ticks) < 30.0
+
+
+def test_no_program_is_built_that_takes_more_than_the_time_left() -> None:
+    budget = Budget(began=0.0, deadline=1e-3, clock=lambda: 0.0)
+    found = polish(ROBOT, at_rest(4.0), Scene(), guess(), budget=budget)
+    assert found.status is SolveStatus.OUT_OF_BUDGET
+    assert found.reason.startswith("no time was left: to build the program would take")
+    assert found.build_s > 1e-3
+    assert found.iterations == 0

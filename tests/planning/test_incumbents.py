@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import functools
-import time
+import itertools
 from dataclasses import replace
 
 import pytest
 
 from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Box, Zone
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning.checking import Condition
@@ -16,7 +17,6 @@ from maneuver_automaton.planning.incumbents import LATE, Candidate, Incumbents
 from maneuver_automaton.planning.result import PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
-from maneuver_automaton.search.budget import Budget
 
 ROBOT = Automaton.of_controls(
     Unicycle(),
@@ -119,7 +119,8 @@ def test_what_is_not_proven_free_may_hit_something_without_a_word():
 def test_checks_ask_the_clock_too():
     """A few plans may be refused once the time is over; then the others are left alone."""
     problem = replace(FREE, obstacles=(WALL,))
-    over = Budget(began=time.monotonic() - 1.0, deadline=time.monotonic())
+    now = 1.0
+    over = Budget(began=0.0, deadline=1.0, clock=lambda: now)
     found = Incumbents(problem, over, Workspace(problem.obstacles))
     hits = [
         Candidate(1.0 + k, 0, functools.partial(driven, "ahead", durations=[3.5 + 0.01 * k]))
@@ -127,6 +128,10 @@ def test_checks_ask_the_clock_too():
     ]
     found.offer_in_turn(hits)
     assert found.refused.total() == LATE
+    now = 2.0
+    late = Incumbents(problem, over, Workspace(problem.obstacles))
+    late.offer_in_turn(hits)
+    assert late.refused.total() == 1
     unhurried = incumbents(problem)
     unhurried.offer_in_turn(hits)
     assert unhurried.refused.total() == 3 * LATE
@@ -139,3 +144,22 @@ def test_what_a_search_has_noted_is_an_improvement_once():
     found.note(4.0, at=1.5)
     assert found.offer(AHEAD, 0)  # its end closed, it costs what the search said
     assert found.improvements == [(0.5, 9.0), (1.5, 4.0)]
+
+
+def test_no_other_plan_is_checked_where_the_time_is_over():
+    over = Budget(began=0.0, deadline=1.0, clock=lambda: 1.0)
+    found = Incumbents(FREE, over, Workspace(()), alternatives=2)
+    found.offer_in_turn([Candidate(1.0, 0, lambda plan=plan: plan) for plan in (AHEAD, TURNING)])
+    assert [one.plan for one in found.plans] == [AHEAD]
+
+
+def test_the_time_of_checks_is_kept_back_from_searches():
+    ticks = itertools.count(0.0, 0.25)  # so that a check takes a quarter of a second
+    found = Incumbents(
+        FREE, Budget(began=0.0, deadline=9.0, clock=lambda: next(ticks)), Workspace(())
+    )
+    before = found.for_better.deadline
+    assert found.offer(AHEAD, 0)
+    assert found.longest_check >= 0.25
+    assert found.for_better.deadline <= 9.0 - found.longest_check < before < 9.0
+    assert found.for_first.deadline > found.for_better.deadline

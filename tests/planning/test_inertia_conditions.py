@@ -9,6 +9,7 @@ import pytest
 import shapely
 
 from maneuver_automaton.automaton.stock import load_stock_library
+from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Zone
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
@@ -32,6 +33,10 @@ BODY = Box([0.5, 0.3])
 CORNERS = np.array([[-0.25, -0.15], [0.25, -0.15], [0.25, 0.15], [-0.25, 0.15]])
 WORK = SearchSettings(max_expansions=4000)
 SLOW = ((0.0, 0.0), (1.0, 0.0), (0.3, 0.0), (0.8, 0.8), (0.8, -0.8))
+
+
+def counted(expansions):
+    return replace(UNLIMITED, expansions=expansions)
 
 
 def posed(goal=(6.0, 0.0, 0.0), *, states=None, **changes):
@@ -113,7 +118,11 @@ def test_no_trim_lasts_less_than_it_must_among_obstacles():
     automaton = unicycle_automaton()
     problem = posed(horizon=Horizon(min_coast=0.4))
     query = lattice_query(problem, (0,))
-    words = [one.word for one in incumbent_words(query, max_expansions=4000) if one.word]
+    words = [
+        one.word
+        for one in incumbent_words(query, budget=replace(UNLIMITED, expansions=4000))
+        if one.word
+    ]
     assert words
     for word in words:
         for trim, time in zip(word.trims, word.durations.tolist(), strict=True):
@@ -137,7 +146,7 @@ def test_settings_of_the_lattice_are_read(monkeypatch):
     )
     stages = ((0, (Resolution(),)), (0, (Resolution(scale=0.5),)))
     monkeypatch.setattr(lattice_schedules, "LINKED", LINKED._replace(stages=stages, first_chunk=4))
-    next(incumbent_words(query, max_expansions=200))
+    next(incumbent_words(query, budget=counted(200)))
     assert weights == [1.3, WEIGHT]
 
 
@@ -145,7 +154,11 @@ def test_a_search_from_the_goal_finds_plans_from_the_start():
     """Every word of the reversed query, turned round, is a free plan of the query."""
     query = lattice_query(posed(), (0,))
     back = reversed_query(query)
-    words = [one.word for one in incumbent_words(back, max_expansions=3000) if one.word]
+    words = [
+        one.word
+        for one in incumbent_words(back, budget=replace(UNLIMITED, expansions=3000))
+        if one.word
+    ]
     assert words
     for word in words:
         one = plan_of_word(query, forward_word(word))
@@ -182,7 +195,7 @@ def test_a_fast_car_passes_a_box(along, aside):
         footprint=Box([4.5, 1.6]),
     )
     query = lattice_query(problem, (0,))
-    found = next(one for one in incumbent_words(query, max_expansions=5000))
+    found = next(one for one in incumbent_words(query, budget=counted(5000)))
     assert found.word is not None
     assert found.word.duration < 6.5
 

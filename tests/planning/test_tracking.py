@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.tracking import clearance_at, free_until, stands_free, track
@@ -63,36 +64,36 @@ class TestTrack:
     @pytest.mark.parametrize("obstacles", [(WALL,), (PASSING,), (WALL, PASSING), ()])
     def test_what_it_finds_is_free_and_ends_at_the_goal(self, obstacles):
         task = problem(*obstacles)
-        found = track(task, time_limit=20.0)
+        found = track(task, budget=Budget.from_now(20.0))
         assert found.plan is not None
         assert check_plan(task, found.plan, found.goal_index or 0).passes(task, 0)
         assert found.cost == pytest.approx(task.cost_of(found.plan))
 
     def test_a_known_plan_is_improved_or_kept(self):
         task = problem(WALL)
-        first = track(task, time_limit=20.0)
-        again = track(task, time_limit=20.0, known=first.plan)
+        first = track(task, budget=Budget.from_now(20.0))
+        again = track(task, budget=Budget.from_now(20.0), known=first.plan)
         assert again.cost <= first.cost + 1e-9
 
     def test_a_known_plan_that_hits_something_is_not_taken(self):
-        found = track(problem(WALL), time_limit=20.0, known=straight(6.0))
+        found = track(problem(WALL), budget=Budget.from_now(20.0), known=straight(6.0))
         assert found.cost > 6.5
 
     def test_a_blocked_goal_is_left_out(self):
         goals = [Goal(pose=[3.0, 0.0, 0.0]), Goal(pose=[6.0, 0.0, 0.0])]
-        assert track(problem(WALL, goal=goals), time_limit=20.0).goal_index == 1
-        found = track(problem(WALL, goal=goals[0]), time_limit=20.0)
+        assert track(problem(WALL, goal=goals), budget=Budget.from_now(20.0)).goal_index == 1
+        found = track(problem(WALL, goal=goals[0]), budget=Budget.from_now(20.0))
         assert (found.plan, found.reason) == (None, "every goal is blocked")
 
     def test_the_limit_of_expansions(self):
         cage = Obstacle(
             Disc(0.5), motion=Motion([0.0, 9.0, 12.0], [[6, 0, 0], [6, 0, 0], [6, 9, 0]])
         )
-        found = track(problem(cage), time_limit=20.0, max_expansions=10)
+        found = track(problem(cage), budget=Budget.from_now(20.0), max_expansions=10)
         assert (found.plan, found.reason) == (None, "no plan was found in the time given")
 
     def test_a_fixed_time_is_filled_with_rest(self):
-        found = track(problem(WALL, horizon=Horizon(time=20.0)), time_limit=20.0)
+        found = track(problem(WALL, horizon=Horizon(time=20.0)), budget=Budget.from_now(20.0))
         assert found.plan is not None
         assert found.plan.duration == pytest.approx(20.0)
         assert found.plan.word[-1] == "rest"
@@ -100,7 +101,7 @@ class TestTrack:
     def test_a_moved_problem_has_the_moved_plan(self):
         move = SE2(np.array([3.0, -8.0, 0.8]))
         task = problem(WALL, PASSING)
-        one, two = (track(each, time_limit=20.0) for each in (task, task.moved(move)))
+        one, two = (track(each, budget=Budget.from_now(20.0)) for each in (task, task.moved(move)))
         assert one.plan is not None
         assert two.plan is not None
         assert one.plan.word == two.plan.word

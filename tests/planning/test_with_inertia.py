@@ -11,6 +11,7 @@ import shapely
 
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.stock import load_stock_library
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Box, Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
@@ -176,7 +177,7 @@ FREE = {
 def test_words_come_first_where_nothing_is_in_the_way(name, cost):
     """No plan is dearer than what the search over words finds by itself."""
     problem = replace(FREE[name], cost=cost)
-    words = search_insertion(problem, problem.goals[0], time_limit=60.0)
+    words = search_insertion(problem, problem.goals[0], budget=Budget.from_now(60.0))
     result = plan(problem, time_limit=60.0)
     assert result.status is PlanStatus.FOUND
     assert result.cost <= words.solutions[0].cost * (1.0 + 1e-9)

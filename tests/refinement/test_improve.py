@@ -10,13 +10,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
-from maneuver_automaton.refinement import improve as improvement
 from maneuver_automaton.refinement.improve import Patience, improve
-from maneuver_automaton.search import lattice_pass
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import lattice_query
@@ -62,11 +61,11 @@ def query_of(problem):
 def improved(name, *, expansions=EXPANSIONS):
     """First word, words found on the way, and what came of it."""
     query = query_of(PROBLEMS[name])
-    first = first_plan(query, deadline=math.inf, max_expansions=20_000).word
+    first = first_plan(query, budget=replace(UNLIMITED, expansions=20_000)).word
     assert first is not None
     incumbents = []
-    better = improve(query, first, deadline=math.inf, patience=Patience(),
-                     max_expansions=expansions, better=incumbents.append)  # fmt: skip
+    counted = replace(UNLIMITED, expansions=expansions)
+    better = improve(query, first, budget=counted, patience=Patience(), better=incumbents.append)
     return query, with_cost(first, query), incumbents, better
 
 
@@ -121,36 +120,30 @@ def test_the_same_twice_to_the_last_bit(name):
     assert better.attempts == better_again.attempts
 
 
-class Clock:
-    """Ticks at every look, so that a deadline is a number of looks."""
-
-    def __init__(self):
-        self.now = 0.0
-
-    def monotonic(self):
-        self.now += 1.0
-        return self.now
-
-
-def incumbents_until(deadline, monkeypatch, name="car"):
-    clock = Clock()
-    monkeypatch.setattr(improvement, "time", clock)
-    monkeypatch.setattr(lattice_pass, "time", clock)
+def incumbents_until(deadline, name="car"):
+    """What is found until a deadline of a clock that ticks at every look."""
+    ticks = itertools.count(1.0)
+    budget = Budget(began=0.0, deadline=deadline, expansions=2000, clock=lambda: next(ticks))
     query = query_of(PROBLEMS[name])
     first = improved(name)[1]
     word = Word(trims=first.trims, durations=first.durations)
     incumbents = []
-    improve(query, word, deadline=deadline, patience=Patience(), max_expansions=2000,
-            better=lambda better: incumbents.append(better.cost))  # fmt: skip
+    improve(
+        query,
+        word,
+        budget=budget,
+        patience=Patience(),
+        better=lambda better: incumbents.append(better.cost),
+    )
     return incumbents
 
 
-def test_less_time_gives_the_beginning_of_what_more_time_gives(monkeypatch):
+def test_less_time_gives_the_beginning_of_what_more_time_gives():
     improved("car")
-    whole = incumbents_until(math.inf, monkeypatch)
+    whole = incumbents_until(math.inf)
     assert len(whole) >= 3
     for deadline in (1.0, 3.0, 7.0, 20.0, 45.0, 80.0, 120.0):
-        part = incumbents_until(deadline, monkeypatch)
+        part = incumbents_until(deadline)
         # but for the last, of which a part was tried
         assert part[:-1] == whole[: len(part) - 1] if part else True
         assert not part or part[-1] >= whole[min(len(part), len(whole)) - 1]
@@ -159,8 +152,9 @@ def test_less_time_gives_the_beginning_of_what_more_time_gives(monkeypatch):
 def test_less_patience_gives_the_beginning_too():
     query, first, incumbents, _ = improved("car")
     short = []
-    improve(query, first, deadline=math.inf, patience=Patience(attempts=1, passes=1),
-            max_expansions=EXPANSIONS, better=short.append)  # fmt: skip
+    counted = replace(UNLIMITED, expansions=EXPANSIONS)
+    impatient = Patience(attempts=1, passes=1)
+    improve(query, first, budget=counted, patience=impatient, better=short.append)
     costs = [word.cost for word in incumbents]
     assert [word.cost for word in short] == costs[: len(short)]
 
@@ -168,21 +162,21 @@ def test_less_patience_gives_the_beginning_too():
 def test_it_ends_at_the_floor():
     query, first, _, better = improved("car")
     floor = 1.02 * better.word.cost
-    ended = improve(query, first, deadline=math.inf, patience=Patience(), floor=floor)
+    ended = improve(query, first, patience=Patience(), floor=floor)
     assert ended.word.cost <= floor
     assert ended.attempts <= better.attempts
 
 
 def test_no_time_at_all():
     query, first, _, _ = improved("car")
-    ended = improve(query, first, deadline=-math.inf, patience=Patience())
+    ended = improve(query, first, budget=Budget(began=0.0, deadline=-math.inf), patience=Patience())
     assert ended.word.cost <= first.cost
     assert (ended.attempts, ended.expansions, ended.finished) == (0, 0, False)
 
 
 def test_the_empty_word_stays_empty():
     query = query_of(replace(BASE, goals=(Goal(pose=BASE.start),)))
-    ended = improve(query, query.word_of([], 0), deadline=math.inf, patience=Patience(), floor=0.0)
+    ended = improve(query, query.word_of([], 0), patience=Patience(), floor=0.0)
     assert (len(ended.word.trims), ended.word.cost) == (0, 0.0)
 
 
@@ -199,6 +193,6 @@ def test_a_detour_round_nothing_is_cut_short():
              (ahead, 2.0)]  # fmt: skip
     word = query.word_of([(SWITCH, int(query.library.trims[k]), t) for k, t in there], 0)
     assert_admitted(query, with_cost(word, query))
-    ended = improve(query, word, deadline=math.inf, patience=Patience(attempts=2000, passes=1))
+    ended = improve(query, word, patience=Patience(attempts=2000, passes=1))
     assert ended.word.trims.tolist() == query.library.trims[[ahead]].tolist()
     assert ended.word.cost == pytest.approx(6.0, abs=1e-9)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import functools
 import itertools
-import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.refinement import improve as improvement
 from maneuver_automaton.refinement import work
 from maneuver_automaton.refinement.improve import Improvement, Patience
@@ -27,11 +28,11 @@ pytestmark = compiled_only
 @functools.cache
 def first_word():
     """The first word past the walls, as the lattice finds it."""
-    return next(incumbent_words(query(), max_expansions=600)).word
+    return next(incumbent_words(query(), budget=replace(UNLIMITED, expansions=600))).word
 
 
 def improving(word, **changes):
-    settings = {"deadline": math.inf, "patience": Patience(), "max_expansions": 0} | changes
+    settings = {"budget": replace(UNLIMITED, expansions=0), "patience": Patience()} | changes
     return Improvement(query(), word, grids=tuple, restarts=FINER, **settings)
 
 
@@ -116,6 +117,6 @@ def test_a_word_that_rests_on_the_way_is_cut_short():
     )
     slow = here.word_of([*steps, *chain], 0)
     few = here.library.arrays.library.n_few
-    better = work.shortcut(here, slow, n_words=few, cut=0.0, deadline=math.inf)
+    better = work.shortcut(here, slow, n_words=few, cut=0.0)
     assert better.cost <= first.cost + 1e-9
     assert_sound(better)

@@ -10,6 +10,7 @@ import pytest
 import shapely
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.collision import Box
 from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.groups import SE2
@@ -171,7 +172,7 @@ def test_the_goal_needs_a_place_and_the_start_its_limits() -> None:
 def test_a_polished_motion_is_exact_clean_and_inside_its_limits() -> None:
     pytest.importorskip("casadi")
     task = swerve()
-    motion = polish_guesses(task, [around()], time_limit=60.0).motion
+    motion = polish_guesses(task, [around()], budget=UNLIMITED).motion
     assert motion is not None
     assert np.abs(motion.course.pose[-1] - [14.0, 0.0, 0.0]).max() < 1e-12
     assert np.abs(motion.course.reduced_state[-1]).max() < 1e-12
@@ -185,8 +186,8 @@ def test_a_polished_motion_is_exact_clean_and_inside_its_limits() -> None:
 
 def test_a_moved_problem_has_the_moved_solution() -> None:
     pytest.importorskip("casadi")
-    here = polish_guesses(swerve(), [around()], time_limit=60.0).motion
-    there = polish_guesses(swerve(SE2([700.0, -300.0, 2.0])), [around()], time_limit=60.0).motion
+    here = polish_guesses(swerve(), [around()], budget=UNLIMITED).motion
+    there = polish_guesses(swerve(SE2([700.0, -300.0, 2.0])), [around()], budget=UNLIMITED).motion
     assert here is not None
     assert there is not None
     assert there.duration == pytest.approx(here.duration, abs=1e-6)
@@ -195,7 +196,7 @@ def test_a_moved_problem_has_the_moved_solution() -> None:
 
 def test_what_is_not_accepted_is_not_returned() -> None:
     pytest.importorskip("casadi")
-    result = polish_guesses(swerve(), [around()], time_limit=60.0, accepts=lambda motion: False)
+    result = polish_guesses(swerve(), [around()], budget=UNLIMITED, accepts=lambda motion: False)
     assert result.motion is None
     assert result.reason == "what was found is not accepted"
 
@@ -208,7 +209,7 @@ def test_gear_sequences_differ_and_come_in_order() -> None:
         problem,
         [car, car_library(wheelbase=2.8, max_steering=0.75, share=0.8)],
         lambda plan: timed(plan, pace_of_car(CAR)).duration,
-        time_limit=20.0,
+        budget=UNLIMITED,
         keep=3,
     )
     assert drives
@@ -243,10 +244,15 @@ def is_free(motion) -> bool:
 @pytest.mark.skipif(not has_casadi(), reason="polishing needs CasADi")
 def test_what_the_solver_did_not_finish_counts_if_it_is_sound() -> None:
     """Thirty iterations of fifty lead near the best motion, which was thrown away."""
-    best = polish_guesses(swerve(), [wide()], time_limit=60.0, accepts=is_free)
+    best = polish_guesses(swerve(), [wide()], budget=UNLIMITED, accepts=is_free)
     few = PolishSettings(max_iterations=30)
     again = polish_guesses(
-        swerve(), [wide()], settings=few, time_limit=60.0, most_iterations=3000, accepts=is_free
+        swerve(),
+        [wide()],
+        settings=few,
+        budget=UNLIMITED,
+        most_iterations=3000,
+        accepts=is_free,
     )
     assert all(one.status != "solved" for one in again.attempts)
     assert again.motion is not None
@@ -256,9 +262,9 @@ def test_what_the_solver_did_not_finish_counts_if_it_is_sound() -> None:
 
 @pytest.mark.skipif(not has_casadi(), reason="polishing needs CasADi")
 def test_work_is_counted_in_iterations() -> None:
-    result = polish_guesses(swerve(), [wide()] * 4, time_limit=60.0, most_iterations=60)
+    result = polish_guesses(swerve(), [wide()] * 4, budget=UNLIMITED, most_iterations=60)
     assert 60 <= sum(one.iterations for one in result.attempts) < 60 + 8 * 60
-    again = polish_guesses(swerve(), [wide()] * 4, time_limit=60.0, most_iterations=60)
+    again = polish_guesses(swerve(), [wide()] * 4, budget=UNLIMITED, most_iterations=60)
     kinds = [[(one.kind, one.iterations) for one in run.attempts] for run in (result, again)]
     assert kinds[0] == kinds[1]
 
@@ -275,7 +281,7 @@ def test_what_closing_leads_beyond_a_limit_is_solved_with_more_room(monkeypatch)
         return closed(*args, **values)
 
     monkeypatch.setattr("maneuver_automaton.refinement.polish.closed", close)
-    found = polish_guesses(swerve(), [around()], time_limit=60.0)
+    found = polish_guesses(swerve(), [around()], budget=UNLIMITED)
     kinds = [attempt.kind for attempt in found.attempts]
     assert "room" in kinds
     assert kinds.index("room") == kinds.index("lines") + 1

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.relaxed_end import _Relaxation, with_relaxed_end
 from maneuver_automaton.search.insertion import search_insertion
@@ -22,7 +23,7 @@ def found(offset):
     goal = replace(GOAL, pose=np.add(GOAL.pose, [offset, -offset, 0.0]))
     problem = Problem(unicycle_automaton(), [offset, -offset, 0.0], goal)
     exact = replace(goal, tolerance_m=0.0, tolerance_rad=0.0)
-    words = search_insertion(problem, exact, time_limit=60.0, alternatives=2)
+    words = search_insertion(problem, exact, budget=Budget.from_now(60.0), alternatives=2)
     return problem, goal, [plan_of(problem, word) for word in words.solutions]
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from maneuver_automaton._compile import bare_kernel
+from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.refinement.incumbent_words import incumbent_words
 from maneuver_automaton.search._kernels_coast import coast_free, coast_inside, coasted
 from maneuver_automaton.search._kernels_maneuver import edge_end, edge_free
@@ -37,7 +37,7 @@ class ManeuverResult:
 def search_maneuvers(
     query: LatticeQuery,
     *,
-    deadline: float = math.inf,
+    budget: Budget = UNLIMITED,
     max_expansions: int | None = None,
     first_only: bool = False,
 ) -> ManeuverResult:
@@ -51,7 +51,8 @@ def search_maneuvers(
     begun = time.monotonic()
     found: list[tuple[Word, int, float]] = []
     total, status = 0, SearchStatus.EXHAUSTED
-    for incumbent in incumbent_words(query, deadline=deadline, max_expansions=max_expansions):
+    counted = replace(budget, expansions=max_expansions)
+    for incumbent in incumbent_words(query, budget=counted):
         total, status = incumbent.expansions, incumbent.status
         if incumbent.word is not None:
             found.append((incumbent.word, total, time.monotonic() - begun))

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap, Polygon
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
@@ -153,7 +154,7 @@ def test_nodes_are_ends_of_free_ways(name, resolution, sign):
 def test_a_connection_ends_at_a_goal_and_costs_what_it_says(name):
     problem = PROBLEMS[name]
     query = query_of(problem)
-    found = first_plan(query, deadline=math.inf, max_expansions=20_000 if COMPILED else 60)
+    found = first_plan(query, budget=replace(UNLIMITED, expansions=20_000 if COMPILED else 60))
     if found.word is None:
         assert not COMPILED
         return
@@ -189,10 +190,12 @@ def test_a_connection_ends_at_a_goal_and_costs_what_it_says(name):
 
 ORDER = """
 import hashlib, math
+from dataclasses import replace
+from maneuver_automaton.budget import UNLIMITED
 from tests.search.test_lattice import PROBLEMS, TIGHT, grown, query_of
 from maneuver_automaton.search.lattice import first_plan
 for name in ("car", "moving", "prices"):
-    found = first_plan(query_of(PROBLEMS[name]), deadline=math.inf, max_expansions=25)
+    found = first_plan(query_of(PROBLEMS[name]), budget=replace(UNLIMITED, expansions=25))
     word = found.word
     print(name, found.expansions, found.queries, found.nearest.hex(), found.exhausted,
           word and ([int(k) for k in word.trims], [float(t).hex() for t in word.durations]))
@@ -281,7 +284,7 @@ def test_a_lattice_without_a_way_out_is_exhausted():
     for footprint in (BODY, (Disc(0.3),)):
         shut_in = replace(BASE, obstacles=(Obstacle(court),), footprint=footprint)
         limit = None if COMPILED else 30
-        found = first_plan(query_of(shut_in), deadline=math.inf, max_expansions=limit)
+        found = first_plan(query_of(shut_in), budget=replace(UNLIMITED, expansions=limit))
         assert found.word is None
         assert found.enclosed == "obstacles enclose the start"
 
@@ -292,9 +295,9 @@ def test_finer_resolutions_begin_one_after_the_other():
     query = query_of(scenes.bay(2.1, 4.3))
     if not COMPILED:
         return
-    found = first_plan(query, deadline=math.inf, max_expansions=1000)
+    found = first_plan(query, budget=replace(UNLIMITED, expansions=1000))
     assert found.word is None or found.expansions <= 1000
-    assert first_plan(query, deadline=math.inf, max_expansions=50).expansions == 50
+    assert first_plan(query, budget=replace(UNLIMITED, expansions=50)).expansions == 50
 
 
 def test_cells_have_numbers_of_64_bits_however_many_there_are():
@@ -316,7 +319,7 @@ def test_cells_have_numbers_of_64_bits_however_many_there_are():
 
 
 def test_time_is_up():
-    found = first_plan(query_of(BASE), deadline=-math.inf)
+    found = first_plan(query_of(BASE), budget=Budget(began=0.0, deadline=-math.inf))
     assert (found.word, found.expansions, found.exhausted) == (None, 0, False)
 
 
@@ -326,7 +329,7 @@ def test_settings_are_heeded():
     assert (one.task.cell, one.task.headings, one.task.weight) == (1.5, 8, 2.0)
     fine = grown(BASE)[1]
     assert len(nodes) < len(fine)
-    found = first_plan(query_of(coarse), deadline=math.inf, max_expansions=EXPANSIONS)
+    found = first_plan(query_of(coarse), budget=replace(UNLIMITED, expansions=EXPANSIONS))
     assert found.expansions <= EXPANSIONS
 
 
@@ -379,5 +382,5 @@ def test_a_goal_on_the_rim_of_the_bounds_is_not_enclosed():
     wall = Box([1.0, 4.0], [5.5, 0.0])
     problem = Problem(CAR, [1, 0, 0], [10, 0, 0], obstacles=wall, footprint=Box([2.0, 2.0]),
                       bounds=Bounds(x=(0.0, 10.0), y=(-10.0, 10.0)))  # fmt: skip
-    found = first_plan(query_of(problem), deadline=math.inf, max_expansions=60)
+    found = first_plan(query_of(problem), budget=replace(UNLIMITED, expansions=60))
     assert found.enclosed == ""

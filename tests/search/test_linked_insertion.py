@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.audit import audit_plan
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search.insertion import search_insertion
@@ -116,4 +117,4 @@ def test_a_word_under_work_comes_back_from_the_whole_word(goal, time):
 
 def test_a_time_limit_ends_the_search_with_what_it_has():
     one = posed([5.0, 1.0, 1.0], car_automaton())
-    assert search_insertion(one, one.goals[0], time_limit=0.05).solutions
+    assert search_insertion(one, one.goals[0], budget=Budget.from_now(0.05)).solutions

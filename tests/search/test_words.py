@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import UserModel
@@ -338,7 +339,7 @@ def test_a_limit_on_words_ends_the_search():
 
 
 def test_no_time_to_search():
-    result = search(parking(), time_limit=0.0, alternatives=None)
+    result = search(parking(), budget=Budget(began=0.0, deadline=0.0), alternatives=None)
     assert not result.complete
     assert result.status in (SearchStatus.FOUND, SearchStatus.OUT_OF_BUDGET)
 

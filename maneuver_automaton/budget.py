@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 COUNTED = 0.7  # share of the time left that a stage of counted work takes at most: others follow
@@ -12,6 +14,9 @@ COUNTED = 0.7  # share of the time left that a stage of counted work takes at mo
 class Budget:
     """Time until a deadline, and expansions, that a search and all its stages may take together.
 
+    It is the one value that says when to stop: whatever loops is handed a budget and asks it.
+    Kernels cannot ask; they are called for a number of steps that takes some milliseconds.
+
     Examples
     --------
     >>> budget = Budget.from_now(10.0, expansions=500)
@@ -19,17 +24,26 @@ class Budget:
     (False, 100, 0)
     >>> budget.part(0.5).deadline < budget.stage(0.5).deadline < budget.deadline
     True
+    >>> round(budget.deadline - budget.before(2.0).deadline, 6)
+    2.0
     """
 
-    began: float  # as `time.monotonic` counts [s]
+    began: float  # as the clock counts [s]
     deadline: float  # the same clock
     expansions: int | None = None  # that are left; None: only the time counts
+    clock: Callable[[], float] = time.monotonic  # seconds from some moment on
 
     @classmethod
-    def from_now(cls, seconds: float, *, expansions: int | None = None) -> Budget:
+    def from_now(
+        cls,
+        seconds: float,
+        *,
+        expansions: int | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> Budget:
         """So many seconds from now on."""
-        now = time.monotonic()
-        return cls(began=now, deadline=now + seconds, expansions=expansions)
+        now = clock()
+        return cls(began=now, deadline=now + seconds, expansions=expansions, clock=clock)
 
     @property
     def seconds(self) -> float:
@@ -39,21 +53,23 @@ class Budget:
     @property
     def elapsed(self) -> float:
         """Time since the begin [s]."""
-        return time.monotonic() - self.began
+        return self.clock() - self.began
 
     @property
     def left(self) -> float:
         """Time that is left [s], at least 0."""
-        return max(self.deadline - time.monotonic(), 0.0)
+        return max(self.deadline - self.clock(), 0.0)
 
     @property
     def is_over(self) -> bool:
         """Whether no time is left."""
-        return time.monotonic() >= self.deadline
+        return self.clock() >= self.deadline
 
     def part(self, share: float, *, at_least: float = 0.0) -> Budget:
         """A budget of its own from now on: a share of the time left, at least so many seconds."""
-        return Budget.from_now(max(share * self.left, at_least), expansions=self.expansions)
+        now = self.clock()
+        seconds = max(share * max(self.deadline - now, 0.0), at_least)
+        return replace(self, began=now, deadline=now + seconds)
 
     def stage(self, share: float) -> Budget:
         """Budget of one stage: a share of the time left, a large one where work is counted.
@@ -62,10 +78,18 @@ class Budget:
         """
         if self.expansions is not None:
             share = max(share, COUNTED)
-        return replace(self, deadline=time.monotonic() + share * self.left)
+        now = self.clock()
+        return replace(self, deadline=now + share * max(self.deadline - now, 0.0))
+
+    def before(self, seconds: float) -> Budget:
+        """The budget that ends so many seconds earlier: what follows takes these."""
+        return replace(self, deadline=self.deadline - seconds)
 
     def less(self, spent: int) -> Budget:
         """The budget that remains after so many expansions."""
         if self.expansions is None:
             return self
         return replace(self, expansions=max(0, self.expansions - spent))
+
+
+UNLIMITED = Budget(began=0.0, deadline=math.inf)

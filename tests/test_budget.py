@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from maneuver_automaton.search.budget import Budget
+from maneuver_automaton.budget import Budget
 
 DAY = 86400.0  # [s] no test takes as long
 
@@ -46,3 +46,14 @@ def test_expansions_that_are_spent_are_gone():
     assert budget.less(30).expansions == 40
     assert budget.less(30).less(60).expansions == 0
     assert Budget.from_now(DAY).less(10**9).expansions is None
+
+
+def test_whatever_clock_there_is_is_asked_by_all_its_parts():
+    now = 10.0
+    budget = Budget.from_now(8.0, clock=lambda: now)
+    assert (budget.began, budget.deadline, budget.before(3.0).deadline) == (10.0, 18.0, 15.0)
+    now = 14.0
+    assert (budget.elapsed, budget.left, budget.part(0.5).deadline) == (4.0, 4.0, 16.0)
+    now = 18.0
+    assert budget.is_over
+    assert budget.stage(0.5).is_over

@@ -1,0 +1,50 @@
+"""Nobody goes on after the deadline: a clock that jumps past it after so many looks."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+
+from maneuver_automaton.budget import Budget
+from maneuver_automaton.collision import Disc
+from maneuver_automaton.planning.plan import plan_within, prepare
+from maneuver_automaton.planning.result import PlanStatus
+from maneuver_automaton.planning.workspace import workspace_of
+from maneuver_automaton.problem import Horizon, Problem
+from tests.matrix.vehicles import VEHICLES
+
+FEW = 60  # looks at the clock once the time is over: every loop has one, and they are nested
+VEHICLE = VEHICLES["unicycle"]
+WAY = [Disc(0.4, [2.0, 0.3])]
+TASKS = {
+    "among obstacles": VEHICLE.problem(obstacles=WAY),
+    "free": VEHICLE.problem(),
+    "a fixed time": VEHICLE.problem(horizon=Horizon(time=9.0)),
+    "a tolerance": VEHICLE.problem(
+        goals=VEHICLE.target(tolerance_m=0.1, tolerance_rad=0.1), obstacles=WAY
+    ),
+    "words among obstacles": VEHICLE.problem(horizon=Horizon(max_trims=4)),
+}
+
+
+def looks_after(problem: Problem, looks: int, alternatives: int) -> tuple[int, PlanStatus]:
+    """How often the clock is looked at once it shows that the time is over, and the answer."""
+    seen = itertools.count()
+    budget = Budget(began=0.0, deadline=1.0, clock=lambda: 0.0 if next(seen) < looks else 1.02)
+    workspace = workspace_of(problem.obstacles)
+    result = plan_within(problem, budget, workspace, alternatives=alternatives)
+    return next(seen) - looks, result.status
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_nobody_goes_on_after_the_deadline(name: str) -> None:
+    problem = TASKS[name]
+    prepare(problem)
+    for looks, alternatives in ((0, 0), (10, 4), (100, 4), (400, 4)):
+        after, _ = looks_after(problem, looks, alternatives)
+        assert after <= FEW, f"{after} looks after the first {looks}"
+
+
+def test_a_plan_that_was_found_in_time_is_checked_and_returned() -> None:
+    assert looks_after(TASKS["among obstacles"], 400, 0)[1] is PlanStatus.FOUND
