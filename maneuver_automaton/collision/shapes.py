@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from maneuver_automaton._arrays import Array, as_array, freeze
+from maneuver_automaton._ceilings import FASTEST, FASTEST_TURN, check_size
 from maneuver_automaton.groups import SE2, LieGroup
 
 
@@ -65,6 +66,8 @@ class Disc:
         freeze(self, "center", last=2)
         if not (math.isfinite(self.radius) and self.radius > 0.0):
             raise ValueError(f"disc: radius must be positive, got {self.radius} m")
+        check_size("disc: radius", self.radius)
+        check_size("disc: center", self.center)
 
     def moved(self, by: LieGroup) -> Disc:
         """The shape moved by a planar pose."""
@@ -96,6 +99,8 @@ class Box:
         freeze(self, "center", last=2)
         if not (self.size > 0.0).all():
             raise ValueError(f"box: size must be positive, got {self.size.tolist()} m")
+        check_size("box: size", self.size)
+        check_size("box: center", self.center)
         if not math.isfinite(self.heading):
             raise ValueError(f"box: heading must be finite, got {self.heading} rad")
 
@@ -140,6 +145,26 @@ class Motion:
             )
         if not (np.diff(self.time) > 0.0).all():
             raise ValueError(f"motion: times must rise, got {self.time.tolist()} s")
+        check_size("motion: pose", self.pose[:, :2])
+        self._refuse_jumps()
+
+    def _refuse_jumps(self) -> None:
+        """Raise a ValueError at the first pose that nothing reaches in time."""
+        lasting = np.diff(self.time)
+        steps = np.diff(self.pose, axis=0)
+        covered = np.hypot(steps[:, 0], steps[:, 1])
+        for change, most, units in (
+            (covered, FASTEST, ("m", "m/s")),
+            (np.abs(steps[:, 2]), FASTEST_TURN, ("rad", "rad/s")),
+        ):
+            jumps = np.flatnonzero(change > most * lasting)
+            if jumps.size:
+                k = int(jumps[0])
+                raise ValueError(
+                    f"motion: pose {k + 2} at {self.time[k + 1]:.6g} s is {change[k]:.6g} "
+                    f"{units[0]} from pose {k + 1}, {lasting[k]:.6g} s before: that is "
+                    f"{change[k] / lasting[k]:.6g} {units[1]}, need at most {most:g} {units[1]}"
+                )
 
     def at(self, time: ArrayLike) -> Array:
         """Poses (..., 3) at `time` (...,) [s]."""
@@ -229,6 +254,8 @@ class OccupancyMap:
         freeze(self, "origin", last=3)
         if not (math.isfinite(self.resolution) and self.resolution > 0.0):
             raise ValueError(f"map: resolution must be positive, got {self.resolution} m")
+        check_size("map: origin", self.origin[:2])
+        check_size("map: size", self.extent)
 
     @property
     def extent(self) -> Array:
@@ -280,6 +307,7 @@ def _ring(name: str, corners: ArrayLike) -> Array:
     ring = np.array(as_array(name, corners))
     if ring.ndim != 2 or ring.shape[1] != 2 or len(ring) < 3:
         raise ValueError(f"{name}: got shape {ring.shape}, need (n, 2) with n >= 3")
+    check_size(name, ring)
     ring.setflags(write=False)
     return ring
 

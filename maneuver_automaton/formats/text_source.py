@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+from maneuver_automaton._ceilings import FARTHEST as FARTHEST
 from maneuver_automaton.errors import InvalidScenario
 
 MAX_BYTES = 5_000_000  # of a file that people write
-FARTHEST = 1e15  # of a coordinate [m], and of any other number of a text
 MAX_MAP_BYTES = 200_000_000  # of a file that holds a map, cell by cell
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._ceilings import FASTEST
 from maneuver_automaton.groups import LieGroup
 
 Pose = TypeVar("Pose", bound=LieGroup)
@@ -42,6 +43,13 @@ class Trim:
         if not self.name or not self.name.strip():
             raise ValueError(
                 f"trim: got the name {self.name!r}, need at least one visible character"
+            )
+        places = [0, 1, *range(3, self.body_velocity.shape[-1])]
+        fastest = float(np.abs(self.body_velocity[..., places]).max(initial=0.0))
+        if fastest > FASTEST:
+            raise ValueError(
+                f"trim {self.name!r}: body_velocity holds {fastest:g} m/s, "
+                f"need at most {FASTEST:g} m/s"
             )
         if not self.max_duration > 0.0:
             raise ValueError(

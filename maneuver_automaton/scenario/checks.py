@@ -21,6 +21,8 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+from maneuver_automaton._ceilings import FARTHEST
+
 
 def need(text: str) -> PydanticCustomError:
     """The error of a value that is not what the file needs there: raise it."""
@@ -70,10 +72,17 @@ class Several:
         return value
 
 
-Number = Annotated[float, Strict(), AllowInfNan(False), Need("a finite number")]
-Positive = Annotated[float, Strict(), AllowInfNan(False), Gt(0), Need("a positive number")]
+def _below_ceiling(value: float) -> float:
+    if abs(value) > FARTHEST:
+        raise need(f"a number of at most {FARTHEST:g} in size")
+    return value
+
+
+_Small = AfterValidator(_below_ceiling)
+Number = Annotated[float, Strict(), AllowInfNan(False), Need("a finite number"), _Small]
+Positive = Annotated[float, Strict(), AllowInfNan(False), Gt(0), Need("a positive number"), _Small]
 NotNegative = Annotated[
-    float, Strict(), AllowInfNan(False), Ge(0), Need("a finite number of at least 0")
+    float, Strict(), AllowInfNan(False), Ge(0), Need("a finite number of at least 0"), _Small
 ]
 Count = Annotated[int, Strict(), Ge(1), Need("a whole number of at least 1")]
 Text = Annotated[str, Strict(), Need("a text")]

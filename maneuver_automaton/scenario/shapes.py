@@ -177,7 +177,11 @@ def _obstacle(document: Document, part: schema.Obstacle, k: int) -> Obstacle:
     motion = None
     if part.motion is not None:
         rows = np.array(part.motion)
-        motion = Motion(rows[:, 0], rows[:, 1:])
+        try:
+            motion = Motion(rows[:, 0], rows[:, 1:])
+        except ValueError as error:
+            where = ("obstacles", k, "motion")
+            raise document.error(where, str(error).removeprefix("motion: ")) from error
     return Obstacle(
         _shape(document, part, ("obstacles", k)),
         height=part.height_m,

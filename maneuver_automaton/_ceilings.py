@@ -1,0 +1,30 @@
+"""Ceilings of what is planned for: no vehicle is so far away, so large or so fast.
+
+Beyond them numbers have no digits left for a body's size, fields and swept solids have no end, and
+the proof that two bodies do not meet takes steps without number.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+FARTHEST = 1e9  # [m] of a coordinate or a size, and of any other number of a file
+FASTEST = 1e3  # [m/s] of a trim, and of an obstacle that moves
+FASTEST_TURN = 1e4  # [rad/s] of an obstacle that moves
+
+
+def check_size(name: str, values: ArrayLike) -> None:
+    """Raise a ValueError if a coordinate or a size [m] is beyond `FARTHEST`.
+
+    Examples
+    --------
+    >>> check_size("disc: radius", 1e12)
+    Traceback (most recent call last):
+        ...
+    ValueError: disc: radius: got 1e+12 m, need at most 1e+09 m in size
+    """
+    numbers = np.atleast_1d(np.asarray(values, dtype=np.float64))
+    far = numbers[np.abs(numbers) > FARTHEST]
+    if far.size:
+        raise ValueError(f"{name}: got {far.flat[0]:g} m, need at most {FARTHEST:g} m in size")

@@ -1,0 +1,85 @@
+"""What no vehicle does is refused where it enters, and the message says what would be right."""
+
+import numpy as np
+import pytest
+
+from maneuver_automaton import Automaton, Problem, Unicycle
+from maneuver_automaton._ceilings import FARTHEST, FASTEST
+from maneuver_automaton.collision import Box, Disc, Motion, OccupancyMap, Polygon
+from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.primitives import Trim
+from maneuver_automaton.problem import Goal
+from maneuver_automaton.scenario.scenario import scenario_of_text
+
+ROBOT = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "left": (0.0, 1.0)})
+FAR = 1.5 * FARTHEST
+SCENARIO = """\
+schema: 1
+name: far
+vehicle: {{model: unicycle}}
+automaton: {{trims: [{{name: ahead, control: [1.0, 0.0]}}, {{name: left, control: [0.0, 1.0]}}]}}
+start: {{pose: [{start}, 0.0, 0.0]}}
+goal: {{pose: [5.0, 0.0, 0.0]}}
+obstacles:
+  - {obstacle}
+"""
+
+
+@pytest.mark.parametrize(
+    ("make", "what"),
+    [
+        (lambda: Disc(FAR), "disc: radius: got 1.5e\\+09 m"),
+        (lambda: Disc(1.0, [0.0, -FAR]), "disc: center: got -1.5e\\+09 m"),
+        (lambda: Box([FAR, 1.0]), "box: size"),
+        (lambda: Box([1.0, 1.0], [FAR, 0.0]), "box: center"),
+        (lambda: Polygon([[0, 0], [FAR, 0], [0, 1]]), "polygon: corners"),
+        (lambda: OccupancyMap(np.eye(2) > 0, resolution=1.0, origin=[FAR, 0, 0]), "map: origin"),
+        (lambda: OccupancyMap(np.eye(2) > 0, resolution=FAR, origin=[0, 0, 0]), "map: size"),
+        (lambda: Motion([0.0], [[FAR, 0, 0]]), "motion: pose"),
+        (lambda: Goal(pose=[FAR, 0.0, 0.0]), "goal: pose"),
+        (lambda: Problem(ROBOT, [FAR, 0, 0], [0, 0, 0]), "start: pose"),
+        (lambda: Problem(ROBOT, [0, 0, 0], [1, 0, 0], margin=FAR), "margin"),
+    ],
+)
+def test_what_is_too_far_or_too_large_is_refused(make, what):
+    with pytest.raises(ValueError, match=f"{what}.*need at most 1e\\+09 m in size"):
+        make()
+
+
+def test_what_is_as_far_as_can_be_is_taken():
+    assert Box([FARTHEST, 1.0], [-FARTHEST, 0.0]).size[0] == FARTHEST
+
+
+def test_a_track_that_jumps_names_its_pose_and_its_time():
+    with pytest.raises(ValueError, match=r"pose 3 at 2[.]001 s is 10 m from pose 2, 0[.]001 s"):
+        Motion([0.0, 2.0, 2.001], [[0, 0, 0], [1, 0, 0], [11, 0, 0]])
+    with pytest.raises(ValueError, match="rad/s, need at most 10000"):
+        Motion([0.0, 1e-6], [[0, 0, 0], [0, 0, 1]])
+    assert Motion([0.0, 1.0], [[0, 0, 0], [FASTEST, 0, 0]]).time.size == 2
+
+
+def test_a_trim_that_nothing_drives_is_refused():
+    with pytest.raises(
+        ValueError, match="trim 'on': body_velocity holds 1e\\+07 m/s, need at most"
+    ):
+        Trim(name="on", body_velocity=[1e7, 0.0, 0.0], control=[1e7, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("start", "obstacle", "says"),
+    [
+        ("1e200", "{disc_m: {center: [3, 3], radius: 0.5}}", "1e\\+200"),
+        ("0.0", "{disc_m: {center: [1e12, 3], radius: 0.5}}", "need a number of at most 1e\\+09"),
+        ("0.0", "{disc_m: {center: [3, 3], radius: 1e15}}", "need a number of at most 1e\\+09"),
+        (
+            "0.0",
+            "{disc_m: {center: [0, 0], radius: 0.5}, motion: [[0, 0, 5, 0], [0.001, 9, 5, 0]]}",
+            "file:8: obstacles.*motion.*pose 2 at 0.001 s is 9 m from pose 1",
+        ),
+    ],
+)
+def test_a_scenario_file_says_where_it_is_beyond_a_ceiling(start, obstacle, says):
+    text = SCENARIO.format(start=start, obstacle=obstacle)
+    with pytest.raises(InvalidScenario, match=says) as error:
+        scenario_of_text(text, name="file")
+    assert str(error.value).startswith("file:")
