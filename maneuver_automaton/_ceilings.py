@@ -1,7 +1,8 @@
 """Ceilings of what is planned for: no vehicle is so far away, so large or so fast.
 
-Beyond them numbers have no digits left for a body's size, fields and swept solids have no end, and
-the proof that two bodies do not meet takes steps without number.
+Coordinates may be counted from far away: published parking cases lie 7e9 m from their origin.
+Beyond the ceilings numbers have no digits left for a body's size, fields and swept solids have no
+end, and the proof that two bodies do not meet takes steps without number.
 """
 
 from __future__ import annotations
@@ -9,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-FARTHEST = 1e9  # [m] of a coordinate or a size, and of any other number of a file
-FASTEST = 1e3  # [m/s] of a trim, and of an obstacle that moves
+FARTHEST = 1e10  # [m] of a coordinate or a size, and of any other number of a file
+FASTEST = 5e3  # [m/s] of a trim, and of an obstacle that moves
 FASTEST_TURN = 1e4  # [rad/s] of an obstacle that moves
 
 
@@ -22,7 +23,7 @@ def check_size(name: str, values: ArrayLike) -> None:
     >>> check_size("disc: radius", 1e12)
     Traceback (most recent call last):
         ...
-    ValueError: disc: radius: got 1e+12 m, need at most 1e+09 m in size
+    ValueError: disc: radius: got 1e+12 m, need at most 1e+10 m in size
     """
     numbers = np.atleast_1d(np.asarray(values, dtype=np.float64))
     far = numbers[np.abs(numbers) > FARTHEST]

@@ -110,7 +110,7 @@ def test_a_model_above_the_file_comes_first(tmp_path):
         ("start: [1, 0, 0]", "start: [1, 0]",
          ":11: robots[0].start: got 2 numbers, need 3: [x, y, heading]"),
         ("start: [1, 0, 0]", "start: [1, 0, .nan]",
-         ":11: robots[0].start[2]: got nan, need a finite number of at most 1e+15 in size"),
+         ":11: robots[0].start[2]: got nan, need a finite number of at most 1e+10 in size"),
         ("start: [1, 0, 0]", "start: [1, 0, true]",
          ":11: robots[0].start[2]: got true, need a finite number"),
         ("    start: [1, 0, 0]  # x, y, theta\n", "",
