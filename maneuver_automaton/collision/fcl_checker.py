@@ -193,10 +193,10 @@ class FclChecker:
                     middle = (first + last) // 2
                     todo += [(middle, last), (first, middle)]
         if self._ground.moving:
-            for pose, twist, span, time in zip(
-                seen[:-1], twists.tolist(), spans.tolist(), clock.tolist(), strict=False
-            ):
-                hit = self._moving_hit_along(pose, (twist[0], twist[1], twist[2]), span, time)
+            for k in self._near_moving(seen, steps, clock).tolist():
+                v_x, v_y, turn_rate = twists[k].tolist()
+                span, time = float(spans[k]), float(clock[k])
+                hit = self._moving_hit_along(seen[k], (v_x, v_y, turn_rate), span, time)
                 if hit is not None:
                     return hit
         return None
@@ -267,6 +267,19 @@ class FclChecker:
                 return hit
             parts = halves(parts)
 
+    def _near_moving(self, seen: Array, steps: Array, clock: Array) -> IntArray:
+        """Numbers of the steps between samples on which a moving obstacle may be met."""
+        body, spans = self._body, np.diff(clock)
+        x, y = body.middle
+        middles = (SE2(seen[:-1]) @ SE2.exp(0.5 * steps)).act(body.middle)
+        covered = 0.5 * np.hypot(steps[:, 0] - steps[:, 2] * y, steps[:, 1] + steps[:, 2] * x)
+        near = np.zeros(len(steps), dtype=np.bool_)
+        for one in self._ground.moving:
+            apart = np.hypot(*(middles - one.path.centers(clock[:-1] + 0.5 * spans)).T)
+            most = covered + 0.5 * spans * one.path.fastest_middle
+            near |= apart <= most + body.reach + one.path.radius
+        return np.flatnonzero(near)
+
     def _moving_hit_along(
         self, start: Array, twist: Twist, duration: float, time: float
     ) -> int | None:
@@ -328,9 +341,16 @@ def _ground_of(
         obstacle = far.moved(to_origin) if any(origin) else far
         region = obstacle_region(obstacle, excess=excess)
         if isinstance(obstacle, Obstacle) and obstacle.motion is not None:
-            reach = float(np.hypot(*region.cover.reshape(-1, 2).T).max())
+            points = region.cover.reshape(-1, 2)
+            middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+            path = MovingBody.of(
+                obstacle.motion,
+                float(np.hypot(*points.T).max()),
+                middle=complex(*middle),
+                radius=float(np.hypot(*(points - middle).T).max()),
+            )
             skin, _ = obstacle_skin([region])
-            moving.append(_Moving(_object(skin), MovingBody.of(obstacle.motion, reach), index))
+            moving.append(_Moving(_object(skin), path, index))
         elif len(region.cover):
             regions.append(region)
             owners.append(index)

@@ -57,15 +57,36 @@ class MovingBody(NamedTuple):
     reach: float  # [m] no point is further from the frame's origin
     speed: float  # [m/s] the frame's origin is never faster
     turn_rate: float  # [rad/s] the frame never turns faster
+    middle: complex  # x + i y of the middle of a disc around the body, in its frame [m]
+    radius: float  # [m] of that disc
 
     @classmethod
-    def of(cls, motion: Motion, reach: float) -> MovingBody:
-        """Body that follows a motion and has no point further than `reach` [m] from its frame."""
+    def of(
+        cls, motion: Motion, reach: float, *, middle: complex = 0j, radius: float | None = None
+    ) -> MovingBody:
+        """Body that follows a motion and has no point further than `reach` [m] from its frame.
+
+        A disc around a `middle` in that frame, of a `radius` [m], is often much smaller: the frame
+        of an obstacle may lie anywhere.
+        """
         rates = np.diff(motion.pose, axis=0) / np.diff(motion.time)[:, None]
         speed = float(np.hypot(rates[:, 0], rates[:, 1]).max(initial=0.0))
-        return cls(
-            motion.time, motion.pose, reach, speed, float(np.abs(rates[:, 2]).max(initial=0))
-        )
+        turn_rate = float(np.abs(rates[:, 2]).max(initial=0))
+        size = reach if radius is None else radius
+        return cls(motion.time, motion.pose, reach, speed, turn_rate, middle, size)
+
+    @property
+    def fastest_middle(self) -> float:
+        """Greatest speed of the middle of the disc [m/s]."""
+        return self.speed + self.turn_rate * abs(self.middle)
+
+    def center(self, pose: Array) -> complex:
+        """Where the middle is at a pose (3,)."""
+        return complex(pose[0], pose[1]) + _direction(pose) * self.middle
+
+    def centers(self, times: Array) -> Array:
+        """Where the middle is (n, 2) at times (n,)."""
+        return SE2(self.at(times)).act(np.array([self.middle.real, self.middle.imag]))
 
     def from_time(self, time: float) -> MovingBody:
         """A copy whose clock is at zero at `time` [s]."""
@@ -90,9 +111,9 @@ class MovingBody(NamedTuple):
 
 def may_meet(body: CoastingBody, other: MovingBody, *, duration: float, center: complex) -> bool:
     """False where both are too far and too slow; `center` is the body's after half the time."""
-    x, y = (float(np.interp(0.5 * duration, other.knots, other.poses[:, k])) for k in range(2))
-    covered = 0.5 * duration * (abs(body.velocity) + other.speed)
-    return abs(center - complex(x, y)) <= covered + body.reach + other.reach
+    there = other.center(other.at(0.5 * duration))
+    covered = 0.5 * duration * (abs(body.velocity) + other.fastest_middle)
+    return abs(center - there) <= covered + body.reach + other.radius
 
 
 def meet(
@@ -125,11 +146,11 @@ def meet(
     turning = abs(body.twist[2]) * body.reach
     bend = abs(body.velocity) * abs(body.twist[2])
     fastest = abs(body.velocity) + other.speed + turning + other.turn_rate * other.reach
-    near = 0.5 * (body.reach + other.reach)
+    near = 0.5 * (body.reach + other.radius)
     time = 0.0
     while True:
         here, there = body.at(time), other.at(time)
-        clearance = abs(body.center(here) - complex(there[0], there[1])) - body.reach - other.reach
+        clearance = abs(body.center(here) - other.center(there)) - body.reach - other.radius
         if clearance <= near:
             clearance = distance(here, there)
             if clearance <= contact:

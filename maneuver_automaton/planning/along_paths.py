@@ -52,7 +52,7 @@ class AlongPaths:
             self.guesses.append(guess_along(problem, first.plan))
         soon = found.budget.stage(IMPROVED_SHARE)
         better = self._track(kinematic_problem(problem), soon, known=first.plan)
-        if better.plan is not None and better.goal_index is not None:
+        if better.plan is not None and better.goal_index is not None and found.may_check:
             yield from _stopping(found, better.plan, better.goal_index)
 
     def _track(self, problem: Problem, budget: Budget, **more: Any) -> Tracked:

@@ -98,3 +98,32 @@ def test_far_and_slow_cannot_meet():
     for duration, possible in ((10.0, False), (19.0, True)):
         center = rover.center(rover.at(0.5 * duration))
         assert may_meet(rover, parked, duration=duration, center=center) is possible
+
+
+@given(
+    start=st.tuples(places, places, st.floats(-7, 7)),
+    knots=st.lists(st.tuples(places, places, st.floats(-9, 9)), min_size=1, max_size=4),
+    duration=st.floats(0.0, 4.0),
+)
+def test_a_disc_beside_its_frame_is_met_where_a_frame_of_its_own_would_be(start, knots, duration):
+    """The same body, seen from a frame 5 m beside it: its disc is small, its reach is not."""
+    times = np.arange(len(knots)) * 0.8
+    far = Motion(times, knots)
+    rover = CoastingBody(np.array(start), (1.0, 0.0, 0.3), 0j, 0.3)
+    other = MovingBody.of(far, 6.3, middle=5.0 + 0j, radius=1.3)
+    dense = np.linspace(0.0, duration, 200)
+    centers = other.centers(dense)
+    apart = np.array(
+        [abs(rover.center(rover.at(t)) - complex(*c)) for t, c in zip(dense, centers, strict=True)]
+    )
+    found = meet(
+        rover,
+        other,
+        duration=duration,
+        distance=lambda a, b: max(0.0, abs(rover.center(a) - other.center(b)) - 1.6),
+        contact=1e-3,
+    )
+    if not found:
+        assert min(apart) > 1.6
+    elif not may_meet(rover, other, duration=duration, center=rover.center(rover.at(duration / 2))):
+        raise AssertionError("what meets may meet")
