@@ -191,16 +191,17 @@ class WordScan:
 
     def _scans(self, n: int, mode: Mode) -> Iterator[tuple[Callable[..., int], int]]:
         """Kernels that words of `n` trims need, and how many words at a time."""
-        # every chunk may lower the upper bound, and costs a call with all arrays
+        # Every chunk may lower the upper bound, and costs a call with all arrays. The clock is asked
+        # between chunks: one of long words takes up to 25 ms.
         few = 1024 if self.pruned else 50_000
         if n <= 2 + mode.kernel_problem[0].targets.size:
             yield self.kernels.scan_flat_words, few
         if n == 3:
             yield self.kernels.scan_words, few
         elif n == 4:
-            yield self.kernels.scan_words, 500
+            yield self.kernels.scan_words, 50
         elif n > 4:
-            yield self.kernels.scan_long_words, 10
+            yield self.kernels.scan_long_words, 2
 
     def modes(self) -> Iterator[Mode]:
         """A fixed time padded by rest; free; a fixed or longest time met exactly."""

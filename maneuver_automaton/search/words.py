@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -14,6 +15,7 @@ from maneuver_automaton.search.setup import SearchSetup, search_setup
 from maneuver_automaton.search.word_scan import MOST_TRIMS, NODES, Mode, WordScan, scanned
 from maneuver_automaton.words.word import Word
 
+MOST_LATE = 100  # solutions, of thousands, that are handed over once the time is over
 SEED_NODES = 24  # per scanned time, where a rough answer will do
 
 
@@ -92,7 +94,8 @@ def search_words(
         budget=budget,
         most_words=problem.search.max_expansions,
     )
-    solutions = tuple(in_order(job.solutions()))
+    found = itertools.islice(job.solutions(), MOST_LATE if budget.is_over else None)
+    solutions = tuple(in_order(found))
     if alternatives is not None and len(solutions) > alternatives + 1:
         asked = solutions[: alternatives + 1]
         most_tied = tied(asked[-1].cost) if ties else -math.inf
