@@ -191,8 +191,8 @@ class WordScan:
 
     def _scans(self, n: int, mode: Mode) -> Iterator[tuple[Callable[..., int], int]]:
         """Kernels that words of `n` trims need, and how many words at a time."""
-        # Every chunk may lower the upper bound, and costs a call with all arrays. The clock is asked
-        # between chunks: one of long words takes up to 25 ms.
+        # Every chunk may lower the upper bound, and costs a call with all arrays. The clock is
+        # asked between chunks: one of long words takes up to 25 ms.
         few = 1024 if self.pruned else 50_000
         if n <= 2 + mode.kernel_problem[0].targets.size:
             yield self.kernels.scan_flat_words, few
