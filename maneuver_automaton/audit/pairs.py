@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.audit.apart import point_apart
+from maneuver_automaton.audit.apart import crossed, point_apart
 from maneuver_automaton.audit.frames import Frames, Spans
 from maneuver_automaton.audit.passages import (
     Body,
@@ -24,6 +24,7 @@ from maneuver_automaton.collision.shapes import Motion
 
 CHORD = 0.25  # [rad] of the first stretches
 _ZERO: Array = np.zeros(1)
+SPARE = 1e-6  # [m] that nothing is left out for rounding
 GUESSES = 16  # places where an edge is looked for that is near
 NEAREST = 64  # pairs of what moves that are looked at first
 
@@ -49,29 +50,25 @@ def spans_within(frames: Frames, first: float, last: float) -> Spans:
 
 
 def overlapped(body: Body, around: Surroundings, spans: Spans) -> int:
-    """An edge of an obstacle that holds the body, or is inside it, as the first stretch begins.
-
-    -1 if there is none.
-    """
+    """An edge of an obstacle that the body overlaps as the first stretch begins; -1 for none."""
     first = spans.of(slice(1))
     pose = poses_of(body, first)[0]
     now = body.clock + body.frames.times_at(first.element, first.begin)
     places = np.unique(body.outline.solid, return_index=True)[1]
     corners = corners_of(body, pose)
+    side = ((*body.outline.begins.T,), (*body.outline.ends.T,))
     for number, one in enumerate(around.groups):
         frame = motion_at(around.motions[number - 1], now) if number else np.zeros((1, 3))
         x, y = seen_from(frame, corners)
         if number and np.hypot(x, y).min() > around.reaches[number - 1] + 2.0 * _size(body):
             continue
         held = one.holds(np.stack([x[0, places], y[0, places]], axis=1)).any(axis=1)[one.solid]
-        x, y = seen_from(pose, placed_at(frame, (one.begins[:, 0], one.begins[:, 1])))
-        held |= body.outline.holds(np.stack([x[0], y[0]], axis=1)).any(axis=0)
+        a, b = (seen_from(pose, placed_at(frame, (*ends.T,))) for ends in (one.begins, one.ends))
+        held |= body.outline.holds(np.stack([a[0][0], a[1][0]], axis=1)).any(axis=0)
+        held |= crossed((a[0].T, a[1].T), (b[0].T, b[1].T), *side).any(axis=1)
         if held.any():
-            return int(
-                (around.moving[around.firsts[number - 1] :] if number else around.still)[
-                    np.argmax(held)
-                ]
-            )
+            edges = around.moving[around.firsts[number - 1] :] if number else around.still
+            return int(edges[np.argmax(held)])
     return -1
 
 
@@ -95,7 +92,7 @@ def still_pairs(body: Body, around: Surroundings, spans: Spans) -> Iterator[tupl
     middles = _middles(body, poses)
     some = np.unique(np.linspace(0, spans.element.size - 1, GUESSES).astype(np.int64))
     guess = Pairs(spans, some, around.nearest(middles[0, some]), None)
-    nearest = float(bounds_of(body, around, guess).measured.min())
+    nearest = float(bounds_of(body, around, guess).measured.min()) + SPARE
     off = off_chords(body, spans)
     reach = nearest + float(body.outline.radius.max()) + off
     boxes = np.stack(
