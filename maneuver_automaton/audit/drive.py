@@ -45,6 +45,7 @@ class Drive:
     states: Array  # (e, N, n_z) reduced states there
     end: Array  # (dof,) last pose
     off: float  # [m, rad, model's units] how far what the plan states is from where it leads
+    turned: float  # [rad] the same, of the headings alone
     ends: Array  # (n,) [s] when the plan's own samples are
     pieces: IntArray  # (n,) number of the primitive that ends there
     controls: Array  # (n, n_u) until there
@@ -177,6 +178,7 @@ def _compared(
         states=reduced.nodes,
         end=poses[-1],
         off=off + reduced.jumps,
+        turned=float(np.abs(differences[0][:, 2]).max(initial=0.0)),
         ends=ends,
         pieces=stated.pieces,
         controls=stated.controls,
@@ -196,6 +198,7 @@ def _standing(plan: Plan, model: Model, stated: Stated) -> Drive:
         states=np.tile(states, (1, N, 1)),
         end=plan.start,
         off=0.0,
+        turned=0.0,
         ends=np.zeros(0),
         pieces=stated.pieces,
         controls=stated.controls,

@@ -87,10 +87,10 @@ def audit_plan(
     """
     near = seen_from(plan, goal)
     drive = driven(near, model)
-    scale = 1.0 + near.duration + float(np.abs(drive.frames.nodes).max())
     missed = distance_to(drive.end, goal)
     reasons = []
-    if not drive.off <= DEFECT_TOLERANCE * scale:
+    most = DEFECT_TOLERANCE * (1.0 + near.duration + np.abs(drive.frames.nodes).max(axis=(0, 1)))
+    if not (drive.off <= most.max() and drive.turned <= most[2]):
         reasons.append(f"the plan is {drive.off:.3g} off the model's equations")
     reasons += _off_the_goal(missed, goal)
     reasons += _beyond_limits(drive)
