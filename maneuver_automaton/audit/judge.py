@@ -105,7 +105,7 @@ def audit_plan(
         least = least_clearance(
             body,
             around(obstacles, origin),
-            spans_within(body.frames, 0.0, math.inf),
+            spans_within(body, 0.0, math.inf),
             enough=_enough(margin),
         )
         distances.append(least.distance)
@@ -179,7 +179,7 @@ def closest_to(
     drive = driven(seen_from(plan, goal), model)
     body = _body(drive.frames, footprint, plan, goal, (0.0, 0.0))
     around = surroundings_of(obstacles, origin_of(goal.pose))
-    least = least_clearance(body, around, spans_within(drive.frames, first, last))
+    least = least_clearance(body, around, spans_within(body, first, last))
     return least._replace(time=clock + least.time)
 
 

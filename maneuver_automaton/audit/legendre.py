@@ -6,7 +6,7 @@ Source: Hairer, Lubich, Wanner (2006), *Geometric Numerical Integration*, Sec. I
 from __future__ import annotations
 
 import numpy as np
-from numpy.polynomial.legendre import leggauss, legvander
+from numpy.polynomial.legendre import leg2poly, leggauss, legvander
 
 from maneuver_automaton._arrays import Array
 
@@ -15,6 +15,7 @@ N = 12  # nodes: over a radian, a cosine is exact to rounding between them too
 _points, _weights = leggauss(N)
 _values = legvander(_points, N - 1)  # (node, degree)
 _degrees = np.arange(N)
+_unit = [np.eye(N + 1)[k, : k + 1] for k in range(N + 1)]
 
 NODES: Array = 0.5 * (1.0 + _points)  # (N,) shares of an element
 SERIES: Array = ((2 * _degrees + 1) * _values * (0.5 * _weights)[:, None]).T  # values to series
@@ -46,6 +47,9 @@ def _slopes() -> Array:
 
 SLOPE: Array = _slopes()
 
+# Terms as sums of powers: those of high degree, whose factors are large, are tiny where it counts.
+_POWERS: Array = np.array([np.pad(leg2poly(row), (0, N - k)) for k, row in enumerate(_unit)])
+
 
 def values_at(series: Array, shares: Array) -> Array:
     """Values (m, d) of series (m, n, d) at shares (m,) of their elements.
@@ -56,9 +60,9 @@ def values_at(series: Array, shares: Array) -> Array:
     >>> values_at(line, np.array([0.75])).tolist()
     [[2.0]]
     """
-    x = 2.0 * shares - 1.0
-    terms = np.ones((series.shape[1], shares.size))
-    terms[1] = x
-    for k in range(1, len(terms) - 1):  # Bonnet's recursion
-        terms[k + 1] = ((2 * k + 1) * x * terms[k] - k * terms[k - 1]) / (k + 1)
+    n = series.shape[1]
+    powers = np.empty((n, shares.size))
+    powers[0], powers[1:] = 1.0, 2.0 * shares - 1.0
+    np.multiply.accumulate(powers, axis=0, out=powers)
+    terms = _POWERS[:n, :n] @ powers
     return np.asarray(np.matmul(terms.T[:, None, :], series)[:, 0])

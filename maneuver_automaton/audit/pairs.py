@@ -8,7 +8,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.audit.apart import crossed, point_apart
-from maneuver_automaton.audit.frames import Frames, Spans
+from maneuver_automaton.audit.frames import Spans
 from maneuver_automaton.audit.passages import (
     Body,
     Pairs,
@@ -23,19 +23,20 @@ from maneuver_automaton.audit.surroundings import Surroundings
 from maneuver_automaton.collision.shapes import Motion
 
 CHORD = 0.25  # [rad] of the first stretches
+LONGEST = 64.0  # of which the path of a small body has so many
 _ZERO: Array = np.zeros(1)
 SPARE = 1e-6  # [m] that nothing is left out for rounding
 GUESSES = 16  # places where an edge is looked for that is near
 NEAREST = 64  # pairs of what moves that are looked at first
 
 
-def spans_within(frames: Frames, first: float, last: float) -> Spans:
-    """The elements cut into stretches that turn little, between two times since the start [s]."""
-    times = frames.times
+def spans_within(body: Body, first: float, last: float) -> Spans:
+    """Stretches that turn little, and are about as long as the body, between two times [s]."""
+    frames, times = body.frames, body.frames.times
     lengths = np.diff(times)
-    steps = max(frames.length / 32.0, 1e-9)
+    steps = max(frames.length / LONGEST, _size(body), 1e-9)
     count = np.ceil(np.maximum(frames.turn / CHORD, frames.speed / steps) * lengths)
-    count = np.clip(count, 1.0, 64.0).astype(np.int64)
+    count = np.maximum(count, 1.0).astype(np.int64)
     element = np.repeat(np.arange(lengths.size), count)
     number = np.arange(element.size) - (np.cumsum(count) - count)[element]
     low, high = (np.clip((at - times[:-1]) / lengths, 0.0, 1.0) for at in (first, last))
@@ -75,7 +76,7 @@ def overlapped(body: Body, around: Surroundings, spans: Spans) -> int:
 def instant(body: Body, around: Surroundings, time: float) -> Pairs:
     """All edges at a time [s] since the start."""
     edge = np.concatenate([around.still, around.moving])
-    spans = spans_within(body.frames, time, time)
+    spans = spans_within(body, time, time)
     frames = np.zeros((edge.size, 2, 3))
     for number, motion in enumerate(around.motions):
         frames[around.movers[edge] == number] = motion_at(motion, np.array([body.clock + time]))

@@ -33,7 +33,7 @@ def what_is_hit(
     pairs = instant(body, around, time)
     known = bounds_of(body, around, pairs, overlaps=True)
     row, distance = int(np.argmin(known.measured)), float(known.measured.min())
-    held = overlapped(body, around, spans_within(body.frames, time, time))
+    held = overlapped(body, around, spans_within(body, time, time))
     if held >= 0 and body.frames.series.shape[2] == 3:
         row, distance = int(np.flatnonzero(pairs.edge == held)[0]), 0.0
     index = int(around.owners[pairs.edge[row]])
@@ -58,7 +58,7 @@ def _name_of(obstacle: AnyObstacle, index: int, place: str) -> str:
 def _nearest_point(body: Body, around: Surroundings, edge: int, frame: Array, time: float) -> Array:
     """The point (2,) of an edge, its frame at a pose (1, 3), that is nearest to the body."""
     a, b = around.outline.begins[edge], around.outline.ends[edge]
-    pose = poses_of(body, spans_within(body.frames, time, time))[0]
+    pose = poses_of(body, spans_within(body, time, time))[0]
     x, y = seen_from(frame, corners_of(body, pose))
     along = b - a
     shares = ((x[0] - a[0]) * along[0] + (y[0] - a[1]) * along[1]) / max(along @ along, 1e-300)

@@ -1,5 +1,7 @@
 """How long the audit of a plan takes: words of 5, 20, 50 trims among 10 and 150 polygons.
 
+Also of the pieces of a closed loop, one second each, among 150.
+
 ``python -m tests.benchmarks.audits [--out FILE] [--against FILE] [--repeats N]``: medians of
 processor time over plans and repeats. Run it with ``PYTHONPATH`` at another checkout and ``--out``
 first, and here with ``--against`` that file, for the ratio.
@@ -11,6 +13,7 @@ import argparse
 import json
 import statistics
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +21,7 @@ import shapely
 
 from maneuver_automaton.audit import audit_plan
 from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.automaton.cutting import head_of, tail_of
 from maneuver_automaton.collision import Motion, Obstacle, Polygon
 from maneuver_automaton.models import Car
 from maneuver_automaton.problem import Goal
@@ -74,6 +78,29 @@ def timed(plan: Plan, obstacles: list[Obstacle], repeats: int) -> float:
     return statistics.median(times[1:])
 
 
+def pieces(seed: int) -> list[tuple[Plan, list[Obstacle]]]:
+    """What a closed loop applies of a word of 20 trims, second by second."""
+    plan, obstacles = scene(seed, 20, 150)
+    steps = range(0, int(plan.duration), 5)
+    return [(head_of(tail_of(plan, float(k)), 1.0), obstacles) for k in steps]
+
+
+def measured(repeats: int) -> Iterator[tuple[str, float]]:
+    """Each kind of scene, and the median time of its audits [ms]."""
+    for trims in TRIMS:
+        for polygons in POLYGONS:
+            for moving in (0, 10):
+                yield (
+                    f"{trims} trims, {polygons} polygons, {moving} moving",
+                    statistics.median(
+                        timed(*scene(seed, trims, polygons, moving=moving), repeats)
+                        for seed in range(PLANS)
+                    ),
+                )
+    cut = [one for seed in range(2) for one in pieces(seed)]
+    yield "pieces of a closed loop", statistics.median(timed(*one, repeats) for one in cut)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path)
@@ -82,16 +109,10 @@ def main() -> None:
     options = parser.parse_args()
     before = json.loads(options.against.read_text()) if options.against else {}
     found = {}
-    for trims in TRIMS:
-        for polygons in POLYGONS:
-            for moving in (0, 10):
-                name = f"{trims} trims, {polygons} polygons, {moving} moving"
-                found[name] = statistics.median(
-                    timed(*scene(seed, trims, polygons, moving=moving), options.repeats)
-                    for seed in range(PLANS)
-                )
-                ratio = f", {before[name] / found[name]:.1f} times" if name in before else ""
-                print(f"{name}: {found[name]:.2f} ms{ratio}", flush=True)
+    for name, ms in measured(options.repeats):
+        found[name] = ms
+        ratio = f", {before[name] / ms:.1f} times" if name in before else ""
+        print(f"{name}: {ms:.2f} ms{ratio}", flush=True)
     if options.out:
         options.out.write_text(json.dumps(found))
 
