@@ -100,28 +100,12 @@ def audit_plan(
     bodies = {"": _body(drive.frames, footprint, plan, goal, body_height)}
     for name, shapes in (parts or {}).items() if obstacles or zones else ():
         bodies[name] = _body(drive.part(name), shapes, plan, goal, body_height)
+    scene = (obstacles, origin, margin)
     distances = []
     for name, body in bodies.items() if obstacles else ():
-        least = least_clearance(
-            body,
-            around(obstacles, origin),
-            spans_within(body, 0.0, math.inf),
-            enough=_enough(margin),
-        )
+        least, hit = _clearance(body, around(obstacles, origin), *scene)
         distances.append(least.distance)
-        if not _is_clear(least, margin):
-            what = f"the {name}: " if name else ""
-            reasons.append(
-                what
-                + what_is_hit(
-                    body,
-                    around(obstacles, origin),
-                    obstacles,
-                    time=least.time,
-                    margin=margin,
-                    origin=origin,
-                )
-            )
+        reasons += [f"the {name}: {hit}" if name else hit] if hit else []
     reasons += zones_broken(drive, list(bodies.values()), zones, origin)
     return Audit(
         passed=not reasons,
@@ -197,15 +181,23 @@ def _body(
     )
 
 
-def _enough(margin: float) -> float:
-    """Distance [m] that is not enough where a margin [m] is to be kept; touching never is."""
-    return max(CONTACT, margin - CONTACT)
+def _clearance(
+    body: Body,
+    around: Surroundings,
+    obstacles: tuple[AnyObstacle, ...],
+    origin: tuple[float, float],
+    margin: float,
+) -> tuple[Least, str]:
+    """The least clearance of a body, and what it hits; empty if it keeps the margin [m].
 
-
-def _is_clear(least: Least, margin: float) -> bool:
-    """Whether the margin is kept; what cannot be told is no collision."""
-    enough = _enough(margin)
-    return least.measured > enough and least.distance > enough - UNRESOLVED
+    Where it cannot be told, to within a millimetre, it does.
+    """
+    enough = max(CONTACT, margin - CONTACT)  # touching never is
+    least = least_clearance(body, around, spans_within(body, 0.0, math.inf), enough=enough)
+    if least.measured > enough and least.distance > enough - UNRESOLVED:
+        return least, ""
+    at = least.time
+    return least, what_is_hit(body, around, obstacles, time=at, margin=margin, origin=origin)
 
 
 def _off_the_goal(missed: TerminalError, goal: Goal) -> list[str]:
