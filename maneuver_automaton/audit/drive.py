@@ -5,7 +5,7 @@ Nothing of what made the plan is used: no group formula, no closed form, no pose
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -155,6 +155,9 @@ def _compared(
 ) -> Drive:
     """The drive, and the greatest difference to what the plan states of it."""
     reduced, frames = found.reduced, found.frames
+    # What a reduced state is off moves the vehicle for as long as it is driven.
+    unknown = (1.0 + float(frames.times[-1])) * (reduced.error + reduced.jumps / reduced.error.size)
+    frames = replace(frames, error=frames.error + unknown)
     ends = np.cumsum(stated.lengths)
     at = np.searchsorted(elements.first, np.arange(ends.size), side="right") - 1
     share = np.clip((ends - frames.times[at]) / elements.lengths[at], 0.0, 1.0)

@@ -47,7 +47,7 @@ def reduced_states(
     for sweep in range(SWEEPS):
         nodes, rates, failed = _driven(model, begins, controls, lengths)
         if failed.any():
-            return Reduced(nodes, nodes, np.where(failed, np.inf, 0.0), 0.0)
+            return Reduced(nodes, nodes, np.where(failed, np.inf, 0.0), np.inf)
         jumps = begins[:-1] + lengths[:-1, None] * (TO_END @ rates[:-1]) - begins[1:]
         scale = 1.0 + np.abs(begins).max(axis=1)
         open_ = np.abs(jumps).max(axis=1, initial=0.0) > SAME * scale[1:]

@@ -98,4 +98,4 @@ def placed(frames: Array, seen: Array) -> Array:
     x, y = seen[..., 0], seen[..., 1]
     planar = [cosine * x - sine * y, sine * x + cosine * y, seen[..., 2]]
     higher = [seen[..., k] if k < seen.shape[-1] else 0.0 * x for k in range(3, frames.shape[-1])]
-    return np.asarray(frames + np.stack([*planar, *higher], axis=-1))
+    return np.asarray(frames + np.stack(np.broadcast_arrays(*planar, *higher), axis=-1))

@@ -348,7 +348,7 @@ def test_against_many_poses(footprint):
             slow_distance(footprint, obstacles, pose, time)
             for pose, time in zip(AROUND.pose_at(times), times, strict=True)
         )
-        assert audit.min_clearance_m <= max(least / 0.9, least + 1e-3) + 1e-9
+        assert audit.min_clearance_m <= least + 1e-9
         assert audit.passed == (audit.min_clearance_m > 1e-9)
 
 
@@ -381,7 +381,7 @@ def test_a_moved_plan_has_the_same_clearance():
         by = SE2([*rng.uniform(-50.0, 50.0, 2), rng.uniform(-5.0, 5.0)])
         one = audited(AROUND, *obstacles)
         other = audited(AROUND.moved(by), *(o.moved(by) for o in obstacles))
-        assert one.min_clearance_m == pytest.approx(other.min_clearance_m, abs=1e-3, rel=0.1)
+        assert one.min_clearance_m == pytest.approx(other.min_clearance_m, abs=1e-3, rel=0.01)
         assert one.passed == other.passed
 
 

@@ -10,8 +10,9 @@ import pytest
 
 from maneuver_automaton.audit import audit_plan
 from maneuver_automaton.automaton import Automaton, Plan
-from maneuver_automaton.collision import Disc, Obstacle
-from maneuver_automaton.models import CarWithTrailer, SecondOrderCar
+from maneuver_automaton.collision import Box, Disc, Obstacle, Zone
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.models import CarWithTrailer, SecondOrderCar, UserModel
 from maneuver_automaton.planning import checking
 from maneuver_automaton.planning.checking import Condition, check_plan
 from maneuver_automaton.primitives import Maneuver, Trim
@@ -109,6 +110,43 @@ def test_a_trailer_that_the_planner_places_beside_its_place(monkeypatch):
     assert found.broken is Condition.AUDIT
     assert found.reason.startswith("the trailer: at ")
     assert found.reason.endswith("touches obstacle 'post'")
+
+
+def test_a_zone_holds_for_what_is_carried():
+    cart = UserModel(
+        name="cart",
+        group=SE2,
+        control_names=("speed",),
+        velocity=lambda z, u: [u[0], 0.0, 0.0],
+        part_names=("cart",),
+        part_poses=lambda z: np.broadcast_to([[-3.0, 0.0, 0.0]], (*np.shape(z)[:-1], 1, 3)),
+    )
+    ahead = Trim(name="ahead", body_velocity=[2.0, 0.0, 0.0], control=[2.0])
+    plan = Plan(np.zeros(3), (ahead,), durations=[2.0])
+    school = Zone(shape=Box([2.0, 2.0], [-2.5, 0.0]), max_speed=1.0, name="the school")
+
+    def judged_with(parts):
+        return audit_plan(plan, Goal(pose=plan.end), cart, parts=parts, zones=(school,))
+
+    assert judged_with({}).passed
+    audit = judged_with({"cart": (Disc(0.3),)})
+    assert audit.reason == "at 0 s the vehicle moves as the school does not admit"
+
+
+def test_an_integration_that_fails_is_no_plan():
+    bursting = UserModel(
+        name="bursting",
+        group=SE2,
+        control_names=("push",),
+        reduced_names=("speed",),
+        velocity=lambda z, u: [z[0], 0.0, 0.0],
+        dynamics=lambda z, u: [1.0 + z[0] * z[0]],  # its speed is infinite after pi / 2
+    )
+    still = Trim(name="still", body_velocity=[0.0, 0.0, 0.0], control=[0.0], reduced_state=[0.0])
+    plan = Plan(np.zeros(3), (still,), durations=[3.0])
+    audit = audit_plan(plan, Goal(pose=plan.end), bursting)
+    assert not audit.passed
+    assert audit.reason.startswith("the plan is ")
 
 
 def test_a_trailer_that_is_pushed_far_is_followed():
