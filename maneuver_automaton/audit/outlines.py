@@ -22,8 +22,8 @@ class Outline(NamedTuple):
     radius: Array  # (n,) [m]
     solid: IntArray  # (n,) which solid each edge bounds, in order; holes bound theirs too
 
-    def of(self, kept: NDArray[np.bool_]) -> Outline:
-        """Some of its edges, their solids numbered anew."""
+    def of(self, kept: NDArray[np.bool_] | IntArray) -> Outline:
+        """Some of its edges, in order, their solids numbered anew."""
         solid = np.unique(self.solid[kept], return_inverse=True)[1]
         return Outline(self.begins[kept], self.ends[kept], self.radius[kept], solid)
 

@@ -9,6 +9,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.audit.apart import crossed, point_apart
 from maneuver_automaton.audit.frames import Spans
+from maneuver_automaton.audit.outlines import Outline
 from maneuver_automaton.audit.passages import (
     Body,
     Pairs,
@@ -55,22 +56,35 @@ def overlapped(body: Body, around: Surroundings, spans: Spans) -> int:
     first = spans.of(slice(1))
     pose = poses_of(body, first)[0]
     now = body.clock + body.frames.times_at(first.element, first.begin)
-    places = np.unique(body.outline.solid, return_index=True)[1]
-    corners = corners_of(body, pose)
-    side = ((*body.outline.begins.T,), (*body.outline.ends.T,))
+    x, y = corners_of(body, pose)
+    radius = float(body.outline.radius.max())
+    low, high = np.array([x.min(), y.min()]) - radius, np.array([x.max(), y.max()]) + radius
+    firsts = np.unique(body.outline.solid, return_index=True)[1]
+    still = around.about(low, high, np.stack([x[0, firsts], y[0, firsts]], axis=1))
+    edge = _overlapped_edge(body, pose, around.outline.of(still), np.zeros((1, 3)))
+    if edge >= 0:
+        return int(still[edge])
     for number, one in enumerate(around.groups):
-        frame = motion_at(around.motions[number - 1], now) if number else np.zeros((1, 3))
-        x, y = seen_from(frame, corners)
-        if number and np.hypot(x, y).min() > around.reaches[number - 1] + 2.0 * _size(body):
-            continue
-        held = one.holds(np.stack([x[0, places], y[0, places]], axis=1)).any(axis=1)[one.solid]
-        a, b = (seen_from(pose, placed_at(frame, (*ends.T,))) for ends in (one.begins, one.ends))
-        held |= body.outline.holds(np.stack([a[0][0], a[1][0]], axis=1)).any(axis=0)
-        held |= crossed((a[0].T, a[1].T), (b[0].T, b[1].T), *side).any(axis=1)
-        if held.any():
-            edges = around.moving[around.firsts[number - 1] :] if number else around.still
-            return int(edges[np.argmax(held)])
+        frame = motion_at(around.motions[number], now)
+        away = np.hypot(x - frame[0, 0], y - frame[0, 1]).min()
+        if away <= around.reaches[number] + 2.0 * _size(body):
+            edge = _overlapped_edge(body, pose, one, frame)
+            if edge >= 0:
+                return int(around.moving[around.firsts[number] + edge])
     return -1
+
+
+def _overlapped_edge(body: Body, pose: Array, one: Outline, frame: Array) -> int:
+    """An edge of an outline in a frame (1, 3) that the body at a pose (1, dof) overlaps, or -1."""
+    own = body.outline
+    x, y = seen_from(frame, corners_of(body, pose))
+    firsts = np.unique(own.solid, return_index=True)[1]
+    held = one.holds(np.stack([x[0, firsts], y[0, firsts]], axis=1)).any(axis=1)[one.solid]
+    a, b = (seen_from(pose, placed_at(frame, (*ends.T,))) for ends in (one.begins, one.ends))
+    held |= own.holds(np.stack([a[0][0], a[1][0]], axis=1)).any(axis=0)
+    side = ((*own.begins.T,), (*own.ends.T,))
+    held |= crossed((a[0].T, a[1].T), (b[0].T, b[1].T), *side).any(axis=1)
+    return int(np.argmax(held)) if held.any() else -1
 
 
 def instant(body: Body, around: Surroundings, time: float) -> Pairs:

@@ -37,7 +37,7 @@ class Surroundings:
     still: IntArray  # (k,) numbers of the edges that stand still
     moving: IntArray  # those of the others, motion by motion
     firsts: IntArray  # (motions + 1,) where those of each motion begin among them
-    groups: tuple[Outline, ...]  # the edges that stand still, then those of each motion
+    groups: tuple[Outline, ...]  # (motions,) the edges of each motion
     reaches: Array  # (motions,) [m] how far they are from their frames at most
     tree: Any  # STRtree of these
 
@@ -50,6 +50,13 @@ class Surroundings:
 
         which, edges = self.tree.query(shapely.box(*boxes.T))
         return which, self.still[edges]
+
+    def about(self, low: Array, high: Array, points: Array) -> IntArray:
+        """Still edges in a box, and to the right of points (m, 2), which tell what holds these."""
+        right = np.column_stack([points, np.full(len(points), math.inf), points[:, 1]])
+        right[:, 2] = max(float(self.outline.begins[:, 0].max(initial=0.0)), float(high[0])) + 1.0
+        edges: IntArray = np.unique(self.near(np.vstack([[*low, *high], right]))[1])
+        return edges
 
     def nearest(self, points: Array) -> IntArray:
         """A still edge (m,) that is near each of points (m, 2)."""
@@ -112,7 +119,7 @@ def surroundings_around(
     heights_of = np.repeat(np.array(heights).reshape(-1, 2), counts, axis=0)
     moving = np.flatnonzero(mover >= 0)
     firsts = np.searchsorted(mover[moving], np.arange(len(motions) + 1))
-    groups = tuple(whole.of(mover == number) for number in range(-1, len(motions)))
+    groups = tuple(whole.of(mover == number) for number in range(len(motions)))
     return Surroundings(
         outline=whole,
         owners=np.repeat(np.arange(len(counts)), counts),
@@ -123,7 +130,7 @@ def surroundings_around(
         moving=moving,
         firsts=firsts,
         groups=groups,
-        reaches=np.array([_reach(group) for group in groups[1:]]),
+        reaches=np.array([_reach(group) for group in groups]),
         tree=shapely.STRtree(_geometries(whole, still, heights_of)),
     )
 
@@ -147,6 +154,6 @@ def _geometries(outline: Outline, still: IntArray, heights: Array) -> Any:
     whole = np.isfinite(heights[still, :1])
     low = np.where(whole, least[outline.solid[still]], low)
     high = np.where(whole, most[outline.solid[still]], high)
-    return np.where(
-        np.asarray(whole[:, 0] | (radius[:, 0] > 0.0)), shapely.box(*low.T, *high.T), edges
-    )
+    boxed = np.flatnonzero(whole | (radius > 0.0))
+    edges[boxed] = shapely.box(*low[boxed].T, *high[boxed].T)
+    return edges
