@@ -135,13 +135,15 @@ def _rings(rings: Sequence[Array]) -> Outline:
 
 
 def _solid_rings(corners: Array, holes: Sequence[Array]) -> list[Array]:
-    """Rings of a polygon, the outer ones counter-clockwise, the holes clockwise.
+    """Rings of a polygon, the holes the other way around than what they are in.
 
     Rings that cross or touch themselves are cut into faces; those that they run around are solid.
     """
     import shapely
 
     whole = shapely.Polygon(corners, holes)
+    if whole.is_valid and not holes and whole.area > 0.0:
+        return [corners]
     if not whole.is_valid:
         whole = _faces(corners)
         for hole in holes:
