@@ -1,12 +1,16 @@
-"""A second opinion on a finished plan, which shares no code with the search that found it.
+"""A second opinion on a finished plan, which shares no code with what made it.
 
-The model's equations are integrated under the plan's controls, and every pose of the plan is
-compared with them. The distance to the obstacles is measured by another library than the one that
-checked the motions.
+The model's equations are integrated once under the plan's controls, from its start. What the plan
+states is compared with that, and the distance of that motion to the obstacles is bounded from
+below, between samples too.
 """
 
-from maneuver_automaton.audit.clearance import closest_to as closest_to
+from maneuver_automaton.audit.clearance import Least as Least
 from maneuver_automaton.audit.judge import audit_plan as audit_plan
+from maneuver_automaton.audit.judge import closest_to as closest_to
+from maneuver_automaton.audit.surroundings import Surroundings as Surroundings
+from maneuver_automaton.audit.surroundings import origin_of as origin_of
+from maneuver_automaton.audit.surroundings import surroundings_around as surroundings_around
 from maneuver_automaton.audit.values import Audit as Audit
 from maneuver_automaton.audit.values import TerminalError as TerminalError
 from maneuver_automaton.audit.values import terminal_error as terminal_error

@@ -1,249 +1,110 @@
-"""How close a plan comes to obstacles, and to zones that do not admit its motion.
+"""The least clearance along a drive, guaranteed: no instant has less.
 
-Distances are measured by shapely, which neither the search nor FCL uses for them.
+A bound holds for every stretch of time and every edge of an obstacle near it (`passages`).
+Stretches where it is not sharp enough are cut, all of them at once.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array
-from maneuver_automaton.audit.stretches import Stretches, course_of
-from maneuver_automaton.audit.values import seen_from
-from maneuver_automaton.automaton import Plan
-from maneuver_automaton.collision import AnyObstacle, Obstacle, Shape, Zone
-from maneuver_automaton.collision.approach import Approach, closest_approach
-from maneuver_automaton.collision.blocked import too_close, touched_near
-from maneuver_automaton.collision.checker import origin_near
-from maneuver_automaton.collision.heights import Layer, layers_of
-from maneuver_automaton.collision.surroundings import (
-    Surroundings,
-    fastest_point,
-    parts_of,
-    surroundings_of,
-)
-from maneuver_automaton.groups import group_of
-from maneuver_automaton.models import Model
-from maneuver_automaton.primitives import Trim
-from maneuver_automaton.problem import Goal
+from maneuver_automaton.audit.frames import Spans
+from maneuver_automaton.audit.pairs import moving_pairs, overlapped, still_pairs
+from maneuver_automaton.audit.passages import Body, Pairs, bounds_of
+from maneuver_automaton.audit.surroundings import Surroundings
 
-CLEARANCE_TOLERANCE = 1e-3  # [m] no overlap between poses is deeper
-FIRST_POSES = 8  # of every trim, to measure distances at
-
-Around: TypeAlias = Callable[[tuple[AnyObstacle, ...], tuple[float, float]], Surroundings]
+CONTACT = 1e-9  # [m] what is closer touches: places are rounded
+SHARP = (1e-3, 0.01)  # [m], and of the distance: by how much less may be reported
+PARTS = 4  # into which a stretch that is not sharp enough is cut
+ROUNDS = 16  # of cutting at most
+MOST = 200_000  # stretches at once; with more, what is known is reported
 
 
-class Scene(NamedTuple):
-    """Obstacles around the place of a plan, and the body that keeps clear of them."""
+class Least(NamedTuple):
+    """The least clearance of a body."""
 
-    footprint: tuple[Shape, ...]
-    obstacles: tuple[AnyObstacle, ...]
-    margin: float  # [m]
-    origin: tuple[float, float]  # where obstacles are counted from [m]
-    place: Array  # (dof,) the pose whose place the plan is counted from
-    clock: float  # [s] when it starts
-    height: tuple[float, float]  # [m] of the body
-
-    def seen(self, plan: Plan, times: Array) -> Array:
-        """Poses (n, 3) of the plan at times since its start, counted from the origin."""
-        poses = plan.pose_at(times)[..., :3].copy()
-        poses[..., :2] += self.place[:2] - self.origin
-        return poses
-
-    def altitudes(self, plan: Plan, times: Array) -> Array:
-        """Altitudes (n,) [m] at times since the start; zero in the plane."""
-        return np.asarray(plan.pose_at(times)[..., 3:].sum(axis=-1) + self.place[3:].sum())
-
-    def layers(self, plan: Plan) -> tuple[Layer, ...]:
-        """The obstacles by height, all in one in the plane."""
-        return layers_of(self.obstacles, in_space=plan.start.size > 3)
+    distance: float  # [m] no instant has less
+    measured: float  # [m] the least one measured
+    time: float  # [s] since the start, when that was
 
 
-def closest_to(
-    plan: Plan,
-    obstacles: tuple[AnyObstacle, ...],
-    *,
-    footprint: tuple[Shape, ...],
-    within: tuple[float, float] = (-math.inf, math.inf),
-) -> Approach:
-    """When a plan comes closest to obstacles, and their distance then [m], measured by shapely.
+NEVER = Least(math.inf, math.inf, 0.0)
+
+
+def least_clearance(
+    body: Body, around: Surroundings, spans: Spans, *, enough: float = 0.0
+) -> Least:
+    """The least clearance of a body over stretches of time.
 
     Parameters
     ----------
-    plan : Plan
-    obstacles : tuple of Obstacle or OccupancyMap
-    footprint : tuple of Shape
-        Parts of the body; empty for a point.
-    within : (float, float)
-        First and last time that counts, on the plan's clock [s].
+    body : Body
+    around : Surroundings
+    spans : Spans
+        In order of time.
+    enough : float
+        Clearance [m] that decides: the bound is made sharp enough to tell on which side it is.
 
     Returns
     -------
-    Approach
-        An infinite distance if there is no obstacle, or the plan has no such time.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.collision import Disc
-    >>> ahead = Trim(name="ahead", body_velocity=[1.0, 0.0, 0.0], control=[1.0, 0.0])
-    >>> plan = Plan([0.0, 0.0, 0.0], (ahead,), durations=[4.0])
-    >>> post = (Obstacle(Disc(0.5, [3.0, 2.0])),)
-    >>> closest_to(plan, post, footprint=(Disc(0.5),), within=(0.0, 3.0))
-    Approach(time=3.0, distance=1.0)
+    Least
+        No instant has less than `distance`, which is at most 1 mm or 1 % below `measured`, unless
+        that takes more than `MOST` stretches at once.
     """
-    goal, clock = Goal(pose=plan.end), plan.start_time
-    first, last = max(within[0] - clock, 0.0), min(within[1] - clock, plan.duration)
-    if not obstacles or first > last:
-        return Approach(clock, math.inf)
-    near, place = seen_from(plan, goal), goal.pose
-    scene = Scene(footprint, obstacles, 0.0, origin_near(place), place, clock, (0.0, 0.0))
-    least = closest(near, scene, surroundings_of, (first, last))
-    return least._replace(time=clock + least.time)
+    if not around.owners.size or not spans.element.size:
+        return NEVER
+    least = NEVER
+    if body.frames.series.shape[2] == 3 and overlapped(body, around, spans) >= 0:
+        start = float(body.frames.times_at(spans.element[:1], spans.begin[:1])[0])
+        return Least(0.0, 0.0, start)
+    for batch in (still_pairs, moving_pairs):
+        for nearest, pairs in batch(body, around, spans):
+            if not nearest < least.measured:
+                break
+            least = _sharpened(body, around, pairs, least, enough)
+    return least._replace(distance=max(least.distance, 0.0))
 
 
-def closest(
-    plan: Plan,
-    scene: Scene,
-    around: Around,
-    within: tuple[float, float] = (0.0, math.inf),
-) -> Approach:
-    """When the plan is closest to an obstacle, between two times since its start [s]."""
-    distances, speed = _distances(plan, scene, around)
-    if not plan.primitives:
-        return Approach(0.0, float(distances(np.zeros(1))[0]))
-    times, twists = _constant_twists(plan)
-    rates = fastest_point(parts_of(scene.footprint), twists[:, :3]) + speed
-    rates = np.hypot(rates, twists[:, 3:].sum(axis=1))
-    first, last = max(within[0], times[0]), min(within[1], times[-1])
-    cut = np.concatenate([[first], times[(times > first) & (times < last)], [last]])
-    stretch = np.searchsorted(times, cut[:-1], "right") - 1
-    return closest_approach(
-        distances,
-        cut,
-        rates[np.clip(stretch, 0, len(rates) - 1)],
-        resolution=CLEARANCE_TOLERANCE,
-        enough=too_close(scene.margin),
-    )
+def _sharpened(
+    body: Body, around: Surroundings, pairs: Pairs, least: Least, enough: float
+) -> Least:
+    """The least clearance over pairs too, their stretches cut until it is sharp."""
+    floor = least.distance
+    for number in range(ROUNDS):
+        known = bounds_of(body, around, pairs)
+        best = int(np.argmin(known.measured))
+        if known.measured[best] < least.measured:
+            least = Least(floor, float(known.measured[best]), float(known.time[best]))
+        sharp = least.measured - max(SHARP[0], SHARP[1] * least.measured)
+        undecided = (known.least <= enough) & (enough < least.measured)
+        open_ = ((known.least < sharp) | undecided) & (least.measured > CONTACT)
+        if number == ROUNDS - 1 or PARTS * int(open_.sum()) > MOST:
+            open_[:] = False
+        floor = min(floor, float(known.least[~open_].min(initial=math.inf)))
+        if not open_.any():
+            break
+        pairs = _cut(pairs, open_)
+    return least._replace(distance=floor)
 
 
-def _distances(plan: Plan, scene: Scene, around: Around) -> tuple[Callable[[Array], Array], float]:
-    """Distances (k,) [m] at times (k,) since the start, and the greatest speed of an obstacle."""
-    layers = scene.layers(plan)
-    near = [around(layer.obstacles, scene.origin) for layer in layers]
-    body = parts_of(scene.footprint)
-
-    def distances(times: Array) -> Array:
-        poses, clock = scene.seen(plan, times), scene.clock + times
-        apart = [one.nearest(body, poses, clock).distance for one in near]
-        altitudes = scene.altitudes(plan, times)
-        over = [layer.clearance(altitudes, scene.height) for layer in layers]
-        return np.asarray(np.min(np.hypot(apart, over), axis=0))
-
-    return distances, max(one.speed for one in near)
-
-
-def _constant_twists(plan: Plan) -> tuple[Array, Array]:
-    """Times (n + 1,) [s] between which the plan's poses run with constant twists (n, dof)."""
-    group = group_of(plan.start.size)
-    times: list[Array] = []
-    twists: list[Array] = []
-    for k, primitive in enumerate(plan.primitives):
-        begin, span = plan.switching_times[k], plan.primitive_durations[k]
-        if isinstance(primitive, Trim):
-            times.append(begin + span * np.arange(FIRST_POSES) / FIRST_POSES)
-            twists.append(np.tile(primitive.body_velocity, (FIRST_POSES, 1)))
-            continue
-        course = course_of(primitive)
-        lengths = np.diff(course.time)
-        steps = (group(course.pose[:-1]).inverse() @ group(course.pose[1:])).log()
-        times.append(begin + course.time[:-1])
-        twists.append(steps / np.maximum(lengths, 1e-300)[:, None])
-    return np.concatenate([*times, plan.switching_times[-1:]]), np.concatenate(twists)
-
-
-def what_is_hit(plan: Plan, scene: Scene, time: float) -> str:
-    """A sentence on what the vehicle touches at a time since the start of the plan [s]."""
-    at = np.array([time])
-    near = [
-        obstacle
-        for layer in scene.layers(plan)
-        if layer.clearance(scene.altitudes(plan, at), scene.height)[0] <= scene.margin
-        for obstacle in layer.obstacles
-    ]
-    what = touched_near(
-        scene.footprint,
-        tuple(near),
-        scene.seen(plan, at)[0],
-        time=scene.clock + time,
-        margin=scene.margin,
-        origin=scene.origin,
-    )
-    return f"at {scene.clock + time:.6g} s {what}"
-
-
-def zones_broken(
-    plan: Plan,
-    driven: Stretches,
-    model: Model,
-    *,
-    footprint: tuple[Shape, ...],
-    zones: tuple[Zone, ...],
-    place: Array,
-) -> list[str]:
-    """Which zones a plan is in while it moves as they do not admit."""
-    if not (zones and driven.lengths.size):
-        return []
-    reasons = []
-    times = np.concatenate([[0.0], np.cumsum(driven.lengths)])
-    group, dof = group_of(plan.start.size), plan.start.size
-    steps = (group(driven.begins).inverse() @ group(driven.ends)).log().reshape(-1, dof)
-    rates = fastest_point(parts_of(footprint), steps[:, :3] / driven.lengths[:, None])
-    moving = [
-        model.body_velocity(states, driven.controls)
-        for states in (driven.states, driven.end_states)
-    ]
-    for zone in zones:
-        admitted = zone.admits(moving[0]) & zone.admits(moving[1])
-        admitted &= _named(plan, zone, 0.5 * (times[:-1] + times[1:]))
-        where = (Obstacle(zone.shape),)
-        scene = Scene(footprint, where, 0.0, origin_near(place), place, 0.0, (0.0, 0.0))
-        least = _closest_while(plan, scene, times, rates, ~admitted)
-        if not least.distance > too_close(0.0):
-            reasons.append(
-                f"at {least.time:.6g} s the vehicle moves as {zone.words} does not admit"
-            )
-    return reasons
-
-
-def _named(plan: Plan, zone: Zone, times: Array) -> NDArray[np.bool_]:
-    """Whether the names of what is driven at `times` (n,) are admitted in a zone."""
-    index = np.searchsorted(plan.switching_times[1:-1], times, side="right")
-    known = [
-        zone.admits_names([one.name] if isinstance(one, Trim) else [one.source, one.target])
-        for one in plan.primitives
-    ]
-    return np.array(known, dtype=np.bool_)[index]
-
-
-def _closest_while(
-    plan: Plan, scene: Scene, times: Array, rates: Array, counted: NDArray[np.bool_]
-) -> Approach:
-    """When the plan is closest, in the stretches between `times` (n + 1,) that are `counted`."""
-    distances, _ = _distances(plan, scene, surroundings_of)
-    least = Approach(0.0, math.inf)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], counted, [False]]).astype(np.int8)))
-    for first, last in edges.reshape(-1, 2):
-        near = closest_approach(
-            distances,
-            times[first : last + 1],
-            rates[first:last],
-            resolution=CLEARANCE_TOLERANCE,
-            enough=too_close(0.0),
-        )
-        least = min(least, near, key=lambda one: one.distance)
-    return least
+def _cut(pairs: Pairs, open_: NDArray[np.bool_]) -> Pairs:
+    """Some stretches in `PARTS` each."""
+    rows = np.repeat(np.flatnonzero(open_), PARTS)
+    part = np.tile(np.arange(PARTS), rows.size // PARTS)
+    kept, number = np.unique(pairs.span[open_], return_inverse=True)
+    whole = pairs.spans.of(kept)
+    shares = np.arange(PARTS + 1) / PARTS
+    ends = whole.begin[:, None] + (whole.end - whole.begin)[:, None] * shares
+    ends[:, -1] = whole.end
+    spans = Spans(np.repeat(whole.element, PARTS), ends[:, :-1].ravel(), ends[:, 1:].ravel())
+    span = np.repeat(number, PARTS) * PARTS + part
+    if pairs.frames is None:
+        return Pairs(spans, span, pairs.edge[rows], None)
+    first, last = pairs.frames[rows, 0], pairs.frames[rows, 1]
+    between = np.stack([part, part + 1], axis=1)[..., None] / PARTS
+    frames = first[:, None] + between * (last - first)[:, None]
+    return Pairs(spans, span, pairs.edge[rows], frames)

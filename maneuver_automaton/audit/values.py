@@ -24,8 +24,8 @@ class Audit:
     """Findings of the audit of one plan."""
 
     passed: bool
-    max_dynamics_defect: float  # [m, rad, model's units] worst difference to the ODE solver
-    min_clearance_m: float | None
+    max_dynamics_defect: float  # [m, rad, model's units] to where the controls lead
+    min_clearance_m: float | None  # guaranteed: never more than the true one
     terminal_position_m: float
     terminal_heading_rad: float
     reason: str = ""

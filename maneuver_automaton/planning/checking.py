@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.audit import Audit, audit_plan
+from maneuver_automaton.audit import Audit, audit_plan, origin_of
 from maneuver_automaton.automaton import Automaton, Plan, Primitive
 from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.collision import Box
@@ -90,12 +90,13 @@ def load_checks(problem: Problem, workspace: Workspace) -> None:
         workspace.checker(
             problem.footprint, layer.obstacles, problem.margin, origin, proven=PROVEN[0]
         )
-        workspace.surroundings(layer.obstacles, origin)
+    if problem.obstacles:
+        workspace.surroundings(problem.obstacles, origin_of(problem.goals[0].pose))
 
 
 @functools.cache
 def load_checking() -> None:
-    """Import what checks: the ODE solver, shapely, FCL."""
+    """Import what checks: the audit, shapely, FCL."""
     ahead = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0)})
     wall = Box([1.0, 1.0], [5.0, 5.0])
     problem = Problem(ahead, [0, 0, 0], [1, 0, 0], obstacles=wall, footprint=Box([0.1, 0.1]))

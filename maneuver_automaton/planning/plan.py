@@ -20,7 +20,7 @@ from maneuver_automaton.search.lattice_query import lattice_query
 
 
 def plan(problem: Problem, *, time_limit: float = 5.0, alternatives: int = 0) -> PlanResult:
-    """Cheapest plan found for `problem`, audited by an ODE solver before it is returned.
+    """Cheapest plan found for `problem`, audited by an integration of its own.
 
     Parameters
     ----------

@@ -6,9 +6,9 @@ import functools
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
+from maneuver_automaton.audit import Surroundings, surroundings_around
 from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.collision.fcl_checker import FclChecker
-from maneuver_automaton.collision.surroundings import Surroundings, surroundings_around
 from maneuver_automaton.search.prepared import RECENT, Prepared
 
 _Map: TypeAlias = tuple[tuple[AnyObstacle, ...], tuple[float, float]]

@@ -70,8 +70,8 @@ def simulate(
         The obstacles that the controller sees and predicts at the step of a number; if omitted,
         those of the problem. By these, which are the true ones, the driven motion is judged.
     audit : bool
-        Have an ODE solver drive every piece again that was applied, and measure its distance to
-        the obstacles of the problem.
+        Integrate every piece again that was applied, and bound its distance to the obstacles of
+        the problem.
     progress : callable, optional
         Called with every step.
 
@@ -272,7 +272,9 @@ def _audited(problem: Problem, piece: Plan) -> Audit:
         Goal(pose=piece.end),
         problem.automaton.model,
         footprint=problem.footprint,
+        parts=problem.parts,
         obstacles=problem.obstacles,
+        body_height=problem.body_height,
         zones=problem.zones,
     )
 

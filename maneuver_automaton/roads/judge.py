@@ -1,8 +1,7 @@
 """What a drive was, by the audit: contacts, distances, the road left, equations and limits.
 
-Nothing of the planner is used. The body is measured by shapely against all other road users while
-they are there, and against the land beside the road; the equations are driven once more by an ODE
-solver.
+Nothing of the planner is used. The equations are integrated once more, and the body is held against
+all other road users while they are there, and against the land beside the road.
 """
 
 from __future__ import annotations
@@ -51,19 +50,19 @@ class RoadVerdict:
 
 def judged(scene: RoadScene, vehicle: RoadVehicle, plan: Plan) -> RoadVerdict:
     """The verdict on a plan in the coordinates and on the clock of the scene."""
-    body = (vehicle.footprint,)
+    model, body = vehicle.model, (vehicle.footprint,)
     clearance, hit = math.inf, set()
     for one in scene.traffic:
         # A road user counts only while it is there, so each is measured within its own times.
-        distance = closest_to(plan, (one,), footprint=body, within=presence_of(one)).distance
+        distance = closest_to(plan, model, (one,), footprint=body, within=presence_of(one)).distance
         clearance = min(clearance, distance)
         if distance <= too_close(0.0):
             hit.add(one.name)
     return RoadVerdict(
-        audit=audit_plan(plan, Goal(pose=plan.end), vehicle.model),
+        audit=audit_plan(plan, Goal(pose=plan.end), model),
         hit=tuple(sorted(hit)),
         clearance_m=clearance,
-        edge_m=closest_to(plan, land_beside(scene.lanelets, plan), footprint=body).distance,
+        edge_m=closest_to(plan, model, land_beside(scene.lanelets, plan), footprint=body).distance,
     )
 
 

@@ -68,7 +68,7 @@ def test_every_word_of_a_right_library_passes(automaton, data):
     assert audit.reason == ""
     assert audit.max_dynamics_defect < 1e-8
     assert audit.terminal_position_m < 1e-12
-    assert audit.terminal_heading_rad == 0.0
+    assert audit.terminal_heading_rad < 1e-12
 
 
 def test_whole_turns_of_the_heading_do_not_count():
@@ -91,9 +91,9 @@ def test_a_trim_that_lies_about_its_twist_is_caught(velocity):
     plan = lying(PARKING, 1, velocity)
     audit = audit_plan(plan, Goal(pose=plan.end), ROBOT.model)
     assert not audit.passed
-    assert audit.terminal_position_m < 1e-12  # by its own account it ends at the goal
-    assert audit.reason == (
-        f"the plan is {audit.max_dynamics_defect:.3g} off the model's equations"
+    assert audit.terminal_position_m > 1e-6  # by its own account it ends at the goal
+    assert audit.reason.startswith(
+        f"the plan is {audit.max_dynamics_defect:.3g} off the model's equations; it ends "
     )
 
 
@@ -103,7 +103,7 @@ def test_a_lie_that_ends_in_the_right_place_is_caught():
     half = Plan([0.0, 0.0, 0.0], (circle,), durations=[1.0])
     audit = audit_plan(half, Goal(pose=[0.0, 2.0, math.pi]), Unicycle())
     assert not audit.passed
-    assert audit.terminal_position_m < 1e-12
+    assert audit.terminal_position_m > 1.0
     # a whole circle in place of a rest: start and end are the same, the way is not
     loop = Trim(name="loop", body_velocity=[1.0, 0.0, 1.0], control=[0.0, 0.0])
     still = Plan([0.0, 0.0, 0.0], (loop,), durations=[2 * math.pi])
@@ -270,8 +270,7 @@ def test_without_obstacles_there_is_no_clearance():
 def test_the_least_clearance_by_hand(obstacle, clearance):
     audit = audited(AHEAD, obstacle)
     assert audit.passed, audit.reason
-    assert audit.min_clearance_m == pytest.approx(clearance, abs=1e-3)
-    assert audit.min_clearance_m >= clearance - 1e-9
+    assert clearance - max(1e-3, 0.01 * clearance) <= audit.min_clearance_m <= clearance + 1e-9
     assert not audited(AHEAD, obstacle, margin=clearance + 1e-2).passed
     assert audited(AHEAD, obstacle, margin=clearance - 1e-2).passed
 
@@ -349,7 +348,7 @@ def test_against_many_poses(footprint):
             slow_distance(footprint, obstacles, pose, time)
             for pose, time in zip(AROUND.pose_at(times), times, strict=True)
         )
-        assert audit.min_clearance_m <= max(least / 0.9, least + 1e-3) + 1e-9
+        assert audit.min_clearance_m <= least + 1e-9
         assert audit.passed == (audit.min_clearance_m > 1e-9)
 
 
@@ -382,7 +381,7 @@ def test_a_moved_plan_has_the_same_clearance():
         by = SE2([*rng.uniform(-50.0, 50.0, 2), rng.uniform(-5.0, 5.0)])
         one = audited(AROUND, *obstacles)
         other = audited(AROUND.moved(by), *(o.moved(by) for o in obstacles))
-        assert one.min_clearance_m == pytest.approx(other.min_clearance_m, abs=1e-3, rel=0.1)
+        assert one.min_clearance_m == pytest.approx(other.min_clearance_m, abs=1e-3, rel=0.01)
         assert one.passed == other.passed
 
 
@@ -411,7 +410,7 @@ def test_where_an_empty_plan_stands_counts():
 def test_only_the_time_that_is_asked_for_counts(within, time, distance):
     plan = Plan([0.0, 0.0, 0.0], (ROBOT["straight"],), durations=[4.0], start_time=5.0)
     post = (Obstacle(Disc(0.5, [3.0, 1.5])),)
-    least = closest_to(plan, post, footprint=(Disc(0.5),), within=within)
+    least = closest_to(plan, ROBOT.model, post, footprint=(Disc(0.5),), within=within)
     assert least.distance == pytest.approx(distance, abs=1e-3)
     assert least.time == pytest.approx(time, abs=0.05)
 

@@ -1,0 +1,172 @@
+"""Shapes as their outlines, in the audit's own reading of them."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.audit.stated import placed
+from maneuver_automaton.collision.shapes import Box, Disc, OccupancyMap, Shape
+
+
+class Outline(NamedTuple):
+    """Edges of rings; a disc is an edge without length that has a radius."""
+
+    begins: Array  # (n, 2) [m], which are all corners
+    ends: Array  # (n, 2) [m]
+    radius: Array  # (n,) [m]
+    solid: IntArray  # (n,) which solid each edge bounds, in order; holes bound theirs too
+
+    def of(self, kept: NDArray[np.bool_] | IntArray) -> Outline:
+        """Some of its edges, in order, their solids numbered anew."""
+        solid = np.unique(self.solid[kept], return_inverse=True)[1]
+        return Outline(self.begins[kept], self.ends[kept], self.radius[kept], solid)
+
+    def holds(self, points: Array) -> Any:
+        """Whether points (m, 2) are in each solid (s, m): the rings run around them.
+
+        Examples
+        --------
+        >>> square = outline_of((Box([2.0, 2.0]), Disc(1.0, [5.0, 0.0])))
+        >>> square.holds(np.array([[0.5, 0.5], [4.5, 0.0]])).tolist()
+        [[True, False], [False, True]]
+        """
+        a, b, p = self.begins[:, None], self.ends[:, None], points[None]
+        rises = (b[..., 1] > p[..., 1]).astype(np.int64) - (a[..., 1] > p[..., 1])
+        to, along = p - a, b - a
+        side = along[..., 0] * to[..., 1] - along[..., 1] * to[..., 0]
+        turns = rises * (side * rises > 0.0)
+        round_ = self.radius[:, None]
+        if round_.any():
+            turns += (round_ > 0.0) & (np.hypot(to[..., 0], to[..., 1]) <= round_)
+        if not len(turns):
+            return np.zeros((0, len(points)), dtype=np.bool_)
+        firsts = np.flatnonzero(np.diff(self.solid, prepend=-1))
+        return np.add.reduceat(turns, firsts, axis=0) != 0
+
+
+def outline_of(shapes: Sequence[Shape], origin: tuple[float, float] = (0.0, 0.0)) -> Outline:
+    """The outline of shapes counted from an origin [m]; of none a point.
+
+    Raises
+    ------
+    ValueError
+        If a polygon has no area.
+    """
+    if not shapes:
+        point = np.zeros((1, 2))
+        return Outline(point, point, np.zeros(1), np.zeros(1, dtype=np.int64))
+    return joined([_outline(shape, np.array(origin)) for shape in shapes])
+
+
+@functools.lru_cache(maxsize=32)
+def body_outline(shapes: tuple[Shape, ...]) -> Outline:
+    """As `outline_of`; those of the last bodies are kept."""
+    return outline_of(shapes)
+
+
+def joined(outlines: Sequence[Outline]) -> Outline:
+    """Several outlines as one."""
+    if not outlines:
+        nothing = np.zeros((0, 2))
+        return Outline(nothing, nothing, np.zeros(0), np.zeros(0, dtype=np.int64))
+    counts = [0, *np.cumsum([int(one.solid.max(initial=-1)) + 1 for one in outlines])[:-1].tolist()]
+    return Outline(
+        np.concatenate([one.begins for one in outlines]),
+        np.concatenate([one.ends for one in outlines]),
+        np.concatenate([one.radius for one in outlines]),
+        np.concatenate([one.solid + n for one, n in zip(outlines, counts, strict=True)]),
+    )
+
+
+def map_outline(one: OccupancyMap, origin: tuple[float, float]) -> Outline:
+    """The borders between blocked cells and free ones, counted from an origin [m].
+
+    Every border has its blocked cell on the left, so they run around what is blocked.
+    """
+    cells = np.pad(one.blocked, 1).astype(np.int8)
+    level = [_borders(np.diff(cells, axis=0)[:, 1:-1].T), _borders(np.diff(cells, axis=1)[1:-1])]
+    (x0, x1, y, up), (y0, y1, x, right) = level
+    low = np.concatenate([np.stack([x0, y], axis=1), np.stack([x, y0], axis=1)])
+    high = np.concatenate([np.stack([x1, y], axis=1), np.stack([x, y1], axis=1)])
+    forward = np.concatenate([up > 0, right < 0])[:, None]
+    ends = np.stack([np.where(forward, low, high), np.where(forward, high, low)])
+    seen = np.concatenate([one.resolution * ends, np.zeros((2, len(low), 1))], axis=-1)
+    corners = placed(one.origin - [*origin, 0.0], seen)
+    n = len(low)
+    return Outline(corners[0, :, :2], corners[1, :, :2], np.zeros(n), np.zeros(n, dtype=np.int64))
+
+
+def _borders(changes: Array) -> tuple[Array, Array, Array, Array]:
+    """Runs of equal changes along the first axis: from, to, where on the second, and the change."""
+    step = np.diff(np.pad(changes, ((1, 1), (0, 0))), axis=0) != 0
+    place, at = np.nonzero(step.T)  # along one line after the other
+    begin, end = at[:-1], at[1:]
+    same = (place[:-1] == place[1:]) & (begin < changes.shape[0])
+    begin, end, place = begin[same], end[same], place[:-1][same]
+    change = changes[begin, place]
+    kept = change != 0
+    whole = np.stack([begin, end, place, change])[:, kept].astype(np.float64)
+    return whole[0], whole[1], whole[2], whole[3]
+
+
+def _outline(shape: Shape, origin: Array) -> Outline:
+    if isinstance(shape, Disc):
+        center = shape.center[None] - origin
+        return Outline(center, center, np.array([shape.radius]), np.zeros(1, dtype=np.int64))
+    if isinstance(shape, Box):
+        corners = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]) * shape.size
+        frame = np.append(shape.center - origin, shape.heading)
+        return _rings([placed(frame, np.column_stack([corners, np.zeros(4)]))[:, :2]])
+    holes = [hole - origin for hole in shape.holes]
+    return _rings(_solid_rings(shape.corners - origin, holes))
+
+
+def _rings(rings: Sequence[Array]) -> Outline:
+    begins = np.concatenate(rings)
+    ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
+    n = len(begins)
+    return Outline(begins, ends, np.zeros(n), np.zeros(n, dtype=np.int64))
+
+
+def _solid_rings(corners: Array, holes: Sequence[Array]) -> list[Array]:
+    """Rings of a polygon, the holes the other way around than what they are in.
+
+    Rings that cross or touch themselves are cut into faces; those that they run around are solid.
+    """
+    import shapely
+
+    whole = shapely.Polygon(corners, holes)
+    if whole.is_valid and not holes and whole.area > 0.0:
+        return [corners]
+    if not whole.is_valid:
+        whole = _faces(corners)
+        for hole in holes:
+            whole = shapely.difference(whole, _faces(hole))
+    parts = [
+        part for part in shapely.get_parts(whole) if part.geom_type == "Polygon" and part.area > 0.0
+    ]
+    if not parts:
+        raise ValueError(f"polygon: got {len(corners)} corners around no area")
+    rings = [
+        shapely.get_coordinates(ring)[:-1]
+        for part in map(shapely.geometry.polygon.orient, parts)
+        for ring in (part.exterior, *part.interiors)
+    ]
+    return [np.asarray(ring) for ring in rings]
+
+
+def _faces(ring: Array) -> Any:
+    """The faces of the plane that a closed line runs around, as one geometry."""
+    import shapely
+
+    lines = shapely.get_parts(shapely.node(shapely.LineString(np.vstack([ring, ring[:1]]))))
+    faces = shapely.get_parts(shapely.polygonize(lines))
+    inner = [[face.representative_point().x, face.representative_point().y] for face in faces]
+    around = _rings([ring]).holds(np.array(inner).reshape(-1, 2))[0]
+    return shapely.union_all(faces[around])
