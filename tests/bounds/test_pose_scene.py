@@ -36,7 +36,7 @@ OBSTACLES = [
 
 def solid(shape):
     if isinstance(shape, Disc):
-        return shapely.Point(shape.center).buffer(shape.radius, quad_segs=512)
+        return shapely.Point(shape.center).buffer(shape.radius, quad_segs=64)
     return shapely.Polygon(shape.corners)
 
 
@@ -87,14 +87,14 @@ def test_states_hold_for_every_pose_of_a_box(body, margin, frame):
     parts = shapely.union_all([solid(one) for one in problem.footprint] or [shapely.Point(0, 0)])
     decided = 0
     for size in (0.05, 0.3, 1.2):
-        boxes = random_boxes(rng, 60, size)
+        boxes = random_boxes(rng, 40, size)
         boxes[:, :3] = scene.world.into(boxes[:, :3])
         states = scene.states(boxes)
         decided += int((states != 1).sum())
         for box, state in zip(boxes, states, strict=True):
             if state == 1:
                 continue
-            world = (SE2(scene.world.frame) @ SE2(poses_in(rng, box, 12))).pose
+            world = (SE2(scene.world.frame) @ SE2(poses_in(rng, box, 6))).pose
             for x, y, heading in world:
                 there = affinity.translate(
                     affinity.rotate(parts, heading, origin=(0, 0), use_radians=True), x, y
@@ -106,7 +106,7 @@ def test_states_hold_for_every_pose_of_a_box(body, margin, frame):
                     assert apart > margin
                 else:
                     assert not inside or apart <= margin
-    assert decided > 90  # of 180
+    assert decided > 60  # of 120
 
 
 def test_small_boxes_of_poses_are_decided_but_for_contact():
