@@ -28,7 +28,8 @@ from maneuver_automaton.search.lattice_window import window_of
 
 HEADINGS = 8  # of the roots of the tree
 MOST_ROOTS = 48  # along a side
-FINEST = 2e-4  # [m] smallest side of a box
+FINEST = 2e-4  # [m] smallest side of a box ...
+FINEST_SHARE = 1e-8  # ... or this share of the scene: places are counted by 32 bits
 PRICE = 0.85  # power of its side that a box costs: large ones are split before many small ones
 MOST_BOXES = 1_000_000
 NO_WAY = np.zeros(0)  # prices of the other way, where they are not known
@@ -188,7 +189,7 @@ def _grid(scene: PoseScene, poses: Array, bounds: Bounds, price: float) -> Grid:
     box[2:] += 0.0 if bounds.x is not None and bounds.y is not None else size
     columns, rows = np.maximum(np.ceil((box[2:] - box[:2]) / size), 1.0).astype(int).tolist()
     sizes, widths, doublings, splits = [size], [turn], [0], []
-    while sizes[-1] > FINEST:
+    while sizes[-1] > max(FINEST, FINEST_SHARE * extent):
         splits.append(scene.turns and widths[-1] * arm > 0.7 * sizes[-1])
         sizes.append(0.5 * sizes[-1])
         widths.append(0.5 * widths[-1] if splits[-1] else widths[-1])

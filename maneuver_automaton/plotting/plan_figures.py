@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton.bounds import Narrowest
 from maneuver_automaton.planning import PlanResult
 from maneuver_automaton.plotting.colors import Color, trim_colors
 from maneuver_automaton.plotting.controls import (
@@ -22,6 +23,7 @@ from maneuver_automaton.plotting.controls import (
     draw_track_controls,
     draw_track_states,
 )
+from maneuver_automaton.plotting.cut_off import draw_cut_off
 from maneuver_automaton.plotting.labels import control_labels, result_text, word_text
 from maneuver_automaton.plotting.nodes import draw_cost_bar, draw_nodes
 from maneuver_automaton.plotting.pages import (
@@ -68,6 +70,8 @@ class _Sheet:
     labels: Sequence[str]  # of the controls
     state_labels: Sequence[str] = ()
     nodes: Array | None = None  # (n, 3) or (n, 4)
+    reached: Array | None = None  # (n, 4, 2)
+    narrowest: Narrowest | None = None
 
 
 def save_plan_figure(
@@ -122,6 +126,8 @@ def save_plan_figure(
         labels=control_labels(problem.automaton.model.control_names),
         state_labels=control_labels(problem.automaton.model.reduced_names),
         nodes=None if nodes is None else as_array("nodes", nodes, last=(3, 4)),
+        reached=result.reached,
+        narrowest=result.narrowest,
     )
     write_figure(_plan_figure(sheet), path)
 
@@ -194,6 +200,8 @@ def _plan_figure(sheet: _Sheet) -> Figure:
         )
     draw_track(ax, track, sheet.scene, colors=colors, legend=False)
     _draw_nodes(figure, ax, sheet)
+    if sheet.reached is not None:
+        draw_cut_off(ax, sheet.reached, narrowest=sheet.narrowest)
     if side:
         named = list(sheet.state_labels) or [f"state {k + 1}" for k in range(states)]
         draw_track_states(side[:states], track, labels=named[:states], colors=colors)

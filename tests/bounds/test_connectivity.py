@@ -1,6 +1,7 @@
 """What is separated, what is connected, by hand and against samples of the poses."""
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
@@ -76,6 +77,13 @@ def test_the_narrowest_place_says_what_is_missing(scene, width, missing, place):
     narrowest = separation(scene(width)).narrowest
     assert missing <= narrowest.missing <= 1.6 * missing
     assert np.hypot(*(np.array(narrowest.place) - place)) < 1.2
+
+
+def test_a_proof_in_the_last_moment_names_no_place():
+    wall = Box([8.0, 14.0], [10.0, 0.0])  # the first boxes close it already
+    proof = separation(dataclasses.replace(gap(1.0), obstacles=[wall]), deadline=-math.inf)
+    assert proof.narrowest is None
+    assert proof.reason.endswith("however it is driven")
 
 
 def test_places_that_are_reached_hold_the_start_and_not_the_goal():
