@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array
@@ -23,7 +24,7 @@ from maneuver_automaton.plotting.controls import (
     draw_track_controls,
     draw_track_states,
 )
-from maneuver_automaton.plotting.cut_off import draw_cut_off
+from maneuver_automaton.plotting.cut_off import REACHED, draw_cut_off
 from maneuver_automaton.plotting.labels import control_labels, result_text, word_text
 from maneuver_automaton.plotting.nodes import draw_cost_bar, draw_nodes
 from maneuver_automaton.plotting.pages import (
@@ -271,6 +272,8 @@ def _legend_entries(sheet: _Sheet, colors: Mapping[str, Color]) -> tuple[list[Ar
     """Handles and names of the first trims of a track, and of what else is in the plane."""
     handles, names = trim_handles(sheet.track, colors)
     others, other_names = scene_handles(sheet.track, sheet.scene)
+    if sheet.reached is not None:
+        others, other_names = [*others, Patch(color=REACHED)], [*other_names, "may be reached"]
     left_out = len(names) - MOST_NAMES
     if left_out <= 0:
         return [*handles, *others], [*names, *other_names]
