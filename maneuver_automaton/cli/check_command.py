@@ -150,7 +150,7 @@ def _automaton(automaton: Automaton) -> Iterator[Finding]:
         words = "; ".join(few(names) for names in report.duplicates[:5])
         yield Finding(what="automaton: no trim twice", holds=None, words=f"equal twists: {words}")
     yield Finding(
-        what="automaton: reaches every pose",
+        what="automaton: reaches every pose of free space",
         holds=True if report.controllable else None,
         words=lines[0],
     )

@@ -22,6 +22,7 @@ from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.audit import Audit, TerminalError
 from maneuver_automaton.automaton import Plan, Primitive
 from maneuver_automaton.automaton.library import automaton_hash
+from maneuver_automaton.bounds import Narrowest
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.planning import Alternative, PlanResult
@@ -63,6 +64,7 @@ def plan_to_dict(result: PlanResult) -> dict[str, Any]:
         "automaton_hash": automaton_hash(result.problem.automaton),
         "status": result.status.value,
         "reason": result.reason,
+        **_narrowest(result.narrowest),
         "cost": _number(result.cost),
         "duration_s": None if plan is None else plan.duration,
         "lower_bound": _number(result.lower_bound),
@@ -77,6 +79,13 @@ def plan_to_dict(result: PlanResult) -> dict[str, Any]:
         "timing_s": {**dict.fromkeys(TIMINGS), **_floats(result.timing_s)},
         "counts": {**dict.fromkeys(COUNTS, 0), **{k: int(v) for k, v in result.counts.items()}},
     }
+
+
+def _narrowest(passage: Narrowest | None) -> dict[str, Any]:
+    """The passage that is too narrow, where one is known."""
+    if passage is None:
+        return {}
+    return {"narrowest": {"place": list(passage.place), "missing_m": passage.missing}}
 
 
 def save_plan(result: PlanResult, path: Path | str) -> None:

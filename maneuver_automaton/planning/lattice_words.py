@@ -19,6 +19,7 @@ from maneuver_automaton.planning.checking import load_checks
 from maneuver_automaton.planning.detours import with_stones
 from maneuver_automaton.planning.free_words import free_words, word_candidate, words_once
 from maneuver_automaton.planning.incumbents import Candidate, Incumbents
+from maneuver_automaton.planning.no_way import before_proof
 from maneuver_automaton.planning.steps import BY_TIME, Steps
 from maneuver_automaton.problem import moves
 from maneuver_automaton.refinement.improve import Improved, Patience, improve
@@ -140,8 +141,8 @@ class LatticeWords:
 def search_lattice(found: Incumbents, steps: Steps) -> LatticeWords:
     """The words found for a problem: a first one, and better ones for as long as there is time.
 
-    All the time that is left may go by until there is a plan; a share of it is for better ones
-    where polishing or alternatives come after.
+    Most of the time that is left may go by until there is a plan, the rest is for a proof that
+    there is none; a share of it is for better ones where polishing or alternatives come after.
     """
     problem, prepared = found.problem, found.workspace.prepared
     query = lattice_query(problem, goals_left(problem), prepared=prepared)
@@ -159,6 +160,8 @@ def search_lattice(found: Incumbents, steps: Steps) -> LatticeWords:
 def _first(lattice: LatticeWords) -> FirstPlan | None:
     """The first plan; where obstacles move, one with rests if a quick search finds none."""
     query, limit = lattice.query, lattice.limit
+    if query.problem.obstacles and not lattice.found.plans:
+        limit = before_proof(limit)
     if not lattice.knows_all and _needs_quick_word(query) and _quick(lattice):
         return None
     if query.problem.moves and lattice.knows_all:

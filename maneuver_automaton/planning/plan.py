@@ -8,6 +8,7 @@ from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.checking import load_checks
 from maneuver_automaton.planning.free_space import plan_by_words
 from maneuver_automaton.planning.in_steps import plan_in_steps
+from maneuver_automaton.planning.no_way import with_proof
 from maneuver_automaton.planning.off_lattice import goals_off_lattice
 from maneuver_automaton.planning.result import PlanResult
 from maneuver_automaton.planning.steps import has_inertia, load_steps, uses_lattice
@@ -75,10 +76,12 @@ def plan_within(
 ) -> PlanResult:
     """The answer to a problem within a budget, the checks included; kernels are loaded already."""
     if has_tolerance(problem):
-        return plan_within_tolerance(
+        result = plan_within_tolerance(
             problem, _answered, budget, workspace, alternatives=alternatives
         )
-    return _answered(problem, budget, workspace, alternatives=alternatives)
+    else:
+        result = _answered(problem, budget, workspace, alternatives=alternatives)
+    return with_proof(result, budget)
 
 
 def _answered(

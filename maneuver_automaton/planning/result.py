@@ -9,6 +9,7 @@ from typing import Protocol
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.audit import Audit, TerminalError
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.bounds import Narrowest
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
@@ -54,6 +55,8 @@ class PlanResult:
     timing_s: dict[str, float] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)
     improvements: tuple[tuple[float, float], ...] = ()  # seconds since the start, cost
+    narrowest: Narrowest | None = None  # the passage that is too narrow, of a proof
+    reached: Array | None = None  # (n, 4, 2) squares that the pose never leaves, of that proof
     nodes: Array | None = None  # (n, 4) x, y, heading, cost of what was expanded, if asked for
 
 

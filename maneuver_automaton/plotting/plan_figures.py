@@ -12,9 +12,11 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton.bounds import Narrowest
 from maneuver_automaton.planning import PlanResult
 from maneuver_automaton.plotting.colors import Color, trim_colors
 from maneuver_automaton.plotting.controls import (
@@ -22,6 +24,7 @@ from maneuver_automaton.plotting.controls import (
     draw_track_controls,
     draw_track_states,
 )
+from maneuver_automaton.plotting.cut_off import REACHED, draw_cut_off
 from maneuver_automaton.plotting.labels import control_labels, result_text, word_text
 from maneuver_automaton.plotting.nodes import draw_cost_bar, draw_nodes
 from maneuver_automaton.plotting.pages import (
@@ -68,6 +71,8 @@ class _Sheet:
     labels: Sequence[str]  # of the controls
     state_labels: Sequence[str] = ()
     nodes: Array | None = None  # (n, 3) or (n, 4)
+    reached: Array | None = None  # (n, 4, 2)
+    narrowest: Narrowest | None = None
 
 
 def save_plan_figure(
@@ -122,6 +127,8 @@ def save_plan_figure(
         labels=control_labels(problem.automaton.model.control_names),
         state_labels=control_labels(problem.automaton.model.reduced_names),
         nodes=None if nodes is None else as_array("nodes", nodes, last=(3, 4)),
+        reached=result.reached,
+        narrowest=result.narrowest,
     )
     write_figure(_plan_figure(sheet), path)
 
@@ -194,6 +201,8 @@ def _plan_figure(sheet: _Sheet) -> Figure:
         )
     draw_track(ax, track, sheet.scene, colors=colors, legend=False)
     _draw_nodes(figure, ax, sheet)
+    if sheet.reached is not None:
+        draw_cut_off(ax, sheet.reached, narrowest=sheet.narrowest)
     if side:
         named = list(sheet.state_labels) or [f"state {k + 1}" for k in range(states)]
         draw_track_states(side[:states], track, labels=named[:states], colors=colors)
@@ -263,6 +272,8 @@ def _legend_entries(sheet: _Sheet, colors: Mapping[str, Color]) -> tuple[list[Ar
     """Handles and names of the first trims of a track, and of what else is in the plane."""
     handles, names = trim_handles(sheet.track, colors)
     others, other_names = scene_handles(sheet.track, sheet.scene)
+    if sheet.reached is not None:
+        others, other_names = [*others, Patch(color=REACHED)], [*other_names, "may be reached"]
     left_out = len(names) - MOST_NAMES
     if left_out <= 0:
         return [*handles, *others], [*names, *other_names]

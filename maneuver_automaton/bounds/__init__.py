@@ -1,0 +1,9 @@
+"""What is certain: poses that collide, and that no plan exists."""
+
+from maneuver_automaton.bounds.connectivity import Connection as Connection
+from maneuver_automaton.bounds.connectivity import connectivity as connectivity
+from maneuver_automaton.bounds.pose_scene import PoseScene as PoseScene
+from maneuver_automaton.bounds.pose_scene import pose_scene as pose_scene
+from maneuver_automaton.bounds.separation import Narrowest as Narrowest
+from maneuver_automaton.bounds.separation import Separation as Separation
+from maneuver_automaton.bounds.separation import separation as separation

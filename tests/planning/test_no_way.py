@@ -1,0 +1,49 @@
+"""A search that ends without a plan: the proof that there is none, or its own verdict."""
+
+import dataclasses
+
+import pytest
+from maneuver_automaton.search.budget import Budget
+
+from maneuver_automaton import SearchSettings, plan
+from maneuver_automaton.formats import plan_to_dict
+from maneuver_automaton.planning import PlanResult, PlanStatus
+from maneuver_automaton.planning.no_way import before_proof, with_proof
+from maneuver_automaton.plotting import save_plan_figure
+from tests.bounds.scenes import bend, gap
+
+
+def ended(problem, status=PlanStatus.OUT_OF_BUDGET):
+    return PlanResult(problem=problem, status=status, reason="no plan within 1 s")
+
+
+def test_a_plan_for_a_gap_that_is_too_narrow_does_not_exist(tmp_path):
+    settings = SearchSettings(max_expansions=300)
+    result = plan(dataclasses.replace(gap(1.6), search=settings), time_limit=30.0)
+    assert result.status is PlanStatus.UNREACHABLE
+    assert result.reason.startswith("no collision-free way leads from the start to the goal")
+    written = plan_to_dict(result)
+    assert written["status"] == "unreachable"
+    assert written["narrowest"]["place"] == pytest.approx([10.0, 0.0], abs=0.5)
+    assert written["narrowest"]["missing_m"] == pytest.approx(0.3, rel=0.2)
+    save_plan_figure(result, tmp_path / "plan.png")
+    assert (tmp_path / "plan.png").stat().st_size > 1000
+
+
+@pytest.mark.parametrize("status", [PlanStatus.OUT_OF_BUDGET, PlanStatus.NO_PLAN])
+def test_a_way_leaves_the_verdict_of_the_search(status):
+    result = ended(bend(3.2), status)
+    assert with_proof(result, Budget.from_now(30.0)) is result
+    assert "narrowest" not in plan_to_dict(result)
+
+
+def test_nothing_is_proven_of_other_verdicts_or_without_time():
+    blocked = ended(gap(1.6), PlanStatus.GOAL_BLOCKED)
+    assert with_proof(blocked, Budget.from_now(30.0)) is blocked
+    late = ended(gap(1.6))
+    assert with_proof(late, Budget.from_now(-1.0)) is late
+
+
+def test_a_share_of_the_time_is_left_for_a_proof():
+    budget = Budget.from_now(10.0)
+    assert before_proof(budget).deadline == pytest.approx(budget.deadline - 1.5)
