@@ -1,9 +1,10 @@
 """Damaged files of every kind: each is a plan, no plan, or one line that says what is wrong.
 
-``python tests/benchmarks/mutations.py [--count N] [--seed S] [--kinds ...] [--keep DIR]``: case k of a seed is always the same file and command. Each runs in a process of its own, forked from one
-that has planned the undamaged files, with a limit of memory and of the time of the processor. What
-ends in an internal error, by a signal, beyond 10 s or 1 GB is listed, and kept in DIR. A case
-reaches the numbers if it is accepted, or refused for more than syntax, keys and kinds of values.
+``python tests/benchmarks/mutations.py [--count N] [--seed S] [--kinds ...] [--keep DIR]``: case k of
+a seed is always the same file and command. Each runs in a process of its own, forked from one that
+has planned the undamaged files, with a limit of memory and of the time of the processor. What ends
+in an internal error, by a signal, beyond 10 s or 1 GB is listed, and kept in DIR. A case reaches the
+numbers if it is accepted, or refused for more than syntax, keys and kinds of values.
 """
 
 from __future__ import annotations
@@ -97,7 +98,7 @@ def kinds(made: Path) -> list[Kind]:
         Kind(
             "mprim",
             _in(DATA, "sbpl/mprim/*"),
-            (*shown_and_written, ("convert", "FILE", "out/l.mprim")),
+            (*shown_and_written, rewritten),
         ),
         Kind("lattice", _in(DATA, "nav2-lattice/*.json"), shown_and_written),
         Kind("road", _in(DATA, "commonroad/scenarios/*.xml"), (plan,)),
