@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import gc
-import sys
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated
 
 import typer
 
-from maneuver_automaton.cli.guard import exits
+from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, complain, exits
+from maneuver_automaton.cli.streams import safe_streams
 from maneuver_automaton.errors import InvalidScenario
 
-# Importing libraries makes a million objects and no garbage: look for it less often than usual.
-COLLECT_EVERY = 100_000  # objects
+PRINTED = (["schema"], ["cache"])  # commands that do nothing but print
 
 app = typer.Typer(
     add_completion=False,
@@ -63,22 +61,18 @@ Case = Annotated[
 
 def run(argv: list[str]) -> int:
     """Run the command line with the arguments `argv`, and return the exit code."""
-    for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="replace")  # names may hold what a terminal cannot show
-    try:
-        app(args=argv, prog_name="maneuver-automaton")
-    except SystemExit as done:
-        return done.code if isinstance(done.code, int) else int(done.code is not None)
-    return 0
-
-
-def main() -> NoReturn:
-    """Entry point of the console script."""
-    gc.set_threshold(COLLECT_EVERY)
-    code = run(sys.argv[1:])
-    gc.freeze()  # or the exit would look through every object of every library once more
-    sys.exit(code)
+    with safe_streams() as (out, _):
+        try:
+            app(args=argv, prog_name="maneuver-automaton")
+            code = 0
+        except SystemExit as done:
+            code = done.code if isinstance(done.code, int) else int(done.code is not None)
+        out.flush()
+        if out.failure is not None and not isinstance(out.failure, BrokenPipeError):
+            complain(f"standard output: cannot be written: {out.failure.strerror or out.failure}")
+            if code == FOUND and argv[:1] in PRINTED:
+                code = BAD_INPUT  # there is no other output
+    return code
 
 
 @app.command()

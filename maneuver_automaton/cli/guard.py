@@ -6,16 +6,15 @@ import functools
 import os
 import sys
 from collections.abc import Callable
-from pathlib import Path
 from typing import ParamSpec
 
 import typer
 
+from maneuver_automaton._interrupts import exit_code, stopped
 from maneuver_automaton.errors import ManeuverAutomatonError
 
 DEBUG = "MANEUVER_AUTOMATON_DEBUG"
 FOUND, NO_PLAN, BAD_INPUT = 0, 1, 2
-INTERRUPTED, BROKEN_PIPE = 130, 141  # 128 + the signal, as shells count
 
 P = ParamSpec("P")
 
@@ -46,21 +45,12 @@ def exits(command: Callable[P, int]) -> Callable[P, None]:
     def safe(*args: P.args, **kwargs: P.kwargs) -> None:
         try:
             code = command(*args, **kwargs)
-            sys.stdout.flush()
         except KeyboardInterrupt:
-            code = INTERRUPTED
-        except BrokenPipeError:
-            _close_stdout()
-            code = BROKEN_PIPE
+            code = exit_code()
         except Exception as error:  # noqa: BLE001, the last resort
-            complain(explained(error))
-            code = BAD_INPUT
-        raise typer.Exit(code)
+            code = exit_code() if stopped() else BAD_INPUT
+            if not stopped():
+                complain(explained(error))
+        raise typer.Exit(exit_code() if stopped() else code)
 
     return safe
-
-
-def _close_stdout() -> None:
-    """Let the flush at exit go nowhere: whoever read our output has left."""
-    with Path(os.devnull).open("w") as nowhere:
-        os.dup2(nowhere.fileno(), sys.stdout.fileno())

@@ -82,15 +82,15 @@ def closed_loop_to_dict(loop: ClosedLoop) -> dict[str, Any]:
     }
 
 
-def save_closed_loop(loop: ClosedLoop, path: Path | str) -> None:
-    """Write closed_loop.json in one step.
+def save_closed_loop(loop: ClosedLoop, path: Path | str, *, interrupted: bool = False) -> None:
+    """Write closed_loop.json in one step; `interrupted` by a signal it says so.
 
     Raises
     ------
     OSError
         If the file cannot be written.
     """
-    write_document(closed_loop_to_dict(loop), path)
+    write_document(closed_loop_to_dict(loop), path, interrupted=interrupted)
 
 
 def load_steps(path: Path | str, automaton: Automaton) -> tuple[tuple[Step, ...], Array]:

@@ -79,26 +79,31 @@ def plan_to_dict(result: PlanResult) -> dict[str, Any]:
     }
 
 
-def save_plan(result: PlanResult, path: Path | str) -> None:
-    """Write plan.json in one step.
+def save_plan(result: PlanResult, path: Path | str, *, interrupted: bool = False) -> None:
+    """Write plan.json in one step; `interrupted` by a signal it says so.
 
     Raises
     ------
     OSError
         If the file cannot be written.
     """
-    write_document(plan_to_dict(result), path)
+    write_document(plan_to_dict(result), path, interrupted=interrupted)
 
 
-def write_document(document: Mapping[str, Any], path: Path | str) -> None:
+def write_document(
+    document: Mapping[str, Any], path: Path | str, *, interrupted: bool = False
+) -> None:
     """Write a plan.json or closed_loop.json in one step: strict JSON, long lists entry by entry.
 
+    Where a signal came before the work was done, the key `interrupted` says so.
+
     Raises
     ------
     OSError
         If the file cannot be written.
     """
-    lines = [f"  {json.dumps(key)}: {_json(key, value)}" for key, value in document.items()]
+    said = {**document, "interrupted": True} if interrupted else document
+    lines = [f"  {json.dumps(key)}: {_json(key, value)}" for key, value in said.items()]
     write_text_atomically(Path(path), "{\n" + ",\n".join(lines) + "\n}\n")
 
 
