@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import functools
 import math
-import time
 from dataclasses import dataclass
 
 import numpy as np
 
+from maneuver_automaton._interrupts import clock
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.planning.tracking import stands_free
 from maneuver_automaton.problem import Problem
@@ -81,7 +81,7 @@ def search_fail_safe(
     left = max_expansions
     while left > 0 and kernels.expand(task, library, *around, min(TIMELY, left)):
         left -= TIMELY
-        if time.monotonic() >= deadline:
+        if clock() >= deadline:
             break
     state = search.state
     node = int(state[kernels.BEST])

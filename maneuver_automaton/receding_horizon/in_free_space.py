@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator
 
+from maneuver_automaton._interrupts import clock
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.receding_horizon.candidates import Candidate, allowed, bounded
 from maneuver_automaton.receding_horizon.log import Deed, Guarantee, Origin
@@ -44,7 +44,7 @@ class InFreeSpace:
         now.exhaustive = True
         alternatives = PACES if self.settings.retimed else 0
         for index, goal in enumerate(here.goals):
-            left = now.deadline - time.monotonic()
+            left = now.deadline - clock()
             same_goal = now.last is None or index == now.last.goal_index
             known = kept.plan if kept is not None and same_goal else None
             if left <= 0.0 and (kept is not None or found):

@@ -7,10 +7,10 @@ zones, heights of obstacles, a fixed time that no rest fills.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 
+from maneuver_automaton._interrupts import clock
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import head_of
 from maneuver_automaton.costs import Cost
@@ -91,7 +91,7 @@ class OverManeuvers:
         guarded = bool(here.obstacles or here.zones) or bounded(here)
         found: list[Candidate] = []
         for index, goal in enumerate(problem.goals):
-            left = now.deadline - time.monotonic()
+            left = now.deadline - clock()
             if left <= 0.0:
                 break
             words = search_insertion(
@@ -156,7 +156,7 @@ class OverManeuvers:
         now, limit, problem = self.now, self.now.longest, self._onward()
         if problem is None:
             return None
-        result = planned(problem, time_limit=max(now.deadline - time.monotonic(), 1e-3))
+        result = planned(problem, time_limit=max(now.deadline - clock(), 1e-3))
         if result.plan is None or result.goal_index is None:
             self.reason = f": {result.reason}"
             return None

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._interrupts import clock
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Car, Unicycle
@@ -123,7 +124,7 @@ def gear_sequences(
     deadline = time.monotonic() + time_limit
     found: list[Drive] = []
     for (turning, switching), library in itertools.product(PRICES, libraries):
-        if time.monotonic() >= deadline:
+        if clock() >= deadline:
             break
         unit = _unit(library)
         cost = Cost(time=1.0, direction_change=turning * unit, switch=switching * unit)

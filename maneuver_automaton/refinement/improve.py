@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import functools
 import math
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
 import numpy as np
 
+from maneuver_automaton._interrupts import clock
 from maneuver_automaton.refinement._kernels_improve import attempt_all
 from maneuver_automaton.refinement.restarts import RANDOM, Restart, Restarts
 from maneuver_automaton.refinement.work import improve_task, shortcut, word_of, work_of
@@ -158,7 +158,7 @@ class Improvement:
     def _late(self) -> bool:
         if self.max_expansions is not None and self.expansions >= self.max_expansions:
             return True
-        return time.monotonic() >= self.deadline
+        return clock() >= self.deadline
 
     def _considered(self, candidate: Word) -> Iterator[Word]:
         """The candidate, if it is the best."""
@@ -214,7 +214,7 @@ class Improvement:
         most = len(arrays.words) if restart.all_words else arrays.n_few
         for n_words in sorted({arrays.n_few, most}):
             for n in range(rounds):
-                if n > 0 and time.monotonic() >= self.deadline:
+                if n > 0 and clock() >= self.deadline:
                     return word
                 before, cut = word.cost, (GOLDEN * n) % 1.0
                 word = shortcut(self.query, word, n_words=n_words, cut=cut, deadline=self.deadline)
@@ -231,7 +231,7 @@ class Improvement:
         while done < attempts:
             n = min(TIMELY, attempts - done)
             uniform, normal = self.rng.random((n, 6)), self.rng.standard_normal((n, 3))
-            if time.monotonic() < self.deadline:
+            if clock() < self.deadline:
                 attempt_all(query.library.arrays, task, scene, work, state, uniform, normal)
                 self.attempts += n
             done += n

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from maneuver_automaton._interrupts import clock
 from maneuver_automaton.refinement.improve import Improvement, Patience
 from maneuver_automaton.refinement.restarts import FINER
 from maneuver_automaton.search.lattice import distance_grids, first_plan
@@ -56,7 +57,7 @@ def incumbent_words(
     room = 2**62 if max_expansions is None else max_expansions
 
     def ended(total: int) -> SearchStatus:
-        over = time.monotonic() >= deadline or total >= room
+        over = clock() >= deadline or total >= room
         return SearchStatus.OUT_OF_BUDGET if over else SearchStatus.EXHAUSTED
 
     grids = distance_grids(query)

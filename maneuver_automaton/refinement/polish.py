@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._interrupts import clock
 from maneuver_automaton.collision import Shape
 from maneuver_automaton.collision.convex import pieces_seen_from
 from maneuver_automaton.groups import group_of
@@ -273,7 +274,7 @@ class _Polishing:
 
     def _left(self) -> float:
         """Time for a solver [s]: the time left less that to write a problem down."""
-        return self.deadline - time.monotonic() - self.building
+        return self.deadline - clock() - self.building
 
     def _work_left(self) -> int | None:
         """Iterations that are left; None if they are not counted."""

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import time
 from typing import NamedTuple
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._interrupts import clock
 from maneuver_automaton.refinement._kernels_points import begin_program, join_points, take_program
 from maneuver_automaton.refinement._kernels_word import AT_WILL, GAIN, LENGTH
 from maneuver_automaton.search.lattice_pass import with_cost
@@ -81,7 +81,7 @@ def shortcut(query: LatticeQuery, word: Word, *, n_words: int, cut: float, deadl
     cost = begin_program(arrays, work, state, times)
     part = max(1, TIMELY_WORDS // (n_words * points))
     for first in range(1, points, part):
-        if first > 1 and time.monotonic() >= deadline:
+        if first > 1 and clock() >= deadline:
             return word
         join_points(arrays, task, scene, work, first, first + part, n_words, GAIN * cost)
     take_program(arrays, task, scene, work, state, cost)

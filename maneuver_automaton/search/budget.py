@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 
+from maneuver_automaton._interrupts import clock
+
 COUNTED = 0.7  # share of the time left that a stage of counted work takes at most: others follow
 
 
@@ -28,8 +30,8 @@ class Budget:
     @classmethod
     def from_now(cls, seconds: float, *, expansions: int | None = None) -> Budget:
         """So many seconds from now on."""
-        now = time.monotonic()
-        return cls(began=now, deadline=now + seconds, expansions=expansions)
+        began = time.monotonic()
+        return cls(began=began, deadline=began + seconds, expansions=expansions)
 
     @property
     def seconds(self) -> float:
@@ -44,12 +46,12 @@ class Budget:
     @property
     def left(self) -> float:
         """Time that is left [s], at least 0."""
-        return max(self.deadline - time.monotonic(), 0.0)
+        return max(self.deadline - clock(), 0.0)
 
     @property
     def is_over(self) -> bool:
         """Whether no time is left."""
-        return time.monotonic() >= self.deadline
+        return clock() >= self.deadline
 
     def part(self, share: float, *, at_least: float = 0.0) -> Budget:
         """A budget of its own from now on: a share of the time left, at least so many seconds."""

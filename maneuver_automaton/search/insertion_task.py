@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass, field
 
+from maneuver_automaton._interrupts import clock
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.alternatives import distinct
@@ -28,11 +28,11 @@ class InsertionTask:
     @property
     def left(self) -> float:
         """Time that is left [s]."""
-        return self.deadline - time.monotonic()
+        return self.deadline - clock()
 
     def is_over(self) -> bool:
         """Whether no time is left."""
-        return time.monotonic() > self.deadline
+        return clock() > self.deadline
 
 
 @dataclass(slots=True, eq=False)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import functools
 import math
-import time
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._interrupts import clock
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
@@ -69,7 +69,7 @@ def first_plan(
     word, proof, total = None, "", 0
     while word is None:
         for one in passes:
-            if not one.alive or total >= room or time.monotonic() >= deadline:
+            if not one.alive or total >= room or clock() >= deadline:
                 continue
             before = one.expansions
             word = one.run(min(one.chunk, room - total), math.inf, deadline=deadline)
@@ -80,7 +80,7 @@ def first_plan(
                 break
         alive = any(one.alive for one in passes)
         proof = "" if alive or word is not None else _enclosed(query, grids)
-        if word is not None or total >= room or time.monotonic() >= deadline or proof:
+        if word is not None or total >= room or clock() >= deadline or proof:
             break
         if stages and (not alive or total >= stages[0][0]):
             passes += _begun(query, schedule, stages.pop(0)[1], grids, table)

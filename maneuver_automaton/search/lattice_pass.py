@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from maneuver_automaton._interrupts import clock
 from maneuver_automaton.search import _kernels_lattice as kernels
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
@@ -72,7 +72,7 @@ class Pass:
     def run(self, n: int, upper_bound: float, *, deadline: float = math.inf) -> Word | None:
         """Expand up to `n` more nodes; a plan, if one was found that costs less than the bound."""
         left = self.expansions + n
-        while self.alive and self.expansions < left and time.monotonic() < deadline:
+        while self.alive and self.expansions < left and clock() < deadline:
             used = int(self.arrays.state[layout.N_NODES])
             step = min(left - self.expansions, TIMELY)
             room = used + self.library.most_children * (step + 1) + 2

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._interrupts import clock
 from maneuver_automaton.groups import LieGroup
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.insertion_task import Found, InsertionTask
@@ -164,7 +165,7 @@ class _Climb:
         """Whether no time is left, or as many words were solved for as the problem admits."""
         most = self.setup.problem.search.max_expansions
         work = EXPANSIONS_A_WORD * self.solved
-        return time.monotonic() > self.deadline or (most is not None and work >= most)
+        return clock() > self.deadline or (most is not None and work >= most)
 
     def top(self, word: TimedWord) -> TimedWord:
         """The word that no change makes cheaper, from this one on."""

@@ -16,6 +16,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._interrupts import clock
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.alternatives import TIE, in_order
 from maneuver_automaton.search.result import SearchResult, SearchStatus
@@ -73,7 +74,7 @@ def steer_linked_words(
         found,
         alternatives,
         upper_bound,
-        none=SearchStatus.OUT_OF_BUDGET if time.monotonic() > deadline else SearchStatus.EXHAUSTED,
+        none=SearchStatus.OUT_OF_BUDGET if clock() > deadline else SearchStatus.EXHAUSTED,
         counts={"expansions": len(headings)},
     )
 
@@ -185,7 +186,7 @@ def _made_good(
         dearest = upper_bound
         if alternatives is not None and len(prices) > alternatives:
             dearest = min(upper_bound, sorted(prices)[alternatives])
-        if found.cost > dearest * slack or (prices and time.monotonic() > deadline):
+        if found.cost > dearest * slack or (prices and clock() > deadline):
             return
         if most is not None and EXPANSIONS_A_WORD * n > most:
             return

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._interrupts import clock
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.alternatives import in_order
 from maneuver_automaton.search.result import SearchResult, SearchStatus
@@ -56,7 +57,7 @@ def search_with_least_times(
     status = SearchStatus.EXHAUSTED
     reaching = np.flatnonzero(np.isin(setup.trims, sub_library(setup).trims)).tolist()
     for word in _words(reaching, most):
-        if time.monotonic() > deadline or words == problem.search.max_expansions:
+        if clock() > deadline or words == problem.search.max_expansions:
             status = SearchStatus.OUT_OF_BUDGET
             break
         words += 1

@@ -6,7 +6,6 @@ Words with transitions are scanned as they are seen from before them; see `_kern
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._interrupts import clock
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.alternatives import tied
@@ -183,7 +183,7 @@ class WordScan:
             )
             if self.candidates.counter[0]:
                 self.polish(*mode.kernel_problem, self.candidates, self.found, self.most)
-            if time.monotonic() > deadline:
+            if clock() > deadline:
                 return False
             if max_words is not None and self.n_words >= max_words:
                 return False
