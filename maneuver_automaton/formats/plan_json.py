@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from maneuver_automaton._arrays import Array, as_array
-from maneuver_automaton._files import write_text_atomically
+from maneuver_automaton._files import open_input, write_text_atomically
 from maneuver_automaton.audit import Audit, TerminalError
 from maneuver_automaton.automaton import Plan, Primitive
 from maneuver_automaton.automaton.library import automaton_hash
@@ -129,12 +129,14 @@ def read_json(path: Path | str, *, needed: Sequence[str], kind: str) -> dict[str
     """
     path = Path(path)
     name = f"{kind.replace(' ', '_')}.json"
-    if path.is_dir():
-        raise InvalidScenario(f"{path}: is a folder, need a {name}")
     try:
-        document = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
+        with open_input(path) as stream:
+            text = stream.read().decode("utf-8")
+        document = json.loads(text, parse_constant=_refuse_constant)
     except FileNotFoundError as error:
         raise InvalidScenario(f"{path}: no such file") from error
+    except IsADirectoryError as error:
+        raise InvalidScenario(f"{path}: is a folder, need a {name}") from error
     except OSError as error:
         raise InvalidScenario(f"{path}: cannot be read: {error.strerror}") from error
     except json.JSONDecodeError as error:

@@ -1,10 +1,10 @@
 """Damaged files of every kind: each is a plan, no plan, or one line that says what is wrong.
 
-``python tests/benchmarks/mutations.py [--count N] [--seed S] [--kinds ...] [--keep DIR]``: case k of
-a seed is always the same file and command. Each runs in a process of its own, forked from one that
-has planned the undamaged files, with a limit of memory and of the time of the processor. What ends
-in an internal error, by a signal, beyond 10 s or 1 GB is listed, and kept in DIR. A case reaches the
-numbers if it is accepted, or refused for more than syntax, keys and kinds of values.
+``python tests/benchmarks/mutations.py [--count N] [--seed S] [--kinds ...] [--keep DIR]``: case k
+of a seed is always the same file and command. Each runs in a process of its own, forked from one
+that has planned the undamaged files, with a limit of memory and of the time of the processor. What
+ends in an internal error, by a signal, beyond 10 s or 1 GB is listed, and kept in DIR. A case
+reaches the numbers if it is accepted, or refused for more than syntax, keys and kinds of values.
 """
 
 from __future__ import annotations
@@ -220,7 +220,7 @@ def wrong(ended: Outcome) -> str:
     """Why an outcome is none that may be; empty if it is."""
     if ended.code not in (0, 1, 2):
         return f"ended by signal {-ended.code}" if ended.code < 0 else f"exit code {ended.code}"
-    if "internal error" in ended.said or "Traceback" in ended.said:
+    if "internal error" in ended.said or "out of memory" in ended.said or "Traceback" in ended.said:
         return "internal error"
     if ended.seconds > MOST_SECONDS:
         return f"{ended.seconds:.1f} s"
