@@ -21,6 +21,9 @@ from maneuver_automaton._cache_files import distrusted, say_once
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])  # the function that is compiled
 
 
+KERNELS = "kernels-"  # what the names of folders of compiled kernels begin with
+
+
 def user_cache_folder() -> Path:
     """Where files that can be made again are kept: the platform's cache folder of this user."""
     if override := os.environ.get("MANEUVER_AUTOMATON_CACHE_DIR"):
@@ -32,6 +35,12 @@ def user_cache_folder() -> Path:
     else:
         base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     return base / "maneuver_automaton"
+
+
+def kernel_base() -> Path:
+    """Where the folders of compiled kernels are, one for every state of their sources."""
+    base = os.environ.get("NUMBA_CACHE_DIR")
+    return Path(base) if base else user_cache_folder()
 
 
 def source_hash() -> str:
@@ -56,10 +65,9 @@ def kernel_folder() -> Path | None:
     Compiled kernels are pickles, which can run any code: they are read from folders that belong to
     the user or the installer, and that nobody else can write.
     """
-    base = os.environ.get("NUMBA_CACHE_DIR")
     folder = None
     try:
-        folder = (Path(base) if base else user_cache_folder()) / f"kernels-{source_hash()}"
+        folder = kernel_base() / f"{KERNELS}{source_hash()}"
         folder.parent.mkdir(parents=True, exist_ok=True)
         folder.mkdir(mode=0o755, exist_ok=True)
         why = distrusted(folder.parent.stat(), shared=True) or distrusted(folder.stat())

@@ -11,7 +11,7 @@ from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, complain, exits
 from maneuver_automaton.cli.streams import safe_streams
 from maneuver_automaton.errors import InvalidScenario
 
-PRINTED = (["schema"], ["cache"])  # commands that do nothing but print
+PRINTED = (["schema"],)  # commands that do nothing but print
 
 app = typer.Typer(
     add_completion=False,
@@ -24,6 +24,10 @@ automaton_app = typer.Typer(
     no_args_is_help=True, rich_markup_mode=None, help="Make, list or draw a library of trims."
 )
 app.add_typer(automaton_app, name="automaton")
+cache_app = typer.Typer(
+    no_args_is_help=True, rich_markup_mode=None, help="List or clear what is kept on disk."
+)
+app.add_typer(cache_app, name="cache")
 
 File = Annotated[Path, typer.Argument(metavar="FILE", help="Scenario (YAML), or another format.")]
 Library = Annotated[Path, typer.Argument(metavar="FILE", help="Scenario or library file.")]
@@ -73,6 +77,24 @@ def run(argv: list[str]) -> int:
             if code == FOUND and argv[:1] in PRINTED:
                 code = BAD_INPUT  # there is no other output
     return code
+
+
+@cache_app.command("show")
+@exits
+def cache_show() -> int:
+    """List what is kept on disk to be quicker the next time: compiled kernels, tables."""
+    from maneuver_automaton.cli import cache_command
+
+    return cache_command.show()
+
+
+@cache_app.command("clear")
+@exits
+def cache_clear() -> int:
+    """Remove it; it is made again when it is needed."""
+    from maneuver_automaton.cli import cache_command
+
+    return cache_command.clear()
 
 
 @app.command()

@@ -66,9 +66,8 @@ def exits(command: Callable[P, int]) -> Callable[P, None]:
         except KeyboardInterrupt:
             code = exit_code()
         except Exception as error:  # noqa: BLE001, the last resort
-            code = exit_code() if stopped() else BAD_INPUT
-            if not stopped():
-                complain(explained(error))
+            complain(explained(error))
+            code = BAD_INPUT
         raise typer.Exit(exit_code() if stopped() else code)
 
     return safe

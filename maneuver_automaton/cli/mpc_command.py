@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from maneuver_automaton._interrupts import patient, stopped
+from maneuver_automaton._interrupts import stopped
 from maneuver_automaton.cli import road_command
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
@@ -105,7 +105,6 @@ def _loop(path: Path, scenario: Scenario, settings: Settings) -> ClosedLoop:
     with (
         announced(quiet=settings.quiet),
         progress_bar("steps", steps, quiet=settings.quiet) as advance,
-        patient(),
     ):
         try:
             return simulate(

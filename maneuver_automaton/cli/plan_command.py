@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from maneuver_automaton._interrupts import patient, stopped
+from maneuver_automaton._interrupts import stopped
 from maneuver_automaton.cli import road_command
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
@@ -113,7 +113,7 @@ def _plan(scenario: Scenario, out: Path, settings: Settings) -> PlanResult:
 
     make_folder(out)
     try:
-        with announced(quiet=settings.quiet), patient():
+        with announced(quiet=settings.quiet):
             result = planning.plan(
                 scenario.problem,
                 time_limit=settings.time_limit or scenario.time_limit_s,

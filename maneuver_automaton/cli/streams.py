@@ -18,7 +18,8 @@ class Output(io.TextIOBase):
         self.stream = stream
         self.failure: OSError | None = None
         if stream is not None and hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="replace")  # names may hold what a terminal cannot show
+            with contextlib.suppress(ValueError):  # it is closed
+                stream.reconfigure(errors="replace")  # names may hold what a terminal cannot show
 
     @property
     def encoding(self) -> str:  # type: ignore[override]
@@ -40,7 +41,10 @@ class Output(io.TextIOBase):
 
     def isatty(self) -> bool:
         """Whether a person reads it."""
-        return self.stream is not None and self.stream.isatty()
+        try:
+            return self.stream is not None and self.stream.isatty()
+        except ValueError:  # it is closed
+            return False
 
     def fileno(self) -> int:
         """Of the stream."""

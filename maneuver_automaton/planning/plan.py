@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from maneuver_automaton._interrupts import patient
 from maneuver_automaton.planning.among_zones import plan_among_zones
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.checking import load_checks
@@ -66,11 +67,12 @@ def plan_in(
     if alternatives and uses_lattice(problem):
         load_search(problem)
     budget = Budget.from_now(time_limit, expansions=problem.search.max_expansions)
-    if has_tolerance(problem):
-        return plan_within_tolerance(
-            problem, _answered, budget, workspace, alternatives=alternatives
-        )
-    return _answered(problem, budget, workspace, alternatives=alternatives)
+    with patient():
+        if has_tolerance(problem):
+            return plan_within_tolerance(
+                problem, _answered, budget, workspace, alternatives=alternatives
+            )
+        return _answered(problem, budget, workspace, alternatives=alternatives)
 
 
 def _answered(
