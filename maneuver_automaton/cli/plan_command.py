@@ -120,6 +120,8 @@ def _plan(scenario: Scenario, out: Path, settings: Settings) -> PlanResult:
                 alternatives=settings.alternatives,
             )
     except KeyboardInterrupt:
+        if not stopped():
+            raise  # in somebody else's program
         result = planning.PlanResult(
             problem=scenario.problem,
             status=planning.PlanStatus.OUT_OF_BUDGET,

@@ -1,6 +1,6 @@
 """Damaged files of every kind: each is a plan, no plan, or one line that says what is wrong.
 
-``python tests/benchmarks/mutations.py [--count N] [--seed S] [--kinds ...] [--keep DIR]``: case k
+``python tests/benchmarks/mutations.py [--count N] [--seed S] [--cases ...] [--keep DIR]``: case k
 of a seed is always the same file and command. Each runs in a process of its own, forked from one
 that has planned the undamaged files, with a limit of memory and of the time of the processor. What
 ends in an internal error, by a signal, beyond 10 s or 1 GB is listed, and kept in DIR. A case
@@ -246,7 +246,7 @@ def main() -> None:
     slowest = largest = 0.0
     failures = 0
     for k, kind, rng in numbered(asked.count, asked.seed, chosen):
-        if k < asked.first:
+        if asked.cases is not None and k not in asked.cases:
             continue
         with tempfile.TemporaryDirectory(prefix="mutation-") as name:
             folder = Path(name)
@@ -267,7 +267,7 @@ def main() -> None:
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=10_000)
-    parser.add_argument("--first", type=int, default=0, help="the case to begin with")
+    parser.add_argument("--cases", type=int, nargs="*", help="only those of these numbers")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--kinds", nargs="*", default=[])
     parser.add_argument("--keep", type=Path)
