@@ -7,16 +7,21 @@ user's cache folder; where nothing can be written, kernels work without a cache.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import os
 import sys
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+from maneuver_automaton._cache_files import distrusted, say_once
+
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])  # the function that is compiled
+
+
+KERNELS = "kernels-"  # what the names of folders of compiled kernels begin with
 
 
 def user_cache_folder() -> Path:
@@ -30,6 +35,12 @@ def user_cache_folder() -> Path:
     else:
         base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     return base / "maneuver_automaton"
+
+
+def kernel_base() -> Path:
+    """Where the folders of compiled kernels are, one for every state of their sources."""
+    base = os.environ.get("NUMBA_CACHE_DIR")
+    return Path(base) if base else user_cache_folder()
 
 
 def source_hash() -> str:
@@ -49,15 +60,24 @@ def source_hash() -> str:
 
 @functools.cache
 def kernel_folder() -> Path | None:
-    """Folder of the compiled kernels, made if need be; None where nothing can be written."""
-    base = os.environ.get("NUMBA_CACHE_DIR")
+    """Folder of the compiled kernels, made if need be; None where there is none to be trusted.
+
+    Compiled kernels are pickles, which can run any code: they are read from folders that belong to
+    the user or the installer, and that nobody else can write.
+    """
+    folder = None
     try:
-        folder = (Path(base) if base else user_cache_folder()) / f"kernels-{source_hash()}"
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except (OSError, RuntimeError):
-        return None  # RuntimeError: no home folder
+        folder = kernel_base() / f"{KERNELS}{source_hash()}"
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=0o755, exist_ok=True)
+        why = distrusted(folder.parent.stat(), shared=True) or distrusted(folder.stat())
+    except OSError as error:
+        why = error.strerror or str(error)
+    except RuntimeError:
+        why = "there is no home folder"
+    if why:
+        say_once("folder", f"{folder or 'cache'}: {why}: kernels are compiled anew at every start")
+        return None
     return folder
 
 
@@ -136,16 +156,11 @@ def _inner(function: Kernel, options: dict[str, Any]) -> Kernel:
 def _cached(function: Kernel, options: dict[str, Any]) -> Kernel:
     import numba
 
-    settings: dict[str, Any] = {"nogil": True, "error_model": "numpy", **options}
+    compiled = numba.njit(nogil=True, error_model="numpy", **options)(function)
     folder = kernel_folder()
-    if folder is None:
-        return cast("Kernel", numba.njit(**settings)(function))
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(folder)  # read while decorating, and only then
-    try:
-        return cast("Kernel", numba.njit(cache=True, **settings)(function))
-    except RuntimeError:
-        # No source file to hang the cache on: an interactive session, a doctest.
-        return cast("Kernel", numba.njit(**settings)(function))
-    finally:
-        numba.config.CACHE_DIR = before
+    if folder is not None and compiled is not function:  # it is, where numba is switched off
+        from maneuver_automaton._kernel_cache import KernelCache
+
+        with contextlib.suppress(OSError):  # no source file: an interactive session, a doctest
+            compiled._cache = KernelCache(function, folder)
+    return cast("Kernel", compiled)

@@ -3,9 +3,30 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
+import stat
+import time
 import uuid
 from pathlib import Path
+from typing import BinaryIO
+
+PART = ".part-"  # what the names of files begin with that are not whole yet
+OLD = 3600.0  # [s] since a part was written: whoever wrote it was killed
+
+
+def open_input(path: Path) -> BinaryIO:
+    """Open a file to read it; a pipe or a device, which may never end, is none.
+
+    Raises
+    ------
+    OSError
+        If it is none, or cannot be opened.
+    """
+    mode = path.stat().st_mode
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise OSError(errno.EINVAL, "it is a pipe or a device, need a file", str(path))
+    return path.open("rb")
 
 
 def write_bytes_atomically(path: Path, content: bytes) -> None:
@@ -20,7 +41,8 @@ def write_bytes_atomically(path: Path, content: bytes) -> None:
     """
     target = path.resolve()  # a link keeps pointing where it points
     target.parent.mkdir(parents=True, exist_ok=True)
-    beside = target.parent / f".part-{uuid.uuid4().hex}"
+    _sweep(target.parent)
+    beside = target.parent / f"{PART}{uuid.uuid4().hex}"
     try:
         with beside.open("xb") as stream:
             stream.write(content)
@@ -33,6 +55,14 @@ def write_bytes_atomically(path: Path, content: bytes) -> None:
         with contextlib.suppress(OSError):
             beside.unlink()
         raise
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what processes left that were killed while they wrote."""
+    for part in folder.glob(f"{PART}*"):
+        with contextlib.suppress(OSError):
+            if time.time() - part.stat().st_mtime > OLD:
+                part.unlink()
 
 
 def write_text_atomically(path: Path, text: str) -> None:

@@ -7,6 +7,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from maneuver_automaton._interrupts import stopped
+
 COUNTED = 0.7  # share of the time left that a stage of counted work takes at most: others follow
 
 
@@ -58,17 +60,17 @@ class Budget:
     @property
     def left(self) -> float:
         """Time that is left [s], at least 0."""
-        return max(self.deadline - self.clock(), 0.0)
+        return 0.0 if self.is_over else max(self.deadline - self.clock(), 0.0)
 
     @property
     def is_over(self) -> bool:
-        """Whether no time is left."""
-        return self.clock() >= self.deadline
+        """Whether no time is left, or a signal asks to come to an end."""
+        return stopped() or self.clock() >= self.deadline
 
     def part(self, share: float, *, at_least: float = 0.0) -> Budget:
         """A budget of its own from now on: a share of the time left, at least so many seconds."""
         now = self.clock()
-        seconds = max(share * max(self.deadline - now, 0.0), at_least)
+        seconds = max(share * self.left, at_least)
         return replace(self, began=now, deadline=now + seconds)
 
     def stage(self, share: float) -> Budget:
@@ -79,7 +81,7 @@ class Budget:
         if self.expansions is not None:
             share = max(share, COUNTED)
         now = self.clock()
-        return replace(self, deadline=now + share * max(self.deadline - now, 0.0))
+        return replace(self, deadline=now + share * self.left)
 
     def before(self, seconds: float) -> Budget:
         """The budget that ends so many seconds earlier: what follows takes these."""

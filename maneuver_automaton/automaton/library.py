@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from maneuver_automaton._files import write_text_atomically
+from maneuver_automaton._files import open_input, write_text_atomically
 from maneuver_automaton.automaton._library_maneuvers import driven, maneuver_entry, maneuver_of
 from maneuver_automaton.automaton._library_models import model_entry, model_of
 from maneuver_automaton.automaton._library_values import (
@@ -116,12 +116,13 @@ def load_library(path: Path | str, *, model: Model | None = None) -> Automaton:
 
 
 def _read(path: Path) -> Any:
-    if path.is_dir():
-        raise InvalidLibrary(f"{path}: is a folder, need a library file")
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        with open_input(path) as stream:
+            text = stream.read().decode("utf-8-sig")
     except FileNotFoundError as error:
         raise InvalidLibrary(f"{path}: no such file") from error
+    except IsADirectoryError as error:
+        raise InvalidLibrary(f"{path}: is a folder, need a library file") from error
     except UnicodeDecodeError as error:
         raise InvalidLibrary(f"{path}: is not a text file in UTF-8") from error
     except (OSError, ValueError) as error:

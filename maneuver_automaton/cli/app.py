@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import gc
-import sys
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated
 
 import typer
 
-from maneuver_automaton.cli.guard import exits
+from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, complain, exits
+from maneuver_automaton.cli.streams import safe_streams
 from maneuver_automaton.errors import InvalidScenario
 
-# Importing libraries makes a million objects and no garbage: look for it less often than usual.
-COLLECT_EVERY = 100_000  # objects
+PRINTED = (["schema"],)  # commands that do nothing but print
 
 app = typer.Typer(
     add_completion=False,
@@ -26,6 +24,10 @@ automaton_app = typer.Typer(
     no_args_is_help=True, rich_markup_mode=None, help="Make, list or draw a library of trims."
 )
 app.add_typer(automaton_app, name="automaton")
+cache_app = typer.Typer(
+    no_args_is_help=True, rich_markup_mode=None, help="List or clear what is kept on disk."
+)
+app.add_typer(cache_app, name="cache")
 
 File = Annotated[Path, typer.Argument(metavar="FILE", help="Scenario (YAML), or another format.")]
 Library = Annotated[Path, typer.Argument(metavar="FILE", help="Scenario or library file.")]
@@ -63,22 +65,36 @@ Case = Annotated[
 
 def run(argv: list[str]) -> int:
     """Run the command line with the arguments `argv`, and return the exit code."""
-    for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="replace")  # names may hold what a terminal cannot show
-    try:
-        app(args=argv, prog_name="maneuver-automaton")
-    except SystemExit as done:
-        return done.code if isinstance(done.code, int) else int(done.code is not None)
-    return 0
+    with safe_streams() as (out, _):
+        try:
+            app(args=argv, prog_name="maneuver-automaton")
+            code = 0
+        except SystemExit as done:
+            code = done.code if isinstance(done.code, int) else int(done.code is not None)
+        out.flush()
+        if out.failure is not None and not isinstance(out.failure, BrokenPipeError):
+            complain(f"standard output: cannot be written: {out.failure.strerror or out.failure}")
+            if code == FOUND and argv[:1] in PRINTED:
+                code = BAD_INPUT  # there is no other output
+    return code
 
 
-def main() -> NoReturn:
-    """Entry point of the console script."""
-    gc.set_threshold(COLLECT_EVERY)
-    code = run(sys.argv[1:])
-    gc.freeze()  # or the exit would look through every object of every library once more
-    sys.exit(code)
+@cache_app.command("show")
+@exits
+def cache_show() -> int:
+    """List what is kept on disk to be quicker the next time: compiled kernels, tables."""
+    from maneuver_automaton.cli import cache_command
+
+    return cache_command.show()
+
+
+@cache_app.command("clear")
+@exits
+def cache_clear() -> int:
+    """Remove it; it is made again when it is needed."""
+    from maneuver_automaton.cli import cache_command
+
+    return cache_command.clear()
 
 
 @app.command()

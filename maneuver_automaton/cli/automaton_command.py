@@ -66,6 +66,9 @@ def _build_maneuvers(file: Path, path: Path, settings: Settings) -> int:
             built = build_file.build(
                 asked, path, jobs=settings.jobs, scheduler=settings.scheduler, progress=count
             )
+        except KeyboardInterrupt:
+            complain(f"{file}: interrupted: called again, the build goes on after what is done")
+            raise
         except OSError as error:
             raise not_written(Path(error.filename or path), error) from error
         except ManeuverAutomatonError:

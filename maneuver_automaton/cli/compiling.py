@@ -6,6 +6,7 @@ import contextlib
 from collections.abc import Iterator
 from typing import Any
 
+from maneuver_automaton._interrupts import compiler_began, compiler_ended
 from maneuver_automaton.cli.guard import complain
 
 COMPILING = "compiling kernels, once after installation: this may take a minute ..."
@@ -13,21 +14,23 @@ COMPILING = "compiling kernels, once after installation: this may take a minute 
 
 @contextlib.contextmanager
 def announced(*, quiet: bool = False) -> Iterator[None]:
-    """Print one line when the compiler starts to work inside; loading from the cache is silent."""
-    if quiet:
-        yield
-        return
+    """Print one line when the compiler starts to work inside; loading from the cache is silent.
+
+    The compiler asks for no time limit: while it is at work a signal breaks off.
+    """
     from numba.core import event
 
     class Announcement(event.Listener):  # type: ignore[misc]
-        said = False
+        said = quiet
 
         def on_start(self, event: Any) -> None:
+            compiler_began()
             if not self.said:
                 complain(COMPILING)
             self.said = True
 
-        def on_end(self, event: Any) -> None: ...
+        def on_end(self, event: Any) -> None:
+            compiler_ended()
 
     with event.install_listener("numba:compile", Announcement()):
         yield

@@ -11,11 +11,11 @@ from typing import ParamSpec
 
 import typer
 
+from maneuver_automaton._interrupts import exit_code, stopped
 from maneuver_automaton.errors import ManeuverAutomatonError
 
 DEBUG = "MANEUVER_AUTOMATON_DEBUG"
 FOUND, NO_PLAN, BAD_INPUT = 0, 1, 2
-INTERRUPTED, BROKEN_PIPE = 130, 141  # 128 + the signal, as shells count
 
 P = ParamSpec("P")
 
@@ -27,8 +27,12 @@ def complain(line: str) -> None:
 
 def explained(error: Exception) -> str:
     """One line for whatever a command raised."""
-    if isinstance(error, ManeuverAutomatonError):
+    if isinstance(error, ManeuverAutomatonError) or _is_worded(error):
         return str(error)
+    if isinstance(error, OSError) and error.strerror:
+        return f"{str(error.filename or 'a file')[:200]}: {error.strerror}"
+    if isinstance(error, MemoryError):
+        return f"out of memory: {error}; need sizes, or distances, that are smaller"
     if os.environ.get(DEBUG):
         import traceback
 
@@ -39,6 +43,19 @@ def explained(error: Exception) -> str:
     )
 
 
+def _is_worded(error: Exception) -> bool:
+    """Whether the package itself found a value to be wrong, and says which."""
+    place = error.__traceback__
+    while place is not None and place.tb_next is not None:
+        place = place.tb_next
+    ours = Path(__file__).parents[1]
+    return (
+        isinstance(error, ValueError)
+        and place is not None
+        and ours in Path(place.tb_frame.f_code.co_filename).parents
+    )
+
+
 def exits(command: Callable[P, int]) -> Callable[P, None]:
     """Make a command end with the exit code that it returns, and with words if it raises."""
 
@@ -46,21 +63,11 @@ def exits(command: Callable[P, int]) -> Callable[P, None]:
     def safe(*args: P.args, **kwargs: P.kwargs) -> None:
         try:
             code = command(*args, **kwargs)
-            sys.stdout.flush()
         except KeyboardInterrupt:
-            code = INTERRUPTED
-        except BrokenPipeError:
-            _close_stdout()
-            code = BROKEN_PIPE
+            code = exit_code()
         except Exception as error:  # noqa: BLE001, the last resort
             complain(explained(error))
             code = BAD_INPUT
-        raise typer.Exit(code)
+        raise typer.Exit(exit_code() if stopped() else code)
 
     return safe
-
-
-def _close_stdout() -> None:
-    """Let the flush at exit go nowhere: whoever read our output has left."""
-    with Path(os.devnull).open("w") as nowhere:
-        os.dup2(nowhere.fileno(), sys.stdout.fileno())

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from maneuver_automaton._interrupts import stopped
 from maneuver_automaton.cli import road_command
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
@@ -204,10 +205,10 @@ def _disturbance(part: Any, seed: int | None) -> Disturbance | None:
 def _write(loop: ClosedLoop, out: Path, settings: Settings) -> None:
     from maneuver_automaton.formats.closed_loop_json import save_closed_loop
 
-    save_closed_loop(loop, out / "closed_loop.json")
+    save_closed_loop(loop, out / "closed_loop.json", interrupted=stopped())
     for name in PICTURES:
         (out / name).unlink(missing_ok=True)  # of an earlier loop
-    if not (settings.plot or settings.animate):
+    if stopped() or not (settings.plot or settings.animate):
         return
     from maneuver_automaton import plotting
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from maneuver_automaton._interrupts import stopped
 from maneuver_automaton.cli import road_command
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
@@ -67,6 +68,8 @@ def plan_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> int
     if result.plan is None:
         complain(f"{path}: {result.status.value}: {result.reason}")
         return NO_PLAN
+    if stopped():
+        complain(f"{path}: interrupted: the best plan so far is in {out / 'plan.json'}")
     if not settings.quiet:
         from maneuver_automaton.cli.tables import print_result
 
@@ -94,6 +97,8 @@ def plan_folder(folder: Path, out: Path, *, settings: Settings, parts: Parts, jo
         for row in work:
             rows.append(row)
             advance()
+            if stopped():
+                break
     for row in rows:
         if row.code != FOUND:
             complain(row.reason)
@@ -107,12 +112,23 @@ def _plan(scenario: Scenario, out: Path, settings: Settings) -> PlanResult:
     from maneuver_automaton import planning
 
     make_folder(out)
-    with announced(quiet=settings.quiet):
-        result = planning.plan(
-            scenario.problem,
-            time_limit=settings.time_limit or scenario.time_limit_s,
-            alternatives=settings.alternatives,
+    try:
+        with announced(quiet=settings.quiet):
+            result = planning.plan(
+                scenario.problem,
+                time_limit=settings.time_limit or scenario.time_limit_s,
+                alternatives=settings.alternatives,
+            )
+    except KeyboardInterrupt:
+        if not stopped():
+            raise  # in somebody else's program
+        result = planning.PlanResult(
+            problem=scenario.problem,
+            status=planning.PlanStatus.OUT_OF_BUDGET,
+            reason="interrupted before there was a plan",
         )
+    if stopped() and result.plan is None:
+        result = replace(result, reason="interrupted before there was a plan")
     result = replace(result, timing_s={**scenario.timing_s, **result.timing_s})
     try:
         _write(result, out, settings)
@@ -124,10 +140,10 @@ def _plan(scenario: Scenario, out: Path, settings: Settings) -> PlanResult:
 def _write(result: PlanResult, out: Path, settings: Settings) -> None:
     from maneuver_automaton.formats.plan_json import save_plan
 
-    save_plan(result, out / "plan.json")
+    save_plan(result, out / "plan.json", interrupted=stopped())
     for name in PICTURES:
         (out / name).unlink(missing_ok=True)  # of an earlier plan
-    if not (settings.plot or settings.animate):
+    if stopped() or not (settings.plot or settings.animate):
         return
     from maneuver_automaton import plotting
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from maneuver_automaton._interrupts import stopped
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written
@@ -52,7 +53,7 @@ def plan_file(
     document = road_plan_to_dict(result)
 
     def write() -> None:
-        write_document(document, out / "plan.json")
+        write_document(document, out / "plan.json", interrupted=stopped())
         for name in ("plan.png", "plan.gif"):
             (out / name).unlink(missing_ok=True)  # of an earlier plan
         if result.plan is not None:
@@ -99,7 +100,7 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
     document = road_drive_to_dict(drive, before=before)
 
     def write() -> None:
-        write_document(document, out / "closed_loop.json")
+        write_document(document, out / "closed_loop.json", interrupted=stopped())
         films = [out / "closed_loop.gif", out / "closed_loop.html"]
         for file in (out / "closed_loop.png", *films):
             file.unlink(missing_ok=True)  # of an earlier loop
@@ -136,7 +137,7 @@ def _draw(
     plot: bool,
     animate: bool,
 ) -> None:
-    if not (plot or animate):
+    if stopped() or not (plot or animate):
         return
     from maneuver_automaton import plotting
 

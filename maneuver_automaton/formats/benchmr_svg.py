@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._files import open_input
 from maneuver_automaton.collision import Obstacle, Polygon
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.statement import Statement
@@ -118,7 +119,7 @@ def n_queries(path: Path) -> int:
 def is_queries(path: Path) -> bool:
     """Whether a file begins like a table of queries."""
     try:
-        with path.open("rb") as stream:
+        with open_input(path) as stream:
             return stream.read(80).removeprefix(b"\xef\xbb\xbf").startswith(b"world,robot")
     except (OSError, ValueError):
         return False

@@ -19,7 +19,9 @@ from maneuver_automaton.automaton.courses import samples_entry
 from maneuver_automaton.automaton.cutting import tail_of, with_samples_at
 from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.json_source import Place
 from maneuver_automaton.formats.plan_json import package_version, read_json, write_document
+from maneuver_automaton.formats.yaml_source import shown
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 from maneuver_automaton.receding_horizon import (
     ClosedLoop,
@@ -31,6 +33,9 @@ from maneuver_automaton.receding_horizon import (
 )
 
 SCHEMA = 1
+COUNTED = ("time_s", "value", "accumulated_cost")  # of every entry of `steps`, numbers
+APPLIED = ("applied_s", "applied_cost", "lower_bound", "solve_s")  # of those applied
+MOST_STEPS = 1_000_000
 NEEDED = ("schema", "automaton_hash", "reached", "steps", "step_s")
 NOT_APPLIED = ("control", "word", "plan", "replanned", "solve_s")
 
@@ -82,15 +87,15 @@ def closed_loop_to_dict(loop: ClosedLoop) -> dict[str, Any]:
     }
 
 
-def save_closed_loop(loop: ClosedLoop, path: Path | str) -> None:
-    """Write closed_loop.json in one step.
+def save_closed_loop(loop: ClosedLoop, path: Path | str, *, interrupted: bool = False) -> None:
+    """Write closed_loop.json in one step; `interrupted` by a signal it says so.
 
     Raises
     ------
     OSError
         If the file cannot be written.
     """
-    write_document(closed_loop_to_dict(loop), path)
+    write_document(closed_loop_to_dict(loop), path, interrupted=interrupted)
 
 
 def load_steps(path: Path | str, automaton: Automaton) -> tuple[tuple[Step, ...], Array]:
@@ -117,6 +122,7 @@ def load_steps(path: Path | str, automaton: Automaton) -> tuple[tuple[Step, ...]
     document = read_json(path, needed=NEEDED, kind="closed loop")
     if document["automaton_hash"] != automaton_hash(automaton):
         raise InvalidScenario(f"{path}: automaton_hash: this loop was planned with another library")
+    _check_entries(document["steps"], automaton, str(path))
     try:
         steps = tuple(
             _step_of(number, entry, automaton)
@@ -128,6 +134,44 @@ def load_steps(path: Path | str, automaton: Automaton) -> tuple[tuple[Step, ...]
         said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
         raise InvalidScenario(f"{path}: {said}") from error
     return steps, poses
+
+
+def _check_entries(entries: Any, automaton: Automaton, file: str) -> None:
+    """Every entry has its times, costs, poses and controls, as numbers."""
+    if not isinstance(entries, list) or not entries:
+        raise InvalidScenario(f"{file}: steps: got {shown(entries)}, need a list of steps")
+    before, last = -math.inf, len(entries) - 1
+    for k, entry in enumerate(entries):
+        place = Place(entry, file, ("steps", k))
+        for key in COUNTED if k == last else (*COUNTED, *APPLIED):
+            place.get(key, float)
+        time = place.value["time_s"]
+        if time < before:
+            raise place.get("time_s", float).error(f"got {time:g}, need at least {before:g}")
+        before = time
+        for key in ("pose", "vehicle_pose"):
+            pose = place.get(key, list)
+            if len(pose.numbers()) != automaton.model.group.dof:
+                raise pose.error(f"need {automaton.model.group.dof} numbers")
+        if k < last:
+            _check_applied(place, automaton)
+
+
+def _check_applied(place: Place, automaton: Automaton) -> None:
+    """The number, the plan and the control of a step that was applied."""
+    number = place.get("number", int)
+    if not 0 <= number.value < MOST_STEPS:
+        raise number.error(f"got {number.value}, need 0 to {MOST_STEPS - 1}")
+    plan = place.get("plan", list)
+    for j in range(len(plan.value)):
+        plan.item(j).get("name", str)
+        plan.item(j).get("duration_s", float)
+    trim = bool(plan.value) and plan.item(0).get("kind", str).value == "trim"
+    if not trim and place.value.get("control", "") is None:
+        return  # nothing was left to do, or the control of a maneuver varies
+    control = place.get("control", list)
+    if len(control.numbers()) != len(automaton.model.control_names):
+        raise control.error(f"need {', '.join(automaton.model.control_names)}")
 
 
 def _step(step: Step, vehicle_pose: list[float], automaton: Automaton) -> dict[str, Any]:

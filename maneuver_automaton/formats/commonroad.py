@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._files import open_input
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Shape
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.polygons import simple_polygon
@@ -38,7 +39,7 @@ OPEN = 1e-3  # share of a step by which sets of occupancies are shorter at both 
 
 def is_commonroad(path: Path) -> bool:
     """Whether an XML file begins like a scenario of CommonRoad."""
-    with path.open("rb") as stream:
+    with open_input(path) as stream:
         return b"<commonRoad" in stream.read(4000)
 
 

@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray, freeze
-from maneuver_automaton._files import write_text_atomically
+from maneuver_automaton._files import open_input, write_text_atomically
 from maneuver_automaton.automaton import Automaton, Trajectory
 from maneuver_automaton.errors import InvalidLibrary
 from maneuver_automaton.formats.levels import levels_of, nearest_level
@@ -112,7 +112,7 @@ class Deviation:
 
 def is_commonroad_primitives(path: Path) -> bool:
     """Whether an XML file begins like one of primitives."""
-    with path.open("rb") as stream:
+    with open_input(path) as stream:
         head = stream.read(4000)
     return f"<{ROOT}".encode() in head or f"<{OLDER_ROOT}".encode() in head
 

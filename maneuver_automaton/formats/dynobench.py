@@ -22,6 +22,7 @@ from maneuver_automaton.formats.dynobench_models import (
     value_at,
 )
 from maneuver_automaton.formats.statement import StatedVehicle, Statement
+from maneuver_automaton.formats.text_source import MAX_YAW
 from maneuver_automaton.formats.yaml_source import Document, Where, shown
 from maneuver_automaton.problem import Bounds
 
@@ -84,6 +85,10 @@ def _end(document: Document, what: str, model: StatedModel) -> tuple[Array, Arra
     """Pose and reduced state of the start or the goal."""
     need = model.ends
     numbers = numbers_at(document, ("robots", 0, what), need.count(",") + 1, need)
+    if abs(numbers[2]) > MAX_YAW:
+        raise document.error(
+            ("robots", 0, what, 2), f"got the heading {numbers[2]:g}, need at most {MAX_YAW:g} rad"
+        )
     return pose_and_state(model.dynamics, numbers)
 
 

@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import save_library
-from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.errors import InvalidLibrary, InvalidScenario
 from maneuver_automaton.formats import aroc, commonroad_primitives, nav2_lattice, sbpl_mprim
 from maneuver_automaton.formats.text_source import read_text
 
@@ -45,6 +45,16 @@ def read_primitives(path: Path) -> PrimitivesRead | None:
     InvalidLibrary
         If it makes no automaton.
     """
+    try:
+        return _read(path)
+    except (InvalidScenario, InvalidLibrary):
+        raise
+    except ValueError as error:
+        raise InvalidLibrary(f"{path}: {error}") from error
+
+
+def _read(path: Path) -> PrimitivesRead | None:
+    """As `read_primitives`; what makes no motion raises a ValueError."""
     ending = path.suffix.lower()
     if aroc.is_aroc(path):
         return _of_aroc(path)

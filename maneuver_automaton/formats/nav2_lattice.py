@@ -37,6 +37,7 @@ from maneuver_automaton.formats.lattice import (
 )
 
 KIND = "Nav2 lattice primitives"
+MOST_CELLS = 3  # between two poses in a row; Nav2 writes one a cell
 MOTIONS = ("ackermann", "diff", "omni")
 DISTINCT = "trajectory_distinctness_ratio"
 ON_HEADING = 1e-6  # [rad] between a last pose and its heading
@@ -265,6 +266,13 @@ def _primitive(row: Place, headings: Array, resolution: float) -> Nav2Primitive:
         straight_length=row.get("straight_length", float).value,
         poses=np.array(poses),
     )
+    steps = np.hypot(*np.diff(made.poses[:, :2], axis=0, prepend=0.0).T) / resolution
+    if not steps.max() <= MOST_CELLS:
+        k = int(steps.argmax())
+        raise rows.item(k).error(
+            f"is {steps[k] * resolution:g} m from the pose before, need at most {MOST_CELLS} "
+            "cells: poses are missing"
+        )
     last, heading = made.poses[-1], float(headings[made.end])
     across = last[:2] / resolution
     if np.abs(across - np.round(across)).max() > ON_GRID:

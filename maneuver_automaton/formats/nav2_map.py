@@ -11,6 +11,7 @@ The mode scale counts as trinary: its shades between the thresholds are degrees 
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,14 +26,14 @@ from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.cells import bounds_around, check_cell
 from maneuver_automaton.formats.grey_image import GreyImage, read_grey_image
 from maneuver_automaton.formats.statement import MapFile, Statement, Unknown
-from maneuver_automaton.formats.text_source import read_text
+from maneuver_automaton.formats.text_source import MAX_YAW, read_text
 from maneuver_automaton.formats.yaml_source import Document, parse, shown
 
 MODES = ("trinary", "scale", "raw")
 YES_OR_NO = {"yes": True, "on": True, "no": False, "off": False}  # words of YAML 1.1
 FARTHEST_CELL = 1e12  # cells between the map and the origin; more, and their corners coincide
-MAX_YAW = 1e6  # [rad]
 REQUIRED = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
+_A_KEY = re.compile(rf"(?m)^[\s{{\"']*({'|'.join(REQUIRED)})[\"']?\s*:")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,6 +68,8 @@ def load_nav2_map(path: Path, *, unknown: Unknown = "blocked") -> OccupancyMap:
         If the file or its image cannot be used: file, line, field, value, what would be right.
     """
     text = read_text(path, what="a map")
+    if text.strip() and not _A_KEY.search(text):  # what another file holds is not for a message
+        raise InvalidScenario(f"{path}: is no map, need YAML with the keys {', '.join(REQUIRED)}")
     return map_of_document(parse(text, name=str(path), what="a map"), path, unknown=unknown)
 
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from maneuver_automaton._arrays import Array, as_array
-from maneuver_automaton._files import write_text_atomically
+from maneuver_automaton._files import open_input, write_text_atomically
 from maneuver_automaton.audit import Audit, TerminalError
 from maneuver_automaton.automaton import Plan, Primitive
 from maneuver_automaton.automaton.library import automaton_hash
@@ -88,26 +88,31 @@ def _narrowest(passage: Narrowest | None) -> dict[str, Any]:
     return {"narrowest": {"place": list(passage.place), "missing_m": passage.missing}}
 
 
-def save_plan(result: PlanResult, path: Path | str) -> None:
-    """Write plan.json in one step.
+def save_plan(result: PlanResult, path: Path | str, *, interrupted: bool = False) -> None:
+    """Write plan.json in one step; `interrupted` by a signal it says so.
 
     Raises
     ------
     OSError
         If the file cannot be written.
     """
-    write_document(plan_to_dict(result), path)
+    write_document(plan_to_dict(result), path, interrupted=interrupted)
 
 
-def write_document(document: Mapping[str, Any], path: Path | str) -> None:
+def write_document(
+    document: Mapping[str, Any], path: Path | str, *, interrupted: bool = False
+) -> None:
     """Write a plan.json or closed_loop.json in one step: strict JSON, long lists entry by entry.
 
+    Where a signal came before the work was done, the key `interrupted` says so.
+
     Raises
     ------
     OSError
         If the file cannot be written.
     """
-    lines = [f"  {json.dumps(key)}: {_json(key, value)}" for key, value in document.items()]
+    said = {**document, "interrupted": True} if interrupted else document
+    lines = [f"  {json.dumps(key)}: {_json(key, value)}" for key, value in said.items()]
     write_text_atomically(Path(path), "{\n" + ",\n".join(lines) + "\n}\n")
 
 
@@ -133,12 +138,14 @@ def read_json(path: Path | str, *, needed: Sequence[str], kind: str) -> dict[str
     """
     path = Path(path)
     name = f"{kind.replace(' ', '_')}.json"
-    if path.is_dir():
-        raise InvalidScenario(f"{path}: is a folder, need a {name}")
     try:
-        document = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
+        with open_input(path) as stream:
+            text = stream.read().decode("utf-8")
+        document = json.loads(text, parse_constant=_refuse_constant)
     except FileNotFoundError as error:
         raise InvalidScenario(f"{path}: no such file") from error
+    except IsADirectoryError as error:
+        raise InvalidScenario(f"{path}: is a folder, need a {name}") from error
     except OSError as error:
         raise InvalidScenario(f"{path}: cannot be read: {error.strerror}") from error
     except json.JSONDecodeError as error:

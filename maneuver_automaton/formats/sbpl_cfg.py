@@ -17,6 +17,7 @@ from typing import TypeAlias
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._files import open_input
 from maneuver_automaton.collision import OccupancyMap
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.cells import bounds_around, check_cell, check_size, drawn_headings
@@ -60,7 +61,7 @@ _Header: TypeAlias = Mapping[str, list[_Word]]  # the numbers after each key
 
 def is_sbpl(path: Path) -> bool:
     """Whether a file begins like an environment."""
-    with path.open("rb") as stream:
+    with open_input(path) as stream:
         return SIZE.encode() in stream.read(2000)
 
 

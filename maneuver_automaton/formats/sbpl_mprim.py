@@ -44,6 +44,7 @@ MULTIPLIER, PRIMITIVE_RADIUS, POSES = (
     "turning_radius:",
     "intermediateposes:",
 )
+FARTHEST_CELLS = 50  # from the first pose, besides three times the way to the end
 IN_CELL, IN_BIN = 0.5, 0.5  # of a cell and of a step between headings: how far off an end may be
 
 
@@ -329,6 +330,7 @@ def _primitive(
         turning_radius=own,
     )
     _check_ends(words, made, resolution, headings, first)
+    _check_between(words, made, resolution)
     return made
 
 
@@ -358,6 +360,19 @@ def _check_ends(
                 f"{words.path}:{line}: got the pose ({pose[0]:g}, {pose[1]:g}, {pose[2]:g}), need "
                 f"it in the cell and at the heading of ({need[0]:g}, {need[1]:g}, {need[2]:g})"
             )
+
+
+def _check_between(words: _Words, made: MprimPrimitive, resolution: float) -> None:
+    """No pose is far from the way between the ends."""
+    most = resolution * (FARTHEST_CELLS + 3.0 * np.hypot(*made.end[:2]))
+    far = np.hypot(*made.poses[:, :2].T)
+    if not far.max() <= most:
+        k = int(far.argmax())
+        raise words.wrong(
+            POSES,
+            f"got pose {k} of the {len(far)} that end here {far[k]:g} m from the first, need at "
+            f"most {most:g} m",
+        )
 
 
 def _narrowest(headings: Array) -> float:

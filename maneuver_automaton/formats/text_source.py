@@ -6,9 +6,11 @@ import math
 from pathlib import Path
 
 from maneuver_automaton._ceilings import FARTHEST as FARTHEST
+from maneuver_automaton._files import open_input
 from maneuver_automaton.errors import InvalidScenario
 
 MAX_BYTES = 5_000_000  # of a file that people write
+MAX_YAW = 1e6  # [rad] of a heading
 MAX_MAP_BYTES = 200_000_000  # of a file that holds a map, cell by cell
 
 
@@ -20,16 +22,16 @@ def read_bytes(path: Path, *, most: int = MAX_BYTES, what: str = "a scenario") -
     InvalidScenario
         If it is missing, a folder, unreadable, or too long.
     """
-    if path.is_dir():
-        raise InvalidScenario(f"{path}: is a folder, need a file")
     try:
-        with path.open("rb") as stream:
+        with open_input(path) as stream:
             content = stream.read(most + 1)
     except FileNotFoundError as error:
         raise InvalidScenario(f"{path}: no such file") from error
+    except IsADirectoryError as error:
+        raise InvalidScenario(f"{path}: is a folder, need a file") from error
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path
         reason = getattr(error, "strerror", None) or str(error)
-        raise InvalidScenario(f"{path}: cannot be read: {reason}") from error
+        raise InvalidScenario(f"{brief(str(path), 200)}: cannot be read: {reason}") from error
     if len(content) > most:
         raise too_long(str(path), most, what=what)
     return content
@@ -118,6 +120,9 @@ def whole(token: str, *, at: str, least: int = 0) -> int:
 def _brief(token: str) -> str:
     """A word as a message shows it."""
     word = token.strip()
-    if not word:
-        return "nothing"
-    return repr(word if len(word) <= 40 else word[:37] + "...")
+    return repr(brief(word, 40)) if word else "nothing"
+
+
+def brief(text: str, most: int) -> str:
+    """A text as a message shows it, with at most so many characters."""
+    return text if len(text) <= most else text[: most - 3] + "..."

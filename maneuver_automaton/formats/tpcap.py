@@ -17,11 +17,12 @@ from pathlib import Path
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._files import open_input
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.polygons import simple_polygon
 from maneuver_automaton.formats.statement import Statement
-from maneuver_automaton.formats.text_source import finite, lines_of, read_text, whole
+from maneuver_automaton.formats.text_source import MAX_YAW, finite, lines_of, read_text, whole
 
 FORMAT = "TPCAP"
 HEAD = ("x0", "y0", "theta0", "xf", "yf", "thetaf", "n")
@@ -38,7 +39,7 @@ class _Value:
 
 def is_tpcap(path: Path) -> bool:
     """Whether a file begins like a case: with a number, not with the head of a table."""
-    with path.open("rb") as stream:
+    with open_input(path) as stream:
         return bool(_FIRST.match(stream.read(80).decode("utf-8-sig", errors="replace")))
 
 
@@ -56,6 +57,11 @@ def read_tpcap(path: Path) -> tuple[Statement, ...]:
             f"{path}: got {len(values)} numbers, need at least {len(HEAD)}: {', '.join(HEAD)}"
         )
     poses = np.array([finite(value.token, at=value.at) for value in values[:6]])
+    for k in (2, 5):
+        if abs(poses[k]) > MAX_YAW:
+            raise InvalidScenario(
+                f"{values[k].at} ({HEAD[k]}): got {poses[k]:g}, need at most {MAX_YAW:g} rad"
+            )
     n = whole(values[6].token, at=f"{values[6].at} (number of obstacles)")
     if n > len(values) - 7:
         raise InvalidScenario(

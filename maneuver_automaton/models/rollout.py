@@ -69,6 +69,8 @@ def rollout(
     def rates(time: float, state: Array) -> Array:
         return as_array("f(x, u)", f(state, as_array("control", control_at(time))))
 
+    if not np.isfinite(rates(times[0], start)).all():
+        raise ValueError(f"rollout: the model's rates at {start} are not finite")
     span = (times[0], times[-1])
     solution = solve_ivp(rates, span, start, method="DOP853", t_eval=times, rtol=rtol, atol=atol)
     if not solution.success:

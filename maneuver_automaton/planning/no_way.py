@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from maneuver_automaton.bounds import pose_scene, separation
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.budget import Budget
 
 RESERVED = 0.15  # share of the time that is left for a proof where there is no plan by then
 MOST_BOXES = 300_000  # of poses that are tested

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from maneuver_automaton._interrupts import patient
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.among_zones import plan_among_zones
 from maneuver_automaton.planning.blocked import blocked_ends
@@ -68,7 +69,8 @@ def plan_in(
     if alternatives and uses_lattice(problem):
         load_search(problem)
     budget = Budget.from_now(time_limit, expansions=problem.search.max_expansions)
-    return plan_within(problem, budget, workspace, alternatives=alternatives)
+    with patient():
+        return plan_within(problem, budget, workspace, alternatives=alternatives)
 
 
 def plan_within(

@@ -11,6 +11,8 @@ from maneuver_automaton.primitives._collocation import Elements, Ride, resolved
 from maneuver_automaton.primitives._legendre import SERIES, WEIGHTS, integrals_to
 from maneuver_automaton.primitives.trajectory import Trajectory
 
+MOST_SAMPLES = 500_000  # of one motion
+
 
 def drive(
     model: Model,
@@ -118,9 +120,9 @@ def _sampled(
     ride: Ride, elements: Elements, max_step_m: float, max_step_rad: float
 ) -> tuple[Trajectory, ...]:
     """Samples of every ride, equal times apart while one control holds, all in one go."""
+    counts = _n_samples(ride, elements, max_step_m, max_step_rad)
     poses = _chained(elements)
     spans = np.cumsum(ride.durations, axis=1)
-    counts = _n_samples(ride, elements, max_step_m, max_step_rad)
     rows, place = np.nonzero(ride.durations)
     count = counts[rows, place]
     of = np.repeat(np.arange(count.size), count)
@@ -179,6 +181,12 @@ def _n_samples(ride: Ride, elements: Elements, max_step_m: float, max_step_rad: 
     turn = np.abs(twists[..., 2]).max(axis=2)
     rate = np.where(elements.step > 0.0, np.maximum(speed / max_step_m, turn / max_step_rad), 0.0)
     need = ride.durations * np.maximum.reduceat(rate, ride.first, axis=1)
+    most = need.sum(axis=1).max(initial=0.0)
+    if not most <= MOST_SAMPLES:
+        raise ValueError(
+            f"drive: a motion has {most:.3g} samples {max_step_m:g} m or {max_step_rad:g} rad "
+            f"apart, need a shorter one: at most {MOST_SAMPLES}"
+        )
     count: IntArray = np.maximum(np.ceil(1.001 * need), 1.0).astype(np.int64)
     return count
 

@@ -40,7 +40,7 @@ class Trim:
         freeze(self, "body_velocity", last=(2, 3, 4))
         freeze(self, "control")
         freeze(self, "reduced_state")
-        if not self.name or not self.name.strip():
+        if not isinstance(self.name, str) or not self.name.strip():
             raise ValueError(
                 f"trim: got the name {self.name!r}, need at least one visible character"
             )

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.audit import Audit, audit_plan
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING, tail_of
@@ -126,22 +127,26 @@ def simulate(
         if last is not None  # within a maneuver, maybe, where there is no first trim
         else at_will or problem.first_trim.is_rest
     )
-    for number in range(begin, begin + steps):
-        if arrived and not stay:
-            break
-        draw = next(random)
-        measured = track.poses[-1] + draw.measurement
-        there = None if obstacles is None else obstacles(number)
-        _, now = controller.step(track.seen(measured), obstacles=there)
-        track.log.append(replace(now, measured=measured) if upset.delay else now)
-        stuck = not (now.deed.leads or problem.moves or obstacles is not None)
-        if stuck and (stops or not moves_on(now.plan)):
-            break
-        track.drive(audit=audit)
-        if progress is not None:
-            progress(track.log[-1])
-        track.arrive(draw.noise)
-        arrived = track.inside[-1] and _arrives(now, stops=stops)
+    with patient():
+        for number in range(begin, begin + steps):
+            if stopped() or (arrived and not stay):
+                break
+            draw = next(random)
+            measured = track.poses[-1] + draw.measurement
+            there = None if obstacles is None else obstacles(number)
+            _, now = controller.step(track.seen(measured), obstacles=there)
+            if stopped():  # the search of this step was cut short: it never was
+                controller.last = track.log[-1] if track.log else last
+                break
+            track.log.append(replace(now, measured=measured) if upset.delay else now)
+            stuck = not (now.deed.leads or problem.moves or obstacles is not None)
+            if stuck and (stops or not moves_on(now.plan)):
+                break
+            track.drive(audit=audit)
+            if progress is not None:
+                progress(track.log[-1])
+            track.arrive(draw.noise)
+            arrived = track.inside[-1] and _arrives(now, stops=stops)
     reached = any(track.inside) if stay else arrived
     return _closed_loop(track, controller, step=step, reached=reached, seen=obstacles)
 
@@ -219,7 +224,9 @@ def _closed_loop(
         value, status = log[-1].lower_bound, "no_plan"
         reason = str(log[-1].violations[-1])
     elif not inside[-1]:
-        if applied:  # the value of the step that would have come next
+        if applied and stopped():  # what the plan of the last step has left
+            value = max(applied[-1].value - applied[-1].applied_cost, 0.0)
+        elif applied:  # the value of the step that would have come next
             controller.last = applied[-1]
             then = applied[-1].number + 1
             value = controller.step(track.poses[-1], obstacles=seen and seen(then))[1].value
@@ -227,6 +234,7 @@ def _closed_loop(
         if not reached:
             status = "steps_spent"
             reason = f"the goal is not reached after {len(applied)} steps"
+            reason += ", when the loop was interrupted" if stopped() else ""
     return ClosedLoop(
         problem=track.problem,
         step=step,

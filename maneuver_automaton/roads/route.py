@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import networkx
 
 SPACING = 1.0  # [m] of the points of the line
+LONGEST = 1e5  # [m] of a route, and of the outline of a goal
 BEFORE, BEYOND = 60.0, 300.0  # [m] the line goes on straight before its first point, after its last
 LANE_CHANGE = 10.0  # [m] that a lane change counts when routes are compared
 SHARE = 0.3  # of the smaller of two areas, common to a lanelet and a goal in it
@@ -180,6 +181,10 @@ def _spaced(line: Array, limits: Array) -> tuple[Array, Array, Array]:
         ]
     )
     station = along(longer)
+    if not station[-1] <= LONGEST:
+        raise ValueError(
+            f"route: is {station[-1]:.3g} m long along its lanelets, need at most {LONGEST:g} m"
+        )
     at = SPACING * np.arange(int(station[-1] / SPACING) + 1)
     points = np.stack([np.interp(at, station, longer[:, k]) for k in range(2)], axis=-1)
     steps = np.gradient(points, axis=0)
@@ -207,6 +212,8 @@ def extent_on(rings: Sequence[Array], route: Route) -> Array:
 def _extent(rings: Sequence[Array], points: Array, heading: Array) -> Array:
     import shapely
 
+    if (around := sum(shapely.LinearRing(ring).length for ring in rings)) > LONGEST:
+        raise ValueError(f"goal: its outline is {around:.3g} m long, need at most {LONGEST:g} m")
     corners = np.concatenate(
         [
             np.asarray(shapely.segmentize(shapely.LinearRing(ring), 2.0 * SPACING).coords)

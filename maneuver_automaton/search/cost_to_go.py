@@ -8,15 +8,13 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import math
-import os
-import tempfile
-import zipfile
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from maneuver_automaton._cache_files import keep_within, read_checked, used_now, write_checked
 from maneuver_automaton._compile import user_cache_folder
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_table
@@ -24,9 +22,12 @@ from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.search.lattice_library import lattice_library
 from maneuver_automaton.search.prepared import RECENT, Prepared
 
+FOLDER = "cost_to_go"  # of the user's cache folder
 HALF = 48  # cells from the middle to the rim
 HEADINGS = 72
 REACH = 3.0  # [turning radii] from the middle to the rim, where nothing else is asked for
+SHAPE = (HEADINGS, 2 * HALF + 1, 2 * HALF + 1)
+MOST_BYTES = 500_000_000  # of all tables that are kept on disk
 SCALES = (0.09, 0.18, 0.36)  # lengths of the program's edges, in those of the lattice's longest
 
 
@@ -119,7 +120,7 @@ def _kept(
     cell = reach / HALF
     digest = hashlib.sha256(twists + rates + edge_durations)
     digest.update(repr((reach, mirrored, HALF, HEADINGS, 1)).encode())
-    path = (folder or user_cache_folder() / "cost_to_go") / f"{digest.hexdigest()[:24]}.npy"
+    path = (folder or user_cache_folder() / FOLDER) / f"{digest.hexdigest()[:24]}.table"
     value = _load(path)
     if value is None:
         value = _kernels_table.fill_table(
@@ -161,22 +162,19 @@ def _to_any_heading(value: NDArray[np.float32]) -> NDArray[np.float32]:
 def _load(path: Path) -> NDArray[np.float32] | None:
     """A table from a file; None if there is none that can be used."""
     try:
-        value = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile):
-        return None
-    right = value.shape == (HEADINGS, 2 * HALF + 1, 2 * HALF + 1) and value.dtype == np.float32
-    return np.ascontiguousarray(value) if right else None
+        content = read_checked(path)
+        if content is None:
+            return None
+        table = np.frombuffer(content, dtype=np.float32).reshape(SHAPE)
+    except (OSError, ValueError):
+        return None  # damaged: it is made and written anew
+    used_now(path)
+    return table.copy()
 
 
 def _save(value: NDArray[np.float32], path: Path) -> None:
-    """Write under another name and rename: a reader sees a whole table or none."""
+    """Write a table, and keep the folder small; where nothing can be written it is made again."""
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                np.save(file, value)
-            Path(name).replace(path)
-        except BaseException:
-            Path(name).unlink(missing_ok=True)
-            raise
+        write_checked(path, value.tobytes())
+        keep_within(path.parent, MOST_BYTES)

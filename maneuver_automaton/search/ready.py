@@ -93,7 +93,9 @@ def compile_the_rest() -> None:
 def _second_process() -> subprocess.Popen[bytes] | None:
     """A process that compiles its share; None without kernels to compile, or without a cache."""
     folder = kernel_folder()
-    if folder is None or any(folder.rglob("*scan_words*")) or (os.cpu_count() or 1) < 2:
+    if folder is None or any(folder.glob("*scan_words*")) or (os.cpu_count() or 1) < 2:
+        return None
+    if not os.access(folder, os.W_OK):
         return None
     if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
         return None

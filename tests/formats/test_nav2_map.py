@@ -157,7 +157,7 @@ def test_the_image_is_found_from_home(tmp_path, monkeypatch):
          ":6: mode: got 'quaternary', need one of trinary, scale, raw"),
         ("0.65\n", "0.65\nmode: [raw]\n",
          ":6: mode: got ['raw'], need one of trinary, scale, raw"),
-        (HEADER, "- 1\n", ":1: got [1], need the keys image, resolution, origin, negate, "
+        (HEADER, "- 1\n", ": is no map, need YAML with the keys image, resolution, origin, negate, "
          "occupied_thresh, free_thresh"),
         (HEADER, "", ": is empty, need a map"),
     ],

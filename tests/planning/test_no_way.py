@@ -3,9 +3,9 @@
 import dataclasses
 
 import pytest
-from maneuver_automaton.search.budget import Budget
 
 from maneuver_automaton import SearchSettings, plan
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.formats import plan_to_dict
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.planning.no_way import before_proof, with_proof

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from maneuver_automaton._cache_files import read_checked, write_checked
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import Box
 from maneuver_automaton.costs import Cost
@@ -123,42 +124,48 @@ def kept_in(folder):
 def test_loading_gives_the_same_bits(tmp_path):
     made = kept_in(tmp_path)
     (path,) = tmp_path.iterdir()
-    assert path.suffix == ".npy"
-    assert np.load(path).tobytes() == made.tobytes()
-    path.write_bytes(path.read_bytes()[:-4] + np.float32(7.0).tobytes())  # to tell it from anew
+    assert read_checked(path) == made.tobytes()
+    write_checked(path, made.tobytes()[:-4] + np.float32(7.0).tobytes())  # to tell it from anew
     loaded = kept_in(tmp_path)
     assert loaded[-1, -1, -1] == 7.0
     assert np.array_equal(loaded.ravel()[:-1], made.ravel()[:-1])
+    assert loaded.flags.writeable  # as the kernels were compiled for
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        b"",
-        b"rubbish",
-        b"\x93NUMPY\x01\x00",
-        b"\x93NUMPY\x01\x00v\x00{'descr': '<f4', 'fortran_order': False, 'shape': (2,)}",
-        b"\x80\x04N.",
-    ],
-)
-def test_a_damaged_file_is_made_anew(tmp_path, content):
+@pytest.mark.parametrize("damage", ["empty", "foreign", "short", "flipped", "another"])
+def test_a_damaged_file_is_made_anew(tmp_path, damage):
     made = kept_in(tmp_path)
     (path,) = tmp_path.iterdir()
     whole = path.read_bytes()
-    path.write_bytes(content)
+    contents = {
+        "empty": b"",
+        "foreign": b"\x93NUMPY\x01\x00v\x00{'descr': '<f4'",
+        "short": whole[:-1000],
+        "flipped": whole[:5000] + bytes([whole[5000] ^ 1]) + whole[5001:],
+    }
+    if damage == "another":
+        write_checked(path, np.zeros((2, 3, 3), dtype=np.float32).tobytes())
+    else:
+        path.write_bytes(contents[damage])
     assert np.array_equal(kept_in(tmp_path), made)
     assert path.read_bytes() == whole
 
 
-def test_a_file_that_ends_too_soon_or_is_another_table_is_made_anew(tmp_path):
-    made = kept_in(tmp_path)
+def test_tables_used_least_recently_go(tmp_path, monkeypatch):
+    kept_in(tmp_path)
     (path,) = tmp_path.iterdir()
-    path.write_bytes(path.read_bytes()[:-1000])
-    assert np.array_equal(kept_in(tmp_path), made)
-    np.save(path, np.zeros((2, 3, 3), dtype=np.float32))
-    assert np.array_equal(kept_in(tmp_path), made)
-    np.save(path, made.astype(np.float64))
-    assert np.array_equal(kept_in(tmp_path), made)
+    size = path.stat().st_size
+    monkeypatch.setattr(cost_to_go, "MOST_BYTES", 3 * size)
+    others = [tmp_path / f"{k}.npy" for k in range(3)]  # as an earlier version wrote them
+    for k, other in enumerate(others):
+        other.write_bytes(bytes(size))
+        os.utime(other, (1000 + k, 1000 + k))
+    os.utime(path, (1, 1))
+    kept_in(tmp_path)  # read, and so used now
+    more = Problem(SMALL.automaton, [0, 0, 0], [1, 0, 0], cost=Cost(time=2.0))
+    cost_to_go_table(more, reach=1.5, folder=tmp_path)
+    assert path.exists()
+    assert [other.exists() for other in others] == [False, False, True]
 
 
 def test_where_nothing_can_be_written_it_works_without(tmp_path):
@@ -177,8 +184,8 @@ def test_nothing_is_left_behind_when_writing_fails(tmp_path, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(cost_to_go.np, "save", full)
-    kept_in(tmp_path)
+    monkeypatch.setattr(Path, "replace", full)
+    assert kept_in(tmp_path).any()
     assert list(tmp_path.iterdir()) == []
 
 

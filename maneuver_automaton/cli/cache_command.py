@@ -1,0 +1,60 @@
+"""`cache show` and `cache clear`: files that can be made again."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+from pathlib import Path
+
+from maneuver_automaton._cache_files import files_of
+from maneuver_automaton._compile import KERNELS, kernel_base, kernel_folder, user_cache_folder
+from maneuver_automaton.cli.guard import FOUND
+from maneuver_automaton.cli.inputs import not_written
+from maneuver_automaton.cli.tables import console, table
+from maneuver_automaton.search.cost_to_go import FOLDER, MOST_BYTES
+
+MEGABYTE = 1e6  # [bytes]
+
+
+def show() -> int:
+    """List the folders of the cache, with what they hold."""
+    now = kernel_folder()
+    rows = []
+    for folder in _folders():
+        files = files_of([folder])
+        size = sum(status.st_size for _, status in files) / MEGABYTE
+        rows.append([_what(folder, now), str(len(files)), f"{size:.1f}", str(folder)])
+    columns = ["", "files", "MB", "folder"]
+    console().print(table("", columns, rows, numbers=(1, 2)), soft_wrap=True)
+    return FOUND
+
+
+def clear() -> int:
+    """Remove what the cache holds; it is made again when it is needed."""
+    folders = _folders()
+    size = sum(status.st_size for _, status in files_of(folders)) / MEGABYTE
+    for folder in folders:
+        try:
+            shutil.rmtree(folder)
+        except OSError as error:
+            raise not_written(Path(error.filename or folder), error) from error
+    console().print(f"{size:.1f} MB removed", soft_wrap=True)
+    return FOUND
+
+
+def _folders() -> list[Path]:
+    """What this package made in its cache folders, of this version and of others."""
+    found: list[Path] = []
+    with contextlib.suppress(OSError, RuntimeError):  # no home folder
+        found += sorted(kernel_base().glob(f"{KERNELS}*"))
+        if kernel_base() != user_cache_folder():
+            found += sorted(user_cache_folder().glob(f"{KERNELS}*"))
+        found.append(user_cache_folder() / FOLDER)
+    return [folder for folder in found if folder.is_dir() and not folder.is_symlink()]
+
+
+def _what(folder: Path, now: Path | None) -> str:
+    """What a folder is for."""
+    if folder.name == FOLDER:
+        return f"tables of the cost to go, at most {MOST_BYTES / MEGABYTE:g} MB"
+    return "compiled kernels" if folder == now else "compiled kernels of another version"

@@ -1,0 +1,33 @@
+"""Where the command line begins: signals are taken before anything heavy is imported."""
+
+from __future__ import annotations
+
+import gc
+import signal
+import sys
+from typing import NoReturn
+
+from maneuver_automaton._interrupts import listening
+from maneuver_automaton.cli.streams import open_closed_streams
+
+# Importing libraries makes a million objects and no garbage: look for it less often than usual.
+COLLECT_EVERY = 100_000  # objects
+
+
+def run(argv: list[str]) -> int:
+    """Run the command line with the arguments `argv`, and return the exit code."""
+    from maneuver_automaton.cli.app import run as run_app
+
+    return run_app(argv)
+
+
+def main() -> NoReturn:
+    """Entry point of the console script."""
+    with listening():
+        open_closed_streams()
+        gc.set_threshold(COLLECT_EVERY)
+        code = run(sys.argv[1:])
+    for one in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(one, signal.SIG_IGN)  # the rest takes no time
+    gc.freeze()  # or the exit would look through every object of every library once more
+    sys.exit(code)

@@ -1,0 +1,274 @@
+"""How commands end when a stream is closed, a signal comes, or a process is killed."""
+
+from __future__ import annotations
+
+import io
+import itertools
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from maneuver_automaton import _cache_files, _compile, _files, planning
+from maneuver_automaton._interrupts import (
+    compiler_began,
+    compiler_ended,
+    listening,
+    patient,
+    stopped,
+)
+from maneuver_automaton.cli import run
+from maneuver_automaton.planning import PlanStatus
+from maneuver_automaton.receding_horizon import RecedingHorizon
+from maneuver_automaton.scenario import build_file
+from maneuver_automaton.search.cost_to_go import FOLDER
+from tests.scenario.files import SCENARIO, but
+
+PLAN = ["plan", "x.yaml", "--no-plot"]
+AHEAD_ONLY = but("    - {name: spin, control: [0.0, 1.0]}\n", "")
+STREAMS = pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, with a scenario, one without a plan, and one that is bad."""
+    monkeypatch.chdir(tmp_path)
+    Path("x.yaml").write_text(SCENARIO)
+    Path("none.yaml").write_text(AHEAD_ONLY)
+    Path("bad.yaml").write_text("schema: 2")
+    return tmp_path
+
+
+def written(name: str = "plan.json") -> dict[str, object]:
+    """The content of a result."""
+    return json.loads((Path("out") / name).read_text())  # type: ignore[no-any-return]
+
+
+# --- streams ---
+
+
+def unusable(how: str) -> io.TextIOBase | None:
+    """A stream that takes nothing."""
+    if how == "left":
+        reader, writer = os.pipe()
+        os.close(reader)
+        return os.fdopen(writer, "w")
+    stream = None if how == "none" else Path("/dev/full").open("w")  # noqa: SIM115
+    if how == "closed":
+        stream.close()
+    return stream
+
+
+@STREAMS
+@pytest.mark.parametrize("which", ["stdout", "stderr"])
+@pytest.mark.parametrize("how", ["full", "closed", "none", "left"])
+def test_a_stream_that_takes_nothing_leaves_the_exit_code_true(monkeypatch, which, how):
+    lost = which == "stdout" and how in ("full", "closed")
+    for arguments, code in (
+        (["plan", "x.yaml", "--no-plot"], 0),
+        (["plan", "none.yaml", "--no-plot"], 1),
+        (["plan", "bad.yaml"], 2),
+        (["schema"], 2 if lost else 0),
+    ):
+        stream = unusable(how)
+        monkeypatch.setattr(sys, which, stream)
+        assert run(arguments) == code
+        if stream is not None:
+            stream.close()  # what was led to nowhere is not written again
+
+
+@STREAMS
+def test_what_is_not_printed_is_said(monkeypatch, capsys):
+    with Path("/dev/full").open("w") as stream:
+        monkeypatch.setattr(sys, "stdout", stream)
+        assert run(["schema"]) == 2
+    said = capsys.readouterr().err
+    assert said == "standard output: cannot be written: No space left on device\n"
+
+
+@STREAMS
+@pytest.mark.parametrize(("to", "code"), [(">&- 2>&- <&-", 0), ("> /dev/full 2> /dev/full", 2)])
+def test_streams_of_a_shell(to, code):
+    order = f"{sys.executable} -m maneuver_automaton schema {to}"
+    root = {"PYTHONPATH": str(Path(__file__).parents[1])}
+    assert subprocess.run(order, shell=True, env=os.environ | root, check=False).returncode == code
+
+
+# --- signals ---
+
+
+def at_once(number: int = signal.SIGINT) -> None:
+    """Send a signal to this process, and let it be taken."""
+    os.kill(os.getpid(), number)
+    for _ in range(3):
+        time.sleep(0.0)
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize("found", [True, False])
+def test_the_best_plan_so_far(monkeypatch, capsys, number, code, found):
+    plan = sys.modules["maneuver_automaton.planning.plan"]
+    answered = plan._answered
+
+    def interrupted(*args, **settings):
+        before = answered(*args, **settings) if found else None
+        at_once(number)
+        return before or answered(*args, **settings)  # which finds that the time is over
+
+    monkeypatch.setattr(plan, "_answered", interrupted)
+    if not found:
+        Path("x.yaml").write_text(
+            SCENARIO + "obstacles: [{disc_m: {center: [0.5, 0.6], radius: 0.1}}]"
+        )
+    with listening():
+        assert run(PLAN) == code
+    document = written()
+    assert document["interrupted"] is True
+    assert document["status"] == ("found" if found else "out_of_budget")
+    assert "Traceback" not in capsys.readouterr().err
+    monkeypatch.undo()
+
+
+def test_a_plan_that_nobody_interrupts_does_not_say_so():
+    with listening():
+        assert run([*PLAN, "--quiet"]) == 0
+    assert "interrupted" not in written()
+
+
+def test_while_a_kernel_is_compiled(monkeypatch):
+    def compiling(problem, **settings):
+        compiler_began()
+        try:
+            at_once()
+        finally:
+            compiler_ended()
+
+    monkeypatch.setattr(planning, "plan", compiling)
+    with listening():
+        assert run([*PLAN, "--quiet"]) == 130
+    assert written()["status"] == PlanStatus.OUT_OF_BUDGET.value
+    assert written()["reason"] == "interrupted before there was a plan"
+
+
+def test_the_second_signal_breaks_off():
+    with listening(), patient():
+        at_once()
+        assert stopped()
+        with pytest.raises(KeyboardInterrupt):
+            at_once()
+
+
+def test_before_the_libraries_are_loaded():
+    code = (
+        "import os, signal, sys\n"
+        "class Sends:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'typer': os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Sends())\n"
+        "sys.argv = ['x', 'schema']\n"
+        "from maneuver_automaton.cli import main\n"
+        "main()\n"
+    )
+    root = {"PYTHONPATH": str(Path(__file__).parents[1])}
+    order = [sys.executable, "-c", code]
+    done = subprocess.run(order, env=os.environ | root, capture_output=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, b"", b"")
+
+
+def test_a_loop_keeps_the_steps_that_were_driven(monkeypatch):
+    part = "receding_horizon: {step_s: 0.25, steps: 12}\n"
+    Path("x.yaml").write_text(SCENARIO.replace("free", "8.0") + part)
+    assert run(["mpc", "x.yaml", "--no-plot", "--quiet", "--steps", "2", "--out", "two"]) == 1
+    drive, calls = RecedingHorizon.step, itertools.count(1)
+
+    def step(self, *args, **settings):
+        if next(calls) == 3:
+            at_once()
+        return drive(self, *args, **settings)
+
+    monkeypatch.setattr(RecedingHorizon, "step", step)
+    with listening():
+        assert run(["mpc", "x.yaml", "--no-plot", "--quiet"]) == 130
+    document, two = (
+        written("closed_loop.json"),
+        json.loads(Path("two/closed_loop.json").read_text()),
+    )
+    assert document["interrupted"] is True
+    assert document["reason"].endswith("after 2 steps, when the loop was interrupted")
+    assert len(document["steps"]) == 3
+    assert document["cost"] == two["cost"]
+    assert document["steps"][-1]["value"] == pytest.approx(two["steps"][-1]["value"])
+    monkeypatch.setattr(RecedingHorizon, "step", drive)
+    assert run(["mpc", "x.yaml", "--no-plot", "--quiet", "--resume", "out/closed_loop.json"]) != 2
+
+
+def test_a_build_says_that_it_can_go_on(monkeypatch, capsys):
+    def build(*_: object, **__: object) -> None:
+        at_once()
+
+    monkeypatch.setattr(build_file, "build", build)
+    Path("b.yaml").write_text(
+        "{schema: 1, library: a, vehicle: {model: unicycle}, "
+        "trims: {speed: [0, 1], turn_rate: [0]}}"
+    )
+    with listening():
+        assert run(["automaton", "build", "b.yaml"]) == 130
+    said = "b.yaml: interrupted: called again, the build goes on after what is done\n"
+    assert capsys.readouterr().err == said
+
+
+# --- kill -9 ---
+
+
+@pytest.mark.skipif(os.name != "posix", reason="SIGKILL")
+def test_killed_at_any_moment_a_file_is_whole(folder):
+    code = (
+        "import itertools, pathlib\n"
+        "from maneuver_automaton._files import write_bytes_atomically\n"
+        "for k in itertools.cycle(range(256)):\n"
+        "    write_bytes_atomically(pathlib.Path('out/plan.json'), bytes([k]) * 200_000)\n"
+    )
+    root = {"PYTHONPATH": str(Path(__file__).parents[1])}
+    for k in range(4):
+        process = subprocess.Popen([sys.executable, "-c", code], env=os.environ | root)
+        while not Path("out/plan.json").exists():
+            time.sleep(0.01)
+        time.sleep(0.05 + 0.003 * k)
+        process.kill()
+        process.wait()
+        content = Path("out/plan.json").read_bytes()
+        assert content == content[:1] * 200_000
+    left = list(Path("out").glob(".part-*"))
+    for part in left:
+        os.utime(part, (1, 1))
+    _files.write_text_atomically(Path("out/plan.json"), "{}")  # the next run works, and tidies up
+    assert [path.name for path in Path("out").iterdir()] == ["plan.json"]
+
+
+# --- what is kept ---
+
+
+def test_the_cache_is_shown_and_cleared(folder, monkeypatch, capsys):
+    monkeypatch.setenv("MANEUVER_AUTOMATON_CACHE_DIR", str(folder / "cache"))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(folder / "numba"))
+    tables, kernels = folder / "cache" / FOLDER, folder / "numba" / f"{_compile.KERNELS}0"
+    for place in (tables, kernels):
+        place.mkdir(parents=True)
+        _cache_files.write_checked(place / "a", bytes(2_000_000))
+    (folder / "cache" / "mine.txt").write_text("not of the cache")
+    assert run(["cache", "show"]) == 0
+    printed = capsys.readouterr().out
+    assert "tables of the cost to go, at most 500 MB" in printed
+    assert "compiled kernels of another version" in printed
+    assert printed.count(" 2.0 ") == 2
+    assert run(["cache", "clear"]) == 0
+    assert capsys.readouterr().out == "4.0 MB removed\n"
+    assert not tables.exists()
+    assert not kernels.exists()
+    assert (folder / "cache" / "mine.txt").exists()
+    assert run(["cache", "clear"]) == 0
