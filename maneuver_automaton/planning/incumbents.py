@@ -6,14 +6,14 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.audit import Audit, TerminalError, terminal_error
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.same_motion import CONVERGED, Likeness, is_new, same_motion
 from maneuver_automaton.planning.checking import Condition, check_plan
-from maneuver_automaton.planning.result import Alternative, PlanResult, PlanStatus
+from maneuver_automaton.planning.result import Alternative, LowerBound, PlanResult, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.conditions import broken_condition
@@ -150,7 +150,7 @@ class Incumbents:
     def found(
         self,
         *,
-        bound: float,
+        bound: LowerBound,
         searched: float | None = None,
         certificate: float | None = None,
         nodes: Array | None = None,
@@ -160,7 +160,7 @@ class Incumbents:
         The search lasted until `searched` [s], or until the first plan.
         """
         best, *others = self.plans[: self.alternatives + 1]
-        bound = min(best.cost, bound)
+        value = min(best.cost, bound.value)
         first = self.improvements[0][0]
         return PlanResult(
             problem=self.problem,
@@ -169,8 +169,9 @@ class Incumbents:
             plan=best.plan,
             goal_index=best.goal_index,
             cost=best.cost,
-            lower_bound=bound,
-            gap=(best.cost - bound) / best.cost if bound < best.cost else 0.0,
+            lower_bound=value,
+            gap=bound.gap(best.cost),
+            bound=replace(bound, value=value, optimal=bound.optimal or value == best.cost),
             certificate=certificate,
             terminal_error=self._terminal_error(best),
             clearance_m=best.audit.min_clearance_m,

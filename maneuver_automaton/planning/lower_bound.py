@@ -1,0 +1,166 @@
+"""`lower_bound(problem)`: how little a plan can cost, proven, whatever its word."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from maneuver_automaton.bounds import Proof, cell_proofs
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.planning.blocked import blocked_ends
+from maneuver_automaton.planning.bounds import bound_along_paths, formula_bound, lattice_bound
+from maneuver_automaton.planning.polishing import rests_at_both_ends
+from maneuver_automaton.planning.result import LowerBound
+from maneuver_automaton.planning.steps import has_inertia
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.refinement.kinematic_paths import extreme_automaton, follows_paths
+from maneuver_automaton.search.lattice_query import lattice_query
+
+POLISHING = 0.85  # share of the time after which what there is gets polished
+
+
+def lower_bound(
+    problem: Problem,
+    *,
+    time_limit: float = 10.0,
+    incumbent: float = math.inf,
+    gap: float = 0.0,
+    max_work: int | None = None,
+) -> LowerBound:
+    """The best lower bound of the cost of all plans that can be proven in a time.
+
+    A function of the pose that falls along no motion faster than its cost rises, and is zero at the
+    goal, is a lower bound wherever it comes from. It is sought as piecewise linear function over
+    cells of poses that are not proven to collide, and what it proves is measured on every cell.
+
+    Parameters
+    ----------
+    problem : Problem
+    time_limit : float
+        [s]
+    incumbent : float
+        Cost of the best plan known. It helps: only poses that a cheaper plan may visit are looked
+        at. No bound exceeds it.
+    gap : float
+        Share of the incumbent's cost that is small enough: end as soon as that is proven.
+    max_work : int, optional
+        Work at which to end, in steps times cells; the answer is then the same at every call,
+        unless the time is over before.
+
+    Returns
+    -------
+    LowerBound
+        `kind` says what won: ``cells`` is the function above, ``incumbent`` that no plan is left
+        that would be cheaper.
+
+    Raises
+    ------
+    ValueError
+        If a limit is not positive, or the gap not from 0 to 1.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Car, Cost, Problem, plan
+    >>> car = Car(wheelbase=2.8, max_steering=0.6)
+    >>> controls = {f"{v} {s}": (v, s) for v in (1, -1) for s in (-0.6, 0.0, 0.6)}
+    >>> robot = Automaton.of_controls(car, controls)
+    >>> problem = Problem(robot, [0, 0, 0], [6, 3, 0.9], cost=Cost(length=1.0))
+    >>> cost = plan(problem).cost
+    >>> bound = lower_bound(problem, incumbent=cost, max_work=20_000_000)
+    >>> bound.kind, 0.0 <= bound.gap(cost) < 0.05
+    ('cells', True)
+    """
+    if not time_limit > 0.0:
+        raise ValueError(f"time_limit must be positive, got {time_limit} s")
+    if not 0.0 <= gap <= 1.0:
+        raise ValueError(f"gap must be a share from 0 to 1, got {gap}")
+    began = time.monotonic()
+    known = known_bound(problem)
+    history = [(time.monotonic() - began, known.value)]
+    best, proof = known, None
+
+    def ends(work: int) -> bool:
+        late = time.monotonic() - began > POLISHING * time_limit
+        return late or (max_work is not None and work >= max_work)
+
+    def over() -> bool:
+        return best.gap(incumbent) <= gap or time.monotonic() - began >= time_limit
+
+    if math.isfinite(incumbent) and over():
+        return LowerBound(value=min(best.value, incumbent), kind=best.kind, history=tuple(history))
+    for proof in proofs_of(problem, incumbent=lambda: incumbent, ends=ends):
+        if proof.value > best.value:
+            kind = "incumbent" if proof.optimal and proof.value >= incumbent else "cells"
+            best = LowerBound(value=proof.value, kind=kind)
+            history.append((time.monotonic() - began, best.value))
+        if over():
+            break
+    return LowerBound(
+        value=min(best.value, incumbent),
+        kind=best.kind,
+        optimal=best.value >= incumbent,
+        history=tuple(history),
+        work=0 if proof is None else proof.work,
+    )
+
+
+def known_bound(problem: Problem) -> LowerBound:
+    """The best bound that takes no search: a formula, or the path of the inscribed disc."""
+    if has_inertia(problem):
+        return bound_along_paths(problem)
+    if blocked_ends(problem) is not None or problem.automaton.lattice is not None:
+        return formula_bound(problem)
+    return lattice_bound(lattice_query(problem, tuple(range(len(problem.goals)))))
+
+
+def proofs_of(
+    problem: Problem, *, incumbent: Callable[[], float], ends: Callable[[int], bool]
+) -> Iterator[Proof]:
+    """Better and better bounds by cells, as `cell_proofs`, in costs of the problem itself."""
+    ramp = _ramp(problem)
+    for proof in cell_proofs(problem, incumbent=lambda: ramp.without(incumbent()), ends=ends):
+        yield replace(proof, value=ramp.added(proof.value))
+
+
+@dataclass(frozen=True, slots=True)
+class _Ramp:
+    """What it costs to start from rest and to stop, on a path of a cost at full speed."""
+
+    seconds: float = 0.0  # greatest speed over greatest acceleration
+    rate: float = 0.0  # cost per second
+    share: float = 0.0  # seconds at full speed for a unit of cost
+
+    def added(self, cost: float) -> float:
+        """Least cost from rest to rest along a path of a cost at full speed."""
+        seconds = self.share * cost
+        if seconds >= self.seconds:
+            return cost + self.rate * self.seconds
+        return cost + self.rate * (2.0 * math.sqrt(seconds * self.seconds) - seconds)
+
+    def without(self, cost: float) -> float:
+        """Greatest cost at full speed of a path that is driven from rest to rest for a cost."""
+        if cost == math.inf or not self.seconds:
+            return cost
+        if cost >= self.added(self.seconds / self.share):
+            return cost - self.rate * self.seconds
+        low, high = 0.0, self.seconds / self.share
+        while (middle := 0.5 * (low + high)) not in (low, high):
+            low, high = (middle, high) if self.added(middle) <= cost else (low, middle)
+        return high
+
+
+def _ramp(problem: Problem) -> _Ramp:
+    """Of a vehicle that turns only as it drives; nothing for others, whose turns need none."""
+    model, cost = problem.automaton.model, problem.cost
+    if not (follows_paths(model) and has_inertia(problem) and rests_at_both_ends(problem)):
+        return _Ramp()
+    twists = extreme_automaton(model).body_velocities  # type: ignore[arg-type]
+    if not isinstance(cost, Cost) or not cost.time or (twists[:, 0] == 0.0).any():
+        return _Ramp()
+    fastest = float(np.abs(twists[:, 0]).max())
+    seconds = fastest / float(model.control_limits[0, 1])
+    return _Ramp(seconds, cost.time, 1.0 / (cost.time + cost.length * fastest))
