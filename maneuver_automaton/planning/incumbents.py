@@ -90,6 +90,7 @@ class Incumbents:
         """Note what a search has found `at` a time [s], now if omitted; it is checked later."""
         if cost < self.least_cost:
             self.least_cost = cost
+            self._tell(cost)
             self.improvements.append((self.budget.elapsed if at is None else at, cost))
 
     def offer(self, plan: Plan, goal_index: int, *, proven: bool = True) -> bool:
@@ -141,7 +142,14 @@ class Incumbents:
             self.plans = sorted([*others, one], key=lambda other: other.rank)
             if self.plans[0] is one and cost < self.least_cost * (1.0 - CHEAPER):
                 self.improvements.append((self.budget.elapsed, cost))
+                self._tell(cost)
         return True
+
+    def _tell(self, cost: float) -> None:
+        """Tell a proof beside the search what a plan of this very problem costs."""
+        watch = self.budget.watch
+        if watch is not None and watch.problem is self.problem:
+            watch.note(cost)
 
     def _refuse(self, broken: Condition, reason: str) -> None:
         self.refused[broken] += 1

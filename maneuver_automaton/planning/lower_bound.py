@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import functools
 import math
-import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.bounds import Proof, cell_proofs
+from maneuver_automaton.collision import Box
 from maneuver_automaton.costs import Cost
+from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.bounds import bound_along_paths, formula_bound, lattice_bound
 from maneuver_automaton.planning.polishing import rests_at_both_ends
@@ -18,6 +21,7 @@ from maneuver_automaton.planning.result import LowerBound
 from maneuver_automaton.planning.steps import has_inertia
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.kinematic_paths import extreme_automaton, follows_paths
+from maneuver_automaton.search.budget import Budget, Watch
 from maneuver_automaton.search.lattice_query import lattice_query
 
 POLISHING = 0.85  # share of the time after which what there is gets polished
@@ -78,34 +82,66 @@ def lower_bound(
         raise ValueError(f"time_limit must be positive, got {time_limit} s")
     if not 0.0 <= gap <= 1.0:
         raise ValueError(f"gap must be a share from 0 to 1, got {gap}")
-    began = time.monotonic()
-    known = known_bound(problem)
-    history = [(time.monotonic() - began, known.value)]
-    best, proof = known, None
+    watch = Watch(gap=gap, cost=incumbent)
+    proving = Proving(problem, Budget.from_now(time_limit), watch, max_work=max_work)
+    proving.run()
+    return proving.bound(incumbent)
 
-    def ends(work: int) -> bool:
-        late = time.monotonic() - began > POLISHING * time_limit
-        return late or (max_work is not None and work >= max_work)
 
-    def over() -> bool:
-        return best.gap(incumbent) <= gap or time.monotonic() - began >= time_limit
+@dataclass(slots=True, eq=False)
+class Proving:
+    """Better and better bounds of a problem, until the gap is closed or the budget is over."""
 
-    if math.isfinite(incumbent) and over():
-        return LowerBound(value=min(best.value, incumbent), kind=best.kind, history=tuple(history))
-    for proof in proofs_of(problem, incumbent=lambda: incumbent, ends=ends):
-        if proof.value > best.value:
-            kind = "incumbent" if proof.optimal and proof.value >= incumbent else "cells"
-            best = LowerBound(value=proof.value, kind=kind)
-            history.append((time.monotonic() - began, best.value))
-        if over():
-            break
-    return LowerBound(
-        value=min(best.value, incumbent),
-        kind=best.kind,
-        optimal=best.value >= incumbent,
-        history=tuple(history),
-        work=0 if proof is None else proof.work,
-    )
+    problem: Problem
+    budget: Budget
+    watch: Watch
+    max_work: int | None = None  # steps times cells
+    best: LowerBound = field(default_factory=lambda: LowerBound(value=0.0, kind="distance"))
+    history: list[tuple[float, float]] = field(default_factory=list)  # seconds, value
+    work: int = 0
+
+    def run(self) -> None:
+        """Prove what can be proven."""
+        self._better(known_bound(self.problem))
+        if self._over():
+            return
+        for proof in proofs_of(self.problem, incumbent=lambda: self.watch.cost, ends=self._late):
+            self.work = proof.work
+            kind = "incumbent" if proof.optimal and proof.value >= self.watch.cost else "cells"
+            self._better(LowerBound(value=proof.value, kind=kind))
+            if self._over():
+                return
+
+    def bound(self, cost: float) -> LowerBound:
+        """The best bound, which is no greater than the cost of a plan that is known."""
+        value = min(self.best.value, cost)
+        history = tuple((at, min(one, cost)) for at, one in self.history)
+        return replace(
+            self.best, value=value, optimal=value == cost, history=history, work=self.work
+        )
+
+    def _better(self, bound: LowerBound) -> None:
+        if bound.value > self.best.value or not self.history:
+            self.best = bound
+            self.history.append((self.budget.elapsed, bound.value))
+            self.watch.bound = bound.value
+
+    def _over(self) -> bool:
+        return self.watch.is_abandoned or self.watch.is_closed or self.budget.is_over
+
+    def _late(self, work: int) -> bool:
+        """Whether to polish what there is: time for that is kept back."""
+        late = self.budget.elapsed > POLISHING * self.budget.seconds or self._over()
+        return late or (self.max_work is not None and work >= self.max_work)
+
+
+@functools.cache
+def load_proofs() -> None:
+    """Compile or load what proofs need, before the clock runs."""
+    robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1), "right": (1, -1)})
+    tiny = Problem(robot, [0, 0, 0], [1, 0.2, 0.1], obstacles=Box([1, 1], [9, 9]))
+    for _ in proofs_of(tiny, incumbent=lambda: 2.0, ends=lambda _work: True):
+        pass
 
 
 def known_bound(problem: Problem) -> LowerBound:
