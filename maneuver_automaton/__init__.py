@@ -41,10 +41,12 @@ if TYPE_CHECKING:
     from maneuver_automaton.models import SingleTrack as SingleTrack
     from maneuver_automaton.models import Unicycle as Unicycle
     from maneuver_automaton.models import UserModel as UserModel
+    from maneuver_automaton.planning import LowerBound as LowerBound
     from maneuver_automaton.planning import Planner as Planner
     from maneuver_automaton.planning import PlanResult as PlanResult
     from maneuver_automaton.planning import PlanStatus as PlanStatus
     from maneuver_automaton.planning import plan as plan
+    from maneuver_automaton.planning.lower_bound import lower_bound as lower_bound
     from maneuver_automaton.primitives import Maneuver as Maneuver
     from maneuver_automaton.primitives import Trajectory as Trajectory
     from maneuver_automaton.primitives import Trim as Trim
@@ -77,6 +79,7 @@ _HOMES = {
     "Helicopter": "models",
     "Horizon": "problem",
     "Hovercraft": "models",
+    "LowerBound": "planning",
     "Maneuver": "primitives",
     "Motion": "collision",
     "Obstacle": "collision",
@@ -106,6 +109,7 @@ _HOMES = {
     "load_plan": "formats.plan_json",
     "load_scenario": "scenario",
     "load_stock_library": "automaton.stock",
+    "lower_bound": "planning.lower_bound",
     "plan": "planning",
     "plan_road": "roads",
     "save_library": "automaton.library",

@@ -12,6 +12,35 @@ from maneuver_automaton._interrupts import stopped
 COUNTED = 0.7  # share of the time left that a stage of counted work takes at most: others follow
 
 
+@dataclass(slots=True, eq=False)
+class Watch:
+    """What a search and a proof beside it tell each other, and anybody who looks on.
+
+    Examples
+    --------
+    >>> watch = Watch(gap=0.05)
+    >>> watch.note(10.0)
+    >>> watch.bound = 9.6
+    >>> watch.is_closed
+    True
+    """
+
+    gap: float  # share of the cost that is small enough
+    problem: object = None  # of which the plans must be, for their cost to count
+    cost: float = math.inf  # of the best plan found
+    bound: float = 0.0  # no plan is cheaper
+    is_abandoned: bool = False  # nobody waits for a better bound any more
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether the gap is small enough."""
+        return self.cost < math.inf and self.cost - self.bound <= self.gap * self.cost
+
+    def note(self, cost: float) -> None:
+        """A plan was found."""
+        self.cost = min(self.cost, cost)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Budget:
     """Time until a deadline, and expansions, that a search and all its stages may take together.
@@ -34,6 +63,7 @@ class Budget:
     deadline: float  # the same clock
     expansions: int | None = None  # that are left; None: only the time counts
     clock: Callable[[], float] = time.monotonic  # seconds from some moment on
+    watch: Watch | None = None  # once its gap is closed, no time is left
 
     @classmethod
     def from_now(
@@ -64,8 +94,9 @@ class Budget:
 
     @property
     def is_over(self) -> bool:
-        """Whether no time is left, or a signal asks to come to an end."""
-        return stopped() or self.clock() >= self.deadline
+        """Whether no time is left, the gap is closed, or a signal asks to come to an end."""
+        closed = self.watch is not None and self.watch.is_closed
+        return closed or stopped() or self.clock() >= self.deadline
 
     def part(self, share: float, *, at_least: float = 0.0) -> Budget:
         """A budget of its own from now on: a share of the time left, at least so many seconds."""

@@ -1,7 +1,9 @@
 """What is certain: poses that collide, and that no plan exists."""
 
+from maneuver_automaton.bounds.certified import cell_proofs as cell_proofs
 from maneuver_automaton.bounds.connectivity import Connection as Connection
 from maneuver_automaton.bounds.connectivity import connectivity as connectivity
+from maneuver_automaton.bounds.levels import Proof as Proof
 from maneuver_automaton.bounds.pose_scene import PoseScene as PoseScene
 from maneuver_automaton.bounds.pose_scene import pose_scene as pose_scene
 from maneuver_automaton.bounds.separation import Narrowest as Narrowest

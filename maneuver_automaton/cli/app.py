@@ -36,6 +36,14 @@ TimeLimit = Annotated[
     float | None,
     typer.Option("--time-limit", metavar="S", help="Upper bound for search and refinement [s]."),
 ]
+Gap = Annotated[
+    float | None,
+    typer.Option(
+        "--gap",
+        metavar="SHARE",
+        help="Stop once no plan is proven to be cheaper by more than this share (0.05: 5 %).",
+    ),
+]
 Alternatives = Annotated[
     int, typer.Option("--alternatives", min=0, metavar="K", help="Dearer plans to list as well.")
 ]
@@ -111,6 +119,7 @@ def plan(
     with_file: With = None,
     case: Case = None,
     model: OwnModel = None,
+    gap: Gap = None,
 ) -> int:
     """Plan the problem of a file, or of every file of a folder."""
     from maneuver_automaton.cli import plan_command
@@ -122,6 +131,7 @@ def plan(
         plot=plot,
         animate=animate,
         quiet=quiet,
+        gap=gap,
     )
     parts = Parts(beside=with_file, case=case, model=model)
     if file.is_dir():

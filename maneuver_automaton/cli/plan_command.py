@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from maneuver_automaton._interrupts import stopped
+from maneuver_automaton.budget import Watch
 from maneuver_automaton.cli import road_command
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.planning import PlanResult
     from maneuver_automaton.scenario import Scenario
 
-PICTURES = ("plan.png", "plan_3d.png", "alternatives.png", "plan.gif")
+PICTURES = ("plan.png", "plan_3d.png", "alternatives.png", "plan.gif", "progress.png")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,11 +33,16 @@ class Settings:
     plot: bool = True
     animate: bool = False
     quiet: bool = False
+    gap: float | None = None  # share of the cost, None: nothing is proven beside the search
 
     def __post_init__(self) -> None:
         if self.time_limit is not None and not 0.0 < self.time_limit < math.inf:
             raise InvalidScenario(
                 f"--time-limit: got {self.time_limit}, need a positive number of seconds"
+            )
+        if self.gap is not None and not 0.0 <= self.gap < 1.0:
+            raise InvalidScenario(
+                f"--gap: got {self.gap}, need a share of the cost from 0 to below 1, such as 0.05"
             )
 
 
@@ -63,8 +69,10 @@ def plan_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> int
         return NO_PLAN if found.plan is None else FOUND
     scenario = scenario_of(path, parts)
     limit = settings.time_limit or scenario.time_limit_s
-    with waiting(f"planning, at most {limit:g} s", quiet=settings.quiet):
-        result = _plan(scenario, out, settings)
+    watch = None if settings.gap is None else Watch(gap=settings.gap)
+    said = f"planning, at most {limit:g} s"
+    with waiting(said, quiet=settings.quiet, more=lambda: _so_far(watch)):
+        result = _plan(scenario, out, settings, watch)
     if result.plan is None:
         complain(f"{path}: {result.status.value}: {result.reason}")
         return NO_PLAN
@@ -107,7 +115,17 @@ def plan_folder(folder: Path, out: Path, *, settings: Settings, parts: Parts, jo
     return max(row.code for row in rows)
 
 
-def _plan(scenario: Scenario, out: Path, settings: Settings) -> PlanResult:
+def _so_far(watch: Watch | None) -> str:
+    """Cost, bound and gap while a plan is being improved."""
+    if watch is None or watch.cost == math.inf:
+        return ""
+    share = max(0.0, 1.0 - watch.bound / watch.cost) if watch.cost > 0.0 else 0.0
+    return f"cost {watch.cost:.6g}, at least {watch.bound:.6g}, gap {100.0 * share:.2g} %"
+
+
+def _plan(
+    scenario: Scenario, out: Path, settings: Settings, watch: Watch | None = None
+) -> PlanResult:
     """Plan and write the files."""
     from maneuver_automaton import planning
 
@@ -118,6 +136,8 @@ def _plan(scenario: Scenario, out: Path, settings: Settings) -> PlanResult:
                 scenario.problem,
                 time_limit=settings.time_limit or scenario.time_limit_s,
                 alternatives=settings.alternatives,
+                gap=settings.gap,
+                watch=watch,
             )
     except KeyboardInterrupt:
         if not stopped():
@@ -151,6 +171,8 @@ def _write(result: PlanResult, out: Path, settings: Settings) -> None:
         plotting.save_plan_figure(result, out / "plan.png", nodes=result.nodes)
         if plotting.flies_among_heights(result.problem):
             plotting.save_space_figure(result, out / "plan_3d.png")
+        if settings.gap is not None and result.plan is not None:
+            plotting.save_progress_figure(result, out / "progress.png")
         if result.alternatives:
             plotting.save_alternatives_figure(result, out / "alternatives.png")
     if settings.animate and result.plan is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Protocol
 
 
@@ -39,15 +39,30 @@ def progress_bar(what: str, total: int, *, quiet: bool) -> Iterator[Advance]:
 
 
 @contextlib.contextmanager
-def waiting(what: str, *, quiet: bool) -> Iterator[None]:
-    """A clock that runs while something is computed of which no one knows how long it takes."""
+def waiting(what: str, *, quiet: bool, more: Callable[[], str] = lambda: "") -> Iterator[None]:
+    """A clock that runs while something is computed of which no one knows how long it takes.
+
+    What `more` says is shown beside it, and asked for again and again.
+    """
     if quiet or not sys.stderr.isatty():
         yield
         return
     from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        Progress,
+        ProgressColumn,
+        SpinnerColumn,
+        Task,
+        TextColumn,
+        TimeElapsedColumn,
+    )
+    from rich.text import Text
 
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    class More(ProgressColumn):
+        def render(self, task: Task) -> Text:
+            return Text(more())
+
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), More())
     with Progress(*columns, console=Console(stderr=True), transient=True) as clock:
         clock.add_task(what, total=None)
         yield

@@ -95,6 +95,8 @@ def _print_alternatives(out: Console, result: PlanResult) -> None:
 def _bound(result: PlanResult) -> str:
     if result.lower_bound is None or result.gap is None:
         return ""
+    if result.bound is not None and result.bound.kind == "incumbent":
+        return " (proven optimal)"
     return f" (at least {result.lower_bound:.9g}, gap {100 * result.gap:.2g} %)"
 
 

@@ -25,7 +25,7 @@ from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.bounds import Narrowest
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.groups import group_of
-from maneuver_automaton.planning import Alternative, PlanResult
+from maneuver_automaton.planning import Alternative, LowerBound, PlanResult
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 
 SCHEMA = 1
@@ -69,6 +69,7 @@ def plan_to_dict(result: PlanResult) -> dict[str, Any]:
         "duration_s": None if plan is None else plan.duration,
         "lower_bound": _number(result.lower_bound),
         "gap": _number(result.gap),
+        "bound": _bound(result.bound),
         "certificate": _number(result.certificate),
         "primitives": primitive_entries(plan),
         "terminal_error": _terminal_error(result.terminal_error),
@@ -76,9 +77,17 @@ def plan_to_dict(result: PlanResult) -> dict[str, Any]:
         "trajectory": trajectory_entry(plan),
         "audit": _audit(result.audit),
         "alternatives": [_alternative(one) for one in result.alternatives],
+        "improvements": [[float(at), float(cost)] for at, cost in result.improvements],
         "timing_s": {**dict.fromkeys(TIMINGS), **_floats(result.timing_s)},
         "counts": {**dict.fromkeys(COUNTS, 0), **{k: int(v) for k, v in result.counts.items()}},
     }
+
+
+def _bound(bound: LowerBound | None) -> dict[str, Any] | None:
+    if bound is None:
+        return None
+    history = [[float(at), float(value)] for at, value in bound.history]
+    return {"value": float(bound.value), "kind": bound.kind, "history": history}
 
 
 def _narrowest(passage: Narrowest | None) -> dict[str, Any]:

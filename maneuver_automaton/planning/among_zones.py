@@ -28,7 +28,7 @@ from maneuver_automaton.models import Model
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.crossing import crossed_slowly, nearest_goal, polish_slowed
 from maneuver_automaton.planning.incumbents import Incumbents
-from maneuver_automaton.planning.result import Answer, PlanResult, PlanStatus
+from maneuver_automaton.planning.result import Answer, LowerBound, PlanResult, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
@@ -76,7 +76,7 @@ def plan_among_zones(
             polish_slowed(found, question, first.plan, budget)
     assert first is not None
     if found.plans:
-        return found.found(bound=first.lower_bound or 0.0)
+        return found.found(bound=first.bound or LowerBound(value=0.0, kind="distance"))
     reason = first.reason or (
         "no plan was found that keeps to the zones, by going around them, or through them with "
         "what they admit"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -12,21 +13,30 @@ from maneuver_automaton.automaton.headings import origin_of
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.models.greatest_speed import greatest_speed
 from maneuver_automaton.planning.polishing import rests_at_both_ends, why_not_polished
+from maneuver_automaton.planning.result import LowerBound
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinematic_problem
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
-from maneuver_automaton.search.limits import closed_bound
+from maneuver_automaton.search.limits import closed_bounds
 from maneuver_automaton.search.plane_bound import plane_bound
 from maneuver_automaton.words.library import moving_trims
 
 
-def lattice_bound(query: LatticeQuery) -> float:
+def formula_bound(problem: Problem, goals: Sequence[Goal] = ()) -> LowerBound:
+    """No plan is cheaper: the best formula for the goal that is the cheapest by it."""
+    bounds = [closed_bounds(problem, goal) for goal in goals or problem.goals]
+    cheapest = min(bounds, key=lambda one: max(one.values()))
+    kind = max(cheapest, key=cheapest.__getitem__)
+    return LowerBound(value=cheapest[kind], kind=kind)
+
+
+def lattice_bound(query: LatticeQuery) -> LowerBound:
     """No plan is cheaper, whatever its word: the largest of the bounds that hold.
 
     The closed bounds hold without obstacles too; the path in the plane knows the static ones.
     """
     problem = query.problem
-    closed = min(closed_bound(problem, problem.goals[k]) for k in query.goal_index)
+    closed = formula_bound(problem, [problem.goals[k] for k in query.goal_index])
     library = moving_trims(problem.automaton, problem.cost)
     pads = problem.horizon.time is not None and library.rest is not None
     rates = library.rates - (library.rest_rate if pads else 0.0)
@@ -35,7 +45,8 @@ def lattice_bound(query: LatticeQuery) -> float:
         return closed
     per_metre = float((rates[drives] / library.speeds[drives]).min())
     fixed = library.rest_rate * (problem.horizon.time or 0.0) if pads else 0.0
-    return max(closed, fixed + per_metre * plane_bound(query))
+    disc = fixed + per_metre * plane_bound(query)
+    return LowerBound(value=disc, kind="disc") if disc > closed.value else closed
 
 
 def speed_bound(problem: Problem) -> float:
@@ -69,7 +80,7 @@ def least_price_per_metre(automaton: Automaton, cost: StageCost) -> float:
     return max(0.0, min(prices, default=0.0))
 
 
-def bound_along_paths(problem: Problem) -> float:
+def bound_along_paths(problem: Problem) -> LowerBound:
     """No plan is cheaper: the shortest path, driven from rest to rest at the limits.
 
     A path that the kinematic vehicle needs B seconds for at full speed v takes ``B + v / a`` with
@@ -80,13 +91,15 @@ def bound_along_paths(problem: Problem) -> float:
     if why_not_polished(problem) and not follows_paths(model):  # all plans are words
         known = max(known, word_bound(problem))
     if not (follows_paths(model) and rests_at_both_ends(problem) and isinstance(cost, Cost)):
-        return known
+        return LowerBound(value=known, kind="distance")
     simpler = kinematic_problem(problem, switch=0.0)
-    least = lattice_bound(lattice_query(simpler, tuple(range(len(problem.goals)))))
+    bound = lattice_bound(lattice_query(simpler, tuple(range(len(problem.goals)))))
+    least = bound.value
     fastest = float(np.abs(model.reduced_limits[0]).max())
     ramp = fastest / float(model.control_limits[0, 1])
     duration = least + ramp if least >= ramp else 2.0 * math.sqrt(least * ramp)
-    return max(known, cost.time * duration + cost.length * least * fastest)
+    value = cost.time * duration + cost.length * least * fastest
+    return LowerBound(value=max(known, value), kind=bound.kind if value > known else "distance")
 
 
 def _least_distance(problem: Problem) -> float:

@@ -6,17 +6,18 @@ from dataclasses import dataclass, replace
 
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
+from maneuver_automaton.planning.bounds import formula_bound
 from maneuver_automaton.planning.checking import Condition
 from maneuver_automaton.planning.free_words import free_words, word_candidate
 from maneuver_automaton.planning.incumbents import Candidate, Incumbents
-from maneuver_automaton.planning.result import PlanResult, PlanStatus
+from maneuver_automaton.planning.result import LowerBound, PlanResult, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search import SearchStatus
 from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.choose import search_goal
 from maneuver_automaton.search.inside import outside
-from maneuver_automaton.search.limits import closed_bound, why_impossible
+from maneuver_automaton.search.limits import why_impossible
 from maneuver_automaton.words.word import Word, word_of_plan
 
 SPARE = 2  # solutions for every alternative, as some may be one motion
@@ -138,8 +139,8 @@ def _least_time(problem: Problem, budget: Budget) -> tuple[PlanStatus, str] | No
     )
 
 
-def _lower_bound(problem: Problem, free: float | None) -> float:
+def _lower_bound(problem: Problem, free: float | None) -> LowerBound:
     """No admitted plan is cheaper: the optimum `free` of bounds if proven, or a closed bound."""
     if free is not None:
-        return free
-    return min(closed_bound(problem, goal) for goal in problem.goals)
+        return LowerBound(value=free, kind="exhaustive")
+    return formula_bound(problem)

@@ -64,7 +64,7 @@ def plan_in_steps(
     if not found.plans:
         return found.none(*_why_none(found, steps, paths, lattice), nodes=nodes)
     return found.found(
-        bound=lattice.bound if lattice and steps.at_will else bound_along_paths(problem),
+        bound=(lattice and lattice.bound) or bound_along_paths(problem),
         searched=searched,
         certificate=None if steps.at_will else _certificate(problem, found.plans[0]),
         nodes=nodes,

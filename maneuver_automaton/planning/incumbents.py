@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.audit import Audit, TerminalError, terminal_error
@@ -13,7 +13,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.same_motion import CONVERGED, Likeness, is_new, same_motion
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.checking import Condition, check_plan
-from maneuver_automaton.planning.result import Alternative, PlanResult, PlanStatus
+from maneuver_automaton.planning.result import Alternative, LowerBound, PlanResult, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.conditions import broken_condition
@@ -115,6 +115,7 @@ class Incumbents:
         """Note what a search has found `at` a time [s], now if omitted; it is checked later."""
         if cost < self.least_cost:
             self.least_cost = cost
+            self._tell(cost)
             self.improvements.append((self.budget.elapsed if at is None else at, cost))
 
     def offer(self, plan: Plan, goal_index: int, *, proven: bool = True) -> bool:
@@ -173,7 +174,14 @@ class Incumbents:
             self.plans = sorted([*others, one], key=lambda other: other.rank)
             if self.plans[0] is one and cost < self.least_cost * (1.0 - CHEAPER):
                 self.improvements.append((self.budget.elapsed, cost))
+                self._tell(cost)
         return True
+
+    def _tell(self, cost: float) -> None:
+        """Tell a proof beside the search what a plan of this very problem costs."""
+        watch = self.budget.watch
+        if watch is not None and watch.problem is self.problem:
+            watch.note(cost)
 
     def _refuse(self, broken: Condition, reason: str) -> None:
         self.refused[broken] += 1
@@ -182,7 +190,7 @@ class Incumbents:
     def found(
         self,
         *,
-        bound: float,
+        bound: LowerBound,
         searched: float | None = None,
         certificate: float | None = None,
         nodes: Array | None = None,
@@ -192,7 +200,7 @@ class Incumbents:
         The search lasted until `searched` [s], or until the first plan.
         """
         best, *others = self.plans[: self.alternatives + 1]
-        bound = min(best.cost, bound)
+        value = min(best.cost, bound.value)
         first = self.improvements[0][0]
         return PlanResult(
             problem=self.problem,
@@ -201,8 +209,9 @@ class Incumbents:
             plan=best.plan,
             goal_index=best.goal_index,
             cost=best.cost,
-            lower_bound=bound,
-            gap=(best.cost - bound) / best.cost if bound < best.cost else 0.0,
+            lower_bound=value,
+            gap=bound.gap(best.cost),
+            bound=replace(bound, value=value, optimal=bound.optimal or value == best.cost),
             certificate=certificate,
             terminal_error=self._terminal_error(best),
             clearance_m=best.audit.min_clearance_m,

@@ -20,6 +20,7 @@ from maneuver_automaton.planning.detours import with_stones
 from maneuver_automaton.planning.free_words import free_words, word_candidate, words_once
 from maneuver_automaton.planning.incumbents import Candidate, Incumbents
 from maneuver_automaton.planning.no_way import before_proof
+from maneuver_automaton.planning.result import LowerBound
 from maneuver_automaton.planning.steps import BY_TIME, Steps
 from maneuver_automaton.problem import moves
 from maneuver_automaton.refinement.improve import Improved, Patience, improve
@@ -61,7 +62,7 @@ class LatticeWords:
     words: list[Word] = field(default_factory=list)
     spent: int = 0  # expansions of first plans and improvements
     first: FirstPlan | None = None  # how the search for a first plan ended
-    bound: float = 0.0  # no word is cheaper
+    bound: LowerBound | None = None  # no word is cheaper; None where they are not all there is
 
     @property
     def budget(self) -> Budget:
@@ -153,7 +154,7 @@ def search_lattice(found: Incumbents, steps: Steps) -> LatticeWords:
     share = BEFORE_POLISHING if steps.polishes and not alone else 1.0
     lattice = LatticeWords(query, table, found, steps, alone, found.for_first.stage(share))
     lattice.first = _first(lattice)
-    lattice.bound = lattice_bound(query) if steps.at_will else 0.0
+    lattice.bound = lattice_bound(query) if steps.at_will else None
     return lattice
 
 
@@ -222,7 +223,7 @@ def improved(lattice: LatticeWords) -> list[Candidate]:
         lattice.words[-1],
         _for_the_best(lattice),
         patience=Patience(),
-        floor=lattice.bound - query.padding if lattice.knows_all else -math.inf,
+        floor=lattice.bound.value - query.padding if lattice.bound else -math.inf,
         better=lattice.gained,
         meanwhile=lambda: load_checks(query.problem, found.workspace),
     )

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
+
 from maneuver_automaton._interrupts import patient
-from maneuver_automaton.budget import Budget
+from maneuver_automaton.budget import Budget, Watch
 from maneuver_automaton.planning.among_zones import plan_among_zones
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.checking import load_checks
@@ -21,7 +23,14 @@ from maneuver_automaton.search.choose import load_search
 from maneuver_automaton.search.lattice_query import lattice_query
 
 
-def plan(problem: Problem, *, time_limit: float = 5.0, alternatives: int = 0) -> PlanResult:
+def plan(
+    problem: Problem,
+    *,
+    time_limit: float = 5.0,
+    alternatives: int = 0,
+    gap: float | None = None,
+    watch: Watch | None = None,
+) -> PlanResult:
     """Cheapest plan found for `problem`, audited by an integration of its own.
 
     Parameters
@@ -32,6 +41,11 @@ def plan(problem: Problem, *, time_limit: float = 5.0, alternatives: int = 0) ->
         Compiling and loading what all problems of a vehicle share do not count.
     alternatives : int
         How many dearer plans to return beside the cheapest, as far as there are so many.
+    gap : float, optional
+        Share of the cost: end as soon as no plan is proven to be cheaper by more. A proof then
+        runs beside the search, for as long as the time limit says.
+    watch : Watch, optional
+        Where to look, from another thread, for the cost and the bound meanwhile.
 
     Returns
     -------
@@ -54,27 +68,55 @@ def plan(problem: Problem, *, time_limit: float = 5.0, alternatives: int = 0) ->
     (('spin', 'ahead', 'spin'), 7.6974, True)
     """
     workspace = workspace_of(problem.obstacles)
-    return plan_in(workspace, problem, time_limit=time_limit, alternatives=alternatives)
+    return plan_in(
+        workspace,
+        problem,
+        time_limit=time_limit,
+        alternatives=alternatives,
+        gap=gap,
+        watch=watch,
+    )
 
 
 def plan_in(
-    workspace: Workspace, problem: Problem, *, time_limit: float, alternatives: int
+    workspace: Workspace,
+    problem: Problem,
+    *,
+    time_limit: float,
+    alternatives: int,
+    gap: float | None = None,
+    watch: Watch | None = None,
 ) -> PlanResult:
     """Plan as `plan` does, with arrays prepared for the problem's map."""
     if not time_limit > 0.0:
         raise ValueError(f"time_limit must be positive, got {time_limit} s")
     if alternatives < 0:
         raise ValueError(f"alternatives must be at least 0, got {alternatives}")
+    if gap is not None and not 0.0 <= gap < 1.0:
+        raise ValueError(f"gap must be a share from 0 to below 1, got {gap}")
     _load(problem, workspace)
+    if gap is not None:
+        from maneuver_automaton.planning.lower_bound import load_proofs
+
+        load_proofs()
     if alternatives and uses_lattice(problem):
         load_search(problem)
     budget = Budget.from_now(time_limit, expansions=problem.search.max_expansions)
     with patient():
-        return plan_within(problem, budget, workspace, alternatives=alternatives)
+        if gap is None:
+            return plan_within(problem, budget, workspace, alternatives=alternatives)
+        from maneuver_automaton.planning.to_gap import plan_to_gap
+
+        watch = watch or Watch(gap=gap)
+        watch.gap, watch.problem = gap, problem
+        search = functools.partial(
+            plan_within, problem, workspace=workspace, alternatives=alternatives
+        )
+        return plan_to_gap(problem, search, budget, watch)
 
 
 def plan_within(
-    problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
+    problem: Problem, budget: Budget, workspace: Workspace, *, alternatives: int
 ) -> PlanResult:
     """The answer to a problem within a budget, the checks included; kernels are loaded already."""
     if has_tolerance(problem):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import math
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -26,6 +27,28 @@ class PlanStatus(enum.Enum):
     OUT_OF_BUDGET = "out_of_budget"
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LowerBound:
+    """No plan of a problem costs less than `value`.
+
+    What proves it is its `kind`: ``exhaustive`` a search of all words, ``cells`` a function on
+    cells of poses, ``incumbent`` that no cheaper plan is left, ``disc`` the path of the inscribed
+    disc, and formulas: ``distance``, ``turn``, ``effort``, ``time``.
+    """
+
+    value: float
+    kind: str
+    optimal: bool = False  # whether a plan of this cost is known
+    history: tuple[tuple[float, float], ...] = ()  # seconds, value
+    work: int = 0  # steps times cells of linear programs
+
+    def gap(self, cost: float) -> float:
+        """Share of a cost that is at most to be saved."""
+        if cost == math.inf:
+            return 1.0
+        return max(0.0, (cost - self.value) / cost) if cost > 0.0 else 0.0
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Alternative:
     """Another locally optimal plan, dearer than the best."""
@@ -47,6 +70,7 @@ class PlanResult:
     cost: float | None = None
     lower_bound: float | None = None
     gap: float | None = None  # (cost - lower_bound) / cost
+    bound: LowerBound | None = None  # what proves it, and since when
     certificate: float | None = None  # smallest reduced cost over the library and all times
     terminal_error: TerminalError | None = None
     clearance_m: float | None = None

@@ -18,12 +18,13 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.headings import trim_headings
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.blocked import why_goal_blocked
+from maneuver_automaton.planning.bounds import formula_bound
 from maneuver_automaton.planning.incumbents import Incumbents
-from maneuver_automaton.planning.result import Answer, PlanResult, PlanStatus
+from maneuver_automaton.planning.result import Answer, LowerBound, PlanResult, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
-from maneuver_automaton.search.limits import closed_bound, why_impossible
+from maneuver_automaton.search.limits import why_impossible
 
 INSIDE = 1e-6  # share of a tolerance by which poses that are aimed at stay within it
 AROUND = 4  # directions in which poses at a distance lie, the first towards the start
@@ -85,11 +86,11 @@ def _questions(problem: Problem) -> Iterator[Problem]:
         yield replace(problem, goals=goals, search=replace(problem.search, max_expansions=share))
 
 
-def _lower_bound(problem: Problem, exact: PlanResult) -> float:
+def _lower_bound(problem: Problem, exact: PlanResult) -> LowerBound:
     """No plan that ends within a tolerance is cheaper: bounds count it for the goals themselves."""
-    if exact.lower_bound is not None and exact.problem.goals == problem.goals:
-        return exact.lower_bound
-    return min(closed_bound(problem, goal) for goal in problem.goals)
+    if exact.bound is not None and exact.problem.goals == problem.goals:
+        return exact.bound
+    return formula_bound(problem)
 
 
 def _aims(problem: Problem) -> Iterator[Goal]:

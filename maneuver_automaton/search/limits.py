@@ -116,27 +116,30 @@ def closed_bound(problem: Problem, goal: Goal) -> float:
     >>> closed_bound(problem, problem.goals[0])
     1.0
     """
+    return max(closed_bounds(problem, goal).values())
+
+
+def closed_bounds(problem: Problem, goal: Goal) -> dict[str, float]:
+    """The bounds of `closed_bound`, each by what it counts; a distance of 0 where none is known."""
     setup = search_setup(problem, goal)
-    if setup.start_is_goal or not len(setup.rates):
-        return 0.0
     limit = problem.horizon.time
     pads = limit is not None and setup.rest is not None
-    prices = _prices(problem.automaton, problem.cost, pads)
-    if prices is None:
-        return 0.0
+    prices = _prices(problem.automaton, problem.cost, pads) if len(setup.rates) else None
+    if setup.start_is_goal or prices is None:
+        return {"distance": 0.0}
     distance, turn = _distance_to(setup, goal), _turn_to(setup, goal)
-    bound = max(
-        distance * prices.per_metre if distance > 0.0 else 0.0,
-        turn * prices.per_radian if turn > 0.0 else 0.0,
-    )
-    padded = 0.0
+    bounds = {
+        "distance": distance * prices.per_metre if distance > 0.0 else 0.0,
+        "turn": turn * prices.per_radian if turn > 0.0 else 0.0,
+    }
     if limit is not None:
-        bound = max(bound, prices.per_square * (distance * distance + turn * turn) / limit)
-        if pads:
-            padded = setup.rest_rate * limit
-        else:
-            bound = max(bound, limit * prices.per_second)
-    return padded + (bound if math.isfinite(bound) else 0.0)
+        bounds["effort"] = prices.per_square * (distance * distance + turn * turn) / limit
+        if not pads:
+            bounds["time"] = limit * prices.per_second
+    if not math.isfinite(max(bounds.values())):
+        bounds = {"distance": 0.0}
+    padded = setup.rest_rate * limit if pads and limit is not None else 0.0
+    return {what: padded + bound for what, bound in bounds.items()}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,0 +1,192 @@
+"""Cells of poses of one size: which ones a plan may visit, and the nodes around them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.bounds import _kernels_certificate
+from maneuver_automaton.bounds.pose_scene import PoseScene
+
+ON_EDGE = 1e-7  # of a cell's size: a pose this near to a neighbour lies in it too
+MOST_BOXED = 12_000_000  # nodes of the box around the cells of one level
+
+Index = tuple[int, int, int]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Cells:
+    """Cells [i, i + 1] x [j, j + 1] x [k, k + 1] times their sizes, seen from a goal.
+
+    The goal is the node (0, 0, 0), in the scene's frame. Nodes of a coarser level are nodes of the
+    next one, whose cells have half the size.
+    """
+
+    size: float  # [m]
+    headings: int  # cells around a whole turn
+    low: IntArray  # (3,) first cell in x, y and heading
+    active: NDArray[np.uint8]  # (I, J, K) 0: no plan visits it, 1: one may, 2: it is free as well
+    round_trip: bool  # whether the headings are a whole turn
+
+    @property
+    def turn(self) -> float:
+        """Size of a cell in heading [rad]."""
+        return 2.0 * math.pi / self.headings
+
+    @property
+    def nodes(self) -> tuple[int, int, int]:
+        """Nodes in each direction; the last layer of a whole turn is the first one again."""
+        i, j, k = self.active.shape
+        return i + 1, j + 1, k + 1
+
+    @property
+    def columns(self) -> IntArray:
+        """Columns (C, 4) of active cells: i, j, first k, number."""
+        shape = self.active.shape
+        padded = np.zeros((*shape[:2], shape[2] + 2), dtype=np.int8)
+        padded[..., 1:-1] = self.active > 0
+        steps = np.diff(padded, axis=2)
+        begins, ends = np.argwhere(steps == 1), np.argwhere(steps == -1)
+        counts = ends[:, 2:] - begins[:, 2:]
+        return np.hstack([begins, counts])
+
+    @property
+    def layers(self) -> Array:
+        """Headings (K + 1,) of the layers of nodes [rad], in the scene's frame."""
+        layers: Array = (self.low[2] + np.arange(self.active.shape[2] + 1)) * self.turn
+        return layers
+
+    def coordinates(self, pose: Array) -> Array:
+        """Place (3,) of a pose in the scene's frame, in cells from the first node."""
+        at = np.asarray(pose[:3]) / (self.size, self.size, self.turn) - self.low
+        if self.round_trip:
+            at[2] %= self.headings
+        else:
+            middle = 0.5 * self.active.shape[2]
+            at[2] = math.remainder(at[2] - middle, self.headings) + middle
+        return np.asarray(at, dtype=np.float64)
+
+    def around(self, at: Array, reach: tuple[float, float]) -> list[Index]:
+        """Cells within a reach in place and heading of coordinates, in cells."""
+        ranges = []
+        for axis, beside in enumerate((reach[0], reach[0], reach[1])):
+            low = math.floor(at[axis] - beside - ON_EDGE)
+            high = math.floor(at[axis] + beside + ON_EDGE)
+            count = self.active.shape[axis]
+            if axis == 2 and self.round_trip:
+                ranges.append(sorted({k % count for k in range(low, min(high, low + count) + 1)}))
+            else:
+                ranges.append([k for k in range(low, high + 1) if 0 <= k < count])
+        return [(i, j, k) for i in ranges[0] for j in ranges[1] for k in ranges[2]]
+
+    def corners(self, at: Array) -> tuple[list[Index], Array]:
+        """The eight nodes of a cell that holds coordinates, and their weights (8,)."""
+        limits = np.array(self.active.shape) - 1
+        cell = np.clip(np.floor(at + 1e-9).astype(np.int64), 0, limits)
+        inside = at - cell
+        nodes, weights = [], []
+        for corner in range(8):
+            bits = np.array([corner & 1, (corner >> 1) & 1, corner >> 2])
+            nodes.append(tuple(int(n) for n in cell + bits))
+            weights.append(float(np.prod(np.where(bits, inside, 1.0 - inside))))
+        return nodes, np.array(weights)  # type: ignore[return-value]
+
+    def value_at(self, value: Array, at: Array) -> float:
+        """Least value over the gears at coordinates, of a function (gears, nodes)."""
+        nodes, weights = self.corners(at)
+        return float(
+            min(sum(w * one[n] for n, w in zip(nodes, weights, strict=True)) for one in value)
+        )
+
+
+def first_cells(scene: PoseScene, *, size: float, headings: int, box: Array) -> Cells:
+    """All cells of a rectangle (4,) of places, and of all headings, that a plan may visit."""
+    low = np.floor(box[:2] / size).astype(np.int64)
+    high = np.maximum(np.ceil(box[2:] / size).astype(np.int64), low + 1)
+    shape = (*(high - low).tolist(), headings)
+    cells = Cells(
+        size=size,
+        headings=headings,
+        low=np.array([low[0], low[1], 0]),
+        active=np.ones(shape, dtype=np.uint8),
+        round_trip=True,
+    )
+    return _classified(cells, scene)
+
+
+def finer(cells: Cells, kept: NDArray[np.bool_], scene: PoseScene) -> Cells | None:
+    """Halves of the cells that are kept; None if there are none left, or too many to hold."""
+    active = np.where(kept, cells.active, 0).astype(np.uint8)
+    low = cells.low
+    used = np.flatnonzero(active.any(axis=(0, 1)))
+    if not used.size:
+        return None
+    round_trip = cells.round_trip
+    if round_trip:
+        gaps = np.diff(np.append(used, used[0] + cells.headings))
+        if gaps.max() > 2:  # the circle is opened where no plan has a heading
+            first = int(used[(int(gaps.argmax()) + 1) % used.size])
+            active = np.roll(active, -first, axis=2)
+            shift = first if first <= cells.headings // 2 else first - cells.headings
+            low, round_trip = low + np.array([0, 0, shift]), False
+    occupied = np.argwhere(active)
+    begin, end = occupied.min(axis=0), occupied.max(axis=0) + 1
+    if round_trip:
+        begin[2], end[2] = 0, cells.headings
+    if 8 * int(np.prod(end - begin)) > MOST_BOXED:
+        return None
+    part = active[begin[0] : end[0], begin[1] : end[1], begin[2] : end[2]]
+    halves = part.repeat(2, axis=0).repeat(2, axis=1).repeat(2, axis=2)
+    halved = Cells(
+        size=0.5 * cells.size,
+        headings=2 * cells.headings,
+        low=2 * (low + begin),
+        active=halves,
+        round_trip=round_trip,
+    )
+    return _classified(halved, scene)
+
+
+def _classified(cells: Cells, scene: PoseScene) -> Cells:
+    """Without the cells all of whose poses collide; those that are free are known to be."""
+    unknown = np.argwhere(cells.active == 1)
+    half = 0.5 * np.array([cells.size, cells.size, cells.turn])
+    boxes = np.empty((len(unknown), 6))
+    boxes[:, :3] = (unknown + cells.low) * (2.0 * half) + half
+    boxes[:, 3:] = half
+    cells.active[tuple(unknown.T)] = scene.states(boxes)
+    return cells
+
+
+def connected(cells: Cells, seeds: list[Index]) -> NDArray[np.bool_]:
+    """Active cells that hang together with the seeds, by faces, edges or corners."""
+    seen = np.zeros_like(cells.active)
+    stack = np.empty(cells.active.size + len(seeds), dtype=np.int64)
+    found = 0
+    for seed in seeds:
+        if cells.active[seed] and not seen[seed]:
+            seen[seed] = 1
+            stack[found] = np.ravel_multi_index(seed, cells.active.shape)
+            found += 1
+    _kernels_certificate.connected(cells.active, seen, stack, found, cells.round_trip)
+    return seen.astype(bool)
+
+
+def on_finer(cells: Cells, halved: Cells, value: Array) -> Array:
+    """A function (gears, nodes) of a level at the nodes of the next one; it stays the same."""
+    for axis in range(3):
+        at = (np.arange(halved.nodes[axis]) + halved.low[axis]) * 0.5 - cells.low[axis]
+        count = cells.nodes[axis]
+        if axis == 2 and cells.round_trip:
+            at %= cells.headings
+        low = np.clip(np.floor(at).astype(np.int64), 0, count - 1)
+        high = np.clip(low + 1, 0, count - 1)
+        share = (at - low).reshape([-1 if axis == a else 1 for a in range(3)])
+        value = (
+            np.take(value, low, axis + 1) * (1.0 - share) + np.take(value, high, axis + 1) * share
+        )
+    return value

@@ -1,0 +1,171 @@
+"""Motions of a vehicle as a bound knows them: how far and how much it turns for a unit of cost."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.refinement.kinematic_paths import extreme_automaton, follows_paths
+from maneuver_automaton.search.limits import rest_rate
+
+MOST_DIRECTIONS = 8  # of driving; more are replaced by the rectangle around them
+SAME = 1e-9  # relative, by which rates are equal
+
+
+class Families(NamedTuple):
+    """Families of motions: all that drive in one direction at a speed and turn at most at a rate.
+
+    Any motion of the vehicle is an average of motions of the families, for the same cost.
+    """
+
+    speed: Array  # (F,) [m per unit of cost]
+    angle: Array  # (F,) [rad] of the driving direction, seen from the vehicle
+    turn_rate: Array  # (F,) [rad per unit of cost], to both sides
+    side: IntArray  # (F,) 0: the opposite direction as well, -1: this direction only
+    gear: IntArray  # (F,) which function is meant, where forward and reverse have one each
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Motions:
+    """All motions of a vehicle, by families, and what else a plan costs."""
+
+    families: Families
+    price: float  # of a change between forward and reverse; 0: one function does for both
+    besides: float  # cost of every plan that does not depend on its path
+
+    @property
+    def speed(self) -> float:
+        """Greatest distance for a unit of cost [m]."""
+        return float(self.families.speed.max())
+
+    @property
+    def turn_rate(self) -> float:
+        """Greatest turn for a unit of cost [rad]."""
+        return float(self.families.turn_rate.max())
+
+
+def motions_of(problem: Problem) -> Motions | None:
+    """Motions of a problem's vehicle in the plane; None where no bound on cells follows from them.
+
+    Of a vehicle with inertia they are those of the kinematic one at its limits, whose poses it
+    shares. Prices of switches are left out, and climbing too: a bound without them holds.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Cost, KinematicCar, Problem
+    >>> car = KinematicCar(wheelbase=2.8, max_speed=2.0, max_steering=0.6)
+    >>> controls = {"ahead": (2, 0), "left": (2, 0.6), "right": (2, -0.6), "back": (-1, 0)}
+    >>> robot = Automaton.of_controls(car, controls)
+    >>> motions = motions_of(Problem(robot, [0, 0, 0], [5, 1, 0], cost=Cost(time=1.0)))
+    >>> motions.families.speed.tolist(), motions.families.turn_rate.round(3).tolist()
+    ([2.0, 1.0], [0.489, 0.0])
+    """
+    cost = problem.cost
+    if not isinstance(cost, Cost) or problem.automaton.translated:
+        return None
+    besides = 0.0
+    if problem.automaton.is_kinematic:
+        twists, rates = problem.automaton.body_velocities[:, :3], problem.rates
+        price = cost.direction_change
+        if (rest := rest_rate(problem)) is not None:
+            rates, besides = rates - rest, rest * (problem.horizon.time or 0.0)
+    elif follows_paths(problem.automaton.model) and (cost.time or cost.length):
+        simpler = extreme_automaton(problem.automaton.model)  # type: ignore[arg-type]
+        twists, price = simpler.body_velocities[:, :3], 0.0
+        rates = Cost(time=cost.time, length=cost.length).rates(simpler.controls, twists)
+    else:
+        return None
+    moving = twists.any(axis=1)
+    if not moving.any() or (rates[moving] <= 0.0).any() or not twists[:, :2].any():
+        return None
+    families = _families(twists[moving] / rates[moving, None], gears=price > 0.0)
+    return Motions(families=families, price=price, besides=besides)
+
+
+def _families(per_cost: Array, *, gears: bool) -> Families:
+    """Families of twists (n, 3) per unit of cost; those with gears are of forward or reverse."""
+    if not per_cost[:, 1].any():
+        found = [
+            (speed, 0.0 if sign > 0 else math.pi, rate)
+            for sign in (1.0, -1.0)
+            for speed, rate in _corners(sign * per_cost[:, 0], np.abs(per_cost[:, 2]))
+        ]
+    else:
+        rate = float(np.abs(per_cost[:, 2]).max())
+        found = [
+            (float(np.hypot(*one)), math.atan2(one[1], one[0]), rate)
+            for one in _directions(per_cost[:, :2])
+        ]
+    if gears:
+        rows = [(*one, -1, 0 if math.cos(one[1]) > 0.0 else 1) for one in found]
+        for gear in (0, 1):  # a gear that no motion has may not rise without end
+            if all(row[4] != gear for row in rows):
+                rows.append((0.0, 0.0, max(row[2] for row in rows), -1, gear))
+        rows.sort(key=lambda row: row[4])
+    else:
+        rows = _merged(found)
+    table = np.array(rows, dtype=np.float64)
+    return Families(
+        speed=table[:, 0].copy(),
+        angle=table[:, 1].copy(),
+        turn_rate=table[:, 2].copy(),
+        side=table[:, 3].astype(np.int64),
+        gear=table[:, 4].astype(np.int64),
+    )
+
+
+def _corners(speeds: Array, rates: Array) -> list[tuple[float, float]]:
+    """Speed and turn rate of at most two boxes that hold all motions that do not go backwards."""
+    ahead = speeds >= 0.0
+    if not (speeds > 0.0).any():
+        return []
+    fastest, spin = float(speeds.max()), float(rates[ahead].max())
+    at_speed = float(rates[speeds >= fastest * (1.0 - SAME)].max())
+    # A motion (v, w) is an average of (fastest, at_speed) and (0, spin) below the line between.
+    below = rates[ahead] <= (at_speed + (spin - at_speed) * (1.0 - speeds[ahead] / fastest)) * (
+        1.0 + SAME
+    )
+    if spin > at_speed * (1.0 + SAME) and below.all():
+        return [(fastest, at_speed), (0.0, spin)]
+    return [(fastest, spin)]
+
+
+def _directions(velocities: Array) -> Array:
+    """Corners (n, 2) of a convex polygon that holds all velocities."""
+    low, high = np.minimum(velocities.min(axis=0), 0.0), np.maximum(velocities.max(axis=0), 0.0)
+    around = np.array([[x, y] for x in (low[0], high[0]) for y in (low[1], high[1])])
+    try:
+        hull = velocities[ConvexHull(velocities).vertices]
+    except (QhullError, ValueError):
+        hull = around
+    corners = hull if len(hull) <= MOST_DIRECTIONS else around
+    return np.asarray(corners[corners.any(axis=1)])
+
+
+def _merged(found: list[tuple[float, float, float]]) -> list[tuple[float, float, float, int, int]]:
+    """Families of one function; two that differ in nothing but the sense become one."""
+    rows: list[tuple[float, float, float, int, int]] = []
+    left = list(found)
+    while left:
+        speed, angle, rate = left.pop(0)
+        twin = next(
+            (
+                one
+                for one in left
+                if math.isclose(one[0], speed, rel_tol=SAME)
+                and math.isclose(one[2], rate, rel_tol=SAME)
+                and (speed == 0.0 or abs(math.remainder(one[1] - angle - math.pi, math.tau)) < SAME)
+            ),
+            None,
+        )
+        if twin is not None:
+            left.remove(twin)
+        rows.append((speed, angle, rate, 0 if twin is not None or speed == 0.0 else -1, 0))
+    return rows

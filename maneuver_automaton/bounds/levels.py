@@ -1,0 +1,355 @@
+"""A proven lower bound over levels of cells, from coarse to fine, in the tube of cheaper plans.
+
+A plan that costs less than the incumbent visits only cells through which such a plan could lead:
+what it costs at least to get there and to go on from there is known from coarser levels. All other
+cells are left out, and what is proven on the rest holds for plans cheaper than the incumbent.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.bounds import _kernels_certificate
+from maneuver_automaton.bounds._kernels_dual import LANES
+from maneuver_automaton.bounds.cells import (
+    Cells,
+    Index,
+    connected,
+    finer,
+    first_cells,
+    on_finer,
+)
+from maneuver_automaton.bounds.families import Motions
+from maneuver_automaton.bounds.pose_scene import PoseScene
+from maneuver_automaton.bounds.program import Program, program_of, raised, slope
+from maneuver_automaton.problem import Goal
+from maneuver_automaton.search.distance_grid import OCTILE
+
+HEADINGS = 32  # of the coarsest level
+MOST_FIRST = 300_000  # cells of the coarsest level
+MOST_CELLS = 3_000_000  # of any level
+BLOCK = 100  # steps between two looks at what is proven
+CHUNK = 4_000_000  # steps times cells between two looks at the clock
+STEPS = (2500, 3000, 5000)  # on each level at most; the last holds for all that follow
+STALLED = 2e-3  # relative gain in PATIENCE blocks below which a level has given what it can
+PATIENCE = 10
+POLISHING = 60  # sweeps that raise what is proven
+SWEEPS = 40  # that raise the bounds of cells from the start and to the goal
+WEIGHT = 8.0  # of the first level: values against dual values, in lengths of a plan in cells
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proof:
+    """What is proven by now."""
+
+    value: float  # no plan is cheaper
+    optimal: bool  # whether the incumbent is: no cheaper plan is left
+    cells: int  # of the level
+    size: float  # [m] of its cells
+    work: int  # steps times cells, of all levels
+
+
+@dataclass(slots=True, eq=False, kw_only=True)
+class _Level:
+    """One level, and bounds of its cells that are known by then."""
+
+    cells: Cells
+    from_start: Array  # (gears, nodes), admissible, backward
+    to_goal: Array  # (gears, nodes), admissible
+    guess: Array  # (gears, nodes), whatever it is
+    dual: NDArray[np.float32] | None
+    weight: float
+
+
+def proofs(
+    scene: PoseScene,
+    motions: Motions,
+    *,
+    start: Array,
+    goals: tuple[Goal, ...],
+    incumbent: Callable[[], float],
+    cap: float,
+    ends: Callable[[int], bool],
+) -> Iterator[Proof]:
+    """Better and better bounds; `incumbent` is asked for the cost of the best plan at each level.
+
+    Where `ends` says so of the work done, a level is left, and what it has is polished. Poses are
+    seen from the scene's frame, in which the first goal is the origin. Plans that cost
+    more than `cap` are left out, so no bound exceeds it; `cap` and what the incumbent costs are
+    without what every plan costs besides.
+    """
+    limit = min(cap, incumbent())
+    gears = 2 if motions.price > 0.0 else 1
+    cells: Cells | None = _coarsest(scene, motions, start, goals, limit)
+    level: _Level | None = None
+    best, work, depth = 0.0, 0, 0
+    while cells is not None:
+        limit = min(limit, incumbent())
+        at = cells.coordinates(start)
+        seeds = cells.around(at, (0.0, 0.0))
+        last = _goal_cells(cells, goals)
+        seen = connected(cells, seeds)
+        cells.active[~seen] = 0
+        total = int(seen.sum())
+        if not any(seen[index] for index in last):
+            yield Proof(value=limit, optimal=True, cells=total, size=cells.size, work=work)
+            return
+        if total > MOST_CELLS:
+            return
+        fixed = _nodes_of(cells, last, exact=_exact_node(cells, goals))
+        if level is None:
+            zero = np.zeros((gears, *cells.nodes))
+            guess = _in_the_plane(cells, fixed, gears) / motions.speed
+            weight = WEIGHT * limit * motions.speed / cells.size
+            level = _Level(
+                cells=cells, from_start=zero, to_goal=zero, guess=guess, dual=None, weight=weight
+            )
+        else:
+            level = _Level(
+                cells=cells,
+                from_start=on_finer(level.cells, cells, level.from_start),
+                to_goal=on_finer(level.cells, cells, level.to_goal),
+                guess=on_finer(level.cells, cells, level.guess),
+                dual=_spread(level, cells),
+                weight=2.0 * level.weight,
+            )
+        program = program_of(cells, motions, start=start, goal_nodes=fixed, value=level.guess)
+        program.weight = level.weight
+        if level.dual is not None:
+            program.dual[:] = level.dual
+        found = level.to_goal
+        most = STEPS[min(depth, len(STEPS) - 1)]
+        for value, function, steps in _solved(program, at, limit, most):
+            work += steps * total
+            best, found = max(best, value), function
+            yield _proof(cells, min(best, limit), total, work)
+            if ends(work):
+                break
+        columns = program.columns
+        found = raised(cells, columns, motions, found, fixed=fixed, sweeps=POLISHING)
+        found = found / max(slope(cells, columns, motions, found), 1.0)
+        best = max(best, cells.value_at(found, at))
+        yield _proof(cells, min(best, limit), total, work)
+        if best >= limit * (1.0 - 1e-12) or ends(work):
+            return
+        level.guess, level.dual, level.weight = (
+            program.value.astype(float),
+            program.dual,
+            program.weight,
+        )
+        kept = _tube(level, motions, columns, found, at, seeds, fixed, limit)
+        for index in (*seeds, *last):
+            kept[index] = cells.active[index] > 0
+        cells = finer(cells, kept, scene)
+        depth += 1
+
+
+def _proof(cells: Cells, value: float, total: int, work: int) -> Proof:
+    return Proof(value=value, optimal=False, cells=total, size=cells.size, work=work)
+
+
+def _solved(
+    program: Program, at: Array, limit: float, most: int
+) -> Iterator[tuple[float, Array, int]]:
+    """Values proven on a level, each with the best function by then, and the steps it took."""
+    cells, motions = program.cells, program.motions
+    best, found, history = 0.0, np.zeros(program.value.shape), [0.0]
+    part = max(1, CHUNK // max(int((cells.active > 0).sum()), 1))
+    for done in range(BLOCK, most + 1, BLOCK):
+        left = BLOCK
+        while left > part:
+            program.run(part)
+            left -= part
+            yield best, found, part
+        program.run(left)
+        function = program.value.astype(np.float64)
+        raw = cells.value_at(function, at)
+        steep = slope(cells, program.columns, motions, function)
+        proven = raw / max(steep, 1e-12)
+        if proven > best:
+            best, found = proven, function / steep
+        history.append(best)
+        yield best, found, left
+        if best >= limit:
+            return
+        if done % 300 == 0:
+            program.weight *= _steered(raw, steep, limit)
+        stalled = len(history) > PATIENCE and best < history[-1 - PATIENCE] * (1.0 + STALLED)
+        if stalled and best > 0.97 * raw:
+            return
+
+
+def _steered(raw: float, steep: float, limit: float) -> float:
+    """Factor of the weight of the values: the optimum is at most the incumbent."""
+    if raw > 1.05 * limit:
+        return 0.5
+    if raw > 0.88 * limit and steep > 1.2:
+        return 0.7
+    if raw < 0.8 * limit and steep < 1.25:
+        return 2.0
+    return 1.0
+
+
+def _tube(
+    level: _Level,
+    motions: Motions,
+    columns: NDArray[np.int64],
+    found: Array,
+    at: Array,
+    seeds: list[Index],
+    fixed: NDArray[np.bool_],
+    limit: float,
+) -> NDArray[np.bool_]:
+    """Cells that a plan cheaper than a limit may visit."""
+    cells = level.cells
+    level.to_goal = _lifted(cells, columns, motions, level.to_goal, fixed, backward=False)
+    sources = _nodes_of(cells, seeds, exact=None)
+    level.from_start = _lifted(cells, columns, motions, level.from_start, sources, backward=True)
+    whole = cells.value_at(found, at)
+    onward = np.maximum(_least(cells, columns, level.to_goal), _least(cells, columns, found))
+    before = np.maximum(
+        _least(cells, columns, level.from_start),
+        _least(cells, columns, whole - found),
+    )
+    return (cells.active > 0) & (np.maximum(onward, 0.0) + np.maximum(before, 0.0) < limit)
+
+
+def _lifted(
+    cells: Cells,
+    columns: NDArray[np.int64],
+    motions: Motions,
+    value: Array,
+    fixed: NDArray[np.bool_],
+    *,
+    backward: bool,
+) -> Array:
+    """An admissible function that is zero at fixed nodes, raised."""
+    value = value.copy()
+    value[:, fixed] = 0.0
+    sign = -1.0 if backward else 1.0
+    value /= max(slope(cells, columns, motions, sign * value), 1.0)
+    value = raised(cells, columns, motions, value, fixed=fixed, sweeps=SWEEPS, backward=backward)
+    return value / max(slope(cells, columns, motions, sign * value), 1.0)
+
+
+def _least(cells: Cells, columns: NDArray[np.int64], value: Array) -> Array:
+    least = np.full(cells.active.shape, math.inf)
+    _kernels_certificate.least_in_cells(np.ascontiguousarray(value), columns, least)
+    return least
+
+
+def _coarsest(
+    scene: PoseScene, motions: Motions, start: Array, goals: tuple[Goal, ...], limit: float
+) -> Cells:
+    """All cells that a plan of a cost may visit."""
+    length = limit * motions.speed
+    low, high = np.full(2, math.inf), np.full(2, -math.inf)
+    for goal in goals:
+        middle = 0.5 * (start[:2] + goal.pose[:2])
+        apart = float(np.linalg.norm(start[:2] - goal.pose[:2]))
+        total = length + goal.tolerance_m
+        beside = 0.5 * math.sqrt(max(total * total - apart * apart, 0.0))
+        along = (start[:2] - goal.pose[:2]) / max(apart, 1e-12)
+        half = np.hypot(0.5 * total * along, beside * along[::-1])
+        low, high = np.minimum(low, middle - half), np.maximum(high, middle + half)
+    for (
+        n_x,
+        n_y,
+        offset,
+    ) in scene.arrays.limits:  # bounds of the place, where they lie along an axis
+        for axis, n in enumerate((n_x, n_y)):
+            if abs(n) > 1.0 - 1e-12:
+                if n > 0.0:
+                    high[axis] = min(high[axis], offset / n)
+                else:
+                    low[axis] = max(low[axis], offset / n)
+    high = np.maximum(high, low)
+    radius = motions.speed / max(motions.turn_rate, 1e-12)
+    size = min(2.0 * math.pi / HEADINGS * radius, length / 8.0)
+    while float(np.prod((high - low) / size + 1.0)) * HEADINGS > MOST_FIRST:
+        size *= 1.25
+    return first_cells(scene, size=size, headings=HEADINGS, box=np.concatenate([low, high]))
+
+
+def _goal_cells(cells: Cells, goals: tuple[Goal, ...]) -> list[Index]:
+    """Cells that hold a pose where a plan may end."""
+    found: list[Index] = []
+    for goal in goals:
+        at = cells.coordinates(goal.pose)
+        turn = cells.headings if goal.free_heading else goal.tolerance_rad / cells.turn
+        found += cells.around(at, (goal.tolerance_m / cells.size, turn))
+    return sorted(set(found))
+
+
+def _exact_node(cells: Cells, goals: tuple[Goal, ...]) -> Index | None:
+    """The node that is the only goal; None if the goal is more than a node."""
+    goal = goals[0]
+    if len(goals) > 1 or goal.free_heading or goal.tolerance_m or goal.tolerance_rad:
+        return None
+    i, j, k = np.rint(cells.coordinates(goal.pose)).astype(int).tolist()
+    return i, j, k
+
+
+def _nodes_of(cells: Cells, inside: list[Index], *, exact: Index | None) -> NDArray[np.bool_]:
+    """Nodes where the value is fixed: those of cells, or the one that is the goal."""
+    fixed = np.zeros(cells.nodes, dtype=np.bool_)
+    if exact is not None:
+        fixed[exact] = True
+    else:
+        for i, j, k in inside:
+            if cells.active[i, j, k]:
+                fixed[i : i + 2, j : j + 2, k : k + 2] = True
+    if cells.round_trip:
+        both = fixed[..., 0] | fixed[..., -1]
+        fixed[..., 0], fixed[..., -1] = both, both
+    return fixed
+
+
+def _in_the_plane(cells: Cells, fixed: NDArray[np.bool_], gears: int) -> Array:
+    """Distances in the plane to the goal (gears, nodes) [m], as a first guess."""
+    passable = cells.active.any(axis=2)
+    n_i, n_j, _ = cells.nodes
+    number = np.arange(n_i * n_j).reshape(n_i, n_j)
+    i, j = np.nonzero(passable)
+    a, b, c, d = number[i, j], number[i + 1, j], number[i, j + 1], number[i + 1, j + 1]
+    ends = np.concatenate(
+        [np.stack(p) for p in ((a, b), (a, c), (b, d), (c, d), (a, d), (b, c))], axis=1
+    )
+    ends = np.unique(np.sort(ends, axis=0), axis=1)
+    across = (ends[1] - ends[0] != 1) & (ends[1] - ends[0] != n_j)
+    lengths = np.where(across, math.sqrt(2.0), 1.0) * cells.size
+    graph = coo_matrix((lengths, (ends[0], ends[1])), shape=(n_i * n_j, n_i * n_j)).tocsr()
+    sources = number[fixed.any(axis=2)]
+    found = dijkstra(graph, directed=False, indices=sources, min_only=True) / OCTILE
+    found[~np.isfinite(found)] = 0.0
+    shape = (gears, *cells.nodes)
+    return np.broadcast_to(found.reshape(1, n_i, n_j, 1), shape).copy()
+
+
+def _spread(level: _Level, cells: Cells) -> NDArray[np.float32]:
+    """Dual values of a level for the next one: an eighth of the parent's for every cell."""
+    assert level.dual is not None
+    index = np.argwhere(cells.active)
+    parents = np.full(level.cells.active.shape, -1, dtype=np.int64)
+    order = np.flatnonzero(level.cells.active.reshape(-1))
+    parents.reshape(-1)[order] = np.arange(order.size)
+    of = (index + cells.low) // 2 - level.cells.low
+    if level.cells.round_trip:
+        of[:, 2] %= level.cells.headings
+    owner = parents[tuple(of.T)]
+    blocks = -(-len(index) // LANES)
+    coarse = level.dual.reshape(-(-order.size // LANES), -1, LANES)
+    dual = np.zeros((blocks, coarse.shape[1], LANES), dtype=np.float32)
+    number = np.arange(len(index))
+    dual[number // LANES, :, number % LANES] = coarse[
+        owner // LANES, :, owner % LANES
+    ] * np.float32(0.125)
+    return dual.reshape(-1)

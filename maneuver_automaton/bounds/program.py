@@ -1,0 +1,216 @@
+"""The linear program of a lower bound on one level of cells, solved by a primal-dual method.
+
+Maximise the value at the start, with 0 at the goal, over all functions on the cells that fall along
+no motion faster than its cost rises. What the method finds need not be admissible: it is divided
+by what `slope` measures.
+
+Source: Pock and Chambolle (2011), diagonal preconditioning for first order primal-dual algorithms.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.bounds import _kernels_certificate, _kernels_dual
+from maneuver_automaton.bounds.cells import Cells
+from maneuver_automaton.bounds.families import Families, Motions
+
+Single = NDArray[np.float32]
+
+OVER = 1.9  # times the step of the method: the limit for convergence is 2
+ROUNDING = 1e-9  # relative, of the largest slope
+
+
+class Rows(NamedTuple):
+    """Rows of the program: weights of the directions at each layer, and sizes of dual steps."""
+
+    table: Single  # (F * 7 * (K + 1),) both layers' directions, and three steps; the last is 0
+    turn: Single  # (F,)
+    side: IntArray  # (F,)
+    gear: IntArray  # (F,)
+
+
+@dataclass(slots=True, eq=False, kw_only=True)
+class Program:
+    """State of the method on one level."""
+
+    cells: Cells
+    motions: Motions
+    columns: IntArray  # (C, 4)
+    base: NDArray[np.int32]  # (blocks * 64,) first node of each cell, in blocks
+    layer: NDArray[np.int32]  # (blocks * 64,) its layer
+    rate: Array  # (F, 3, K + 1) sum of the entries of a row, without sign
+    share: Array  # (gears, nodes) one over the sum of the entries of a node, 0 where fixed
+    aim: Single  # (gears, nodes) weights of the value at the start
+    value: Single  # (gears, nodes)
+    ahead: Single
+    back: Single
+    dual: Single  # (blocks * F * 24 * 64,)
+    weight: float = 1.0  # of the values against the dual values, in steps
+
+    @property
+    def shape(self) -> tuple[int, int, int, int]:
+        """Gears and nodes."""
+        i, j, k = self.cells.nodes
+        return self.value.shape[0], i, j, k
+
+    def run(self, steps: int) -> None:
+        """So many steps of the method."""
+        rows = _rows(self)
+        step = (self.share * self.weight).astype(np.float32)
+        whole, price = self.cells.round_trip, self.motions.price
+        flat = [a.reshape(-1) for a in (self.value, self.ahead, self.back, step, self.aim)]
+        value, ahead, back, step, aim = flat
+        room = np.zeros(_kernels_dual.ROWS * _kernels_dual.LANES, dtype=np.float32)
+        for _ in range(steps):
+            _kernels_dual.primal_step(value, ahead, back, step, aim, self.shape, whole, price, OVER)
+            _kernels_dual.dual_step(
+                ahead, self.dual, back, self.base, self.layer, self.shape, rows, room, OVER
+            )
+
+
+def program_of(
+    cells: Cells, motions: Motions, *, start: Array, goal_nodes: NDArray[np.bool_], value: Array
+) -> Program:
+    """The program of a level, from the pose `start` to the nodes of the goal, from first values."""
+    gears = 2 if motions.price > 0.0 else 1
+    families, count = motions.families, cells.active.shape[2] + 1
+    columns = cells.columns
+    base, layer = _blocks(cells)
+    weights = _weights(cells, families)
+    size = np.abs(weights)
+    turn = families.turn_rate / cells.turn
+    rate = np.zeros((families.side.size, 3, count))
+    rate[:, 0] = 2.0 * size.sum(axis=2) + 2.0 * turn[:, None]
+    upper = np.roll(size, -1, axis=1).sum(axis=2)
+    rate[:, 1] = 2.0 * upper + 2.0 * turn[:, None]
+    rate[:, 2] = size.sum(axis=2) + upper + 2.0 * turn[:, None]
+    share = _shares(cells, families, size, turn, gears)
+    share[:, goal_nodes] = 0.0
+    aim = np.zeros((gears, *cells.nodes), dtype=np.float32)
+    nodes, inside = cells.corners(cells.coordinates(start))
+    for node, part in zip(nodes, inside, strict=True):
+        aim[(slice(None), *node)] += part / gears
+    if cells.round_trip:
+        both = aim[..., 0] + aim[..., -1]
+        aim[..., 0], aim[..., -1] = both, both
+    single = np.ascontiguousarray(value, dtype=np.float32)
+    return Program(
+        cells=cells,
+        motions=motions,
+        columns=columns,
+        base=base,
+        layer=layer,
+        rate=rate,
+        share=share,
+        aim=aim,
+        value=single,
+        ahead=single.copy(),
+        back=np.zeros_like(single),
+        dual=np.zeros(base.size * families.side.size * 24, dtype=np.float32),
+    )
+
+
+def _blocks(cells: Cells) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """First node and layer of each active cell, filled up to whole blocks."""
+    index = np.argwhere(cells.active)
+    count = -(-len(index) // _kernels_dual.LANES) * _kernels_dual.LANES
+    base = np.zeros(count, dtype=np.int32)
+    layer = np.full(count, cells.active.shape[2], dtype=np.int32)
+    base[: len(index)] = np.ravel_multi_index(tuple(index.T), cells.nodes)
+    layer[: len(index)] = index[:, 2]
+    return base, layer
+
+
+def slope(cells: Cells, columns: IntArray, motions: Motions, value: Array) -> float:
+    """Upper bound of how fast a function (gears, nodes) falls along motions, per unit of cost."""
+    families = motions.families
+    headings = cells.layers[None, :] + families.angle[:, None]
+    ahead = np.stack([np.cos(headings), np.sin(headings)], axis=2)
+    steep = _kernels_certificate.steepest(
+        value, columns, families, ahead, cells.size, cells.turn, max(motions.price, 1e-300)
+    )
+    return max(steep * (1.0 + ROUNDING), 1e-12)
+
+
+def raised(
+    cells: Cells,
+    columns: IntArray,
+    motions: Motions,
+    value: Array,
+    *,
+    fixed: NDArray[np.bool_],
+    sweeps: int,
+    backward: bool = False,
+) -> Array:
+    """A function that obeys the rows, raised where it has room, node by node.
+
+    `backward`: it is one from the start, which rises along motions.
+    """
+    families = motions.families
+    if backward:
+        families = families._replace(side=-families.side)
+    room = np.empty_like(value)
+    weights = _weights(cells, families)
+    for _ in range(sweeps):
+        _kernels_certificate.room_above(
+            value, columns, families, weights, families.turn_rate / cells.turn, room, motions.price
+        )
+        room[~np.isfinite(room)] = 0.0
+        if cells.round_trip:
+            least = np.minimum(room[..., 0], room[..., -1])
+            room[..., 0], room[..., -1] = least, least
+        room[:, fixed] = 0.0
+        value = value + room
+    return value
+
+
+def _weights(cells: Cells, families: Families) -> Array:
+    """Directions (F, K + 1, 2) at the layers as the rows have them [1 per unit of cost]."""
+    headings = cells.layers[None, :] + families.angle[:, None]
+    ahead = np.stack([np.cos(headings), np.sin(headings)], axis=2)
+    ahead[np.abs(ahead) < 1e-12] = 0.0
+    scale = families.speed / (cells.size * math.cos(0.5 * cells.turn))
+    return np.asarray(ahead * scale[:, None, None])
+
+
+def _rows(program: Program) -> Rows:
+    cells, families = program.cells, program.motions.families
+    weights = _weights(cells, families)
+    table = np.zeros((families.side.size, 7, weights.shape[1]), dtype=np.float32)
+    table[:, 0:2, :-1] = weights[:, :-1].transpose(0, 2, 1)
+    table[:, 2:4, :-1] = weights[:, 1:].transpose(0, 2, 1)
+    steps = 1.0 / np.maximum(program.weight * program.rate, 1e-30)
+    table[:, 4:7, :-1] = steps[:, :, :-1]
+    return Rows(
+        table=table.reshape(-1),
+        turn=(families.turn_rate / cells.turn).astype(np.float32),
+        side=families.side,
+        gear=families.gear,
+    )
+
+
+def _shares(cells: Cells, families: Families, size: Array, turn: Array, gears: int) -> Array:
+    """One over the sum of the entries of each node in all rows, 0 where there are none."""
+    active = cells.active > 0
+    total = np.zeros((gears, *cells.nodes))
+    for m, gear in enumerate(families.gear.tolist()):
+        lower, upper = size[m, :-1].sum(axis=1), size[m, 1:].sum(axis=1)
+        below = 4.0 * lower + 2.0 * upper + 6.0 * turn[m]
+        above = 4.0 * upper + 2.0 * lower + 6.0 * turn[m]
+        for a in (0, 1):
+            for b in (0, 1):
+                part = total[gear, a : a + active.shape[0], b : b + active.shape[1]]
+                part[..., :-1] += active * below
+                part[..., 1:] += active * above
+    if cells.round_trip:
+        both = total[..., 0] + total[..., -1]
+        total[..., 0], total[..., -1] = both, both
+    with np.errstate(divide="ignore"):
+        return np.where(total > 0.0, 1.0 / total, 0.0)

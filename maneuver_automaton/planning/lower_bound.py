@@ -1,0 +1,202 @@
+"""`lower_bound(problem)`: how little a plan can cost, proven, whatever its word."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.bounds import Proof, cell_proofs
+from maneuver_automaton.budget import Budget, Watch
+from maneuver_automaton.collision import Box
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.models import Unicycle
+from maneuver_automaton.planning.blocked import blocked_ends
+from maneuver_automaton.planning.bounds import bound_along_paths, formula_bound, lattice_bound
+from maneuver_automaton.planning.polishing import rests_at_both_ends
+from maneuver_automaton.planning.result import LowerBound
+from maneuver_automaton.planning.steps import has_inertia
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.refinement.kinematic_paths import extreme_automaton, follows_paths
+from maneuver_automaton.search.lattice_query import lattice_query
+
+POLISHING = 0.85  # share of the time after which what there is gets polished
+
+
+def lower_bound(
+    problem: Problem,
+    *,
+    time_limit: float = 10.0,
+    incumbent: float = math.inf,
+    gap: float = 0.0,
+    max_work: int | None = None,
+) -> LowerBound:
+    """The best lower bound of the cost of all plans that can be proven in a time.
+
+    A function of the pose that falls along no motion faster than its cost rises, and is zero at the
+    goal, is a lower bound wherever it comes from. It is sought as piecewise linear function over
+    cells of poses that are not proven to collide, and what it proves is measured on every cell.
+
+    Parameters
+    ----------
+    problem : Problem
+    time_limit : float
+        [s]
+    incumbent : float
+        Cost of the best plan known. It helps: only poses that a cheaper plan may visit are looked
+        at. No bound exceeds it.
+    gap : float
+        Share of the incumbent's cost that is small enough: end as soon as that is proven.
+    max_work : int, optional
+        Work at which to end, in steps times cells; the answer is then the same at every call,
+        unless the time is over before.
+
+    Returns
+    -------
+    LowerBound
+        `kind` says what won: ``cells`` is the function above, ``incumbent`` that no plan is left
+        that would be cheaper.
+
+    Raises
+    ------
+    ValueError
+        If a limit is not positive, or the gap not from 0 to 1.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Car, Cost, Problem, plan
+    >>> car = Car(wheelbase=2.8, max_steering=0.6)
+    >>> controls = {f"{v} {s}": (v, s) for v in (1, -1) for s in (-0.6, 0.0, 0.6)}
+    >>> robot = Automaton.of_controls(car, controls)
+    >>> problem = Problem(robot, [0, 0, 0], [6, 3, 0.9], cost=Cost(length=1.0))
+    >>> cost = plan(problem).cost
+    >>> bound = lower_bound(problem, incumbent=cost, max_work=20_000_000)
+    >>> bound.kind, 0.0 <= bound.gap(cost) < 0.05
+    ('cells', True)
+    """
+    if not time_limit > 0.0:
+        raise ValueError(f"time_limit must be positive, got {time_limit} s")
+    if not 0.0 <= gap <= 1.0:
+        raise ValueError(f"gap must be a share from 0 to 1, got {gap}")
+    watch = Watch(gap=gap, cost=incumbent)
+    proving = Proving(problem, Budget.from_now(time_limit), watch, max_work=max_work)
+    proving.run()
+    return proving.bound(incumbent)
+
+
+@dataclass(slots=True, eq=False)
+class Proving:
+    """Better and better bounds of a problem, until the gap is closed or the budget is over."""
+
+    problem: Problem
+    budget: Budget
+    watch: Watch
+    max_work: int | None = None  # steps times cells
+    best: LowerBound = field(default_factory=lambda: LowerBound(value=0.0, kind="distance"))
+    history: list[tuple[float, float]] = field(default_factory=list)  # seconds, value
+    work: int = 0
+
+    def run(self) -> None:
+        """Prove what can be proven."""
+        self._better(known_bound(self.problem))
+        if self._over():
+            return
+        for proof in proofs_of(self.problem, incumbent=lambda: self.watch.cost, ends=self._late):
+            self.work = proof.work
+            kind = "incumbent" if proof.optimal and proof.value >= self.watch.cost else "cells"
+            self._better(LowerBound(value=proof.value, kind=kind))
+            if self._over():
+                return
+
+    def bound(self, cost: float) -> LowerBound:
+        """The best bound, which is no greater than the cost of a plan that is known."""
+        value = min(self.best.value, cost)
+        history = tuple((at, min(one, cost)) for at, one in self.history)
+        return replace(
+            self.best, value=value, optimal=value == cost, history=history, work=self.work
+        )
+
+    def _better(self, bound: LowerBound) -> None:
+        if bound.value > self.best.value or not self.history:
+            self.best = bound
+            self.history.append((self.budget.elapsed, bound.value))
+            self.watch.bound = bound.value
+
+    def _over(self) -> bool:
+        return self.watch.is_abandoned or self.watch.is_closed or self.budget.is_over
+
+    def _late(self, work: int) -> bool:
+        """Whether to polish what there is: time for that is kept back."""
+        late = self.budget.elapsed > POLISHING * self.budget.seconds or self._over()
+        return late or (self.max_work is not None and work >= self.max_work)
+
+
+@functools.cache
+def load_proofs() -> None:
+    """Compile or load what proofs need, before the clock runs."""
+    robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1), "right": (1, -1)})
+    tiny = Problem(robot, [0, 0, 0], [1, 0.2, 0.1], obstacles=Box([1, 1], [9, 9]))
+    for _ in proofs_of(tiny, incumbent=lambda: 2.0, ends=lambda _work: True):
+        pass
+
+
+def known_bound(problem: Problem) -> LowerBound:
+    """The best bound that takes no search: a formula, or the path of the inscribed disc."""
+    if has_inertia(problem):
+        return bound_along_paths(problem)
+    if blocked_ends(problem) is not None or problem.automaton.lattice is not None:
+        return formula_bound(problem)
+    return lattice_bound(lattice_query(problem, tuple(range(len(problem.goals)))))
+
+
+def proofs_of(
+    problem: Problem, *, incumbent: Callable[[], float], ends: Callable[[int], bool]
+) -> Iterator[Proof]:
+    """Better and better bounds by cells, as `cell_proofs`, in costs of the problem itself."""
+    ramp = _ramp(problem)
+    for proof in cell_proofs(problem, incumbent=lambda: ramp.without(incumbent()), ends=ends):
+        yield replace(proof, value=ramp.added(proof.value))
+
+
+@dataclass(frozen=True, slots=True)
+class _Ramp:
+    """What it costs to start from rest and to stop, on a path of a cost at full speed."""
+
+    seconds: float = 0.0  # greatest speed over greatest acceleration
+    rate: float = 0.0  # cost per second
+    share: float = 0.0  # seconds at full speed for a unit of cost
+
+    def added(self, cost: float) -> float:
+        """Least cost from rest to rest along a path of a cost at full speed."""
+        seconds = self.share * cost
+        if seconds >= self.seconds:
+            return cost + self.rate * self.seconds
+        return cost + self.rate * (2.0 * math.sqrt(seconds * self.seconds) - seconds)
+
+    def without(self, cost: float) -> float:
+        """Greatest cost at full speed of a path that is driven from rest to rest for a cost."""
+        if cost == math.inf or not self.seconds:
+            return cost
+        if cost >= self.added(self.seconds / self.share):
+            return cost - self.rate * self.seconds
+        low, high = 0.0, self.seconds / self.share
+        while (middle := 0.5 * (low + high)) not in (low, high):
+            low, high = (middle, high) if self.added(middle) <= cost else (low, middle)
+        return high
+
+
+def _ramp(problem: Problem) -> _Ramp:
+    """Of a vehicle that turns only as it drives; nothing for others, whose turns need none."""
+    model, cost = problem.automaton.model, problem.cost
+    if not (follows_paths(model) and has_inertia(problem) and rests_at_both_ends(problem)):
+        return _Ramp()
+    twists = extreme_automaton(model).body_velocities  # type: ignore[arg-type]
+    if not isinstance(cost, Cost) or not cost.time or (twists[:, 0] == 0.0).any():
+        return _Ramp()
+    fastest = float(np.abs(twists[:, 0]).max())
+    seconds = fastest / float(model.control_limits[0, 1])
+    return _Ramp(seconds, cost.time, 1.0 / (cost.time + cost.length * fastest))

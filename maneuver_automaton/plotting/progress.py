@@ -1,0 +1,66 @@
+"""Draw how a search went on: cost of the best plan, the bound below it, and the gap between."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from matplotlib.axes import Axes
+
+from maneuver_automaton.planning import PlanResult
+from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE
+from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
+from maneuver_automaton.plotting.style import tidy
+
+EARLIEST = 1e-3  # [s] from where time is drawn, on a logarithmic axis
+ABOVE = 1.35  # times the final cost, up to which first plans are drawn
+
+
+def save_progress_figure(result: PlanResult, path: str | Path) -> None:
+    """Write the picture of a search: what the best plan cost, and what was proven, over time.
+
+    Raises
+    ------
+    ValueError
+        If the result holds no plan.
+    """
+    if result.plan is None or result.cost is None or result.bound is None:
+        raise ValueError("progress: the result holds no plan, so there is nothing to draw")
+    figure = new_figure(6.4, 3.9)
+    ax = axes_at(figure, left=0.75, bottom=0.6, width=4.3, height=2.65)
+    draw_progress(ax, result)
+    gap = 0.0 if result.gap is None else 100.0 * result.gap
+    said = "proven optimal" if result.bound.optimal else f"gap {gap:.2g} % by {result.bound.kind}"
+    headline = f"Cost {result.cost:.6g}, {said}"
+    heading_text(figure, [(headline, 10.0, "bold")], left=0.3)
+    write_figure(figure, path)
+
+
+def draw_progress(ax: Axes, result: PlanResult) -> None:
+    """Draw steps of cost and bound, the gap between them shaded, each named at its end."""
+    assert result.cost is not None
+    assert result.bound is not None
+    costs = [(max(at, EARLIEST), cost) for at, cost in result.improvements]
+    bounds = [(max(at, EARLIEST), bound) for at, bound in result.bound.history]
+    costs = costs or [(EARLIEST, result.cost)]
+    bounds = bounds or [(EARLIEST, result.bound.value)]
+    end = 1.1 * max(costs[-1][0], bounds[-1][0], 10.0 * EARLIEST)
+    costs.append((end, result.cost))
+    bounds.append((end, result.bound.value))
+    times = sorted({at for at, _ in (*costs, *bounds) if at >= max(costs[0][0], bounds[0][0])})
+    upper = [min(cost for at, cost in costs if at <= time) for time in times]
+    lower = [max(bound for at, bound in bounds if at <= time) for time in times]
+    ax.fill_between(times, lower, upper, step="post", color=GREY, alpha=0.25, linewidth=0.0)
+    for steps, color, name in ((costs, SEQUENCE[0], "cost"), (bounds, SEQUENCE[1], "lower bound")):
+        ax.step(*zip(*steps, strict=True), where="post", color=color, linewidth=1.6)
+        ax.annotate(
+            f"{name} {steps[-1][1]:.6g}",
+            steps[-1],
+            xytext=(5, -3),
+            textcoords="offset points",
+            fontsize=8.0,
+            color=INK,
+        )
+    ax.set_xscale("log")
+    ax.set_xlim(EARLIEST, end)
+    ax.set_ylim(0.0, ABOVE * result.cost if result.cost > 0.0 else 1.0)
+    tidy(ax, x="time since the search began [s]", y="cost")

@@ -1,0 +1,166 @@
+"""Certified lower bounds: admissible, below every plan, and refused where they are not."""
+
+import math
+
+import numpy as np
+import pytest
+
+import maneuver_automaton as ma
+from maneuver_automaton.bounds import pose_scene
+from maneuver_automaton.bounds.cells import finer, first_cells, on_finer
+from maneuver_automaton.bounds.families import motions_of
+from maneuver_automaton.bounds.levels import _goal_cells, _in_the_plane, _nodes_of
+from maneuver_automaton.bounds.program import program_of, slope
+
+CAR = ma.Car(wheelbase=2.8, max_steering=0.6)
+SHUTTLE = ma.Automaton.of_controls(
+    CAR, {f"{v} {s}": (v, s) for v in (1, -1) for s in (-0.6, 0.0, 0.6)}
+)
+BODY = ma.Box([4.7, 1.9], [1.35, 0.0])
+LENGTH = ma.Cost(length=1.0)
+WORK = 4_000_000
+WALL = [ma.Box([1.0, 7.0], [4.0, 4.5]), ma.Box([1.0, 4.0], [4.0, -5.0])]
+
+
+def among(obstacles, goal=(9.0, 1.0, 0.3), **more):
+    more = {"cost": LENGTH, "footprint": BODY} | more
+    return ma.Problem(SHUTTLE, [0, 0, 0], list(goal), obstacles=obstacles, **more)
+
+
+def solved(problem, *, steps=400, size=0.8):
+    """A program of one level after some steps, and where it starts."""
+    scene, motions = pose_scene(problem, frame=problem.goals[0].pose), motions_of(problem)
+    start = scene.world.into(problem.start)
+    box = np.array([-12.0, -12.0, 12.0, 12.0])
+    cells = first_cells(scene, size=size, headings=32, box=box)
+    goals = tuple(
+        ma.Goal(pose=scene.world.into(goal.pose), free_heading=goal.free_heading)
+        for goal in problem.goals
+    )
+    node = tuple(np.rint(cells.coordinates(goals[0].pose)).astype(int).tolist())
+    fixed = _nodes_of(cells, _goal_cells(cells, goals), exact=node)
+    gears = 2 if motions.price else 1
+    value = _in_the_plane(cells, fixed, gears) / motions.speed
+    program = program_of(cells, motions, start=start, goal_nodes=fixed, value=value)
+    program.weight = 100.0
+    program.run(steps)
+    return scene, program, cells.coordinates(start)
+
+
+def falls(value, cells, at, direction, turn):
+    """How fast a function (nodes) falls at coordinates along a motion, by small differences."""
+    step = 1e-6
+    heading = (at[2] + cells.low[2]) * cells.turn
+    moved = at.copy()
+    moved[0] += step * direction * math.cos(heading) / cells.size
+    moved[1] += step * direction * math.sin(heading) / cells.size
+    moved[2] += step * turn / cells.turn
+    return (cells.value_at(value[None], at) - cells.value_at(value[None], moved)) / step
+
+
+@pytest.mark.parametrize("price", [0.0, 0.5])
+def test_no_motion_in_an_active_cell_falls_faster_than_the_slope_says(price):
+    problem = among(WALL, cost=ma.Cost(length=1.0, direction_change=price))
+    _, program, _ = solved(problem, steps=150)
+    cells, value = program.cells, program.value.astype(float)
+    steep = slope(cells, program.columns, program.motions, value)
+    rng = np.random.default_rng(1)
+    chosen = rng.permutation(np.argwhere(cells.active))[:400]
+    worst = 0.0
+    for cell in chosen:
+        at = cell + rng.uniform(0.01, 0.99, 3)
+        for direction in (1.0, -1.0):
+            gear = 1 if price and direction < 0.0 else 0
+            for turn in (-1.0, 0.0, 1.0):
+                rate = turn * program.motions.turn_rate
+                worst = max(worst, falls(value[gear], cells, at, direction, rate))
+    assert 0.3 * steep < worst <= steep * (1.0 + 1e-4)
+    if price:
+        assert np.abs(value[0] - value[1])[cells.active.shape[0] // 2].max() <= price * steep + 1e-6
+
+
+def test_a_function_raised_at_a_node_that_carries_flow_is_refused():
+    _, program, at = solved(among(WALL), steps=1500)
+    cells, value = program.cells, program.value.astype(float)
+    motions, columns = program.motions, program.columns
+    value /= slope(cells, columns, motions, value)
+    nodes, weights = cells.corners(at)
+    node = (0, *nodes[int(weights.argmax())])
+    value[node] += 0.01 * value[node]
+    assert slope(cells, columns, motions, value) > 1.001
+
+
+def test_a_finer_level_holds_the_same_function():
+    problem = among(WALL)
+    scene, program, _ = solved(problem, steps=20)
+    cells, value = program.cells, program.value.astype(float)
+    halved = finer(cells, cells.active > 0, scene)
+    same = on_finer(cells, halved, value)
+    rng = np.random.default_rng(2)
+    for pose in rng.uniform(-3, 3, (50, 3)):
+        coarse = cells.value_at(value, cells.coordinates(pose))
+        assert halved.value_at(same, halved.coordinates(pose)) == pytest.approx(coarse, abs=1e-9)
+
+
+@pytest.mark.parametrize("goal", [(6, 3, 0.9), (0, 2, 0), (-3, 1, 2.5), (2, -4, -1.5)])
+def test_no_bound_in_free_space_exceeds_the_shortest_path(goal):
+    problem = among((), goal=goal)
+    shortest = ma.plan(problem).cost
+    bound = ma.lower_bound(problem, max_work=WORK)
+    assert 0.5 * shortest < bound.value <= shortest * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("price", [0.0, 1.0])
+def test_a_bound_among_obstacles_knows_no_plan_and_lies_below_it(price):
+    problem = among(WALL, cost=ma.Cost(length=1.0, direction_change=price))
+    cost = ma.plan(problem, time_limit=1.0).cost
+    uncut = ma.lower_bound(problem, max_work=2 * WORK)
+    cut = ma.lower_bound(problem, max_work=2 * WORK, incumbent=cost)
+    assert uncut.value <= cost * (1.0 + 1e-9)
+    assert 0.8 * cost < cut.value <= cost
+    assert cut.kind == "cells"
+    assert [value for _, value in cut.history] == sorted(value for _, value in cut.history)
+
+
+def test_a_moved_scene_has_the_moved_bound():
+    problem = among(WALL)
+    move = ma.SE2([30.0, -20.0, 0.7])
+    walls = [ma.Polygon(move.act(np.asarray(wall.shape.corners))) for wall in problem.obstacles]
+    moved = ma.Problem(
+        SHUTTLE,
+        (move @ ma.SE2(problem.start)).pose,
+        (move @ ma.SE2([9.0, 1.0, 0.3])).pose,
+        cost=LENGTH,
+        footprint=BODY,
+        obstacles=walls,
+    )
+    here, there = (ma.lower_bound(one, max_work=WORK, incumbent=20.0) for one in (problem, moved))
+    assert there.value == pytest.approx(here.value, rel=1e-6)
+    assert here.work == there.work
+
+
+def test_nothing_cheaper_than_a_straight_line_is_left():
+    bound = ma.lower_bound(among((), goal=(8.0, 0.0, 0.0)), incumbent=8.0)
+    assert (bound.value, bound.optimal) == (8.0, True)
+
+
+def test_the_bound_of_a_time_counts_slow_reverse_and_a_start_from_rest():
+    slow = {"ahead": (2, 0.0), "left": (2, 0.6), "right": (2, -0.6), "back": (-0.5, 0.0)}
+    problem = ma.Problem(
+        ma.Automaton.of_controls(CAR, slow), [0, 0, 0], [-5, 0, 0], cost=ma.Cost(time=1.0)
+    )
+    best = ma.plan(problem).cost
+    assert 0.6 * best < ma.lower_bound(problem, max_work=WORK).value <= best * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ({"time_limit": 0.0}, "time_limit must be positive, got 0.0 s"),
+        ({"gap": 1.5}, "gap must be a share from 0 to 1, got 1.5"),
+    ],
+)
+def test_bad_limits_are_refused(more, message):
+    with pytest.raises(ValueError) as caught:
+        ma.lower_bound(among(()), **more)
+    assert str(caught.value) == message
