@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 FARTHEST = 1e10  # [m] of a coordinate or a size, and of any other number of a file
 FASTEST = 5e3  # [m/s] of a trim, and of an obstacle that moves
 FASTEST_TURN = 1e4  # [rad/s] of an obstacle that moves
+LONGEST_STROKE = 1e4  # [m, rad] of one maneuver from rest to rest, which is sampled all along
 
 
 def check_size(name: str, values: ArrayLike) -> None:

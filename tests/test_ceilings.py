@@ -7,7 +7,9 @@ from maneuver_automaton import Automaton, Problem, Unicycle
 from maneuver_automaton._ceilings import FARTHEST, FASTEST
 from maneuver_automaton.collision import Box, Disc, Motion, OccupancyMap, Polygon
 from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.models import SecondOrderCar
 from maneuver_automaton.primitives import Trim
+from maneuver_automaton.primitives.strokes import strokes
 from maneuver_automaton.problem import Goal
 from maneuver_automaton.scenario.scenario import scenario_of_text
 
@@ -83,3 +85,16 @@ def test_a_scenario_file_says_where_it_is_beyond_a_ceiling(start, obstacle, says
     with pytest.raises(InvalidScenario, match=says) as error:
         scenario_of_text(text, name="file")
     assert str(error.value).startswith("file:")
+
+
+def test_a_stroke_that_is_sampled_without_end_is_refused():
+    car = SecondOrderCar(
+        wheelbase=2.8,
+        max_steering=0.7,
+        max_speed=2.5,
+        max_acceleration=1.0,
+        max_steering_rate=0.5,
+    )
+    rest = Trim(name="rest", body_velocity=np.zeros(3), control=np.zeros(2), reduced_state=[0, 0])
+    with pytest.raises(ValueError, match=r"stroke: got 1e[+]15, need at most 10000 in size"):
+        strokes(car, [rest], [1e15])

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from maneuver_automaton._ceilings import LONGEST_STROKE
 from maneuver_automaton.errors import NotATrim
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives.bang_bang import check_limited_rates
@@ -141,6 +142,8 @@ def _swing(model: Model, rest: Trim, length: float, component: str, limit: float
             f"stroke: got {length}, but the {component} of the {model.name} is within "
             f"[{least:.6g}, {greatest:.6g}]; need a way that is not 0 and leads there"
         )
+    if abs(length) > LONGEST_STROKE:
+        raise ValueError(f"stroke: got {length:g}, need at most {LONGEST_STROKE:g} in size")
     ramp = ramp_of(
         length,
         max_speed=float(most) if limit is None else min(float(most), limit),

@@ -19,7 +19,7 @@ SHUTTLE = ma.Automaton.of_controls(
 BODY = ma.Box([4.7, 1.9], [1.35, 0.0])
 LENGTH = ma.Cost(length=1.0)
 WORK = 4_000_000
-WALL = [ma.Box([1.0, 7.0], [4.0, 4.5]), ma.Box([1.0, 4.0], [4.0, -5.0])]
+WALL = [ma.Box([1.0, 7.0], [5.0, 9.5]), ma.Box([1.0, 10.0], [5.0, -2.0])]  # a gap of 3 m
 
 
 def among(obstacles, goal=(9.0, 1.0, 0.3), **more):

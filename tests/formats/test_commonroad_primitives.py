@@ -184,6 +184,8 @@ def test_a_wheelbase_that_nothing_tells(tmp_path):
         ("<Initial><x>0</x>", "<Initial><x>1</x>",
          ":7: x: got 1, need 0: a primitive begins at the origin"),
         ("<x>0.25</x>", "", ":10: State: the element x is missing"),
+        ("<velocity>3.0", "<velocity>1e7",
+         ":10: velocity: got 1e+07 m/s, need at most 5000 m/s in size"),
         ("<time_step>1</time_step>", "<time_step>3</time_step>",
          ":10: time_step: got 3, need 1"),
         ("<VehicleType>BMW_320i</VehicleType>", "<VehicleType/>",
