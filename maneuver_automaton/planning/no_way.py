@@ -12,7 +12,7 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.problem import Problem
 
-RESERVED = 0.15  # share of the time that is left for a proof where there is no plan by then
+RESERVED = 0.1  # share of the time that is left for a proof where there is no plan by then
 MOST_BOXES = 300_000  # of poses that are tested
 UNPROVEN = (PlanStatus.NO_PLAN, PlanStatus.OUT_OF_BUDGET)
 

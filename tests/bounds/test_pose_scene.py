@@ -14,6 +14,8 @@ from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyM
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import UserModel
 from maneuver_automaton.problem import Bounds
+from tests.inertia import CAR as SLOW_CAR
+from tests.inertia import resting
 
 CAR = Automaton.of_controls(
     Car(wheelbase=2.7, max_steering=0.58), {"ahead": (1, 0), "left": (1, 0.5)}
@@ -124,6 +126,14 @@ def test_a_pose_has_the_depth_at_which_obstacles_that_draw_back_let_it_pass():
     assert scene.states(poses).tolist() == [0]
     assert scene.states(poses, give=0.249).tolist() == [0]
     assert scene.states(poses, give=0.251).tolist() == [2]
+
+
+def test_a_vehicle_with_inertia_turns_whatever_its_trims_are():
+    problem = problem_with("box")
+    assert pose_scene(problem).turns
+    straight = Automaton.of_controls(Car(wheelbase=2.7), {"ahead": (1, 0), "back": (-1, 0)})
+    assert not pose_scene(dataclasses.replace(problem, automaton=straight)).turns
+    assert pose_scene(dataclasses.replace(problem, automaton=resting(SLOW_CAR))).turns
 
 
 def test_what_moves_or_can_be_flown_over_stands_in_no_way():

@@ -46,4 +46,4 @@ def test_nothing_is_proven_of_other_verdicts_or_without_time():
 
 def test_a_share_of_the_time_is_left_for_a_proof():
     budget = Budget.from_now(10.0)
-    assert before_proof(budget).deadline == pytest.approx(budget.deadline - 1.5)
+    assert before_proof(budget).deadline == pytest.approx(budget.deadline - 1.0)
