@@ -19,10 +19,10 @@ SHUTTLE = ma.Automaton.of_controls(
 BODY = ma.Box([4.7, 1.9], [1.35, 0.0])
 LENGTH = ma.Cost(length=1.0)
 WORK = 4_000_000
-WALL = [ma.Box([1.0, 7.0], [5.0, 9.5]), ma.Box([1.0, 10.0], [5.0, -2.0])]  # a gap of 3 m
+WALL = [ma.Box([1.0, 7.0], [8.0, 9.5]), ma.Box([1.0, 10.0], [8.0, -2.0])]  # a gap of 3 m
 
 
-def among(obstacles, goal=(9.0, 1.0, 0.3), **more):
+def among(obstacles, goal=(15.0, 1.0, 0.3), **more):
     more = {"cost": LENGTH, "footprint": BODY} | more
     return ma.Problem(SHUTTLE, [0, 0, 0], list(goal), obstacles=obstacles, **more)
 
@@ -31,7 +31,7 @@ def solved(problem, *, steps=400, size=0.8):
     """A program of one level after some steps, and where it starts."""
     scene, motions = pose_scene(problem, frame=problem.goals[0].pose), motions_of(problem)
     start = scene.world.into(problem.start)
-    box = np.array([-12.0, -12.0, 12.0, 12.0])
+    box = np.array([-20.0, -10.0, 6.0, 10.0])
     cells = first_cells(scene, size=size, headings=32, box=box)
     goals = tuple(
         ma.Goal(pose=scene.world.into(goal.pose), free_heading=goal.free_heading)
@@ -129,12 +129,12 @@ def test_a_moved_scene_has_the_moved_bound():
     moved = ma.Problem(
         SHUTTLE,
         (move @ ma.SE2(problem.start)).pose,
-        (move @ ma.SE2([9.0, 1.0, 0.3])).pose,
+        (move @ ma.SE2([15.0, 1.0, 0.3])).pose,
         cost=LENGTH,
         footprint=BODY,
         obstacles=walls,
     )
-    here, there = (ma.lower_bound(one, max_work=WORK, incumbent=20.0) for one in (problem, moved))
+    here, there = (ma.lower_bound(one, max_work=WORK, incumbent=30.0) for one in (problem, moved))
     assert there.value == pytest.approx(here.value, rel=1e-6)
     assert here.work == there.work
 
