@@ -47,8 +47,8 @@ def cell_proofs(
     >>> controls = {"ahead": (1, 0), "left": (1, 0.6), "right": (1, -0.6), "back": (-1, 0)}
     >>> robot = Automaton.of_controls(car, controls)
     >>> problem = Problem(robot, [0, 0, 0], [6, 3, 0.9], cost=Cost(length=1.0))
-    >>> *_, last = cell_proofs(problem, ends=lambda work: work > 2e7)
-    >>> 6.5 < last.value < 6.9
+    >>> *_, last = cell_proofs(problem, incumbent=lambda: 6.84, ends=lambda work: work > 2e6)
+    >>> 6.6 < last.value < 6.84
     True
     """
     motions = motions_of(problem)

@@ -74,7 +74,7 @@ def lower_bound(
     >>> robot = Automaton.of_controls(car, controls)
     >>> problem = Problem(robot, [0, 0, 0], [6, 3, 0.9], cost=Cost(length=1.0))
     >>> cost = plan(problem).cost
-    >>> bound = lower_bound(problem, incumbent=cost, max_work=20_000_000)
+    >>> bound = lower_bound(problem, incumbent=cost, max_work=2_000_000)
     >>> bound.kind, 0.0 <= bound.gap(cost) < 0.05
     ('cells', True)
     """

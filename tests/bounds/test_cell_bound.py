@@ -18,7 +18,7 @@ SHUTTLE = ma.Automaton.of_controls(
 )
 BODY = ma.Box([4.7, 1.9], [1.35, 0.0])
 LENGTH = ma.Cost(length=1.0)
-WORK = 4_000_000
+WORK = 2_000_000
 WALL = [ma.Box([1.0, 7.0], [8.0, 9.5]), ma.Box([1.0, 10.0], [8.0, -2.0])]  # a gap of 3 m
 
 
