@@ -440,8 +440,9 @@ def test_schema_is_json(capsys):
 def stand_in(monkeypatch: pytest.MonkeyPatch) -> None:
     """A planner that runs out of time."""
 
-    def plan(problem: object, *, time_limit: float = 5.0, alternatives: int = 0) -> PlanResult:
+    def plan(problem: object, *, time_limit: float, alternatives: int, **more: Any) -> PlanResult:
         assert (time_limit, alternatives) == (0.25, 2)
+        assert more == {"gap": None, "watch": None}
         return PlanResult(
             problem=problem,  # type: ignore[arg-type]
             status=PlanStatus.OUT_OF_BUDGET,

@@ -60,7 +60,7 @@ def asked(monkeypatch):
     """Problems that a planner is asked for; it finds none."""
     problems = []
 
-    def plan(problem, *, time_limit=5.0, alternatives=0):
+    def plan(problem, **options):
         problems.append(problem)
         return PlanResult(problem=problem, status=PlanStatus.NO_PLAN, reason="not tried")
 

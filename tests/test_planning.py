@@ -591,7 +591,7 @@ def test_trims_that_lie_are_told_by_the_audit():
     assert result.status is PlanStatus.NO_PLAN
     assert result.reason == (
         f"the audit rejected {result.counts['rejected_by_audit']} plans: the plan is 0.5 off the "
-        "model's equations; do the trims belong to the model?"
+        "model's equations; it ends 0.5 m from the goal; do the trims belong to the model?"
     )
 
 

@@ -100,7 +100,7 @@ def rates_of(body: Body, pairs: Pairs) -> _Rates:
     drift = spin = np.zeros(time.size)
     if pairs.frames is not None:
         change = pairs.frames[:, 1] - pairs.frames[:, 0]
-        lasting = np.maximum(time, 1e-300)
+        lasting = np.where(time > 0.0, time, np.inf)  # rounding alone moves it in no time
         drift, spin = np.hypot(change[:, 0], change[:, 1]) / lasting, np.abs(change[:, 2]) / lasting
     rows = (of.speed[element], of.turn[element], of.pull[element], of.swerve[element])
     return _Rates(*(one[:, None] for one in (time, *rows, drift, spin)))

@@ -59,8 +59,8 @@ def motions_of(problem: Problem) -> Motions | None:
 
     Examples
     --------
-    >>> from maneuver_automaton import Automaton, Cost, KinematicCar, Problem
-    >>> car = KinematicCar(wheelbase=2.8, max_speed=2.0, max_steering=0.6)
+    >>> from maneuver_automaton import Automaton, Car, Cost, Problem
+    >>> car = Car(wheelbase=2.8, max_steering=0.6)
     >>> controls = {"ahead": (2, 0), "left": (2, 0.6), "right": (2, -0.6), "back": (-1, 0)}
     >>> robot = Automaton.of_controls(car, controls)
     >>> motions = motions_of(Problem(robot, [0, 0, 0], [5, 1, 0], cost=Cost(time=1.0)))

@@ -128,5 +128,5 @@ def _why_none(
         return PlanStatus.NO_PLAN, f"none at any resolution tried, which proves nothing{near}"
     spent = f"{found.counts['expansions']} expansions" if lattice else "the expansions allowed"
     return PlanStatus.OUT_OF_BUDGET, (
-        f"no plan within {found.budget.seconds:g} s and {spent}{paths.reason}{near}"
+        f"no plan within {found.budget.seconds:.4g} s and {spent}{paths.reason}{near}"
     )

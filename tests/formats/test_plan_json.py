@@ -32,6 +32,7 @@ KEYS = {
     "duration_s",
     "lower_bound",
     "gap",
+    "bound",
     "certificate",
     "primitives",
     "terminal_error",
@@ -39,6 +40,7 @@ KEYS = {
     "trajectory",
     "audit",
     "alternatives",
+    "improvements",
     "timing_s",
     "counts",
 }

@@ -42,7 +42,6 @@ QUICK_FEATURES = (  # that all kinematic vehicles are tried with
     "same_plan_twice",
     "lower_bound",
     "certificate",
-    "planner_with_all",
     "moved_problem",
     "loop",
     "resume",
@@ -51,9 +50,11 @@ SLOW = {  # four coasting times at a climb take long
     (feature, "glider")
     for feature in ("fixed_time", "free_heading", "same_plan_twice", "loop", "resume")
 }
-WITH_INERTIA = ("plan_file", "fixed_time", "loop_moving_obstacles", "planner_with_all")
+WITH_INERTIA = ("plan_file", "fixed_time", "loop_moving_obstacles")
 ONE_BY_ONE = {  # so that every feature is tried with a few vehicles
     *(("car", feature) for feature in ("discs", "polygons", "zones", "margin", "bounds")),
+    ("car", "planner_with_all"),
+    ("car_with_trailer", "planner_with_all"),
     *(("car", feature) for feature in ("max_time", "min_coast", "loop_noise", "moving_obstacles")),
     *(("car", feature) for feature in ("several_parts", "free_heading_among_obstacles")),
     ("boat", "occupancy_map"),

@@ -14,7 +14,7 @@ from maneuver_automaton.collision import Box, Zone
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning.checking import Condition
 from maneuver_automaton.planning.incumbents import LATE, Candidate, Incumbents
-from maneuver_automaton.planning.result import PlanStatus
+from maneuver_automaton.planning.result import LowerBound, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
 
@@ -87,7 +87,7 @@ def test_plans_are_kept_by_cost_each_motion_once():
     assert [one.plan for one in found.plans] == [AHEAD, TURNING, SLOWLY]
     assert found.cost == 4.0
     assert [cost for _, cost in found.improvements] == [8.0, 5.0, 4.0]
-    answer = found.found(bound=1.0)
+    answer = found.found(bound=LowerBound(value=1.0, kind="distance"))
     assert (answer.plan, answer.cost, answer.gap) == (AHEAD, 4.0, 0.75)
     assert [one.plan for one in answer.alternatives] == [TURNING]
     assert answer.timing_s["first_plan"] == answer.timing_s["search"] == found.improvements[0][0]

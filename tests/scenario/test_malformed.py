@@ -467,7 +467,7 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
     ),
     "map is this file": (
         obstacle("{map: x.yaml}"),
-        ":15: obstacles[0].map: x.yaml:1: the key 'image' is missing: a map needs image, "
+        ":15: obstacles[0].map: x.yaml: is no map, need YAML with the keys image, "
         "resolution, origin, negate, occupied_thresh, free_thresh",
     ),
     "map unknown": (
