@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
@@ -24,6 +25,8 @@ from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.kinematic_paths import extreme_automaton, follows_paths
 from maneuver_automaton.search.lattice_query import lattice_query
 
+WAITED = 0.5  # share of the time that proofs wait for a plan
+LOOK = 0.002  # [s] between two looks whether there is one
 POLISHING = 0.85  # share of the time after which what there is gets polished
 
 
@@ -100,9 +103,17 @@ class Proving:
     history: list[tuple[float, float]] = field(default_factory=list)  # seconds, value
     work: int = 0
 
-    def run(self) -> None:
-        """Prove what can be proven."""
+    def run(self, *, after_a_plan: bool = False) -> None:
+        """Prove what can be proven; `after_a_plan` cells wait for one, without which they are many.
+
+        They wait for a share of the time at most.
+        """
         self._better(known_bound(self.problem))
+        until = WAITED * self.budget.seconds
+        while after_a_plan and self.watch.cost == math.inf and self.budget.elapsed < until:
+            if self._over():
+                return
+            time.sleep(LOOK)
         if self._over():
             return
         for proof in proofs_of(self.problem, incumbent=lambda: self.watch.cost, ends=self._late):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -33,7 +34,7 @@ def plan_to_gap(
         proving.run()
         return proven(result, proving)
     proving = Proving(problem, budget, watch)
-    thread = _Beside(proving.run)
+    thread = _Beside(functools.partial(proving.run, after_a_plan=True))
     thread.start()
     try:
         result = search(replace(budget, watch=watch))

@@ -50,12 +50,15 @@ def draw_progress(ax: Axes, result: PlanResult) -> None:
     upper = [min(cost for at, cost in costs if at <= time) for time in times]
     lower = [max(bound for at, bound in bounds if at <= time) for time in times]
     ax.fill_between(times, lower, upper, step="post", color=GREY, alpha=0.25, linewidth=0.0)
-    for steps, color, name in ((costs, SEQUENCE[0], "cost"), (bounds, SEQUENCE[1], "lower bound")):
+    for steps, color, name, lifted in (
+        (costs, SEQUENCE[0], "cost", 3),
+        (bounds, SEQUENCE[1], "lower bound", -9),
+    ):
         ax.step(*zip(*steps, strict=True), where="post", color=color, linewidth=1.6)
         ax.annotate(
             f"{name} {steps[-1][1]:.6g}",
             steps[-1],
-            xytext=(5, -3),
+            xytext=(5, lifted),
             textcoords="offset points",
             fontsize=8.0,
             color=INK,

@@ -1,0 +1,56 @@
+"""Plans with a proof beside the search: how near the optimum they are, and the same each time."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import maneuver_automaton as ma
+from maneuver_automaton.budget import Watch
+from maneuver_automaton.cli import run
+from tests import scenes
+
+SLOT = replace(scenes.parallel_slot(6.5), cost=ma.Cost(length=1.0))
+
+
+def test_a_search_ends_once_its_gap_is_proven():
+    watch = Watch(gap=0.0)
+    result = ma.plan(SLOT, time_limit=60.0, gap=0.1, watch=watch)
+    assert result.gap <= 0.1
+    assert result.audit.passed
+    assert (result.bound.kind, result.lower_bound) == ("cells", result.bound.value)
+    assert watch.cost == pytest.approx(result.cost)
+    assert watch.bound == pytest.approx(result.lower_bound)
+    assert watch.is_closed
+    values = [value for _, value in result.bound.history]
+    assert values == sorted(values)
+    assert values[-1] == result.lower_bound
+
+
+def test_counted_work_proves_the_same_and_leaves_the_plan_as_it_is():
+    counted = replace(SLOT, search=ma.SearchSettings(max_expansions=1_000))
+    alone = ma.plan(counted, time_limit=600.0)
+    first, second = (ma.plan(counted, time_limit=600.0, gap=0.01) for _ in range(2))
+    assert first.cost == second.cost == alone.cost
+    assert (first.bound.work, first.lower_bound) == (second.bound.work, second.lower_bound)
+    assert first.lower_bound > alone.lower_bound
+
+
+def test_the_command_line_says_and_draws_what_is_proven(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    scenario = Path(__file__).parents[2] / "scenarios" / "car_slot.yaml"
+    assert run(["plan", str(scenario), "--gap", "0.05", "--time-limit", "30"]) == 0
+    assert "gap 2 %" in capsys.readouterr().out
+    document = json.loads(Path("out/plan.json").read_text())
+    assert document["bound"]["value"] == document["lower_bound"]
+    assert document["improvements"][-1][1] == pytest.approx(document["cost"])
+    assert Path("out/progress.png").stat().st_size > 10_000
+    assert run(["plan", str(scenario), "--gap", "1.5"]) == 2
+    assert "--gap: got 1.5, need a share" in capsys.readouterr().err
+
+
+def test_a_gap_is_a_share():
+    with pytest.raises(ValueError) as caught:
+        ma.plan(SLOT, gap=1.0)
+    assert str(caught.value) == "gap must be a share from 0 to below 1, got 1.0"
