@@ -127,7 +127,7 @@ def proofs(
             program.dual[:] = level.dual
         found = level.to_goal
         most = STEPS[min(depth, len(STEPS) - 1)]
-        for value, function, steps in _solved(program, at, limit, most):
+        for value, function, steps in _solved(program, at, fixed, limit, most):
             work += steps * total
             best, found = max(best, value), function
             yield _proof(cells, min(best, limit), total, work)
@@ -136,7 +136,7 @@ def proofs(
         columns = program.columns
         found = raised(cells, columns, motions, found, fixed=fixed, sweeps=POLISHING)
         found = found / max(slope(cells, columns, motions, found), 1.0)
-        best = max(best, cells.value_at(found, at))
+        best = max(best, _fall(cells, found, at, fixed))
         yield _proof(cells, min(best, limit), total, work)
         if best >= limit * (1.0 - 1e-12) or ends(work):
             return
@@ -156,8 +156,13 @@ def _proof(cells: Cells, value: float, total: int, work: int) -> Proof:
     return Proof(value=value, optimal=False, cells=total, size=cells.size, work=work)
 
 
+def _fall(cells: Cells, value: Array, at: Array, fixed: NDArray[np.bool_]) -> float:
+    """How far a function falls from the start to any pose of the goal, at least."""
+    return cells.value_at(value, at) - float(value[:, fixed].max())
+
+
 def _solved(
-    program: Program, at: Array, limit: float, most: int
+    program: Program, at: Array, fixed: NDArray[np.bool_], limit: float, most: int
 ) -> Iterator[tuple[float, Array, int]]:
     """Values proven on a level, each with the best function by then, and the steps it took."""
     cells, motions = program.cells, program.motions
@@ -171,7 +176,7 @@ def _solved(
             yield best, found, part
         program.run(left)
         function = program.value.astype(np.float64)
-        raw = cells.value_at(function, at)
+        raw = _fall(cells, function, at, fixed)
         steep = slope(cells, program.columns, motions, function)
         proven = raw / max(steep, 1e-12)
         if proven > best:

@@ -130,6 +130,8 @@ def _blocks(cells: Cells) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
 
 def slope(cells: Cells, columns: IntArray, motions: Motions, value: Array) -> float:
     """Upper bound of how fast a function (gears, nodes) falls along motions, per unit of cost."""
+    if cells.round_trip and (value[..., 0] != value[..., -1]).any():
+        return math.inf  # it jumps where the circle of headings is closed
     families = motions.families
     headings = cells.layers[None, :] + families.angle[:, None]
     ahead = np.stack([np.cos(headings), np.sin(headings)], axis=2)
