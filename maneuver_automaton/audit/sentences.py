@@ -17,7 +17,7 @@ from maneuver_automaton.audit.passages import (
     seen_from,
 )
 from maneuver_automaton.audit.surroundings import Surroundings
-from maneuver_automaton.collision.shapes import AnyObstacle, OccupancyMap
+from maneuver_automaton.collision.shapes import AnyObstacle, name_of
 
 
 def what_is_hit(
@@ -39,20 +39,11 @@ def what_is_hit(
     index = int(around.owners[pairs.edge[row]])
     assert pairs.frames is not None
     x, y = _nearest_point(body, around, pairs.edge[row], pairs.frames[row, :1], time) + origin
-    name = _name_of(obstacles[index], index, f"({x:.10g}, {y:.10g})")
+    name = name_of(obstacles[index], index, f"({x:.10g}, {y:.10g})")
     if distance <= CONTACT:
         return f"at {body.clock + time:.6g} s the vehicle touches {name}"
     near = f"the vehicle is {distance:.6g} m from {name}, closer than {margin:.6g} m"
     return f"at {body.clock + time:.6g} s {near}"
-
-
-def _name_of(obstacle: AnyObstacle, index: int, place: str) -> str:
-    if isinstance(obstacle, OccupancyMap):
-        name = "map" if obstacle.name == "map" else f"map {obstacle.name}"
-        return f"{name}, cell at {place}"
-    if obstacle.name:
-        return f"obstacle {obstacle.name!r}"
-    return f"obstacle {index} ({type(obstacle.shape).__name__.lower()} near {place})"
 
 
 def _nearest_point(body: Body, around: Surroundings, edge: int, frame: Array, time: float) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array
-from maneuver_automaton.collision.shapes import AnyObstacle, OccupancyMap, Shape
+from maneuver_automaton.collision.shapes import AnyObstacle, OccupancyMap, Shape, name_of
 from maneuver_automaton.collision.surroundings import Part, parts_of, runs_of, surroundings_of
 from maneuver_automaton.groups import SE2
 
@@ -66,7 +66,7 @@ def touched_near(
         return ""
     seen = obstacles[index].moved(SE2(np.array([-origin[0], -origin[1], 0.0])))
     x, y = _point_of(seen, body, here, time) + origin
-    name = _name_of(obstacles[index], index, f"({x:.10g}, {y:.10g})")
+    name = name_of(obstacles[index], index, f"({x:.10g}, {y:.10g})")
     if distance <= CONTACT:
         return f"the vehicle touches {name}"
     return f"the vehicle is {distance:.6g} m from {name}, closer than {margin:.6g} m"
@@ -75,15 +75,6 @@ def touched_near(
 def too_close(margin: float) -> float:
     """Distance [m] that is not enough where a margin [m] is to be kept; touching never is."""
     return max(CONTACT, margin - CONTACT)
-
-
-def _name_of(obstacle: AnyObstacle, index: int, place: str) -> str:
-    if isinstance(obstacle, OccupancyMap):
-        name = "map" if obstacle.name == "map" else f"map {obstacle.name}"
-        return f"{name}, cell at {place}"
-    if obstacle.name:
-        return f"obstacle {obstacle.name!r}"
-    return f"obstacle {index} ({type(obstacle.shape).__name__.lower()} near {place})"
 
 
 def _point_of(obstacle: AnyObstacle, body: list[Part], here: Array, time: float) -> Array:

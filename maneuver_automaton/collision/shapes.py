@@ -271,6 +271,16 @@ class OccupancyMap:
 AnyObstacle: TypeAlias = Obstacle | OccupancyMap
 
 
+def name_of(obstacle: AnyObstacle, index: int, place: str) -> str:
+    """What messages call an obstacle, the `index`-th of a problem, and a place at it."""
+    if isinstance(obstacle, OccupancyMap):
+        name = "map" if obstacle.name == "map" else f"map {obstacle.name}"
+        return f"{name}, cell at {place}"
+    if obstacle.name:
+        return f"obstacle {obstacle.name!r}"
+    return f"obstacle {index} ({type(obstacle.shape).__name__.lower()} near {place})"
+
+
 def as_obstacles(value: object) -> tuple[AnyObstacle, ...]:
     """Obstacles from obstacles, maps and bare shapes, or one of these.
 
