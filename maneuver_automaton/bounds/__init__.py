@@ -3,6 +3,8 @@
 from maneuver_automaton.bounds.certified import cell_proofs as cell_proofs
 from maneuver_automaton.bounds.connectivity import Connection as Connection
 from maneuver_automaton.bounds.connectivity import connectivity as connectivity
+from maneuver_automaton.bounds.cost_to_go import CostToGo as CostToGo
+from maneuver_automaton.bounds.families import besides as besides
 from maneuver_automaton.bounds.levels import Proof as Proof
 from maneuver_automaton.bounds.pose_scene import PoseScene as PoseScene
 from maneuver_automaton.bounds.pose_scene import pose_scene as pose_scene

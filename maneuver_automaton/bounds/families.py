@@ -70,12 +70,11 @@ def motions_of(problem: Problem) -> Motions | None:
     cost = problem.cost
     if not isinstance(cost, Cost) or problem.automaton.translated:
         return None
-    besides = 0.0
     if problem.automaton.is_kinematic:
         twists, rates = problem.automaton.body_velocities[:, :3], problem.rates
         price = cost.direction_change
         if (rest := rest_rate(problem)) is not None:
-            rates, besides = rates - rest, rest * (problem.horizon.time or 0.0)
+            rates = rates - rest
     elif follows_paths(problem.automaton.model) and (cost.time or cost.length):
         simpler = extreme_automaton(problem.automaton.model)  # type: ignore[arg-type]
         twists, price = simpler.body_velocities[:, :3], 0.0
@@ -86,7 +85,13 @@ def motions_of(problem: Problem) -> Motions | None:
     if not moving.any() or (rates[moving] <= 0.0).any() or not twists[:, :2].any():
         return None
     families = _families(twists[moving] / rates[moving, None], gears=price > 0.0)
-    return Motions(families=families, price=price, besides=besides)
+    return Motions(families=families, price=price, besides=besides(problem))
+
+
+def besides(problem: Problem) -> float:
+    """Cost of every plan that does not depend on its path: of resting for a fixed time."""
+    rest = rest_rate(problem) if problem.automaton.is_kinematic else None
+    return 0.0 if rest is None else rest * (problem.horizon.time or 0.0)
 
 
 def _families(per_cost: Array, *, gears: bool) -> Families:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ from maneuver_automaton.bounds.cells import (
     first_cells,
     on_finer,
 )
+from maneuver_automaton.bounds.cost_to_go import CostToGo
 from maneuver_automaton.bounds.families import Motions
 from maneuver_automaton.bounds.pose_scene import PoseScene
 from maneuver_automaton.bounds.program import Program, program_of, raised, slope
@@ -55,6 +56,7 @@ class Proof:
     cells: int  # of the level
     size: float  # [m] of its cells
     work: int  # steps times cells, of all levels
+    function: CostToGo | None = None  # that proves it, at the end of a level
 
 
 @dataclass(slots=True, eq=False, kw_only=True)
@@ -90,7 +92,8 @@ def proofs(
     gears = 2 if motions.price > 0.0 else 1
     cells: Cells | None = _coarsest(scene, motions, start, goals, limit)
     level: _Level | None = None
-    best, work, depth = 0.0, 0, 0
+    best, work, depth, reach = 0.0, 0, 0, limit
+    function: CostToGo | None = None
     while cells is not None:
         limit = min(limit, incumbent())
         at = cells.coordinates(start)
@@ -100,7 +103,9 @@ def proofs(
         cells.active[~seen] = 0
         total = int(seen.sum())
         if not any(seen[index] for index in last):
-            yield Proof(value=limit, optimal=True, cells=total, size=cells.size, work=work)
+            function = None if function is None else replace(function, least=limit)
+            proof = _proof(cells, limit, total, work)
+            yield replace(proof, optimal=True, function=function)
             return
         if total > MOST_CELLS:
             return
@@ -127,17 +132,30 @@ def proofs(
             program.dual[:] = level.dual
         found = level.to_goal
         most = STEPS[min(depth, len(STEPS) - 1)]
-        for value, function, steps in _solved(program, at, fixed, limit, most):
+        for value, proven, steps in _solved(program, at, fixed, limit, most):
             work += steps * total
-            best, found = max(best, value), function
+            best, found = max(best, value), proven
             yield _proof(cells, min(best, limit), total, work)
             if ends(work):
                 break
         columns = program.columns
-        found = raised(cells, columns, motions, found, fixed=fixed, sweeps=POLISHING)
+        found = raised(program, found, fixed=fixed, sweeps=POLISHING)
         found = found / max(slope(cells, columns, motions, found), 1.0)
         best = max(best, _fall(cells, found, at, fixed))
-        yield _proof(cells, min(best, limit), total, work)
+        function = CostToGo(
+            world=scene.world,
+            cells=cells,
+            value=found,
+            at_goal=float(found[:, fixed].max()),
+            start=start,
+            least=min(best, limit),
+            limit=reach,
+            goals=goals,
+            speed=motions.speed,
+            priced=motions.price > 0.0,
+            whole=depth == 0,
+        )
+        yield replace(_proof(cells, min(best, limit), total, work), function=function)
         if best >= limit * (1.0 - 1e-12) or ends(work):
             return
         level.guess, level.dual, level.weight = (
@@ -145,10 +163,10 @@ def proofs(
             program.dual,
             program.weight,
         )
-        kept = _tube(level, motions, columns, found, at, seeds, fixed, limit)
+        kept = _tube(level, program, found, at, seeds, fixed, limit)
         for index in (*seeds, *last):
             kept[index] = cells.active[index] > 0
-        cells = finer(cells, kept, scene)
+        cells, reach = finer(cells, kept, scene), limit
         depth += 1
 
 
@@ -205,8 +223,7 @@ def _steered(raw: float, steep: float, limit: float) -> float:
 
 def _tube(
     level: _Level,
-    motions: Motions,
-    columns: NDArray[np.int64],
+    program: Program,
     found: Array,
     at: Array,
     seeds: list[Index],
@@ -214,10 +231,10 @@ def _tube(
     limit: float,
 ) -> NDArray[np.bool_]:
     """Cells that a plan cheaper than a limit may visit."""
-    cells = level.cells
-    level.to_goal = _lifted(cells, columns, motions, level.to_goal, fixed, backward=False)
+    cells, columns = level.cells, program.columns
+    level.to_goal = _lifted(program, level.to_goal, fixed, backward=False)
     sources = _nodes_of(cells, seeds, exact=None)
-    level.from_start = _lifted(cells, columns, motions, level.from_start, sources, backward=True)
+    level.from_start = _lifted(program, level.from_start, sources, backward=True)
     whole = cells.value_at(found, at)
     onward = np.maximum(_least(cells, columns, level.to_goal), _least(cells, columns, found))
     before = np.maximum(
@@ -227,21 +244,14 @@ def _tube(
     return (cells.active > 0) & (np.maximum(onward, 0.0) + np.maximum(before, 0.0) < limit)
 
 
-def _lifted(
-    cells: Cells,
-    columns: NDArray[np.int64],
-    motions: Motions,
-    value: Array,
-    fixed: NDArray[np.bool_],
-    *,
-    backward: bool,
-) -> Array:
+def _lifted(program: Program, value: Array, fixed: NDArray[np.bool_], *, backward: bool) -> Array:
     """An admissible function that is zero at fixed nodes, raised."""
+    cells, columns, motions = program.cells, program.columns, program.motions
     value = value.copy()
     value[:, fixed] = 0.0
     sign = -1.0 if backward else 1.0
     value /= max(slope(cells, columns, motions, sign * value), 1.0)
-    value = raised(cells, columns, motions, value, fixed=fixed, sweeps=SWEEPS, backward=backward)
+    value = raised(program, value, fixed=fixed, sweeps=SWEEPS, backward=backward)
     return value / max(slope(cells, columns, motions, sign * value), 1.0)
 
 

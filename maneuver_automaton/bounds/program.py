@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.bounds import _kernels_certificate, _kernels_dual
+from maneuver_automaton.bounds import _kernels_ascent, _kernels_certificate, _kernels_dual
 from maneuver_automaton.bounds.cells import Cells
 from maneuver_automaton.bounds.families import Families, Motions
 
@@ -142,9 +142,7 @@ def slope(cells: Cells, columns: IntArray, motions: Motions, value: Array) -> fl
 
 
 def raised(
-    cells: Cells,
-    columns: IntArray,
-    motions: Motions,
+    program: Program,
     value: Array,
     *,
     fixed: NDArray[np.bool_],
@@ -153,24 +151,48 @@ def raised(
 ) -> Array:
     """A function that obeys the rows, raised where it has room, node by node.
 
-    `backward`: it is one from the start, which rises along motions.
+    `backward`: it is one from the start, which rises along motions. It obeys the rows to within
+    single precision; `slope` says how well.
     """
-    families = motions.families
-    if backward:
-        families = families._replace(side=-families.side)
-    room = np.empty_like(value)
-    weights = _weights(cells, families)
+    cells, families = program.cells, program.motions.families
+    base, layer = _filled(program)
+    weights = _weights(cells, families).astype(np.float32)
+    table = np.zeros((families.side.size, 4, weights.shape[1]), dtype=np.float32)
+    table[:, 0:2, :-1] = weights[:, :-1].transpose(0, 2, 1)
+    table[:, 2:4, :-1] = weights[:, 1:].transpose(0, 2, 1)
+    rates = (families.turn_rate / cells.turn).astype(np.float32)
+    single = np.ascontiguousarray(value, dtype=np.float32)
+    single = single.copy() if single is value else single
+    room = np.empty_like(single)
+    free = np.where(fixed, 0.0, 1.0).astype(np.float32).reshape(-1)
+    work = np.zeros(_kernels_ascent.ROWS * _kernels_dual.LANES, dtype=np.float32)
     for _ in range(sweeps):
-        _kernels_certificate.room_above(
-            value, columns, families, weights, families.turn_rate / cells.turn, room, motions.price
+        _kernels_ascent.room_above(
+            single.reshape(-1),
+            room.reshape(-1),
+            base,
+            layer,
+            program.shape,
+            table.reshape(-1),
+            rates,
+            -families.side if backward else families.side,
+            families.gear,
+            work,
         )
-        room[~np.isfinite(room)] = 0.0
         if cells.round_trip:
             least = np.minimum(room[..., 0], room[..., -1])
             room[..., 0], room[..., -1] = least, least
-        room[:, fixed] = 0.0
-        value = value + room
-    return value
+        _kernels_ascent.raise_nodes(
+            single.reshape(-1), room.reshape(-1), free, program.motions.price
+        )
+    return single.astype(np.float64)
+
+
+def _filled(program: Program) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """First nodes and layers of whole blocks, filled up with the first cell once more."""
+    filler = program.layer == program.cells.active.shape[2]
+    base = np.where(filler, program.base[0], program.base)
+    return base.astype(np.int32), np.where(filler, program.layer[0], program.layer).astype(np.int32)
 
 
 def _weights(cells: Cells, families: Families) -> Array:

@@ -155,6 +155,7 @@ def mpc(
     ] = None,
     out: Out = Path("out"),
     time_limit: TimeLimit = None,
+    gap: Gap = None,
     alternatives: Alternatives = 0,
     plot: Plot = True,
     animate: Animate = False,
@@ -182,7 +183,7 @@ def mpc(
     from maneuver_automaton.cli import mpc_command, plan_command
     from maneuver_automaton.cli.inputs import Parts
 
-    plan_command.Settings(time_limit=time_limit)  # checked alike
+    plan_command.Settings(time_limit=time_limit, gap=gap)  # checked alike
     if alternatives:
         raise InvalidScenario(
             f"--alternatives: got {alternatives}, but a closed loop keeps one plan a step; "
@@ -196,6 +197,7 @@ def mpc(
         scheduler=dask,
         resume=resume,
         time_limit=time_limit,
+        gap=gap,
         plot=plot,
         animate=animate,
         quiet=quiet,

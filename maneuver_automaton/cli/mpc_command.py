@@ -34,6 +34,7 @@ class Settings:
     scheduler: str | None = None
     resume: Path | None = None
     time_limit: float | None = None  # [s] per step
+    gap: float | None = None  # share of the cost, None: nothing is proven
     plot: bool = True
     animate: bool = False
     quiet: bool = False
@@ -117,6 +118,7 @@ def _loop(path: Path, scenario: Scenario, settings: Settings) -> ClosedLoop:
                 last=last,
                 stay=part.stay,
                 retimed=part.retimed,
+                gap=settings.gap,
                 progress=lambda _: advance(),
             )
         except ValueError as error:
@@ -154,6 +156,7 @@ def _statistics(path: Path, scenario: Scenario, out: Path, settings: Settings) -
                 time_limit=settings.time_limit or scenario.time_limit_s,
                 stay=part.stay,
                 retimed=part.retimed,
+                gap=settings.gap,
                 audit=bool(scenario.problem.obstacles),  # else nothing looks for collisions
                 jobs=settings.jobs,
                 scheduler=settings.scheduler,

@@ -11,13 +11,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.bounds import Proof, cell_proofs
+from maneuver_automaton.bounds import CostToGo, Proof, besides, cell_proofs
 from maneuver_automaton.budget import Budget, Watch
 from maneuver_automaton.collision import Box
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.bounds import bound_along_paths, formula_bound, lattice_bound
+from maneuver_automaton.planning.kept_bounds import KeptBounds
 from maneuver_automaton.planning.polishing import rests_at_both_ends
 from maneuver_automaton.planning.result import LowerBound
 from maneuver_automaton.planning.steps import has_inertia
@@ -99,9 +100,11 @@ class Proving:
     budget: Budget
     watch: Watch
     max_work: int | None = None  # steps times cells
+    kept: KeptBounds | None = None  # of other starts
     best: LowerBound = field(default_factory=lambda: LowerBound(value=0.0, kind="distance"))
     history: list[tuple[float, float]] = field(default_factory=list)  # seconds, value
     work: int = 0
+    functions: list[CostToGo] = field(default_factory=list)  # of all levels
 
     def run(self, *, after_a_plan: bool = False) -> None:
         """Prove what can be proven; `after_a_plan` cells wait for one, without which they are many.
@@ -109,6 +112,9 @@ class Proving:
         They wait for a share of the time at most.
         """
         self._better(known_bound(self.problem))
+        if self.kept is not None:
+            value = in_costs(self.problem, self.kept.bound(self.problem))
+            self._better(LowerBound(value=value, kind="cells"))
         until = WAITED * self.budget.seconds
         while after_a_plan and self.watch.cost == math.inf and self.budget.elapsed < until:
             if self._over():
@@ -118,6 +124,7 @@ class Proving:
             return
         for proof in proofs_of(self.problem, incumbent=lambda: self.watch.cost, ends=self._late):
             self.work = proof.work
+            self._remember(proof.function)
             kind = "incumbent" if proof.optimal and proof.value >= self.watch.cost else "cells"
             self._better(LowerBound(value=proof.value, kind=kind))
             if self._over():
@@ -136,6 +143,13 @@ class Proving:
             self.best = bound
             self.history.append((self.budget.elapsed, bound.value))
             self.watch.bound = bound.value
+
+    def _remember(self, function: CostToGo | None) -> None:
+        """Keep what proves it, for poses on the way and for other starts."""
+        if function is not None:
+            self.functions.append(function)
+            if self.kept is not None:
+                self.kept.functions.append(function)
 
     def _over(self) -> bool:
         return self.watch.is_abandoned or self.watch.is_closed or self.budget.is_over
@@ -171,6 +185,11 @@ def proofs_of(
     ramp = _ramp(problem)
     for proof in cell_proofs(problem, incumbent=lambda: ramp.without(incumbent()), ends=ends):
         yield replace(proof, value=ramp.added(proof.value))
+
+
+def in_costs(problem: Problem, value: float) -> float:
+    """What a function on cells proves of a problem's start, in costs of the problem itself."""
+    return _ramp(problem).added(value + besides(problem))
 
 
 @dataclass(frozen=True, slots=True)

@@ -105,6 +105,7 @@ def plan_in(
     with patient():
         if gap is None:
             return plan_within(problem, budget, workspace, alternatives=alternatives)
+        from maneuver_automaton.planning.kept_bounds import kept_bounds
         from maneuver_automaton.planning.to_gap import plan_to_gap
 
         watch = watch or Watch(gap=gap)
@@ -112,7 +113,8 @@ def plan_in(
         search = functools.partial(
             plan_within, problem, workspace=workspace, alternatives=alternatives
         )
-        return plan_to_gap(problem, search, budget, watch)
+        kept = kept_bounds(problem, workspace)
+        return plan_to_gap(problem, search, budget, watch, kept=kept)
 
 
 def plan_within(

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.headings import origin_of
+from maneuver_automaton.budget import Watch
 from maneuver_automaton.collision import AnyObstacle, Shape, Zone, as_footprint, as_obstacles
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.planning.plan import plan_in, prepare
@@ -119,13 +120,23 @@ class Planner:
         alternatives: int = 0,
         start_time: float = 0.0,
         start_trim: str | None = None,
+        gap: float | None = None,
+        watch: Watch | None = None,
     ) -> PlanResult:
         """Plan as `plan` does for the problem from `start` (dof,) to `goals`, at `start_time` [s].
 
-        It starts in `start_trim`, or else in the planner's own; a `Goal` names the last trim.
+        It starts in `start_trim`, or else in the planner's own; a `Goal` names the last trim. What
+        is proven for a `gap` is kept, and known at once from other starts to the same goals.
         """
         problem = self.problem(start, goals, start_time=start_time, start_trim=start_trim)
-        return plan_in(self.workspace, problem, time_limit=time_limit, alternatives=alternatives)
+        return plan_in(
+            self.workspace,
+            problem,
+            time_limit=time_limit,
+            alternatives=alternatives,
+            gap=gap,
+            watch=watch,
+        )
 
     def with_obstacles(
         self, obstacles: AnyObstacle | Shape | Sequence[AnyObstacle | Shape]

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from maneuver_automaton.budget import Budget, Watch
+from maneuver_automaton.planning.kept_bounds import KeptBounds
 from maneuver_automaton.planning.lower_bound import Proving
 from maneuver_automaton.planning.result import PlanResult
 from maneuver_automaton.problem import Problem
@@ -17,23 +18,30 @@ LOOK = 0.02  # [s] between two looks at the proof once the search is over
 
 
 def plan_to_gap(
-    problem: Problem, search: Callable[[Budget], PlanResult], budget: Budget, watch: Watch
+    problem: Problem,
+    search: Callable[[Budget], PlanResult],
+    budget: Budget,
+    watch: Watch,
+    *,
+    kept: KeptBounds | None = None,
 ) -> PlanResult:
     """The answer of a search, with what is proven of it.
 
     The proof runs in a thread of its own, mostly in compiled code, and both stop once the gap is
     small enough. Where expansions are counted the search goes first, and the proof does a stated
-    amount of work after it: neither then depends on the clock, unless the time is over.
+    amount of work after it: neither then depends on the clock, unless the time is over. `kept` is
+    what was proven of other starts, and gets what is proven here.
     """
     if budget.expansions is not None:
         result = search(budget)
         if result.plan is None or result.cost is None:
             return result
         watch.note(result.cost)
-        proving = Proving(problem, budget, watch, max_work=WORK_PER_EXPANSION * budget.expansions)
+        most = WORK_PER_EXPANSION * budget.expansions
+        proving = Proving(problem, budget, watch, max_work=most, kept=kept)
         proving.run()
         return proven(result, proving)
-    proving = Proving(problem, budget, watch)
+    proving = Proving(problem, budget, watch, kept=kept)
     thread = _Beside(functools.partial(proving.run, after_a_plan=True))
     thread.start()
     try:

@@ -20,6 +20,7 @@ from maneuver_automaton.receding_horizon.decision import StepSearch, decide
 from maneuver_automaton.receding_horizon.guarantees import broken, promises, too_cheap
 from maneuver_automaton.receding_horizon.log import Deed, Origin, Step, Violation
 from maneuver_automaton.receding_horizon.pace import is_uniform
+from maneuver_automaton.receding_horizon.proving import LoopBounds
 from maneuver_automaton.receding_horizon.searches import load_search, started
 from maneuver_automaton.receding_horizon.settings import (
     Settings,
@@ -69,6 +70,9 @@ class RecedingHorizon:
     hold : bool
         Within the goal's tolerance, correct the error within a few steps, along plans that stay
         within it if there are such; otherwise, and with inertia, rest.
+    gap : float, optional
+        Share of the cost: a plan that is proven to be so near the optimum is kept without a search,
+        and what time a step has left goes into a proof. Not for retimed plans.
     look_ahead : float
         [s] that a fail-safe trajectory, or standing still, must be free; less where nothing moves
         any more. With inertia one that is free for `stand` will do where none is for so long.
@@ -111,6 +115,7 @@ class RecedingHorizon:
         first: Plan | None = None,
         hold: bool = False,
         retimed: bool = False,
+        gap: float | None = None,
         look_ahead: float = 60.0,
         stand: float = 2.0,
     ) -> None:
@@ -121,6 +126,7 @@ class RecedingHorizon:
             first=first,
             hold=hold,
             retimed=retimed,
+            gap=None if retimed else gap,
             pad=filling_rest(problem),
             at_will=switches_at_will(problem),
             look_ahead=look_ahead,
@@ -144,6 +150,7 @@ class RecedingHorizon:
             bound = self.promises.most_steps(last.value)
             self.most_steps = None if bound is None else bound + last.number
         load_search(problem)
+        self.proven = None if settings.gap is None else LoopBounds.ready(settings.gap)
 
     def step(
         self,
@@ -203,11 +210,23 @@ class RecedingHorizon:
         now, search = started(
             self.settings, here, last, passed=passed, budget=budget, changed=changed
         )
+        if self.proven is not None:
+            now.bound = self._known(now)
         self.last = self._logged(decide(now, search), search, now)
         control = self.last.control
         if control is None and self.settings.pad is not None:
             control = self.settings.pad.control
         return control, self.last
+
+    def _known(self, now: Situation) -> float:
+        """What steps before have proven of this one."""
+        assert self.proven is not None
+        if now.changed:
+            self.proven.forget()
+        elif now.last is None or now.off_plan or not now.last.deed.leads:
+            self.proven.leave()
+        here = now.as_it_moves
+        return 0.0 if here is None else self.proven.known(here, _accumulated(now))
 
     def _horizon(self, at: float) -> Horizon:
         """The horizon of a step at a time [s] of the world's clock."""
@@ -242,7 +261,7 @@ class RecedingHorizon:
             value=value,
             applied=applied,
             applied_cost=cost_until(here, plan, applied),
-            accumulated_cost=0.0 if last is None else last.accumulated_cost + last.applied_cost,
+            accumulated_cost=_accumulated(now),
             origin=chosen.origin,
             replanned=last is not None and not is_rest_of(plan, now.rest),
             shifted_value=chosen.shifted_value,
@@ -291,7 +310,16 @@ class RecedingHorizon:
         if self.settings.retimed:  # trims at another pace may cost less than those of the library
             here = now.here
             return min(self.promises.effort_bound(here.start, goal) for goal in here.goals)
-        return search.lower_bound()
+        least, moving = search.lower_bound(), now.as_it_moves
+        if self.proven is None or moving is None:
+            return least
+        proven = self.proven.prove(moving, chosen.value, _accumulated(now), now.budget)
+        return max(least, proven)
+
+
+def _accumulated(now: Situation) -> float:
+    """Cost of what has been driven until now."""
+    return 0.0 if now.last is None else now.last.accumulated_cost + now.last.applied_cost
 
 
 def _deed(chosen: Chosen, now: Situation) -> Deed:

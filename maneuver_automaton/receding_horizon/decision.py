@@ -71,7 +71,8 @@ def decide(now: Situation, search: StepSearch) -> Chosen:
             )
         return replace(chosen, free_until=search.free_until)
     kept = _kept(now, search)
-    best = now.best(kept, search.cheaper(kept)) or search.otherwise()
+    found = [] if now.is_near_optimal(kept) else search.cheaper(kept)
+    best = now.best(kept, found) or search.otherwise()
     if best is None:
         return _without_plan(now, search)
     now.flag_late(best.plan)

@@ -24,6 +24,7 @@ class Settings:
     first: Plan | None = None
     hold: bool = False
     retimed: bool = False
+    gap: float | None = None  # share of the cost that may be left to gain; None: nothing is proven
     pad: Trim | None = None  # the rest that prolongs a plan
     at_will: bool = True  # trims are: nothing is ever committed, and a motion may end anywhere
     look_ahead: float = 60.0  # [s] that a fail-safe trajectory must be free
@@ -36,6 +37,10 @@ class Settings:
                 raise ValueError(f"receding horizon: {name} must be positive, got {value} s")
         if not self.margin >= 0.0:
             raise ValueError(f"receding horizon: margin must be at least 0, got {self.margin}")
+        if self.gap is not None and not 0.0 <= self.gap < 1.0:
+            raise ValueError(
+                f"receding horizon: gap must be a share from 0 to below 1, got {self.gap}"
+            )
         if not self.stand >= 0.0:
             raise ValueError(f"receding horizon: stand must be at least 0, got {self.stand} s")
 

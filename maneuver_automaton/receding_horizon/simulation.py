@@ -43,6 +43,7 @@ def simulate(
     first: Plan | None = None,
     stay: bool = False,
     retimed: bool = False,
+    gap: float | None = None,
     look_ahead: float = 60.0,
     stand: float = 2.0,
     obstacles: Seen | None = None,
@@ -61,7 +62,7 @@ def simulate(
         At most so many.
     disturbance : Disturbance, optional
         None: the vehicle moves as its model says.
-    margin, time_limit, first, retimed, look_ahead, stand
+    margin, time_limit, first, retimed, gap, look_ahead, stand
         As in `RecedingHorizon`.
     last : Step, optional
         To go on from the last step of another loop; the problem's start is where that led.
@@ -109,6 +110,7 @@ def simulate(
         first=first,
         hold=stay,
         retimed=retimed,
+        gap=gap,
         look_ahead=look_ahead,
         stand=stand,
     )

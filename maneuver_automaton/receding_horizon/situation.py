@@ -79,12 +79,18 @@ class Situation:
         self.exhaustive = False
         self.off_plan: float | None = None
         self.rest: Plan | None = None
+        self.bound = 0.0  # no plan costs less, as is known before a search
         self.busy = 0.0  # [s] that are committed: until the maneuver under way ends
         if last is not None:
             off = distance(here.start, Goal(pose=last.plan.pose_at(last.time + passed)))
             self.off_plan = 0.0 if off <= EXACT * self.size else off
             self.rest = rest_of(last.plan, passed, start=here.start, pad=settings.pad_of(here))
             self.busy = committed(last.plan, passed)
+
+    def is_near_optimal(self, kept: Candidate | None) -> bool:
+        """Whether the plan that is kept is proven to be near enough to the optimum, if asked."""
+        gap = self.settings.gap
+        return gap is not None and kept is not None and kept.cost - self.bound <= gap * kept.cost
 
     @property
     def size(self) -> float:
@@ -106,6 +112,18 @@ class Situation:
         if self.last is not None and self.last.plan.trims:
             return self.last.plan.trims[-1]
         return self.here.first_trim
+
+    @property
+    def as_it_moves(self) -> Problem | None:
+        """The problem from here, which starts in a trim that moves if the vehicle does.
+
+        None for a vehicle with inertia whose library has no such trim. Bounds ask for no more.
+        """
+        here, automaton = self.here, self.here.automaton
+        if automaton.is_kinematic or (self.trim.is_rest and not self.busy):
+            return here
+        moving = next((trim.name for trim in automaton.trims if not trim.is_rest), None)
+        return None if moving is None else replace(here, start_trim=moving)
 
     @property
     def onward(self) -> Problem | None:

@@ -87,6 +87,7 @@ def simulate_many(
     time_limit: float = 5.0,
     stay: bool = False,
     retimed: bool = False,
+    gap: float | None = None,
     audit: bool = False,
     jobs: int = 1,
     scheduler: str | None = None,
@@ -101,7 +102,7 @@ def simulate_many(
         Poses to start from; the problem's own start if omitted.
     seeds : sequence of int
         Each start is tried with each of them.
-    step, steps, disturbance, margin, time_limit, stay, retimed, audit
+    step, steps, disturbance, margin, time_limit, stay, retimed, gap, audit
         As in `simulate`; the seed of `disturbance` is replaced.
     jobs : int
         Processes at a time.
@@ -150,6 +151,7 @@ def simulate_many(
         time_limit=time_limit,
         stay=stay,
         retimed=retimed,
+        gap=gap,
         audit=audit,
     )
     done: list[Outcome] = []
@@ -170,6 +172,7 @@ class _Settings:
     time_limit: float
     stay: bool
     retimed: bool
+    gap: float | None
     audit: bool
 
 
@@ -195,6 +198,7 @@ def _outcome(problem: Problem, pose: Array, seed: int, settings: _Settings) -> O
         time_limit=settings.time_limit,
         stay=settings.stay,
         retimed=settings.retimed,
+        gap=settings.gap,
         audit=settings.audit,
     )
     return outcome_of(loop, seed=seed)
