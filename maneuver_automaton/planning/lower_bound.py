@@ -28,6 +28,7 @@ from maneuver_automaton.search.lattice_query import lattice_query
 
 WAITED = 0.5  # share of the time that proofs wait for a plan
 LOOK = 0.002  # [s] between two looks whether there is one
+SHARES = (0.0, 0.5, 2.0)  # of a plan's cost, shared by the changes it may have: prices of one
 POLISHING = 0.85  # share of the time after which what there is gets polished
 
 
@@ -38,6 +39,7 @@ def lower_bound(
     incumbent: float = math.inf,
     gap: float = 0.0,
     max_work: int | None = None,
+    max_direction_changes: int | None = None,
 ) -> LowerBound:
     """The best lower bound of the cost of all plans that can be proven in a time.
 
@@ -58,6 +60,9 @@ def lower_bound(
     max_work : int, optional
         Work at which to end, in steps times cells; the answer is then the same at every call,
         unless the time is over before.
+    max_direction_changes : int, optional
+        Bound the plans that change between forward and reverse at most so often, of a vehicle
+        without inertia: "not below 12 m with fewer than 3 changes".
 
     Returns
     -------
@@ -68,7 +73,7 @@ def lower_bound(
     Raises
     ------
     ValueError
-        If a limit is not positive, or the gap not from 0 to 1.
+        If a limit is not positive, the gap not from 0 to 1, or the number of changes negative.
 
     Examples
     --------
@@ -86,10 +91,46 @@ def lower_bound(
         raise ValueError(f"time_limit must be positive, got {time_limit} s")
     if not 0.0 <= gap <= 1.0:
         raise ValueError(f"gap must be a share from 0 to 1, got {gap}")
+    if max_direction_changes is not None and max_direction_changes < 0:
+        raise ValueError(f"max_direction_changes must be at least 0, got {max_direction_changes}")
     watch = Watch(gap=gap, cost=incumbent)
-    proving = Proving(problem, Budget.from_now(time_limit), watch, max_work=max_work)
+    budget = Budget.from_now(time_limit)
+    if max_direction_changes is not None and problem.automaton.is_kinematic:
+        return _with_few_changes(
+            problem, budget, max_work, most=max_direction_changes, incumbent=incumbent
+        )
+    proving = Proving(problem, budget, watch, max_work=max_work)
     proving.run()
     return proving.bound(incumbent)
+
+
+def _with_few_changes(
+    problem: Problem, budget: Budget, work: int | None, *, most: int, incumbent: float
+) -> LowerBound:
+    """Bound of plans with at most so many changes of direction.
+
+    Where every change costs a price more, such a plan costs at most so many prices more: what is
+    proven of the dearer costs, less these prices, holds for it. The best of some prices counts.
+    """
+    best, cost = known_bound(problem), problem.cost
+    if not isinstance(cost, Cost):
+        return best
+    scale = incumbent if incumbent < math.inf else 2.0 * best.value
+    for number, share in enumerate(SHARES):
+        price = share * scale / (1 + most)
+        dearer = replace(cost, direction_change=cost.direction_change + price)
+        limit = incumbent + most * price
+        one = Proving(
+            replace(problem, cost=dearer),
+            budget.part(1.0 / (len(SHARES) - number)),
+            Watch(gap=0.0, cost=limit),
+            max_work=None if work is None else work // len(SHARES),
+        )
+        one.run()
+        value = one.bound(limit).value - most * price
+        if value > best.value:
+            best = replace(one.best, value=min(value, incumbent), work=one.work)
+    return best
 
 
 @dataclass(slots=True, eq=False)

@@ -9,11 +9,15 @@ import numpy as np
 
 from maneuver_automaton.bounds import pose_scene, separation
 from maneuver_automaton.budget import Budget
+from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
-from maneuver_automaton.problem import Problem
+from maneuver_automaton.problem import Horizon, Problem
 
 RESERVED = 0.1  # share of the time that is left for a proof where there is no plan by then
 MOST_BOXES = 300_000  # of poses that are tested
+MOST_WORK = 40_000_000  # steps times cells of a proof that plans take too long
+ROUNDING = 1e-6  # relative
+BEYOND = 1.25  # times the longest time: plans that take longer are not looked at
 UNPROVEN = (PlanStatus.NO_PLAN, PlanStatus.OUT_OF_BUDGET)
 
 
@@ -36,13 +40,44 @@ def with_proof(result: PlanResult, budget: Budget) -> PlanResult:
         result.problem, most_boxes=MOST_BOXES, deadline=Budget.from_now(left).deadline
     )
     if proof is None:
-        return result
+        reason = too_long(result.problem, Budget.from_now(max(budget.left, 0.0)))
+        return replace(result, status=PlanStatus.UNREACHABLE, reason=reason) if reason else result
     return replace(
         result,
         status=PlanStatus.UNREACHABLE,
         reason=proof.reason,
         narrowest=proof.narrowest,
         reached=proof.reached,
+    )
+
+
+def too_long(problem: Problem, budget: Budget) -> str:
+    """Why every plan takes longer than the horizon admits; empty if that is not proven."""
+    horizon = problem.horizon
+    longest = horizon.time or horizon.max_time
+    if longest is None or budget.is_over:
+        return ""
+    from maneuver_automaton.planning.lower_bound import known_bound, load_proofs, proofs_of
+
+    left = budget.left
+    load_proofs()
+    budget = Budget.from_now(left)
+    timed = replace(problem, cost=Cost(time=1.0), horizon=Horizon())
+    least = known_bound(timed).value
+    if least <= longest:
+        for proof in proofs_of(
+            timed,
+            incumbent=lambda: BEYOND * longest,
+            ends=lambda work: work >= MOST_WORK or budget.is_over,
+        ):
+            least = max(least, proof.value)
+            if least > longest * (1.0 + ROUNDING):
+                break
+    if least <= longest * (1.0 + ROUNDING):
+        return ""
+    return (
+        f"every plan takes at least {least:.4g} s, and the horizon admits {longest:g} s: no way "
+        "that leads to the goal is short enough"
     )
 
 

@@ -1,6 +1,7 @@
 """Certified lower bounds: admissible, below every plan, and refused where they are not."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -171,3 +172,16 @@ def test_bad_limits_are_refused(more, message):
     with pytest.raises(ValueError) as caught:
         ma.lower_bound(among(()), **more)
     assert str(caught.value) == message
+
+
+def test_plans_without_a_change_of_direction_cost_more_than_the_best_one():
+    problem = among((), goal=(0.0, 2.0, 0.0))
+    cheapest = ma.plan(problem).cost
+    forward = {str(angle): (1.0, angle) for angle in (-0.6, 0.0, 0.6)}
+    without = ma.plan(replace(problem, automaton=ma.Automaton.of_controls(CAR, forward))).cost
+    bound = ma.lower_bound(
+        problem, max_direction_changes=0, incumbent=without, max_work=6 * WORK, time_limit=1e3
+    )
+    assert cheapest < bound.value <= without
+    with pytest.raises(ValueError, match="max_direction_changes must be at least 0, got -1"):
+        ma.lower_bound(problem, max_direction_changes=-1)

@@ -4,13 +4,14 @@ import dataclasses
 
 import pytest
 
-from maneuver_automaton import SearchSettings, plan
+from maneuver_automaton import Cost, Horizon, SearchSettings, plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.formats import plan_to_dict
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.planning.no_way import before_proof, with_proof
 from maneuver_automaton.plotting import save_plan_figure
 from tests.bounds.scenes import bend, gap
+from tests.bounds.test_cell_bound import WALL, among
 
 
 def ended(problem, status=PlanStatus.OUT_OF_BUDGET):
@@ -42,6 +43,18 @@ def test_nothing_is_proven_of_other_verdicts_or_without_time():
     assert with_proof(blocked, Budget.from_now(30.0)) is blocked
     late = ended(gap(1.6))
     assert with_proof(late, Budget.from_now(-1.0)) is late
+
+
+def test_no_plan_is_as_quick_as_the_horizon_admits():
+    problem = among(WALL, cost=Cost(time=1.0))
+    duration = plan(problem, time_limit=1.0).plan.duration
+    for share, status in ((0.9, PlanStatus.UNREACHABLE), (0.99, PlanStatus.OUT_OF_BUDGET)):
+        short = dataclasses.replace(problem, horizon=Horizon(max_time=share * duration))
+        result = with_proof(ended(short), Budget.from_now(1e3))
+        assert result.status is status
+        assert ("s: no way that leads to the goal is short enough" in result.reason) == (
+            status is PlanStatus.UNREACHABLE
+        )
 
 
 def test_a_share_of_the_time_is_left_for_a_proof():
