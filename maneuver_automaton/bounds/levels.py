@@ -42,8 +42,8 @@ CHUNK = 4_000_000  # steps times cells between two looks at the clock
 STEPS = (2500, 3000, 5000)  # on each level at most; the last holds for all that follow
 STALLED = 2e-3  # relative gain in PATIENCE blocks below which a level has given what it can
 PATIENCE = 10
-POLISHING = 60  # sweeps that raise what is proven
-SWEEPS = 40  # that raise the bounds of cells from the start and to the goal
+POLISHING = 250  # sweeps that raise what is proven
+SWEEPS = 100  # that raise the bounds of cells from the start and to the goal
 WEIGHT = 8.0  # of the first level: values against dual values, in lengths of a plan in cells
 
 
