@@ -41,6 +41,7 @@ def road_plan_to_dict(result: RoadPlanResult) -> dict[str, Any]:
         "cost": result.cost,
         "duration_s": None if plan is None else plan.duration,
         "lower_bound": None,
+        "bound": None,
         "gap": None,
         "certificate": None,
         "primitives": _primitives(plan),
@@ -52,6 +53,7 @@ def road_plan_to_dict(result: RoadPlanResult) -> dict[str, Any]:
         "alternatives": [],
         "timing_s": {"search": result.search_s},
         "counts": {},
+        "improvements": [],
     }
 
 
