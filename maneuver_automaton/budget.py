@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 from maneuver_automaton._interrupts import stopped
 
 COUNTED = 0.7  # share of the time left that a stage of counted work takes at most: others follow
+LATE_SHARE, LATE = 0.08, 0.01  # of the time, and [s], by which the checks of an answer may be late
+MOMENT = 4e-3  # [s] between two looks at the clock
 
 
 @dataclass(slots=True, eq=False)
@@ -114,6 +116,11 @@ class Budget:
         now = self.clock()
         return replace(self, deadline=now + share * self.left)
 
+    @property
+    def late(self) -> Budget:
+        """The budget of checks: a plan that was found in time may be a moment late."""
+        return self.before(-LATE_SHARE * self.seconds - LATE)
+
     def before(self, seconds: float) -> Budget:
         """The budget that ends so many seconds earlier: what follows takes these."""
         return replace(self, deadline=self.deadline - seconds)
@@ -126,3 +133,43 @@ class Budget:
 
 
 UNLIMITED = Budget(began=0.0, deadline=math.inf)
+
+
+@dataclass(slots=True, eq=False)
+class Pace:
+    """Steps of a kernel in portions that take a moment each, by what the last one took.
+
+    For work that is the same however it is parted.
+
+    Examples
+    --------
+    >>> pace = Pace(UNLIMITED, steps=2)
+    >>> pace.take(9), pace.take(7) >= 1, Pace(Budget.from_now(0.0), steps=2).take(9)
+    (2, True, 0)
+    """
+
+    budget: Budget
+    steps: int  # that are taken first
+    most: int = 2**62
+    moment: float = MOMENT  # [s] inf: `most` steps, unless the time gets short
+    _taken: int = 0
+    _since: float = 0.0
+
+    def take(self, left: int) -> int:
+        """How many of the steps that are left to do now, after those taken before; 0: time is over.
+
+        Few where little time is left.
+        """
+        if self.budget.is_over or left <= 0:
+            return 0
+        now = self.budget.clock()
+        if self._taken:
+            moment = min(self.moment, self.budget.left)
+            fit = moment * self._taken / max(now - self._since, 1e-9)
+            self.steps = int(min(max(fit, 1.0), 4 * self.steps, self.most))
+        self._taken, self._since = min(self.steps, left), now
+        return self._taken
+
+    def go_on(self, budget: Budget) -> None:
+        """Take further steps after a while."""
+        self.budget, self._taken = budget, 0

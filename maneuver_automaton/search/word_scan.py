@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.budget import Budget
+from maneuver_automaton.budget import Budget, Pace
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.alternatives import tied
@@ -28,6 +28,7 @@ NODES = 64  # per scanned time, bisected where the function bends
 NODES_2D = 32  # per scanned time where there are two
 TOLERANCE = 1e-12  # relative, for tangent circles and parallel lines
 CAPACITY = 4096
+SECONDS_PER_WORD = (0.0, 1e-6, 1e-6, 5e-6, 5e-4, 1e-2)  # by trims: where little time is left
 
 BoolArray = NDArray[np.bool_]
 
@@ -174,9 +175,12 @@ class WordScan:
         """Scan all words of `n` trims with one kernel, `chunk` at a time; False at a limit."""
         tail = 1 if self.setup.free_heading else 0
         number, last = 0, len(self.setup.trims) ** n
+        # Another portion may prune other words, and count them so: it is smaller only at the end.
+        at_first = min(chunk, max(1.0, budget.left / SECONDS_PER_WORD[min(n + tail, 5)]))
+        pace = Pace(budget, steps=int(at_first), most=chunk, moment=math.inf)
         while number < last:
-            left = chunk if max_words is None else max(max_words - self.n_words, 1)
-            until = min(number + min(chunk, left), last)
+            left = last if max_words is None else max(max_words - self.n_words, 1)
+            until = number + max(pace.take(min(left, last - number)), 1)
             upper_bound = tied(float(self.found.best[-1]))
             number = scan(
                 *mode.kernel_problem, self.candidates, n + tail, number, until, upper_bound
@@ -193,7 +197,7 @@ class WordScan:
         """Kernels that words of `n` trims need, and how many words at a time."""
         # Every chunk may lower the upper bound, and costs a call with all arrays. The clock is
         # asked between chunks: one of long words takes up to 25 ms.
-        few = 1024 if self.pruned else 50_000
+        few = 1024 if self.pruned else 2048
         if n <= 2 + mode.kernel_problem[0].targets.size:
             yield self.kernels.scan_flat_words, few
         if n == 3:
