@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from maneuver_automaton._interrupts import stopped
 
 COUNTED = 0.7  # share of the time left that a stage of counted work takes at most: others follow
-LATE_SHARE, LATE = 0.08, 0.01  # of the time, and [s], by which the checks of an answer may be late
+LATE_SHARE, LATE = 0.08, 0.01  # of the time, and [s], by which checks of an answer may be late
 MOMENT = 4e-3  # [s] between two looks at the clock
 
 
@@ -66,6 +66,7 @@ class Budget:
     expansions: int | None = None  # that are left; None: only the time counts
     clock: Callable[[], float] = time.monotonic  # seconds from some moment on
     watch: Watch | None = None  # once its gap is closed, no time is left
+    worked: float = -math.inf  # [s] processor time of this process at the begin; -inf: no matter
 
     @classmethod
     def from_now(
@@ -77,7 +78,13 @@ class Budget:
     ) -> Budget:
         """So many seconds from now on."""
         now = clock()
-        return cls(began=now, deadline=now + seconds, expansions=expansions, clock=clock)
+        return cls(
+            began=now,
+            deadline=now + seconds,
+            expansions=expansions,
+            clock=clock,
+            worked=time.process_time(),
+        )
 
     @property
     def seconds(self) -> float:
@@ -92,19 +99,24 @@ class Budget:
     @property
     def left(self) -> float:
         """Time that is left [s], at least 0."""
-        return 0.0 if self.is_over else max(self.deadline - self.clock(), 0.0)
+        return 0.0 if self.is_stopped else max(self.deadline - self.clock(), 0.0)
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether the gap is closed, or a signal asks to come to an end."""
+        return stopped() or (self.watch is not None and self.watch.is_closed)
 
     @property
     def is_over(self) -> bool:
-        """Whether no time is left, the gap is closed, or a signal asks to come to an end."""
-        closed = self.watch is not None and self.watch.is_closed
-        return closed or stopped() or self.clock() >= self.deadline
+        """Whether no time is left, or it is stopped."""
+        return self.is_stopped or self.clock() >= self.deadline
 
     def part(self, share: float, *, at_least: float = 0.0) -> Budget:
         """A budget of its own from now on: a share of the time left, at least so many seconds."""
         now = self.clock()
         seconds = max(share * self.left, at_least)
-        return replace(self, began=now, deadline=now + seconds)
+        worked = time.process_time() if self.worked > -math.inf else self.worked
+        return replace(self, began=now, deadline=now + seconds, worked=worked)
 
     def stage(self, share: float) -> Budget:
         """Budget of one stage: a share of the time left, a large one where work is counted.
@@ -117,9 +129,16 @@ class Budget:
         return replace(self, deadline=now + share * self.left)
 
     @property
-    def late(self) -> Budget:
-        """The budget of checks: a plan that was found in time may be a moment late."""
-        return self.before(-LATE_SHARE * self.seconds - LATE)
+    def left_to_check(self) -> float:
+        """Time that is left to check what was found [s]: it may be a moment late.
+
+        What other programs have delayed is not late yet: the processor time of this one counts.
+        """
+        late = self.seconds + LATE_SHARE * self.seconds + LATE
+        spent = self.elapsed
+        if spent >= late:
+            spent = min(spent, time.process_time() - self.worked)
+        return max(late - spent, 0.0)
 
     def before(self, seconds: float) -> Budget:
         """The budget that ends so many seconds earlier: what follows takes these."""
@@ -149,25 +168,26 @@ class Pace:
     """
 
     budget: Budget
-    steps: int  # that are taken first
+    steps: int  # that are taken first ...
+    each: float = 0.0  # ... unless it takes longer than there is time, at so many seconds each
     most: int = 2**62
     moment: float = MOMENT  # [s] inf: `most` steps, unless the time gets short
     _taken: int = 0
     _since: float = 0.0
 
-    def take(self, left: int) -> int:
-        """How many of the steps that are left to do now, after those taken before; 0: time is over.
-
-        Few where little time is left.
-        """
-        if self.budget.is_over or left <= 0:
-            return 0
+    def take(self, steps: int) -> int:
+        """How many of some steps to do now, those taken before being done; 0: the time is over."""
         now = self.budget.clock()
+        left = self.budget.deadline - now
+        if left <= 0.0 or self.budget.is_stopped:
+            return 0
         if self._taken:
-            moment = min(self.moment, self.budget.left)
-            fit = moment * self._taken / max(now - self._since, 1e-9)
+            self.each = max(now - self._since, 1e-9) / self._taken
+            fit = min(self.moment, left) / self.each
             self.steps = int(min(max(fit, 1.0), 4 * self.steps, self.most))
-        self._taken, self._since = min(self.steps, left), now
+        elif self.each * self.steps > left:
+            self.steps = max(1, int(left / self.each))
+        self._taken, self._since = min(self.steps, steps), now
         return self._taken
 
     def go_on(self, budget: Budget) -> None:

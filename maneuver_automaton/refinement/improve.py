@@ -37,7 +37,7 @@ MOST_CHUNK = 16384  # expansions between two looks at the word of a search
 SEED = 20_09  # of the random draws
 MOST_OTHERS = 50  # words kept beside the best
 DRAWN = 400  # attempts whose random numbers are drawn at once
-TIMELY, TIMELY_LINKED = 400, 10  # attempts before the first look at the clock: some ms
+TIMELY, TIMELY_LINKED = 100, 10  # attempts before the first look at the clock: some ms
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -81,7 +81,8 @@ def shortcut(
     work, state = work_of(query, word, points=points)
     task, scene, arrays = improve_task(query, word), query.scene(), query.library.arrays
     cost = begin_program(arrays, work, state, times)
-    pace, first = Pace(budget, steps=max(1, TIMELY_WORDS // (n_words * points))), 1
+    most = max(1, TIMELY_WORDS // (n_words * points))  # the last points have the most connections
+    pace, first = Pace(budget, steps=most, most=most), 1
     while part := pace.take(points - first):
         join_points(arrays, task, scene, work, first, first + part, n_words, GAIN * cost)
         first += part

@@ -280,3 +280,8 @@ def load_linked_words() -> None:
     problem = Problem(robot, [0, 0, 0], goal, start_trim="ahead")
     steer_linked_words(problem, goal)
     scan_linked_words(problem, goal)
+
+
+def load_words_of(problem: Problem, goal: Goal) -> None:
+    """Have the words ready that all problems of a vehicle at a cost are steered along."""
+    word_setup(problem, goal, most_trims=ALPHABET, steers=True)

@@ -5,6 +5,7 @@ Words with transitions are scanned as they are seen from before them; see `_kern
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -176,19 +177,19 @@ class WordScan:
         tail = 1 if self.setup.free_heading else 0
         number, last = 0, len(self.setup.trims) ** n
         # Another portion may prune other words, and count them so: it is smaller only at the end.
-        at_first = min(chunk, max(1.0, budget.left / SECONDS_PER_WORD[min(n + tail, 5)]))
-        pace = Pace(budget, steps=int(at_first), most=chunk, moment=math.inf)
+        each = SECONDS_PER_WORD[min(n + tail, 5)]
+        pace = Pace(budget, steps=chunk, each=each, most=chunk, moment=math.inf)
         while number < last:
             left = last if max_words is None else max(max_words - self.n_words, 1)
-            until = number + max(pace.take(min(left, last - number)), 1)
+            step = pace.take(min(left, last - number))
+            if not step:
+                return False
             upper_bound = tied(float(self.found.best[-1]))
             number = scan(
-                *mode.kernel_problem, self.candidates, n + tail, number, until, upper_bound
+                *mode.kernel_problem, self.candidates, n + tail, number, number + step, upper_bound
             )
             if self.candidates.counter[0]:
                 self.polish(*mode.kernel_problem, self.candidates, self.found, self.most)
-            if budget.is_over:
-                return False
             if max_words is not None and self.n_words >= max_words:
                 return False
         return True
@@ -334,6 +335,11 @@ class _Tables:
     reaches: Array  # (M,) [s]
 
 
+def load_tables(setup: SearchSetup) -> None:
+    """Have ready what all problems of a library share."""
+    _tables(setup)
+
+
 def _priced(rates: Array, paces: Array) -> Array:
     """Cost (M, 2) per metre and per radian, inf where a trim makes none."""
     none = np.full(paces.shape, np.inf)
@@ -374,8 +380,15 @@ def _reaches(setup: SearchSetup, twists: Array, periods: Array) -> Array:
 
 def _parallel(twists: Array) -> BoolArray:
     """Which pairs of twists span one line only (M, M), altitude aside."""
-    lengths = np.sqrt((twists[:, :3] ** 2).sum(axis=1)).clip(min=1e-300)
-    a, b, c = (twists[:, :3] / lengths[:, None]).T
+    return _parallel_rows(twists[:, :3].tobytes(), len(twists))
+
+
+@functools.lru_cache(maxsize=4)
+def _parallel_rows(rows: bytes, n: int) -> BoolArray:
+    """The same of `n` twists; of thousands it takes longer than most searches, so it is kept."""
+    twists = np.frombuffer(rows).reshape(n, 3)
+    lengths = np.sqrt((twists**2).sum(axis=1)).clip(min=1e-300)
+    a, b, c = (twists / lengths[:, None]).T
     minors = [np.outer(p, q) for p, q in ((a, b), (b, c), (c, a))]
     square = sum((minor - minor.T) ** 2 for minor in minors)
     return np.asarray(np.sqrt(square) < 1e-9)
