@@ -11,7 +11,7 @@ from maneuver_automaton._interrupts import stopped
 
 COUNTED = 0.7  # share of the time left that a stage of counted work takes at most: others follow
 LATE_SHARE, LATE = 0.08, 0.01  # of the time, and [s], by which checks of an answer may be late
-MOMENT = 4e-3  # [s] between two looks at the clock
+MOMENT, SHARE = 4e-3, 0.25  # [s], and of the time left, between two looks at the clock
 
 
 @dataclass(slots=True, eq=False)
@@ -158,7 +158,8 @@ UNLIMITED = Budget(began=0.0, deadline=math.inf)
 class Pace:
     """Steps of a kernel in portions that take a moment each, by what the last one took.
 
-    For work that is the same however it is parted.
+    For work that is the same however it is parted. Where time gets short portions get smaller, so
+    that a dear step among cheap ones does little harm.
 
     Examples
     --------
@@ -168,10 +169,8 @@ class Pace:
     """
 
     budget: Budget
-    steps: int  # that are taken first ...
-    each: float = 0.0  # ... unless it takes longer than there is time, at so many seconds each
+    steps: int  # that are taken first
     most: int = 2**62
-    moment: float = MOMENT  # [s] inf: `most` steps, unless the time gets short
     _taken: int = 0
     _since: float = 0.0
 
@@ -182,14 +181,45 @@ class Pace:
         if left <= 0.0 or self.budget.is_stopped:
             return 0
         if self._taken:
-            self.each = max(now - self._since, 1e-9) / self._taken
-            fit = min(self.moment, left) / self.each
+            fit = min(MOMENT, SHARE * left) * self._taken / max(now - self._since, 1e-9)
             self.steps = int(min(max(fit, 1.0), 4 * self.steps, self.most))
-        elif self.each * self.steps > left:
-            self.steps = max(1, int(left / self.each))
         self._taken, self._since = min(self.steps, steps), now
         return self._taken
 
     def go_on(self, budget: Budget) -> None:
         """Take further steps after a while."""
         self.budget, self._taken = budget, 0
+
+
+@dataclass(slots=True, eq=False)
+class EvenPace:
+    """Steps that all cost about the same: as many as fit, at most so many at once.
+
+    Portions are smaller than that, and a step that does not fit is not begun, only where time gets
+    short: for work that depends on how it is parted.
+
+    Examples
+    --------
+    >>> EvenPace(UNLIMITED, most=8, each=1e-3).take(9)
+    8
+    >>> pace = EvenPace(Budget(began=0.0, deadline=1.0, clock=lambda: 0.5), most=8, each=0.2)
+    >>> pace.take(9)
+    2
+    """
+
+    budget: Budget
+    most: int
+    each: float  # [s] guessed at first, then measured
+    _taken: int = 0
+    _since: float = 0.0
+
+    def take(self, steps: int) -> int:
+        """How many of some steps to do now, those taken before being done; 0: none fits."""
+        now = self.budget.clock()
+        if self.budget.is_stopped:
+            return 0
+        if self._taken:
+            self.each = max((now - self._since) / self._taken, 1e-9)
+        fits = max(self.budget.deadline - now, 0.0) / self.each
+        self._taken, self._since = int(min(steps, self.most, fits)), now
+        return self._taken

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from maneuver_automaton.budget import LATE, LATE_SHARE, MOMENT, Budget, Pace
+from maneuver_automaton.budget import LATE, LATE_SHARE, MOMENT, Budget, EvenPace, Pace
 
 DAY = 86400.0  # [s] no test takes as long
 
@@ -80,3 +80,13 @@ def test_portions_of_work_take_a_moment_each():
     assert taken[3:] == [pytest.approx(MOMENT / 1e-3, abs=1)] * 2
     now = 1.0
     assert pace.take(3) == 0
+
+
+def test_even_steps_are_parted_only_where_time_gets_short():
+    now = 0.0
+    pace = EvenPace(Budget(began=0.0, deadline=1.0, clock=lambda: now), most=10, each=0.01)
+    taken = []
+    while step := pace.take(100):
+        taken.append(step)
+        now += 0.03 * step
+    assert taken == [10, 10, 10, 3]  # the next would end at 1.02 s

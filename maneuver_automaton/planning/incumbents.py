@@ -124,12 +124,14 @@ class Incumbents:
 
         Whether one passed them; what was not `proven` free may hit something without a word.
         """
-        none_fits = True
-        for fitted in fitted_plans(self.problem, plan, self.problem.goals[goal_index]):
+        none_fits, goal = True, self.problem.goals[goal_index]
+        for fitted in fitted_plans(self.problem, plan, goal, budget=self.budget):
             none_fits = False
             if self._keep(fitted, goal_index, proven=proven):
                 return True
-        if none_fits and proven:
+        if none_fits and self.budget.left_to_check == 0.0:
+            self.unchecked += 1
+        elif none_fits and proven:
             self._refuse(Condition.WORD, broken_condition(self.problem, padded(self.problem, plan)))
             self.misfits.append((plan, goal_index))
         return False

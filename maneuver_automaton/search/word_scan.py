@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.budget import Budget, Pace
+from maneuver_automaton.budget import Budget, EvenPace
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.alternatives import tied
@@ -29,7 +29,7 @@ NODES = 64  # per scanned time, bisected where the function bends
 NODES_2D = 32  # per scanned time where there are two
 TOLERANCE = 1e-12  # relative, for tangent circles and parallel lines
 CAPACITY = 4096
-SECONDS_PER_WORD = (0.0, 1e-6, 1e-6, 5e-6, 5e-4, 1e-2)  # by trims: where little time is left
+SECONDS_PER_WORD = (1e-6, 1e-6, 1e-6, 5e-6, 1e-3, 2e-2)  # by trims, where little time is left
 
 BoolArray = NDArray[np.bool_]
 
@@ -64,6 +64,8 @@ def scanned(
         finished = scan.run(budget, most_words)
         if scan.n_found <= capacity:
             return scan, finished
+        if budget.is_over:  # there is no time to scan them again, with room for all
+            return scan, False
         capacity = 2 * scan.n_found
 
 
@@ -177,8 +179,7 @@ class WordScan:
         tail = 1 if self.setup.free_heading else 0
         number, last = 0, len(self.setup.trims) ** n
         # Another portion may prune other words, and count them so: it is smaller only at the end.
-        each = SECONDS_PER_WORD[min(n + tail, 5)]
-        pace = Pace(budget, steps=chunk, each=each, most=chunk, moment=math.inf)
+        pace = EvenPace(budget, most=chunk, each=SECONDS_PER_WORD[min(n + tail, 5)])
         while number < last:
             left = last if max_words is None else max(max_words - self.n_words, 1)
             step = pace.take(min(left, last - number))
@@ -292,7 +293,7 @@ class WordScan:
 
     def solutions(self) -> Iterator[Word]:
         """Words found by rising cost, rest last; if pruned, those asked for, and ties."""
-        yield from [self._padded(word) for word in self.timed()]
+        yield from map(self._padded, self.timed())
 
     def timed(self) -> Iterator[TimedWord]:
         """The moving trims of what was found, by the automaton's numbers, and their times."""
