@@ -14,6 +14,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search.alternatives import in_order
@@ -144,7 +145,7 @@ def _improved(work: _Work) -> SearchResult:
     if most < LONGEST and binding and not library.free_heading and not task.budget.is_over:
         words += _from_longer(library, begun, most, counts)
     if _prices_switches(problem) and not task.budget.is_over:
-        words += _with_fewer_switches(library, words)
+        words += _with_fewer_switches(library, words, task.budget)
     if (
         task.alternatives > 0 and not task.budget.is_over
     ):  # the best times of a seed's own word are locally optimal, too
@@ -208,14 +209,16 @@ def _prices_switches(problem: Problem) -> bool:
     return not isinstance(cost, Cost) or cost.switch > 0.0 or cost.direction_change > 0.0
 
 
-def _with_fewer_switches(library: LibraryArrays, words: Sequence[TimedWord]) -> Iterator[TimedWord]:
+def _with_fewer_switches(
+    library: LibraryArrays, words: Sequence[TimedWord], budget: Budget
+) -> Iterator[TimedWord]:
     """The words found with fewer and fewer trims: where switches cost, these may pay."""
     if library.free_heading:
         return
     for word in words[:SHORTENED]:
         longer = word
         for most in range(len(word.trims) - 1, 0, -1):
-            short = shortened(library, longer, most)
+            short = None if budget.is_over else shortened(library, longer, most)
             if short is None:
                 break
             yield short
