@@ -26,6 +26,7 @@ from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
 FIRST_SHARE = 0.8  # of the time limit, for a first path
 IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
 AT_ONCE = Patience(attempts=0, passes=0)
+STOPPING_S = 0.01  # [s] that it takes to stop and steer along a path
 WAITS = 9  # at rest, before a path is followed among moving obstacles
 
 
@@ -72,6 +73,8 @@ def _stopping(found: Incumbents, path: Plan, goal_index: int) -> Iterator[tuple[
     moving obstacles elsewhere: it waits before it starts, as long as it takes, or does not go.
     """
     problem, goal = found.problem, found.problem.goals[goal_index]
+    if found.budget.left_to_check < STOPPING_S:
+        return
     plan = stop_and_steer(
         problem.automaton.model,  # type: ignore[arg-type]
         path,
