@@ -21,7 +21,7 @@ from maneuver_automaton.cli.compiling import COMPILING
 from maneuver_automaton.formats import load_plan
 from maneuver_automaton.models import rollout
 from maneuver_automaton.planning import PlanResult, PlanStatus
-from maneuver_automaton.problem import Bounds, Problem
+from maneuver_automaton.problem import Bounds, Horizon, Problem
 from maneuver_automaton.scenario import load_scenario
 from tests import translations as vehicles
 from tests.scenario.files import SCENARIO, automaton, but
