@@ -233,7 +233,8 @@ def _headings(goal: Goal) -> Array:
 def _steered(setup: WordSetup, headings: Array, budget: Budget) -> Iterator[TimedWord]:
     """Words of up to three trims and a climb that lead to the goal, cheapest first.
 
-    Once the time is over, those of the rows of the library that were steered by then.
+    Once the time is over, those of the rows of the library that were steered by then: the first
+    ones, which are the shortest, in any case.
     """
     arrays, scratch = setup.library.arrays, setup.library.scratch()
     start, goal = four_columns(np.array([setup.problem.start, setup.goal.pose]))[:, None]
@@ -241,7 +242,10 @@ def _steered(setup: WordSetup, headings: Array, budget: Budget) -> Iterator[Time
     for number, heading in enumerate(headings):
         goal[0, 2], row = heading, 0
         pace = Pace(budget, steps=max(1, STEERED // (1 + len(arrays.climbs))))
-        while step := pace.take(len(arrays.words) - row):
+        while left := len(arrays.words) - row:
+            step = pace.take(left) or (0 if found else min(pace.steps, left))
+            if not step:
+                break
             n = kernels.candidate_batch(
                 arrays._replace(words=arrays.words[row : row + step]),
                 step,
