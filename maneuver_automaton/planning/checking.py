@@ -29,6 +29,7 @@ from maneuver_automaton.refinement.conditions import broken_condition
 from maneuver_automaton.search.inside import stays_inside
 
 PROVEN = (1e-3, 2e-5)  # [m] a hit counts if it is one for the finer cover of round shapes too
+AUDIT_S = 5e-3  # [s] that an audit takes, which nobody can stop
 
 
 class Condition(enum.Enum):
@@ -79,7 +80,7 @@ def check_plan(
         return Checked(audit=None, broken=Condition.BOUNDS, reason="it leaves the bounds")
     try:
         reason = what_is_hit(problem, plan, goal, workspace, budget=budget)
-        _ask(budget)
+        _ask(budget, AUDIT_S)
     except TooLate:
         return Checked(audit=None, broken=Condition.TIME)
     if reason:
@@ -101,8 +102,9 @@ def check_plan(
     return Checked(audit=audit, broken=broken, reason=audit.reason)
 
 
-def _ask(budget: Budget) -> None:
-    if budget.left_to_check == 0.0:
+def _ask(budget: Budget, needed: float = 0.0) -> None:
+    """Go on only if more than the time needed [s] is left."""
+    if budget.left_to_check <= needed:
         raise TooLate
 
 
