@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 from maneuver_automaton._interrupts import stopped
 
 COUNTED = 0.7  # share of the time left that a stage of counted work takes at most: others follow
+LATE_SHARE, LATE = 0.08, 0.01  # of the time, and [s], by which checks of an answer may be late
+MOMENT, SHARE = 4e-3, 0.25  # [s], and of the time left, between two looks at the clock
 
 
 @dataclass(slots=True, eq=False)
@@ -64,6 +66,7 @@ class Budget:
     expansions: int | None = None  # that are left; None: only the time counts
     clock: Callable[[], float] = time.monotonic  # seconds from some moment on
     watch: Watch | None = None  # once its gap is closed, no time is left
+    worked: float = -math.inf  # [s] processor time of this process at the begin; -inf: no matter
 
     @classmethod
     def from_now(
@@ -75,7 +78,13 @@ class Budget:
     ) -> Budget:
         """So many seconds from now on."""
         now = clock()
-        return cls(began=now, deadline=now + seconds, expansions=expansions, clock=clock)
+        return cls(
+            began=now,
+            deadline=now + seconds,
+            expansions=expansions,
+            clock=clock,
+            worked=time.process_time(),
+        )
 
     @property
     def seconds(self) -> float:
@@ -90,19 +99,24 @@ class Budget:
     @property
     def left(self) -> float:
         """Time that is left [s], at least 0."""
-        return 0.0 if self.is_over else max(self.deadline - self.clock(), 0.0)
+        return 0.0 if self.is_stopped else max(self.deadline - self.clock(), 0.0)
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether the gap is closed, or a signal asks to come to an end."""
+        return stopped() or (self.watch is not None and self.watch.is_closed)
 
     @property
     def is_over(self) -> bool:
-        """Whether no time is left, the gap is closed, or a signal asks to come to an end."""
-        closed = self.watch is not None and self.watch.is_closed
-        return closed or stopped() or self.clock() >= self.deadline
+        """Whether no time is left, or it is stopped."""
+        return self.is_stopped or self.clock() >= self.deadline
 
     def part(self, share: float, *, at_least: float = 0.0) -> Budget:
         """A budget of its own from now on: a share of the time left, at least so many seconds."""
         now = self.clock()
         seconds = max(share * self.left, at_least)
-        return replace(self, began=now, deadline=now + seconds)
+        worked = time.process_time() if self.worked > -math.inf else self.worked
+        return replace(self, began=now, deadline=now + seconds, worked=worked)
 
     def stage(self, share: float) -> Budget:
         """Budget of one stage: a share of the time left, a large one where work is counted.
@@ -113,6 +127,18 @@ class Budget:
             share = max(share, COUNTED)
         now = self.clock()
         return replace(self, deadline=now + share * self.left)
+
+    @property
+    def left_to_check(self) -> float:
+        """Time that is left to check what was found [s]: it may be a moment late.
+
+        What other programs have delayed is not late yet: the processor time of this one counts.
+        """
+        late = self.seconds + LATE_SHARE * self.seconds + LATE
+        spent = self.elapsed
+        if spent >= late:
+            spent = min(spent, time.process_time() - self.worked)
+        return max(late - spent, 0.0)
 
     def before(self, seconds: float) -> Budget:
         """The budget that ends so many seconds earlier: what follows takes these."""
@@ -126,3 +152,74 @@ class Budget:
 
 
 UNLIMITED = Budget(began=0.0, deadline=math.inf)
+
+
+@dataclass(slots=True, eq=False)
+class Pace:
+    """Steps of a kernel in portions that take a moment each, by what the last one took.
+
+    For work that is the same however it is parted. Where time gets short portions get smaller, so
+    that a dear step among cheap ones does little harm.
+
+    Examples
+    --------
+    >>> pace = Pace(UNLIMITED, steps=2)
+    >>> pace.take(9), pace.take(7) >= 1, Pace(Budget.from_now(0.0), steps=2).take(9)
+    (2, True, 0)
+    """
+
+    budget: Budget
+    steps: int  # that are taken first
+    most: int = 2**62
+    _taken: int = 0
+    _since: float = 0.0
+
+    def take(self, steps: int) -> int:
+        """How many of some steps to do now, those taken before being done; 0: the time is over."""
+        now = self.budget.clock()
+        left = self.budget.deadline - now
+        if left <= 0.0 or self.budget.is_stopped:
+            return 0
+        if self._taken:
+            fit = min(MOMENT, SHARE * left) * self._taken / max(now - self._since, 1e-9)
+            self.steps = int(min(max(fit, 1.0), 4 * self.steps, self.most))
+        self._taken, self._since = min(self.steps, steps), now
+        return self._taken
+
+    def go_on(self, budget: Budget) -> None:
+        """Take further steps after a while."""
+        self.budget, self._taken = budget, 0
+
+
+@dataclass(slots=True, eq=False)
+class EvenPace:
+    """Steps that all cost about the same: as many as fit, at most so many at once.
+
+    Portions are smaller than that, and a step that does not fit is not begun, only where time gets
+    short: for work that depends on how it is parted.
+
+    Examples
+    --------
+    >>> EvenPace(UNLIMITED, most=8, each=1e-3).take(9)
+    8
+    >>> pace = EvenPace(Budget(began=0.0, deadline=1.0, clock=lambda: 0.5), most=8, each=0.2)
+    >>> pace.take(9)
+    2
+    """
+
+    budget: Budget
+    most: int
+    each: float  # [s] guessed at first, then measured
+    _taken: int = 0
+    _since: float = 0.0
+
+    def take(self, steps: int) -> int:
+        """How many of some steps to do now, those taken before being done; 0: none fits."""
+        now = self.budget.clock()
+        if self.budget.is_stopped:
+            return 0
+        if self._taken:
+            self.each = max((now - self._since) / self._taken, 1e-9)
+        fits = max(self.budget.deadline - now, 0.0) / self.each
+        self._taken, self._since = int(min(steps, self.most, fits)), now
+        return self._taken

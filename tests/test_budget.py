@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from maneuver_automaton.budget import Budget
+from maneuver_automaton.budget import LATE, LATE_SHARE, MOMENT, Budget, EvenPace, Pace
 
 DAY = 86400.0  # [s] no test takes as long
 
@@ -57,3 +57,36 @@ def test_whatever_clock_there_is_is_asked_by_all_its_parts():
     now = 18.0
     assert budget.is_over
     assert budget.stage(0.5).is_over
+
+
+def test_what_was_found_may_be_checked_a_moment_longer():
+    now = 10.0
+    budget = Budget(began=10.0, deadline=18.0, clock=lambda: now)
+    assert budget.left_to_check == pytest.approx(8.0 * (1.0 + LATE_SHARE) + LATE)
+    now = 18.0 + 8.0 * LATE_SHARE + LATE
+    assert budget.left_to_check == 0.0
+    delayed = Budget(began=10.0, deadline=18.0, clock=lambda: now, worked=time.process_time())
+    assert delayed.left_to_check > 8.0
+
+
+def test_portions_of_work_take_a_moment_each():
+    now = 0.0
+    pace = Pace(Budget(began=0.0, deadline=1.0, clock=lambda: now), steps=64, most=256)
+    taken = []
+    for each in (1e-5, 1e-5, 1e-3, 1e-3, 1e-3):  # [s] of a step
+        taken.append(pace.take(10**6))
+        now += taken[-1] * each
+    assert taken[1:3] == [256, 256]
+    assert taken[3:] == [pytest.approx(MOMENT / 1e-3, abs=1)] * 2
+    now = 1.0
+    assert pace.take(3) == 0
+
+
+def test_even_steps_are_parted_only_where_time_gets_short():
+    now = 0.0
+    pace = EvenPace(Budget(began=0.0, deadline=1.0, clock=lambda: now), most=10, each=0.01)
+    taken = []
+    while step := pace.take(100):
+        taken.append(step)
+        now += 0.03 * step
+    assert taken == [10, 10, 10, 3]  # the next would end at 1.02 s

@@ -21,7 +21,7 @@ from maneuver_automaton.cli.compiling import COMPILING
 from maneuver_automaton.formats import load_plan
 from maneuver_automaton.models import rollout
 from maneuver_automaton.planning import PlanResult, PlanStatus
-from maneuver_automaton.problem import Bounds, Problem
+from maneuver_automaton.problem import Bounds, Horizon, Problem
 from maneuver_automaton.scenario import load_scenario
 from tests import translations as vehicles
 from tests.scenario.files import SCENARIO, automaton, but
@@ -496,6 +496,17 @@ def test_no_traceback_reaches_a_user(folder, capsys, monkeypatch, raised, code, 
     monkeypatch.setattr(planning, "plan", plan)
     assert run(["plan", "x.yaml", "--quiet"]) == code
     assert capsys.readouterr().err == printed
+
+
+def test_a_wrong_value_of_the_package_itself_does_not_read_as_bad_input(
+    folder, capsys, monkeypatch
+):
+    def plan(*args: object, **kwargs: object) -> None:
+        Horizon(max_trims=0)
+
+    monkeypatch.setattr(planning, "plan", plan)
+    assert run(["plan", "x.yaml", "--quiet"]) == 2
+    assert capsys.readouterr().err.startswith("internal error: ValueError: ")
 
 
 def test_details_of_a_bug_on_demand(folder, capsys, monkeypatch):

@@ -29,6 +29,7 @@ DEFECT_TOLERANCE = 1e-8  # [m, rad] between plan and integration, per metre, rad
 TERMINAL_TOLERANCE = 1e-9  # [m, rad] of the last pose, beyond the goal's own tolerance
 LIMIT_TOLERANCE = 1e-9  # relative to the limit, at least to 1, by which a value may exceed it
 STATE_TOLERANCE = 1e-9  # [model's units] of the first and the last reduced state
+MOST_TURNED = 2e4  # [rad] of a plan that is driven again, in elements of less than a radian each
 UNRESOLVED = 1e-3  # [m] by which a distance may not be known sharply enough to decide
 
 Around: TypeAlias = Callable[[tuple[AnyObstacle, ...], tuple[float, float]], Surroundings]
@@ -86,6 +87,13 @@ def audit_plan(
         the true one. None without obstacles.
     """
     near = seen_from(plan, goal)
+    turned = sum(
+        abs(float(t.body_velocity[2])) * d for t, d in zip(near.trims, near.durations, strict=True)
+    )
+    if turned > MOST_TURNED:
+        return _not_driven(
+            near, goal, f"it turns by {turned:.3g} rad, need at most {MOST_TURNED:g}"
+        )
     drive = driven(near, model)
     missed = distance_to(drive.end, goal)
     reasons = []
@@ -114,6 +122,19 @@ def audit_plan(
         terminal_position_m=missed.position_m,
         terminal_heading_rad=missed.heading_rad,
         reason="; ".join(reasons),
+    )
+
+
+def _not_driven(near: Plan, goal: Goal, reason: str) -> Audit:
+    """The audit of a plan that nobody can drive again."""
+    missed = distance_to(near.end, goal)
+    return Audit(
+        passed=False,
+        max_dynamics_defect=math.inf,
+        min_clearance_m=None,
+        terminal_position_m=missed.position_m,
+        terminal_heading_rad=missed.heading_rad,
+        reason=reason,
     )
 
 

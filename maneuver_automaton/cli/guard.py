@@ -6,7 +6,6 @@ import functools
 import os
 import sys
 from collections.abc import Callable
-from pathlib import Path
 from typing import ParamSpec
 
 import typer
@@ -27,7 +26,7 @@ def complain(line: str) -> None:
 
 def explained(error: Exception) -> str:
     """One line for whatever a command raised."""
-    if isinstance(error, ManeuverAutomatonError) or _is_worded(error):
+    if isinstance(error, ManeuverAutomatonError):
         return str(error)
     if isinstance(error, OSError) and error.strerror:
         return f"{str(error.filename or 'a file')[:200]}: {error.strerror}"
@@ -40,19 +39,6 @@ def explained(error: Exception) -> str:
     return (
         f"internal error: {type(error).__name__}: {error}; this is a bug of the program, "
         f"{DEBUG}=1 shows where"
-    )
-
-
-def _is_worded(error: Exception) -> bool:
-    """Whether the package itself found a value to be wrong, and says which."""
-    place = error.__traceback__
-    while place is not None and place.tb_next is not None:
-        place = place.tb_next
-    ours = Path(__file__).parents[1]
-    return (
-        isinstance(error, ValueError)
-        and place is not None
-        and ours in Path(place.tb_frame.f_code.co_filename).parents
     )
 
 

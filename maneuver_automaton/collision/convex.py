@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from maneuver_automaton.collision.shapes import Box, Disc, Polygon, Shape
 TINY_EDGE = 1e-6  # [m]
 MOST_MERGED = 60  # triangles that are joined to larger pieces; more stay as they are
 DIGITS = 9  # decimals of coordinates seen from a frame [m, rad]
+
+_Corner: TypeAlias = tuple[float, float]
+_Ring: TypeAlias = tuple[_Corner, ...]
 
 
 class Solids(NamedTuple):
@@ -201,33 +204,49 @@ def _decomposed(shape: Polygon) -> list[Array]:
 
 def _merged(pieces: list[Array]) -> list[Array]:
     """Join neighbours across an edge as long as what comes out is convex."""
-    pieces = [piece for piece in pieces if len(piece) >= 3]
-    # Every union starts the search for the next one again, which is too much for thousands.
-    joined = len(pieces) <= MOST_MERGED
-    while joined:
-        joined = False
-        edges: dict[tuple[tuple[float, ...], tuple[float, ...]], int] = {}
-        for k, piece in enumerate(pieces):
-            for a, b in zip(piece, np.roll(piece, -1, axis=0), strict=True):
-                edges[(tuple(a), tuple(b))] = k
-        for (a, b), k in edges.items():
-            other = edges.get((b, a))
-            if other is None or other == k:
-                continue
-            union = _union(pieces[k], pieces[other], a, b)
-            if union is not None and _is_convex(union):
-                pieces = [p for i, p in enumerate(pieces) if i not in (k, other)] + [union]
-                joined = True
-                break
-    return pieces
+    rings = [tuple((x, y) for x, y in piece.tolist()) for piece in pieces if len(piece) >= 3]
+    if len(rings) > MOST_MERGED:
+        return [np.array(ring) for ring in rings]
+    apart: set[tuple[int, int, _Corner]] = set()  # pairs that stay two, and where they meet
+    numbered = dict(enumerate(rings))
+    number = len(rings)
+    while pair := _first_to_join(numbered, apart):
+        k, other, union = pair
+        del numbered[k], numbered[other]
+        numbered[number] = union  # it comes last
+        number += 1
+    return [np.array(ring) for ring in numbered.values()]
 
 
-def _union(one: Array, other: Array, a: tuple[float, ...], b: tuple[float, ...]) -> Array | None:
+def _first_to_join(
+    numbered: dict[int, _Ring], apart: set[tuple[int, int, _Corner]]
+) -> tuple[int, int, _Ring] | None:
+    """The first two neighbours that are convex together, and their ring.
+
+    Those that are not are noted in `apart`, and not tried again for every union.
+    """
+    edges = {edge: k for k, ring in numbered.items() for edge in _edges(ring)}
+    for (a, b), k in edges.items():
+        other = edges.get((b, a), k)
+        if other == k or (k, other, a) in apart:
+            continue
+        union = _union(numbered[k], numbered[other], a, b)
+        if union is not None and _is_convex(np.array(union)):
+            return k, other, union
+        apart.add((k, other, a))
+    return None
+
+
+def _edges(ring: _Ring) -> Iterator[tuple[_Corner, _Corner]]:
+    return zip(ring, ring[1:] + ring[:1], strict=True)
+
+
+def _union(one: _Ring, other: _Ring, a: _Corner, b: _Corner) -> _Ring | None:
     """Ring of two pieces that share the edge from `a` to `b`."""
-    begin = next(i for i, corner in enumerate(one) if tuple(corner) == b)
-    first = np.roll(one, -begin, axis=0)  # b ... a
-    begin = next(i for i, corner in enumerate(other) if tuple(corner) == a)
-    second = np.roll(other, -begin, axis=0)  # a ... b
-    if tuple(first[-1]) != a or tuple(second[-1]) != b:
+    begin = one.index(b)
+    first = one[begin:] + one[:begin]  # b ... a
+    begin = other.index(a)
+    second = other[begin:] + other[:begin]  # a ... b
+    if first[-1] != a or second[-1] != b:
         return None
-    return np.concatenate([first, second[1:-1]])
+    return first + second[1:-1]

@@ -14,7 +14,7 @@ import numpy as np
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Obstacle
-from maneuver_automaton.planning.checking import what_is_hit
+from maneuver_automaton.planning.checking import TooLate, what_is_hit
 from maneuver_automaton.planning.incumbents import Incumbents
 from maneuver_automaton.planning.polishing import Aimed, guess_along
 from maneuver_automaton.planning.tracking import Tracked, track
@@ -26,6 +26,7 @@ from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
 FIRST_SHARE = 0.8  # of the time limit, for a first path
 IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
 AT_ONCE = Patience(attempts=0, passes=0)
+STOPPING_S = 0.01  # [s] that it takes to stop and steer along a path
 WAITS = 9  # at rest, before a path is followed among moving obstacles
 
 
@@ -48,6 +49,8 @@ class AlongPaths:
             self.reason = f" ({first.reason})" if first.reason else ""
             return
         yield from _stopping(found, first.plan, first.goal_index)
+        if found.budget.is_over:
+            return
         if first.plan.duration > 0.0:
             self.guesses.append(guess_along(problem, first.plan))
         soon = found.budget.stage(IMPROVED_SHARE)
@@ -70,6 +73,8 @@ def _stopping(found: Incumbents, path: Plan, goal_index: int) -> Iterator[tuple[
     moving obstacles elsewhere: it waits before it starts, as long as it takes, or does not go.
     """
     problem, goal = found.problem, found.problem.goals[goal_index]
+    if found.budget.left_to_check < STOPPING_S:
+        return
     plan = stop_and_steer(
         problem.automaton.model,  # type: ignore[arg-type]
         path,
@@ -85,11 +90,15 @@ def _stopping(found: Incumbents, path: Plan, goal_index: int) -> Iterator[tuple[
         if isinstance(one, Obstacle) and one.motion is not None
     )
     for wait in np.linspace(0.0, max(settled - problem.start_time, 0.0), WAITS):
-        if wait > 0.0 and found.budget.is_over:
+        if found.budget.is_over:
             return
         durations = plan.durations.copy()
         durations[0] += wait
         later = replace(plan, durations=durations)
-        if not what_is_hit(problem, later, goal, found.workspace):
+        try:
+            hit = what_is_hit(problem, later, goal, found.workspace, budget=found.budget)
+        except TooLate:
+            return
+        if not hit:
             yield later, goal_index
             return

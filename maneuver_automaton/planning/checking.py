@@ -14,6 +14,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.audit import Audit, audit_plan, origin_of
 from maneuver_automaton.automaton import Automaton, Plan, Primitive
 from maneuver_automaton.automaton.carried import carried
+from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.collision import Box
 from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.collision.fcl_checker import FclChecker
@@ -28,6 +29,7 @@ from maneuver_automaton.refinement.conditions import broken_condition
 from maneuver_automaton.search.inside import stays_inside
 
 PROVEN = (1e-3, 2e-5)  # [m] a hit counts if it is one for the finer cover of round shapes too
+AUDIT_S = 5e-3  # [s] that an audit takes, which nobody can stop
 
 
 class Condition(enum.Enum):
@@ -37,6 +39,7 @@ class Condition(enum.Enum):
     BOUNDS = "bounds"
     COLLISION = "collision"  # with an obstacle, or with a zone that does not admit the motion
     AUDIT = "audit"
+    TIME = "time"  # of the checks themselves: nothing else is known to be broken
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -53,17 +56,33 @@ class Checked:
         return self.broken is None
 
 
+class TooLate(Exception):
+    """There is no time left to check a plan."""
+
+
 def check_plan(
-    problem: Problem, plan: Plan, goal: Goal, workspace: Workspace | None = None
+    problem: Problem,
+    plan: Plan,
+    goal: Goal,
+    workspace: Workspace | None = None,
+    *,
+    budget: Budget = UNLIMITED,
 ) -> Checked:
-    """Horizon and limits, bounds, FCL, audit, in this order; the first that fails ends it."""
+    """Horizon and limits, bounds, FCL, audit, in this order; the first that fails ends it.
+
+    They are given up, too, a moment after the time of a `budget` is over.
+    """
     workspace = workspace or workspace_of(problem.obstacles)
     reason = broken_condition(problem, plan)
     if reason:
         return Checked(audit=None, broken=Condition.WORD, reason=reason)
     if not stays_inside(plan, problem.bounds):
         return Checked(audit=None, broken=Condition.BOUNDS, reason="it leaves the bounds")
-    reason = what_is_hit(problem, plan, goal, workspace)
+    try:
+        reason = what_is_hit(problem, plan, goal, workspace, budget=budget)
+        _ask(budget, AUDIT_S)
+    except TooLate:
+        return Checked(audit=None, broken=Condition.TIME)
     if reason:
         return Checked(audit=None, broken=Condition.COLLISION, reason=reason)
     audit = audit_plan(
@@ -81,6 +100,12 @@ def check_plan(
     )
     broken = None if audit.passed else Condition.AUDIT
     return Checked(audit=audit, broken=broken, reason=audit.reason)
+
+
+def _ask(budget: Budget, needed: float = 0.0) -> None:
+    """Go on only if more than the time needed [s] is left."""
+    if budget.left_to_check <= needed:
+        raise TooLate
 
 
 def load_checks(problem: Problem, workspace: Workspace) -> None:
@@ -104,9 +129,20 @@ def load_checking() -> None:
 
 
 def what_is_hit(
-    problem: Problem, plan: Plan, goal: Goal, workspace: Workspace | None = None
+    problem: Problem,
+    plan: Plan,
+    goal: Goal,
+    workspace: Workspace | None = None,
+    *,
+    budget: Budget = UNLIMITED,
 ) -> str:
-    """Which edge hits what, or what a zone does not admit, by FCL; empty if none does."""
+    """Which edge hits what, or what a zone does not admit, by FCL; empty if none does.
+
+    Raises
+    ------
+    TooLate
+        A moment after the time of a `budget` is over.
+    """
     workspace = workspace or workspace_of(problem.obstacles)
     forbidden = what_zone_forbids(problem, plan, _origin(goal)) if problem.zones else ""
     if forbidden or not problem.obstacles:
@@ -121,7 +157,7 @@ def what_is_hit(
                 checker = workspace.checker(
                     shapes, layer.obstacles, problem.margin, _origin(goal), proven=proven
                 )
-                hit = _what_hits(checker, moving, layer, problem)
+                hit = _what_hits(checker, moving, layer, problem, budget)
                 if not hit:
                     break
             if hit:
@@ -129,7 +165,9 @@ def what_is_hit(
     return ""
 
 
-def _what_hits(checker: FclChecker, plan: Plan, layer: Layer, problem: Problem) -> str:
+def _what_hits(
+    checker: FclChecker, plan: Plan, layer: Layer, problem: Problem, budget: Budget
+) -> str:
     """Which primitive hits what of a layer, while its altitude is within reach of it."""
     if not plan.primitives:
         height = plan.start[3:].sum(keepdims=True)
@@ -138,6 +176,7 @@ def _what_hits(checker: FclChecker, plan: Plan, layer: Layer, problem: Problem) 
         hit = checker.pose_hit(plan.start[:3], time=plan.start_time)
         return "" if hit is None else f"obstacle {layer.numbers[hit]} is hit at the start"
     for k, primitive in enumerate(plan.primitives):
+        _ask(budget)
         start, begin = plan.switching_poses[k], float(plan.switching_times[k])
         if isinstance(primitive, Maneuver) and primitive.course is None:
             return f"maneuver {primitive.name!r} has no course, so it cannot be checked"

@@ -83,6 +83,8 @@ def _order(word: Word) -> tuple[float, int, tuple[int, ...]]:
 
 def _why_none(found: Incumbents, listed: _Listed) -> tuple[PlanStatus, str]:
     problem, refused = found.problem, found.refused
+    if found.why_unchecked:
+        return PlanStatus.OUT_OF_BUDGET, found.why_unchecked
     if refused[Condition.AUDIT]:
         return PlanStatus.NO_PLAN, (
             f"the audit rejected {refused[Condition.AUDIT]} plans: "

@@ -44,13 +44,13 @@ def plan_in_steps(
     )
     found.counts.update(expansions=0, collision_queries=0)
     paths, lattice, searched = AlongPaths(found), None, None
-    if steps.along_paths or steps.words or not steps.at_will:
+    if (steps.along_paths or steps.words or not steps.at_will) and not budget.is_over:
         load_checks(problem, found.workspace)
-    if steps.along_paths:
+    if steps.along_paths and not budget.is_over:
         _offer(found, paths.plans())
     if steps.words and not budget.is_over:
         _offer(found, _free_words(found, steps), proven=not problem.obstacles)
-    if steps.lattice and not (found.plans and budget.is_over):
+    if steps.lattice and not budget.is_over:
         lattice = search_lattice(found, steps)
         searched = budget.elapsed if lattice.knows_all else None
         found.offer_in_turn(improved(lattice))
@@ -119,6 +119,8 @@ def _why_none(
     proof = proof or (why_impossible(found.problem) if steps.at_will else "")
     if proof:
         return PlanStatus.UNREACHABLE, proof
+    if found.why_unchecked:
+        return PlanStatus.OUT_OF_BUDGET, found.why_unchecked
     if found.why_refused:
         return PlanStatus.NO_PLAN, f"every plan found was refused: {found.why_refused}"
     near = ""

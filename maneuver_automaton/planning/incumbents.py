@@ -21,7 +21,6 @@ from maneuver_automaton.refinement.fitting import fitted_plans, padded
 
 CHEAPER = 1e-7  # share of a cost that closing the end of a plan may change it by
 LATE = 8  # plans that may be refused once the time is over, before no other is checked
-LATE_S, LATE_SHARE = 0.01, 0.05  # [s], and of the time, in which they are
 OTHERS_SHARE = 0.1  # of the time, that is kept back for the checks of alternatives
 CHECK_S = 0.01  # [s] a check takes that nothing is known of yet
 LONGER = 1.3  # times the longest check so far, that the next one may take
@@ -70,6 +69,7 @@ class Incumbents:
     counts: Counter[str] = field(default_factory=Counter)
     refused: Counter[Condition] = field(default_factory=Counter)
     reasons: dict[Condition, str] = field(default_factory=dict)  # the first of each kind
+    unchecked: int = 0  # plans whose checks were given up, as the time was over
     misfits: list[tuple[Plan, int]] = field(default_factory=list)  # of no times that would do
     least_cost: float = math.inf  # cost of the cheapest plan that a search took to be free
     checking: float = 0.0  # [s] that the checks took
@@ -94,17 +94,18 @@ class Incumbents:
     @property
     def may_check(self) -> bool:
         """Whether there is time to check one more plan; always where there is none yet."""
-        return not self.plans or self.budget.left + self._moment >= self.longest_check
-
-    @property
-    def _moment(self) -> float:
-        """Time [s] by which the checks of an answer may exceed the limit."""
-        return LATE_SHARE * self.budget.seconds + LATE_S
+        return not self.plans or self.budget.left_to_check >= self.longest_check
 
     @property
     def why_refused(self) -> str:
         """Why the first plan was refused; empty if none was."""
         return next(iter(self.reasons.values()), "")
+
+    @property
+    def why_unchecked(self) -> str:
+        """That plans were found too late; empty if none was."""
+        late = f"a plan was found too late to be checked within {self.budget.seconds:.4g} s"
+        return late if self.unchecked else ""
 
     @property
     def rejected(self) -> int:
@@ -123,12 +124,14 @@ class Incumbents:
 
         Whether one passed them; what was not `proven` free may hit something without a word.
         """
-        none_fits = True
-        for fitted in fitted_plans(self.problem, plan, self.problem.goals[goal_index]):
+        none_fits, goal = True, self.problem.goals[goal_index]
+        for fitted in fitted_plans(self.problem, plan, goal, budget=self.budget):
             none_fits = False
             if self._keep(fitted, goal_index, proven=proven):
                 return True
-        if none_fits and proven:
+        if none_fits and self.budget.left_to_check == 0.0:
+            self.unchecked += 1
+        elif none_fits and proven:
             self._refuse(Condition.WORD, broken_condition(self.problem, padded(self.problem, plan)))
             self.misfits.append((plan, goal_index))
         return False
@@ -152,16 +155,19 @@ class Incumbents:
 
     def _is_late(self, late: int) -> bool:
         """Whether no other plan is checked after so many that were late."""
-        return late >= LATE or self.budget.elapsed > self.budget.seconds + self._moment
+        return late >= LATE or self.budget.left_to_check == 0.0
 
     def _keep(self, plan: Plan, goal_index: int, *, proven: bool) -> bool:
         """Keep a plan if it passes the checks; of one motion only the cheapest plan stays."""
         begin = self.budget.elapsed
         goal = self.problem.goals[goal_index]
-        checked = check_plan(self.problem, plan, goal, self.workspace)
+        checked = check_plan(self.problem, plan, goal, self.workspace, budget=self.budget)
         took = self.budget.elapsed - begin
         self.checking += took
         self.longest_check = max(self.longest_check, took)
+        if checked.broken is Condition.TIME:
+            self.unchecked += 1
+            return False
         if checked.broken is not None or checked.audit is None:
             if proven:
                 self._refuse(checked.broken or Condition.AUDIT, checked.reason)

@@ -44,6 +44,7 @@ PASSING_SHARE = 0.3  # of the time that is left, for paths that let moving obsta
 BEFORE_POLISHING = 0.2  # share of what is left that the lattice gets, where there was a plan
 ALONE_BEFORE_POLISHING = 0.4  # the same for better words where its own was the first
 FOR_THE_BEST = 0.6  # the same where alternatives are asked for
+TIMES_SHARE = 0.2  # of the time that is left, for the best times of one word
 FREE_WORDS = 4  # words of free space that are looked at for every alternative
 FREE_WORDS_SHARE = 0.3  # of the time that is left for alternatives
 MOST_DETOURS = 8  # known paths beside which others are looked for
@@ -102,8 +103,9 @@ class LatticeWords:
         """Offer the cheapest word with the best of its coasting times."""
         word, problem = self.words[-1], self.query.problem
         index = self.query.goal_index[word.goal]
-        better = with_relaxed_end(problem, plan_of_word(self.query, word), problem.goals[index])
-        if better is not None:
+        plan, part = plan_of_word(self.query, word), self.found.for_better.stage(TIMES_SHARE)
+        better = with_relaxed_end(problem, plan, problem.goals[index], budget=part)
+        if better is not None and self.found.may_check:
             self.found.offer(better, index, proven=False)  # it ends its coasts elsewhere
 
     def first_plan(

@@ -25,7 +25,7 @@ from maneuver_automaton.refinement.ready import load_lattice, load_maneuver_kern
 from maneuver_automaton.search.choose import load_search
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
 from maneuver_automaton.search.lattice_library import lattice_library
-from maneuver_automaton.search.linked_words import load_linked_words
+from maneuver_automaton.search.linked_words import load_linked_words, load_words_of
 from maneuver_automaton.search.ready import load_times_kernels
 
 BY_TIME = Cost(time=1.0)  # one value: what is prepared for it is found again
@@ -138,6 +138,8 @@ def load_steps(problem: Problem, workspace: Workspace) -> None:
             _load_libraries(problem, workspace)
         if _suits_words(problem) or steps.words:
             load_linked_words()
+            for goal in problem.goals:
+                load_words_of(problem, goal)
 
 
 def _load_libraries(problem: Problem, workspace: Workspace) -> None:

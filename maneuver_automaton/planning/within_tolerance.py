@@ -34,6 +34,7 @@ MOST_AIMS = 12  # poses that are aimed at where the goal itself is blocked
 SHARES = (1.0, 0.5, 0.25)  # of the tolerance that an end may use, until it is free
 LATER = (0.45, 0.8)  # shares of the time left for the first question, and for the second of three
 MOST_LAST = 4  # trims at the end whose times alone are changed where all of them hit something
+LOOSENED_SHARE = 0.1  # of the time, that is kept back for letting ends loose
 LEAST_TIME = 1e-3  # [s] for each question, also where the time is over
 SPARE = 3  # plans asked for each alternative: with loose ends some are one motion
 
@@ -50,10 +51,11 @@ def plan_within_tolerance(
     found = Incumbents(problem, budget, workspace, alternatives)
     asked = list(_questions(problem))
     results: list[PlanResult] = []
+    asking = budget.before(LOOSENED_SHARE * budget.seconds)
     for k, question in enumerate(asked):
-        if results and budget.is_over:
+        if results and asking.is_over:
             break
-        part = budget.part(1.0 if k == len(asked) - 1 else LATER[k], at_least=LEAST_TIME)
+        part = asking.part(1.0 if k == len(asked) - 1 else LATER[k], at_least=LEAST_TIME)
         part = replace(part, expansions=question.search.max_expansions)
         result = answer(question, part, workspace, alternatives=SPARE * alternatives)
         for at, cost in result.improvements:
@@ -65,6 +67,8 @@ def plan_within_tolerance(
             for plan in (result.plan, *(other.plan for other in result.alternatives)):
                 _offer_loosened(found, plan)
     if not found.plans:
+        if found.why_unchecked:
+            return found.none(PlanStatus.OUT_OF_BUDGET, found.why_unchecked)
         return found.none(*_why_none(problem, results[0], found.why_refused))
     return found.found(bound=_lower_bound(problem, results[0]), nodes=results[0].nodes)
 
@@ -168,11 +172,13 @@ def _with_loose_ends(problem: Problem, plan: Plan, goal: Goal, budget: Budget) -
 
     Where nothing is in the way the times of the whole word are the best there are.
     """
+    if budget.is_over:
+        return [plan]
     guarded = bool(problem.obstacles or problem.zones or not problem.bounds.are_open)
     n = len(plan.trims)
     firsts = sorted({0, *range(max(0, n - MOST_LAST), n)}) if guarded else [0]
     loose = [
-        with_relaxed_end(problem, plan, goal, share=share, first=first)
+        with_relaxed_end(problem, plan, goal, share=share, first=first, budget=budget)
         for first in firsts
         for share in (SHARES if guarded else SHARES[:1])
         if not budget.is_over

@@ -15,6 +15,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.conditions import broken_condition
 from maneuver_automaton.words import TimesStatus, solve_switching_times
@@ -23,8 +24,12 @@ CHANGED = 2  # trims at most that are left out, or no longer so, to meet a least
 RESTARTS = 2
 
 
-def fitted_plans(problem: Problem, plan: Plan, goal: Goal) -> Iterator[Plan]:
+def fitted_plans(
+    problem: Problem, plan: Plan, goal: Goal, *, budget: Budget = UNLIMITED
+) -> Iterator[Plan]:
     """Plans of the same word that keep to the horizon, the cheapest first; none if none is known.
+
+    A moment after the time of a `budget` is over, those that were found by then.
 
     Examples
     --------
@@ -44,6 +49,8 @@ def fitted_plans(problem: Problem, plan: Plan, goal: Goal) -> Iterator[Plan]:
         return
     found: list[Plan] = []
     for least, longest in _coasting_limits(problem, plan):
+        if budget.left_to_check == 0.0:
+            break
         again = _solved(problem, plan, goal, least, longest)
         if again is None or broken_condition(problem, again):
             continue

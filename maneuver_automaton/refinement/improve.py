@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from maneuver_automaton.budget import UNLIMITED, Budget
+from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.refinement._kernels_improve import attempt_all
 from maneuver_automaton.refinement.restarts import RANDOM, Restart, Restarts
 from maneuver_automaton.refinement.work import improve_task, shortcut, word_of, work_of
@@ -37,7 +37,7 @@ MOST_CHUNK = 16384  # expansions between two looks at the word of a search
 SEED = 20_09  # of the random draws
 MOST_OTHERS = 50  # words kept beside the best
 DRAWN = 400  # attempts whose random numbers are drawn at once
-TIMELY, TIMELY_LINKED = 400, 40  # attempts between two looks at the clock: some ms
+TIMELY, TIMELY_LINKED = 100, 10  # attempts before the first look at the clock: some ms
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -229,17 +229,17 @@ class Improvement:
         query = self.query
         work, state = work_of(query, word)
         task, scene = improve_task(query, word), query.scene()
+        pace = Pace(self.budget, TIMELY if query.library.at_will else TIMELY_LINKED)
         done = 0
         while done < attempts:
             n = min(DRAWN, attempts - done)
             uniform, normal = self.rng.random((n, 6)), self.rng.standard_normal((n, 3))
-            few = TIMELY if query.library.at_will else TIMELY_LINKED
-            for first in range(0, n, few):
-                if self.budget.is_over:
-                    break
-                some = slice(first, first + few)
+            first = 0
+            while step := pace.take(n - first):
+                some = slice(first, first + step)
                 draws = uniform[some], normal[some]
                 attempt_all(query.library.arrays, task, scene, work, state, *draws)
-                self.attempts += len(draws[0])
+                first += step
+            self.attempts += first
             done += n
         return word_of(work, state, word, query)

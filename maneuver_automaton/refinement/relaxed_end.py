@@ -12,6 +12,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING
+from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.fitting import without_nothing
@@ -26,7 +27,13 @@ RANK = 1e-9  # singular values below this, relative, count as none
 
 
 def with_relaxed_end(
-    problem: Problem, plan: Plan, goal: Goal, *, share: float = 1.0, first: int = 0
+    problem: Problem,
+    plan: Plan,
+    goal: Goal,
+    *,
+    share: float = 1.0,
+    first: int = 0,
+    budget: Budget = UNLIMITED,
 ) -> Plan | None:
     """A plan's word with the cheapest coasting times that end within the tolerance of a goal.
 
@@ -41,6 +48,8 @@ def with_relaxed_end(
         Of the tolerance that may be used.
     first : int
         First trim whose time may change: the motion before it stays, and stays collision-free.
+    budget : Budget
+        None is found once its time is over.
 
     Returns
     -------
@@ -59,11 +68,15 @@ def with_relaxed_end(
     """
     if not plan.trims:
         return None
-    times = _best_times(_Relaxation(problem, plan, goal, share, first))
+    times = _best_times(_Relaxation(problem, plan, goal, share, first), budget)
     if times is None:
         return None
     relaxed = without_nothing(replace(plan, durations=times))
     return relaxed if problem.cost_of(relaxed) < problem.cost_of(plan) else None
+
+
+class _OutOfTime(Exception):
+    """A solver that cannot be told to stop is left so."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +169,7 @@ class _Relaxation:
         return np.array(values), np.array(rows).reshape(len(values), times.size)
 
 
-def _best_times(task: _Relaxation) -> Array | None:
+def _best_times(task: _Relaxation, budget: Budget) -> Array | None:
     """The cheapest times; None if the solver found none that keep the conditions."""
     from scipy.optimize import Bounds, minimize
 
@@ -184,15 +197,24 @@ def _best_times(task: _Relaxation) -> Array | None:
         conditions.append(
             {"type": "ineq", "fun": lambda t: task.room(t)[0], "jac": lambda t: task.room(t)[1]}
         )
-    solved = minimize(  # type: ignore[call-overload]  # its stubs want one-dimensional types
-        lambda t: float(rates @ t) / scale,
-        begin,
-        jac=lambda t: rates / scale,
-        method="SLSQP",
-        bounds=Bounds(least, longest),
-        constraints=conditions,
-        options={"maxiter": ITERATIONS, "ftol": ACCURACY},
-    )
+
+    def ask(times: Array) -> None:
+        if budget.is_over:
+            raise _OutOfTime
+
+    try:
+        solved = minimize(  # type: ignore[call-overload]  # its stubs want one-dimensional types
+            lambda t: float(rates @ t) / scale,
+            begin,
+            jac=lambda t: rates / scale,
+            method="SLSQP",
+            bounds=Bounds(least, longest),
+            constraints=conditions,
+            callback=ask,
+            options={"maxiter": ITERATIONS, "ftol": ACCURACY},
+        )
+    except _OutOfTime:
+        return None
     times = np.clip(np.where(solved.x > NOTHING, solved.x, least), least, longest)
     return _closed(task, times) if np.isfinite(times).all() else None
 

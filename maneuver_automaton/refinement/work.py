@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.budget import UNLIMITED, Budget
+from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.refinement._kernels_points import begin_program, join_points, take_program
 from maneuver_automaton.refinement._kernels_word import AT_WILL, GAIN, LENGTH
 from maneuver_automaton.search.lattice_pass import with_cost
@@ -81,11 +81,13 @@ def shortcut(
     work, state = work_of(query, word, points=points)
     task, scene, arrays = improve_task(query, word), query.scene(), query.library.arrays
     cost = begin_program(arrays, work, state, times)
-    part = max(1, TIMELY_WORDS // (n_words * points))
-    for first in range(1, points, part):
-        if first > 1 and budget.is_over:
-            return word
+    most = max(1, TIMELY_WORDS // (n_words * points))  # the last points have the most connections
+    pace, first = Pace(budget, steps=most, most=most), 1
+    while part := pace.take(points - first):
         join_points(arrays, task, scene, work, first, first + part, n_words, GAIN * cost)
+        first += part
+    if first < points:
+        return word
     take_program(arrays, task, scene, work, state, cost)
     return word_of(work, state, word, query)
 

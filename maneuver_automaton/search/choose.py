@@ -16,10 +16,12 @@ from maneuver_automaton.search.ready import (
     load_word_kernels,
 )
 from maneuver_automaton.search.result import SearchResult
-from maneuver_automaton.search.word_scan import MOST_TRIMS
+from maneuver_automaton.search.setup import search_setup
+from maneuver_automaton.search.word_scan import MOST_TRIMS, load_tables
 from maneuver_automaton.search.words import search_words
 
 AFFORDABLE = 2.0  # [s] an exhaustive search may be expected to take when the method is `auto`
+LARGE = 200  # trims of a library whose tables are worth to be had ready
 SECONDS_PER_WORD = (0.0, 1e-6, 1e-6, 1e-6, 5e-5, 2e-3)  # by moving trims, measured, generous
 
 
@@ -32,6 +34,8 @@ def load_search(problem: Problem) -> None:
     if problem.search.method == "words" or (problem.search.method == "auto" and affordable):
         tail = int(any(goal.free_heading for goal in problem.goals))
         load_word_kernels(min((problem.horizon.max_trims or MOST_TRIMS) + tail, MOST_TRIMS))
+        if len(problem.automaton) > LARGE:
+            load_tables(search_setup(problem, problem.goals[0]))
     else:
         more = problem.start.size > 3 or problem.horizon.time or problem.horizon.max_time
         turned = any(goal.free_heading for goal in problem.goals)

@@ -58,9 +58,7 @@ def distance_grid(
     if not field.distance.size:
         return _none()
     width = float(np.maximum(high - low, field.cell).prod())
-    stride = 1
-    while width / (stride * field.cell) ** 2 > MOST_CELLS:
-        stride += 2  # odd: centres of cells stay centres of field cells
+    stride = stride_of(width, field.cell)
     cell = stride * field.cell
     origin = np.array([field.origin_x, field.origin_y]) - (stride // 2) * field.cell
     first = np.floor((low - origin) / cell).astype(int)
@@ -94,6 +92,23 @@ def distance_grid(
     )
     _kernels_distance.seed(grid, np.ascontiguousarray(seeds[:, :2]))
     return grid
+
+
+def stride_of(area: float, cell: float) -> int:
+    """Least odd number of field cells [m] a cell that parts an area [m^2] into few enough.
+
+    Odd, so that centres of cells stay centres of field cells.
+
+    Examples
+    --------
+    >>> stride_of(1e6, 1.0), stride_of(1.1e6, 1.0), stride_of(1e20, 1.0)
+    (1, 3, 10000001)
+    """
+    least = math.ceil(math.sqrt(area / MOST_CELLS) / cell)
+    stride = max(least - 2 + (least - 1) % 2, 1)  # one less than that, for what rounding has done
+    while area / (stride * cell) ** 2 > MOST_CELLS:
+        stride += 2
+    return stride
 
 
 def _none() -> DistanceGrid:

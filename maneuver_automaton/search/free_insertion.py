@@ -14,6 +14,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search.alternatives import in_order
@@ -38,6 +39,7 @@ FIRST_ROUNDS_OF_MANY = 2
 FULL = 2  # how many of the then cheapest words go on
 FULL_OF_MANY = 1
 ROUNDS = 60  # insertions into these
+SECONDS_A_ROUND = 3e-6  # for every trim of the library, measured
 GROWN = 2  # seeds that may grow beyond the limit before they are shortened
 SHORTENED = 3  # words that are tried with fewer trims where switches cost
 CHATTER = 5  # trims of a word in which two may chatter
@@ -132,18 +134,18 @@ def _improved(work: _Work) -> SearchResult:
         if words and (task.budget.is_over or (limit is not None and len(words) >= limit)):
             status = SearchStatus.OUT_OF_BUDGET
             break
-        words.append(_with_insertions(library, seed, most, rounds, counts))
+        words.append(_with_insertions(library, seed, most, _fitting(work, rounds), counts))
     counts["expansions"] = counts["seeds"] = len(words)
     words = sorted((word for word in words if math.isfinite(word.cost)), key=_cost)
     for k in range(min(len(words), max(FULL_OF_MANY if many else FULL, task.alternatives + 1))):
         if words[k].certificate < -ACCURACY * library.scale and not task.budget.is_over:
-            words[k] = _with_insertions(library, words[k], most, ROUNDS, counts)
+            words[k] = _with_insertions(library, words[k], most, _fitting(work, ROUNDS), counts)
     words = [_calmed(library, word) for word in words]
     binding = not words or min(words, key=_cost).certificate < -ACCURACY * library.scale
     if most < LONGEST and binding and not library.free_heading and not task.budget.is_over:
         words += _from_longer(library, begun, most, counts)
     if _prices_switches(problem) and not task.budget.is_over:
-        words += _with_fewer_switches(library, words)
+        words += _with_fewer_switches(library, words, task.budget)
     if (
         task.alternatives > 0 and not task.budget.is_over
     ):  # the best times of a seed's own word are locally optimal, too
@@ -153,6 +155,12 @@ def _improved(work: _Work) -> SearchResult:
     return SearchResult(
         status=status, solutions=tuple(in_order(_closed(work, words))), counts=counts
     )
+
+
+def _fitting(work: _Work, rounds: int) -> int:
+    """As many of some rounds of insertion as fit into the time left, at least one."""
+    fits = work.task.budget.left / (SECONDS_A_ROUND * len(work.library.rates))
+    return max(1, int(min(rounds, fits)))
 
 
 def _closed(work: _Work, words: Sequence[TimedWord]) -> list[Word]:
@@ -201,14 +209,16 @@ def _prices_switches(problem: Problem) -> bool:
     return not isinstance(cost, Cost) or cost.switch > 0.0 or cost.direction_change > 0.0
 
 
-def _with_fewer_switches(library: LibraryArrays, words: Sequence[TimedWord]) -> Iterator[TimedWord]:
+def _with_fewer_switches(
+    library: LibraryArrays, words: Sequence[TimedWord], budget: Budget
+) -> Iterator[TimedWord]:
     """The words found with fewer and fewer trims: where switches cost, these may pay."""
     if library.free_heading:
         return
     for word in words[:SHORTENED]:
         longer = word
         for most in range(len(word.trims) - 1, 0, -1):
-            short = shortened(library, longer, most)
+            short = None if budget.is_over else shortened(library, longer, most)
             if short is None:
                 break
             yield short
@@ -312,7 +322,7 @@ def _without_unused(trims: IntArray, times: Array) -> tuple[IntArray, Array]:
 def _seeds(work: _Work) -> Iterator[TimedWord]:
     """Cheapest words of the sub-library, in the library's numbers, rest and free turn appended."""
     found = _words_of_few(work, work.problem)
-    if not found and work.total is not None:
+    if not found and work.total is not None and not work.task.budget.is_over:
         found = _fast_words(work)
     yield from found
 
@@ -341,7 +351,9 @@ def _fast_words(work: _Work) -> list[TimedWord]:
     )
     met = []
     for seed in _words_of_few(least, hurry):
-        word = _with_insertions(library, seed, LONGEST, ROUNDS, {"insertions": 0})
+        if work.task.budget.is_over:
+            break
+        word = _with_insertions(library, seed, LONGEST, _fitting(least, ROUNDS), {"insertions": 0})
         if not math.isfinite(word.cost):
             continue
         quick = next(_solutions(least, word), None)

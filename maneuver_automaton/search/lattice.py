@@ -18,7 +18,7 @@ from maneuver_automaton.search.lattice_pass import Pass, both_ends, pass_of
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_schedules import Schedule, schedule_of
 from maneuver_automaton.search.lattice_task import Resolution
-from maneuver_automaton.search.reversal import forward_word, reversed_query
+from maneuver_automaton.search.reversal import forward_word, reversed_query, to_reverse
 from maneuver_automaton.words.word import Word
 
 Grids = tuple[DistanceGrid, DistanceGrid]  # distances to the goals and to the start
@@ -63,7 +63,7 @@ def first_plan(
     if query.settings.weight is not None:
         coarse = tuple(replace(one, weight=query.settings.weight) for one in coarse)
     passes = _begun(query, schedule, coarse, grids, table)
-    word, proof, total = None, "", 0
+    word, proof, total, left_out = None, "", 0, False
     while word is None:
         for one in passes:
             if not one.alive or total >= room or budget.is_over:
@@ -80,7 +80,11 @@ def first_plan(
         if word is not None or total >= room or budget.is_over or proof:
             break
         if stages and (not alive or total >= stages[0][0]):
-            passes += _begun(query, schedule, stages.pop(0)[1], grids, table)
+            _, resolutions = stages.pop(0)
+            if any(one.backwards for one in resolutions) and budget.left < to_reverse(query):
+                left_out = True
+                continue
+            passes += _begun(query, schedule, resolutions, grids, table)
         elif not alive:
             break
     ahead = [one for one in passes if not one.resolution.backwards]
@@ -88,7 +92,7 @@ def first_plan(
         word=word,
         expansions=total,
         queries=sum(one.queries for one in passes),
-        exhausted=word is None and not alive,
+        exhausted=word is None and not alive and not left_out,
         enclosed=proof,
         nearest=min(one.nearest for one in ahead) if word is None else math.inf,
         nodes=_expanded(query, passes) if query.settings.show_nodes else None,

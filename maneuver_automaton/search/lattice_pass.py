@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from maneuver_automaton.budget import UNLIMITED, Budget
+from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.search import _kernels_lattice as kernels
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
@@ -23,7 +23,8 @@ from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word, with_price
 
 FIRST_CHUNK = 64  # expansions
-TIMELY = 256  # expansions between two looks at the clock
+TIMELY = 256  # expansions between two looks at what was found
+AT_FIRST = 200_000  # words steered at the first expansion for which one is a portion of its own
 LONGER = 1.6  # times a least coasting time, for the longer of two coasts
 NO_EDGE = layout.COASTED
 LEAST = 1e-5  # share of the cost that a better word has to save
@@ -41,6 +42,7 @@ class Pass:
     table: CostTable
     arrays: SearchArrays
     library: LatticeArrays
+    pace: Pace
     chunk: int = FIRST_CHUNK
     alive: bool = True
 
@@ -72,11 +74,21 @@ class Pass:
     def run(self, n: int, upper_bound: float, *, budget: Budget = UNLIMITED) -> Word | None:
         """Expand up to `n` more nodes; a plan, if one was found that costs less than the bound."""
         left = self.expansions + n
+        self.pace.go_on(budget)
         while self.alive and self.expansions < left and not budget.is_over:
+            self._expand(min(left - self.expansions, TIMELY), upper_bound)
+            if self.task.stop_at_first and self.arrays.state[layout.FOUND]:
+                break
+            if self.task.ends_early and self.arrays.found[0] < upper_bound * (1.0 - LEAST):
+                break
+        return _word(self) if self.arrays.state[layout.FOUND] else None
+
+    def _expand(self, n: int, upper_bound: float) -> None:
+        """Expand up to `n` more nodes, a few at a time."""
+        left, stops = self.expansions + n, self.task.stop_at_first
+        while self.alive and (step := self.pace.take(left - self.expansions)):
             used = int(self.arrays.state[layout.N_NODES])
-            step = min(left - self.expansions, TIMELY)
-            room = used + self.library.most_children * (step + 1) + 2
-            self.arrays = with_room(self.arrays, room)
+            self.arrays = with_room(self.arrays, used + self.library.most_children * (step + 1) + 2)
             self.alive = bool(
                 kernels.expand(
                     self.arrays,
@@ -89,11 +101,8 @@ class Pass:
                     upper_bound,
                 )
             )
-            if self.task.stop_at_first and self.arrays.state[layout.FOUND]:
-                break
-            if self.task.ends_early and self.arrays.found[0] < upper_bound * (1.0 - LEAST):
-                break
-        return _word(self) if self.arrays.state[layout.FOUND] else None
+            if self.expansions >= left or (stops and self.arrays.state[layout.FOUND]):
+                return
 
 
 def pass_of(
@@ -112,7 +121,10 @@ def pass_of(
     room = search_arrays(scaled.library) if arrays is None else arrays
     room = with_room(room, len(task.roots) + 4)
     kernels.begin(room, task, scaled, scene, grid, table)
-    return Pass(query, resolution, task, scene, grid, table, room, scaled)
+    known = scaled.library
+    steered = max(len(known.words) * (1 + len(known.climbs)) * len(task.aims), 1)
+    pace = Pace(UNLIMITED, steps=max(1, min(FIRST_CHUNK, AT_FIRST // steered)))
+    return Pass(query, resolution, task, scene, grid, table, room, scaled, pace)
 
 
 def _with_coasts(query: LatticeQuery, resolution: Resolution, sign: float) -> LatticeArrays:

@@ -14,8 +14,8 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.budget import UNLIMITED, Budget
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.alternatives import TIE, in_order
 from maneuver_automaton.search.result import SearchResult, SearchStatus
@@ -23,7 +23,7 @@ from maneuver_automaton.search.timed_word import TimedWord
 from maneuver_automaton.search.word_scan import scanned
 from maneuver_automaton.search.word_setup import WordSetup, word_setup
 from maneuver_automaton.words import _kernels_candidates as kernels
-from maneuver_automaton.words.library import four_columns
+from maneuver_automaton.words.library import NO_TRIM, four_columns
 
 ALPHABET = 24  # trims that words are made of, of a larger library those that differ most
 LONGEST = 4  # trims of a scanned word, unless fewer are asked for
@@ -32,7 +32,7 @@ HEADINGS = 24  # a free heading is tried at so many
 SLACK = 0.1  # share by which a word may be dearer than what is asked for before it is made good
 WORDS_AN_EXPANSION = 16  # that are looked at in the time of one expansion of the lattice
 EXPANSIONS_A_WORD = 8  # in place of solving one word for its times
-
+STEERED = 2000  # words between the first looks at the clock, some ms
 LATE_WORDS = 8  # that are made good once the time is over, where none has been before
 
 
@@ -66,9 +66,10 @@ def steer_linked_words(
     # the times of so few trims follow from the pose: to meet a time exactly is left to the scan
     headings = _headings(goal)[: 0 if setup.exactly else None]
     refined = bool(goal.free_heading or setup.limit or problem.horizon.min_coast)
-    found = _made_good(
-        setup, _steered(setup, headings), alternatives, upper_bound, budget, refined=refined
-    )
+    steered = _steered(setup, headings, budget)
+    found = list(
+        _made_good(setup, steered, alternatives, upper_bound, budget, refined=refined)
+    )  # before the status is known
     return _result(
         setup,
         found,
@@ -229,30 +230,44 @@ def _headings(goal: Goal) -> Array:
     return np.linspace(0.0, 2.0 * np.pi, HEADINGS, endpoint=False)
 
 
-def _steered(setup: WordSetup, headings: Array) -> Iterator[TimedWord]:
-    """Words of up to three trims and a climb that lead to the goal, cheapest first."""
+def _steered(setup: WordSetup, headings: Array, budget: Budget) -> Iterator[TimedWord]:
+    """Words of up to three trims and a climb that lead to the goal, cheapest first.
+
+    Once the time is over, those of the rows of the library that were steered by then: the first
+    ones, which are the shortest, in any case.
+    """
     arrays, scratch = setup.library.arrays, setup.library.scratch()
     start, goal = four_columns(np.array([setup.problem.start, setup.goal.pose]))[:, None]
-    found: list[tuple[Array, IntArray, IntArray, Array]] = []  # costs, rows, climbs, times
-    for heading in headings:
-        goal[0, 2] = heading
-        n = kernels.candidate_batch(
-            arrays,
-            len(arrays.words),
-            start,
-            setup.start_trim,
-            goal,
-            setup.goal_trim,
-            math.inf,
-            scratch,
-        )
-        one = scratch.costs, scratch.rows, scratch.climbs, scratch.times
-        found.append((one[0][:n].copy(), one[1][:n].copy(), one[2][:n].copy(), one[3][:n].copy()))
+    found: list[tuple[Array, ...]] = []  # costs, numbers of headings, climbs, rows, times
+    for number, heading in enumerate(headings):
+        goal[0, 2], row = heading, 0
+        pace = Pace(budget, steps=max(1, STEERED // (1 + len(arrays.climbs))))
+        while left := len(arrays.words) - row:
+            step = pace.take(left) or (0 if found else min(pace.steps, left))
+            if not step:
+                break
+            n = kernels.candidate_batch(
+                arrays._replace(words=arrays.words[row : row + step]),
+                step,
+                start,
+                setup.start_trim,
+                goal,
+                setup.goal_trim,
+                math.inf,
+                scratch,
+            )
+            costs, times = scratch.costs[:n].copy(), scratch.times[:n].copy()
+            rows, climbs = scratch.rows[:n] + row, scratch.climbs[:n].copy()
+            found.append((costs, np.full(n, number), climbs, rows, times))
+            row += step
     if not found:
         return
-    costs, rows, climbs, times = (np.concatenate(each) for each in zip(*found, strict=True))
+    costs, numbers, climbs, rows, times = (
+        np.concatenate(each) for each in zip(*found, strict=True)
+    )
     costs = costs + setup.switch * np.maximum(np.count_nonzero(times > 0.0, axis=1) - 1, 0)
-    for k in np.argsort(costs, kind="stable"):
+    in_turn = (climbs[:, None] == [NO_TRIM, *arrays.climbs]).argmax(axis=1)
+    for k in np.lexsort((rows, in_turn, numbers, costs)):  # the same however it is parted
         word = np.append(arrays.words[rows[k]], climbs[k])
         used = word >= 0
         yield TimedWord(tuple(word[used].tolist()), times[k, used], cost=float(costs[k]))
@@ -269,3 +284,8 @@ def load_linked_words() -> None:
     problem = Problem(robot, [0, 0, 0], goal, start_trim="ahead")
     steer_linked_words(problem, goal)
     scan_linked_words(problem, goal)
+
+
+def load_words_of(problem: Problem, goal: Goal) -> None:
+    """Have the words ready that all problems of a vehicle at a cost are steered along."""
+    word_setup(problem, goal, most_trims=ALPHABET, steers=True)

@@ -25,6 +25,17 @@ from maneuver_automaton.search.scene import for_library
 from maneuver_automaton.words.library import library_of
 from maneuver_automaton.words.word import Word
 
+SECONDS_A_MANEUVER, SECONDS_A_WORD = 1e-3, 2e-6  # measured, generous
+
+
+def to_reverse(query: LatticeQuery) -> float:
+    """Time [s] that it may take to make the reversed library of a query, which cannot be stopped.
+
+    By the number of maneuvers, whose courses are sampled and priced anew, and of words.
+    """
+    words = len(query.library.arrays.library.words)
+    return SECONDS_A_MANEUVER * len(query.automaton.maneuvers) + SECONDS_A_WORD * words
+
 
 def reversed_query(query: LatticeQuery) -> LatticeQuery | None:
     """The query from goal to start; None where obstacles move, or with several goals."""

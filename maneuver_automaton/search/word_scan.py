@@ -5,6 +5,7 @@ Words with transitions are scanned as they are seen from before them; see `_kern
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.budget import Budget
+from maneuver_automaton.budget import Budget, EvenPace
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.alternatives import tied
@@ -28,6 +29,7 @@ NODES = 64  # per scanned time, bisected where the function bends
 NODES_2D = 32  # per scanned time where there are two
 TOLERANCE = 1e-12  # relative, for tangent circles and parallel lines
 CAPACITY = 4096
+SECONDS_PER_WORD = (1e-6, 1e-6, 1e-6, 5e-6, 1e-3, 2e-2)  # by trims, where little time is left
 
 BoolArray = NDArray[np.bool_]
 
@@ -62,6 +64,8 @@ def scanned(
         finished = scan.run(budget, most_words)
         if scan.n_found <= capacity:
             return scan, finished
+        if budget.is_over:  # there is no time to scan them again, with room for all
+            return scan, False
         capacity = 2 * scan.n_found
 
 
@@ -174,17 +178,19 @@ class WordScan:
         """Scan all words of `n` trims with one kernel, `chunk` at a time; False at a limit."""
         tail = 1 if self.setup.free_heading else 0
         number, last = 0, len(self.setup.trims) ** n
+        # Another portion may prune other words, and count them so: it is smaller only at the end.
+        pace = EvenPace(budget, most=chunk, each=SECONDS_PER_WORD[min(n + tail, 5)])
         while number < last:
-            left = chunk if max_words is None else max(max_words - self.n_words, 1)
-            until = min(number + min(chunk, left), last)
+            left = last if max_words is None else max(max_words - self.n_words, 1)
+            step = pace.take(min(left, last - number))
+            if not step:
+                return False
             upper_bound = tied(float(self.found.best[-1]))
             number = scan(
-                *mode.kernel_problem, self.candidates, n + tail, number, until, upper_bound
+                *mode.kernel_problem, self.candidates, n + tail, number, number + step, upper_bound
             )
             if self.candidates.counter[0]:
                 self.polish(*mode.kernel_problem, self.candidates, self.found, self.most)
-            if budget.is_over:
-                return False
             if max_words is not None and self.n_words >= max_words:
                 return False
         return True
@@ -193,7 +199,7 @@ class WordScan:
         """Kernels that words of `n` trims need, and how many words at a time."""
         # Every chunk may lower the upper bound, and costs a call with all arrays. The clock is
         # asked between chunks: one of long words takes up to 25 ms.
-        few = 1024 if self.pruned else 50_000
+        few = 1024 if self.pruned else 2048
         if n <= 2 + mode.kernel_problem[0].targets.size:
             yield self.kernels.scan_flat_words, few
         if n == 3:
@@ -287,7 +293,7 @@ class WordScan:
 
     def solutions(self) -> Iterator[Word]:
         """Words found by rising cost, rest last; if pruned, those asked for, and ties."""
-        yield from [self._padded(word) for word in self.timed()]
+        yield from map(self._padded, self.timed())
 
     def timed(self) -> Iterator[TimedWord]:
         """The moving trims of what was found, by the automaton's numbers, and their times."""
@@ -330,6 +336,11 @@ class _Tables:
     reaches: Array  # (M,) [s]
 
 
+def load_tables(setup: SearchSetup) -> None:
+    """Have ready what all problems of a library share."""
+    _tables(setup)
+
+
 def _priced(rates: Array, paces: Array) -> Array:
     """Cost (M, 2) per metre and per radian, inf where a trim makes none."""
     none = np.full(paces.shape, np.inf)
@@ -370,8 +381,15 @@ def _reaches(setup: SearchSetup, twists: Array, periods: Array) -> Array:
 
 def _parallel(twists: Array) -> BoolArray:
     """Which pairs of twists span one line only (M, M), altitude aside."""
-    lengths = np.sqrt((twists[:, :3] ** 2).sum(axis=1)).clip(min=1e-300)
-    a, b, c = (twists[:, :3] / lengths[:, None]).T
+    return _parallel_rows(twists[:, :3].tobytes(), len(twists))
+
+
+@functools.lru_cache(maxsize=4)
+def _parallel_rows(rows: bytes, n: int) -> BoolArray:
+    """The same of `n` twists; of thousands it takes longer than most searches, so it is kept."""
+    twists = np.frombuffer(rows).reshape(n, 3)
+    lengths = np.sqrt((twists**2).sum(axis=1)).clip(min=1e-300)
+    a, b, c = (twists / lengths[:, None]).T
     minors = [np.outer(p, q) for p, q in ((a, b), (b, c), (c, a))]
     square = sum((minor - minor.T) ** 2 for minor in minors)
     return np.asarray(np.sqrt(square) < 1e-9)

@@ -153,7 +153,13 @@ def search_setup_words(
         problem, setup, most + int(padded), alternatives, nodes=SEED_NODES, spare=spare and padded
     )
     job.run(budget, None)
-    return list(in_order(job.solutions()))[: alternatives + 1]
+    cheapest: list[Word] = []
+    for word in job.solutions():  # by rising cost, but for a user's own prices
+        enough = len(cheapest) > alternatives and not job.own_prices
+        if enough and word.cost > tied(cheapest[alternatives].cost):
+            break
+        cheapest.append(word)
+    return list(in_order(cheapest))[: alternatives + 1]
 
 
 def resting(problem: Problem, setup: SearchSetup) -> SearchResult:

@@ -5,7 +5,6 @@ Everything here is the same for every start, goal and map: symmetry makes it reu
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -309,24 +308,27 @@ def words_of(trims: Sequence[int], transitions: Transitions) -> tuple[IntArray, 
 
     Those of the first few trims come first; how many they are.
     """
-    linked = np.isfinite(transitions.cost)
-    allowed = linked[np.ix_(transitions.class_of[list(trims)], transitions.class_of[list(trims)])]
-    number = {trim: k for k, trim in enumerate(trims)}
-    words = [(NO_TRIM, NO_TRIM, NO_TRIM), *((a, NO_TRIM, NO_TRIM) for a in trims)]
-    pairs = [(a, b) for a, b in itertools.permutations(trims, 2) if allowed[number[a], number[b]]]
-    words += [(a, b, NO_TRIM) for a, b in pairs]
-    words += [
-        (a, b, c) for a, b in pairs for c in trims if b != c and allowed[number[b], number[c]]
-    ]
-    few = {NO_TRIM, *trims[:FEW_TRIMS]}
-
-    def order(word: tuple[int, int, int]) -> tuple[bool, int, int, int, int]:
-        last = next((trim for trim in reversed(word) if trim != NO_TRIM), NO_TRIM)
-        return not few.issuperset(word), 3 - word.count(NO_TRIM), word[0], last, word[1]
-
-    words.sort(key=order)
-    n_few = sum(few.issuperset(word) for word in words)
-    return np.array(words, dtype=np.int64).reshape(-1, 3), n_few
+    classes = transitions.class_of[list(trims)]
+    joined = np.isfinite(transitions.cost)[np.ix_(classes, classes)]
+    joined &= ~np.eye(len(trims), dtype=np.bool_)
+    # Words as places in the list of trims; the last place, -1, holds no trim.
+    one, none = np.arange(len(trims)), np.full((joined.size * len(trims), 1), -1)
+    pairs = np.argwhere(joined)
+    first, third = np.nonzero(joined[pairs[:, 1]])
+    places = np.concatenate(
+        [
+            np.full((1, 3), -1),
+            np.column_stack([one, none[: one.size], none[: one.size]]),
+            np.column_stack([pairs, none[: len(pairs)]]),
+            np.column_stack([pairs[first], third]),
+        ]
+    )
+    words = np.append(np.array(trims, dtype=np.int64), NO_TRIM)[places]
+    size = (places >= 0).sum(axis=1)
+    last = words[np.arange(len(words)), np.maximum(size, 1) - 1]
+    few = (places < FEW_TRIMS).all(axis=1)
+    order = np.lexsort((words[:, 1], last, words[:, 0], size, ~few))
+    return words[order], int(few.sum())
 
 
 def most_different(twists: Array, n: int) -> IntArray:

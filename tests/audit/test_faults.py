@@ -12,7 +12,7 @@ from maneuver_automaton.audit import audit_plan
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.collision import Box, Disc, Obstacle, Zone
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.models import CarWithTrailer, SecondOrderCar, UserModel
+from maneuver_automaton.models import CarWithTrailer, SecondOrderCar, Unicycle, UserModel
 from maneuver_automaton.planning import checking
 from maneuver_automaton.planning.checking import Condition, check_plan
 from maneuver_automaton.primitives import Maneuver, Trim
@@ -147,6 +147,16 @@ def test_an_integration_that_fails_is_no_plan():
     audit = audit_plan(plan, Goal(pose=plan.end), bursting)
     assert not audit.passed
     assert audit.reason.startswith("the plan is ")
+
+
+def test_what_turns_without_end_is_not_driven_again():
+    """Each radian is an element: a coast of 1e9 s would take hundreds of gigabytes."""
+    spin = Trim(name="spin", body_velocity=[0.0, 0.0, -2.0], control=[0.0, -2.0])
+    for lasting, passes in ((90.0, True), (1e9, False)):
+        plan = Plan(np.zeros(3), (spin,), durations=[lasting])
+        audit = audit_plan(plan, Goal(pose=plan.end), Unicycle())
+        assert audit.passed is passes, audit.reason
+    assert audit.reason == "it turns by 2e+09 rad, need at most 20000"
 
 
 def test_a_trailer_that_is_pushed_far_is_followed():

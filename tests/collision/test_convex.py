@@ -10,7 +10,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from maneuver_automaton.collision import Box, Disc, Obstacle, Polygon
+from maneuver_automaton.collision import Box, Disc, Obstacle, Polygon, convex
 from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.collision.convex import convex_pieces, pieces_seen_from, solids_of
 from maneuver_automaton.collision.outline import outlines
@@ -167,3 +167,14 @@ def world_clearances(obstacles):
 def assert_below(found, obstacles, *, atol):
     exact = shapely_world((Box([1.0, 0.5]),), obstacles).clearance(PLACES)
     assert (found <= np.maximum(exact, 0.0) + atol).all()
+
+
+@pytest.mark.parametrize("n", [20, 58])
+def test_pieces_are_joined_in_few_tries(monkeypatch, n):
+    """Neighbours that are not convex together are not tried again for every union."""
+    angles = 2.0 * math.pi * np.arange(n) / n
+    radii = np.where(np.arange(n) % 2, 1.0, 0.6)
+    tries, union = [], convex._union
+    monkeypatch.setattr(convex, "_union", lambda *one: tries.append(0) or union(*one))
+    convex_pieces(Polygon(radii[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)))
+    assert n / 2 < len(tries) < 6 * n

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import functools
 import itertools
+import math
 from dataclasses import replace
 
 import pytest
 
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.collision import Box, Zone
+from maneuver_automaton.collision import Box, Disc, Zone
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning.checking import Condition
 from maneuver_automaton.planning.incumbents import LATE, Candidate, Incumbents
@@ -131,7 +132,8 @@ def test_checks_ask_the_clock_too():
     now = 2.0
     late = Incumbents(problem, over, Workspace(problem.obstacles))
     late.offer_in_turn(hits)
-    assert late.refused.total() == 1
+    assert (late.refused.total(), late.unchecked) == (0, 1)
+    assert late.why_unchecked == "a plan was found too late to be checked within 1 s"
     unhurried = incumbents(problem)
     unhurried.offer_in_turn(hits)
     assert unhurried.refused.total() == 3 * LATE
@@ -151,6 +153,17 @@ def test_no_other_plan_is_checked_where_the_time_is_over():
     found = Incumbents(FREE, over, Workspace(()), alternatives=2)
     found.offer_in_turn([Candidate(1.0, 0, lambda plan=plan: plan) for plan in (AHEAD, TURNING)])
     assert [one.plan for one in found.plans] == [AHEAD]
+
+
+def test_a_check_is_given_up_between_two_edges_and_not_where_others_have_delayed_it():
+    turns = driven("ahead", "left", "ahead", durations=[0.5, 0.1, 0.5])
+    problem = replace(FREE, goals=Goal(pose=turns.end), obstacles=(Disc(0.1, [0.0, 3.0]),))
+    for ticks, worked, checked in ((0.0, 0.0, True), (0.4, -math.inf, False), (0.4, 1e9, True)):
+        clock = itertools.count(0.9, ticks)
+        budget = Budget(began=0.0, deadline=1.0, clock=lambda c=clock: next(c), worked=worked)
+        found = Incumbents(problem, budget, Workspace(problem.obstacles))
+        assert found.offer(turns, 0) is checked
+        assert found.unchecked == (not checked)
 
 
 def test_the_time_of_checks_is_kept_back_from_searches():

@@ -28,10 +28,12 @@ TASKS = {
 }
 
 
-def looks_after(problem: Problem, looks: int, alternatives: int) -> tuple[int, PlanStatus]:
-    """How often the clock is looked at once it shows that the time is over, and the answer."""
+def looks_after(
+    problem: Problem, looks: int, alternatives: int, late: float
+) -> tuple[int, PlanStatus]:
+    """How often the clock is looked at once it shows `late` [s] of 1 s, and the answer."""
     seen = itertools.count()
-    budget = Budget(began=0.0, deadline=1.0, clock=lambda: 0.0 if next(seen) < looks else 1.02)
+    budget = Budget(began=0.0, deadline=1.0, clock=lambda: 0.0 if next(seen) < looks else late)
     workspace = workspace_of(problem.obstacles)
     result = plan_within(problem, budget, workspace, alternatives=alternatives)
     return next(seen) - looks, result.status
@@ -42,9 +44,13 @@ def test_nobody_goes_on_after_the_deadline(name: str) -> None:
     problem = TASKS[name]
     prepare(problem)
     for looks, alternatives in ((0, 0), (10, 4), (100, 4), (400, 4)):
-        after, _ = looks_after(problem, looks, alternatives)
+        after, _ = looks_after(problem, looks, alternatives, 1.5)
         assert after <= FEW, f"{after} looks after the first {looks}"
 
 
 def test_a_plan_that_was_found_in_time_is_checked_and_returned() -> None:
-    assert looks_after(TASKS["among obstacles"], 400, 0)[1] is PlanStatus.FOUND
+    assert looks_after(TASKS["among obstacles"], 400, 0, 1.02)[1] is PlanStatus.FOUND
+
+
+def test_a_plan_is_not_returned_late_for_its_checks() -> None:
+    assert looks_after(TASKS["among obstacles"], 400, 0, 1.5)[1] is PlanStatus.OUT_OF_BUDGET

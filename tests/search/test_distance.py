@@ -10,7 +10,7 @@ import pytest
 from maneuver_automaton.collision import Box, Disc, Obstacle, Polygon
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.search._kernels_distance import NARROW, distances
-from maneuver_automaton.search.distance_grid import distance_grid
+from maneuver_automaton.search.distance_grid import MOST_CELLS, distance_grid, stride_of
 from tests.collision import scenes
 from tests.reference_collision import shapely_world, still, world_around
 from tests.reference_lattice import cells_open, centre_clearances, grid_distances
@@ -128,6 +128,16 @@ def test_many_cells_are_made_larger():
     # centres of cells are centres of cells of the field
     off = (grid.origin_x + 0.5 * grid.cell - field.origin_x) / field.cell - 0.5
     assert off == pytest.approx(round(off), abs=1e-6)
+
+
+def test_the_size_of_cells_is_found_however_far_the_goal_is():
+    areas = MOST_CELLS * np.array([0.3, 1.0, 1.0 + 1e-12, 8.9, 9.0, 9.1, 1e5, 1e14])
+    for area in areas:
+        stride = stride_of(area, 1.0)
+        assert stride % 2 == 1
+        assert area / stride**2 <= MOST_CELLS
+        assert stride == 1 or area / (stride - 2) ** 2 > MOST_CELLS
+    assert stride_of(1e24, 1e-3) == 10**12 + 1  # by no loop: a goal may be 1e10 m away
 
 
 def test_on_the_rim_of_what_is_searched():
