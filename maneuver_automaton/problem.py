@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, freeze
-from maneuver_automaton._ceilings import check_size
+from maneuver_automaton._ceilings import MOST_TURNS, check_size
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton, Plan, Primitive
 from maneuver_automaton.automaton.headings import motion_of, posed
@@ -232,6 +232,13 @@ class Problem:
                 self.automaton.index_of(goal.trim)
         if self.start_trim is not None:
             self.automaton.index_of(self.start_trim)
+        if self.horizon.time is not None and dof > 2:
+            turns = self.horizon.time * np.abs(self.automaton.body_velocities[:, 2]).max() / math.tau
+            if turns > MOST_TURNS:
+                raise ValueError(
+                    f"horizon: time is {self.horizon.time:g} s, in which the {turns:.3g} whole "
+                    f"turns of a trim would all be tried, need at most {MOST_TURNS}"
+                )
         if not math.isfinite(self.start_time):
             raise ValueError(f"start: time must be finite, got {self.start_time} s")
         object.__setattr__(self, "obstacles", as_obstacles(self.obstacles))

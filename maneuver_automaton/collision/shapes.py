@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from maneuver_automaton._arrays import Array, as_array, freeze
-from maneuver_automaton._ceilings import FASTEST, FASTEST_TURN, check_size
+from maneuver_automaton._ceilings import FASTEST, FASTEST_TURN, LARGEST_BODY, check_size
 from maneuver_automaton.groups import SE2, LieGroup
 
 
@@ -304,9 +304,16 @@ def as_footprint(value: object) -> tuple[Shape, ...]:
     Raises
     ------
     ValueError
-        If it holds anything else.
+        If it holds anything else, or reaches too far.
     """
     if isinstance(value, Polygon | Disc | Box):
+        disc = isinstance(value, Disc)
+        points, around = (value.center, value.radius) if disc else (value.corners, 0.0)
+        reach = float(np.linalg.norm(points, axis=-1).max()) + around
+        if reach > LARGEST_BODY:
+            raise ValueError(
+                f"footprint: reaches {reach:g} m from the pose, need at most {LARGEST_BODY:g} m"
+            )
         return (value,)
     if isinstance(value, Sequence) and not isinstance(value, str):
         return tuple(one for part in value for one in as_footprint(part))
