@@ -233,7 +233,9 @@ class Problem:
         if self.start_trim is not None:
             self.automaton.index_of(self.start_trim)
         if self.horizon.time is not None and dof > 2:
-            turns = self.horizon.time * np.abs(self.automaton.body_velocities[:, 2]).max() / math.tau
+            turns = (
+                self.horizon.time * np.abs(self.automaton.body_velocities[:, 2]).max() / math.tau
+            )
             if turns > MOST_TURNS:
                 raise ValueError(
                     f"horizon: time is {self.horizon.time:g} s, in which the {turns:.3g} whole "

@@ -75,12 +75,12 @@ def test_a_trim_that_nothing_drives_is_refused():
 
 def test_a_body_far_from_its_pose_is_refused():
     for shape in (Box([1.0, 1.0], [1e9, 0.0]), Disc(1e5), Polygon([[0, 0], [1, 0], [1, 2e4]])):
-        with pytest.raises(ValueError, match="footprint: reaches .* m from the pose, need at most"):
+        with pytest.raises(ValueError, match=r"footprint: reaches .* m from the pose"):
             Problem(ROBOT, [0, 0, 0], [1, 0, 0], footprint=shape)
 
 
 def test_a_fixed_time_of_turns_without_number_is_refused():
-    with pytest.raises(ValueError, match="time is 1e\\+09 s, in which the 1.59e\\+08 whole turns"):
+    with pytest.raises(ValueError, match=r"time is 1e\+09 s, in which the 1[.]59e\+08 whole"):
         Problem(ROBOT, [0, 0, 0], [1, 0, 0], horizon=Horizon(time=1e9))
     assert Problem(ROBOT, [0, 0, 0], [1, 0, 0], horizon=Horizon(time=1e3)).horizon.time == 1e3
 
@@ -97,7 +97,7 @@ def test_rides_that_need_elements_without_number_are_refused_together(monkeypatc
     )
     control = np.zeros((30, 1, 2))
     control[:, 0, 1] = 60.0
-    with pytest.raises(ValueError, match="the motion under control .* cannot be followed"):
+    with pytest.raises(ValueError, match=r"the motion under control .* cannot be followed"):
         drive_all(car, np.tile([9.0, -1.5], (30, 1)), control=control, durations=np.ones((30, 1)))
 
 

@@ -307,9 +307,7 @@ def as_footprint(value: object) -> tuple[Shape, ...]:
         If it holds anything else, or reaches too far.
     """
     if isinstance(value, Polygon | Disc | Box):
-        disc = isinstance(value, Disc)
-        points, around = (value.center, value.radius) if disc else (value.corners, 0.0)
-        reach = float(np.linalg.norm(points, axis=-1).max()) + around
+        reach = _reach(value)
         if reach > LARGEST_BODY:
             raise ValueError(
                 f"footprint: reaches {reach:g} m from the pose, need at most {LARGEST_BODY:g} m"
@@ -318,6 +316,13 @@ def as_footprint(value: object) -> tuple[Shape, ...]:
     if isinstance(value, Sequence) and not isinstance(value, str):
         return tuple(one for part in value for one in as_footprint(part))
     raise ValueError(f"footprint: got {value!r}, need Polygon, Disc or Box, or several")
+
+
+def _reach(shape: Shape) -> float:
+    """Greatest distance [m] of a point of a shape from the origin."""
+    if isinstance(shape, Disc):
+        return math.hypot(*shape.center) + shape.radius
+    return float(np.hypot(*shape.corners.T).max())
 
 
 def _ring(name: str, corners: ArrayLike) -> Array:
