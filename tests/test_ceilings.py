@@ -79,6 +79,13 @@ def test_a_body_far_from_its_pose_is_refused():
             Problem(ROBOT, [0, 0, 0], [1, 0, 0], footprint=shape)
 
 
+def test_a_heading_without_digits_is_refused():
+    with pytest.raises(ValueError, match=r"goal: pose: got the heading 1e\+10 rad, need at most"):
+        Goal(pose=[0.0, 0.0, 1e10])
+    with pytest.raises(ValueError, match=r"start: pose: got the heading -1e\+10 rad"):
+        Problem(ROBOT, [0, 0, -1e10], [1, 0, 0])
+
+
 def test_a_fixed_time_of_turns_without_number_is_refused():
     with pytest.raises(ValueError, match=r"time is 1e\+09 s, in which the 1[.]59e\+08 whole"):
         Problem(ROBOT, [0, 0, 0], [1, 0, 0], horizon=Horizon(time=1e9))
