@@ -16,7 +16,7 @@ FASTEST_TURN = 1e4  # [rad/s] of an obstacle that moves
 FASTEST_SPIN = 1e3  # [rad/s] of a trim, which a plan may hold for long
 MOST_HEADING = 1e6  # [rad] of a pose, which has no digits left for a millimetre beyond
 MOST_TURNS = 200  # whole turns within a fixed time, of which plans may have any number
-LARGEST_BODY = 1e5  # [m] from a vehicle's pose to any point of its body
+LARGEST_BODY = 1e7  # [m] from a vehicle's pose to any point of its body
 STEEPEST_STEERING = 1.5  # [rad] of a wheel; at a right angle nothing rolls
 LONGEST_STROKE = 1e4  # [m, rad] of one maneuver from rest to rest, which is sampled all along
 
