@@ -13,6 +13,11 @@ from numpy.typing import ArrayLike
 FARTHEST = 1e10  # [m] of a coordinate or a size, and of any other number of a file
 FASTEST = 5e3  # [m/s] of a trim, and of an obstacle that moves
 FASTEST_TURN = 1e4  # [rad/s] of an obstacle that moves
+FASTEST_SPIN = 1e3  # [rad/s] of a trim, which a plan may hold for long
+MOST_HEADING = 1e6  # [rad] of a pose, which has no digits left for a millimetre beyond
+MOST_TURNS = 200  # whole turns within a fixed time, of which plans may have any number
+LARGEST_BODY = 1e7  # [m] from a vehicle's pose to any point of its body
+STEEPEST_STEERING = 1.5  # [rad] of a wheel; at a right angle nothing rolls
 LONGEST_STROKE = 1e4  # [m, rad] of one maneuver from rest to rest, which is sampled all along
 
 
@@ -30,3 +35,21 @@ def check_size(name: str, values: ArrayLike) -> None:
     far = numbers[np.abs(numbers) > FARTHEST]
     if far.size:
         raise ValueError(f"{name}: got {far.flat[0]:g} m, need at most {FARTHEST:g} m in size")
+
+
+def check_heading(name: str, pose: ArrayLike) -> None:
+    """Raise a ValueError if the heading [rad] of a pose is beyond `MOST_HEADING`.
+
+    Examples
+    --------
+    >>> check_heading("start: pose", [0.0, 0.0, -1e9])
+    Traceback (most recent call last):
+        ...
+    ValueError: start: pose: got the heading -1e+09 rad, need at most 1e+06 rad in size
+    """
+    for heading in np.asarray(pose, dtype=np.float64)[2:3]:
+        if abs(heading) > MOST_HEADING:
+            raise ValueError(
+                f"{name}: got the heading {heading:g} rad, need at most {MOST_HEADING:g} rad in "
+                "size"
+            )

@@ -7,8 +7,9 @@ import math
 import os
 import signal
 import sys
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import FrameType
 
 BASE = 128  # exit code of a process that a signal ended, less the number of the signal
@@ -20,6 +21,7 @@ class _State:
     signal: int | None = None
     patient: int = 0  # blocks that end by themselves once `stopped`
     compiling: int = 0  # functions that the compiler is at work on: it asks nobody
+    tells: tuple[Callable[[], None], ...] = ()  # what to call when the first signal comes
 
 
 _STATE = _State()
@@ -41,21 +43,45 @@ def exit_code() -> int:
 
 
 @contextlib.contextmanager
-def patient() -> Iterator[None]:
+def patient(tell: Callable[[], None] | None = None) -> Iterator[None]:
     """A block that asks `stopped`, or a time limit, often: the first signal does not break it off.
+
+    That signal calls `tell`, for those that work for this process.
 
     Raises
     ------
     KeyboardInterrupt
-        If a signal came before, comes again, or while a kernel is compiled.
+        If a signal came before any such block, comes again, or while a kernel is compiled.
     """
-    if stopped():
+    if stopped() and not _STATE.patient:
         raise KeyboardInterrupt
+    before = _STATE.tells
     _STATE.patient += 1
+    _STATE.tells = before if tell is None else (*before, tell)
     try:
         yield
     finally:
+        _STATE.tells = before
         _STATE.patient -= 1
+
+
+def serving() -> None:
+    """In a process that works for another one: only note a signal, for whoever asks `stopped`."""
+    for one in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(one, _note)
+
+
+@contextlib.contextmanager
+def unheard() -> Iterator[None]:
+    """A block whose child processes never hear Ctrl-C: this process tells them."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @contextlib.contextmanager
@@ -87,10 +113,16 @@ def compiler_ended() -> None:
     _STATE.compiling -= 1
 
 
+def _note(number: int, _frame: FrameType | None) -> None:
+    _STATE.signal = number
+
+
 def _take(number: int, frame: FrameType | None) -> None:
     """Ask the block to end, if it is patient; otherwise break off."""
     again, _STATE.signal = stopped(), number
     if _STATE.patient and not _STATE.compiling and not again:
+        for tell in _STATE.tells:
+            tell()
         return
     while frame is not None:
         if frame.f_code.co_filename.startswith("<frozen importlib"):

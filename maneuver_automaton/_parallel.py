@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
+
+from maneuver_automaton._interrupts import patient, serving, stopped, unheard
 
 Piece = TypeVar("Piece")
 Result = TypeVar("Result")
@@ -17,6 +20,7 @@ def in_parallel(
     jobs: int = 1,
     scheduler: str | None = None,
     order: Literal["as given", "as done"] = "as given",
+    ends_early: bool = False,
 ) -> Iterator[Result]:
     """Results of all pieces, one by one as they come.
 
@@ -33,6 +37,9 @@ def in_parallel(
         the same work is sent there. Needs the package ``distributed``.
     order : str
         Results in the order of the pieces, or as they are done.
+    ends_early : bool
+        `function` asks `stopped`, here and in other processes: after a signal it comes to an end
+        by itself, and all results are waited for.
 
     Raises
     ------
@@ -46,7 +53,7 @@ def in_parallel(
     """
     if jobs < 1:
         raise ValueError(f"jobs must be at least 1, got {jobs}")
-    return _results(function, pieces, jobs, scheduler, order)
+    return _results(function, pieces, jobs, scheduler, order, ends_early)
 
 
 def _results(
@@ -55,9 +62,11 @@ def _results(
     jobs: int,
     scheduler: str | None,
     order: str,
+    ends_early: bool,
 ) -> Iterator[Result]:
     if jobs == 1 and scheduler is None:
-        yield from map(function, pieces)
+        with patient() if ends_early else contextlib.nullcontext():
+            yield from map(function, pieces)
         return
     from joblib import Parallel, delayed
 
@@ -65,7 +74,39 @@ def _results(
         lazily = "generator" if order == "as given" else "generator_unordered"
         returned = lazily if scheduler is None else "list"
         work = Parallel(n_jobs=jobs if scheduler is None else -1, return_as=returned)
-        yield from work(delayed(function)(piece) for piece in pieces)
+        if ends_early and scheduler is None:
+            yield from _patiently(work, function, pieces)
+        else:
+            yield from work(delayed(function)(piece) for piece in pieces)
+
+
+def _patiently(
+    work: Any, function: Callable[[Piece], Result], pieces: Sequence[Piece]
+) -> Iterator[Result]:
+    """Results of processes that are told of a signal, and come to an end by themselves."""
+    from joblib import delayed
+    from joblib.externals.loky import get_reusable_executor
+
+    with patient(_tell_children):
+        with unheard():  # the processes begin here
+            results = work(delayed(_served)(function, piece) for piece in pieces)
+        try:
+            yield from results
+        except Exception:
+            if not stopped():  # told before it could listen, a process has died of it
+                raise
+        if stopped():
+            get_reusable_executor().shutdown(kill_workers=True)  # they would end at once for ever
+
+
+def _served(function: Callable[[Piece], Result], piece: Piece) -> Result:
+    serving()
+    return function(piece)
+
+
+def _tell_children() -> None:
+    for child in multiprocessing.active_children():
+        child.terminate()
 
 
 @contextlib.contextmanager

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, freeze
-from maneuver_automaton._ceilings import check_size
+from maneuver_automaton._ceilings import MOST_TURNS, check_heading, check_size
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton, Plan, Primitive
 from maneuver_automaton.automaton.headings import motion_of, posed
@@ -60,6 +60,7 @@ class Goal:
         if self.pose.ndim != 1:
             raise ValueError(f"goal: pose has shape {self.pose.shape}, need one pose")
         check_size("goal: pose", self.pose[[0, 1, *range(3, self.pose.size)]])
+        check_heading("goal: pose", self.pose)
         for name in ("tolerance_m", "tolerance_rad"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
@@ -221,6 +222,7 @@ class Problem:
         if self.start.ndim != 1:
             raise ValueError(f"start: pose has shape {self.start.shape}, need one pose")
         check_size("start: pose", self.start[[0, 1, *range(3, dof)]])
+        check_heading("start: pose", self.start)
         check_size("margin", self.margin)
         for goal in self.goals:
             if goal.pose.size != dof:
@@ -232,6 +234,15 @@ class Problem:
                 self.automaton.index_of(goal.trim)
         if self.start_trim is not None:
             self.automaton.index_of(self.start_trim)
+        if self.horizon.time is not None and dof > 2:
+            turns = (
+                self.horizon.time * np.abs(self.automaton.body_velocities[:, 2]).max() / math.tau
+            )
+            if turns > MOST_TURNS:
+                raise ValueError(
+                    f"horizon: time is {self.horizon.time:g} s, in which the {turns:.3g} whole "
+                    f"turns of a trim would all be tried, need at most {MOST_TURNS}"
+                )
         if not math.isfinite(self.start_time):
             raise ValueError(f"start: time must be finite, got {self.start_time} s")
         object.__setattr__(self, "obstacles", as_obstacles(self.obstacles))

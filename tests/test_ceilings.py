@@ -1,5 +1,7 @@
 """What no vehicle does is refused where it enters, and the message says what would be right."""
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -9,8 +11,10 @@ from maneuver_automaton.collision import Box, Disc, Motion, OccupancyMap, Polygo
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.models import SecondOrderCar
 from maneuver_automaton.primitives import Trim
+from maneuver_automaton.primitives.driving import drive_all
 from maneuver_automaton.primitives.strokes import strokes
-from maneuver_automaton.problem import Goal
+from maneuver_automaton.problem import Goal, Horizon
+from maneuver_automaton.receding_horizon import simulate
 from maneuver_automaton.scenario.scenario import scenario_of_text
 
 ROBOT = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "left": (0.0, 1.0)})
@@ -65,6 +69,53 @@ def test_a_trim_that_nothing_drives_is_refused():
         ValueError, match="trim 'on': body_velocity holds 1e\\+07 m/s, need at most"
     ):
         Trim(name="on", body_velocity=[1e7, 0.0, 0.0], control=[1e7, 0.0])
+    with pytest.raises(ValueError, match="turns at 1e\\+09 rad/s, need at most 1000 rad/s"):
+        Trim(name="on", body_velocity=[0.0, 0.0, -1e9], control=[1e9])
+
+
+def test_a_body_far_from_its_pose_is_refused():
+    for shape in (Box([1.0, 1.0], [1e9, 0.0]), Disc(1e8), Polygon([[0, 0], [1, 0], [1, 2e8]])):
+        with pytest.raises(ValueError, match=r"footprint: reaches .* m from the pose"):
+            Problem(ROBOT, [0, 0, 0], [1, 0, 0], footprint=shape)
+
+
+def test_a_heading_without_digits_is_refused():
+    with pytest.raises(ValueError, match=r"goal: pose: got the heading 1e\+10 rad, need at most"):
+        Goal(pose=[0.0, 0.0, 1e10])
+    with pytest.raises(ValueError, match=r"start: pose: got the heading -1e\+10 rad"):
+        Problem(ROBOT, [0, 0, -1e10], [1, 0, 0])
+
+
+def test_a_fixed_time_of_turns_without_number_is_refused():
+    with pytest.raises(ValueError, match=r"time is 1e\+09 s, in which the 1[.]59e\+08 whole"):
+        Problem(ROBOT, [0, 0, 0], [1, 0, 0], horizon=Horizon(time=1e9))
+    assert Problem(ROBOT, [0, 0, 0], [1, 0, 0], horizon=Horizon(time=1e3)).horizon.time == 1e3
+
+
+def test_a_step_of_a_loop_far_shorter_than_its_plan_takes_no_memory():
+    loop = simulate(Problem(ROBOT, [0, 0, 0], [5, 0, 0]), step=1e-9, steps=2)
+    assert len(loop.steps) == 2
+
+
+def test_rides_that_need_elements_without_number_are_refused_together(monkeypatch):
+    monkeypatch.setattr("maneuver_automaton.primitives._collocation.MOST_ELEMENTS", 1000)
+    car = SecondOrderCar(
+        wheelbase=2.8, max_steering=0.75, max_speed=9.0, max_acceleration=1.0, max_steering_rate=0.5
+    )
+    control = np.zeros((30, 1, 2))
+    control[:, 0, 1] = 60.0
+    with pytest.raises(ValueError, match=r"the motion under control .* cannot be followed"):
+        drive_all(car, np.tile([9.0, -1.5], (30, 1)), control=control, durations=np.ones((30, 1)))
+
+
+def test_a_library_of_maneuvers_without_number_is_refused(monkeypatch):
+    model = SecondOrderCar(
+        wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
+    )
+    monkeypatch.setattr(sys.modules["maneuver_automaton.primitives.bang_bang"], "MOST", 100)
+    trims = {"speed": np.linspace(0.0, 2.0, 6), "steering": [0.0, 0.1]}
+    with pytest.raises(ValueError, match="got 132 maneuvers between 12 trims, need at most 100"):
+        Automaton.of_model(model, trims, pairs="all")
 
 
 @pytest.mark.parametrize(

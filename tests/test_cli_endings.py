@@ -10,9 +10,10 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from maneuver_automaton import _cache_files, _compile, _files, planning
@@ -23,14 +24,21 @@ from maneuver_automaton._interrupts import (
     patient,
     stopped,
 )
-from maneuver_automaton.cli import run
+from maneuver_automaton.cli import plan_command, run
 from maneuver_automaton.planning import PlanStatus
-from maneuver_automaton.receding_horizon import RecedingHorizon
+from maneuver_automaton.receding_horizon import RecedingHorizon, simulate
+from maneuver_automaton.roads import RoadPlanner
 from maneuver_automaton.scenario import build_file
+from maneuver_automaton.search import cost_to_go
 from maneuver_automaton.search.cost_to_go import FOLDER
+from tests.roads.files import GOAL, LANES, commonroad, interval, problem
 from tests.scenario.files import SCENARIO, but
 
 PLAN = ["plan", "x.yaml", "--no-plot"]
+LONG = SCENARIO.replace("x_trims: 4}", "").replace(  # never done before its time limit
+    "horizon: {time_s: free, ma", "obstacles: [{disc_m: {center: [0.5, 0.6], radius: 0.1}}]\n#"
+)
+LATE = GOAL.replace(interval("time", 20, 40), interval("time", 0, 5))
 AHEAD_ONLY = but("    - {name: spin, control: [0.0, 1.0]}\n", "")
 STREAMS = pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
 
@@ -231,7 +239,126 @@ def test_a_build_says_that_it_can_go_on(monkeypatch, capsys):
     assert capsys.readouterr().err == said
 
 
+@pytest.mark.parametrize("jobs", ["1", pytest.param("2", marks=pytest.mark.slow)])
+def test_a_folder_tells_of_every_file(monkeypatch, capfd, jobs):
+    for name in "abcd":
+        Path("many").mkdir(exist_ok=True)
+        Path("many", f"{name}.yaml").write_text(SCENARIO if name == "a" else LONG)
+    results = plan_command.in_parallel
+
+    def interrupted(function, problems, **settings):
+        for number, row in enumerate(results(function, problems, **settings)):
+            yield row
+            if number == 0:
+                at_once()  # as the terminal's Ctrl-C, which processes of ours do not hear
+
+    monkeypatch.setattr(plan_command, "in_parallel", interrupted)
+    with listening():
+        assert run(["plan", "many", "--jobs", jobs, "--no-plot", "--time-limit", "30"]) == 130
+    out, said = capfd.readouterr()
+    assert all(f"{name}.yaml" in out for name in "abcd")
+    assert "d.yaml: interrupted before it was planned" in said
+    assert "Traceback" not in said
+    assert "interrupted" not in json.loads(Path("out/a/plan.json").read_text())
+    if jobs == "2":  # b was under way
+        assert json.loads(Path("out/b/plan.json").read_text())["interrupted"] is True
+    assert not Path("out/d").exists()
+
+
+def test_statistics_are_of_the_loops_that_were_done(monkeypatch):
+    Path("x.yaml").write_text(SCENARIO + "receding_horizon: {step_s: 0.5}\n")
+    calls = itertools.count(1)
+
+    def interrupted(problem, **settings):
+        if next(calls) == 3:
+            at_once()
+        return simulate(problem, **settings)
+
+    monkeypatch.setattr(
+        sys.modules["maneuver_automaton.receding_horizon.statistics"], "simulate", interrupted
+    )
+    with listening():
+        assert run(["mpc", "x.yaml", "--no-plot", "--quiet", "--seeds", "5"]) == 130
+    document = written("statistics.json")
+    assert document["interrupted"] is True
+    assert document["loops_run"] == 2
+    calls = itertools.count(3)
+    Path("out/statistics.json").unlink()
+    with listening():
+        assert run(["mpc", "x.yaml", "--no-plot", "--quiet", "--seeds", "5"]) == 130
+    assert not Path("out/statistics.json").exists()  # none was done
+
+
+@pytest.mark.parametrize("step", [0, 3])
+def test_a_drive_on_roads(monkeypatch, step):
+    Path("road.xml").write_text(commonroad())
+    decide, calls = RoadPlanner.decide, itertools.count(-1)  # twice before the first step
+
+    def interrupted(*args, **settings):
+        if next(calls) == step:
+            at_once()
+        return decide(*args, **settings)
+
+    monkeypatch.setattr(RoadPlanner, "decide", interrupted)
+    with listening():
+        assert run(["mpc", "road.xml", "--no-plot", "--quiet"]) == 130
+    document = written("closed_loop.json")
+    assert document["interrupted"] is True
+    assert len(document["steps"]) == step + 1
+    assert "when the drive was interrupted" in document["reason"]
+
+
+@pytest.mark.parametrize("found", [True, False])
+def test_a_plan_on_roads(monkeypatch, found):
+    Path("road.xml").write_text(commonroad() if found else commonroad(*LANES, problem(goal=LATE)))
+    search = RoadPlanner.search
+
+    def interrupted(*args, **settings):
+        at_once()
+        return search(*args, **settings)
+
+    monkeypatch.setattr(RoadPlanner, "search", interrupted)
+    with listening():
+        assert run(["plan", "road.xml", "--no-plot", "--quiet"]) == 130
+    document = written()
+    assert document["interrupted"] is True
+    assert document["status"] == ("found" if found else "out_of_budget")
+    assert ("interrupted" in document["reason"]) is not found
+
+
 # --- kill -9 ---
+
+
+def killed(write: Callable[[], object]) -> bool:
+    """Call a function in a process of its own that is killed before its first file is there."""
+    child = os.fork()
+    if child == 0:
+        Path.replace = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
+        write()
+        os._exit(0)
+    return os.WIFSIGNALED(os.waitpid(child, 0)[1])
+
+
+WRITING = {
+    "out/plan.json": lambda: run([*PLAN, "--quiet"]),
+    "l.json": lambda: run(["automaton", "build", "x.yaml", "-o", "l.json"]),
+    "out/closed_loop.json": lambda: run(["mpc", "loop.yaml", "--no-plot", "--quiet"]),
+    "table": lambda: cost_to_go._save(np.ones(10_000, np.float32), Path("table").resolve()),
+}
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="fork")
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+@pytest.mark.parametrize("name", WRITING)
+def test_killed_while_it_writes_a_command_leaves_whole_files(capfd, name):
+    Path("loop.yaml").write_text(SCENARIO + "receding_horizon: {step_s: 0.5}\n")
+    assert killed(WRITING[name])
+    assert not Path(name).exists()
+    WRITING[name]()  # the next one finds nothing amiss
+    before = Path(name).read_bytes()
+    assert killed(WRITING[name])  # what would be replaced stays
+    assert Path(name).read_bytes() == before
+    assert capfd.readouterr().err == ""
 
 
 @pytest.mark.skipif(os.name != "posix", reason="SIGKILL")

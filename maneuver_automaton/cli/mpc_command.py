@@ -165,7 +165,7 @@ def _statistics(path: Path, scenario: Scenario, out: Path, settings: Settings) -
         except ValueError as error:
             raise _in_file(path, error) from error
     try:
-        save_statistics(statistics, out / "statistics.json")
+        save_statistics(statistics, out / "statistics.json", interrupted=stopped())
     except OSError as error:
         raise not_written(Path(error.filename or out), error) from error
     if not settings.quiet:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from maneuver_automaton._interrupts import stopped
+from maneuver_automaton._parallel import in_parallel
 from maneuver_automaton.budget import Watch
 from maneuver_automaton.cli import road_command
 from maneuver_automaton.cli.compiling import announced
@@ -90,29 +92,22 @@ def plan_folder(folder: Path, out: Path, *, settings: Settings, parts: Parts, jo
     from maneuver_automaton.cli.folders import problems_in
 
     problems = problems_in(folder, parts)
-    from joblib import Parallel, delayed
-
     make_folder(out)
     jobs = min(jobs, len(problems))
     if jobs > 1:
         _compile_first(settings)
-    work = Parallel(n_jobs=jobs, return_as="generator")(
-        delayed(_row)(path, needs, out / path.stem, settings, Path.cwd())
-        for path, needs in problems
-    )
+    one = functools.partial(_row, out=out, settings=settings, folder=Path.cwd())
     rows: list[Row] = []
     with progress_bar("planning", len(problems), quiet=settings.quiet) as advance:
-        for row in work:
+        for row in in_parallel(one, problems, jobs=jobs, ends_early=True):
             rows.append(row)
             advance()
-            if stopped():
-                break
     for row in rows:
         if row.code != FOUND:
             complain(row.reason)
     if not settings.quiet:
         _print_rows(rows)
-    return max(row.code for row in rows)
+    return max((row.code for row in rows), default=NO_PLAN)
 
 
 def _so_far(watch: Watch | None) -> str:
@@ -179,11 +174,16 @@ def _write(result: PlanResult, out: Path, settings: Settings) -> None:
         plotting.save_plan_animation(result.plan, out / "plan.gif", problem=result.problem)
 
 
-def _row(path: Path, parts: Parts, out: Path, settings: Settings, folder: Path) -> Row:
+def _row(problem: tuple[Path, Parts], *, out: Path, settings: Settings, folder: Path) -> Row:
     """Plan one file of a folder; what goes wrong is told in the row.
 
     Paths are relative to `folder`: a process that works for others may have begun elsewhere.
     """
+    path, parts = problem
+    out = out / path.stem
+    if stopped():
+        reason = f"{path}: interrupted before it was planned"
+        return Row(name=path.name, code=NO_PLAN, status="interrupted", reason=reason)
     try:
         with contextlib.chdir(folder):
             if road_command.is_road(path):

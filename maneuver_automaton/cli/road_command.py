@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from maneuver_automaton._interrupts import stopped
+from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written
@@ -51,6 +52,9 @@ def plan_file(
         except ValueError as error:
             raise _in_file(path, error) from error
     document = road_plan_to_dict(result)
+    if stopped() and result.plan is None:
+        result = replace(result, reason="interrupted before there was a plan")
+        document |= {"status": "out_of_budget", "reason": result.reason}
 
     def write() -> None:
         write_document(document, out / "plan.json", interrupted=stopped())
@@ -81,7 +85,7 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
             raise InvalidScenario(f"{name}: drives on roads have no such option; leave it out")
     scene, vehicle = _road(path, parts)
     make_folder(out)
-    with announced(quiet=settings.quiet):
+    with announced(quiet=settings.quiet), patient():
         try:
             planner = road_planner(scene, vehicle)
         except ValueError as error:

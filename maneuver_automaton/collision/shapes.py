@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from maneuver_automaton._arrays import Array, as_array, freeze
-from maneuver_automaton._ceilings import FASTEST, FASTEST_TURN, check_size
+from maneuver_automaton._ceilings import FASTEST, FASTEST_TURN, LARGEST_BODY, check_size
 from maneuver_automaton.groups import SE2, LieGroup
 
 
@@ -304,13 +304,25 @@ def as_footprint(value: object) -> tuple[Shape, ...]:
     Raises
     ------
     ValueError
-        If it holds anything else.
+        If it holds anything else, or reaches too far.
     """
     if isinstance(value, Polygon | Disc | Box):
+        reach = _reach(value)
+        if reach > LARGEST_BODY:
+            raise ValueError(
+                f"footprint: reaches {reach:g} m from the pose, need at most {LARGEST_BODY:g} m"
+            )
         return (value,)
     if isinstance(value, Sequence) and not isinstance(value, str):
         return tuple(one for part in value for one in as_footprint(part))
     raise ValueError(f"footprint: got {value!r}, need Polygon, Disc or Box, or several")
+
+
+def _reach(shape: Shape) -> float:
+    """Greatest distance [m] of a point of a shape from the origin."""
+    if isinstance(shape, Disc):
+        return math.hypot(*shape.center) + shape.radius
+    return float(np.hypot(*shape.corners.T).max())
 
 
 def _ring(name: str, corners: ArrayLike) -> Array:

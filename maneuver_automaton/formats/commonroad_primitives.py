@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray, freeze
-from maneuver_automaton._ceilings import FASTEST
+from maneuver_automaton._ceilings import FASTEST, STEEPEST_STEERING
 from maneuver_automaton._files import open_input, write_text_atomically
 from maneuver_automaton.automaton import Automaton, Trajectory
 from maneuver_automaton.errors import InvalidLibrary
@@ -308,10 +308,13 @@ def _primitive(row: Element) -> RoadPrimitive:
                 .need(name)
                 .error(f"got {states[0, k]:g}, need 0: a primitive begins at the origin")
             )
-    for state, speed in zip(rows, states[:, 3].tolist(), strict=True):
+    for state, (speed, steering) in zip(rows, states[:, 3:].tolist(), strict=True):
         if abs(speed) > FASTEST:
             said = f"got {speed:g} m/s, need at most {FASTEST:g} m/s in size"
             raise state.need("velocity").error(said)
+        if abs(steering) > STEEPEST_STEERING:
+            said = f"got {steering:g} rad, need at most {STEEPEST_STEERING:g} rad in size"
+            raise state.need("steering_angle").error(said)
     stated = int(lasting) if unit == TENTHS else lasting
     return RoadPrimitive(duration=stated, states=states, line=row.line, unit=unit)
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._ceilings import MOST_HEADING
 from maneuver_automaton.collision import Box, Obstacle
 from maneuver_automaton.formats.dynobench_models import (
     StatedModel,
@@ -22,7 +23,6 @@ from maneuver_automaton.formats.dynobench_models import (
     value_at,
 )
 from maneuver_automaton.formats.statement import StatedVehicle, Statement
-from maneuver_automaton.formats.text_source import MAX_YAW
 from maneuver_automaton.formats.yaml_source import Document, Where, shown
 from maneuver_automaton.problem import Bounds
 
@@ -85,9 +85,10 @@ def _end(document: Document, what: str, model: StatedModel) -> tuple[Array, Arra
     """Pose and reduced state of the start or the goal."""
     need = model.ends
     numbers = numbers_at(document, ("robots", 0, what), need.count(",") + 1, need)
-    if abs(numbers[2]) > MAX_YAW:
+    if abs(numbers[2]) > MOST_HEADING:
         raise document.error(
-            ("robots", 0, what, 2), f"got the heading {numbers[2]:g}, need at most {MAX_YAW:g} rad"
+            ("robots", 0, what, 2),
+            f"got the heading {numbers[2]:g}, need at most {MOST_HEADING:g} rad",
         )
     return pose_and_state(model.dynamics, numbers)
 

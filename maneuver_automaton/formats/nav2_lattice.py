@@ -38,6 +38,9 @@ from maneuver_automaton.formats.lattice import (
 
 KIND = "Nav2 lattice primitives"
 MOST_CELLS = 3  # between two poses in a row; Nav2 writes one a cell
+GAP_CELLS = 1.75  # between two poses in a row, where all others of a primitive are nearer
+GAP_TURN = 0.25  # [rad] the same of a turn; Nav2 writes at most 0.232 rad
+UNEVEN = 1.5  # a gap is so many times as long as the middle one of a primitive's steps
 MOTIONS = ("ackermann", "diff", "omni")
 DISTINCT = "trajectory_distinctness_ratio"
 ON_HEADING = 1e-6  # [rad] between a last pose and its heading
@@ -273,6 +276,14 @@ def _primitive(row: Place, headings: Array, resolution: float) -> Nav2Primitive:
             f"is {steps[k] * resolution:g} m from the pose before, need at most {MOST_CELLS} "
             "cells: poses are missing"
         )
+    turns = np.abs(wrapped(np.diff(made.poses[:, 2], prepend=headings[made.start])))
+    for values, most, unit in ((steps, GAP_CELLS, "cells"), (turns, GAP_TURN, "rad")):
+        k, usual = int(values.argmax()), _usual(values)
+        if values[k] > max(most, UNEVEN * usual):
+            raise rows.item(k).error(
+                f"is {values[k]:.3g} {unit} from the pose before, need at most "
+                f"{max(most, UNEVEN * usual):.3g} {unit} as between others: a pose is missing"
+            )
     last, heading = made.poses[-1], float(headings[made.end])
     across = last[:2] / resolution
     if np.abs(across - np.round(across)).max() > ON_GRID:
@@ -284,6 +295,17 @@ def _primitive(row: Place, headings: Array, resolution: float) -> Nav2Primitive:
             f"got the yaw {last[2]:g}, need {heading:g}, that of end_angle_index {made.end}"
         )
     return made
+
+
+def _usual(steps: Array) -> float:
+    """The middle one of the steps that are not zero, the lower of two.
+
+    A lone one has none to compare with: inf if it is all there is, 0 beside steps of zero.
+    """
+    some = np.sort(steps[steps > 0.0])
+    if some.size > 1:
+        return float(some[(some.size - 1) // 2])
+    return math.inf if steps.size == 1 else 0.0
 
 
 def _check_order(rows: Place, primitives: Sequence[Nav2Primitive], n: int) -> None:

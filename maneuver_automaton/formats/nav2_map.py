@@ -20,13 +20,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._ceilings import MOST_HEADING
 from maneuver_automaton._files import write_bytes_atomically, write_text_atomically
 from maneuver_automaton.collision import OccupancyMap
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.cells import bounds_around, check_cell
 from maneuver_automaton.formats.grey_image import GreyImage, read_grey_image
 from maneuver_automaton.formats.statement import MapFile, Statement, Unknown
-from maneuver_automaton.formats.text_source import MAX_YAW, read_text
+from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import Document, parse, shown
 
 MODES = ("trinary", "scale", "raw")
@@ -180,7 +181,7 @@ def _number(document: Document, where: tuple[str | int, ...], most: float = math
 
 def _origin(document: Document, k: int, resolution: float) -> float:
     value = _number(document, ("origin", k))
-    most = FARTHEST_CELL * resolution if k < 2 else MAX_YAW
+    most = FARTHEST_CELL * resolution if k < 2 else MOST_HEADING
     if abs(value) > most:
         raise document.error(("origin", k), f"got {value:g}, need at most {most:g} in size")
     return value

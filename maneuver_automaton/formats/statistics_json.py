@@ -10,8 +10,8 @@ from maneuver_automaton.formats.plan_json import package_version
 from maneuver_automaton.receding_horizon import Statistics
 
 
-def save_statistics(statistics: Statistics, path: Path | str) -> None:
-    """Write statistics.json in one step.
+def save_statistics(statistics: Statistics, path: Path | str, *, interrupted: bool = False) -> None:
+    """Write statistics.json in one step; `interrupted` by a signal it says so.
 
     Raises
     ------
@@ -25,6 +25,7 @@ def save_statistics(statistics: Statistics, path: Path | str) -> None:
         "reached": statistics.reached,
         "stayed": statistics.stayed,
         "steps_with_a_broken_guarantee": statistics.broken,
+        **({"interrupted": True} if interrupted else {}),
     }
     rows = [
         {

@@ -10,7 +10,6 @@ from maneuver_automaton._files import open_input
 from maneuver_automaton.errors import InvalidScenario
 
 MAX_BYTES = 5_000_000  # of a file that people write
-MAX_YAW = 1e6  # [rad] of a heading
 MAX_MAP_BYTES = 200_000_000  # of a file that holds a map, cell by cell
 
 

@@ -17,12 +17,13 @@ from pathlib import Path
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._ceilings import MOST_HEADING
 from maneuver_automaton._files import open_input
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.polygons import simple_polygon
 from maneuver_automaton.formats.statement import Statement
-from maneuver_automaton.formats.text_source import MAX_YAW, finite, lines_of, read_text, whole
+from maneuver_automaton.formats.text_source import finite, lines_of, read_text, whole
 
 FORMAT = "TPCAP"
 HEAD = ("x0", "y0", "theta0", "xf", "yf", "thetaf", "n")
@@ -58,9 +59,9 @@ def read_tpcap(path: Path) -> tuple[Statement, ...]:
         )
     poses = np.array([finite(value.token, at=value.at) for value in values[:6]])
     for k in (2, 5):
-        if abs(poses[k]) > MAX_YAW:
+        if abs(poses[k]) > MOST_HEADING:
             raise InvalidScenario(
-                f"{values[k].at} ({HEAD[k]}): got {poses[k]:g}, need at most {MAX_YAW:g} rad"
+                f"{values[k].at} ({HEAD[k]}): got {poses[k]:g}, need at most {MOST_HEADING:g} rad"
             )
     n = whole(values[6].token, at=f"{values[6].at} (number of obstacles)")
     if n > len(values) - 7:

@@ -15,6 +15,7 @@ RESOLVED = 1e-13  # last terms of a series, over the greatest value or 1 [m, rad
 SETTLED = 1e-14  # change of the reduced state in an iteration, over the greatest value or 1
 NOISE = 1e-12  # the same, where it goes on for ever because rates are differences of great numbers
 FINEST = 2**16  # parts of an interval of constant control, at most
+MOST_ELEMENTS = 2**17  # of all rides together, or 16 for each control: some 0.5 GB
 ITERATIONS = 40  # before a stretch counts as too long to be solved at once
 HOPEFUL = 9  # iterations after which every one has to halve the change, or the stretch is too long
 
@@ -44,6 +45,7 @@ class Ride(NamedTuple):
 def resolved(model: Model, z: Array, control: Array, durations: Array) -> tuple[Ride, Elements]:
     """Elements that are fine enough for their series to be exact, for each ride by itself."""
     parts = np.ones(durations.shape, dtype=np.int64)
+    most_elements = max(MOST_ELEMENTS, 16 * parts.size)
     while True:
         most = parts.max(axis=0)
         first = np.cumsum(most) - most
@@ -59,7 +61,7 @@ def resolved(model: Model, z: Array, control: Array, durations: Array) -> tuple[
         finer = np.zeros(parts.shape, dtype=bool)
         finer[ride, owner[place]] = True
         parts[finer] *= 2
-        if parts.max() > FINEST:
+        if parts.max() > FINEST or parts.max(axis=0).sum() * len(parts) > most_elements:
             r, k = np.unravel_index(np.argmax(parts), parts.shape)
             raise ValueError(
                 f"{model.name}: the motion under control {control[r, k].tolist()} cannot be "

@@ -18,6 +18,7 @@ from maneuver_automaton.primitives.trim import Trim
 Pairs = Literal["all", "neighbours"] | Sequence[tuple[int, int]]
 EQUAL = 1e-12  # times or states closer than this, over their size, are equal [s, units of z]
 BATCH = 2000  # maneuvers that are integrated together
+MOST = 300_000  # maneuvers of one library
 
 
 def bang_bang(model: Model, source: Trim, target: Trim, *, late: bool = False) -> Maneuver:
@@ -197,6 +198,11 @@ def _chosen(trims: Sequence[Trim], pairs: Pairs) -> list[tuple[Trim, Trim]]:
     levels = np.stack([_levels(column) for column in states.T], axis=-1)
     steps = np.abs(levels[:, None] - levels).max(axis=2, initial=0)
     wanted: NDArray[np.bool_] = (steps > 0) & ((steps == 1) | (pairs == "all"))
+    if (count := np.count_nonzero(wanted)) > MOST:
+        raise ValueError(
+            f"pairs: got {count} maneuvers between {len(trims)} trims, need at most {MOST}: fewer "
+            "trims, or neighbours instead of all"
+        )
     return [(trims[i], trims[j]) for i, j in np.argwhere(wanted)]
 
 

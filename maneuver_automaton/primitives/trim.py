@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, freeze
-from maneuver_automaton._ceilings import FASTEST
+from maneuver_automaton._ceilings import FASTEST, FASTEST_SPIN
 from maneuver_automaton.groups import LieGroup
 
 Pose = TypeVar("Pose", bound=LieGroup)
@@ -50,6 +50,12 @@ class Trim:
             raise ValueError(
                 f"trim {self.name!r}: body_velocity holds {fastest:g} m/s, "
                 f"need at most {FASTEST:g} m/s"
+            )
+        spin = float(np.abs(self.body_velocity[..., 2:3]).max(initial=0.0))
+        if spin > FASTEST_SPIN:
+            raise ValueError(
+                f"trim {self.name!r}: body_velocity turns at {spin:g} rad/s, "
+                f"need at most {FASTEST_SPIN:g} rad/s"
             )
         if not self.max_duration > 0.0:
             raise ValueError(

@@ -29,6 +29,8 @@ from maneuver_automaton.receding_horizon.settings import (
 )
 from maneuver_automaton.receding_horizon.situation import Chosen, Situation
 
+MOST_AHEAD = 10_000  # steps ahead for which a plan gets samples; later steps see to theirs
+
 
 class RecedingHorizon:
     """Model predictive control with trims: plan to the goal, apply the beginning, plan again.
@@ -247,7 +249,8 @@ class RecedingHorizon:
 
     def _logged(self, chosen: Chosen, search: StepSearch, now: Situation) -> Step:
         here, last, delta = now.here, now.last, self.settings.step
-        instants = here.start_time + delta * np.arange(1, 2 + chosen.plan.duration / delta)
+        most = min(chosen.plan.duration / delta, MOST_AHEAD)
+        instants = here.start_time + delta * np.arange(1, 2 + most)
         plan = with_samples_at(chosen.plan, instants, here.automaton.model)
         deed = _deed(chosen, now)
         bound = self._bound(chosen, search, now)

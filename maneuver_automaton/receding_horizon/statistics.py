@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, freeze
+from maneuver_automaton._interrupts import stopped
 from maneuver_automaton._parallel import in_parallel
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon.disturbance import Disturbance
@@ -115,7 +116,8 @@ def simulate_many(
     Returns
     -------
     Statistics
-        In the order of starts, then seeds, whatever ran where.
+        In the order of starts, then seeds, whatever ran where; after a signal to the command line
+        of the loops done until then.
 
     Raises
     ------
@@ -156,10 +158,13 @@ def simulate_many(
     )
     done: list[Outcome] = []
     work = partial(_outcomes, problem, settings=settings)
-    for outcomes in in_parallel(work, chunks, jobs=jobs, scheduler=scheduler):
+    results = in_parallel(work, chunks, jobs=jobs, scheduler=scheduler, ends_early=True)
+    for outcomes in results:
         done += outcomes
         if progress is not None:
             progress(len(done), len(cases))
+    if not done:
+        raise KeyboardInterrupt  # the signal came before any loop was done
     return Statistics(outcomes=tuple(done))
 
 
@@ -185,7 +190,13 @@ def _chunks(cases: Sequence[Case], n: int) -> Iterator[list[Case]]:
 
 
 def _outcomes(problem: Problem, cases: Sequence[Case], *, settings: _Settings) -> list[Outcome]:
-    return [_outcome(problem, pose, seed, settings) for pose, seed in cases]
+    """Outcomes of loops one after the other, without one that a signal cut short."""
+    done: list[Outcome] = []
+    for pose, seed in cases:
+        if not stopped():
+            outcome = _outcome(problem, pose, seed, settings)
+            done += [] if stopped() else [outcome]
+    return done
 
 
 def _outcome(problem: Problem, pose: Array, seed: int, settings: _Settings) -> Outcome:

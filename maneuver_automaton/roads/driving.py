@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.primitives.driving import drive
@@ -83,23 +84,25 @@ def drive_scene(
     progress : callable, optional
         Called with the number of each step that is done.
     """
-    planner.warm()
     last = planner.last_tick
     longest = math.ceil(LONGEST / planner.tick) if math.isinf(planner.scene.last_time) else last
     limit = min(longest if steps is None else steps, last)
     state, tail = planner.start_state, first
     done: list[RoadStep] = []
     tick = 0
-    while not planner.at_goal(state, tick=tick) and tick < limit:
-        done.append(_step(planner, state, tick=tick, tail=tail))
-        decision = done[-1].decision
-        state = _state_after(planner, state, decision.controls[0])
-        tick, tail = tick + 1, decision.tail()
-        if progress is not None:
-            progress(tick)
+    with patient():
+        planner.warm()
+        while not (planner.at_goal(state, tick=tick) or tick >= limit or stopped()):
+            done.append(_step(planner, state, tick=tick, tail=tail))
+            decision = done[-1].decision
+            state = _state_after(planner, state, decision.controls[0])
+            tick, tail = tick + 1, decision.tail()
+            if progress is not None:
+                progress(tick)
     reached = planner.at_goal(state, tick=tick)
     states = np.array([*(step.state for step in done), state])
     status, reason = _ending(planner, states, stood=_stood(done), reached=reached)
+    reason += ", when the drive was interrupted" if stopped() and not reached else ""
     applied = np.array([step.control for step in done]).reshape(-1, 2)
     driven = planner.plan_of(planner.start_state, applied)
     return RoadDrive(

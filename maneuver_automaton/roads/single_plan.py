@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.roads.decision import RoadDecision, RoadSettings
 from maneuver_automaton.roads.driving import RoadDrive, drive_scene
@@ -64,19 +65,32 @@ def plan_road(
     tick = tick_of(scene.step)
     horizon = min(max(math.ceil(last / tick - 1e-6) * tick, tick), LONGEST)
     begin = time.perf_counter()
+    with patient():
+        best = _widened(scene, vehicle, settings, horizon, begin + time_limit)
+    return replace(best, search_s=time.perf_counter() - begin)
+
+
+def _widened(
+    scene: RoadScene,
+    vehicle: RoadVehicle | None,
+    settings: RoadSettings,
+    horizon: float,
+    deadline: float,
+) -> RoadPlanResult:
+    """The better one of the first search that finds a plan, and of the next wider one."""
     planner = road_planner(scene, vehicle, replace(settings, width=WIDTHS[0], horizon_s=horizon))
     best = RoadPlanResult(
         planner=planner, decision=None, plan=None, verdict=None, reason="", search_s=0.0
     )
     for width in WIDTHS:
-        if width > WIDTHS[0] and time.perf_counter() - begin > time_limit:
+        if width > WIDTHS[0] and (stopped() or time.perf_counter() > deadline):
             break
         found, cost = _searched(planner.wider(width)), best.cost
         if cost is None or (found.cost is not None and found.cost < cost):
             best = found
         if cost is not None:
             break
-    return replace(best, search_s=time.perf_counter() - begin)
+    return best
 
 
 def _searched(planner: RoadPlanner) -> RoadPlanResult:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from annotated_types import Ge
-from pydantic import AllowInfNan, BeforeValidator, Field, Strict
+from pydantic import AfterValidator, AllowInfNan, BeforeValidator, Field, Strict
 
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton._library_models import model_of as model_of_entry
@@ -29,6 +30,7 @@ from maneuver_automaton.optimal_control.maneuvers import ManeuverObjective, Tran
 from maneuver_automaton.primitives.bang_bang import has_limited_rates
 from maneuver_automaton.primitives.equilibrium import MissingTrim, trims_of
 from maneuver_automaton.primitives.trim import Trim
+from maneuver_automaton.scenario.automata import MAX_STEADY_TRIMS
 from maneuver_automaton.scenario.checks import (
     Count,
     Name,
@@ -63,12 +65,19 @@ def _mapping(value: Any) -> Any:
     return value
 
 
+def _each_once(values: tuple[float, ...]) -> tuple[float, ...]:
+    if len(set(values)) < len(values):
+        raise need("a list of numbers, each of them once")
+    return values
+
+
 Mapped = Annotated[dict[str, Any], BeforeValidator(_mapping)]
+_Once = AfterValidator(_each_once)
 Grid = Annotated[
-    dict[str, Annotated[tuple[Number, ...], Several("a list of numbers", at_least=1)]],
+    dict[str, Annotated[tuple[Number, ...], Several("a list of numbers", at_least=1), _Once]],
     BeforeValidator(_grid),
 ]
-Numbers = Annotated[tuple[Number, ...], Several("a list of numbers", at_least=0)]
+Numbers = Annotated[tuple[Number, ...], Several("a list of numbers", at_least=0), _Once]
 
 
 class ManeuversPart(Part):
@@ -185,6 +194,9 @@ def build_file_of_text(text: str, *, name: str) -> BuildFile:
     document = parse(text, name=name, what="a build file")
     file = checked(document, LibraryFile)
     model = _model(document, file)
+    count = math.prod(len(values) for values in file.trims.values())
+    if count > MAX_STEADY_TRIMS:
+        raise document.error(("trims",), f"got {count:g} trims, need at most {MAX_STEADY_TRIMS}")
     with at(document, ("trims",)):
         found = trims_of(
             model, file.trims, max_lateral_acceleration=file.max_lateral_acceleration_m_s2

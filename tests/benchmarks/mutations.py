@@ -39,6 +39,7 @@ MOST_SECONDS, MOST_BYTES = (
     1_000_000_000,
 )  # of one case: processor, and memory beside the start
 STOP_SECONDS = 30  # a case that takes so long is stopped
+EVERY = 500  # cases between two lines on how far the run is
 LONGEST = 130_000  # bytes of a file that is damaged
 FAST = ["--quiet", "--no-plot", "--time-limit", "0.2", "--out", "out"]
 PARSERS = ("read_bytes", "read_text", "too_long", "read_json_document", "parse", "need", "_take")
@@ -260,6 +261,9 @@ def main() -> None:
                 _keep(asked.keep, k, command, folder, f"{why}\n{ended.said}")
                 last = ended.said.strip().splitlines()[-1:] or [""]
                 print(f"{k} {kind.name}: {why}: {' '.join(command)}: {last[0][:200]}", flush=True)
+        if k % EVERY == EVERY - 1:
+            reached = sum(n for (_, what), n in codes.items() if what == "reached")
+            print(f"{k + 1} cases, {failures} wrong, {reached} reached the numbers", flush=True)
     _print(chosen, codes, failures, slowest, largest)
     raise SystemExit(bool(failures))
 

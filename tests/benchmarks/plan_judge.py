@@ -1,8 +1,11 @@
 """Judge plans of `random_plans.py` by numpy and shapely alone; nothing of the package is imported.
 
 ``python tests/benchmarks/plan_judge.py FILE [OTHER]``: does a plan begin at the start, end at the
-goal, last as long as its primitives, move as its vehicle's equations say (integrated here), and
-touch nothing at any of its samples? With a second file of the same problems: which costs differ.
+goal, last as long as its primitives, cost what it says, move as its vehicle's equations say
+(integrated here from sample to sample, and from the start to the end), touch nothing at any of its
+samples or between them, and keep the clearance that it states? Of a closed loop: does every piece
+do so, begin where the piece before ended, and is the loop where, when and as dear as its file says?
+With a second file of the same problems: which costs differ.
 """
 
 from __future__ import annotations
@@ -13,6 +16,7 @@ import statistics
 import sys
 from collections import Counter, defaultdict
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -89,19 +93,65 @@ def pose_rates(pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
     return rates
 
 
-def defect(vehicle: str, time: np.ndarray, pose: np.ndarray, z: np.ndarray, u: np.ndarray) -> float:
-    """Greatest distance of a sample from where the one before leads."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Course:
+    """A sampled motion, integrated here."""
+
+    time: np.ndarray  # (n,)
+    pose: np.ndarray  # (n, d) as recorded
+    z: np.ndarray  # (n, n_z)
+    u: np.ndarray  # (n, n_u) from each sample to the next
+    between: np.ndarray  # (n_b, d) poses at all samples and within every step, integrated
+    between_z: np.ndarray  # (n_b, n_z)
+    off: float  # greatest distance of a sample from where the one before leads
+    end: np.ndarray  # (d,) where the integrated steps lead, one after the other, from the start
+
+
+def integrated(vehicle: str, entry: dict[str, Any]) -> Course:
+    """The motion of a recorded trajectory."""
+    time, pose = np.array(entry["time_s"]), np.array(entry["pose"])
+    pose[:, :2] += entry.get("origin", [0.0, 0.0])
+    n = len(time)
+    z = np.array(entry["reduced_state"], dtype=float).reshape(n, -1)
+    u = np.array(entry["control"], dtype=float).reshape(n, -1)
+    poses, states = steps(vehicle, np.diff(time)[:, None], pose[:-1], z, u[:-1])
+    off = np.abs(poses[-1] - pose[1:]).max(initial=0.0)
+    if VEHICLES[vehicle][1] is not None and z.shape[1]:
+        off = max(off, np.abs(states[-1] - z[1:]).max(initial=0.0))
+    own = poses[-1] - pose[:-1]  # seen from the body before each step, it adds up from the start
+    heading = pose[:-1, 2] if pose.shape[1] > 2 else np.zeros(n - 1)
+    ahead = np.cos(heading) * own[:, 0] + np.sin(heading) * own[:, 1]
+    aside = np.cos(heading) * own[:, 1] - np.sin(heading) * own[:, 0]
+    if pose.shape[1] > 2:
+        heading = pose[0, 2] + np.concatenate([[0.0], np.cumsum(own[:-1, 2])])[: n - 1]
+    own[:, 0] = np.cos(heading) * ahead - np.sin(heading) * aside
+    own[:, 1] = np.sin(heading) * ahead + np.cos(heading) * aside
+    return Course(
+        time,
+        pose,
+        z,
+        u,
+        np.concatenate([pose[:1], *poses]),
+        np.concatenate([z[:1], *states]),
+        float(off),
+        pose[0] + own.sum(axis=0),
+    )
+
+
+def steps(
+    vehicle: str, lasting: np.ndarray, p: np.ndarray, z: np.ndarray, control: np.ndarray
+) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Poses and reduced states after each step of Runge and Kutta from all samples but the last."""
     velocity, dynamics = VEHICLES[vehicle]
-    lasting = np.diff(time)[:, None]
-    p, state, control = pose[:-1].copy(), z[:-1].copy(), u[:-1]
-    h = lasting / STEPS
+    state, h = z[:-1], lasting / STEPS
 
     def rates(at: float, p: np.ndarray, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         if dynamics is None:  # the recorded states, straight between two samples
             here = z[:-1] + at * (z[1:] - z[:-1])
-            return pose_rates(p, velocity(here, control)), np.zeros_like(state)
+            return pose_rates(p, velocity(here, control)), (z[1:] - z[:-1]) / lasting
         return pose_rates(p, velocity(state, control)), dynamics(state, control)
 
+    poses, states = [], []
     for n in range(STEPS):
         a = rates(n / STEPS, p, state)
         b = rates((n + 0.5) / STEPS, p + h / 2 * a[0], state + h / 2 * a[1])
@@ -109,10 +159,9 @@ def defect(vehicle: str, time: np.ndarray, pose: np.ndarray, z: np.ndarray, u: n
         d = rates((n + 1) / STEPS, p + h * c[0], state + h * c[1])
         p = p + h / 6 * (a[0] + 2 * b[0] + 2 * c[0] + d[0])
         state = state + h / 6 * (a[1] + 2 * b[1] + 2 * c[1] + d[1])
-    off = np.abs(p - pose[1:]).max(initial=0.0)
-    if dynamics is not None and z.shape[1]:
-        off = max(off, np.abs(state - z[1:]).max(initial=0.0))
-    return float(off)
+        poses.append(p)
+        states.append(state)
+    return poses, states
 
 
 def solids(entries: list[dict[str, Any]], poses: np.ndarray) -> list[tuple[np.ndarray, float]]:
@@ -129,8 +178,9 @@ def solids(entries: list[dict[str, Any]], poses: np.ndarray) -> list[tuple[np.nd
     return found
 
 
-def clearance(answer: dict[str, Any], pose: np.ndarray, z: np.ndarray) -> float:
-    """Least distance [m] of the body, and of a trailer, from an obstacle at any sample."""
+def clearance(answer: dict[str, Any], course: Course) -> float:
+    """Least distance [m] of the body, and of a trailer, from an obstacle anywhere on a course."""
+    pose, z = course.between, course.between_z
     flat = pose[:, :3] if pose.shape[1] > 2 else np.column_stack([pose, np.zeros(len(pose))])
     bodies = solids(answer["footprint"], flat)
     if answer["parts"]:
@@ -144,31 +194,89 @@ def clearance(answer: dict[str, Any], pose: np.ndarray, z: np.ndarray) -> float:
     return least
 
 
+def off_goal(pose: np.ndarray, goal: list[float]) -> np.ndarray:
+    """Components of a pose less those of the goal, the heading modulo a turn."""
+    off = pose - goal
+    if off.size > 2:
+        off[2] = (off[2] + math.pi) % (2.0 * math.pi) - math.pi
+    return np.abs(off)
+
+
+def motion_faults(answer: dict[str, Any], course: Course) -> list[str]:
+    """What is wrong with a motion, wherever it leads; it may touch something."""
+    wrong = []
+    straight = VEHICLES[answer["vehicle"]][1] is None
+    if course.off > (STRAIGHT if straight else DRIVEN):
+        wrong.append(f"dynamics {course.off:.1e}")
+    drift = np.abs(course.end - course.pose[-1]).max()
+    if drift > (STRAIGHT * 10.0 if straight else DRIVEN * 10.0):
+        wrong.append(f"integrated from the start, it ends {drift:.1e} off")
+    return wrong
+
+
 def faults(answer: dict[str, Any]) -> list[str]:
     """What is wrong with a plan."""
     plan = answer["plan"]
-    course = plan["trajectory"]
-    time, pose = np.array(course["time_s"]), np.array(course["pose"])
-    pose[:, :2] += course.get("origin", [0.0, 0.0])
-    n = len(time)
-    z = np.array(course["reduced_state"], dtype=float).reshape(n, -1)
-    u = np.array(course["control"], dtype=float).reshape(n, -1)
-    wrong = []
-    if np.abs(pose[0] - answer["start"]).max() > ENDS:
+    course = integrated(answer["vehicle"], plan["trajectory"])
+    wrong = motion_faults(answer, course)
+    if np.abs(course.pose[0] - answer["start"]).max() > ENDS:
         wrong.append("start")
-    off = pose[-1] - answer["goal"]
-    if off.size > 2:
-        off[2] = (off[2] + math.pi) % (2.0 * math.pi) - math.pi
-    if np.abs(off).max() > ENDS:
+    if off_goal(course.pose[-1], answer["goal"]).max() > ENDS:
         wrong.append("goal")
-    lasts = sum(one["duration_s"] for one in plan["primitives"])
-    if abs(lasts - (time[-1] - time[0])) > ENDS or abs(lasts - plan["duration_s"]) > ENDS:
+    lasts, lasted = sum(one["duration_s"] for one in plan["primitives"]), np.ptp(course.time)
+    if abs(lasts - lasted) > ENDS or abs(lasts - plan["duration_s"]) > ENDS:
         wrong.append("duration")
-    off_course = defect(answer["vehicle"], time, pose, z, u)
-    if off_course > (STRAIGHT if VEHICLES[answer["vehicle"]][1] is None else DRIVEN):
-        wrong.append(f"dynamics {off_course:.1e}")
-    if clearance(answer, pose, z) < 0.0:
-        wrong.append(f"collision {clearance(answer, pose, z):.1e}")
+    if abs(plan["cost"] - lasts) > ENDS:  # all are asked for least time
+        wrong.append(f"costs {plan['cost']}, lasts {lasts}")
+    if plan["lower_bound"] is not None and plan["lower_bound"] > plan["cost"] + ENDS:
+        wrong.append(f"costs {plan['cost']}, bound {plan['lower_bound']}")
+    least = clearance(answer, course)
+    if least < 0.0:
+        wrong.append(f"collision {least:.1e}")
+    elif plan["clearance_m"] is not None and plan["clearance_m"] > least + ENDS:
+        wrong.append(f"clearance {least}, stated {plan['clearance_m']}")
+    return wrong
+
+
+def loop_faults(answer: dict[str, Any]) -> list[str]:
+    """What is wrong with a closed loop."""
+    loop, wrong = answer["loop"], []
+    entries, least, spent = loop["steps"], math.inf, 0.0
+    if np.abs(np.subtract(entries[0]["vehicle_pose"], answer["start"])).max() > ENDS:
+        wrong.append("start")
+    if len(answer["pieces"]) != len(entries) - 1:
+        wrong.append("pieces")
+    for k, piece in enumerate(answer["pieces"]):
+        now, then = entries[k], entries[k + 1]
+        if not piece["time_s"]:
+            continue
+        course = integrated(answer["vehicle"], piece)
+        wrong += [f"step {k}: {said}" for said in motion_faults(answer, course)]
+        if np.abs(course.pose[0] - now["vehicle_pose"]).max() > ENDS:
+            wrong.append(f"step {k}: start")
+        jump = np.abs(course.pose[-1] - then["vehicle_pose"]).max()
+        if jump > (0.01 * math.dist(answer["goal"][:2], [0.0, 0.0]) if answer["noisy"] else ENDS):
+            wrong.append(f"step {k}: end {jump:.1e}")
+        spent += float(np.ptp(course.time))
+        if abs(then["time_s"] - now["time_s"] - np.ptp(course.time)) > ENDS:
+            wrong.append(f"step {k}: time")
+        if abs(then["accumulated_cost"] - spent) > ENDS:
+            wrong.append(f"step {k}: cost")
+        if now["control"] is not None and not np.allclose(now["control"], course.u[0], atol=ENDS):
+            wrong.append(f"step {k}: control")
+        least = min(least, clearance(answer, course))
+    place, turn = answer["tolerance"]
+    off = off_goal(np.array(entries[-1]["vehicle_pose"]), answer["goal"])
+    away = float(np.linalg.norm(np.delete(off, 2) if off.size > 2 else off))
+    there = away <= place + ENDS and off[2:3].max(initial=0.0) <= turn + ENDS
+    if loop["reached"] and not there:
+        wrong.append("goal")
+    if abs(loop["cost"] - spent) > ENDS:
+        wrong.append("cost")
+    if least < 0.0 and not (answer["noisy"] and loop["collisions"]):
+        wrong.append(f"collision {least:.1e}")
+    elif loop["min_clearance_m"] is not None and loop["min_clearance_m"] > max(least, 0.0) + ENDS:
+        wrong.append(f"clearance {least}, stated {loop['min_clearance_m']}")
     return wrong
 
 
@@ -181,8 +289,11 @@ def judged(answers: dict[tuple[str, int], dict[str, Any]]) -> None:
     """Print a line for each vehicle, and every fault."""
     rows: dict[str, Counter[str]] = defaultdict(Counter)
     for (vehicle, seed), answer in answers.items():
-        rows[vehicle][answer["plan"]["status"]] += 1
-        wrong = faults(answer) if answer["plan"]["status"] == "found" else []
+        status = (answer["loop"] if "loop" in answer else answer["plan"])["status"]
+        rows[vehicle][status] += 1
+        wrong = loop_faults(answer) if "loop" in answer else []
+        if status == "found":
+            wrong = faults(answer)
         rows[vehicle]["unsound"] += bool(wrong)
         if wrong:
             print(f"{vehicle} {seed}: {', '.join(wrong)}")

@@ -186,6 +186,8 @@ def test_a_wheelbase_that_nothing_tells(tmp_path):
         ("<x>0.25</x>", "", ":10: State: the element x is missing"),
         ("<velocity>3.0", "<velocity>1e7",
          ":10: velocity: got 1e+07 m/s, need at most 5000 m/s in size"),
+        ("<x>0</x><y>0.0</y><steering_angle>0.0", "<x>0</x><y>0.0</y><steering_angle>3",
+         ":7: steering_angle: got 3 rad, need at most 1.5 rad in size"),
         ("<time_step>1</time_step>", "<time_step>3</time_step>",
          ":10: time_step: got 3, need 1"),
         ("<VehicleType>BMW_320i</VehicleType>", "<VehicleType/>",

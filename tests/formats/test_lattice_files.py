@@ -292,6 +292,12 @@ def test_primitives_of_nav2(tmp_path):
         ({"row": {"poses": [[0, 0]]}},
          ": primitives[2].poses[0]: got 2 numbers, need 3: x, y, yaw"),
         ({"row": {"poses": []}}, ": primitives[2].poses: is empty, need at least one pose"),
+        ({"row": {"poses": [[-0.5, 0.5, ANGLES[3]], [-1.5, 1.5, ANGLES[3]]]}},
+         ": primitives[2].poses[1]: is 2.83 cells from the pose before, need at most 2.12 cells as "
+         "between others: a pose is missing"),
+        ({"row": {"poses": [[0, 0, ANGLES[2]], [0, 0, ANGLES[3]]]}},
+         ": primitives[2].poses[1]: is 1.57 rad from the pose before, need at most 0.25 rad as "
+         "between others: a pose is missing"),
         ({"turning_radius": "a"},
          ": lattice_metadata.turning_radius: got 'a', need a finite number"),
     ],

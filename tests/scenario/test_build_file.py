@@ -124,6 +124,14 @@ def test_a_build_file_is_no_scenario(tmp_path):
             "{speed: [0, 1], ...}",
         ),
         (
+            ("speed: [-1, 0, 2]", "speed: [-1, -1, 2]"),
+            "x.yaml:4: trims.speed: got [-1, -1, 2], need a list of numbers, each of them once",
+        ),
+        (
+            ("speed: [-1, 0, 2]", f"speed: {[k / 1000 for k in range(1000)]}"),
+            "x.yaml:4: trims: got 3000 trims, need at most 2000",
+        ),
+        (
             ("turn_rate", "yaw_rate"),
             "x.yaml:4: trims: grid: the car has no 'yaw_rate', need speed, steering, "
             "lateral_speed, turn_rate",
