@@ -11,8 +11,10 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Iterable, Iterator
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
@@ -238,7 +240,7 @@ def _steered(setup: WordSetup, headings: Array, budget: Budget) -> Iterator[Time
     """
     arrays, scratch = setup.library.arrays, setup.library.scratch()
     start, goal = four_columns(np.array([setup.problem.start, setup.goal.pose]))[:, None]
-    found: list[tuple[Array, ...]] = []  # costs, numbers of headings, climbs, rows, times
+    found: list[tuple[NDArray[Any], ...]] = []  # costs, numbers of headings, climbs, rows, times
     for number, heading in enumerate(headings):
         goal[0, 2], row = heading, 0
         pace = Pace(budget, steps=max(1, STEERED // (1 + len(arrays.climbs))))
