@@ -67,7 +67,9 @@ def plan_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> int
     if road_command.is_road(path):
         found = road_command.plan_file(path, out, settings=settings, parts=parts)
         if found.plan is None:
-            complain(f"{path}: no_plan: {found.reason}")
+            complain(f"{path}: {road_command.status_of(found)}: {found.reason}")
+        elif stopped():
+            complain(f"{path}: interrupted: the best plan so far is in {out / 'plan.json'}")
         return NO_PLAN if found.plan is None else FOUND
     scenario = scenario_of(path, parts)
     limit = settings.time_limit or scenario.time_limit_s
@@ -209,8 +211,9 @@ def _road_row(path: Path, parts: Parts, out: Path, settings: Settings) -> Row:
     """Plan one drive on roads of a folder."""
     result = road_command.plan_file(path, out, settings=replace(settings, quiet=True), parts=parts)
     if result.plan is None or result.verdict is None:
-        reason = f"{path}: no_plan: {result.reason}"
-        return Row(name=path.name, code=NO_PLAN, status="no_plan", reason=reason)
+        status = road_command.status_of(result)
+        reason = f"{path}: {status}: {result.reason}"
+        return Row(name=path.name, code=NO_PLAN, status=status, reason=reason)
     return Row(
         name=path.name,
         code=FOUND,

@@ -51,10 +51,9 @@ def plan_file(
             result = plan_road(scene, vehicle, time_limit=limit)
         except ValueError as error:
             raise _in_file(path, error) from error
-    document = road_plan_to_dict(result)
     if stopped() and result.plan is None:
         result = replace(result, reason="interrupted before there was a plan")
-        document |= {"status": "out_of_budget", "reason": result.reason}
+    document = road_plan_to_dict(result) | {"status": status_of(result)}
 
     def write() -> None:
         write_document(document, out / "plan.json", interrupted=stopped())
@@ -68,6 +67,13 @@ def plan_file(
     if result.plan is not None and not settings.quiet:
         _print(scene.name, _plan_facts(result, out))
     return result
+
+
+def status_of(result: RoadPlanResult) -> str:
+    """How planning a drive ended."""
+    if result.plan is not None:
+        return "found"
+    return "out_of_budget" if stopped() else "no_plan"
 
 
 def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: Parts) -> int:
