@@ -300,7 +300,7 @@ class _Polishing:
         unfinished: list[Polished] = []
         if not shuffles:
             found = self._solve("fixed planes", number, guess, fixed_planes=True)
-            if found.status is SolveStatus.SOLVED:
+            if found.is_feasible:
                 return found
             if not self._left() > 0.0:
                 return None
@@ -321,7 +321,7 @@ class _Polishing:
                 return None
         # None is solved; a result near enough to a motion is closed and audited all the same.
         for one in unfinished:
-            if self.best is None and one.status is SolveStatus.OUT_OF_BUDGET and one.iterations:
+            if self.best is None and (one.is_feasible or one.status is SolveStatus.OUT_OF_BUDGET):
                 self._consider(one)
         return None
 
@@ -330,12 +330,10 @@ class _Polishing:
         if not self._is_over():
             patient = replace(self.settings, max_iterations=LONGER * self.settings.max_iterations)
             found = self._solve("lines", number, rough.as_guess, settings=patient)
-            # An unfinished solve may be sound all the same: it is closed and audited.
-            cheaper = found.objective < rough.objective
-            unfinished = found.status is SolveStatus.OUT_OF_BUDGET and cheaper
-            if (found.status is SolveStatus.SOLVED or unfinished) and self._consider(
-                found, number=number
-            ):
+            # What was not solved to the end may be sound all the same: it is closed and audited.
+            ended = found.is_feasible or found.status is SolveStatus.OUT_OF_BUDGET
+            worth = found.status is SolveStatus.SOLVED or found.objective < rough.objective
+            if ended and worth and self._consider(found, number=number):
                 return
         if self.best is None:
             self._consider(rough)
@@ -356,7 +354,7 @@ class _Polishing:
             duration=raw.duration,
         )
         found = self._solve("finer", -1, guess)
-        if found.status is SolveStatus.SOLVED:
+        if found.is_feasible:
             self._consider(found)
 
     def _solve(
