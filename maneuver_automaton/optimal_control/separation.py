@@ -21,7 +21,7 @@ from maneuver_automaton.optimal_control.problem import Components
 
 TOUCHING = 1e-6  # [m] nearer solids have no direction between them
 SHARED = 0.1  # share of the distance by which a piece may stand out before the line of another one
-TURNED = np.radians([-45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0])  # by which lines may turn
+TURNED = np.radians(np.linspace(-70.0, 70.0, 9))  # by which lines may turn
 
 Solid = tuple[Array, float]
 """Corners (n, 2) of a convex polygon, and the radius that rounds it: one corner makes a disc."""
