@@ -9,14 +9,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.optimal_control._casadi import load_casadi, numpy_on_symbols
 from maneuver_automaton.optimal_control.blocks import Blocks, Kind, assembled, kind_of
 from maneuver_automaton.optimal_control.parting import Parting
 from maneuver_automaton.optimal_control.polish_program import Program
 from maneuver_automaton.optimal_control.polish_values import Answer, Point, PolishSettings
-from maneuver_automaton.optimal_control.separation import PartPose, Solid
+from maneuver_automaton.optimal_control.separation import PartPose
 from maneuver_automaton.optimal_control.solution import SolveStatus
 from maneuver_automaton.optimal_control.stopping import Watcher, watcher_of
 from maneuver_automaton.optimal_control.transcription import STATUS
@@ -60,7 +60,7 @@ def solver_of(
     free = np.tile([-np.inf, np.inf], (0 if fixed else 2 * len(own), 1))
     inside = np.tile([0.0, np.inf], (program.n_intervals if elastic else 0, 1))
     bounds = np.vstack([program.bounds, free, inside])
-    corners, places = _corners(program)
+    corners, places = _corners(program, parting)
     blocks = [*program.blocks, *_line_blocks(program, parting, places, fixed, elastic)]
     if elastic:
         numbers = np.arange(len(bounds) - len(inside), len(bounds))[None]
@@ -83,24 +83,24 @@ def solver_of(
     return Solver(function, watcher, bounds, built.limits, corners, fixed)
 
 
-def _corners(program: Program) -> tuple[Array, tuple[list[int], list[int]]]:
-    """Parameters of all corners of both sides, and where those of each solid begin."""
+def _corners(program: Program, parting: Parting) -> tuple[Array, tuple[IntArray, IntArray]]:
+    """Parameters of corners of both sides, and where those of each solid begin.
 
-    def rows(solids: list[Solid], first: int) -> tuple[list[Array], list[int]]:
-        ends = np.cumsum([first, *(len(corners) for corners, _ in solids)])
-        return [np.column_stack([corners, np.full(len(corners), by)])
-                for corners, by in solids], ends.tolist()  # fmt: skip
-
+    Of the pieces only those that are in pairs: a map may have thousands.
+    """
     body, pieces = program.scene.both
-    mine, here = rows(body, 0)
-    theirs, there = rows(pieces, here[-1])
-    return np.vstack([np.zeros((0, OF_CORNER)), *mine, *theirs]).ravel(), (here, there)
+    used, owner = np.unique(parting.pairs.piece, return_inverse=True)
+    solids = [*body, *(pieces[k] for k in used.tolist())]
+    rows = [np.column_stack([corners, np.full(len(corners), by)]) for corners, by in solids]
+    begins = np.cumsum([0, *map(len, rows)])
+    every = np.vstack([np.zeros((0, OF_CORNER)), *rows]).ravel()
+    return every, (begins[: len(body)], begins[len(body) :][owner])
 
 
 def _line_blocks(
     program: Program,
     parting: Parting,
-    places: tuple[list[int], list[int]],
+    places: tuple[IntArray, IntArray],
     fixed: bool,
     elastic: bool,
 ) -> list[Blocks]:
@@ -136,7 +136,7 @@ def _line_blocks(
     if not fixed:
         pair, corner = np.nonzero(parting.facing.piece)
         line = slot[parting.owner[pair]]
-        at = first + OF_CORNER * (np.array(there)[pairs.piece[pair]] + corner)
+        at = first + OF_CORNER * (there[pair] + corner)
         told = [OF_LINE * line + k for k in range(OF_LINE)] + [at + k for k in range(OF_CORNER)]
         variables = [angle[line], angle[line] + n_lines]
         blocks.append(Blocks(_piece_kind(), np.vstack(variables), np.array(told)))

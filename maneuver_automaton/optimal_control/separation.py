@@ -104,7 +104,7 @@ def near_pairs(
     """Pairs that are nearer than `within` [m], from control points in numbers."""
     import shapely
 
-    solid = np.array([_geometry(corners) for corners, _ in pieces], dtype=object)
+    solid = _geometries([corners for corners, _ in pieces])
     rounding = np.array([by for _, by in pieces])
     tree = shapely.STRtree(solid)
     intervals, bodies, found = [], [], []
@@ -131,13 +131,14 @@ def first_lines(
     """Lines between nearest points; where two solids overlap, along their least penetration."""
     import shapely
 
-    solid = np.array([_geometry(corners) for corners, _ in pieces], dtype=object)
+    if not len(pairs.piece):
+        return Lines(np.zeros(0), np.zeros((0, 2)))
+    used, owner = np.unique(pairs.piece, return_inverse=True)
+    solid = _geometries([pieces[k][0] for k in used.tolist()])
     hulls = [_hulls(x, y) for x, y in points]
     mine = np.array([hulls[b][k] for k, b in zip(pairs.interval, pairs.body, strict=True)],
                     dtype=object)  # fmt: skip
-    if not len(mine):
-        return Lines(np.zeros(0), np.zeros((0, 2)))
-    ends = shapely.get_coordinates(shapely.shortest_line(mine, solid[pairs.piece]))
+    ends = shapely.get_coordinates(shapely.shortest_line(mine, solid[owner]))
     here, there = ends[0::2], ends[1::2]
     angle = np.arctan2(there[:, 1] - here[:, 1], there[:, 0] - here[:, 0])
     anchor = 0.5 * (here + there)
@@ -175,9 +176,9 @@ def reaches(
         between[which] = along.max(axis=0) + body[number][1]
     if not len(normal):
         return Reach(nodes, between, np.zeros(0))
-    corners, rounding = _padded(pieces)
-    there = corners[pairs.piece] - lines.anchor[:, None]
-    begin = np.einsum("nkd,nd->nk", there, normal).min(axis=1) - rounding[pairs.piece]
+    corners, rounding = _padded(pieces, pairs.piece)
+    there = corners - lines.anchor[:, None]
+    begin = np.einsum("nkd,nd->nk", there, normal).min(axis=1) - rounding
     return Reach(nodes, between, begin)
 
 
@@ -210,7 +211,7 @@ def shared_lines(pieces: Sequence[Solid], pairs: Pairs, lines: Lines, reach: Rea
     owner = np.arange(len(pairs.interval))
     if not len(owner):
         return owner
-    corners, rounding = _padded(pieces)
+    corners, rounding = _padded(pieces, pairs.piece)
     gap = reach.piece - reach.between
     limit = reach.piece - SHARED * np.maximum(gap, 0.0)
     normal = lines.normal
@@ -221,18 +222,20 @@ def shared_lines(pieces: Sequence[Solid], pairs: Pairs, lines: Lines, reach: Rea
         while len(left):
             k, left = left[0], left[1:]
             owner[k] = k
-            behind = ((corners[pairs.piece[left]] - lines.anchor[k]) @ normal[k]).min(axis=1)
-            parted = behind - rounding[pairs.piece[left]] >= limit[k]
+            behind = ((corners[left] - lines.anchor[k]) @ normal[k]).min(axis=1)
+            parted = behind - rounding[left] >= limit[k]
             owner[left[parted]] = k
             left = left[~parted]
     return owner
 
 
-def _padded(solids: Sequence[Solid]) -> tuple[Array, Array]:
-    """Corners (n, most, 2), the last one repeated, and radii (n,)."""
-    most = max(len(corners) for corners, _ in solids)
-    rows = [np.pad(corners, ((0, most - len(corners)), (0, 0)), "edge") for corners, _ in solids]
-    return np.array(rows), np.array([by for _, by in solids])
+def _padded(solids: Sequence[Solid], which: IntArray) -> tuple[Array, Array]:
+    """Corners (n, most, 2) of some solids, the last one repeated, and radii (n,)."""
+    used, owner = np.unique(which, return_inverse=True)
+    some = [solids[k] for k in used.tolist()]
+    most = max(len(corners) for corners, _ in some)
+    rows = [np.pad(corners, ((0, most - len(corners)), (0, 0)), "edge") for corners, _ in some]
+    return np.array(rows)[owner], np.array([by for _, by in some])[owner]
 
 
 class Facing(NamedTuple):
@@ -283,10 +286,10 @@ def facing(
             here[which[:, None], node, foremost] = True
     if not count:
         return Facing(here, np.zeros((0, 0), dtype=np.bool_))
-    corners, rounding = _padded(pieces)
+    corners, rounding = _padded(pieces, pairs.piece)
     there = np.zeros((count, corners.shape[1]), dtype=np.bool_)
-    own = corners[pairs.piece] - lines.anchor[:, None]
-    along = c * own[:, None, :, 0] + s * own[:, None, :, 1] - rounding[pairs.piece][:, None, None]
+    own = corners - lines.anchor[:, None]
+    along = c * own[:, None, :, 0] + s * own[:, None, :, 1] - rounding[:, None, None]
     least = along.min(axis=2)
     first = np.full(least.shape, np.inf)
     np.minimum.at(first, owner, least)
@@ -295,12 +298,18 @@ def facing(
     return Facing(here, there)
 
 
-def _geometry(corners: Array) -> Any:
+def _geometries(rings: Sequence[Array]) -> Any:
+    """Points, edges and polygons (n,) from their corners, those of as many corners at once."""
     import shapely
 
-    if len(corners) == 1:
-        return shapely.Point(corners[0])
-    return shapely.LineString(corners) if len(corners) == 2 else shapely.Polygon(corners)
+    counts = np.array([len(ring) for ring in rings])
+    found = np.empty(len(rings), dtype=object)
+    for count in np.unique(counts).tolist():
+        which = np.flatnonzero(counts == count)
+        corners = np.stack([rings[k] for k in which.tolist()])
+        make = shapely.linestrings if count == 2 else shapely.polygons
+        found[which] = shapely.points(corners[:, 0]) if count == 1 else make(corners)
+    return found
 
 
 def _hulls(x: Array, y: Array) -> Any:

@@ -12,10 +12,12 @@ import numpy as np
 
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.collision import Obstacle
+from maneuver_automaton.collision import AnyObstacle, Box, Obstacle, Shape
 from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.collision.convex import convex_pieces
+from maneuver_automaton.collision.rectangles import blocked_rectangles
 from maneuver_automaton.collision.surroundings import parts_of, surroundings_of
+from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Model, SecondOrderCar, SecondOrderUnicycle
 from maneuver_automaton.optimal_control import Guess, PolishSettings, has_casadi, load_casadi
 from maneuver_automaton.optimal_control.polishing import intervals_for
@@ -70,8 +72,6 @@ def why_not_polished(problem: Problem) -> str:
         return "the vehicle moves by the maneuvers of its library alone"
     if any(moves(obstacle) for obstacle in problem.obstacles):
         return "something moves"
-    if not all(isinstance(obstacle, Obstacle) for obstacle in problem.obstacles):
-        return "there is an occupancy map"
     unlimited = problem.horizon.time is None and problem.horizon.max_time is None
     if unlimited and polished_price(problem).cost.time == 0.0:
         return "time costs nothing"
@@ -264,7 +264,7 @@ def polish_plans(
         goal=tuple(pose),
         goal_state=_end_state(problem.automaton, last),
         parts=_body_parts(problem),
-        obstacles=tuple(one.shape for one in problem.obstacles if isinstance(one, Obstacle)),
+        obstacles=tuple(shape for one in problem.obstacles for shape in _shapes_of(one)),
         bounds=problem.bounds,
         margin=problem.margin,
         durations=admitted_durations(problem),
@@ -290,6 +290,15 @@ def polish_plans(
         most_iterations=most_iterations,
         accepts=sound,
     )
+
+
+def _shapes_of(obstacle: AnyObstacle) -> list[Shape]:
+    """What does not move, as shapes: the blocked cells of a map are joined to few boxes."""
+    if isinstance(obstacle, Obstacle):
+        return [obstacle.shape]
+    low, high = np.split(obstacle.resolution * blocked_rectangles(obstacle.blocked), 2, axis=1)
+    middles, heading = SE2(obstacle.origin).act((low + high) / 2.0), float(obstacle.origin[2])
+    return [Box(size, at, heading) for size, at in zip(high - low, middles, strict=True)]
 
 
 def _end_state(automaton: Automaton, last: Trim) -> tuple[float | None, ...]:
