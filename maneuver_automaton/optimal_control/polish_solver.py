@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import functools
 import math
 from collections.abc import Callable
@@ -21,17 +22,46 @@ from maneuver_automaton.optimal_control.solution import SolveStatus
 from maneuver_automaton.optimal_control.stopping import Watcher, watcher_of
 from maneuver_automaton.optimal_control.transcription import STATUS
 
-WARM = {"ipopt.mu_init": 1e-5}
 ROW_S = 1e-5  # [s] for each row of a program, to put it together: measured, generous
 ORDERING = 2  # approximate minimum fill: factorises twice as quickly as the default
 OF_LINE = 4  # parameters of a line: margin, anchor, angle
 OF_CORNER = 3  # parameters of a corner: its place, and the radius that rounds it
 
 
+class Begin(enum.Enum):
+    """Where a solve begins: its options are for that."""
+
+    GUESS = "guess"
+    NEARBY = "nearby"
+    SAME = "same"
+
+
+BEGINS: dict[Begin, dict[str, Any]] = {
+    Begin.GUESS: {},
+    Begin.NEARBY: {"ipopt.mu_init": 1e-5},  # found with other rows
+    Begin.SAME: {  # found with the same rows, multipliers too: half the iterations
+        "ipopt.mu_init": 1e-6,
+        "ipopt.warm_start_init_point": "yes",
+        "ipopt.warm_start_bound_push": 1e-7,
+        "ipopt.warm_start_bound_frac": 1e-7,
+        "ipopt.warm_start_slack_bound_push": 1e-7,
+        "ipopt.warm_start_slack_bound_frac": 1e-7,
+        "ipopt.warm_start_mult_bound_push": 1e-7,
+    },
+}
+
+
+class Multipliers(NamedTuple):
+    """Of bounds and rows, as a solve found them."""
+
+    bounds: Array  # (variables,)
+    rows: Array  # (rows,)
+
+
 class Solver(NamedTuple):
     """The program with lines for some pairs, built."""
 
-    function: Callable[[bool], Any]  # whether from nearby: with a smaller barrier
+    function: Callable[[Begin], Any]  # by where it begins
     watcher: Watcher  # asks the budget at every iteration, and keeps the best
     bounds: Array  # (variables, 2)
     limits: Array  # (rows, 2)
@@ -76,9 +106,8 @@ def solver_of(
     options["iteration_callback"] = watcher
 
     @functools.cache
-    def function(again: bool) -> Any:
-        more = WARM if again else {}
-        return casadi.nlpsol("solver", "ipopt", built.functions, options | more)
+    def function(begin: Begin) -> Any:
+        return casadi.nlpsol("solver", "ipopt", built.functions, options | BEGINS[begin])
 
     return Solver(function, watcher, bounds, built.limits, corners, fixed)
 
@@ -189,11 +218,19 @@ def _priced(price: float) -> Kind:
 
 
 def solve_from(
-    solver: Solver, program: Program, point: Point, apart: Parting, *, again: bool, trust: float
-) -> tuple[Point, Parting, Answer]:
+    solver: Solver,
+    program: Program,
+    point: Point,
+    apart: Parting,
+    *,
+    begin: Begin,
+    known: Multipliers | None,
+    trust: float,
+) -> tuple[Point, Parting, Multipliers, Answer]:
     """The solver's answer from a point and lines, with places within `trust` [m] of the point.
 
-    Where it did not come to its end: its best iterate that breaks no condition, if there is one.
+    The `known` multipliers count where it begins at what the same solver has found. Where it does
+    not come to its end, its best iterate that breaks no condition is the answer, if there is one.
     """
     state, control, duration = program.values(point)
     own, lines = apart.own, apart.lines.of(apart.own)
@@ -211,7 +248,7 @@ def solve_from(
             # nodes but for the ends
             inner = slice(n_x + axis, n_x * program.n_intervals + axis, n_x)
             bounds[inner] = state[1:-1, axis, None] + np.array([-trust, trust])
-    function = solver.function(again)
+    function = solver.function(begin)
     watcher.forget()
     answer = function(
         x0=np.clip(np.concatenate(first), *bounds.T),
@@ -220,6 +257,7 @@ def solve_from(
         ubx=bounds[:, 1],
         lbg=solver.limits[:, 0],
         ubg=solver.limits[:, 1],
+        **({"lam_x0": known.bounds, "lam_g0": known.rows} if known and begin is Begin.SAME else {}),
     )
     stats = function.stats()
     reason = str(stats["return_status"])
@@ -233,6 +271,7 @@ def solve_from(
     return (
         _point_of(program, values),
         apart,
+        Multipliers(*(answer[name].full().ravel() for name in ("lam_x", "lam_g"))),
         Answer(
             status=status,
             reason=reason,

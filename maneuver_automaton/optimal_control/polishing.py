@@ -14,7 +14,7 @@ from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control.parting import pairs_near, parted
 from maneuver_automaton.optimal_control.polish_program import program_of
-from maneuver_automaton.optimal_control.polish_solver import Solver, solve_from, solver_of
+from maneuver_automaton.optimal_control.polish_solver import Begin, Solver, solve_from, solver_of
 from maneuver_automaton.optimal_control.polish_values import (
     Answer,
     Ends,
@@ -93,7 +93,7 @@ def polish(
     best, total = point, _nothing("lines were missing to the end")
     solver: Solver | None = None
     needed = 0.0  # [s] to build a program that was not built
-    again, trust = False, math.inf
+    begin, trust, known = Begin.GUESS, math.inf, None
     for _ in range(FIXED_ROUNDS if fixed_planes else settings.rounds):
         if budget.is_over:
             total = total._replace(status=SolveStatus.OUT_OF_BUDGET, reason="no time was left")
@@ -107,7 +107,9 @@ def polish(
                 break
             solver = built
         apart = apart.with_margins(program, point, fixed=fixed_planes)
-        found, moved, answer = solve_from(solver, program, point, apart, again=again, trust=trust)
+        found, moved, known, answer = solve_from(
+            solver, program, point, apart, begin=begin, known=known, trust=trust
+        )
         total = total.then(answer)
         if answer.is_feasible or not total.is_feasible:
             best = found
@@ -123,8 +125,8 @@ def polish(
         if trust < near:
             missed = pairs_near(program, found, near)
         apart = moved.joined(program, point, missed)
-        again = apart is moved
-        if again and not fixed_planes:
+        begin = Begin.SAME if apart is moved else Begin.GUESS
+        if apart is moved and not fixed_planes:
             apart = moved.split(program, point, TIGHT * reach)
         if apart is moved and moved.is_kept(program, point):
             if far < 0.99 * trust:
@@ -132,7 +134,8 @@ def polish(
                 break
         else:
             apart = apart.faced(program, point)
-        solver = solver if apart is moved else None
+        if apart is not moved:
+            solver, begin = None, Begin.NEARBY if begin is Begin.SAME else begin
     return _polished(best, total, max(budget.elapsed - began, needed))
 
 
