@@ -1,16 +1,19 @@
-"""Polishing in symbols: the transcription, paths of the body, walls and limits between nodes."""
+"""Polishing in symbols: one interval of each kind, with paths of the body, walls and limits."""
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control._casadi import load_casadi, numpy_on_symbols
+from maneuver_automaton.optimal_control.blocks import Blocks, Kind, kind_of
+from maneuver_automaton.optimal_control.paths import Frames, paths
 from maneuver_automaton.optimal_control.polish_values import (
     Ends,
     Point,
@@ -20,23 +23,11 @@ from maneuver_automaton.optimal_control.polish_values import (
 from maneuver_automaton.optimal_control.problem import (
     Components,
     Grid,
-    Guess,
     OptimalControlProblem,
     RunningCost,
 )
-from maneuver_automaton.optimal_control.separation import (
-    BodyPart,
-    Frames,
-    Lines,
-    Pairs,
-    Paths,
-    Reach,
-    first_lines,
-    near_pairs,
-    paths,
-    reaches,
-)
-from maneuver_automaton.optimal_control.transcription import Transcription, transcribe
+from maneuver_automaton.optimal_control.separation import BodyPart
+from maneuver_automaton.optimal_control.transcription import bounds_of, transcribe
 from maneuver_automaton.optimal_control.vehicles import moving_frame
 
 POINT = BodyPart(solids=((np.zeros((1, 2)), 0.0),))  # the reference point alone
@@ -45,31 +36,31 @@ CURVED = 20.0  # times the tightening for reduced states that do not run straigh
 
 
 class Program(NamedTuple):
-    """The problem in symbols, but for the lines."""
+    """The problem in blocks, but for the lines."""
 
     casadi: Any
     scene: Scene
     settings: PolishSettings
-    written: Transcription
-    paths: list[Paths]
-    numbers: Any  # function: variables of the transcription -> x and y of the control points
-    objective: Any
-    below: Any  # (m,) further expressions that must not be positive
-    zero: Any  # (m,) further expressions that must be zero
+    problem: OptimalControlProblem
+    dof: int
+    n_intervals: int
+    bounds: Array  # (variables, 2)
+    blocks: tuple[Blocks, ...]
+    path: Any  # function of one interval: states, control, step -> x and y of the control points
     paced: bool
 
     @property
-    def n_intervals(self) -> int:
-        """Number of intervals."""
-        return self.written.grid.n_nodes - 1
-
-    @property
     def size(self) -> int:
-        """Number of variables without lines."""
-        return len(self.written.bounds)
+        """Number of variables without lines: states, controls, the duration."""
+        return len(self.bounds)
+
+    def states_at(self, node: IntArray) -> IntArray:
+        """Numbers (n_x, n) of the variables that are the states at nodes."""
+        n_x = self.problem.n_states
+        return np.arange(n_x)[:, None] + n_x * node
 
     def values(self, point: Point) -> tuple[Array, Array, float]:
-        """State, control and duration as the transcription has them."""
+        """State, control and duration as the program has them."""
         duration = float(point.durations.sum())
         pace = point.durations[:, None] * (self.n_intervals / duration)
         control = np.hstack([point.control, pace]) if self.paced else point.control
@@ -77,11 +68,23 @@ class Program(NamedTuple):
 
     def points(self, point: Point) -> list[tuple[Array, Array]]:
         """Control points of every solid of the body, in numbers."""
-        if not self.paths:
+        if not self.scene.parts:
             return []
-        state, control, duration = self.values(point)
-        found = [m.full() for m in self.numbers(state.T, control.T, duration)]
+        begin, end = point.state[:-1].T, point.state[1:].T
+        every = self.path.map(self.n_intervals)
+        found = [m.full() for m in every(begin, end, point.control.T, point.durations[None])]
         return list(zip(found[0::2], found[1::2], strict=True))
+
+
+class Interval(NamedTuple):
+    """Kinds of blocks that intervals are made of."""
+
+    stage: Kind  # states at both nodes, control, duration; given the share of the duration
+    change: Kind  # controls of two intervals
+    place: Kind  # x and y of a node; given a wall
+    swing: Kind  # as the stage; given a wall and the share
+    gear: Kind  # states at both nodes, control; given a sign
+    pace: Kind  # paces of two intervals
 
 
 def program_of(
@@ -91,50 +94,126 @@ def program_of(
     settings: PolishSettings,
     stage_cost: RunningCost | None,
     gears: Array | None,
-    guess: Guess,
+    point: Point,
 ) -> Program:
-    """The program of a vehicle, its ends and its scene, on as many intervals as the guess has.
+    """The program of a vehicle, its ends and its scene, on as many intervals as the point has.
 
     With `gears`, the sign of the speed ahead in every interval, time has a pace of its own in every
     stretch of one sign.
     """
     casadi = load_casadi()
+    paced, count = gears is not None, len(point.durations)
     problem = _problem(model, ends, settings, stage_cost)
-    n_u, count = problem.n_controls, len(guess.control) if gears is None else len(gears)
-    if gears is not None:
-        problem = _paced(problem, guess.duration)
-    written = transcribe(problem, Grid(n_nodes=count + 1, rule="rk4"))
-    state, control = written.state, written.control[:n_u, :]
-    pace = casadi.SX.ones(1, count) if gears is None else written.control[n_u, :]
-    step = (written.duration / count) * pace
-    with numpy_on_symbols(casadi):
-        begin = _frames(casadi, model, state[:, :count], control)
-        end = _frames(casadi, model, state[:, 1:], control)
-        found = paths(casadi, scene.parts, begin, end, step=step)
-        (swing,) = paths(casadi, (POINT,), begin, end, step=step)
-        below = _between(model, begin, end, step=step, settings=settings)
-    zero = []
-    for a, b, c in scene.walls:
-        along = a * swing.x + b * swing.y - (c - settings.tightening)
-        below.append(casadi.vec(along[1, : count - 1]))  # nodes but for the first and the last
-        below.append(casadi.vec(along[2:, :]) - 2.0 * settings.tightening)
-    if gears is not None:
-        sign = casadi.DM(np.asarray(gears, dtype=np.float64)).T
-        below += [-(sign * at.twist[0]).T for at in (begin, end)]
-        same = np.flatnonzero(np.diff(gears) == 0)
-        zero.append((pace[:, (same + 1).tolist()] - pace[:, same.tolist()]).T)
-    variables = [written.state, written.control, written.duration]
+    if paced:
+        problem = _paced(problem, float(point.durations.sum()))
+    weights = settings.effort, settings.change, settings.tightening
+    kinds = _kinds(model, *weights, stage_cost, paced)  # type: ignore[arg-type]  # values all
     return Program(
         casadi=casadi,
         scene=scene,
         settings=settings,
-        written=written,
-        paths=found,
-        numbers=casadi.Function("paths", variables, [m for path in found for m in path]),
-        objective=written.objective + settings.change * _changes(casadi, model, control),
-        below=casadi.vertcat(*below),
-        zero=casadi.vertcat(*zero),
-        paced=gears is not None,
+        problem=problem,
+        dof=model.group.dof,
+        n_intervals=count,
+        bounds=bounds_of(problem, Grid(n_nodes=count + 1, rule="rk4")),
+        blocks=tuple(_blocks(problem, model, scene, settings, kinds, gears, count)),
+        path=_path(casadi, model, scene),
+        paced=paced,
+    )
+
+
+def _blocks(
+    problem: OptimalControlProblem,
+    model: Model,
+    scene: Scene,
+    settings: PolishSettings,
+    kinds: Interval,
+    gears: Array | None,
+    count: int,
+) -> list[Blocks]:
+    n_x, n_u, own = problem.n_states, problem.n_controls, len(model.control_names)
+    states = np.arange((count + 1) * n_x).reshape(count + 1, n_x).T
+    controls = (count + 1) * n_x + np.arange(count * n_u).reshape(count, n_u).T
+    duration = np.full((1, count), (count + 1) * n_x + count * n_u)
+    every = np.vstack([states[:, :-1], states[:, 1:], controls, duration])
+    share = np.full((1, count), 1.0 / count)
+    found = [Blocks(kinds.stage, every, share)]
+    if count > 1:
+        found.append(Blocks(kinds.change, np.vstack([controls[:own, :-1], controls[:own, 1:]]),
+                            np.zeros((0, count - 1))))  # fmt: skip
+    for a, b, c in scene.walls:
+        wall = np.tile(np.array([[a], [b], [c - settings.tightening]]), (1, count))
+        found.append(Blocks(kinds.place, states[:2, 1:-1], wall[:, 1:]))
+        found.append(Blocks(kinds.swing, every, np.vstack([wall, share])))
+    if gears is not None:
+        signs = np.asarray(gears, dtype=np.float64)[None]
+        found.append(Blocks(kinds.gear, every[: 2 * n_x + own], signs))
+        same = np.flatnonzero(np.diff(gears) == 0)
+        if len(same):
+            paces = np.vstack([controls[own, same], controls[own, same + 1]])
+            found.append(Blocks(kinds.pace, paces, np.zeros((0, len(same)))))
+    return [one for one in found if one.number]
+
+
+@functools.lru_cache(maxsize=16)
+def _kinds(
+    model: Model,
+    effort: float,
+    change: float,
+    tightening: float,
+    stage_cost: RunningCost | None,
+    paced: bool,
+) -> Interval:
+    """One interval of a vehicle, differentiated; the same for all scenes and all its lengths."""
+    casadi = load_casadi()
+    settings = PolishSettings(effort=effort, change=change, tightening=tightening)
+    free = (None,) * (model.group.dof + len(model.reduced_names))
+    problem = _problem(model, Ends(free, free), settings, stage_cost)
+    own = problem.n_controls
+    if paced:
+        problem = _paced(problem, 1.0)
+    written = transcribe(problem, Grid(n_nodes=2, rule="rk4"))
+    sizes = (problem.n_states, problem.n_states, problem.n_controls)
+    first, last, control = (casadi.SX.sym(name, k) for name, k in zip("abu", sizes, strict=True))
+    duration, share = casadi.SX.sym("T"), casadi.SX.sym("share")
+    whole = casadi.Function("whole", [written.state, written.control, written.duration],
+                            [written.objective, written.constraints])  # fmt: skip
+    price, defects = whole(casadi.horzcat(first, last), control, duration * share)
+    step = duration * share * (control[own] if paced else 1.0)
+    with numpy_on_symbols(casadi):
+        begin, end = (_frames(casadi, model, x, control[:own]) for x in (first, last))
+        (swing,) = paths(casadi, (POINT,), begin, end, step=step)
+        below = _between(model, begin, end, step=step, settings=settings)
+    every = casadi.vertcat(first, last, control, duration)
+    nothing = casadi.SX.sym("nothing", 0)
+    before, after = casadi.SX.sym("before", own), casadi.SX.sym("after", own)
+    changed = casadi.sumsqr((after - before) / casadi.DM(_scales(model)))
+    wall, place, sign = casadi.SX.sym("w", 3), casadi.SX.sym("p", 2), casadi.SX.sym("sign")
+    beyond = [wall[0] * swing.x[k] + wall[1] * swing.y[k] - wall[2] for k in (2, 3)]
+    paces = casadi.SX.sym("paces", 2)
+    return Interval(
+        stage=kind_of(casadi, every, share, price=price, zero=defects,
+                      below=casadi.vertcat(casadi.SX(0, 1), *below)),
+        change=kind_of(casadi, casadi.vertcat(before, after), nothing, price=change * changed),
+        place=kind_of(casadi, place, wall, below=casadi.dot(wall[:2], place) - wall[2]),
+        swing=kind_of(casadi, every, casadi.vertcat(wall, share),
+                      below=casadi.vertcat(*beyond) - 2.0 * tightening),
+        gear=kind_of(casadi, casadi.vertcat(first, last, control[:own]), sign,
+                     below=-sign * casadi.vertcat(begin.twist[0], end.twist[0])),
+        pace=kind_of(casadi, paces, nothing, zero=paces[1] - paces[0]),
+    )  # fmt: skip
+
+
+def _path(casadi: Any, model: Model, scene: Scene) -> Any:
+    """Control points of every solid of the body in one interval, as a function."""
+    n_x = model.group.dof + len(model.reduced_names)
+    first, last = casadi.SX.sym("a", n_x), casadi.SX.sym("b", n_x)
+    control, step = casadi.SX.sym("u", len(model.control_names)), casadi.SX.sym("h")
+    with numpy_on_symbols(casadi):
+        begin, end = (_frames(casadi, model, x, control) for x in (first, last))
+        found = paths(casadi, scene.parts, begin, end, step=step)
+    return casadi.Function(
+        "path", [first, last, control, step], [m for path in found for m in path]
     )
 
 
@@ -235,13 +314,6 @@ def _frames(casadi: Any, model: Model, state: Any, control: Any) -> Frames:
     )
 
 
-def _changes(casadi: Any, model: Model, control: Any) -> Any:
-    """How much the controls change from interval to interval, squared and scaled."""
-    scaled = control / casadi.DM(_scales(model))
-    steps = scaled[:, 1:] - scaled[:, :-1]
-    return casadi.sumsqr(steps)
-
-
 def _scales(model: Model) -> Array:
     """Sizes (n_u,) of the controls: their greatest values, 1 where there is no limit."""
     most = np.abs(model.control_limits).max(axis=1)
@@ -262,22 +334,3 @@ def _ends_in_rates(model: Model) -> list[int]:
 
 def _within(limits: Array, by: float) -> Array:
     return np.asarray(limits + np.array([by, -by]))
-
-
-def lines_at(program: Program, point: Point, pairs: Pairs) -> Lines:
-    """First lines for pairs, from a point; see `first_lines`."""
-    return first_lines(program.points(point), program.scene.body, program.scene.pieces, pairs)
-
-
-def pairs_near(program: Program, point: Point, within: float) -> Pairs:
-    """Pairs nearer than `within` [m] at a point; see `near_pairs`."""
-    scene = program.scene
-    if not (scene.pieces and scene.parts):
-        empty = np.zeros(0, dtype=np.int64)
-        return Pairs(empty, empty, empty)
-    return near_pairs(program.points(point), scene.body, scene.pieces, within=within)
-
-
-def reaches_at(program: Program, point: Point, pairs: Pairs, lines: Lines) -> Reach:
-    """How far both sides of lines come at a point; see `reaches`."""
-    return reaches(program.points(point), program.scene.both, pairs, lines)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import functools
 import math
 from collections.abc import Callable
@@ -9,39 +10,74 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.budget import Budget
+from maneuver_automaton.optimal_control._casadi import load_casadi, numpy_on_symbols
+from maneuver_automaton.optimal_control.blocks import Blocks, Kind, assembled, kind_of
+from maneuver_automaton.optimal_control.parting import Parting
 from maneuver_automaton.optimal_control.polish_program import Program
 from maneuver_automaton.optimal_control.polish_values import Answer, Point, PolishSettings
-from maneuver_automaton.optimal_control.separation import Lines, Pairs, line_rows
+from maneuver_automaton.optimal_control.separation import PartPose
 from maneuver_automaton.optimal_control.solution import SolveStatus
-from maneuver_automaton.optimal_control.stopping import asked_between_iterations
+from maneuver_automaton.optimal_control.stopping import Watcher, watcher_of
 from maneuver_automaton.optimal_control.transcription import STATUS
 
-WARM = {"ipopt.mu_init": 1e-5}
-NODE_S = 2.5e-5  # [s] for each node of an expression, to differentiate it: measured, generous
+ROW_S = 1e-5  # [s] for each row of a program, to put it together: measured, generous
+ORDERING = 2  # approximate minimum fill: factorises twice as quickly as the default
+OF_LINE = 4  # parameters of a line: margin, anchor, angle
+OF_CORNER = 3  # parameters of a corner: its place, and the radius that rounds it
+
+
+class Begin(enum.Enum):
+    """Where a solve begins: its options are for that."""
+
+    GUESS = "guess"
+    NEARBY = "nearby"
+    SAME = "same"
+
+
+BEGINS: dict[Begin, dict[str, Any]] = {
+    Begin.GUESS: {},
+    Begin.NEARBY: {"ipopt.mu_init": 1e-5},  # found with other rows
+    Begin.SAME: {  # found with the same rows, multipliers too: half the iterations
+        "ipopt.mu_init": 1e-6,
+        "ipopt.warm_start_init_point": "yes",
+        "ipopt.warm_start_bound_push": 1e-7,
+        "ipopt.warm_start_bound_frac": 1e-7,
+        "ipopt.warm_start_slack_bound_push": 1e-7,
+        "ipopt.warm_start_slack_bound_frac": 1e-7,
+        "ipopt.warm_start_mult_bound_push": 1e-7,
+    },
+}
+
+
+class Multipliers(NamedTuple):
+    """Of bounds and rows, as a solve found them."""
+
+    bounds: Array  # (variables,)
+    rows: Array  # (rows,)
 
 
 class Solver(NamedTuple):
     """The program with lines for some pairs, built."""
 
-    function: Any
-    warm: Callable[[], Any]  # the same with a smaller barrier, for another solve from nearby
-    budget: Budget  # that every iteration asks
+    function: Callable[[Begin], Any]  # by where it begins
+    watcher: Watcher  # asks the budget at every iteration, and keeps the best
     bounds: Array  # (variables, 2)
     limits: Array  # (rows, 2)
+    corners: Array  # (k,) parameters that stay
     fixed: bool
 
 
 def solver_of(
-    program: Program, pairs: Pairs, *, fixed: bool, price: float, budget: Budget
+    program: Program, parting: Parting, *, fixed: bool, price: float, budget: Budget
 ) -> Solver | float:
-    """The program with lines for some pairs; where no time is left to build it, what it takes [s].
+    """The program with its lines; where no time is left to build it, what it takes [s].
 
     Parameters
     ----------
     program : Program
-    pairs : Pairs
+    parting : Parting
     fixed : bool
         Whether the lines stand still.
     price : float
@@ -49,84 +85,162 @@ def solver_of(
     budget : Budget
         Every iteration asks it: a solve ends with what it has once the time is over.
     """
-    casadi, written, scene = program.casadi, program.written, program.scene
-    variables = [casadi.vec(written.state), casadi.vec(written.control), written.duration]
-    bounds = [written.bounds]
-    rows = [written.constraints, program.zero, program.below]
-    equations = written.constraints.shape[0] + program.zero.shape[0]
-    count = len(pairs.interval)
-    given = casadi.SX.sym("given", 4, count)  # margin, anchor, angle
-    objective = program.objective
-    if count:
-        angle, offset = casadi.SX.sym("angle", 1, count), casadi.SX.sym("offset", 1, count)
-        if fixed:
-            angle, offset = given[3, :], casadi.SX.zeros(1, count)
-        else:
-            variables += [angle.T, offset.T]
-            bounds.append(np.tile([-np.inf, np.inf], (2 * count, 1)))
-        margin = given[0, :]
-        if math.isfinite(price):
-            inside = casadi.SX.sym("inside", 1, program.n_intervals)
-            variables.append(inside.T)
-            bounds.append(np.tile([0.0, np.inf], (program.n_intervals, 1)))
-            objective += price * casadi.sum2(inside)
-            margin -= inside[:, pairs.interval.tolist()]
-        rows.append(
-            line_rows(casadi, program.paths, scene.both, pairs, anchor=given[1:3, :],
-                      lines=(angle, offset), margin=margin, pieces_too=not fixed)
-        )  # fmt: skip
-    constraints = casadi.vertcat(*rows)
-    limits = np.zeros((constraints.shape[0], 2))
-    limits[equations:, 0] = -np.inf
-    functions = {
-        "x": casadi.vertcat(*variables),
-        "p": casadi.vec(given),
-        "f": objective,
-        "g": constraints,
-    }
-    most = program.settings.fixed_iterations if fixed else program.settings.max_iterations
-    given_names = [functions["x"], functions["p"]], [objective, constraints]
-    takes = NODE_S * casadi.Function("size", *given_names).n_nodes()
+    casadi, own = program.casadi, parting.own
+    elastic = math.isfinite(price) and len(own) > 0
+    free = np.tile([-np.inf, np.inf], (0 if fixed else 2 * len(own), 1))
+    inside = np.tile([0.0, np.inf], (program.n_intervals if elastic else 0, 1))
+    bounds = np.vstack([program.bounds, free, inside])
+    corners, places = _corners(program, parting)
+    blocks = [*program.blocks, *_line_blocks(program, parting, places, fixed, elastic)]
+    if elastic:
+        numbers = np.arange(len(bounds) - len(inside), len(bounds))[None]
+        blocks.append(Blocks(_priced(price), numbers, np.zeros((0, numbers.size))))
+    takes = ROW_S * sum(one.kind.rows * one.number for one in blocks)
     if takes > budget.left:
         return float(takes)
-    options = _options(program.settings, most)
-    asked = asked_between_iterations(
-        budget, n_variables=functions["x"].numel(), n_rows=constraints.numel(), n_given=4 * count
-    )
-    options["iteration_callback"] = asked
-    solver = casadi.nlpsol("solver", "ipopt", functions, options)
+    given = OF_LINE * len(own) + corners.size
+    built = assembled(casadi, blocks, size=len(bounds), given=given)
+    watcher = watcher_of(budget, built.limits, n_variables=len(bounds), n_given=given)
+    most = program.settings.fixed_iterations if fixed else program.settings.max_iterations
+    options = _options(program.settings, most) | built.derivatives
+    options["iteration_callback"] = watcher
 
     @functools.cache
-    def warm() -> Any:
-        return casadi.nlpsol("again", "ipopt", functions, options | WARM | _derivatives(solver))
+    def function(begin: Begin) -> Any:
+        return casadi.nlpsol("solver", "ipopt", built.functions, options | BEGINS[begin])
 
-    return Solver(solver, warm, budget, np.vstack(bounds), limits, fixed)
+    return Solver(function, watcher, bounds, built.limits, corners, fixed)
 
 
-def _derivatives(solver: Any) -> dict[str, Any]:
-    """Derivatives that one solver has and another can use."""
-    names = {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g", "hess_lag": "nlp_hess_l"}
-    return {option: solver.get_function(name) for option, name in names.items()}
+def _corners(program: Program, parting: Parting) -> tuple[Array, tuple[IntArray, IntArray]]:
+    """Parameters of corners of both sides, and where those of each solid begin.
+
+    Of the pieces only those that are in pairs: a map may have thousands.
+    """
+    body, pieces = program.scene.both
+    used, owner = np.unique(parting.pairs.piece, return_inverse=True)
+    solids = [*body, *(pieces[k] for k in used.tolist())]
+    rows = [np.column_stack([corners, np.full(len(corners), by)]) for corners, by in solids]
+    begins = np.cumsum([0, *map(len, rows)])
+    every = np.vstack([np.zeros((0, OF_CORNER)), *rows]).ravel()
+    return every, (begins[: len(body)], begins[len(body) :][owner])
+
+
+def _line_blocks(
+    program: Program,
+    parting: Parting,
+    places: tuple[IntArray, IntArray],
+    fixed: bool,
+    elastic: bool,
+) -> list[Blocks]:
+    """How far corners of the body, and of the pieces, reach over the lines."""
+    pairs, own, (here, there) = parting.pairs, parting.own, places
+    if not len(own):
+        return []
+    n_lines = len(own)
+    slot = np.full(len(parting.owner), -1)
+    slot[own] = np.arange(n_lines)
+    angle = program.size + np.arange(n_lines)
+    inside = program.size + (0 if fixed else 2 * n_lines) + np.arange(program.n_intervals)
+    first = OF_LINE * n_lines
+    model_pose = [part.pose for part in program.scene.parts for _ in part.solids]
+    blocks = []
+    for number, pose in enumerate(model_pose):
+        line, node, corner = np.nonzero(parting.facing.body[own])
+        some = pairs.body[own[line]] == number
+        line, node, corner = line[some], node[some], corner[some]
+        if not len(line):
+            continue
+        interval = pairs.interval[own[line]]
+        states = program.states_at(interval + node)
+        variables = [states if pose else states[:3]]
+        if not fixed:
+            variables += [angle[line][None], angle[line][None] + n_lines]
+        if elastic:
+            variables.append(inside[interval][None])
+        at = first + OF_CORNER * (here[number] + corner)
+        told = [OF_LINE * line + k for k in range(OF_LINE)] + [at + k for k in range(OF_CORNER)]
+        kind = _corner_kind(pose, program.problem.n_states, program.dof, fixed, elastic)
+        blocks.append(Blocks(kind, np.vstack(variables), np.array(told)))
+    if not fixed:
+        pair, corner = np.nonzero(parting.facing.piece)
+        line = slot[parting.owner[pair]]
+        at = first + OF_CORNER * (there[pair] + corner)
+        told = [OF_LINE * line + k for k in range(OF_LINE)] + [at + k for k in range(OF_CORNER)]
+        variables = [angle[line], angle[line] + n_lines]
+        blocks.append(Blocks(_piece_kind(), np.vstack(variables), np.array(told)))
+    return blocks
+
+
+@functools.lru_cache(maxsize=16)
+def _corner_kind(
+    pose: PartPose | None, n_states: int, dof: int, fixed: bool, elastic: bool
+) -> Kind:
+    """How far a corner of the body reaches over a line, less what it may be inside."""
+    casadi = load_casadi()
+    state = casadi.SX.sym("x", n_states if pose else 3)
+    line, inside = casadi.SX.sym("line", 0 if fixed else 2), casadi.SX.sym("inside", int(elastic))
+    given = casadi.SX.sym("given", OF_LINE + OF_CORNER)
+    margin, anchor_x, anchor_y, known, along, aside, rounding = casadi.vertsplit(given)
+    angle, offset = (known, 0.0) if fixed else casadi.vertsplit(line)
+    x, y, heading = state[0], state[1], state[2]
+    if pose:
+        with numpy_on_symbols(casadi):
+            p_x, p_y, turn = pose(casadi.vertsplit(state[dof:]))
+        cosine, sine = casadi.cos(heading), casadi.sin(heading)
+        x, y = x + cosine * p_x - sine * p_y, y + sine * p_x + cosine * p_y
+        heading += turn
+    c, s = casadi.cos(angle), casadi.sin(angle)
+    over = c * (x - anchor_x) + s * (y - anchor_y) - offset + margin + rounding
+    over += along * casadi.cos(heading - angle) - aside * casadi.sin(heading - angle)
+    if elastic:
+        over -= inside
+    return kind_of(casadi, casadi.vertcat(state, line, inside), given, below=over)
+
+
+@functools.cache
+def _piece_kind() -> Kind:
+    """How far a corner of a piece reaches over a line."""
+    casadi = load_casadi()
+    line, given = casadi.SX.sym("line", 2), casadi.SX.sym("given", OF_LINE + OF_CORNER)
+    _, anchor_x, anchor_y, _, x, y, rounding = casadi.vertsplit(given)
+    angle, offset = casadi.vertsplit(line)
+    beyond = casadi.cos(angle) * (x - anchor_x) + casadi.sin(angle) * (y - anchor_y)
+    return kind_of(casadi, line, given, below=offset + rounding - beyond)
+
+
+@functools.lru_cache(maxsize=16)
+def _priced(price: float) -> Kind:
+    """What it costs to be inside obstacles."""
+    casadi = load_casadi()
+    inside = casadi.SX.sym("inside")
+    return kind_of(casadi, inside, casadi.SX.sym("nothing", 0), price=price * inside)
 
 
 def solve_from(
     solver: Solver,
     program: Program,
     point: Point,
-    lines: Lines,
-    margins: Array,
+    apart: Parting,
     *,
-    again: bool,
+    begin: Begin,
+    known: Multipliers | None,
     trust: float,
-) -> tuple[Point, Lines, Answer]:
-    """The solver's answer from a point and lines with their margins, places within `trust` [m]."""
+) -> tuple[Point, Parting, Multipliers, Answer]:
+    """The solver's answer from a point and lines, with places within `trust` [m] of the point.
+
+    The `known` multipliers count where it begins at what the same solver has found. Where it does
+    not come to its end, its best iterate that breaks no condition is the answer, if there is one.
+    """
     state, control, duration = program.values(point)
+    own, lines = apart.own, apart.lines.of(apart.own)
     first = [state.ravel(), control.ravel(), np.array([duration])]
     if not solver.fixed:
-        first += [lines.angle, np.zeros(lines.angle.size)]
+        first += [lines.angle, np.zeros(len(own))]
     first.append(np.zeros(len(solver.bounds) - sum(map(len, first))))  # how deep inside
-    given = np.column_stack([margins, lines.anchor, lines.angle])
-    began = solver.budget.elapsed
+    given = np.column_stack([apart.margins[own], lines.anchor, lines.angle])
+    watcher = solver.watcher
+    began = watcher.budget.elapsed
     bounds = solver.bounds.copy()
     if math.isfinite(trust):
         n_x = state.shape[1]
@@ -134,38 +248,43 @@ def solve_from(
             # nodes but for the ends
             inner = slice(n_x + axis, n_x * program.n_intervals + axis, n_x)
             bounds[inner] = state[1:-1, axis, None] + np.array([-trust, trust])
-    function = solver.warm() if again else solver.function
+    function = solver.function(begin)
+    watcher.forget()
     answer = function(
         x0=np.clip(np.concatenate(first), *bounds.T),
-        p=given.ravel(),
+        p=np.concatenate([given.ravel(), solver.corners]),
         lbx=bounds[:, 0],
         ubx=bounds[:, 1],
         lbg=solver.limits[:, 0],
         ubg=solver.limits[:, 1],
+        **({"lam_x0": known.bounds, "lam_g0": known.rows} if known and begin is Begin.SAME else {}),
     )
-    solving = solver.budget.elapsed - began
     stats = function.stats()
-    values = np.asarray(answer["x"].full(), dtype=np.float64).ravel()
-    if not solver.fixed:
-        both = values[program.size :][: 2 * lines.angle.size]
-        angle, offset = both.reshape(2, -1)
-        lines = Lines(angle, lines.anchor).shifted(offset)
     reason = str(stats["return_status"])
+    status = STATUS.get(reason, SolveStatus.FAILED)
+    values = np.asarray(answer["x"].full(), dtype=np.float64).ravel()
+    objective, is_solved = float(answer["f"]), status is SolveStatus.SOLVED
+    if not is_solved and watcher.best is not None:
+        values, objective = watcher.best, watcher.least
+    if not solver.fixed:
+        apart = apart.moved(*values[program.size :][: 2 * len(own)].reshape(2, -1))
     return (
         _point_of(program, values),
-        lines,
+        apart,
+        Multipliers(*(answer[name].full().ravel() for name in ("lam_x", "lam_g"))),
         Answer(
-            status=STATUS.get(reason, SolveStatus.FAILED),
+            status=status,
             reason=reason,
-            objective=float(answer["f"]),
+            objective=objective,
             iterations=int(stats["iter_count"]),
-            seconds=solving,
+            seconds=watcher.budget.elapsed - began,
+            is_feasible=is_solved or watcher.best is not None,
         ),
     )
 
 
 def _point_of(program: Program, values: Array) -> Point:
-    problem, n = program.written.problem, program.n_intervals + 1
+    problem, n = program.problem, program.n_intervals + 1
     n_x, n_u = problem.n_states, problem.n_controls
     state = values[: n * n_x].reshape(n, n_x)
     control = values[n * n_x : n * n_x + (n - 1) * n_u].reshape(n - 1, n_u)
@@ -182,6 +301,7 @@ def _options(settings: PolishSettings, most: int) -> dict[str, Any]:
         "error_on_fail": False,
         "ipopt.print_level": 0,
         "ipopt.sb": "yes",  # no banner
+        "ipopt.mumps_pivot_order": ORDERING,
         "ipopt.mu_strategy": "monotone",
         "ipopt.mu_init": settings.mu_init,
         "ipopt.tol": settings.tolerance,

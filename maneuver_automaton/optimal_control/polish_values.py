@@ -74,6 +74,7 @@ class Polished:
     control: Array  # (n - 1, n_u)
     durations: Array  # (n - 1,) [s]
     objective: float
+    is_feasible: bool  # whether it breaks no condition of the program, solved or not
     iterations: int
     build_s: float
     solve_s: float
@@ -111,3 +112,14 @@ class Answer(NamedTuple):
     objective: float
     iterations: int
     seconds: float
+    is_feasible: bool  # whether the point breaks no condition of the program
+
+    def then(self, later: Answer) -> Answer:
+        """The answer after another solve, and what both took; an earlier point stays."""
+        kept = later.is_feasible or not self.is_feasible
+        return later._replace(
+            objective=later.objective if kept else self.objective,
+            iterations=self.iterations + later.iterations,
+            seconds=self.seconds + later.seconds,
+            is_feasible=self.is_feasible or later.is_feasible,
+        )

@@ -12,18 +12,9 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.models import Model
-from maneuver_automaton.optimal_control.polish_program import (
-    Program,
-    lines_at,
-    pairs_near,
-    program_of,
-    reaches_at,
-)
-from maneuver_automaton.optimal_control.polish_solver import (
-    Solver,
-    solve_from,
-    solver_of,
-)
+from maneuver_automaton.optimal_control.parting import pairs_near, parted
+from maneuver_automaton.optimal_control.polish_program import program_of
+from maneuver_automaton.optimal_control.polish_solver import Begin, Solver, solve_from, solver_of
 from maneuver_automaton.optimal_control.polish_values import (
     Answer,
     Ends,
@@ -33,14 +24,14 @@ from maneuver_automaton.optimal_control.polish_values import (
     Scene,
 )
 from maneuver_automaton.optimal_control.problem import Guess, RunningCost, resampled
-from maneuver_automaton.optimal_control.separation import Lines, Pairs
 from maneuver_automaton.optimal_control.solution import SolveStatus
 
-SWING = 1.1  # of what corners swing out between nodes is kept as a margin
 MISSED = 0.02  # radii of the body: pairs that came nearer than this need a line
 TOO_DEEP = 0.2  # radii of the body inside obstacles from where fixed planes lead nowhere
 PRICE = 2.0  # of being inside obstacles, in durations of the guess per radius of the body
+FIXED_ROUNDS = 2  # solves with fixed planes: what comes out is a guess
 TRUST = 0.6  # share of the distance within which pairs have lines
+TIGHT = 2e-3  # radii of the body: pieces nearer than this are held back by their line
 
 
 def polish(
@@ -89,72 +80,63 @@ def polish(
     """
     settings = settings or PolishSettings()
     began = budget.elapsed
-    program = program_of(model, ends, scene, settings, stage_cost, gears, guess)
-    point = Point(
-        resampled(guess.state, program.n_intervals + 1),
-        held(guess.control, program.n_intervals),
-        np.full(program.n_intervals, guess.duration / program.n_intervals),
-    )
+    point = _point_of(guess, len(guess.control) if gears is None else len(gears))
+    program = program_of(model, ends, scene, settings, stage_cost, gears, point)
     ahead = settings.ahead * _fastest(point)
     reach = max((part.reach for part in scene.parts), default=0.0) or 0.5 * ahead or 1.0
     near = max(settings.near * reach, ahead)
-    pairs = pairs_near(program, point, near)
-    lines = lines_at(program, point, pairs)
-    total = Answer(SolveStatus.OUT_OF_BUDGET, "lines were missing to the end", math.inf, 0, 0.0)
+    apart = parted(program, point, pairs_near(program, point, near))
+    if fixed_planes and apart.depth(program, point) > TOO_DEEP * reach:
+        why = "the guess is too deep inside obstacles for fixed planes"
+        return _polished(point, _nothing(why), budget.elapsed - began)
+    price = PRICE * guess.duration / reach if elastic else math.inf
+    best, total = point, _nothing("lines were missing to the end")
     solver: Solver | None = None
     needed = 0.0  # [s] to build a program that was not built
-    margins, again, trust = np.zeros(len(pairs.interval)), False, math.inf
-    if fixed_planes and _depth(program, point, pairs, lines) > TOO_DEEP * reach:
-        total = total._replace(reason="the guess is too deep inside obstacles for fixed planes")
-        return _polished(point, total, budget.elapsed - began)
-    for _ in range(settings.rounds):
+    begin, trust, known = Begin.GUESS, math.inf, None
+    for _ in range(FIXED_ROUNDS if fixed_planes else settings.rounds):
         if budget.is_over:
             total = total._replace(status=SolveStatus.OUT_OF_BUDGET, reason="no time was left")
             break
         if solver is None:
-            price = PRICE * guess.duration / reach if elastic else math.inf
-            built = solver_of(program, pairs, fixed=fixed_planes, price=price, budget=budget)
+            built = solver_of(program, apart, fixed=fixed_planes, price=price, budget=budget)
             if isinstance(built, float):
                 reason = f"no time was left: to build the program would take {built:.2g} s"
                 total = total._replace(status=SolveStatus.OUT_OF_BUDGET, reason=reason)
                 needed = built
                 break
             solver = built
-        if fixed_planes:
-            lines = lines.shifted(reaches_at(program, point, pairs, lines).piece)
-        margins = np.maximum(margins, _margins(program, point, pairs, lines))
-        before = point
-        found, moved, answer = solve_from(
-            solver, program, point, lines, margins, again=again, trust=trust
+        apart = apart.with_margins(program, point, fixed=fixed_planes)
+        found, moved, known, answer = solve_from(
+            solver, program, point, apart, begin=begin, known=known, trust=trust
         )
-        total = Answer(*answer[:3], total.iterations + answer.iterations,
-                        total.seconds + answer.seconds)  # fmt: skip
+        total = total.then(answer)
+        if answer.is_feasible or not total.is_feasible:
+            best = found
         if elastic or answer.status is not SolveStatus.SOLVED:
-            point = found
             break
-        missed = pairs_near(program, found, MISSED * reach)
-        far = float(np.abs(found.state[:, :2] - before.state[:, :2]).max())
         total = total._replace(status=SolveStatus.FAILED, reason="touches between nodes")
-        if (
-            trust > near
-            and far > near
-            and len(pairs.extended(missed).interval) > len(pairs.interval)
-        ):
+        missed = pairs_near(program, found, MISSED * reach)
+        far = float(np.abs(found.state[:, :2] - point.state[:, :2]).max())
+        if trust > near and far > near and apart.lacks(missed):
             trust = TRUST * near  # it went through what was not near: once more, in short steps
             continue
-        point, lines, again = found, moved, True
+        point = found
         if trust < near:
             missed = pairs_near(program, found, near)
-        more = pairs.extended(missed)
-        if len(more.interval) > len(pairs.interval):
-            new = Pairs(*(column[len(pairs.interval) :] for column in more))
-            lines = lines.extended(lines_at(program, point, new))
-            margins = np.append(margins, np.zeros(len(new.interval)))
-            pairs, solver, again = more, None, False
-        elif far < 0.99 * trust and _kept(program, point, pairs, lines):
-            total = total._replace(status=answer.status, reason=answer.reason)
-            break
-    return _polished(point, total, max(budget.elapsed - began, needed))
+        apart = moved.joined(program, point, missed)
+        begin = Begin.SAME if apart is moved else Begin.GUESS
+        if apart is moved and not fixed_planes:
+            apart = moved.split(program, point, TIGHT * reach)
+        if apart is moved and moved.is_kept(program, point):
+            if far < 0.99 * trust:
+                total = total._replace(status=answer.status, reason=answer.reason)
+                break
+        else:
+            apart = apart.faced(program, point)
+        if apart is not moved:
+            solver, begin = None, Begin.NEARBY if begin is Begin.SAME else begin
+    return _polished(best, total, max(budget.elapsed - began, needed))
 
 
 def _polished(point: Point, total: Answer, seconds: float) -> Polished:
@@ -165,6 +147,7 @@ def _polished(point: Point, total: Answer, seconds: float) -> Polished:
         control=point.control,
         durations=point.durations,
         objective=total.objective,
+        is_feasible=total.is_feasible,
         iterations=total.iterations,
         build_s=seconds - total.seconds,
         solve_s=total.seconds,
@@ -189,22 +172,18 @@ def _fastest(point: Point) -> float:
     return float((steps / point.durations).max(initial=0.0))
 
 
-def _margins(program: Program, point: Point, pairs: Pairs, lines: Lines) -> Array:
-    """Margins (n,) [m] at the nodes for what the corners swing out between them."""
-    reach = reaches_at(program, point, pairs, lines)
-    return program.settings.clearance + SWING * (reach.between - reach.nodes)
+def _nothing(reason: str) -> Answer:
+    """No answer yet."""
+    return Answer(SolveStatus.OUT_OF_BUDGET, reason, math.inf, 0, 0.0, False)
 
 
-def _depth(program: Program, point: Point, pairs: Pairs, lines: Lines) -> float:
-    """How deep the body is inside obstacles [m]."""
-    reach = reaches_at(program, point, pairs, lines)
-    return float((reach.between - reach.piece).max(initial=0.0))
-
-
-def _kept(program: Program, point: Point, pairs: Pairs, lines: Lines) -> bool:
-    """Whether every path keeps half of the margin to its piece."""
-    reach = reaches_at(program, point, pairs, lines)
-    return bool((reach.between - reach.piece <= -0.5 * program.settings.clearance).all())
+def _point_of(guess: Guess, count: int) -> Point:
+    """The guess on so many intervals."""
+    return Point(
+        resampled(guess.state, count + 1),
+        held(guess.control, count),
+        np.full(count, guess.duration / count),
+    )
 
 
 def held(control: Array, count: int) -> Array:

@@ -14,11 +14,14 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.optimal_control.problem import Components
 
 TOUCHING = 1e-6  # [m] nearer solids have no direction between them
+SHARED = 0.1  # share of the distance by which a piece may stand out before the line of another one
+TURNED = np.radians(np.linspace(-70.0, 70.0, 9))  # by which lines may turn
 
 Solid = tuple[Array, float]
 """Corners (n, 2) of a convex polygon, and the radius that rounds it: one corner makes a disc."""
@@ -67,13 +70,6 @@ class Pairs(NamedTuple):
         return Pairs(*columns)
 
 
-class Paths(NamedTuple):
-    """Control points of the paths of m corners: first all begins, all ends, then those between."""
-
-    x: Any  # (4 m, n - 1)
-    y: Any  # (4 m, n - 1)
-
-
 class Lines(NamedTuple):
     """A line for each pair, through its anchor; the normal points from the body to the piece."""
 
@@ -89,80 +85,13 @@ class Lines(NamedTuple):
         """These, then the others."""
         return Lines(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
 
+    def of(self, which: IntArray) -> Lines:
+        """Some of the lines."""
+        return Lines(self.angle[which], self.anchor[which])
+
     def shifted(self, offset: Array) -> Lines:
         """The lines moved along their normals."""
         return Lines(self.angle, self.anchor + offset[:, None] * self.normal)
-
-
-class Frames(NamedTuple):
-    """Where the vehicle is and how it moves, in symbols: at one node of each interval."""
-
-    pose: Any  # (dof, n - 1)
-    twist: Sequence[Any]  # dof rows (1, n - 1)
-    reduced: Any  # (n_z, n - 1)
-    reduced_rates: Any  # (n_z, n - 1)
-
-
-def paths(
-    casadi: Any, parts: Sequence[BodyPart], begin: Frames, end: Frames, *, step: Any
-) -> list[Paths]:
-    """Control points of every solid's corners in every interval, in symbols.
-
-    Source: Farin (2002), *Curves and Surfaces for CAGD*, Sec. 7.5 (cubic Hermite interpolation in
-    Bernstein form).
-
-    Parameters
-    ----------
-    casadi : module
-    parts : sequence of BodyPart
-    begin, end : Frames
-        At the begin and at the end of each interval, with the control of the interval.
-    step : (1, n - 1) symbols
-        Duration of each interval [s].
-    """
-    found = []
-    for part in parts:
-        for corners, _ in part.solids:
-            x_0, y_0, v_0, w_0 = _corners(casadi, part, corners, begin)
-            x_1, y_1, v_1, w_1 = _corners(casadi, part, corners, end)
-            third = casadi.repmat(step / 3.0, len(corners), 1)
-            x = casadi.vertcat(x_0, x_1, x_0 + third * v_0, x_1 - third * v_1)
-            y = casadi.vertcat(y_0, y_1, y_0 + third * w_0, y_1 - third * w_1)
-            found.append(Paths(x, y))
-    return found
-
-
-def _corners(casadi: Any, part: BodyPart, corners: Array, at: Frames) -> tuple[Any, ...]:
-    """Places x, y and velocities (m, n - 1) of the corners of a part."""
-    count = at.pose.shape[1]
-    ones = casadi.SX.ones(1, count)
-    along, aside = casadi.DM(corners[:, 0]), casadi.DM(corners[:, 1])
-    if part.pose is None:
-        x, y = along @ ones, aside @ ones
-        v = w = casadi.SX.zeros(len(corners), count)
-    else:
-        place = part.pose(casadi.vertsplit(at.reduced))
-        p_x, p_y, turn = (casadi.SX(value) * ones for value in place)
-        every = casadi.SX.ones(len(corners), 1)
-        x = every @ p_x + along @ casadi.cos(turn) - aside @ casadi.sin(turn)
-        y = every @ p_y + along @ casadi.sin(turn) + aside @ casadi.cos(turn)
-        v = casadi.jtimes(x, at.reduced, at.reduced_rates)
-        w = casadi.jtimes(y, at.reduced, at.reduced_rates)
-    ahead, sideways, turning = (
-        casadi.repmat(casadi.SX(at.twist[k]) * ones, len(corners), 1) for k in range(3)
-    )
-    v, w = ahead - turning * y + v, sideways + turning * x + w
-    cosine, sine, p_x, p_y = (
-        casadi.repmat(row, len(corners), 1)
-        for row in (casadi.cos(at.pose[2, :]), casadi.sin(at.pose[2, :]), at.pose[0, :],
-                    at.pose[1, :])
-    )  # fmt: skip
-    return (
-        p_x + cosine * x - sine * y,
-        p_y + sine * x + cosine * y,
-        cosine * v - sine * w,
-        sine * v + cosine * w,
-    )
 
 
 def near_pairs(
@@ -175,7 +104,7 @@ def near_pairs(
     """Pairs that are nearer than `within` [m], from control points in numbers."""
     import shapely
 
-    solid = np.array([_geometry(corners) for corners, _ in pieces], dtype=object)
+    solid = _geometries([corners for corners, _ in pieces])
     rounding = np.array([by for _, by in pieces])
     tree = shapely.STRtree(solid)
     intervals, bodies, found = [], [], []
@@ -202,13 +131,14 @@ def first_lines(
     """Lines between nearest points; where two solids overlap, along their least penetration."""
     import shapely
 
-    solid = np.array([_geometry(corners) for corners, _ in pieces], dtype=object)
+    if not len(pairs.piece):
+        return Lines(np.zeros(0), np.zeros((0, 2)))
+    used, owner = np.unique(pairs.piece, return_inverse=True)
+    solid = _geometries([pieces[k][0] for k in used.tolist()])
     hulls = [_hulls(x, y) for x, y in points]
     mine = np.array([hulls[b][k] for k, b in zip(pairs.interval, pairs.body, strict=True)],
                     dtype=object)  # fmt: skip
-    if not len(mine):
-        return Lines(np.zeros(0), np.zeros((0, 2)))
-    ends = shapely.get_coordinates(shapely.shortest_line(mine, solid[pairs.piece]))
+    ends = shapely.get_coordinates(shapely.shortest_line(mine, solid[owner]))
     here, there = ends[0::2], ends[1::2]
     angle = np.arctan2(there[:, 1] - here[:, 1], there[:, 0] - here[:, 0])
     anchor = 0.5 * (here + there)
@@ -216,62 +146,6 @@ def first_lines(
         own = shapely.get_coordinates(mine[row])
         angle[row], anchor[row] = _least_penetration(own, pieces[pairs.piece[row]][0])
     return Lines(angle, anchor)
-
-
-def line_rows(
-    casadi: Any,
-    found: Sequence[Paths],
-    scene: tuple[Sequence[Solid], Sequence[Solid]],
-    pairs: Pairs,
-    *,
-    anchor: Any,
-    lines: tuple[Any, Any],
-    margin: Any,
-    pieces_too: bool,
-) -> Any:
-    """What must not be positive: how far each side reaches over its line, as one column.
-
-    Parameters
-    ----------
-    found : sequence of Paths
-        One for each solid of the body.
-    scene : (body, pieces)
-        Solids of both sides.
-    anchor : (2, n) symbols
-        A place near each line [m].
-    lines : (angle, offset)
-        Rows (1, n) of symbols: how far beyond its anchor each line runs.
-    margin : (1, n) symbols
-        Kept between the body at the nodes and the line [m].
-    pieces_too : bool
-        Whether the pieces need rows of their own; not where the lines stand still.
-    """
-    body, pieces = scene
-    angle, offset = lines
-    cosine, sine = casadi.cos(angle), casadi.sin(angle)
-    rows = []
-    for number, path in enumerate(found):
-        which = np.flatnonzero(pairs.body == number).tolist()
-        if not which:
-            continue
-        columns = pairs.interval[which].tolist()
-        count = path.x.shape[0] // 2
-        c, s, o = (
-            casadi.repmat(row[:, which], count, 1) for row in (cosine, sine, offset - margin)
-        )
-        x = path.x[:count, columns] - casadi.repmat(anchor[0, which], count, 1)
-        y = path.y[:count, columns] - casadi.repmat(anchor[1, which], count, 1)
-        rows.append(casadi.vec(c * x + s * y - o + body[number][1]))
-    if pieces_too:
-        owner = np.concatenate([np.full(len(pieces[p][0]), k) for k, p in enumerate(pairs.piece)])
-        corner = np.concatenate([pieces[p][0] for p in pairs.piece])
-        rounding = casadi.DM([pieces[pairs.piece[k]][1] for k in owner]).T
-        own = owner.tolist()
-        x = casadi.DM(corner[:, 0]).T - anchor[0, own]
-        y = casadi.DM(corner[:, 1]).T - anchor[1, own]
-        beyond = cosine[:, own] * x + sine[:, own] * y - offset[:, own] - rounding
-        rows.append(casadi.vec(-beyond))
-    return casadi.vertcat(*rows)
 
 
 class Reach(NamedTuple):
@@ -300,19 +174,142 @@ def reaches(
         half = len(along) // 2
         nodes[which] = along[:half].max(axis=0) + body[number][1]
         between[which] = along.max(axis=0) + body[number][1]
-    begin = [
-        float(((pieces[p][0] - lines.anchor[k]) @ normal[k]).min()) - pieces[p][1]
-        for k, p in enumerate(pairs.piece)
-    ]
-    return Reach(nodes, between, np.array(begin))
+    if not len(normal):
+        return Reach(nodes, between, np.zeros(0))
+    corners, rounding = _padded(pieces, pairs.piece)
+    there = corners - lines.anchor[:, None]
+    begin = np.einsum("nkd,nd->nk", there, normal).min(axis=1) - rounding
+    return Reach(nodes, between, begin)
 
 
-def _geometry(corners: Array) -> Any:
+def shared_lines(pieces: Sequence[Solid], pairs: Pairs, lines: Lines, reach: Reach) -> IntArray:
+    """For each pair the pair whose line parts it: lines of near pieces part those behind them.
+
+    Parameters
+    ----------
+    pieces : sequence of Solid
+    pairs : Pairs
+    lines : Lines
+        One for each pair.
+    reach : Reach
+        How far both sides of its line come, for each pair.
+
+    Returns
+    -------
+    (n,) integers
+        Of a pair that keeps its own line, its own number.
+
+    Examples
+    --------
+    >>> pairs = Pairs(*np.array([[0, 0], [0, 0], [0, 1]]))
+    >>> lines = Lines(np.zeros(2), np.array([[1.0, 0.0], [2.0, 0.0]]))
+    >>> walls = [(np.array([[x, -1.0], [x, 1.0]]), 0.0) for x in (2.0, 4.0)]
+    >>> reach = Reach(-np.ones(2), -np.ones(2), np.array([1.0, 2.0]))
+    >>> shared_lines(walls, pairs, lines, reach).tolist()
+    [0, 0]
+    """
+    owner = np.arange(len(pairs.interval))
+    if not len(owner):
+        return owner
+    corners, rounding = _padded(pieces, pairs.piece)
+    gap = reach.piece - reach.between
+    limit = reach.piece - SHARED * np.maximum(gap, 0.0)
+    normal = lines.normal
+    order = np.lexsort((gap, pairs.body, pairs.interval))
+    changes = np.diff(pairs.interval[order]) | np.diff(pairs.body[order])
+    for group in np.split(order, np.flatnonzero(changes) + 1):
+        left = group
+        while len(left):
+            k, left = left[0], left[1:]
+            owner[k] = k
+            behind = ((corners[left] - lines.anchor[k]) @ normal[k]).min(axis=1)
+            parted = behind - rounding[left] >= limit[k]
+            owner[left[parted]] = k
+            left = left[~parted]
+    return owner
+
+
+def _padded(solids: Sequence[Solid], which: IntArray) -> tuple[Array, Array]:
+    """Corners (n, most, 2) of some solids, the last one repeated, and radii (n,)."""
+    used, owner = np.unique(which, return_inverse=True)
+    some = [solids[k] for k in used.tolist()]
+    most = max(len(corners) for corners, _ in some)
+    rows = [np.pad(corners, ((0, most - len(corners)), (0, 0)), "edge") for corners, _ in some]
+    return np.array(rows)[owner], np.array([by for _, by in some])[owner]
+
+
+class Facing(NamedTuple):
+    """Corners that may touch a line as it turns a little."""
+
+    body: NDArray[np.bool_]  # (n, 2, most) of the body: at the begin and at the end
+    piece: NDArray[np.bool_]  # (n, most)
+
+    def joined(self, other: Facing) -> Facing:
+        """Corners of both, those of the other for its pairs, which are the first of these."""
+        body, piece = self.body.copy(), self.piece.copy()
+        body[: len(other.body)] |= other.body
+        piece[: len(other.piece)] |= other.piece
+        return Facing(body, piece)
+
+    def holds(self, other: Facing) -> bool:
+        """Whether it has all corners of another one."""
+        return bool((self.body >= other.body).all() and (self.piece >= other.piece).all())
+
+
+def facing(
+    points: Sequence[tuple[Array, Array]],
+    scene: tuple[Sequence[Solid], Sequence[Solid]],
+    pairs: Pairs,
+    lines: Lines,
+    owner: IntArray,
+    *,
+    turned: Array,
+) -> Facing:
+    """Corners of both sides that are foremost for some line, `turned` by some angle [rad].
+
+    Of pieces that share a line only the corners that are foremost among those of all.
+    """
+    body, pieces = scene
+    count = len(pairs.interval)
+    most = max((len(corners) for corners, _ in body), default=0)
+    here = np.zeros((count, 2, most), dtype=np.bool_)
+    angle = lines.angle[:, None] + turned
+    c, s = np.cos(angle)[..., None], np.sin(angle)[..., None]
+    for number, (x, y) in enumerate(points):
+        which = np.flatnonzero(pairs.body == number)
+        m = len(body[number][0])
+        for node in (0, 1):
+            columns = pairs.interval[which]
+            rows = slice(node * m, (node + 1) * m)
+            along = c[which] * x[rows, columns].T[:, None] + s[which] * y[rows, columns].T[:, None]
+            foremost = along.argmax(axis=2)
+            here[which[:, None], node, foremost] = True
+    if not count:
+        return Facing(here, np.zeros((0, 0), dtype=np.bool_))
+    corners, rounding = _padded(pieces, pairs.piece)
+    there = np.zeros((count, corners.shape[1]), dtype=np.bool_)
+    own = corners - lines.anchor[:, None]
+    along = c * own[:, None, :, 0] + s * own[:, None, :, 1] - rounding[:, None, None]
+    least = along.min(axis=2)
+    first = np.full(least.shape, np.inf)
+    np.minimum.at(first, owner, least)
+    which, turn = np.nonzero(least <= first[owner])
+    there[which, along.argmin(axis=2)[which, turn]] = True
+    return Facing(here, there)
+
+
+def _geometries(rings: Sequence[Array]) -> Any:
+    """Points, edges and polygons (n,) from their corners, those of as many corners at once."""
     import shapely
 
-    if len(corners) == 1:
-        return shapely.Point(corners[0])
-    return shapely.LineString(corners) if len(corners) == 2 else shapely.Polygon(corners)
+    counts = np.array([len(ring) for ring in rings])
+    found = np.empty(len(rings), dtype=object)
+    for count in np.unique(counts).tolist():
+        which = np.flatnonzero(counts == count)
+        corners = np.stack([rings[k] for k in which.tolist()])
+        make = shapely.linestrings if count == 2 else shapely.polygons
+        found[which] = shapely.points(corners[:, 0]) if count == 1 else make(corners)
+    return found
 
 
 def _hulls(x: Array, y: Array) -> Any:

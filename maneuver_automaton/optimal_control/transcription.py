@@ -125,7 +125,7 @@ def transcribe(problem: OptimalControlProblem, grid: Grid) -> Transcription:
         objective=objective,
         constraints=defects,
         limits=np.zeros((n_states * (n - 1), 2)),
-        bounds=_bounds(problem, grid),
+        bounds=bounds_of(problem, grid),
     )
 
 
@@ -231,7 +231,7 @@ def ipopt_options(settings: SolverSettings) -> dict[str, Any]:
     return options
 
 
-def _bounds(problem: OptimalControlProblem, grid: Grid) -> Array:
+def bounds_of(problem: OptimalControlProblem, grid: Grid) -> Array:
     """Limits (variables, 2) of all variables; fixed ones have both alike."""
     limits = limits_of(problem.state_limits, problem.n_states)
     states = np.tile(limits, (grid.n_nodes, 1, 1))

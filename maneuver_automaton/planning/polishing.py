@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,10 +12,12 @@ import numpy as np
 
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.collision import Obstacle
+from maneuver_automaton.collision import AnyObstacle, Box, Obstacle, Shape
 from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.collision.convex import convex_pieces
+from maneuver_automaton.collision.rectangles import blocked_rectangles
 from maneuver_automaton.collision.surroundings import parts_of, surroundings_of
+from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Model, SecondOrderCar, SecondOrderUnicycle
 from maneuver_automaton.optimal_control import Guess, PolishSettings, has_casadi, load_casadi
 from maneuver_automaton.optimal_control.polishing import intervals_for
@@ -70,8 +72,6 @@ def why_not_polished(problem: Problem) -> str:
         return "the vehicle moves by the maneuvers of its library alone"
     if any(moves(obstacle) for obstacle in problem.obstacles):
         return "something moves"
-    if not all(isinstance(obstacle, Obstacle) for obstacle in problem.obstacles):
-        return "there is an occupancy map"
     unlimited = problem.horizon.time is None and problem.horizon.max_time is None
     if unlimited and polished_price(problem).cost.time == 0.0:
         return "time costs nothing"
@@ -107,19 +107,14 @@ def polish_found(found: Incumbents, paths: Sequence[Aimed]) -> None:
     if not known[0][0].duration > 0.0:
         return  # it is there already
     solid = _without_passed(problem, known[0][0])
-    aimed = [Aimed(guess_of_plan(plan), goal_index) for plan, goal_index in known]
-    aimed += _other_headings(problem, aimed[0])
-    if rests_at_both_ends(problem):
-        along = list(guesses_along_paths(problem, budget))
-        aimed = along or [*paths, *aimed]
     work = iterations_within(budget)
-    for goal_index in dict.fromkeys(one.goal_index for one in aimed):
+    for goal_index, guesses in _by_goal(problem, _guesses(problem, known, paths, budget)):
         if budget.is_over or (work is not None and work <= 0):
             return
         try:
             polished = polish_plans(
                 solid,
-                [one.guess for one in aimed if one.goal_index == goal_index],
+                guesses,
                 goal_index,
                 price.stage_cost(known[0][0]),
                 budget=budget,
@@ -132,6 +127,33 @@ def polish_found(found: Incumbents, paths: Sequence[Aimed]) -> None:
         found.counts.update(polished=len(polished.attempts))
         if work is not None:
             work -= sum(attempt.iterations for attempt in polished.attempts)
+
+
+def _guesses(
+    problem: Problem, known: Sequence[tuple[Plan, int]], paths: Sequence[Aimed], budget: Budget
+) -> Iterator[Aimed]:
+    """Guesses along kinematic plans; where there are none, the plans that are known."""
+    if rests_at_both_ends(problem):
+        along = guesses_along_paths(problem, budget)
+        first = next(along, None)
+        if first is not None:
+            yield first
+            yield from along
+            return
+        yield from paths
+    aimed = [Aimed(guess_of_plan(plan), goal_index) for plan, goal_index in known]
+    yield from aimed
+    yield from _other_headings(problem, aimed[0])
+
+
+def _by_goal(problem: Problem, aimed: Iterator[Aimed]) -> Iterator[tuple[int, Iterable[Guess]]]:
+    """Guesses for each goal; those of a single one as they come, so that the first is soon."""
+    if len(problem.goals) == 1:
+        yield 0, (one.guess for one in aimed)
+        return
+    every = list(aimed)
+    for goal_index in dict.fromkeys(one.goal_index for one in every):
+        yield goal_index, [one.guess for one in every if one.goal_index == goal_index]
 
 
 def _other_headings(problem: Problem, known: Aimed) -> list[Aimed]:
@@ -183,7 +205,7 @@ def rests_at_both_ends(problem: Problem) -> bool:
 
 
 def guesses_along_paths(problem: Problem, budget: Budget) -> Iterator[Aimed]:
-    """Guesses from kinematic plans whose gears differ, the most promising first.
+    """Guesses from kinematic plans whose gears differ, a promising one before all are searched.
 
     None for a vehicle that does not follow the paths of a kinematic one.
     """
@@ -218,7 +240,7 @@ def guess_of_plan(plan: Plan) -> Guess:
 
 def polish_plans(
     problem: Problem,
-    guesses: Sequence[Guess],
+    guesses: Iterable[Guess],
     goal_index: int,
     stage_cost: RunningCost | None,
     *,
@@ -242,7 +264,7 @@ def polish_plans(
         goal=tuple(pose),
         goal_state=_end_state(problem.automaton, last),
         parts=_body_parts(problem),
-        obstacles=tuple(one.shape for one in problem.obstacles if isinstance(one, Obstacle)),
+        obstacles=tuple(shape for one in problem.obstacles for shape in _shapes_of(one)),
         bounds=problem.bounds,
         margin=problem.margin,
         durations=admitted_durations(problem),
@@ -268,6 +290,15 @@ def polish_plans(
         most_iterations=most_iterations,
         accepts=sound,
     )
+
+
+def _shapes_of(obstacle: AnyObstacle) -> list[Shape]:
+    """What does not move, as shapes: the blocked cells of a map are joined to few boxes."""
+    if isinstance(obstacle, Obstacle):
+        return [obstacle.shape]
+    low, high = np.split(obstacle.resolution * blocked_rectangles(obstacle.blocked), 2, axis=1)
+    middles, heading = SE2(obstacle.origin).act((low + high) / 2.0), float(obstacle.origin[2])
+    return [Box(size, at, heading) for size, at in zip(high - low, middles, strict=True)]
 
 
 def _end_state(automaton: Automaton, last: Trim) -> tuple[float | None, ...]:

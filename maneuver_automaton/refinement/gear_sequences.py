@@ -1,4 +1,4 @@
-"""Kinematic plans that differ in their gears, most promising first.
+"""Kinematic plans that differ in their gears, a promising one first.
 
 The sequence of gears, and the side on which obstacles are passed, decide the result of polishing.
 So several plans are made, by pricing changes of direction differently and by turning less
@@ -8,7 +8,6 @@ tightly than the vehicle could, and ranked by the time they would take from stop
 from __future__ import annotations
 
 import functools
-import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -103,8 +102,8 @@ def gear_sequences(
     *,
     budget: Budget,
     keep: int = 6,
-) -> tuple[Drive, ...]:
-    """Kinematic plans that differ, those first that are estimated to take the least time.
+) -> Iterator[Drive]:
+    """Kinematic plans that differ: a promising one soon, then those that take the least time.
 
     Parameters
     ----------
@@ -118,21 +117,33 @@ def gear_sequences(
         Its time is for all searches together; they are counted in expansions and attempts, so it
         only cuts them short.
     keep : int
-        How many plans to return at most.
+        How many plans there are at most.
+
+    Yields
+    ------
+    Drive
+        The best of the first prices before the others are tried; then the others, by estimate.
     """
     found: list[Drive] = []
-    for (turning, switching), library in itertools.product(PRICES, libraries):
-        if budget.is_over:
-            break
-        unit = _unit(library)
-        cost = Cost(time=1.0, direction_change=turning * unit, switch=switching * unit)
-        variant = replace(problem, automaton=library, cost=cost)
-        for plan in _plans(variant, budget):
-            drive = Drive(plan=plan, estimate=estimate(plan), strokes=_strokes(plan))
-            if any(drive.resembles(other) and drive.estimate >= other.estimate for other in found):
-                continue
-            found = [other for other in found if not drive.resembles(other)] + [drive]
-    return tuple(sorted(found, key=lambda one: one.estimate)[:keep])
+    first: Drive | None = None
+    for turning, switching in PRICES:
+        for library in libraries:
+            if budget.is_over:
+                break
+            unit = _unit(library)
+            cost = Cost(time=1.0, direction_change=turning * unit, switch=switching * unit)
+            variant = replace(problem, automaton=library, cost=cost)
+            for plan in _plans(variant, budget):
+                drive = Drive(plan=plan, estimate=estimate(plan), strokes=_strokes(plan))
+                alike = [other for other in found if drive.resembles(other)]
+                if not any(drive.estimate >= other.estimate for other in alike):
+                    found = [other for other in found if other not in alike] + [drive]
+        if first is None and found:
+            first = min(found, key=lambda one: one.estimate)
+            yield first
+    if first is not None:
+        others = sorted(found, key=lambda one: one.estimate)[:keep]
+        yield from (one for one in others if not one.resembles(first))
 
 
 def _plans(problem: Problem, budget: Budget) -> Iterator[Plan]:

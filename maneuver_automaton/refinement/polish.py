@@ -8,7 +8,7 @@ the others only those that come close to the best. Whatever is found is closed: 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -196,7 +196,7 @@ Accepts = Callable[[PolishedMotion], bool]
 
 def polish_guesses(
     task: PolishTask,
-    guesses: Sequence[Guess],
+    guesses: Iterable[Guess],
     *,
     stage_cost: RunningCost | None = None,
     settings: PolishSettings | None = None,
@@ -209,8 +209,8 @@ def polish_guesses(
     Parameters
     ----------
     task : PolishTask
-    guesses : sequence of Guess
-        Seen from the start, the most promising first; see `guesses`.
+    guesses : iterable of Guess
+        Seen from the start, the most promising first; see `guesses`. Asked for one by one.
     stage_cost : callable, optional
         Cost per second ``l(z, u)`` on top of 1 for the time.
     settings : PolishSettings, optional
@@ -239,7 +239,7 @@ class _Polishing:
 
     task: PolishTask
     scene: Scene
-    guesses: Sequence[Guess]
+    guesses: Iterable[Guess]
     stage_cost: RunningCost | None
     settings: PolishSettings
     budget: Budget
@@ -253,10 +253,10 @@ class _Polishing:
 
     def run(self) -> PolishResult:
         quick: list[tuple[float, int, Polished]] = []
-        for number in range(len(self.guesses)):
+        for number, guess in enumerate(self.guesses):
             if self._is_over():
                 break
-            rough = self._rough(number)
+            rough = self._rough(number, guess)
             if rough is None:
                 continue
             if self.best is None:
@@ -292,15 +292,14 @@ class _Polishing:
             return work >= 3 * max((one.iterations for one in last), default=0)
         return self._left() >= 3.0 * max((one.seconds for one in last), default=0.0)
 
-    def _rough(self, number: int) -> Polished | None:
+    def _rough(self, number: int, guess: Guess) -> Polished | None:
         """Where a guess leads with fixed planes, or with fixed gears."""
-        guess = self.guesses[number]
         gears = _gears(self.task.model, guess)
         shuffles = np.count_nonzero(np.diff(gears)) >= SHUFFLE
         unfinished: list[Polished] = []
         if not shuffles:
             found = self._solve("fixed planes", number, guess, fixed_planes=True)
-            if found.status is SolveStatus.SOLVED:
+            if found.is_feasible:
                 return found
             if not self._left() > 0.0:
                 return None
@@ -321,7 +320,7 @@ class _Polishing:
                 return None
         # None is solved; a result near enough to a motion is closed and audited all the same.
         for one in unfinished:
-            if self.best is None and one.status is SolveStatus.OUT_OF_BUDGET and one.iterations:
+            if self.best is None and (one.is_feasible or one.status is SolveStatus.OUT_OF_BUDGET):
                 self._consider(one)
         return None
 
@@ -330,12 +329,10 @@ class _Polishing:
         if not self._is_over():
             patient = replace(self.settings, max_iterations=LONGER * self.settings.max_iterations)
             found = self._solve("lines", number, rough.as_guess, settings=patient)
-            # An unfinished solve may be sound all the same: it is closed and audited.
-            cheaper = found.objective < rough.objective
-            unfinished = found.status is SolveStatus.OUT_OF_BUDGET and cheaper
-            if (found.status is SolveStatus.SOLVED or unfinished) and self._consider(
-                found, number=number
-            ):
+            # What was not solved to the end may be sound all the same: it is closed and audited.
+            ended = found.is_feasible or found.status is SolveStatus.OUT_OF_BUDGET
+            worth = found.status is SolveStatus.SOLVED or found.objective < rough.objective
+            if ended and worth and self._consider(found, number=number):
                 return
         if self.best is None:
             self._consider(rough)
@@ -356,7 +353,7 @@ class _Polishing:
             duration=raw.duration,
         )
         found = self._solve("finer", -1, guess)
-        if found.status is SolveStatus.SOLVED:
+        if found.is_feasible:
             self._consider(found)
 
     def _solve(

@@ -199,9 +199,8 @@ def row(
     def estimate(plan: Plan) -> float:
         return timed(plan, vehicle.pace).duration
 
-    drives = gear_sequences(
-        problem, vehicle.libraries, estimate, budget=Budget.from_now(SEARCH * limit), keep=KEEP
-    )
+    budget = Budget.from_now(SEARCH * limit)
+    drives = list(gear_sequences(problem, vehicle.libraries, estimate, budget=budget, keep=KEEP))
     searched = time.process_time()
     guesses: list[Guess] = [
         vehicle.guess(replace(drive.plan, start=np.zeros(3))) for drive in drives

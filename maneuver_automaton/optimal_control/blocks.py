@@ -1,0 +1,206 @@
+"""Nonlinear programs of many like blocks: one block of a kind is differentiated for all of them.
+
+To differentiate a whole program takes longer than to solve it. Here each kind of block, say an
+interval or a corner beside a line, is a small function of a few variables. Its derivatives are
+mapped over all blocks of the kind, and their entries put where they belong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray
+
+
+class Kind(NamedTuple):
+    """One block, differentiated: entries of derivatives in the order of their sparsity."""
+
+    price: Any  # function: (variables, given) -> objective
+    value: Any  # function: (variables, given) -> rows
+    slope: Any  # function: (variables, given) -> entries of the Jacobian
+    curve: Any  # function: (variables, given, of objective, of rows) -> entries of the Hessian
+    jacobian: tuple[IntArray, IntArray]  # row and variable of each entry
+    hessian: tuple[IntArray, IntArray]  # both variables of each entry, of the upper triangle
+    size: int  # number of variables
+    given: int  # number of parameters
+    rows: int
+    zero: int  # so many rows, the first ones, must be zero; the others must not be positive
+    is_priced: bool  # whether it adds to the objective
+
+
+class Blocks(NamedTuple):
+    """Blocks of one kind: which variables each has, and what is given to it."""
+
+    kind: Kind
+    variables: IntArray  # (size, n) numbers of variables of the program
+    given: Array | IntArray  # (given, n) values, or numbers of parameters of the program
+
+    @property
+    def number(self) -> int:
+        """Number of blocks."""
+        return int(self.variables.shape[1])
+
+
+class BlockProgram(NamedTuple):
+    """A nonlinear program in symbols, with its derivatives."""
+
+    functions: dict[str, Any]  # x, p, f, g
+    derivatives: dict[str, Any]  # options of ``casadi.nlpsol``
+    limits: Array  # (rows, 2)
+
+
+def kind_of(
+    casadi: Any,
+    variables: Any,
+    given: Any,
+    *,
+    price: Any = 0.0,
+    zero: Any = None,
+    below: Any = None,
+) -> Kind:
+    """A kind of block from the symbols of one: its price, and rows that are zero or not positive.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> x, p = casadi.SX.sym("x", 2), casadi.SX.sym("p")
+    >>> kind = kind_of(casadi, x, p, price=x[0] ** 2, below=x[0] * x[1] - p)
+    >>> kind.rows, kind.zero, [entry.tolist() for entry in kind.hessian]
+    (1, 0, [[0, 0], [0, 1]])
+    """
+    none = casadi.SX(0, 1)
+    zero, below = none if zero is None else zero, none if below is None else below
+    price, rows = casadi.SX(price), casadi.vertcat(zero, below)
+    of_price, of_rows = casadi.SX.sym("of_price"), casadi.SX.sym("of_rows", rows.shape[0])
+    jacobian = casadi.jacobian(rows, variables)
+    lagrangian = of_price * price + casadi.dot(of_rows, rows)
+    hessian = casadi.triu(casadi.hessian(lagrangian, variables)[0])
+    known = [variables, given]
+    return Kind(
+        price=casadi.Function("price", known, [price]),
+        value=casadi.Function("value", known, [casadi.densify(rows)]),
+        slope=casadi.Function("slope", known, [_entries(casadi, jacobian)]),
+        curve=casadi.Function("curve", [*known, of_price, of_rows], [_entries(casadi, hessian)]),
+        jacobian=_places(jacobian),
+        hessian=_places(hessian),
+        size=variables.numel(),
+        given=given.numel(),
+        rows=rows.shape[0],
+        zero=zero.shape[0],
+        is_priced=not price.is_zero(),
+    )
+
+
+def _entries(casadi: Any, matrix: Any) -> Any:
+    """Nonzero entries of a matrix as a dense column."""
+    return casadi.vertcat(casadi.SX(0, 1), *matrix.nonzeros())
+
+
+def _places(matrix: Any) -> tuple[IntArray, IntArray]:
+    rows, columns = matrix.sparsity().get_triplet()
+    return np.array(rows, dtype=np.int64), np.array(columns, dtype=np.int64)
+
+
+def assembled(casadi: Any, blocks: Sequence[Blocks], *, size: int, given: int) -> BlockProgram:
+    """The program of `size` variables and so many parameters that blocks add up to."""
+    x, p = casadi.MX.sym("x", size), casadi.MX.sym("p", given)
+    of_f, of_g = casadi.MX.sym("lam_f"), casadi.MX.sym("lam_g", _rows(blocks))
+    price, rows, entries, curves = casadi.MX(0.0), [], [], []
+    first = 0
+    for one in blocks:
+        kind, count = one.kind, one.number
+        taken = casadi.reshape(x[one.variables.ravel("F").tolist()], kind.size, count)
+        told = _told(casadi, p, one)
+        if kind.is_priced:
+            price += casadi.sum2(kind.price.map(count)(taken, told))
+        weights = casadi.reshape(of_g[first : first + kind.rows * count], kind.rows, count)
+        curve = kind.curve.map(count)(taken, told, casadi.repmat(of_f, 1, count), weights)
+        rows.append(casadi.vec(kind.value.map(count)(taken, told)))
+        entries.append(casadi.vec(kind.slope.map(count)(taken, told)))
+        curves.append(casadi.vec(curve))
+        first += kind.rows * count
+    g = casadi.vertcat(*rows)
+    jacobian = _matrix(casadi, casadi.vertcat(*entries), _jacobian_places(blocks), first, size)
+    hessian = _matrix(casadi, casadi.vertcat(*curves), _hessian_places(blocks), size, size)
+    named = ["x", "p"], ["g", "jac_g_x"]
+    of = ["x", "p", "lam_f", "lam_g"], ["triu_hess_gamma_x_x"]
+    derivatives = {  # not the gradient: IPOPT got numbers of it that were none (CasADi 3.8.2)
+        "jac_g": casadi.Function("nlp_jac_g", [x, p], [g, jacobian], *named),
+        "hess_lag": casadi.Function("nlp_hess_l", [x, p, of_f, of_g], [hessian], *of),
+        "no_nlp_grad": True,  # nor are the multipliers of what is given asked for
+        "calc_lam_p": False,
+    }
+    return BlockProgram({"x": x, "p": p, "f": price, "g": g}, derivatives, _limits(blocks))
+
+
+def _told(casadi: Any, p: Any, one: Blocks) -> Any:
+    """What is given to each block: numbers, or places among the parameters."""
+    if one.given.dtype.kind == "i":
+        return casadi.reshape(p[one.given.ravel("F").tolist()], one.kind.given, one.number)
+    return casadi.MX(casadi.DM(one.given.reshape(one.kind.given, one.number)))
+
+
+def _rows(blocks: Sequence[Blocks]) -> int:
+    return sum(one.kind.rows * one.number for one in blocks)
+
+
+def _limits(blocks: Sequence[Blocks]) -> Array:
+    """Limits (rows, 2): of the rows that must be zero, and of the others."""
+    limits = np.zeros((_rows(blocks), 2))
+    first = 0
+    for one in blocks:
+        last = first + one.kind.rows * one.number
+        limits[first:last, 0].reshape(one.number, one.kind.rows)[:, one.kind.zero :] = -np.inf
+        first = last
+    return limits
+
+
+def _jacobian_places(blocks: Sequence[Blocks]) -> tuple[IntArray, IntArray]:
+    rows, columns = [], []
+    first = 0
+    for one in blocks:
+        row, variable = one.kind.jacobian
+        begins = first + one.kind.rows * np.arange(one.number)
+        rows.append((begins[:, None] + row).ravel())
+        columns.append(one.variables[variable].ravel("F"))
+        first += one.kind.rows * one.number
+    return np.concatenate(rows), np.concatenate(columns)
+
+
+def _hessian_places(blocks: Sequence[Blocks]) -> tuple[IntArray, IntArray]:
+    """Both variables of each entry, the smaller number first."""
+    rows, columns = [], []
+    for one in blocks:
+        row, column = (one.variables[place].ravel("F") for place in one.kind.hessian)
+        rows.append(np.minimum(row, column))
+        columns.append(np.maximum(row, column))
+    return np.concatenate(rows), np.concatenate(columns)
+
+
+def _matrix(
+    casadi: Any, entries: Any, places: tuple[IntArray, IntArray], rows: int, columns: int
+) -> Any:
+    """The sparse matrix that entries at some places add up to."""
+    row, column = places
+    keys, owner = np.unique(column * rows + row, return_inverse=True)
+    begins = (
+        np.searchsorted(keys // rows, np.arange(columns + 1))
+        if len(keys)
+        else np.zeros(columns + 1, dtype=np.int64)
+    )
+    sparsity = casadi.Sparsity(rows, columns, begins.tolist(), (keys % rows).tolist())
+    if len(keys) == len(owner):  # each place once: they only change their order
+        order = np.empty(len(keys), dtype=np.int64)
+        order[owner] = np.arange(len(keys))
+        return casadi.MX(sparsity, entries[order.tolist()])
+    return casadi.MX(sparsity, _summed(casadi, entries, owner, len(keys)))
+
+
+def _summed(casadi: Any, entries: Any, owner: IntArray, count: int) -> Any:
+    """Sums (count,) of the entries of each owner."""
+    begins = np.arange(len(owner) + 1)
+    sparsity = casadi.Sparsity(count, len(owner), begins.tolist(), owner.tolist())
+    return casadi.MX(casadi.DM(sparsity, np.ones(len(owner)))) @ entries
