@@ -8,7 +8,7 @@ from maneuver_automaton._interrupts import patient
 from maneuver_automaton.budget import Budget, Watch
 from maneuver_automaton.planning.among_zones import plan_among_zones
 from maneuver_automaton.planning.blocked import blocked_ends
-from maneuver_automaton.planning.checking import load_checks
+from maneuver_automaton.planning.checking import load_checking, load_checks
 from maneuver_automaton.planning.free_space import plan_by_words
 from maneuver_automaton.planning.in_steps import plan_in_steps
 from maneuver_automaton.planning.no_way import with_proof
@@ -164,6 +164,8 @@ def prepare(problem: Problem, workspace: Workspace | None = None) -> None:
 def _load(problem: Problem, workspace: Workspace) -> None:
     """Compile or load what planning needs, before the clock runs."""
     guarded = bool(problem.obstacles or problem.zones)
+    if guarded:
+        load_checking()  # what is imported in the first check would make it late
     in_space = problem.start.size > 3 and guarded
     if has_inertia(problem) or uses_lattice(problem) or in_space:
         load_steps(problem, workspace)

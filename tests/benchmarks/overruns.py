@@ -9,7 +9,7 @@ nothing. Kernels that are compiled or loaded after the call began are named, and
 counted. A call of every vehicle and kind goes before; what these left behind for good, the
 compiler's objects above all, is then taken out of the collection of garbage, a full one of which
 would look through it all in 0.1 s now and then. What collections take in a call counts, and is
-noted.
+noted. Figures are in docs/guarantees.md.
 """
 
 from __future__ import annotations

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import sys
 
 import pytest
 
@@ -54,3 +55,12 @@ def test_a_plan_that_was_found_in_time_is_checked_and_returned() -> None:
 
 def test_a_plan_is_not_returned_late_for_its_checks() -> None:
     assert looks_after(TASKS["among obstacles"], 400, 0, 1.5)[1] is PlanStatus.OUT_OF_BUDGET
+
+
+def test_what_checks_is_imported_before_the_clock_starts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first check of a process would be late for its imports, and its plan lost."""
+    loaded: list[str] = []
+    module = sys.modules[plan_within.__module__]
+    monkeypatch.setattr(module, "load_checking", lambda: loaded.append("checks"))
+    prepare(TASKS["among obstacles"])
+    assert loaded == ["checks"]
