@@ -20,6 +20,7 @@ from maneuver_automaton.optimal_control.separation import (
     first_lines,
     near_pairs,
     reaches,
+    shared_lines,
 )
 from tests.reference_dynamics import trailer_pose
 
@@ -244,6 +245,30 @@ def test_a_solve_ends_between_two_iterations_once_the_time_is_over() -> None:
     assert (found.status, found.reason) == (SolveStatus.OUT_OF_BUDGET, "User_Requested_Stop")
     assert 0 < found.iterations < 20
     assert next(ticks) < 30.0
+
+
+def test_a_solve_that_is_cut_short_hands_on_its_best_iterate() -> None:
+    """It breaks no condition of the program, and is near the end of the whole solve."""
+    scene = Scene(parts=(BODY,), pieces=((SQUARE * [1.0, 0.6] + [2.0, 0.0], 0.0),))
+    whole = polish(ROBOT, at_rest(4.0), scene, guess(aside=0.8))
+    few = PolishSettings(max_iterations=whole.iterations - 1)
+    cut = polish(ROBOT, at_rest(4.0), scene, guess(aside=0.8), settings=few)
+    assert cut.status is SolveStatus.OUT_OF_BUDGET
+    assert cut.is_feasible
+    poses = simulated(cut.state, cut.control, cut.durations)
+    assert poses[-1] == pytest.approx([4.0, 0.0, 0.0], abs=1e-3)
+    assert whole.objective <= cut.objective < 1.001 * whole.objective
+
+
+def test_pieces_behind_one_another_share_a_line() -> None:
+    body = [(SQUARE, 0.0)]
+    pieces = [(moved(x, y), 0.0) for x, y in ((2.0, 0.0), (3.0, 0.5), (0.0, 2.0))]
+    pairs = near_pairs(standing(0.0), body, pieces, within=3.0)
+    lines = first_lines(standing(0.0), body, pieces, pairs)
+    reach = reaches(standing(0.0), (body, pieces), pairs, lines)
+    owner = shared_lines(pieces, pairs, lines, reach)
+    near = {int(piece): int(pairs.piece[k]) for piece, k in zip(pairs.piece, owner, strict=True)}
+    assert near == {0: 0, 1: 0, 2: 2}
 
 
 def test_no_program_is_built_that_takes_more_than_the_time_left() -> None:
