@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Trajectory
@@ -43,6 +44,7 @@ def closed(
     *,
     control: Array,
     durations: Array,
+    budget: Budget = UNLIMITED,
 ) -> Closed | str:
     """The smallest change of controls, and of the pace, with which a motion ends exactly.
 
@@ -59,6 +61,8 @@ def closed(
         Within its limits.
     durations : (n,) array
         How long each control holds [s].
+    budget : Budget
+        No further step is made once no time is left to check what comes out.
 
     Returns
     -------
@@ -85,6 +89,8 @@ def closed(
         if best is None or error < best.error:
             best = Closed(control=u, durations=h, course=course, error=error)
         if error <= EXACT * max(1.0, float(np.abs(course.pose).max())):
+            break
+        if not budget.left_to_check:
             break
         by_control, by_pace = _derivatives(model, start_state, u, h)
         room = np.minimum(np.minimum(u - low, high - u), 1.0)

@@ -18,8 +18,10 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.models import Car, Unicycle
-from maneuver_automaton.problem import Problem
+from maneuver_automaton.models import Car, Model, Unicycle
+from maneuver_automaton.optimal_control import Guess
+from maneuver_automaton.optimal_control.polish_values import Polished
+from maneuver_automaton.problem import STANDING, Problem
 from maneuver_automaton.refinement.improve import Patience, improve
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
 from maneuver_automaton.search.lattice import first_plan
@@ -173,3 +175,54 @@ def _strokes(plan: Plan) -> Array:
         return lengths
     begins = np.flatnonzero(np.diff(np.sign(lengths), prepend=0.0))
     return np.add.reduceat(lengths, begins)
+
+
+def gears_of(model: Model, guess: Guess | Polished) -> Array:
+    """Sign (n - 1,) of the speed ahead in every interval; where it is zero, that of the next."""
+    signs = np.sign(_speeds(model, guess)[:, 0])
+    for k in range(len(signs) - 2, -1, -1):
+        signs[k] = signs[k] or signs[k + 1]
+    for k in range(1, len(signs)):
+        signs[k] = signs[k] or signs[k - 1]
+    return np.where(signs == 0.0, 1.0, signs)
+
+
+def without_shuffles(model: Model, found: Polished, shortest: float) -> Array | None:
+    """Gears (n - 1,) without stretches shorter than `shortest` [m]; None if there are none.
+
+    A solver may go back and forth by millimetres about a change of direction, which gains nothing.
+    None for what moves sideways too: it has no gears.
+    """
+    speeds = _speeds(model, found)
+    if speeds[:, 1].any():
+        return None
+    driven = np.abs(speeds[:, 0]) * found.durations
+    gears = gears_of(model, found)
+    longer = _merged(gears, driven, shortest)
+    changed = (longer != gears) & (np.abs(speeds[:, 0]) > STANDING)
+    return longer if changed.any() else None
+
+
+def _merged(gears: Array, driven: Array, shortest: float) -> Array:
+    """Gears (n,) of which no stretch is shorter, the shortest ones turned first.
+
+    Examples
+    --------
+    >>> _merged(np.array([1.0, 1.0, -1.0, 1.0, -1.0]), np.array([2.0, 2.0, 0.1, 0.2, 3.0]), 0.5)
+    array([ 1.,  1.,  1.,  1., -1.])
+    """
+    gears = gears.copy()
+    while True:
+        begins = np.flatnonzero(np.diff(gears, prepend=0.0))
+        lengths = np.add.reduceat(driven, begins)
+        least = int(np.argmin(lengths))
+        if len(begins) == 1 or lengths[least] >= shortest:
+            return gears
+        gears[begins[least] : [*begins, len(gears)][least + 1]] *= -1.0
+
+
+def _speeds(model: Model, motion: Guess | Polished) -> Array:
+    """Mean body velocities (n - 1, dof) in every interval."""
+    reduced = motion.state[:, model.group.dof :]
+    begin = model.body_velocity(reduced[:-1], motion.control)
+    return np.asarray((begin + model.body_velocity(reduced[1:], motion.control)) / 2.0)

@@ -33,7 +33,8 @@ from maneuver_automaton.optimal_control.problem import RunningCost, resampled
 from maneuver_automaton.optimal_control.separation import BodyPart
 from maneuver_automaton.primitives import Maneuver, Trajectory
 from maneuver_automaton.problem import Bounds
-from maneuver_automaton.refinement.closure import closed
+from maneuver_automaton.refinement.closure import Closed, closed
+from maneuver_automaton.refinement.gear_sequences import gears_of, without_shuffles
 
 NEAR = 1.12  # share of the best cost so far up to which free lines are tried
 DEEP_ITERATIONS = 150  # from a guess inside obstacles, before it is led out of them
@@ -42,6 +43,8 @@ FIRST_BUILD = 0.3  # [s] that writing a problem down is expected to take
 LONGER = 3  # times the usual iterations, for free lines: among many obstacles they take so many
 ROOM = 20.0  # times the usual distance from all limits, where closing the end needed more
 EVEN = 1e-9  # [s] by which equal steps may differ
+SHUFFLED = 0.01  # radii of the body: shorter stretches in one gear are none that a plan names
+STEADY = 1e-3  # share of the cost by which a motion without them may be dearer
 FINER = 0.6  # share of the step with which the best is solved once more
 
 
@@ -294,7 +297,7 @@ class _Polishing:
 
     def _rough(self, number: int, guess: Guess) -> Polished | None:
         """Where a guess leads with fixed planes, or with fixed gears."""
-        gears = _gears(self.task.model, guess)
+        gears = gears_of(self.task.model, guess)
         shuffles = np.count_nonzero(np.diff(gears)) >= SHUFFLE
         unfinished: list[Polished] = []
         if not shuffles:
@@ -406,16 +409,16 @@ class _Polishing:
     def _consider(self, found: Polished, *, number: int = -1, again: bool = True) -> bool:
         """Close the motion found, and keep it if it is accepted and better.
 
-        Where closing leads beyond a limit, it is solved once more with more room.
+        Where it shuffles a little, one that does not is tried first. Where closing leads beyond a
+        limit, it is solved once more with more room.
         """
-        ends = self.task.ends(float(found.state[-1, 2]))
-        ending = closed(
-            self.task.model,
-            self.task.start_state,
-            ends.end,
-            control=found.control,
-            durations=found.durations,
-        )
+        gears = without_shuffles(self.task.model, found, SHUFFLED * self._reach)
+        if again and gears is not None and not self._is_over():
+            steady = self._solve("gears", number, found.as_guess, gears=gears)
+            worth = steady.objective < (1.0 + STEADY) * found.objective
+            if steady.is_feasible and worth and self._keep(steady, self._closed(steady), found):
+                return True
+        ending = self._closed(found)
         if isinstance(ending, str):
             self.reason = ending
             even = np.ptp(found.durations) <= EVEN
@@ -426,6 +429,27 @@ class _Polishing:
             if roomy.status is not SolveStatus.SOLVED:
                 return False
             return self._consider(roomy, number=number, again=False)
+        return self._keep(found, ending, found)
+
+    @property
+    def _reach(self) -> float:
+        """How big the greatest part of the body is [m]."""
+        return max((part.reach for part in self.task.parts), default=0.0)
+
+    def _closed(self, found: Polished) -> Closed | str:
+        return closed(
+            self.task.model,
+            self.task.start_state,
+            self.task.ends(float(found.state[-1, 2])).end,
+            control=found.control,
+            durations=found.durations,
+            budget=self.budget,
+        )
+
+    def _keep(self, found: Polished, ending: Closed | str, raw: Polished) -> bool:
+        """Keep a closed motion if it is accepted and better; `raw` is where finer steps begin."""
+        if isinstance(ending, str):
+            return False
         motion = PolishedMotion(
             course=ending.course,
             control=ending.control,
@@ -438,19 +462,5 @@ class _Polishing:
         if not self.accepts(motion):
             self.reason = "what was found is not accepted"
             return False
-        self.best, self.best_raw = motion, found
+        self.best, self.best_raw = motion, raw
         return True
-
-
-def _gears(model: Model, guess: Guess) -> Array:
-    """Sign (n - 1,) of the speed ahead in every interval; where it is zero, that of the next."""
-    reduced = guess.state[:, model.group.dof :]
-    control = guess.control
-    begin = model.body_velocity(reduced[:-1], control)[:, 0]
-    end = model.body_velocity(reduced[1:], control)[:, 0]
-    signs = np.sign(begin + end)
-    for k in range(len(signs) - 2, -1, -1):
-        signs[k] = signs[k] or signs[k + 1]
-    for k in range(1, len(signs)):
-        signs[k] = signs[k] or signs[k - 1]
-    return np.where(signs == 0.0, 1.0, signs)
