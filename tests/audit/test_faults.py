@@ -150,13 +150,13 @@ def test_an_integration_that_fails_is_no_plan():
 
 
 def test_what_turns_without_end_is_not_driven_again():
-    """Each radian is an element: a coast of 1e9 s would take hundreds of gigabytes."""
+    """Each radian is an element, and coasts of years would take hundreds of gigabytes."""
     spin = Trim(name="spin", body_velocity=[0.0, 0.0, -2.0], control=[0.0, -2.0])
-    for lasting, passes in ((90.0, True), (1e9, False)):
+    for lasting, passes in ((90.0, True), (1e5, False)):
         plan = Plan(np.zeros(3), (spin,), durations=[lasting])
         audit = audit_plan(plan, Goal(pose=plan.end), Unicycle())
         assert audit.passed is passes, audit.reason
-    assert audit.reason == "it turns by 2e+09 rad, need at most 20000"
+    assert audit.reason == "it turns by 2e+05 rad, need at most 20000"
 
 
 def test_a_trailer_that_is_pushed_far_is_followed():
