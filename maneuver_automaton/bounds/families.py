@@ -10,7 +10,9 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost
+from maneuver_automaton.models import Car, CarWithTrailer, Model
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.kinematic_paths import extreme_automaton, follows_paths
 from maneuver_automaton.search.limits import rest_rate
@@ -75,8 +77,7 @@ def motions_of(problem: Problem) -> Motions | None:
         price = cost.direction_change
         if (rest := rest_rate(problem)) is not None:
             rates = rates - rest
-    elif follows_paths(problem.automaton.model) and (cost.time or cost.length):
-        simpler = extreme_automaton(problem.automaton.model)  # type: ignore[arg-type]
+    elif (simpler := _at_the_limits(problem.automaton.model)) and (cost.time or cost.length):
         twists, price = simpler.body_velocities[:, :3], 0.0
         rates = Cost(time=cost.time, length=cost.length).rates(simpler.controls, twists)
     else:
@@ -86,6 +87,19 @@ def motions_of(problem: Problem) -> Motions | None:
         return None
     families = _families(twists[moving] / rates[moving, None], gears=price > 0.0)
     return Motions(families=families, price=price, besides=besides(problem))
+
+
+def _at_the_limits(model: Model) -> Automaton | None:
+    """Trims of a kinematic vehicle that reach all poses of one with inertia; None if not known."""
+    if follows_paths(model):
+        return extreme_automaton(model)  # type: ignore[arg-type]
+    if not isinstance(model, CarWithTrailer):
+        return None
+    car = Car(wheelbase=model.wheelbase, max_steering=model.max_steering)  # whatever it pulls
+    angles = (-model.max_steering, 0.0, model.max_steering)
+    speeds = [speed for speed in model.control_limits[0].tolist() if speed]
+    controls = {f"{speed:g}, {angle:g}": (speed, angle) for speed in speeds for angle in angles}
+    return Automaton.of_controls(car, controls)
 
 
 def besides(problem: Problem) -> float:

@@ -56,7 +56,7 @@ def groups() -> dict[str, Iterator[tuple[str, Problem]]]:
 
 def with_inertia() -> Iterator[tuple[str, Problem]]:
     root = Path(__file__).parents[2] / "scenarios"
-    for name in ("hovercraft", "trailer_parking", "second_order_parking"):
+    for name in ("hovercraft", "trailer", "robot_with_inertia"):
         if (root / f"{name}.yaml").exists():
             yield name, ma.load_scenario(root / f"{name}.yaml").problem
 

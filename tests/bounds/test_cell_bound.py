@@ -185,3 +185,18 @@ def test_plans_without_a_change_of_direction_cost_more_than_the_best_one():
     assert cheapest < bound.value <= without
     with pytest.raises(ValueError, match="max_direction_changes must be at least 0, got -1"):
         ma.lower_bound(problem, max_direction_changes=-1)
+
+
+def test_a_trailer_moves_at_most_as_the_car_that_pulls_it():
+    car = ma.CarWithTrailer(
+        wheelbase=2.8, hitch_length=3.0, max_steering=0.6, max_speed=2.0, min_speed=-1.0
+    )
+    straight = ma.Automaton.of_model(car, {"speed": [2.0, 0.0, -1.0], "steering": [0.0]})
+    problem = ma.Problem(
+        straight, [0, 0, 0], [15.0, 1.0, 0.3], cost=ma.Cost(time=1.0), obstacles=WALL,
+        footprint=BODY,
+    )  # fmt: skip
+    bound = ma.lower_bound(problem, max_work=WORK, time_limit=1e3, incumbent=9.0)
+    alone = ma.plan(among(WALL, cost=ma.Cost(time=1.0)), time_limit=1.0).cost  # at 1 m/s
+    assert bound.kind == "cells"
+    assert 0.5 * math.hypot(15.0, 1.0) < bound.value <= 0.5 * alone
