@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from maneuver_automaton.bounds import CostToGo
 from maneuver_automaton.budget import Budget, Watch
+from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.lower_bound import Proving, in_costs, load_proofs
 from maneuver_automaton.problem import Problem
 
@@ -76,8 +77,10 @@ class LoopBounds:
     def _note(self, here: Problem, least: float, accumulated: float) -> None:
         """Keep a bound of plans from here, for steps on the way.
 
-        Not where one more change of direction may lie between two steps at a price, nor for a
-        fixed time, which every step begins anew.
+        Not where a switch or a change of direction between two steps has a price, which neither
+        step counts, nor for a fixed time, which every step begins anew.
         """
-        if not getattr(here.cost, "direction_change", 0.0) and here.horizon.time is None:
+        cost = here.cost
+        priced = not isinstance(cost, Cost) or cost.switch or cost.direction_change
+        if not priced and here.horizon.time is None:
             self.least, self.at = least, accumulated

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import maneuver_automaton as ma
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.receding_horizon import RecedingHorizon, proving
 from tests import scenes
 
@@ -48,6 +49,16 @@ def test_off_the_plan_the_way_proves_nothing():
     assert log[1].off_plan > 0.0
     rest = ma.plan(replace(SLOT, start=log[1].pose), time_limit=0.5)
     assert 0.0 < log[1].lower_bound <= rest.cost * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("price", ["switch", "direction_change"])
+def test_what_is_priced_between_two_steps_is_not_taken_for_driven(price):
+    """Neither step counts it, so a bound less what was driven would be too high."""
+    for more, kept in ({price: 0.1}, False), ({}, True):
+        bounds = proving.LoopBounds(gap=0.9)
+        problem = replace(SLOT, cost=ma.Cost(length=1.0, **more))
+        assert bounds.prove(problem, 9.0, 0.0, Budget.from_now(30.0)) > 6.0
+        assert (bounds.least > 0.0) is kept
 
 
 def test_a_gap_of_a_loop_is_a_share():
