@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from matplotlib.axes import Axes
+from matplotlib.ticker import NullFormatter
 
 from maneuver_automaton.planning import PlanResult
 from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE
@@ -64,6 +65,7 @@ def draw_progress(ax: Axes, result: PlanResult) -> None:
             color=INK,
         )
     ax.set_xscale("log")
+    ax.xaxis.set_minor_formatter(NullFormatter())  # between the decades labels lie on each other
     ax.set_xlim(EARLIEST, end)
     ax.set_ylim(0.0, ABOVE * result.cost if result.cost > 0.0 else 1.0)
     tidy(ax, x="time since the search began [s]", y="cost")
