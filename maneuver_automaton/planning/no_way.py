@@ -18,6 +18,8 @@ MOST_BOXES = 300_000  # of poses that are tested
 MOST_WORK = 40_000_000  # steps times cells of a proof that plans take too long
 ROUNDING = 1e-6  # relative
 BEYOND = 1.25  # times the longest time: plans that take longer are not looked at
+FIRST_LOOK = 0.5  # [s] that the first look at the cells takes, in one piece
+SWEEPS = 250  # steps over all cells that polishing takes as long as, in one piece too
 UNPROVEN = (PlanStatus.NO_PLAN, PlanStatus.OUT_OF_BUDGET)
 
 
@@ -52,10 +54,13 @@ def with_proof(result: PlanResult, budget: Budget) -> PlanResult:
 
 
 def too_long(problem: Problem, budget: Budget) -> str:
-    """Why every plan takes longer than the horizon admits; empty if that is not proven."""
+    """Why every plan takes longer than the horizon admits; empty if that is not proven.
+
+    Work that nobody can stop is begun only if the time that is left is enough for it.
+    """
     horizon = problem.horizon
     longest = horizon.time or horizon.max_time
-    if longest is None or budget.is_over:
+    if longest is None or budget.left < FIRST_LOOK:
         return ""
     from maneuver_automaton.planning.lower_bound import known_bound, load_proofs, proofs_of
 
@@ -63,15 +68,16 @@ def too_long(problem: Problem, budget: Budget) -> str:
     load_proofs()
     budget = Budget.from_now(left)
     timed = replace(problem, cost=Cost(time=1.0), horizon=Horizon())
-    least = known_bound(timed).value
+    least, polishing = known_bound(timed).value, 0.0
     if least <= longest:
         for proof in proofs_of(
             timed,
             incumbent=lambda: BEYOND * longest,
-            ends=lambda work: work >= MOST_WORK or budget.is_over,
+            ends=lambda work: work >= MOST_WORK or budget.left < 2.0 * polishing,
         ):
             least = max(least, proof.value)
-            if least > longest * (1.0 + ROUNDING):
+            polishing = SWEEPS * proof.cells * budget.elapsed / max(proof.work, 1)
+            if least > longest * (1.0 + ROUNDING) or budget.left < polishing:
                 break
     if least <= longest * (1.0 + ROUNDING):
         return ""

@@ -20,6 +20,7 @@ DIVERGED = 100.0  # times the least miss so far
 EXACT = 1e-13  # [m, rad, units of z], over the size of the motion, at which it is over
 PROBE = 1e-5  # of central differences, in units of each variable
 INSIDE = 1e-12  # limits may be exceeded by rounding
+FIRST_STEP = 3.0  # times the first drive, that a step of Newton's method takes at most, about
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -62,7 +63,7 @@ def closed(
     durations : (n,) array
         How long each control holds [s].
     budget : Budget
-        No further step is made once no time is left to check what comes out.
+        No further step is made that would leave no time to check what comes out.
 
     Returns
     -------
@@ -74,7 +75,8 @@ def closed(
     low, high = model.control_limits.T
     best: Closed | None = None
     u, h = np.clip(control, low, high), np.array(durations)
-    for _ in range(STEPS):
+    since, longest = budget.elapsed, 0.0
+    for step in range(STEPS):
         try:
             course = drive(model, start_state, control=u, durations=h)
         except ValueError as why:  # a step of Newton's method led where no motion is
@@ -90,8 +92,11 @@ def closed(
             best = Closed(control=u, durations=h, course=course, error=error)
         if error <= EXACT * max(1.0, float(np.abs(course.pose).max())):
             break
-        if not budget.left_to_check:
+        now = budget.elapsed
+        longest = max(longest, (now - since) * (1.0 if step else FIRST_STEP))
+        if budget.left_to_check <= longest:
             break
+        since = now
         by_control, by_pace = _derivatives(model, start_state, u, h)
         room = np.minimum(np.minimum(u - low, high - u), 1.0)
         columns = np.hstack([(by_control * room).reshape(len(by_control), -1), by_pace[:, None]])

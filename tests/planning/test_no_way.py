@@ -5,10 +5,11 @@ import dataclasses
 import pytest
 
 from maneuver_automaton import Cost, Horizon, SearchSettings, plan
+from maneuver_automaton.bounds.levels import Proof
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.formats import plan_to_dict
-from maneuver_automaton.planning import PlanResult, PlanStatus
-from maneuver_automaton.planning.no_way import before_proof, with_proof
+from maneuver_automaton.planning import PlanResult, PlanStatus, lower_bound
+from maneuver_automaton.planning.no_way import FIRST_LOOK, before_proof, too_long, with_proof
 from maneuver_automaton.plotting import save_plan_figure
 from tests.bounds.scenes import bend, gap
 from tests.bounds.test_cell_bound import WALL, among
@@ -55,6 +56,22 @@ def test_no_plan_is_as_quick_as_the_horizon_admits():
         assert ("s: no way that leads to the goal is short enough" in result.reason) == (
             status is PlanStatus.UNREACHABLE
         )
+
+
+@pytest.mark.parametrize(("seconds", "yields"), [(0.9 * FIRST_LOOK, 0), (1e3, 1)])
+def test_work_that_nobody_can_stop_is_not_begun_late(monkeypatch, seconds, yields):
+    """A level of many cells takes longer to polish than there is time."""
+    asked = []
+
+    def proofs_of(problem, *, incumbent, ends):
+        for work in (1, 2):
+            asked.append(work)
+            yield Proof(value=0.0, optimal=False, cells=10**12, size=1.0, work=work)
+
+    monkeypatch.setattr(lower_bound, "proofs_of", proofs_of)
+    problem = dataclasses.replace(bend(3.2), horizon=Horizon(max_time=1e3))
+    assert too_long(problem, Budget.from_now(seconds)) == ""
+    assert len(asked) == yields
 
 
 def test_a_share_of_the_time_is_left_for_a_proof():
