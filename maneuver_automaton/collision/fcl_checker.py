@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import math
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -155,13 +156,20 @@ class FclChecker:
         return self._moving_hit_along(here, twist, duration, start_time)
 
     def course_hit(
-        self, start: ArrayLike, poses: ArrayLike, times: ArrayLike, *, start_time: float = 0.0
+        self,
+        start: ArrayLike,
+        poses: ArrayLike,
+        times: ArrayLike,
+        *,
+        start_time: float = 0.0,
+        ask: Callable[[], None] = lambda: None,
     ) -> int | None:
         """Which obstacle the body touches along a course; None if the path is free.
 
         The course is sampled at `poses` (n, 3), seen from `start`, and `times` (n,) [s] since its
         begin, and runs with a constant twist from sample to sample. One solid serves several
-        samples; where it touches, halves of it are tried, down to single ones.
+        samples; where it touches, halves of it are tried, down to single ones. `ask` is called
+        before each, and may raise to give it up.
 
         Raises
         ------
@@ -177,6 +185,7 @@ class FclChecker:
         if self._may_come_near(seen, steps):
             todo = chunks(steps)[::-1]
             while todo:
+                ask()
                 first, last = todo.pop()
                 if last - first == 1:
                     twist = (*steps[first].tolist(),)
@@ -194,6 +203,7 @@ class FclChecker:
                     todo += [(middle, last), (first, middle)]
         if self._ground.moving:
             for k in self._near_moving(seen, steps, clock).tolist():
+                ask()
                 v_x, v_y, turn_rate = twists[k].tolist()
                 span, time = float(spans[k]), float(clock[k])
                 hit = self._moving_hit_along(seen[k], (v_x, v_y, turn_rate), span, time)

@@ -29,7 +29,7 @@ from maneuver_automaton.refinement.conditions import broken_condition
 from maneuver_automaton.search.inside import stays_inside
 
 PROVEN = (1e-3, 2e-5)  # [m] a hit counts if it is one for the finer cover of round shapes too
-AUDIT_S = 5e-3  # [s] that an audit takes, which nobody can stop
+AUDIT_S, SAMPLE_S = 5e-3, 1.5e-5  # [s] that an audit takes, in all and a sample among obstacles
 
 
 class Condition(enum.Enum):
@@ -80,7 +80,7 @@ def check_plan(
         return Checked(audit=None, broken=Condition.BOUNDS, reason="it leaves the bounds")
     try:
         reason = what_is_hit(problem, plan, goal, workspace, budget=budget)
-        _ask(budget, AUDIT_S)
+        _ask(budget, _audit_takes(problem, plan))
     except TooLate:
         return Checked(audit=None, broken=Condition.TIME)
     if reason:
@@ -106,6 +106,15 @@ def _ask(budget: Budget, needed: float = 0.0) -> None:
     """Go on only if more than the time needed [s] is left."""
     if budget.left_to_check <= needed:
         raise TooLate
+
+
+def _audit_takes(problem: Problem, plan: Plan) -> float:
+    """About how long an audit takes, which nobody can stop [s]."""
+    if not problem.obstacles:
+        return AUDIT_S
+    courses = [m.course for m in plan.maneuvers if m is not None and m.course is not None]
+    samples = sum(len(course.time) for course in courses)
+    return AUDIT_S + SAMPLE_S * samples * (1 + len(problem.parts))
 
 
 def load_checks(problem: Problem, workspace: Workspace) -> None:
@@ -149,6 +158,7 @@ def what_is_hit(
         return forbidden
     bodies = [("", plan, problem.footprint)]
     for name, shapes in problem.parts.items():
+        _ask(budget)
         bodies.append((f"the {name}: ", carried(plan, problem.automaton.model, name), shapes))
     layers = layers_of(problem.obstacles, in_space=plan.start.size > 3)
     for what, moving, shapes in bodies:
@@ -190,7 +200,9 @@ def _what_hits(
                 )
             else:
                 since = piece.time - piece.time[0]
-                hit = checker.course_hit(start[:3], piece.pose, since, start_time=time)
+                hit = checker.course_hit(
+                    start[:3], piece.pose, since, start_time=time, ask=lambda: _ask(budget)
+                )
             if hit is not None:
                 kind = "trim" if isinstance(primitive, Trim) else "maneuver"
                 return f"obstacle {layer.numbers[hit]} is hit in {kind} {k}, {primitive.name!r}"

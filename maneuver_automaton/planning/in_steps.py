@@ -54,7 +54,7 @@ def plan_in_steps(
         lattice = search_lattice(found, steps)
         searched = budget.elapsed if lattice.knows_all else None
         found.offer_in_turn(improved(lattice))
-    if steps.polishes:
+    if steps.polishes and not found.for_better.is_over:
         known = found.cost
         polish_found(found, paths.guesses)
         if lattice and lattice.words and found.cost == known and not budget.is_over:

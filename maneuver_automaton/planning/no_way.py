@@ -18,8 +18,9 @@ MOST_BOXES = 300_000  # of poses that are tested
 MOST_WORK = 40_000_000  # steps times cells of a proof that plans take too long
 ROUNDING = 1e-6  # relative
 BEYOND = 1.25  # times the longest time: plans that take longer are not looked at
-FIRST_LOOK = 0.5  # [s] that the first look at the cells takes, in one piece
-SWEEPS = 250  # steps over all cells that polishing takes as long as, in one piece too
+FIRST_BOXES = 0.04  # [s] that the first boxes take among many obstacles, in one piece
+FIRST_LOOK = 0.5  # [s] that the first look at the cells takes, the same
+SWEEPS = 250  # steps over all cells that polishing takes as long as, the same
 UNPROVEN = (PlanStatus.NO_PLAN, PlanStatus.OUT_OF_BUDGET)
 
 
@@ -32,9 +33,10 @@ def with_proof(result: PlanResult, budget: Budget) -> PlanResult:
     """The result, or that no plan exists if the time that is left proves it.
 
     The proof does a stated amount of work: what is proven depends on no clock unless the time gets
-    short.
+    short. Work that nobody can stop is begun only if the time that is left is enough for it.
     """
-    if result.status not in UNPROVEN or not result.problem.obstacles or budget.is_over:
+    unproven = result.status in UNPROVEN and result.problem.obstacles
+    if not unproven or budget.left < FIRST_BOXES:
         return result
     left = budget.left
     _load()  # the compiler's time is not the budget's
@@ -54,10 +56,7 @@ def with_proof(result: PlanResult, budget: Budget) -> PlanResult:
 
 
 def too_long(problem: Problem, budget: Budget) -> str:
-    """Why every plan takes longer than the horizon admits; empty if that is not proven.
-
-    Work that nobody can stop is begun only if the time that is left is enough for it.
-    """
+    """Why every plan takes longer than the horizon admits; empty if that is not proven."""
     horizon = problem.horizon
     longest = horizon.time or horizon.max_time
     if longest is None or budget.left < FIRST_LOOK:
@@ -69,12 +68,12 @@ def too_long(problem: Problem, budget: Budget) -> str:
     budget = Budget.from_now(left)
     timed = replace(problem, cost=Cost(time=1.0), horizon=Horizon())
     least, polishing = known_bound(timed).value, 0.0
+
+    def ends(work: int) -> bool:
+        return work >= MOST_WORK or budget.left < 2.0 * polishing
+
     if least <= longest:
-        for proof in proofs_of(
-            timed,
-            incumbent=lambda: BEYOND * longest,
-            ends=lambda work: work >= MOST_WORK or budget.left < 2.0 * polishing,
-        ):
+        for proof in proofs_of(timed, incumbent=lambda: BEYOND * longest, ends=ends):
             least = max(least, proof.value)
             polishing = SWEEPS * proof.cells * budget.elapsed / max(proof.work, 1)
             if least > longest * (1.0 + ROUNDING) or budget.left < polishing:

@@ -443,3 +443,19 @@ def test_a_course_meets_what_moves():
     assert checker.course_hit([0, 0, 0], poses, np.linspace(0.0, 2.0, 41)) is None
     assert checker.course_hit([0, 0, 0], poses, np.linspace(0.0, 2.0, 41), start_time=6.0) == 0
     assert checker.course_hit([0, 3, 0], poses, np.linspace(0.0, 2.0, 41), start_time=6.0) is None
+
+
+def test_a_course_may_be_given_up_between_its_parts():
+    wall = (Obstacle(Box([2.0, 2.0], center=[5.0, 0.0])),)
+    coming = Obstacle(Box([2.0, 2.0]), motion=Motion([0.0, 10.0], [[9.0, 2.5, 0], [0.0, 2.5, 0]]))
+    poses = np.stack([np.linspace(0.0, 3.0, 41), np.zeros(41), np.zeros(41)], axis=-1)
+
+    def late():
+        raise TimeoutError
+
+    for obstacles in (wall, (coming,)):
+        checker = FclChecker((Box([2.0, 2.0]),), obstacles)
+        with pytest.raises(TimeoutError):
+            checker.course_hit(
+                [0, 0, 0], poses, np.linspace(0.0, 2.0, 41), start_time=6.0, ask=late
+            )

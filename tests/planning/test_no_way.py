@@ -9,7 +9,13 @@ from maneuver_automaton.bounds.levels import Proof
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.formats import plan_to_dict
 from maneuver_automaton.planning import PlanResult, PlanStatus, lower_bound
-from maneuver_automaton.planning.no_way import FIRST_LOOK, before_proof, too_long, with_proof
+from maneuver_automaton.planning.no_way import (
+    FIRST_BOXES,
+    FIRST_LOOK,
+    before_proof,
+    too_long,
+    with_proof,
+)
 from maneuver_automaton.plotting import save_plan_figure
 from tests.bounds.scenes import bend, gap
 from tests.bounds.test_cell_bound import WALL, among
@@ -43,7 +49,8 @@ def test_nothing_is_proven_of_other_verdicts_or_without_time():
     blocked = ended(gap(1.6), PlanStatus.GOAL_BLOCKED)
     assert with_proof(blocked, Budget.from_now(30.0)) is blocked
     late = ended(gap(1.6))
-    assert with_proof(late, Budget.from_now(-1.0)) is late
+    for seconds in (-1.0, 0.9 * FIRST_BOXES):
+        assert with_proof(late, Budget.from_now(seconds)) is late
 
 
 def test_no_plan_is_as_quick_as_the_horizon_admits():
