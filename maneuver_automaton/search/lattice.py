@@ -63,6 +63,8 @@ def first_plan(
     if query.settings.weight is not None:
         coarse = tuple(replace(one, weight=query.settings.weight) for one in coarse)
     passes = _begun(query, schedule, coarse, grids, table)
+    if budget.left < min(one.first_takes for one in passes):
+        budget = budget.part(0.0)  # nothing is begun that would be late
     word, proof, total, left_out = None, "", 0, False
     while word is None:
         for one in passes:

@@ -25,6 +25,7 @@ from maneuver_automaton.words.word import Word, with_price
 FIRST_CHUNK = 64  # expansions
 TIMELY = 256  # expansions between two looks at what was found
 AT_FIRST = 200_000  # words steered at the first expansion for which one is a portion of its own
+STEERED_S = 2.5e-8  # [s] that steering one word takes
 LONGER = 1.6  # times a least coasting time, for the longer of two coasts
 NO_EDGE = layout.COASTED
 LEAST = 1e-5  # share of the cost that a better word has to save
@@ -50,6 +51,11 @@ class Pass:
     def expansions(self) -> int:
         """Nodes expanded so far."""
         return int(self.arrays.state[layout.EXPANSIONS])
+
+    @property
+    def first_takes(self) -> float:
+        """About how long the first expansion takes, which nobody can stop [s]."""
+        return 0.0 if self.expansions else STEERED_S * _steered(self.library, self.task)
 
     @property
     def queries(self) -> int:
@@ -121,10 +127,14 @@ def pass_of(
     room = search_arrays(scaled.library) if arrays is None else arrays
     room = with_room(room, len(task.roots) + 4)
     kernels.begin(room, task, scaled, scene, grid, table)
-    known = scaled.library
-    steered = max(len(known.words) * (1 + len(known.climbs)) * len(task.aims), 1)
-    pace = Pace(UNLIMITED, steps=max(1, min(FIRST_CHUNK, AT_FIRST // steered)))
+    pace = Pace(UNLIMITED, steps=max(1, min(FIRST_CHUNK, AT_FIRST // _steered(scaled, task))))
     return Pass(query, resolution, task, scene, grid, table, room, scaled, pace)
+
+
+def _steered(library: LatticeArrays, task: Task) -> int:
+    """Words that are steered at the first expansion."""
+    known = library.library
+    return max(len(known.words) * (1 + len(known.climbs)) * len(task.aims), 1)
 
 
 def _with_coasts(query: LatticeQuery, resolution: Resolution, sign: float) -> LatticeArrays:

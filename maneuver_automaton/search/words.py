@@ -154,7 +154,8 @@ def search_setup_words(
     )
     job.run(budget, None)
     cheapest: list[Word] = []
-    for word in job.solutions():  # by rising cost, but for a user's own prices
+    some = MOST_LATE if budget.is_over else None
+    for word in itertools.islice(job.solutions(), some):  # by rising cost, but for own prices
         enough = len(cheapest) > alternatives and not job.own_prices
         if enough and word.cost > tied(cheapest[alternatives].cost):
             break

@@ -21,7 +21,7 @@ from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSet
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search.lattice import distance_grids, first_plan
 from maneuver_automaton.search.lattice_memory import search_arrays, with_room
-from maneuver_automaton.search.lattice_pass import both_ends, with_cost
+from maneuver_automaton.search.lattice_pass import both_ends, pass_of, with_cost
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_schedules import AT_WILL
 from maneuver_automaton.search.lattice_task import Resolution, task_of
@@ -384,3 +384,14 @@ def test_a_goal_on_the_rim_of_the_bounds_is_not_enclosed():
                       bounds=Bounds(x=(0.0, 10.0), y=(-10.0, 10.0)))  # fmt: skip
     found = first_plan(query_of(problem), budget=replace(UNLIMITED, expansions=60))
     assert found.enclosed == ""
+
+
+def test_no_first_expansion_is_begun_that_would_be_late():
+    query = query_of(BASE)
+    search = pass_of(query, Resolution(), grid=distance_grids(query)[0])
+    assert search.first_takes > 0.0
+    late = Budget(began=0.0, deadline=0.5 * search.first_takes, clock=lambda: 0.0)
+    found = first_plan(query, budget=late)
+    assert (found.word, found.expansions, found.exhausted) == (None, 0, False)
+    search.run(1, math.inf)
+    assert search.first_takes == 0.0

@@ -13,7 +13,8 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import UserModel
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.search import SearchStatus, search_words
+from maneuver_automaton.search import SearchStatus, search_words, words
+from maneuver_automaton.search.setup import search_setup
 from tests.reference import Word, words_of
 from tests.search.cases import (
     INTERPRETED,
@@ -540,3 +541,23 @@ def test_too_many_trims_are_refused(problem, most):
     message = rf"max_trims is \d+, need at most {most}; use insertion for more"
     with pytest.raises(ValueError, match=message):
         search(problem)
+
+
+@pytest.mark.parametrize(("seconds", "most"), [(-1.0, words.MOST_LATE), (60.0, 1000)])
+def test_few_of_many_seeds_are_made_once_the_time_is_over(monkeypatch, seconds, most):
+    """All of one cost, so that none is left out for its price."""
+    made = []
+
+    def solutions(_job):
+        for number in range(1000):
+            made.append(number)
+            yield words.Word(trims=[0], durations=[1.0], cost=1.0)
+
+    monkeypatch.setattr(words.WordScan, "solutions", solutions)
+    monkeypatch.setattr(words.WordScan, "run", lambda *_: True)
+    problem = parking()
+    setup = search_setup(problem, problem.goals[0])
+    found = words.search_setup_words(
+        problem, setup, alternatives=2, budget=Budget.from_now(seconds), spare=False
+    )
+    assert (len(found), len(made)) == (3, most)
