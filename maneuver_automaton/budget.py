@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from maneuver_automaton._interrupts import stopped
 
 COUNTED = 0.7  # share of the time left that a stage of counted work takes at most: others follow
-LATE_SHARE, LATE = 0.08, 0.01  # of the time, and [s], by which checks of an answer may be late
+LATE_SHARE, LATE = 0.08, 0.006  # of the time, and [s], by which checks of an answer may be late
 MOMENT, SHARE = 4e-3, 0.25  # [s], and of the time left, between two looks at the clock
 
 

@@ -7,6 +7,7 @@ Stretches where it is not sharp enough are cut, all of them at once.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -36,7 +37,12 @@ NEVER = Least(math.inf, math.inf, 0.0)
 
 
 def least_clearance(
-    body: Body, around: Surroundings, spans: Spans, *, enough: float = 0.0
+    body: Body,
+    around: Surroundings,
+    spans: Spans,
+    *,
+    enough: float = 0.0,
+    ask: Callable[[], None] = lambda: None,
 ) -> Least:
     """The least clearance of a body over stretches of time.
 
@@ -48,6 +54,8 @@ def least_clearance(
         In order of time.
     enough : float
         Clearance [m] that decides: the bound is made sharp enough to tell on which side it is.
+    ask : callable
+        Called before each part of the work; it may raise to give it up.
 
     Returns
     -------
@@ -65,16 +73,22 @@ def least_clearance(
         for nearest, pairs in batch(body, around, spans):
             if not nearest < least.measured:
                 break
-            least = _sharpened(body, around, pairs, least, enough)
+            least = _sharpened(body, around, pairs, least, enough, ask)
     return least._replace(distance=max(least.distance, 0.0))
 
 
 def _sharpened(
-    body: Body, around: Surroundings, pairs: Pairs, least: Least, enough: float
+    body: Body,
+    around: Surroundings,
+    pairs: Pairs,
+    least: Least,
+    enough: float,
+    ask: Callable[[], None],
 ) -> Least:
     """The least clearance over pairs too, their stretches cut until it is sharp."""
     floor = least.distance
     for number in range(ROUNDS):
+        ask()
         known = bounds_of(body, around, pairs)
         best = int(np.argmin(known.measured))
         if known.measured[best] < least.measured:

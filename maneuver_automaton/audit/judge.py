@@ -48,6 +48,7 @@ def audit_plan(
     states: tuple[Array, Array] | None = None,
     zones: tuple[Zone, ...] = (),
     around: Around = surroundings_of,
+    ask: Callable[[], None] = lambda: None,
 ) -> Audit:
     """Drive a finished plan again under its controls, and bound its distance to the obstacles.
 
@@ -75,6 +76,8 @@ def audit_plan(
         Where not every motion is admitted.
     around : callable
         The surroundings of some obstacles, say from a store of those of the map.
+    ask : callable
+        Called before each part of the work; it may raise to give it up.
 
     Returns
     -------
@@ -108,7 +111,7 @@ def audit_plan(
     bodies = {"": _body(drive.frames, footprint, plan, goal, body_height)}
     for name, shapes in (parts or {}).items() if obstacles or zones else ():
         bodies[name] = _body(drive.part(name), shapes, plan, goal, body_height)
-    scene = (obstacles, origin, margin)
+    scene = (obstacles, origin, margin, ask)
     distances = []
     for name, body in bodies.items() if obstacles else ():
         least, hit = _clearance(body, around(obstacles, origin), *scene)
@@ -208,13 +211,16 @@ def _clearance(
     obstacles: tuple[AnyObstacle, ...],
     origin: tuple[float, float],
     margin: float,
+    ask: Callable[[], None],
 ) -> tuple[Least, str]:
     """The least clearance of a body, and what it hits; empty if it keeps the margin [m].
 
     Where it cannot be told, to within a millimetre, it does.
     """
     enough = max(CONTACT, margin - CONTACT)  # touching never is
-    least = least_clearance(body, around, spans_within(body, 0.0, math.inf), enough=enough)
+    ask()
+    spans = spans_within(body, 0.0, math.inf)
+    least = least_clearance(body, around, spans, enough=enough, ask=ask)
     if least.measured > enough and least.distance > enough - UNRESOLVED:
         return least, ""
     at = least.time

@@ -80,24 +80,25 @@ def check_plan(
         return Checked(audit=None, broken=Condition.BOUNDS, reason="it leaves the bounds")
     try:
         reason = what_is_hit(problem, plan, goal, workspace, budget=budget)
+        if reason:
+            return Checked(audit=None, broken=Condition.COLLISION, reason=reason)
         _ask(budget, _audit_takes(problem, plan))
+        audit = audit_plan(
+            plan,
+            goal,
+            problem.automaton.model,
+            footprint=problem.footprint,
+            parts=problem.parts,
+            obstacles=problem.obstacles,
+            body_height=problem.body_height,
+            margin=problem.margin,
+            states=_end_states(problem, goal),
+            zones=problem.zones,
+            around=workspace.surroundings,
+            ask=lambda: _ask(budget),
+        )
     except TooLate:
         return Checked(audit=None, broken=Condition.TIME)
-    if reason:
-        return Checked(audit=None, broken=Condition.COLLISION, reason=reason)
-    audit = audit_plan(
-        plan,
-        goal,
-        problem.automaton.model,
-        footprint=problem.footprint,
-        parts=problem.parts,
-        obstacles=problem.obstacles,
-        body_height=problem.body_height,
-        margin=problem.margin,
-        states=_end_states(problem, goal),
-        zones=problem.zones,
-        around=workspace.surroundings,
-    )
     broken = None if audit.passed else Condition.AUDIT
     return Checked(audit=audit, broken=broken, reason=audit.reason)
 
@@ -109,7 +110,7 @@ def _ask(budget: Budget, needed: float = 0.0) -> None:
 
 
 def _audit_takes(problem: Problem, plan: Plan) -> float:
-    """About how long an audit takes, which nobody can stop [s]."""
+    """About how long an audit takes [s]: one that is begun late would be given up."""
     if not problem.obstacles:
         return AUDIT_S
     courses = [m.course for m in plan.maneuvers if m is not None and m.course is not None]

@@ -134,6 +134,7 @@ def load_steps(problem: Problem, workspace: Workspace) -> None:
     if problem.automaton.maneuvers:
         load_maneuver_kernels()
         load_times_kernels()
+        least_price_per_metre(problem.automaton, problem.cost)
         if steps.lattice:
             _load_libraries(problem, workspace)
         if _suits_words(problem) or steps.words:
@@ -145,7 +146,6 @@ def load_steps(problem: Problem, workspace: Workspace) -> None:
 def _load_libraries(problem: Problem, workspace: Workspace) -> None:
     """Have the libraries ready of the lattice over maneuvers, at the prices that it needs."""
     goals, horizon = range(len(problem.goals)), problem.horizon
-    least_price_per_metre(problem.automaton, problem.cost)
     library = lattice_library(problem, goals, prepared=workspace.prepared)
     if horizon.time or horizon.max_time or library.per_metre == 0.0:
         lattice_library(replace(problem, cost=BY_TIME), goals, prepared=workspace.prepared)

@@ -143,7 +143,7 @@ def _improved(work: _Work) -> SearchResult:
     words = [_calmed(library, word) for word in words]
     binding = not words or min(words, key=_cost).certificate < -ACCURACY * library.scale
     if most < LONGEST and binding and not library.free_heading and not task.budget.is_over:
-        words += _from_longer(library, begun, most, counts)
+        words += _from_longer(work, begun, counts)
     if _prices_switches(problem) and not task.budget.is_over:
         words += _with_fewer_switches(library, words, task.budget)
     if (
@@ -187,18 +187,20 @@ def compile_calming(problem: Problem) -> None:
 
 
 def _from_longer(
-    library: LibraryArrays, begun: list[TimedWord], most: int, counts: dict[str, int]
+    work: _Work, begun: list[TimedWord], counts: dict[str, int]
 ) -> Iterator[TimedWord]:
     """The word of the cheapest seed that may grow first, and is shortened afterwards."""
-    grown = [
-        _calmed(library, _with_insertions(library, seed, LONGEST, ROUNDS, counts))
-        for seed in begun[:GROWN]
-    ]
+    library, most, grown = work.library, work.most, []
+    for seed in begun[:GROWN]:
+        if work.task.budget.is_over:
+            return
+        word = _with_insertions(library, seed, LONGEST, _fitting(work, ROUNDS), counts)
+        grown.append(_calmed(library, word))
     longer = [word for word in grown if math.isfinite(word.cost) and len(word.trims) > most]
     for word in sorted(longer, key=_cost)[:1]:
-        short = shortened(library, word, most)
+        short = None if work.task.budget.is_over else shortened(library, word, most)
         if short is not None and len(short.trims) <= most:
-            again = _with_insertions(library, short, most, ROUNDS, counts)
+            again = _with_insertions(library, short, most, _fitting(work, ROUNDS), counts)
             if math.isfinite(again.cost) and len(again.trims) <= most:
                 yield again
 

@@ -68,7 +68,7 @@ def first_plan(
     word, proof, total, left_out = None, "", 0, False
     while word is None:
         for one in passes:
-            if not one.alive or total >= room or budget.is_over:
+            if not one.may_expand or total >= room or budget.is_over:
                 continue
             before = one.expansions
             word = one.run(min(one.chunk, room - total), math.inf, budget=budget)
@@ -79,7 +79,8 @@ def first_plan(
                 break
         alive = any(one.alive for one in passes)
         proof = "" if alive or word is not None else _enclosed(query, grids)
-        if word is not None or total >= room or budget.is_over or proof:
+        late = alive and not any(one.may_expand for one in passes)
+        if word is not None or total >= room or budget.is_over or proof or late:
             break
         if stages and (not alive or total >= stages[0][0]):
             _, resolutions = stages.pop(0)

@@ -12,6 +12,7 @@ from maneuver_automaton.search import _kernels_nodes as kernels
 from maneuver_automaton.words.library import LibraryArrays, Scratch, scratch_of
 
 SMALLEST = 2048  # nodes
+GROWN_S = 2.5e-7  # [s] that room for one node takes, what there is moved there
 
 
 class SearchArrays(NamedTuple):
@@ -40,6 +41,11 @@ def search_arrays(library: LibraryArrays) -> SearchArrays:
         found=np.zeros(5),
         scratch=scratch_of(library),
     )
+
+
+def room_takes(search: SearchArrays, nodes: int) -> float:
+    """About how long `with_room` takes [s]."""
+    return 0.0 if nodes <= len(search.nodes) else GROWN_S * max(nodes, 2 * len(search.nodes))
 
 
 def with_room(search: SearchArrays, nodes: int) -> SearchArrays:

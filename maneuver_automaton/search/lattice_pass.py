@@ -14,7 +14,12 @@ from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.distance_grid import DistanceGrid
 from maneuver_automaton.search.lattice_arrays import LatticeArrays, moves_of
-from maneuver_automaton.search.lattice_memory import SearchArrays, search_arrays, with_room
+from maneuver_automaton.search.lattice_memory import (
+    SearchArrays,
+    room_takes,
+    search_arrays,
+    with_room,
+)
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_task import Resolution, Task, goal_of_root, task_of
 from maneuver_automaton.search.scene import Scene
@@ -46,11 +51,17 @@ class Pass:
     pace: Pace
     chunk: int = FIRST_CHUNK
     alive: bool = True
+    is_late: bool = False  # no time is left to make room for more nodes
 
     @property
     def expansions(self) -> int:
         """Nodes expanded so far."""
         return int(self.arrays.state[layout.EXPANSIONS])
+
+    @property
+    def may_expand(self) -> bool:
+        """Whether there is something left to expand, and time to do so."""
+        return self.alive and not self.is_late
 
     @property
     def first_takes(self) -> float:
@@ -65,7 +76,7 @@ class Pass:
     @property
     def may_go_on(self) -> bool:
         """Whether there is something left to expand, and leave to do so."""
-        return self.alive and self.expansions < self.resolution.most
+        return self.may_expand and self.expansions < self.resolution.most
 
     @property
     def nearest(self) -> float:
@@ -81,7 +92,7 @@ class Pass:
         """Expand up to `n` more nodes; a plan, if one was found that costs less than the bound."""
         left = self.expansions + n
         self.pace.go_on(budget)
-        while self.alive and self.expansions < left and not budget.is_over:
+        while self.may_expand and self.expansions < left and not budget.is_over:
             self._expand(min(left - self.expansions, TIMELY), upper_bound)
             if self.task.stop_at_first and self.arrays.state[layout.FOUND]:
                 break
@@ -94,7 +105,11 @@ class Pass:
         left, stops = self.expansions + n, self.task.stop_at_first
         while self.alive and (step := self.pace.take(left - self.expansions)):
             used = int(self.arrays.state[layout.N_NODES])
-            self.arrays = with_room(self.arrays, used + self.library.most_children * (step + 1) + 2)
+            most = used + self.library.most_children * (step + 1) + 2
+            self.is_late = room_takes(self.arrays, most) > self.pace.budget.left
+            if self.is_late:
+                return
+            self.arrays = with_room(self.arrays, most)
             self.alive = bool(
                 kernels.expand(
                     self.arrays,

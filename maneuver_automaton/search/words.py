@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -94,8 +94,7 @@ def search_words(
         budget=budget,
         most_words=problem.search.max_expansions,
     )
-    found = itertools.islice(job.solutions(), MOST_LATE if budget.is_over else None)
-    solutions = tuple(in_order(found))
+    solutions = tuple(in_order(_handed_over(job, budget)))
     if alternatives is not None and len(solutions) > alternatives + 1:
         asked = solutions[: alternatives + 1]
         most_tied = tied(asked[-1].cost) if ties else -math.inf
@@ -154,13 +153,20 @@ def search_setup_words(
     )
     job.run(budget, None)
     cheapest: list[Word] = []
-    some = MOST_LATE if budget.is_over else None
-    for word in itertools.islice(job.solutions(), some):  # by rising cost, but for own prices
+    for word in _handed_over(job, budget):  # by rising cost, but for a user's own prices
         enough = len(cheapest) > alternatives and not job.own_prices
         if enough and word.cost > tied(cheapest[alternatives].cost):
             break
         cheapest.append(word)
     return list(in_order(cheapest))[: alternatives + 1]
+
+
+def _handed_over(job: WordScan, budget: Budget) -> Iterator[Word]:
+    """The words that were found; once the time is over some of them only."""
+    for number, word in enumerate(job.solutions()):
+        if number >= MOST_LATE and budget.is_over:
+            return
+        yield word
 
 
 def resting(problem: Problem, setup: SearchSetup) -> SearchResult:

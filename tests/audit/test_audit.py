@@ -421,3 +421,19 @@ def test_all_that_is_wrong_is_said():
     audit = audit_plan(AHEAD, wrong, CAR.model, footprint=BODY, obstacles=(crate,))
     assert audit.reason.startswith("it ends 1 m from the goal; at ")
     assert audit.reason.endswith(" s the vehicle touches obstacle 'crate'")
+
+
+@pytest.mark.parametrize("most", [1, 2])
+def test_an_audit_may_be_given_up(most):
+    """Once driven, and before each round of what bounds the clearance."""
+    asked = []
+
+    def ask():
+        asked.append(0)
+        if len(asked) == most:
+            raise TimeoutError
+
+    walls = (Obstacle(Box([1.0, 9.0], [6.0, 0.0])),)
+    options = {"footprint": (Box([1.0, 0.5]),), "obstacles": walls, "ask": ask}
+    with pytest.raises(TimeoutError):
+        audit_plan(PARKING, Goal(pose=PARKING.end), ROBOT.model, **options)

@@ -59,7 +59,7 @@ def test_a_long_audit_is_not_begun_late(samples, broken):
     trip = Plan([0, 0, 0], (rest, rest), durations=[0, 0], maneuvers=(hop,))
     library = Automaton(ROBOT, (rest,), (hop,))
     problem = Problem(library, [0, 0, 0], trip.end, obstacles=Box([1, 1], [5, 5]))
-    late = Budget(began=0.0, deadline=1.0, clock=lambda: 1.08)
+    late = Budget(began=0.0, deadline=1.0, clock=lambda: 1.076)
     assert check_plan(problem, trip, problem.goals[0], budget=late).broken is broken
 
 

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import itertools
 import sys
+from typing import Literal
 
 import pytest
 
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Disc
+from maneuver_automaton.planning import steps
 from maneuver_automaton.planning.plan import plan_within, prepare
 from maneuver_automaton.planning.result import PlanStatus
 from maneuver_automaton.planning.workspace import workspace_of
-from maneuver_automaton.problem import Horizon, Problem
+from maneuver_automaton.problem import Horizon, Problem, SearchSettings
+from tests.inertia import unicycle_automaton
 from tests.matrix.vehicles import VEHICLES
 
 FEW = 60  # looks at the clock once the time is over: every loop has one, and they are nested
@@ -64,3 +67,15 @@ def test_what_checks_is_imported_before_the_clock_starts(monkeypatch: pytest.Mon
     monkeypatch.setattr(module, "load_checking", lambda: loaded.append("checks"))
     prepare(TASKS["among obstacles"])
     assert loaded == ["checks"]
+
+
+@pytest.mark.parametrize("method", ["insertion", "lattice"])
+def test_prices_of_maneuvers_are_known_before_the_clock_starts(
+    monkeypatch: pytest.MonkeyPatch, method: Literal["insertion", "lattice"]
+) -> None:
+    """The bound of a plan needs them, 25 ms for a helicopter."""
+    priced: list[str] = []
+    monkeypatch.setattr(steps, "least_price_per_metre", lambda *_: priced.append(method))
+    linked = unicycle_automaton()
+    prepare(Problem(linked, [0, 0, 0], [2, 1, 0], search=SearchSettings(method=method)))
+    assert priced == [method]

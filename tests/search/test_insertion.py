@@ -13,11 +13,17 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import Unicycle, UserModel
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.search import SearchStatus, search_insertion, search_words
+from maneuver_automaton.search import (
+    SearchStatus,
+    free_insertion,
+    search_insertion,
+    search_words,
+)
 from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.insertion import insertion_stages
 from maneuver_automaton.search.library_arrays import library_arrays
@@ -283,6 +289,28 @@ def test_a_number_of_trims_is_kept():
     for most in (4, 5, 6):
         solution = best(parking(max_trims=most))
         assert len(solution.trims) <= most
+
+
+@compiled_only
+def test_words_do_not_grow_once_the_time_is_over(monkeypatch):
+    """A grid whose seeds grow: the first word that may be long takes all the time."""
+    long = []
+    insert = free_insertion._with_insertions
+
+    def inserted(library, seed, most, rounds, counts):
+        long.extend([most] * (most == free_insertion.LONGEST))
+        return insert(library, seed, most, rounds, counts)
+
+    monkeypatch.setattr(free_insertion, "_with_insertions", inserted)
+    grid = Automaton.of_grid(Unicycle(), [AXIS, AXIS])
+    problem = Problem(
+        grid, [0, 0, 0], [3, 1, 2.0], cost=Cost(effort=1.0), horizon=Horizon(time=8.0, max_trims=3)
+    )
+    for ends, most in ((1, 1), (99, free_insertion.GROWN)):
+        long.clear()
+        budget = Budget(began=0.0, deadline=1.0, clock=lambda ends=ends: 2.0 * (len(long) >= ends))
+        search_insertion(problem, problem.goals[0], budget=budget)
+        assert len(long) == most
 
 
 def test_alternatives_are_different_words_by_rising_cost():

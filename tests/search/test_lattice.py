@@ -20,7 +20,12 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search.lattice import distance_grids, first_plan
-from maneuver_automaton.search.lattice_memory import search_arrays, with_room
+from maneuver_automaton.search.lattice_memory import (
+    GROWN_S,
+    SMALLEST,
+    search_arrays,
+    with_room,
+)
 from maneuver_automaton.search.lattice_pass import both_ends, pass_of, with_cost
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_schedules import AT_WILL
@@ -30,6 +35,7 @@ from tests import scenes
 from tests.collision.scenes import random_map
 from tests.reference import plain_end
 from tests.reference_collision import driven
+from tests.search.cases import compiled_only
 from tests.solids import World, outside
 
 ROOT = Path(__file__).parents[2]
@@ -263,6 +269,17 @@ def test_arrays_grow_and_forget_nothing():
     other, _, _ = grown(PROBLEMS["car"], n=min(EXPANSIONS, 400) + 20)
     more = int(wide.state[layout.N_NODES])
     assert np.array_equal(wide.nodes[:more], other.arrays.nodes[:more])
+
+
+@compiled_only
+def test_room_for_more_nodes_is_not_made_late():
+    """What is found by then stands; the search is neither exhausted nor over."""
+    one, _, _ = grown(PROBLEMS["car"], n=1)
+    late = Budget(began=0.0, deadline=0.5 * GROWN_S * SMALLEST, clock=lambda: 0.0)
+    one.run(10 * SMALLEST, math.inf, budget=late)
+    assert (one.alive, one.is_late, one.may_go_on) == (True, True, False)
+    assert len(one.arrays.nodes) == SMALLEST
+    assert one.expansions > 1
 
 
 def test_joined_and_priced_by_hand():

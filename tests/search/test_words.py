@@ -543,9 +543,11 @@ def test_too_many_trims_are_refused(problem, most):
         search(problem)
 
 
-@pytest.mark.parametrize(("seconds", "most"), [(-1.0, words.MOST_LATE), (60.0, 1000)])
-def test_few_of_many_seeds_are_made_once_the_time_is_over(monkeypatch, seconds, most):
-    """All of one cost, so that none is left out for its price."""
+@pytest.mark.parametrize(("looks", "most"), [(0, words.MOST_LATE), (250, 350), (10**6, 1000)])
+def test_few_of_many_seeds_are_made_once_the_time_is_over(monkeypatch, looks, most):
+    """All of one cost, so that none is left out for its price; over after some looks."""
+    seen = itertools.count()
+    budget = Budget(began=0.0, deadline=1.0, clock=lambda: 2.0 * (next(seen) >= looks))
     made = []
 
     def solutions(_job):
@@ -557,7 +559,5 @@ def test_few_of_many_seeds_are_made_once_the_time_is_over(monkeypatch, seconds, 
     monkeypatch.setattr(words.WordScan, "run", lambda *_: True)
     problem = parking()
     setup = search_setup(problem, problem.goals[0])
-    found = words.search_setup_words(
-        problem, setup, alternatives=2, budget=Budget.from_now(seconds), spare=False
-    )
-    assert (len(found), len(made)) == (3, most)
+    found = words.search_setup_words(problem, setup, alternatives=2, budget=budget, spare=False)
+    assert (len(found), len(made)) == (3, most + (most < 1000))
