@@ -21,6 +21,7 @@ from maneuver_automaton._cache_files import distrusted, say_once
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])  # the function that is compiled
 
 
+HOW = ("_compile.py", "_linking.py")  # how kernels are compiled
 KERNELS = "kernels-"  # what the names of folders of compiled kernels begin with
 
 
@@ -44,17 +45,12 @@ def kernel_base() -> Path:
 
 
 def source_hash() -> str:
-    """Hash of every kernel source and of the names of all modules, 16 hexadecimal digits.
-
-    Compiled code names the modules of the structures it is given: where one has moved to another
-    module, numba fails to load what it compiled before.
-    """
+    """Hash of every kernel source and of how they are compiled, 16 hexadecimal digits."""
     digest = hashlib.sha256()
     package = Path(__file__).parent
-    for path in sorted(package.rglob("*.py")):
+    for path in sorted((*package.rglob("_kernels*.py"), *(package / one for one in HOW))):
         digest.update(path.relative_to(package).as_posix().encode())
-        if path.name.startswith("_kernels") or path.name == "_compile.py":
-            digest.update(path.read_bytes())
+        digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
 
@@ -116,23 +112,13 @@ def bare_inner_kernel(function: Kernel) -> Kernel:
     return _inner(function, NO_COUNTS)
 
 
-def merged_kernel(function: Kernel) -> Kernel:
-    """A `bare_inner_kernel` that LLVM merges into its callers, for functions with one caller.
+def inlined_kernel(function: Kernel) -> Kernel:
+    """A `bare_inner_kernel` that LLVM merges into its callers, wherever they call it.
 
     A call hands over every field of every structure it is given, hundreds of words for a scene;
-    merged, none is copied. Unlike an `inlined_kernel` it is typed once, on its own.
+    merged, none is copied. It is typed once, on its own.
     """
     return _inner(function, {"forceinline": True, **NO_COUNTS})
-
-
-def inlined_kernel(function: Kernel) -> Kernel:
-    """Compile a function that makes no array into each kernel that calls it, line by line."""
-    import numba
-
-    return cast(
-        "Kernel",
-        numba.njit(nogil=True, error_model="numpy", inline="always", **NO_COUNTS)(function),
-    )
 
 
 NO_COUNTS: dict[str, Any] = {"_nrt": False}
@@ -141,6 +127,8 @@ NO_COUNTS: dict[str, Any] = {"_nrt": False}
 def _inner(function: Kernel, options: dict[str, Any]) -> Kernel:
     import numba
 
+    from maneuver_automaton._linking import LinkedCompiler
+
     return cast(
         "Kernel",
         numba.njit(
@@ -148,6 +136,7 @@ def _inner(function: Kernel, options: dict[str, Any]) -> Kernel:
             error_model="numpy",
             no_cpython_wrapper=True,
             no_cfunc_wrapper=True,
+            pipeline_class=LinkedCompiler,
             **options,
         )(function),
     )
@@ -156,7 +145,15 @@ def _inner(function: Kernel, options: dict[str, Any]) -> Kernel:
 def _cached(function: Kernel, options: dict[str, Any]) -> Kernel:
     import numba
 
-    compiled = numba.njit(nogil=True, error_model="numpy", **options)(function)
+    from maneuver_automaton._linking import KernelCompiler
+
+    compiled = numba.njit(
+        nogil=True,
+        error_model="numpy",
+        no_cfunc_wrapper=True,
+        pipeline_class=KernelCompiler,
+        **options,
+    )(function)
     folder = kernel_folder()
     if folder is not None and compiled is not function:  # it is, where numba is switched off
         from maneuver_automaton._kernel_cache import KernelCache

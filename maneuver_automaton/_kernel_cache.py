@@ -18,6 +18,7 @@ from typing import Any
 import numba
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
+from numba.core.types.containers import BaseTuple
 
 from maneuver_automaton._cache_files import read_checked, say_once, write_checked
 
@@ -80,8 +81,19 @@ class KernelCache:
             say_once("not kept", f"{self.folder}: compiled kernels cannot be kept here: {why}")
 
     def _path(self, signature: Any, codegen: Any) -> Path:
-        key = repr((self.made_from, codegen.magic_tuple(), signature))
+        places = _places(getattr(signature, "args", signature))
+        key = repr((self.made_from, codegen.magic_tuple(), signature, places))
         return self.folder / f"{self.name}-{hashlib.sha256(key.encode()).hexdigest()[:24]}{ENDING}"
+
+
+def _places(kinds: Any) -> list[str]:
+    """The modules that types are from: numba fails to load code for structures that have moved."""
+    found = []
+    for kind in kinds:
+        if isinstance(kind, BaseTuple):
+            place = getattr(kind, "instance_class", tuple).__module__
+            found += [place, *_places(kind.types)]
+    return found
 
 
 @functools.cache

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, merged_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
 from maneuver_automaton.bounds._kernels_dual import LANES, gather
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ ROWS = 48  # of the array `w`
 Six: TypeAlias = tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]
 
 
-@merged_kernel
+@inlined_kernel
 def room_of_row(
     least: Six,
     apart: tuple[np.float32, np.float32, np.float32, np.float32, np.float32],

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from maneuver_automaton._compile import bare_inner_kernel, kernel, merged_kernel
+from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel, kernel
 from maneuver_automaton.collision._kernels_clearance import (
     NEAR,
     field_bound,
@@ -61,7 +61,7 @@ def free_time(
     return free, clearance
 
 
-@merged_kernel
+@inlined_kernel
 def free_of_static(
     world: WorldArrays,
     body: Body,

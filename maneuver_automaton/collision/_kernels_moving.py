@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from maneuver_automaton._compile import bare_inner_kernel, merged_kernel
+from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 from maneuver_automaton.collision._kernels_clearance import NEAR, SHARP, piece_clearance
 from maneuver_automaton.groups._kernels import coast, compose
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 SOON = 1e-11  # [s] a knot that is nearer in time counts as reached: in it nothing moves 1e-9 m
 
 
-@merged_kernel
+@inlined_kernel
 def knot_before(moving: MovingObstacles, m: int, time: float) -> int:
     """The last knot at or before `time`, which is after the first one and before the last."""
     low, high = moving.first_knot[m], moving.first_knot[m + 1] - 1
@@ -34,7 +34,7 @@ def knot_before(moving: MovingObstacles, m: int, time: float) -> int:
         middle = (low + high) // 2
 
 
-@merged_kernel
+@inlined_kernel
 def obstacle_pose(moving: MovingObstacles, m: int, time: float) -> tuple[float, float, float]:
     """Pose (x, y, heading) of a moving obstacle, held before its first knot and after."""
     k_0, k_1 = moving.first_knot[m], moving.first_knot[m + 1]
@@ -52,7 +52,7 @@ def obstacle_pose(moving: MovingObstacles, m: int, time: float) -> tuple[float, 
     return x, y, heading
 
 
-@merged_kernel
+@inlined_kernel
 def closing_of(
     moving: MovingObstacles,
     m: int,
@@ -98,7 +98,7 @@ def closing_of(
     return closing, lasting
 
 
-@merged_kernel
+@inlined_kernel
 def moving_clearance(
     moving: MovingObstacles,
     m: int,

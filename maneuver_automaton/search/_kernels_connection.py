@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from maneuver_automaton._compile import bare_inner_kernel, merged_kernel
+from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 from maneuver_automaton.search._kernels_coast import coast_free, coast_inside, coasted
 from maneuver_automaton.search._kernels_maneuver import edge_end, edge_free
 from maneuver_automaton.words._kernels_library import class_of
@@ -38,7 +38,7 @@ def transition_free(
     return True, pose, clock
 
 
-@merged_kernel
+@inlined_kernel
 def connection_free(
     scene: Scene,
     lib: LatticeArrays,
@@ -80,7 +80,7 @@ def connection_free(
     return True
 
 
-@merged_kernel
+@inlined_kernel
 def free_candidate(
     scene: Scene,
     lib: LatticeArrays,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from maneuver_automaton._compile import bare_inner_kernel, merged_kernel
+from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 from maneuver_automaton.search._kernels_coast import may_stay, too_short
 from maneuver_automaton.search._kernels_connection import free_candidate
 from maneuver_automaton.search._kernels_nodes import (
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.search.scene import Scene
 
 
-@merged_kernel
+@inlined_kernel
 def connect_ends(
     search: SearchArrays,
     task: Task,

@@ -30,7 +30,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from maneuver_automaton._compile import bare_kernel, inlined_kernel, merged_kernel
+from maneuver_automaton._compile import bare_kernel, inlined_kernel
 from maneuver_automaton.search._kernels_cells import first_slot
 from maneuver_automaton.search._kernels_distance import pop, push
 from maneuver_automaton.words._kernels_library import class_of
@@ -126,7 +126,7 @@ def node_in(table: IntArray, generation: int, slot: int) -> int:
     return entry & NODE_BITS if entry >> 31 == generation else -1
 
 
-@merged_kernel
+@inlined_kernel
 def add_node(
     search: SearchArrays,
     weight: float,

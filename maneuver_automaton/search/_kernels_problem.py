@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, merged_kernel
+from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel, inner_kernel
 from maneuver_automaton.groups._kernels import back_from, compose
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def word_extra(problem: WordProblem, word: IntArray, n: int) -> float:
     return problem.fixed[COST] + switch_prices(problem, word, n)
 
 
-@merged_kernel
+@inlined_kernel
 def switch_prices(problem: WordProblem, word: IntArray, n: int) -> float:
     """Price of the switches of a word.
 
@@ -229,7 +229,7 @@ def room_for(problem: WordProblem, n: int) -> WordProblem:
     )
 
 
-@merged_kernel
+@inlined_kernel
 def look_ahead(
     problem: WordProblem, links: Links, seen: WordProblem, word: IntArray, n: int
 ) -> None:
@@ -259,7 +259,7 @@ def look_ahead(
         before = after
 
 
-@merged_kernel
+@inlined_kernel
 def class_after(problem: WordProblem, links: Links, word: IntArray, n: int, i: int) -> int:
     """Class of trims that the transition before position `i` leads to; -1 for no transition.
 
@@ -272,7 +272,7 @@ def class_after(problem: WordProblem, links: Links, word: IntArray, n: int, i: i
     return links.goal
 
 
-@merged_kernel
+@inlined_kernel
 def look(
     problem: WordProblem, links: Links, seen: WordProblem, word: IntArray, n: int, rows: IntArray
 ) -> None:
@@ -304,7 +304,7 @@ def look(
             seen.parallel[k, i] = seen.parallel[i, k]
 
 
-@merged_kernel
+@inlined_kernel
 def copy_row(problem: WordProblem, trim: int, seen: WordProblem, row: int) -> None:
     """What a search knows of a trim, as a row of the problem that is seen."""
     seen.trims[row] = trim

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from maneuver_automaton._compile import bare_inner_kernel, merged_kernel
+from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search._kernels_problem import (
     AIM,
@@ -42,7 +42,7 @@ def affordable(
     return reach
 
 
-@merged_kernel
+@inlined_kernel
 def any_node_may_do(
     problem: WordProblem,
     candidates: Candidates,
@@ -94,7 +94,7 @@ def any_node_may_do(
     return False
 
 
-@merged_kernel
+@inlined_kernel
 def nearly_cheap(problem: WordProblem, word: IntArray, n: int, upper_bound: float) -> float:
     """What the trims of a word may cost at a node for it to be looked at."""
     if problem.slack == np.inf:
@@ -116,7 +116,7 @@ def may_be_cheap(one: float, other: float, most: float) -> bool:
     return min(one, other) - change < most
 
 
-@merged_kernel
+@inlined_kernel
 def coasting_cost(
     problem: WordProblem, word: IntArray, triple: IntArray, free: int, time: float, solved: Array
 ) -> float:
@@ -130,7 +130,7 @@ def coasting_cost(
     return cost
 
 
-@merged_kernel
+@inlined_kernel
 def least_per_metre(problem: WordProblem, word: IntArray, n: int, left_out: int) -> float:
     """Best price per metre among the trims of a word but one; -inf where one of them pays."""
     price = np.inf
@@ -142,7 +142,7 @@ def least_per_metre(problem: WordProblem, word: IntArray, n: int, left_out: int)
     return price
 
 
-@merged_kernel
+@inlined_kernel
 def least_after(problem: WordProblem, trim: int, time: float, per_metre: float) -> float:
     """Lower bound of what coasting costs in a word whose first trim lasts `time`.
 
@@ -159,7 +159,7 @@ def least_after(problem: WordProblem, trim: int, time: float, per_metre: float) 
     return problem.rates[trim] * time + (left * per_metre if left > NONE_LEFT else 0.0)
 
 
-@merged_kernel
+@inlined_kernel
 def is_met_nearby(
     problem: WordProblem, word: IntArray, triple: IntArray, lack: float, before: float
 ) -> bool:

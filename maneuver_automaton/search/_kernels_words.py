@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel, merged_kernel
+from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel, inner_kernel, kernel
 from maneuver_automaton.search._kernels_problem import (
     COST,
     DISTANCE,
@@ -215,7 +215,7 @@ def passing_words(
             closed_form_words(seen, candidates, kept, n - 1, triple, room, upper_bound)
 
 
-@merged_kernel
+@inlined_kernel
 def first_of_class(links: Links, wanted: int) -> int:
     """The first trim of a class."""
     for trim in range(links.class_of.size):
@@ -224,7 +224,7 @@ def first_of_class(links: Links, wanted: int) -> int:
     return -1
 
 
-@merged_kernel
+@inlined_kernel
 def promising(
     problem: WordProblem, left: WordProblem, word: IntArray, n: int, upper_bound: float
 ) -> bool:
@@ -399,7 +399,7 @@ def spell(n_trims: int, word: IntArray, n: int, number: int, tail: int) -> None:
         number //= n_trims
 
 
-@merged_kernel
+@inlined_kernel
 def prepare_word(
     problem: WordProblem,
     candidates: Candidates,

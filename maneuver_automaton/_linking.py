@@ -1,0 +1,96 @@
+"""How compiled functions are put together: each kernel is optimised once, as a whole.
+
+numba optimises every function and translates it to machine code on its own, and does so again in
+whatever calls it: as often as calls are nested. Functions that only kernels call stay as they were
+lowered here; the kernel that Python calls is optimised with all of them, which it has for itself.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from llvmlite.binding import Linkage
+from numba import _dynfunc
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import register_pass
+from numba.core.typed_passes import NativeLowering
+
+
+class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """Code that is only linked into other code."""
+
+    def finalize(self) -> None:
+        """Link what is called, and leave the rest to the kernel that it becomes part of."""
+        self._raise_if_finalized()
+        for library in dict.fromkeys(self._linking_libraries):
+            self._reload_init.update(library._reload_init)
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+
+class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """Code that Python calls, with what it calls in its turn."""
+
+    def _optimize_final_module(self) -> None:
+        """Optimise what is linked in as what nobody else calls."""
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == Linkage.linkonce_odr:
+                function.linkage = "internal"
+        super()._optimize_final_module()
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class LinkedLowering(NativeLowering):  # type: ignore[misc]
+    """Lower a function that only kernels call."""
+
+    _name = "linked_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower without machine code; Python is given something that is never called."""
+        state.library = LinkedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.flags.no_compile = True
+        super().run_pass(state)
+        state.library.finalize()
+        lowered = state["cr"]
+        name = lowered.fndesc.qualname
+        key = _dynfunc.make_function(
+            lowered.fndesc.lookup_module(), name, name, 0, lowered.env, (state.library,)
+        )
+        state["cr"] = lowered._replace(cfunc=key)
+        state.targetctx.insert_user_function(key, lowered.fndesc, [state.library])
+        return True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class KernelLowering(NativeLowering):  # type: ignore[misc]
+    """Lower a function that Python calls."""
+
+    _name = "kernel_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower into a library that has what it calls for itself."""
+        state.library = KernelLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return bool(super().run_pass(state))
+
+
+class LinkedCompiler(CompilerBase):  # type: ignore[misc]
+    """Compiler of functions that only kernels call."""
+
+    lowering: ClassVar[type[NativeLowering]] = LinkedLowering
+
+    def define_pipelines(self) -> list[Any]:
+        """The usual passes, but for the lowering."""
+        usual = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        usual.add_pass_after(self.lowering, NativeLowering)
+        usual.passes = [one for one in usual.passes if one[0] is not NativeLowering]
+        usual.finalize()
+        return [usual]
+
+
+class KernelCompiler(LinkedCompiler):
+    """Compiler of functions that Python calls."""
+
+    lowering = KernelLowering
