@@ -21,8 +21,8 @@ class PolishSettings:
 
     step: float = 0.12  # [s] between nodes, as far as their number allows
     nodes: tuple[int, int] = (40, 300)  # fewest and most intervals
-    near: float = 0.8  # pairs nearer than this get a line, in radii of the body ...
-    ahead: float = 0.8  # ... or than the guess drives at its fastest in this time [s]
+    near: float = 0.5  # pairs nearer than this get a line, in radii of the body ...
+    ahead: float = 0.5  # ... or than the guess drives at its fastest in this time [s]
     clearance: float = 1e-4  # [m] kept between body and line, for the path between nodes
     tightening: float = 1e-6  # of all limits, in their units, so that closure has room
     effort: float = 3e-3  # price of full control, per second, for those that end in rates

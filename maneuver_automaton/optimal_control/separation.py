@@ -245,10 +245,14 @@ class Facing(NamedTuple):
     piece: NDArray[np.bool_]  # (n, most)
 
     def joined(self, other: Facing) -> Facing:
-        """Corners of both, those of the other for its pairs, which are the first of these."""
+        """Corners of both, those of the other for its pairs, which are the first of these.
+
+        The other's pieces may have fewer corners, and so fewer columns.
+        """
         body, piece = self.body.copy(), self.piece.copy()
         body[: len(other.body)] |= other.body
-        piece[: len(other.piece)] |= other.piece
+        rows, columns = other.piece.shape
+        piece[:rows, :columns] |= other.piece
         return Facing(body, piece)
 
     def holds(self, other: Facing) -> bool:

@@ -21,6 +21,7 @@ from maneuver_automaton.planning.tracking import Tracked, track
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.improve import Patience
 from maneuver_automaton.refinement.kinematic_paths import kinematic_problem
+from maneuver_automaton.refinement.path_guesses import path_guesses
 from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
 
 FIRST_SHARE = 0.8  # of the time limit, for a first path
@@ -51,8 +52,9 @@ class AlongPaths:
         yield from _stopping(found, first.plan, first.goal_index)
         if found.budget.is_over:
             return
-        if first.plan.duration > 0.0:
-            self.guesses.append(guess_along(problem, first.plan))
+        along = path_guesses(problem.automaton.model)
+        if along is not None and first.plan.duration > 0.0:
+            self.guesses.append(guess_along(problem, along, first.plan))
         soon = found.budget.stage(IMPROVED_SHARE)
         better = self._track(kinematic_problem(problem), soon, known=first.plan)
         if better.plan is not None and better.goal_index is not None and found.may_check:

@@ -39,15 +39,16 @@ class PolishedPrice:
             return self.problem.cost_of(plan)
         return replace(self.problem, cost=self.cost).cost_of(plan)
 
-    def stage_cost(self, known: Plan) -> RunningCost | None:
+    def stage_cost(self, known: Plan | None) -> RunningCost | None:
         """Cost per second beside 1 for the time; None if there is none.
 
-        The unit is the price of time or, where it has none, what a `known` plan costs per second.
+        The unit is the price of time or, where it has none, what a `known` plan costs per second;
+        without one, 1.
         """
         cost, model = self.cost, self.problem.automaton.model
         unit = cost.time
         if cost.time <= self.waiting:
-            unit = self.of(known) / known.duration - self.waiting
+            unit = self.of(known) / known.duration - self.waiting if known else 1.0
         fixed = (cost.time - self.waiting) / unit - 1.0 if unit > 0.0 else 0.0
         if not unit > 0.0 or (fixed == cost.effort == cost.norm == cost.length == 0.0):
             return None

@@ -17,31 +17,25 @@ from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.collision.rectangles import blocked_rectangles
 from maneuver_automaton.collision.surroundings import parts_of, surroundings_of
+from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.models import Model, SecondOrderCar, SecondOrderUnicycle
+from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control import Guess, PolishSettings, has_casadi, load_casadi
 from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.problem import Components, RunningCost
 from maneuver_automaton.optimal_control.separation import BodyPart
 from maneuver_automaton.planning.incumbents import Incumbents
-from maneuver_automaton.planning.polished_price import admitted_durations, polished_price
+from maneuver_automaton.planning.polished_price import (
+    PolishedPrice,
+    admitted_durations,
+    polished_price,
+)
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem, moves
-from maneuver_automaton.refinement.gear_sequences import (
-    car_library,
-    gear_sequences,
-    unicycle_library,
-)
-from maneuver_automaton.refinement.guesses import (
-    Pace,
-    car_guess,
-    course_guess,
-    pace_of_car,
-    pace_of_unicycle,
-    timed,
-    unicycle_guess,
-)
-from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinematic_problem
+from maneuver_automaton.refinement.gear_sequences import gear_sequences
+from maneuver_automaton.refinement.guesses import course_guess, timed
+from maneuver_automaton.refinement.kinematic_paths import follows_paths, simpler_problem
+from maneuver_automaton.refinement.path_guesses import PathGuesses, path_guesses
 from maneuver_automaton.refinement.polish import (
     PolishedMotion,
     PolishResult,
@@ -55,7 +49,7 @@ SAMPLES = 500  # of a plan that passes above or below obstacles
 EXPANSIONS_AN_ITERATION = 4  # of the lattice, in place of one iteration of polishing
 FEWEST_ITERATIONS = 100  # however few expansions are allowed: one guess to its end
 NEAR_HEADING = 1.0  # [rad] from the heading of a plan, to which its motion is a guess
-TURNS = (1.0, 0.8)  # of the greatest curvature, with which they turn
+BY_TIME = Cost(time=1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,8 +77,9 @@ def why_not_polished(problem: Problem) -> str:
 def load_polishing(problem: Problem) -> None:
     """Have ready what polishing needs: the solver, and tables of the kinematic libraries."""
     load_casadi()
-    for library in _libraries_of(problem.automaton.model)[0]:
-        cost_to_go_table(replace(kinematic_problem(problem, switch=0.0), automaton=library))
+    along = path_guesses(problem.automaton.model)
+    for library in along.libraries if along else ():
+        cost_to_go_table(simpler_problem(problem, library, cost=BY_TIME))
 
 
 def polish_found(found: Incumbents, paths: Sequence[Aimed]) -> None:
@@ -94,21 +89,15 @@ def polish_found(found: Incumbents, paths: Sequence[Aimed]) -> None:
     """
     problem, budget = found.problem, found.for_better
     price = polished_price(problem)
-    known = [(one.plan, one.goal_index) for one in found.plans]
-    cheapest = sorted(known, key=lambda one: price.of(one[0]))[:1]
-    quickest = sorted(known, key=lambda one: one[0].duration)[:1]
-    known = [*cheapest, *(one for one in quickest if one not in cheapest)]
-    horizon = problem.horizon
-    if not known and (horizon.max_time or horizon.time or horizon.max_trims):
-        # a plan that is late may be made quicker, and one maneuver of too many trims
-        known = sorted(found.misfits, key=lambda one: one[0].duration)[:1]
-    if not known or budget.is_over or why_not_polished(problem):
+    known = _worth_polishing(found, price)
+    if budget.is_over or why_not_polished(problem):
         return
-    if not known[0][0].duration > 0.0:
+    if known and not known[0][0].duration > 0.0:
         return  # it is there already
-    solid = _without_passed(problem, known[0][0])
+    stage_cost = price.stage_cost(known[0][0] if known else None)
+    solid = _without_passed(problem, known[0][0]) if known else problem
     work = iterations_within(budget)
-    for goal_index, guesses in _by_goal(problem, _guesses(problem, known, paths, budget)):
+    for goal_index, guesses in _in_groups(problem, known, paths, budget):
         if budget.is_over or (work is not None and work <= 0):
             return
         try:
@@ -116,7 +105,7 @@ def polish_found(found: Incumbents, paths: Sequence[Aimed]) -> None:
                 solid,
                 guesses,
                 goal_index,
-                price.stage_cost(known[0][0]),
+                stage_cost,
                 budget=budget,
                 most_iterations=work,
                 accepts=functools.partial(found.offer, goal_index=goal_index),
@@ -129,11 +118,37 @@ def polish_found(found: Incumbents, paths: Sequence[Aimed]) -> None:
             work -= sum(attempt.iterations for attempt in polished.attempts)
 
 
+def _worth_polishing(found: Incumbents, price: PolishedPrice) -> list[tuple[Plan, int]]:
+    """The cheapest and the quickest plan; where there is none, one that nearly was."""
+    every = [(one.plan, one.goal_index) for one in found.plans]
+    cheapest = sorted(every, key=lambda one: price.of(one[0]))[:1]
+    quickest = sorted(every, key=lambda one: one[0].duration)[:1]
+    known = [*cheapest, *(one for one in quickest if one not in cheapest)]
+    horizon = found.problem.horizon
+    if not known and (horizon.max_time or horizon.time or horizon.max_trims):
+        # a plan that is late may be made quicker, and one maneuver of too many trims
+        known = sorted(found.misfits, key=lambda one: one[0].duration)[:1]
+    return known
+
+
+def _in_groups(
+    problem: Problem, known: Sequence[tuple[Plan, int]], paths: Sequence[Aimed], budget: Budget
+) -> Iterator[tuple[int, Iterable[Guess]]]:
+    """Guesses for one goal each that are polished together.
+
+    Those along paths that the vehicle cannot follow come last: nothing else may suffer from them.
+    """
+    if known:
+        yield from _by_goal(problem, _guesses(problem, known, paths, budget))
+    if is_led_by_paths(problem):
+        yield from _by_goal(problem, guesses_along_paths(problem, budget))
+
+
 def _guesses(
     problem: Problem, known: Sequence[tuple[Plan, int]], paths: Sequence[Aimed], budget: Budget
 ) -> Iterator[Aimed]:
     """Guesses along kinematic plans; where there are none, the plans that are known."""
-    if rests_at_both_ends(problem):
+    if rests_at_both_ends(problem) and follows_paths(problem.automaton.model):
         along = guesses_along_paths(problem, budget)
         first = next(along, None)
         if first is not None:
@@ -204,32 +219,38 @@ def rests_at_both_ends(problem: Problem) -> bool:
     )
 
 
+def is_led_by_paths(problem: Problem) -> bool:
+    """Whether paths of a kinematic vehicle are guesses only, as this one cannot follow them."""
+    model = problem.automaton.model
+    led = path_guesses(model) is not None and not follows_paths(model)
+    return led and rests_at_both_ends(problem)
+
+
 def guesses_along_paths(problem: Problem, budget: Budget) -> Iterator[Aimed]:
     """Guesses from kinematic plans whose gears differ, a promising one before all are searched.
 
-    None for a vehicle that does not follow the paths of a kinematic one.
+    None for a vehicle for which no kinematic one stands.
     """
-    model = problem.automaton.model
-    if not follows_paths(model):
+    along = path_guesses(problem.automaton.model)
+    if along is None:
         return
-    libraries, pace = _libraries_of(model)
     for drive in gear_sequences(
-        kinematic_problem(problem, switch=0.0),
-        libraries,
-        lambda plan: timed(plan, pace).duration,
+        simpler_problem(problem, along.libraries[0], cost=BY_TIME),
+        along.libraries,
+        lambda plan: timed(plan, along.pace).duration,
         budget=budget,
     ):
         if drive.plan.duration > 0.0:
-            yield guess_along(problem, drive.plan)
+            yield guess_along(problem, along, drive.plan)
 
 
-def guess_along(problem: Problem, path: Plan) -> Aimed:
+def guess_along(problem: Problem, along: PathGuesses, path: Plan) -> Aimed:
     """A guess along a kinematic plan, seen from its start, and the goal where it ends."""
-    model = problem.automaton.model
     seen = replace(path, start=np.zeros(problem.start.size), start_time=0.0)
-    how = car_guess if isinstance(model, SecondOrderCar) else unicycle_guess
-    off = [sum(goal.off(path.end)) for goal in problem.goals]
-    return Aimed(how(model, seen, intervals=_intervals()), int(np.argmin(off)))  # type: ignore[arg-type]
+    goal_index = int(np.argmin([sum(goal.off(path.end)) for goal in problem.goals]))
+    first, last = problem.first_trim, problem.last_trim(problem.goals[goal_index])
+    guess = along.guess(seen, first.reduced_state, last.reduced_state, _intervals())
+    return Aimed(guess, goal_index)
 
 
 def guess_of_plan(plan: Plan) -> Guess:
@@ -324,20 +345,6 @@ def _body_parts(problem: Problem) -> tuple[BodyPart, ...]:
 def _frame_of(model: Model, which: int) -> Callable[[Components], Sequence[Any]]:
     frames = model.part_frames  # type: ignore[attr-defined]
     return lambda z: tuple(frames(z)[which])
-
-
-def _libraries_of(model: Model) -> tuple[list[Automaton], Pace]:
-    """Kinematic libraries that turn as tightly as can be, and less, and the pace along them."""
-    if isinstance(model, SecondOrderCar):
-        car = functools.partial(
-            car_library, wheelbase=model.wheelbase, max_steering=model.max_steering
-        )
-        return [car(share=share) for share in TURNS], pace_of_car(model)
-    assert isinstance(model, SecondOrderUnicycle)
-    robot = functools.partial(
-        unicycle_library, max_speed=model.max_speed, max_turn_rate=model.max_turn_rate
-    )
-    return [robot(share=share) for share in TURNS], pace_of_unicycle(model)
 
 
 def _intervals() -> Callable[[float], int]:

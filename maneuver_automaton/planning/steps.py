@@ -129,8 +129,8 @@ def load_steps(problem: Problem, workspace: Workspace) -> None:
     if follows_paths(problem.automaton.model) and rests_at_both_ends(problem):
         simpler = kinematic_problem(problem, switch=0.0)
         cost_to_go_table(simpler, prepared=workspace.prepared)
-        if steps.polishes:
-            load_polishing(problem)
+    if steps.polishes and rests_at_both_ends(problem):
+        load_polishing(problem)
     if problem.automaton.maneuvers:
         load_maneuver_kernels()
         load_times_kernels()

@@ -15,7 +15,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.models import SecondOrderCar, SecondOrderUnicycle
+from maneuver_automaton.models import CarWithTrailer, SecondOrderCar, SecondOrderUnicycle
 from maneuver_automaton.optimal_control import Guess
 from maneuver_automaton.primitives import Trajectory
 
@@ -193,6 +193,46 @@ def unicycle_guess(model: SecondOrderUnicycle, plan: Plan, *, intervals: Step) -
     return _second_order(run, at, turn, model.control_limits)
 
 
+def trailer_guess(
+    model: CarWithTrailer, plan: Plan, hitches: tuple[float, float], *, intervals: Step
+) -> Guess:
+    """Guess for a car that pulls a trailer, between two angles at its hitch [rad]."""
+    run = timed(plan, pace_of_trailer(model))
+    at = np.linspace(0.0, run.duration, intervals(run.duration) + 1)
+    middle = 0.5 * (at[1:] + at[:-1])
+    driven = [np.interp(middle, run.time, column) for column in (run.twist[:, 0], run.steering)]
+    control = np.clip(np.column_stack(driven), *model.control_limits.T)
+    hitch = _hitched(model, control, at[1], hitches)
+    return Guess(
+        state=np.column_stack([_at(run, at), hitch]), control=control, duration=run.duration
+    )
+
+
+def _hitched(
+    model: CarWithTrailer, control: Array, step: float, hitches: tuple[float, float]
+) -> Array:
+    """Angles (n + 1,) at the hitch [rad], which may jump where the gear changes.
+
+    A trailer that is pulled comes round behind its car, and one that is pushed jackknifes: so they
+    follow from the angle before it where the car goes ahead, and from the one after it in reverse.
+    """
+    low, high = model.reduced_limits[0].tolist()
+    angle = np.zeros(len(control) + 1)
+    angle[0], angle[-1] = hitches
+    pushed = control[:, 0] < 0.0
+
+    def after(k: int, time: float) -> float:
+        hitch = float(angle[k] if time > 0.0 else angle[k + 1])
+        (rate,) = model.dynamics((hitch,), control[k])
+        return float(min(max(hitch + time * rate, low), high))
+
+    for k in np.flatnonzero(~pushed).tolist():
+        angle[k + 1] = after(k, step)
+    for k in np.flatnonzero(pushed)[::-1].tolist():
+        angle[k] = after(k, -step)
+    return angle
+
+
 def course_guess(course: Trajectory, *, intervals: Step) -> Guess:
     """Guess from a motion that any model can make: an automaton's plan."""
     time = course.time - course.time[0]
@@ -225,6 +265,12 @@ def pace_of_unicycle(model: SecondOrderUnicycle) -> Pace:
         turn_rate=model.max_turn_rate,
         angular_acceleration=model.max_angular_acceleration,
     )
+
+
+def pace_of_trailer(model: CarWithTrailer) -> Pace:
+    """Limits of a car with a trailer along a path."""
+    low, high = model.control_limits[0]
+    return Pace(speed=high, reverse_speed=-low, acceleration=math.inf, wheelbase=model.wheelbase)
 
 
 def _second_order(run: Timed, at: Array, second: Array, limits: Array) -> Guess:

@@ -43,11 +43,17 @@ def kinematic_problem(
     model = problem.automaton.model
     automaton = extreme_automaton(model)  # type: ignore[arg-type]
     slowest = float(np.max(np.ptp(model.reduced_limits, axis=1) / model.control_limits[:, 1]))
+    cost = Cost(time=1.0, switch=switch * slowest, direction_change=direction_change * slowest)
+    return simpler_problem(problem, automaton, cost=cost)
+
+
+def simpler_problem(problem: Problem, automaton: Automaton, *, cost: Cost) -> Problem:
+    """The way of a kinematic vehicle between the same obstacles, from start to goals."""
     return Problem(
         automaton,
         problem.start,
         tuple(replace(goal, trim=None) for goal in problem.goals),
-        cost=Cost(time=1.0, switch=switch * slowest, direction_change=direction_change * slowest),
+        cost=cost,
         horizon=Horizon(),
         start_time=problem.start_time,
         bounds=problem.bounds,

@@ -48,6 +48,7 @@ from maneuver_automaton.refinement.guesses import (
     timed,
     unicycle_guess,
 )
+from maneuver_automaton.refinement.path_guesses import path_guesses
 from maneuver_automaton.refinement.polish import (
     PolishedMotion,
     PolishTask,
@@ -74,7 +75,6 @@ DYNOBENCH = {
     "car1_v0/bugtrap_double": 32.8,
 }
 TPCAP_SHARES = (1.0, 0.9, 0.8)
-TRAILER_SHARES = (0.2, 0.28, 0.14)  # of the greatest curvature: a trailer follows no tighter arc
 UNICYCLE_SHARES = (1.0, 0.6)
 
 
@@ -99,7 +99,7 @@ def tpcap_car() -> Vehicle:
     )
 
 
-def dynobench_vehicle(name: str, hitch: float) -> Vehicle:
+def dynobench_vehicle(name: str, hitches: Sequence[float]) -> Vehicle:
     """The vehicle of a problem's folder."""
     body = BodyPart(solids=tuple(convex_pieces(Box([0.5, 0.25]))))
     if name.startswith("unicycle2"):
@@ -120,34 +120,15 @@ def dynobench_vehicle(name: str, hitch: float) -> Vehicle:
         solids=tuple(convex_pieces(Box([0.3, 0.25]))),
         pose=trailer_pose(0.5),
     )
+    led = path_guesses(truck)
+    assert led is not None
     return Vehicle(
         truck,
-        [car_library(wheelbase=0.25, max_steering=steering, share=s) for s in TRAILER_SHARES],
-        Pace(speed=0.5, reverse_speed=0.1, acceleration=math.inf, wheelbase=0.25),
-        lambda plan: trailer_guess(truck, plan, hitch=hitch),
+        led.libraries,
+        led.pace,
+        lambda plan: led.guess(plan, np.array([hitches[0]]), np.array([hitches[1]]), STEPS),
         (body, trailer),
     )
-
-
-def trailer_guess(model: CarWithTrailer, plan: Plan, *, hitch: float) -> Guess:
-    """Guess for a car with a trailer, which follows as it is pulled, from a hitch angle [rad]."""
-    low, high = model.control_limits[0]
-    pace = Pace(speed=high, reverse_speed=-low, acceleration=math.inf, wheelbase=model.wheelbase)
-    run = timed(plan, pace)
-    at = np.linspace(0.0, run.duration, STEPS(run.duration) + 1)
-    middle = 0.5 * (at[1:] + at[:-1])
-    control = np.stack([np.interp(middle, run.time, run.twist[:, 0]),
-                        np.interp(middle, run.time, run.steering)], axis=1)  # fmt: skip
-    control = np.clip(control, *model.control_limits.T)
-    angles = np.empty(len(at))
-    angles[0] = hitch
-    least, most = model.reduced_limits[0]
-    for k, (speed, steering) in enumerate(control):
-        bend = math.tan(steering) / model.wheelbase - math.sin(angles[k]) / model.hitch_length
-        angles[k + 1] = min(max(angles[k] + at[1] * speed * bend, least), most)
-    poses = [np.interp(at, run.time, column) for column in run.pose.T]
-    state = np.column_stack([*poses, angles])
-    return Guess(state=state, control=control, duration=run.duration)
 
 
 def tpcap_task(problem: Problem) -> PolishTask:
@@ -171,7 +152,7 @@ def dynobench(name: str) -> tuple[Problem, PolishTask, Vehicle]:
     first, last = ([float(v) for v in robot[key]] for key in ("start", "goal"))
     trailer = name.startswith("car1")
     states = [[s[2] - s[3]] if trailer else s[3:] for s in (first, last)]
-    vehicle = dynobench_vehicle(name, states[0][0])
+    vehicle = dynobench_vehicle(name, [state[0] for state in states])
     boxes = tuple(Box(one["size"], one["center"]) for one in world["obstacles"])
     low, high = world["min"], world["max"]
     bounds = Bounds(x=(low[0], high[0]), y=(low[1], high[1]))

@@ -15,6 +15,7 @@ from maneuver_automaton.optimal_control.polish_values import Ends, PolishSetting
 from maneuver_automaton.optimal_control.polishing import intervals_for, polish
 from maneuver_automaton.optimal_control.separation import (
     BodyPart,
+    Facing,
     Lines,
     Pairs,
     first_lines,
@@ -269,6 +270,15 @@ def test_pieces_behind_one_another_share_a_line() -> None:
     owner = shared_lines(pieces, pairs, lines, reach)
     near = {int(piece): int(pairs.piece[k]) for piece, k in zip(pairs.piece, owner, strict=True)}
     assert near == {0: 0, 1: 0, 2: 2}
+
+
+@pytest.mark.parametrize("known", [0, 1])
+def test_pieces_of_more_corners_join_those_of_fewer(known: int) -> None:
+    """Beside discs, or beside nothing at all, a box comes near once the motion has changed."""
+    before = Facing(np.ones((known, 2, 4), dtype=bool), np.ones((known, known), dtype=bool))
+    now = Facing(np.zeros((2, 2, 4), dtype=bool), np.zeros((2, 4), dtype=bool))
+    assert now.joined(before).piece.sum() == known
+    assert now.joined(before).body.sum() == 8 * known
 
 
 def test_no_program_is_built_that_takes_more_than_the_time_left() -> None:
