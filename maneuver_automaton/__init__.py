@@ -12,6 +12,8 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from maneuver_automaton._lazy import lazily
+
 if TYPE_CHECKING:
     from maneuver_automaton import plotting as plotting
     from maneuver_automaton.automaton import Automaton as Automaton
@@ -121,15 +123,14 @@ _HOMES = {
 __all__ = [*_HOMES, "plotting"]
 
 
+_get, _names = lazily(__name__, _HOMES)
+
+
 def __getattr__(name: str) -> Any:
     if name == "plotting":
         return importlib.import_module("maneuver_automaton.plotting")
-    if name not in _HOMES:
-        raise AttributeError(f"module 'maneuver_automaton' has no attribute {name!r}")
-    value = getattr(importlib.import_module(f"maneuver_automaton.{_HOMES[name]}"), name)
-    globals()[name] = value
-    return value
+    return _get(name)
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *__all__])
+    return _names()

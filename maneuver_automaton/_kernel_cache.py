@@ -17,12 +17,16 @@ from typing import Any
 
 import numba
 from numba.core.compiler import CompileResult
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 from numba.core.types.containers import BaseTuple
 
 from maneuver_automaton._cache_files import read_checked, say_once, write_checked
+from maneuver_automaton._compile_all import compile_missing, processors
+from maneuver_automaton._kernel_folders import shipped_folder
 
 ENDING = ".nbc"
+OTHER = "made for another processor, Python or numba: kernels are compiled anew, once"
 FORMAT = 1  # of the files; counts into their names
 
 
@@ -54,17 +58,28 @@ class KernelCache:
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
         """What was compiled for a signature; None if that is not to be had."""
-        target_context.refresh()
-        path = self._path(signature, target_context.codegen())
-        try:
-            content = read_checked(path, trusted=True)
-            if content is None:
-                return None
-            stated, payload = pickle.loads(content)
-            if stated == signature:
-                return CompileResult._rebuild(target_context, *payload)
-        except Exception as error:  # noqa: BLE001, the kernel is compiled whatever is wrong here
-            say_once("damaged", f"{path}: {error or type(error).__name__}: compiled again")
+        rtsys.initialize(target_context)
+        found = self._found(signature, target_context)
+        if found is None and _is_listed(self.name, signature) and _all_compiled():
+            found = self._found(signature, target_context)
+        return found
+
+    def _found(self, signature: Any, target_context: Any) -> Any:
+        own = target_context.codegen().magic_tuple()
+        places = [(self.folder, own)]
+        if shipped := shipped_folder():
+            places = [(shipped, (own[0], one, "")) for one in processors()] + places
+        for folder, target in places:
+            path = folder / self._file(signature, target)
+            try:
+                content = read_checked(path, trusted=True)
+                if content is None:
+                    continue
+                stated, payload = pickle.loads(content)
+                if stated == signature:
+                    return CompileResult._rebuild(target_context, *payload)
+            except Exception as error:  # noqa: BLE001, the kernel is compiled whatever is wrong here
+                say_once("damaged", f"{path}: {error or type(error).__name__}: compiled again")
         return None
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
@@ -73,17 +88,34 @@ class KernelCache:
             not one.can_cache for one in compiled.lifted
         ):
             return
-        path = self._path(signature, compiled.codegen)
+        path = self.folder / self._file(signature, compiled.codegen.magic_tuple())
         try:
             write_checked(path, dumps((signature, compiled._reduce())))
         except OSError as error:
             why = error.strerror or error
             say_once("not kept", f"{self.folder}: compiled kernels cannot be kept here: {why}")
 
-    def _path(self, signature: Any, codegen: Any) -> Path:
+    def _file(self, signature: Any, target: Any) -> str:
         places = _places(getattr(signature, "args", signature))
-        key = repr((self.made_from, codegen.magic_tuple(), signature, places))
-        return self.folder / f"{self.name}-{hashlib.sha256(key.encode()).hexdigest()[:24]}{ENDING}"
+        key = repr((self.made_from, target, signature, places))
+        return f"{self.name}-{hashlib.sha256(key.encode()).hexdigest()[:24]}{ENDING}"
+
+
+def _is_listed(name: str, signature: Any) -> bool:
+    from maneuver_automaton._kernel_list import listed
+
+    return tuple(signature) in listed().get(name, ())
+
+
+@functools.cache
+def _all_compiled() -> bool:
+    """Have all kernels compiled, the first time that one of them is missing."""
+    if shipped_folder():
+        say_once("shipped", f"{shipped_folder()}: {OTHER}")
+    failed = compile_missing()
+    for failure in failed or ():
+        say_once(failure, f"{failure}: compiled when it is used")
+    return failed is not None
 
 
 def _places(kinds: Any) -> list[str]:

@@ -7,6 +7,7 @@ lowered here; the kernel that Python calls is optimised with all of them, which 
 
 from __future__ import annotations
 
+import ctypes
 from typing import Any, ClassVar
 
 from llvmlite.binding import Linkage
@@ -15,6 +16,8 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
 from numba.core.typed_passes import NativeLowering
+
+CALLED = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.py_object, ctypes.py_object, ctypes.c_void_p)
 
 
 class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
@@ -48,18 +51,24 @@ class LinkedLowering(NativeLowering):  # type: ignore[misc]
     _name = "linked_lowering"
 
     def run_pass(self, state: Any) -> bool:
-        """Lower without machine code; Python is given something that is never called."""
+        """Lower without machine code; Python, which tests call it from, interprets it."""
         state.library = LinkedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
         state.library.finalize()
         lowered = state["cr"]
-        name = lowered.fndesc.qualname
-        key = _dynfunc.make_function(
-            lowered.fndesc.lookup_module(), name, name, 0, lowered.env, (state.library,)
+        name, function = lowered.fndesc.qualname, state.func_id.func
+        called = CALLED(lambda closure, args, keywords: function(*args))
+        entry = _dynfunc.make_function(
+            lowered.fndesc.lookup_module(),
+            name,
+            name,
+            ctypes.cast(called, ctypes.c_void_p).value,
+            lowered.env,
+            (state.library, called),
         )
-        state["cr"] = lowered._replace(cfunc=key)
-        state.targetctx.insert_user_function(key, lowered.fndesc, [state.library])
+        state["cr"] = lowered._replace(cfunc=entry)
+        state.targetctx.insert_user_function(entry, lowered.fndesc, [state.library])
         return True
 
 

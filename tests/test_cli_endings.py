@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from maneuver_automaton import _cache_files, _compile, _files, planning
+from maneuver_automaton import _cache_files, _files, _kernel_folders, planning
 from maneuver_automaton._interrupts import (
     compiler_began,
     compiler_ended,
@@ -394,7 +394,7 @@ def test_killed_at_any_moment_a_file_is_whole(folder):
 def test_the_cache_is_shown_and_cleared(folder, monkeypatch, capsys):
     monkeypatch.setenv("MANEUVER_AUTOMATON_CACHE_DIR", str(folder / "cache"))
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(folder / "numba"))
-    tables, kernels = folder / "cache" / FOLDER, folder / "numba" / f"{_compile.KERNELS}0"
+    tables, kernels = folder / "cache" / FOLDER, folder / "numba" / f"{_kernel_folders.KERNELS}0"
     for place in (tables, kernels):
         place.mkdir(parents=True)
         _cache_files.write_checked(place / "a", bytes(2_000_000))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from maneuver_automaton import _compile
+from maneuver_automaton import _kernel_folders
 
 EXAMPLE = """
 from maneuver_automaton._compile import inner_kernel, kernel
@@ -32,7 +32,7 @@ CALL = """
 import json
 import numba
 import numpy as np
-from maneuver_automaton._compile import kernel_folder
+from maneuver_automaton._kernel_folders import kernel_folder
 before = numba.config.CACHE_DIR
 import example_kernels
 result = example_kernels.reciprocals(np.array([4.0, 0.0])).tolist()
@@ -94,32 +94,34 @@ def package(tmp_path, monkeypatch):
         path = tmp_path / "package" / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
-    monkeypatch.setattr(_compile, "__file__", str(tmp_path / "package" / "_compile.py"))
+    monkeypatch.setattr(
+        _kernel_folders, "__file__", str(tmp_path / "package" / "_kernel_folders.py")
+    )
     return tmp_path / "package"
 
 
 def test_the_folder_is_named_after_all_kernel_sources():
-    number = _compile.source_hash()
+    number = _kernel_folders.source_hash()
     assert len(number) == 16
     assert int(number, 16) >= 0
-    assert number == _compile.source_hash()
-    assert _compile.kernel_folder().name == f"kernels-{number}"
+    assert number == _kernel_folders.source_hash()
+    assert _kernel_folders.kernel_folder().name == f"kernels-{number}"
 
 
 def test_the_hash_sees_every_kernel_source_and_how_kernels_are_compiled(package):
     (package / "other.py").write_text("one")
-    before = _compile.source_hash()
+    before = _kernel_folders.source_hash()
     (package / "other.py").write_text("changed")
     (package / "search" / "notes.txt").write_text("new")
-    assert _compile.source_hash() == before
+    assert _kernel_folders.source_hash() == before
     seen = {before}
     for name in ("_compile.py", "_linking.py", "search/_kernels.py", "search/_kernels_words.py"):
         (package / name).write_text("changed")
-        seen.add(_compile.source_hash())
+        seen.add(_kernel_folders.source_hash())
     (package / "search" / "_kernels_words.py").rename(package / "search" / "_kernels_letters.py")
-    seen.add(_compile.source_hash())
+    seen.add(_kernel_folders.source_hash())
     (package / "search" / "_kernels_more.py").write_text("new")
-    seen.add(_compile.source_hash())
+    seen.add(_kernel_folders.source_hash())
     assert len(seen) == 7
 
 
@@ -137,7 +139,7 @@ def test_where_the_user_s_cache_is(tmp_path, monkeypatch, platform, variable, ex
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(sys, "platform", platform)
     monkeypatch.setenv(variable, str(tmp_path))
-    assert _compile.user_cache_folder() == tmp_path / expected
+    assert _kernel_folders.user_cache_folder() == tmp_path / expected
 
 
 @pytest.mark.parametrize(
@@ -153,14 +155,14 @@ def test_without_a_word_it_is_in_the_home_folder(tmp_path, monkeypatch, platform
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(sys, "platform", platform)
     monkeypatch.setattr(Path, "home", lambda: tmp_path)
-    assert _compile.user_cache_folder() == tmp_path / expected
+    assert _kernel_folders.user_cache_folder() == tmp_path / expected
 
 
 @pytest.mark.parametrize("variable", ["NUMBA_CACHE_DIR", "MANEUVER_AUTOMATON_CACHE_DIR"])
 def test_kernels_are_compiled_once_and_kept_where_it_is_said(example, variable):
     first = run(CALL, example, **{variable: example / "cache"})
     again = run(CALL, example, **{variable: example / "cache"})
-    folder = example / "cache" / f"kernels-{_compile.source_hash()}"
+    folder = example / "cache" / f"kernels-{_kernel_folders.source_hash()}"
     assert first["folder"] == again["folder"] == str(folder)
     assert (first["hits"], again["hits"]) == (0, 1)
     assert first["result"] == again["result"] == ["0.25", "inf"]  # division is IEEE's
@@ -188,7 +190,7 @@ def test_kernels_work_without_a_home_folder(monkeypatch):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.setattr(Path, "home", nowhere)
-    assert _compile.kernel_folder.__wrapped__() is None
+    assert _kernel_folders.kernel_folder.__wrapped__() is None
 
 
 def test_kernels_of_an_interactive_session_work(tmp_path):

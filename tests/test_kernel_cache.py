@@ -13,7 +13,7 @@ from pathlib import Path
 import numba
 import pytest
 
-from maneuver_automaton import _cache_files, _compile, _kernel_cache
+from maneuver_automaton import _cache_files, _kernel_cache, _kernel_folders
 from maneuver_automaton._kernel_cache import KernelCache
 
 POSIX = pytest.mark.skipif(os.name != "posix", reason="owners and modes of files")
@@ -136,13 +136,13 @@ def test_a_file_of_somebody_else_is_not_unpickled(tmp_path, said, monkeypatch):
 @pytest.mark.parametrize("which", ["base", "kernels"])
 def test_a_folder_that_others_can_write_is_not_used(tmp_path, said, monkeypatch, which):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
-    folder = _compile.kernel_folder.__wrapped__()
+    folder = _kernel_folders.kernel_folder.__wrapped__()
     assert stat.S_IMODE(folder.stat().st_mode) == 0o755
     (folder if which == "kernels" else folder.parent).chmod(0o777)
-    assert _compile.kernel_folder.__wrapped__() is None
+    assert _kernel_folders.kernel_folder.__wrapped__() is None
     assert "writable by others (mode 777): kernels are compiled anew" in said.messages[0]
     (folder if which == "kernels" else folder.parent).chmod(0o1777)  # a sticky one, such as /tmp
-    assert _compile.kernel_folder.__wrapped__() == (folder if which == "base" else None)
+    assert _kernel_folders.kernel_folder.__wrapped__() == (folder if which == "base" else None)
 
 
 @POSIX

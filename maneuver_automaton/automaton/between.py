@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import breadth_first_order
 
 from maneuver_automaton._arrays import IntArray
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton.automaton import Automaton
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 
 def trims_between(automaton: Automaton, start: int, goals: Iterable[int]) -> IntArray:
@@ -26,6 +28,8 @@ def trims_between(automaton: Automaton, start: int, goals: Iterable[int]) -> Int
     >>> trims_between(library, 0, [1]).tolist()
     [0, 1]
     """
+    from scipy.sparse import csr_array
+
     classes = automaton.trim_classes  # trims of one class switch at will: a class is a node
     n = int(classes.max()) + 1
     ends = [
@@ -60,6 +64,8 @@ def _part(automaton: Automaton, kept: tuple[int, ...]) -> Automaton:
 
 
 def _reached(graph: csr_array, nodes: list[int]) -> NDArray[np.bool_]:
+    from scipy.sparse.csgraph import breadth_first_order
+
     found: NDArray[np.bool_] = np.zeros(graph.shape[0], dtype=np.bool_)
     for node in nodes:
         found[breadth_first_order(graph, node, return_predecessors=False)] = True

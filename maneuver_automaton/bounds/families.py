@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Automaton
@@ -163,6 +162,8 @@ def _corners(speeds: Array, rates: Array) -> list[tuple[float, float]]:
 
 def _directions(velocities: Array) -> Array:
     """Corners (n, 2) of a convex polygon that holds all velocities."""
+    from scipy.spatial import ConvexHull, QhullError
+
     low, high = np.minimum(velocities.min(axis=0), 0.0), np.maximum(velocities.max(axis=0), 0.0)
     around = np.array([[x, y] for x in (low[0], high[0]) for y in (low[1], high[1])])
     try:

@@ -105,6 +105,20 @@ def cache_clear() -> int:
     return cache_command.clear()
 
 
+@app.command("compile")
+@exits
+def compile_all(
+    jobs: Annotated[
+        int | None,
+        typer.Option("--jobs", min=1, metavar="N", help="Processes; as many as cores by default."),
+    ] = None,
+) -> int:
+    """Compile all kernels now; an installation that is not editable brings them."""
+    from maneuver_automaton.cli import compile_command
+
+    return compile_command.run(jobs=jobs)
+
+
 @app.command()
 @exits
 def plan(

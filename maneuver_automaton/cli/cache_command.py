@@ -7,7 +7,12 @@ import shutil
 from pathlib import Path
 
 from maneuver_automaton._cache_files import files_of
-from maneuver_automaton._compile import KERNELS, kernel_base, kernel_folder, user_cache_folder
+from maneuver_automaton._kernel_folders import (
+    KERNELS,
+    kernel_base,
+    kernel_folder,
+    user_cache_folder,
+)
 from maneuver_automaton.cli.guard import FOUND
 from maneuver_automaton.cli.inputs import not_written
 from maneuver_automaton.cli.tables import console, table

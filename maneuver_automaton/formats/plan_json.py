@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,11 +22,13 @@ from maneuver_automaton._files import open_input, write_text_atomically
 from maneuver_automaton.audit import Audit, TerminalError
 from maneuver_automaton.automaton import Plan, Primitive
 from maneuver_automaton.automaton.library import automaton_hash
-from maneuver_automaton.bounds import Narrowest
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.planning import Alternative, LowerBound, PlanResult
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
+
+if TYPE_CHECKING:
+    from maneuver_automaton.bounds import Narrowest
 
 SCHEMA = 1
 FAR = 1e6  # [m] from here on poses are written relative to the start

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.bounds import CostToGo
-from maneuver_automaton.bounds.pose_scene import lasting_obstacles
 from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.costs import StageCost
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.prepared import RECENT
+
+if TYPE_CHECKING:
+    from maneuver_automaton.bounds import CostToGo
 
 MOST = 4  # functions of the same goals
 
@@ -40,6 +41,8 @@ def kept_bounds(problem: Problem, workspace: Workspace) -> KeptBounds | None:
     """
     if workspace.prepared is RECENT:
         return None
+    from maneuver_automaton.bounds.pose_scene import lasting_obstacles
+
     aims = tuple(
         (tuple(goal.pose[:3].tolist()), goal.tolerance_m, goal.tolerance_rad, goal.free_heading)
         for goal in problem.goals

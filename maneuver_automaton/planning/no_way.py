@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from maneuver_automaton.bounds import pose_scene, separation
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
@@ -38,6 +37,8 @@ def with_proof(result: PlanResult, budget: Budget) -> PlanResult:
     unproven = result.status in UNPROVEN and result.problem.obstacles
     if not unproven or budget.left < FIRST_BOXES:
         return result
+    from maneuver_automaton.bounds import separation
+
     left = budget.left
     _load()  # the compiler's time is not the budget's
     proof = separation(
@@ -90,6 +91,7 @@ def too_long(problem: Problem, budget: Budget) -> str:
 def _load() -> None:
     """Compile or load what a proof needs."""
     from maneuver_automaton.automaton import Automaton
+    from maneuver_automaton.bounds import pose_scene, separation
     from maneuver_automaton.collision import Box
     from maneuver_automaton.models import Unicycle
 

@@ -5,15 +5,17 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.audit import Audit, TerminalError
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.bounds import Narrowest
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
+
+if TYPE_CHECKING:
+    from maneuver_automaton.bounds import Narrowest
 
 
 class PlanStatus(enum.Enum):

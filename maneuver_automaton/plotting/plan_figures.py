@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -16,7 +16,6 @@ from matplotlib.patches import Patch
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array
-from maneuver_automaton.bounds import Narrowest
 from maneuver_automaton.planning import PlanResult
 from maneuver_automaton.plotting.colors import Color, trim_colors
 from maneuver_automaton.plotting.controls import (
@@ -47,6 +46,9 @@ from maneuver_automaton.plotting.scene import (
 )
 from maneuver_automaton.plotting.style import TEXT_PT, line_handle
 from maneuver_automaton.plotting.track import Track, track_of_document, track_of_plan
+
+if TYPE_CHECKING:
+    from maneuver_automaton.bounds import Narrowest
 
 WIDTH, LEFT, RIGHT = 9.6, 0.7, 0.15  # [in] of the page, and beside the axes on it
 INNER = WIDTH - LEFT - RIGHT

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from maneuver_automaton.bounds import CostToGo
 from maneuver_automaton.budget import Budget, Watch
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.lower_bound import Proving, in_costs, load_proofs
 from maneuver_automaton.problem import Problem
+
+if TYPE_CHECKING:
+    from maneuver_automaton.bounds import CostToGo
 
 
 @dataclass(slots=True, eq=False)

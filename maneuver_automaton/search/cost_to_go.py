@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._cache_files import keep_within, read_checked, used_now, write_checked
-from maneuver_automaton._compile import user_cache_folder
+from maneuver_automaton._kernel_folders import user_cache_folder
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_table
 from maneuver_automaton.search.lattice_arrays import LatticeLibrary

@@ -1,21 +1,13 @@
-"""Load or compile the search kernels before the clock runs: a time limit is for searching.
-
-The first time after installation two processes share the compiling: one compiles the kernels that
-scan words, the other those that refine and price them, into the cache that both read.
-"""
+"""Load or compile the search kernels before the clock runs: a time limit is for searching."""
 
 from __future__ import annotations
 
 import functools
-import os
-import subprocess
-import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from maneuver_automaton._compile import kernel_folder
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Unicycle
@@ -23,27 +15,18 @@ from maneuver_automaton.problem import Goal, Horizon, Problem
 from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.free_insertion import compile_calming
 from maneuver_automaton.search.insertion import search_insertion
-from maneuver_automaton.search.words import compile_polishing, compile_scanning, search_words
+from maneuver_automaton.search.words import search_words
 from maneuver_automaton.words import solve_switching_times
 from maneuver_automaton.words.word import Word
 
 if TYPE_CHECKING:
     from maneuver_automaton.search.lattice_query import LatticeQuery
 
-PATIENCE = 120.0  # [s] for the second process
-
 
 @functools.cache
 def load_word_kernels(max_trims: int) -> None:
     """Have the kernels of exhaustive search ready, for words of up to `max_trims` trims."""
     problem = replace(_smallest_problem(), horizon=Horizon(max_trims=max_trims))
-    helper = _second_process()
-    if helper is not None:
-        compile_scanning(problem)
-        try:
-            helper.wait(PATIENCE)
-        except subprocess.TimeoutExpired:
-            helper.kill()  # the kernels that it did not compile are compiled here
     found = search_words(problem, problem.goals[0])
     certificate(problem, problem.goals[0], found.solutions[0])
 
@@ -80,35 +63,6 @@ def smallest_lattice_query() -> LatticeQuery:
     grid = distance_grid(query.world, query.box, query.goals, query.start)
     distances(grid, query.world.arrays.field, np.zeros((1, 2)))
     return query
-
-
-def compile_the_rest() -> None:
-    """Work of the second process: compile the kernels that refine words and price them."""
-    problem = _smallest_problem()
-    compile_polishing(problem)
-    straight = Word(trims=np.array([0]), durations=np.array([1.0]), cost=1.0)
-    certificate(problem, problem.goals[0], straight)
-
-
-def _second_process() -> subprocess.Popen[bytes] | None:
-    """A process that compiles its share; None without kernels to compile, or without a cache."""
-    folder = kernel_folder()
-    if folder is None or any(folder.glob("*scan_words*")) or (os.cpu_count() or 1) < 2:
-        return None
-    if not os.access(folder, os.W_OK):
-        return None
-    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
-        return None
-    order = f"from {__name__} import compile_the_rest; compile_the_rest()"
-    try:
-        return subprocess.Popen(
-            [sys.executable, "-c", order],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
-    except OSError:
-        return None
 
 
 def _smallest_problem() -> Problem:

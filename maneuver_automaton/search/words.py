@@ -12,7 +12,7 @@ from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.alternatives import in_order, tied
 from maneuver_automaton.search.result import SearchResult, SearchStatus
 from maneuver_automaton.search.setup import SearchSetup, search_setup
-from maneuver_automaton.search.word_scan import MOST_TRIMS, NODES, Mode, WordScan, scanned
+from maneuver_automaton.search.word_scan import MOST_TRIMS, NODES, WordScan, scanned
 from maneuver_automaton.words.word import Word
 
 MOST_LATE = 100  # solutions, of thousands, that are handed over once the time is over
@@ -112,24 +112,6 @@ def search_words(
         exhaustive=finished and problem.horizon.max_trims is not None and not job.gridded,
         counts={"expansions": job.n_words, "steering_calls": job.n_steering},
     )
-
-
-def compile_scanning(problem: Problem) -> None:
-    """Have the kernel that scans words compiled, for any problem like this one."""
-    job, mode = _first_job(problem)
-    job.kernels.scan_words(*mode.kernel_problem, job.candidates, 3, 0, 0, math.inf)
-
-
-def compile_polishing(problem: Problem) -> None:
-    """Have the other kernels of the search compiled, for any problem like this one."""
-    job, mode = _first_job(problem)
-    job.kernels.scan_flat_words(*mode.kernel_problem, job.candidates, 1, 0, 0, math.inf)
-    job.polish(*mode.kernel_problem, job.candidates, job.found, MOST_TRIMS)
-
-
-def _first_job(problem: Problem) -> tuple[WordScan, Mode]:
-    job = WordScan(problem, search_setup(problem, problem.goals[0]), MOST_TRIMS, 0)
-    return job, next(job.modes())
 
 
 def search_setup_words(

@@ -1,0 +1,190 @@
+"""Compile every listed kernel in all cores: when the package is installed, or when one is missing.
+
+Each process is handed one kernel after the other, neighbours in the list: those share functions.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import os
+import platform
+import subprocess
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from maneuver_automaton._kernel_folders import KERNELS, SHIPPED, kernel_folder, source_hash
+
+FIRST = ("refinement.", "search._kernels_lattice", "receding_horizon.")  # share most, take longest
+LOCK, STALE = ".compiling", 900.0  # name of the lock in the folder; [s] after which it is nobody's
+WORKER = "MANEUVER_AUTOMATON_COMPILES"  # set in the environment of the processes that compile
+X86_64_V3 = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse4.2", "xsave")
+
+Report = Callable[[int, int], None]  # how many kernels are compiled, of how many
+
+
+def compile_kernels(
+    *, jobs: int | None = None, report: Report | None = None, settings: dict[str, str] | None = None
+) -> list[str]:
+    """Compile what is not compiled yet, in several processes; what failed, and why.
+
+    Parameters
+    ----------
+    jobs : int, optional
+        Processes at a time; as many as there are cores by default.
+    report : callable, optional
+        Called as kernels are done.
+    settings : dict, optional
+        More environment variables for them.
+    """
+    from maneuver_automaton._kernel_list import listed
+
+    names = sorted(listed(), key=lambda name: (not any(one in name for one in FIRST), name))
+    waiting, failed, done = deque(names), list[str](), list[str]()
+    workers = [_worker(settings or {}) for _ in range(min(jobs or cores(), len(names)))]
+
+    def serve(number: int, worker: subprocess.Popen[str]) -> None:
+        assert worker.stdin is not None
+        assert worker.stdout is not None
+        with contextlib.suppress(IndexError, OSError):
+            while True:
+                name = waiting.popleft() if number % 2 == 0 else waiting.pop()
+                worker.stdin.write(f"{name}\n")
+                worker.stdin.flush()
+                answer = worker.stdout.readline().strip()
+                if answer != "done":
+                    failed.append(f"{name}: {answer or 'the compiler ended'}")
+                done.append(name)
+
+    threads = [
+        threading.Thread(target=serve, args=pair, daemon=True) for pair in enumerate(workers)
+    ]
+    try:
+        for thread in threads:
+            thread.start()
+        while any(thread.is_alive() for thread in threads):
+            threads[0].join(0.1)
+            threads[-1].join(0.1)
+            if report is not None:
+                report(len(done), len(names))
+    finally:
+        for worker in workers:
+            worker.kill()
+            with contextlib.suppress(OSError):
+                worker.communicate()
+    return failed
+
+
+def compile_missing(*, jobs: int | None = None) -> list[str] | None:
+    """Compile all kernels into the user's cache, unless another process does: then wait for it.
+
+    What failed, and why; None where no folder can be written, or in a process that compiles itself.
+    """
+    folder = kernel_folder()
+    if folder is None or os.environ.get(WORKER) or not os.access(folder, os.W_OK):
+        return None
+    from numba.core import event
+
+    with event.trigger_event("numba:compile", data={}):
+        while not _locked(folder / LOCK):
+            time.sleep(0.2)
+            if not (folder / LOCK).exists():
+                return []  # the other process has compiled them
+        try:
+            with _bar() as report:
+                return compile_kernels(jobs=jobs, report=report)
+        finally:
+            with contextlib.suppress(OSError):
+                (folder / LOCK).unlink()
+
+
+def work() -> None:
+    """What a process does: compile the kernels whose names come in, and say so."""
+    gc.disable()  # the compiler makes millions of objects, and few of them in circles
+    from maneuver_automaton._kernel_list import kernel_named, listed
+
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)  # nothing else is an answer
+    for line in sys.stdin:
+        name, answer = line.strip(), "done"
+        try:
+            for signature in listed()[name]:
+                kernel_named(name).compile(signature)  # type: ignore[attr-defined]
+        except Exception as error:  # noqa: BLE001, whatever it is, the kernel is compiled when used
+            answer = " ".join(f"{type(error).__name__}: {error}".split())
+        answers.write(f"{answer}\n")
+        answers.flush()
+
+
+def ship(package: Path) -> list[str]:
+    """Compile all kernels into a package that is built, for every processor of its kind."""
+    folder = package / SHIPPED
+    settings = {"NUMBA_CACHE_DIR": str(folder), "PYTHONPATH": str(package.parent)}
+    name = processors()[0]
+    settings |= {"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": ""}
+    failed = compile_kernels(settings=settings)
+    for other in folder.glob(f"{KERNELS}*"):
+        if other.name != f"{KERNELS}{source_hash()}":
+            for path in other.iterdir():
+                path.unlink()
+            other.rmdir()
+    return failed
+
+
+def processors() -> list[str]:
+    """Kinds of processors, as LLVM names them, that this one can stand for; the best one first."""
+    from llvmlite import binding
+
+    if platform.machine().lower() not in ("x86_64", "amd64"):
+        return ["generic"]
+    features = binding.get_host_cpu_features()
+    can = all(features.get(one, False) for one in X86_64_V3)
+    return ["x86-64-v3", "x86-64"] if can else ["x86-64"]
+
+
+def cores() -> int:
+    """How many processes this one may keep busy."""
+    with contextlib.suppress(AttributeError):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _worker(settings: dict[str, str]) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", f"from {__name__} import work; work()"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        env={**os.environ, WORKER: "1", **settings},
+    )
+
+
+def _locked(lock: Path) -> bool:
+    """Whether the lock is ours now: of somebody else, it is so for `STALE` seconds at most."""
+    try:
+        with contextlib.suppress(FileNotFoundError):
+            if time.time() - lock.stat().st_mtime > STALE:
+                lock.unlink()
+        os.close(os.open(lock, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644))
+    except FileExistsError:
+        return False
+    return True
+
+
+@contextlib.contextmanager
+def _bar() -> Iterator[Report | None]:
+    """A bar of progress on a terminal; nothing elsewhere."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("compiling kernels, once")
+        yield lambda done, total: progress.update(task, completed=done, total=total)

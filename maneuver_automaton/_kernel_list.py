@@ -1,0 +1,97 @@
+"""Which kernels there are, and for which types they are compiled before anybody waits for them.
+
+The list is `kernels.json`: of every kernel the types of its arguments, as plans use it. A type is
+written as ``"float64"``, an array as ``"float64[2C]"`` (two axes, in the order of C), a tuple as a
+list, and one with names as ``{"module:name": [types of its fields]}``.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import json
+import re
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from numba import types
+from numba.core.types.containers import BaseNamedTuple, BaseTuple
+from numba.core.types.scalars import BooleanLiteral
+
+FILE = Path(__file__).with_name("kernels.json")
+ARRAY = re.compile(r"(\w+)\[(\d+)([CFA])(, read only)?\]")
+LITERALS = {"True": True, "False": False}
+
+Stated = Any  # a type as the list has it
+
+
+@functools.cache
+def listed() -> dict[str, tuple[tuple[Any, ...], ...]]:
+    """The types of the arguments of each kernel, by ``module.name``, in the order of the list."""
+    known: dict[str, list[list[Stated]]] = json.loads(FILE.read_text())
+    return {
+        name: tuple(tuple(map(type_of, args)) for args in signatures)
+        for name, signatures in known.items()
+    }
+
+
+def kernel_named(name: str) -> Callable[..., Any]:
+    """A kernel by ``module.name``."""
+    module, function = name.rsplit(".", 1)
+    found: Callable[..., Any] = getattr(importlib.import_module(module), function)
+    return found
+
+
+def write_list(signatures: dict[str, Iterable[Iterable[Any]]]) -> None:
+    """Write the list: the types of the arguments of each kernel."""
+    known = {
+        name: sorted(([stated(one) for one in args] for args in every), key=json.dumps)
+        for name, every in sorted(signatures.items())
+    }
+    lines = ",\n".join(f"{json.dumps(name)}: [\n{_rows(args)}\n]" for name, args in known.items())
+    FILE.write_text(f"{{\n{lines}\n}}\n")
+
+
+def _rows(signatures: list[list[Stated]]) -> str:
+    return ",\n".join(f" {json.dumps(args)}" for args in signatures)
+
+
+def stated(kind: Any) -> Stated:
+    """A type of numba, as the list has it.
+
+    Raises
+    ------
+    ValueError
+        If the list has no word for it.
+    """
+    if isinstance(kind, BaseNamedTuple):
+        place = f"{kind.instance_class.__module__}:{kind.instance_class.__qualname__}"
+        return {place: [stated(one) for one in kind.types]}
+    if isinstance(kind, BaseTuple):
+        return [stated(one) for one in kind.types]
+    if isinstance(kind, types.Array) and kind.aligned:
+        held = "" if kind.mutable else ", read only"
+        return f"{kind.dtype}[{kind.ndim}{kind.layout}{held}]"
+    name = str(kind.literal_value) if isinstance(kind, BooleanLiteral) else str(kind)
+    if type_of(name) != kind:
+        raise ValueError(f"no kernel that is compiled ahead takes {kind}")
+    return name
+
+
+def type_of(name: Stated) -> Any:
+    """The type of numba that the list means."""
+    if isinstance(name, dict):
+        ((place, fields),) = name.items()
+        module, qualified = place.split(":")
+        holder = getattr(importlib.import_module(module), qualified)
+        return BaseTuple.from_types(tuple(map(type_of, fields)), holder)
+    if isinstance(name, list):
+        return BaseTuple.from_types(tuple(map(type_of, name)))
+    if name in LITERALS:
+        return BooleanLiteral(LITERALS[name])
+    if found := ARRAY.fullmatch(name):
+        layout: Any
+        dtype, axes, layout, held = found.groups()
+        return types.Array(type_of(dtype), int(axes), layout, readonly=bool(held))
+    return getattr(types, "boolean" if name == "bool" else name)

@@ -1,0 +1,160 @@
+"""The list of kernels that are compiled ahead: complete, readable, and compiled as it says."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections import namedtuple
+from pathlib import Path
+
+import numba
+import pytest
+from numba import types
+
+import maneuver_automaton
+from maneuver_automaton import _compile_all, _kernel_cache
+from maneuver_automaton._kernel_cache import KernelCache
+from maneuver_automaton._kernel_list import kernel_named, listed, stated, type_of, write_list
+
+PACKAGE = Path(maneuver_automaton.__file__).parent
+Pair = namedtuple("Pair", "near far")
+
+
+def test_every_kernel_is_listed():
+    decorated = {
+        f"{PACKAGE.name}.{'.'.join(path.relative_to(PACKAGE).with_suffix('').parts)}.{name}"
+        for path in PACKAGE.rglob("_kernels*.py")
+        for before, line in zip(
+            path.read_text().splitlines(), path.read_text().splitlines()[1:], strict=False
+        )
+        if before in ("@kernel", "@bare_kernel")
+        for name in [line.removeprefix("def ").split("(")[0]]
+    }
+    assert set(listed()) == decorated
+    for name in listed():
+        assert kernel_named(name).__name__ == name.rsplit(".", 1)[1]
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        (types.float64, "float64"),
+        (types.boolean, "bool"),
+        (types.Array(types.int64, 2, "C"), "int64[2C]"),
+        (types.Array(types.boolean, 1, "A", readonly=True), "bool[1A, read only]"),
+        (types.UniTuple(types.float64, 2), ["float64", "float64"]),
+        (types.literal(True), "True"),
+        (
+            types.NamedTuple((types.int64, types.float64), Pair),
+            {f"{__name__}:Pair": ["int64", "float64"]},
+        ),
+    ],
+)
+def test_types_are_written_and_read(kind, name):
+    assert stated(kind) == name
+    assert type_of(json.loads(json.dumps(name))) == kind
+
+
+def test_the_list_is_written_as_it_was_read(tmp_path, monkeypatch):
+    file = tmp_path / "kernels.json"
+    monkeypatch.setattr("maneuver_automaton._kernel_list.FILE", file)
+    before = listed()
+    write_list({name: list(args) for name, args in before.items()})
+    assert file.read_text() == (PACKAGE / "kernels.json").read_text()
+
+
+def third(x: float) -> float:
+    """A kernel."""
+    return x / 3.0
+
+
+MADE_FOR_ALL = """
+import sys
+from pathlib import Path
+import numba
+from maneuver_automaton._kernel_cache import KernelCache
+from tests.test_kernel_list import third
+made = numba.njit(nogil=True)(third)
+made._cache = KernelCache(third, Path(sys.argv[1]))
+made.compile((numba.types.float64,))
+"""
+
+
+@pytest.mark.skipif(_compile_all.processors()[0] == "generic", reason="kinds of x86-64")
+def test_kernels_that_came_compiled_are_used_where_the_processor_has_what_they_need(
+    tmp_path, monkeypatch
+):
+    came, own = tmp_path / "came", tmp_path / "own"
+    came.mkdir()
+    own.mkdir()
+    env = {**os.environ, "NUMBA_CPU_NAME": _compile_all.processors()[0], "NUMBA_CPU_FEATURES": ""}
+    subprocess.run([sys.executable, "-c", MADE_FOR_ALL, str(came)], env=env, check=True)
+    monkeypatch.setattr(_kernel_cache, "shipped_folder", lambda: came)
+
+    def hits():
+        made = numba.njit(nogil=True)(third)
+        made._cache = KernelCache(third, own)
+        assert made(1.5) == 0.5
+        return sum(made.stats.cache_hits.values())
+
+    assert hits() == 1
+    monkeypatch.setattr(_kernel_cache, "processors", lambda: ["another"])
+    assert hits() == 0  # compiled for this one, into the user's folder
+    assert hits() == 1
+
+
+def test_kernels_are_compiled_by_several_processes(monkeypatch):
+    names = ("collision._kernels_field.count_buckets", "collision._kernels_field.fill_buckets")
+    few = {f"maneuver_automaton.{name}": () for name in names}
+    monkeypatch.setattr("maneuver_automaton._kernel_list.listed", lambda: few)
+    seen = []
+    failed = _compile_all.compile_kernels(jobs=2, report=lambda done, of: seen.append((done, of)))
+    assert failed == []
+    assert seen[-1] == (2, 2)
+    monkeypatch.setattr("maneuver_automaton._kernel_list.listed", lambda: {"no.kernel": ()})
+    assert _compile_all.compile_kernels(jobs=1) == ["no.kernel: KeyError: 'no.kernel'"]
+
+
+def test_the_lock_of_a_process_that_is_gone_is_taken(tmp_path):
+    lock = tmp_path / "lock"
+    assert _compile_all._locked(lock)
+    assert not _compile_all._locked(lock)
+    os.utime(lock, (0.0, 0.0))
+    assert _compile_all._locked(lock)
+
+
+OWN = """
+import sys
+if {first!r}:
+    import maneuver_automaton as ma
+    robot = ma.Automaton.of_controls(ma.Unicycle(), {{"ahead": (1, 0), "left": (1, 1)}})
+    ma.plan(ma.Problem(robot, [0, 0, 0], [1, 0, 0], cost=ma.Cost(effort=1.0)))
+import numba
+
+@numba.njit
+def own(values):
+    total = 0.0
+    for value in values:
+        total += value * value
+    return total
+
+own.compile((numba.types.float64[::1],))
+names = [name for name in dir(numba.config) if name.isupper()]
+print({{name: getattr(numba.config, name) for name in names}})
+print(own.inspect_asm(own.signatures[0]).count("ymm"), type(own._cache).__name__)
+"""
+
+
+def test_numba_functions_of_a_user_are_compiled_as_without_the_package():
+    answers = {
+        subprocess.run(
+            [sys.executable, "-c", OWN.format(first=first)],
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for first in (False, True)
+    }
+    assert len(answers) == 1
