@@ -26,7 +26,11 @@ class BuildWithKernels(build_py):
         if self.editable_mode:
             return  # they are compiled when they are used first
         package = Path(self.build_lib).absolute() / "maneuver_automaton"
-        paths = {**os.environ, "PYTHONPATH": str(package.parent)}
+        found = os.environ.get("PYTHONPATH")  # pip names what a build needs there
+        paths = {
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join(filter(None, (str(package.parent), found))),
+        }
         if subprocess.run([sys.executable, "-c", COMPILE, str(package)], env=paths).returncode:
             self.warn("kernels were not compiled: they will be when they are used first")
 

@@ -123,10 +123,8 @@ def work() -> None:
 def ship(package: Path) -> list[str]:
     """Compile all kernels into a package that is built, for every processor of its kind."""
     folder = package / SHIPPED
-    settings = {"NUMBA_CACHE_DIR": str(folder), "PYTHONPATH": str(package.parent)}
-    name = processors()[0]
-    settings |= {"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": ""}
-    failed = compile_kernels(settings=settings)
+    target = {"NUMBA_CPU_NAME": processors()[0], "NUMBA_CPU_FEATURES": ""}
+    failed = compile_kernels(settings={"NUMBA_CACHE_DIR": str(folder), **target})
     for other in folder.glob(f"{KERNELS}*"):
         if other.name != f"{KERNELS}{source_hash()}":
             for path in other.iterdir():
