@@ -16,16 +16,27 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.plotting.bodies import DART
 from maneuver_automaton.plotting.colors import GREY, INK, Color, trim_colors, twist_color
+from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.maneuvers import draw_maneuvers
-from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
+from maneuver_automaton.plotting.pages import (
+    axes_at,
+    heading_height,
+    heading_text,
+    new_figure,
+    title_lines,
+    write_figure,
+)
 from maneuver_automaton.plotting.paths import ARC_POINTS
 from maneuver_automaton.plotting.style import TEXT_PT, shortened, tidy
 from maneuver_automaton.primitives import Trim
 
 MOST_NODES = 30
+LEAST_ALPHA = 0.16  # of arrows where they are very many
 MOST_LEVEL_NAMES = 12
-NAME_PT, NAME_LENGTH, CHARACTER = 7.5, 24, 0.058  # [pt], characters, [in]
+NAME_PT, NAME_LENGTH, CHARACTER = 7.5, 40, 0.058  # [pt], characters, [in]
 SHOWN_S = 1.0  # how long each trim is shown [s]
+RING = 4.2  # [in] of a ring of nodes whose names stick out
+MOST_HEADED = 60  # free switches, or maneuvers, that have an arrow head at each end
 SPIN_SIZE = 0.45  # of a node, for turns on the spot
 
 
@@ -66,11 +77,19 @@ def draw_motions(ax: Axes, automaton: Automaton) -> LineCollection:
     many = len(automaton) > MOST_NODES
     paths = [_motion(trim)[:, :2] for trim in automaton.trims]
     size = max(float(np.abs(path).max()) for path in paths) or 1.0
+    colors = _colors(automaton)
     lines = LineCollection(
-        paths, colors=_colors(automaton), linewidths=0.7 if many else 2.2, zorder=3.0,
+        paths, colors=colors, linewidths=0.7 if many else 2.2, zorder=3.0,
         alpha=0.6 if many else 1.0,
     )  # fmt: skip
     ax.add_collection(lines)
+    moving = [] if many else [k for k, path in enumerate(paths) if np.ptp(path, axis=0).any()]
+    ax.add_collection(
+        PolyCollection(
+            [_head(paths[k], 0.25 * size) for k in moving],
+            facecolors=[colors[k] for k in moving], linewidths=0.0, zorder=3.2,
+        )
+    )  # fmt: skip
     ax.add_collection(
         PolyCollection([0.08 * size * DART], facecolors=[INK], linewidths=0.0, zorder=4.0)
     )
@@ -82,15 +101,19 @@ def draw_motions(ax: Axes, automaton: Automaton) -> LineCollection:
     return lines
 
 
-def save_automaton_figure(automaton: Automaton, path: str | Path) -> None:
+def save_automaton_figure(automaton: Automaton, path: str | Path, *, title: str = "") -> None:
     """Write a picture of an `automaton`: its graph, and one second of each trim to scale.
 
-    The file is replaced in one step; its ending chooses the format.
+    A `title` stands above. The file is replaced in one step; its ending chooses the format.
     """
     points = len(automaton) > MOST_NODES
-    width = height = 4.1 if points or len(automaton) <= MOST_LEVEL_NAMES else 6.1
+    lines = title_lines(Look(title=title), 8.0, _summary(automaton))
+    width = height = 4.1
+    if not points and len(automaton) > MOST_LEVEL_NAMES:
+        longest = max(min(len(name), NAME_LENGTH) for name in automaton.trim_names)
+        width = height = RING + 2.0 * CHARACTER * longest  # names stick out like rays
     width += 1.0
-    figure = new_figure(width + 4.5, height + 0.8)
+    figure = new_figure(width + 4.5, height + 0.55 + heading_height(lines))
     edge = 0.62 if points else 0.1
     left = axes_at(
         figure, left=edge, bottom=0.5 if points else 0.15, width=width - edge,
@@ -102,12 +125,12 @@ def save_automaton_figure(automaton: Automaton, path: str | Path) -> None:
     draw_automaton(left, automaton)
     if automaton.maneuvers and not automaton.body_velocities.any():
         draw_maneuvers(right, automaton.maneuvers)
-        title = f"every maneuver, {np.ptp(right.get_xlim()):.3g} m wide"
+        said = f"every maneuver, {np.ptp(right.get_xlim()):.3g} m wide"
     else:
         draw_motions(right, automaton)
-        title = "1 s of each trim from the same pose"
-    right.set_title(title, fontsize=TEXT_PT, color=INK, loc="left")
-    heading_text(figure, [(_summary(automaton), 10.0, "bold")], left=0.62 if points else 0.3)
+        said = "1 s of each trim from the same pose"
+    right.set_title(said, fontsize=TEXT_PT, color=INK, loc="left")
+    heading_text(figure, lines, left=0.62 if points else 0.3)
     write_figure(figure, path)
 
 
@@ -161,15 +184,14 @@ def _draw_graph(ax: Axes, automaton: Automaton) -> AutomatonArtists:
         [centre + radius * _disc() for centre in centres], facecolors="white", edgecolors=colors,
         linewidths=1.6, zorder=3.0,
     )  # fmt: skip
+    pairs = combinations(range(len(automaton)), 2)
+    free = [centres[[a, b]] for a, b in pairs if classes[a] == classes[b]]
     switches = LineCollection(
-        [
-            centres[[a, b]]
-            for a, b in combinations(range(len(automaton)), 2)
-            if classes[a] == classes[b]
-        ],
-        colors=[GREY], linewidths=0.6,
+        free, colors=[GREY], linewidths=0.6,
         alpha=0.7 if len(automaton) <= MOST_LEVEL_NAMES else 0.25, zorder=1.0,
     )  # fmt: skip
+    if len(free) <= MOST_HEADED:
+        _draw_switch_heads(ax, free, radius)
     pictures, heads = _pictures(automaton, radius)
     motions = LineCollection(
         [picture + centre for picture, centre in zip(pictures, centres, strict=True)],
@@ -247,20 +269,50 @@ def _head(picture: Array, radius: float) -> Array:
     return np.array([tip, picture[-1] + 0.13 * radius * aside, picture[-1] - 0.13 * radius * aside])
 
 
+def _draw_switch_heads(ax: Axes, switches: list[Array], radius: float) -> None:
+    """Arrow heads at both ends of lines (2, 2) between nodes: trims that switch at will."""
+    heads = [
+        _tip(there, (there - here) / np.linalg.norm(there - here), radius)
+        for line in switches
+        for here, there in (line, line[::-1])
+        if np.linalg.norm(there - here) > 2.6 * radius  # there is room between the nodes
+    ]
+    ax.add_collection(PolyCollection(heads, facecolors=[GREY], linewidths=0.0, zorder=2.0))
+
+
+def _tip(centre: Array, along: Array, radius: float) -> Array:
+    """An arrow head (3, 2) that comes `along` (2,) and touches the node at `centre`."""
+    size = min(0.045, 0.3 * radius)
+    aside = np.array([-along[1], along[0]])
+    tip = centre - 1.03 * radius * along
+    foot = tip - size * along
+    return np.array([tip, foot + 0.4 * size * aside, foot - 0.4 * size * aside])
+
+
 def _draw_maneuvers(
     ax: Axes, automaton: Automaton, centres: Array, radius: float
 ) -> tuple[FancyArrowPatch, ...]:
-    """One curved arrow for each ordered pair of trims that a maneuver joins."""
+    """One curved arrow for each ordered pair of trims that a maneuver joins.
+
+    Where they are many they are thin and pale, and one line with two heads joins trims that are
+    joined both ways.
+    """
     arrows = []
     pairs = dict.fromkeys((maneuver.source, maneuver.target) for maneuver in automaton.maneuvers)
+    many = len(pairs) > MOST_HEADED
+    alpha = max(LEAST_ALPHA, MOST_HEADED / len(pairs)) if many else 1.0
     for source, target in pairs:
+        both = many and source != target and (target, source) in pairs
+        if both and automaton.index_of(target) < automaton.index_of(source):
+            continue
         begin, end = centres[automaton.index_of(source)], centres[automaton.index_of(target)]
         apart = end - begin
         gap = 1.12 * radius * apart / max(float(np.linalg.norm(apart)), 1e-12)
         arrow = FancyArrowPatch(
-            tuple(begin + gap), tuple(end - gap), connectionstyle="arc3,rad=0.14",
-            arrowstyle="-|>", mutation_scale=9.0, color=INK, linewidth=0.9, shrinkA=0.0,
-            shrinkB=0.0, zorder=2.0,
+            tuple(begin + gap), tuple(end - gap),
+            connectionstyle="arc3,rad=0.0" if both else "arc3,rad=0.14",
+            arrowstyle="<|-|>" if both else "-|>", mutation_scale=6.0 if many else 9.0, color=INK,
+            linewidth=0.5 if many else 0.9, alpha=alpha, shrinkA=0.0, shrinkB=0.0, zorder=2.0,
         )  # fmt: skip
         ax.add_patch(arrow)
         arrows.append(arrow)

@@ -10,7 +10,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, ScalarFormatter
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.plotting.colors import GREY, INK, Color
@@ -18,7 +18,8 @@ from maneuver_automaton.plotting.colors import GREY, INK, Color
 TEXT_PT = 9.0
 SMALL_PT = 8.0
 FAR_M = 1e5  # from here on coordinates are counted from a round number
-NAME_LENGTH = 28  # characters of a name before it is cut
+NAME_LENGTH = 60  # characters of a name before it is cut
+LEAST_SHARE = 0.3  # of the width of axes that a legend beside them leaves
 Corner = Literal["upper left", "upper right", "lower left", "lower right"]
 CORNERS: tuple[Corner, ...] = ("upper left", "upper right", "lower left", "lower right")
 
@@ -32,6 +33,9 @@ def tidy(ax: Axes, *, x: str, y: str) -> None:
     ax.spines[["left", "bottom"]].set(color=GREY, linewidth=0.6)
     ax.grid(visible=True, color=GREY, alpha=0.22, linewidth=0.5)
     ax.set_axisbelow(True)
+    for axis in (ax.xaxis, ax.yaxis):
+        if isinstance(formatter := axis.get_major_formatter(), ScalarFormatter):
+            formatter.set_useOffset(False)
 
 
 def count_from_near(ax: Axes, place: Array) -> None:
@@ -94,6 +98,27 @@ def corner_legend(
         handlelength=1.6,
     )
     return plain(legend, labels, length=length)
+
+
+def side_legend(ax: Axes, handles: Sequence[Artist], labels: Sequence[str]) -> Legend:
+    """A legend on the right of `ax`, which makes room for it unless a layout engine does."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    longest = max((min(len(label), NAME_LENGTH) for label in labels), default=0)
+    place, room = ax.get_position(), (0.062 * longest + 0.6) / figure.get_size_inches()[0]
+    if figure.get_layout_engine() is None and place.width - room > LEAST_SHARE * place.width:
+        ax.set_position((place.x0, place.y0, place.width - room, place.height))
+    legend = ax.legend(
+        handles,
+        [str(k) for k in range(len(labels))],
+        loc="upper left",
+        bbox_to_anchor=(1.02, 1.0),
+        fontsize=SMALL_PT,
+        frameon=False,
+        borderaxespad=0.0,
+        handlelength=1.6,
+    )
+    return plain(legend, labels)
 
 
 def _emptiest_corner(points: Array) -> Corner:
