@@ -15,9 +15,10 @@ from matplotlib.text import Text
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.plotting.bodies import DART
-from maneuver_automaton.plotting.colors import GREY, INK, Color, trim_colors, twist_color
+from maneuver_automaton.plotting.colors import GREY, INK, Color, twist_color
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.maneuvers import draw_maneuvers
+from maneuver_automaton.plotting.motions import track_colors
 from maneuver_automaton.plotting.pages import (
     axes_at,
     heading_height,
@@ -146,7 +147,7 @@ def _summary(automaton: Automaton) -> str:
 def _colors(automaton: Automaton) -> list[Color]:
     if len(automaton) > MOST_NODES:
         return [twist_color(trim.body_velocity) for trim in automaton.trims]
-    named = trim_colors({trim.name: trim.body_velocity for trim in automaton.trims})
+    named = track_colors({trim.name: trim.body_velocity for trim in automaton.trims})
     return [named[name] for name in automaton.trim_names]
 
 

@@ -33,7 +33,7 @@ MOST_SINGLE = 48  # maneuvers that have a panel each
 MOST_PANELS = 120
 PANEL, LINE, GAP, EDGE = 1.35, 0.11, 0.2, 0.34  # [in]
 COLUMNS = 8
-NAME_LENGTH = 25
+NAME_LENGTH, HARD = 25, "\N{NO-BREAK SPACE}"
 FULL_COLOR = 0.6  # [rad] of a change of heading
 ROOM = 1.35  # side of a panel, over the size of what is in it
 DART_SIZE = 0.075  # of the side of a panel
@@ -153,8 +153,9 @@ def _panels(automaton: Automaton) -> list[tuple[str, list[Maneuver]]]:
 
 
 def _wrapped(name: str) -> str:
-    """A name in lines as wide as a panel."""
-    return textwrap.fill(shortened(name, 3 * NAME_LENGTH), NAME_LENGTH)
+    """A name in lines as wide as a panel, broken between its parts rather than within them."""
+    held = shortened(name, 3 * NAME_LENGTH).replace(" ", HARD).replace(f",{HARD}", ", ")
+    return textwrap.fill(held, NAME_LENGTH).replace(HARD, " ")
 
 
 def _count(automaton: Automaton) -> str:

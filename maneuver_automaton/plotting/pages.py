@@ -147,5 +147,5 @@ def write_figure(figure: Figure, path: str | Path) -> None:
 
 def _columns(labels: Sequence[str], width: float, length: int) -> int:
     longest = max((min(len(label), length) for label in labels), default=1)
-    most = max(1, min(len(labels), int(width / (0.062 * longest + 0.48))))
+    most = max(1, min(len(labels), int(width / (0.062 * longest + 0.44))))
     return math.ceil(len(labels) / math.ceil(len(labels) / most))

@@ -39,7 +39,7 @@ from maneuver_automaton.plotting.track import Track, track_of_plan
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
 
-WIDTH, SPACE, FLAT = 9.6, 5.3, 1.75  # [in] of the page; heights of the axes
+WIDTH, SPACE, FLAT = 9.6, 5.2, 1.75  # [in] of the page; heights of the axes
 HIGHEST = 2.6  # [in] of the plane
 LEFT, GAP = 0.7, 0.62  # [in]
 ELEVATION, AZIMUTH = 42.0, -68.0  # [deg] from where space is seen
@@ -156,10 +156,10 @@ def _figure(result: PlanResult, title: str) -> Figure:
     each = 0.5 * room
     height = max(FLAT, min(each * span[1] / span[0], HIGHEST))
     lines = title_lines(Look(title=title), WIDTH - LEFT, _headline(result))
-    figure = new_figure(WIDTH, bottom + height + heading_height(lines) + SPACE)
+    figure = new_figure(WIDTH, bottom + height + 0.15 + SPACE + heading_height(lines))
     tall = float(figure.get_size_inches()[1])
     base = bottom + height + 0.15
-    box = (0.0, base / tall, 1.0, (tall - base - 0.3) / tall)
+    box = (0.0, base / tall, 1.0, SPACE / tall)
     space: Any = figure.add_axes(box, projection="3d", computed_zorder=False)
     space.patch.set_alpha(0.0)
     draw_space(space, result)
