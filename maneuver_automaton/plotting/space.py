@@ -21,7 +21,7 @@ from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanResult
 from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded, trim_colors
-from maneuver_automaton.plotting.labels import result_text
+from maneuver_automaton.plotting.labels import result_text, shown_name
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.pages import (
     axes_at,
@@ -324,7 +324,8 @@ def _legend(result: PlanResult, track: Track) -> tuple[list[Line2D], list[str]]:
     names = list(colors)
     if result.plan is not None and any(result.plan.maneuvers):
         handles.append(line_handle(INK))
-        names.append("maneuvers")
+        done = {shown_name(one.name) for one in result.plan.maneuvers if one is not None}
+        names.append("maneuvers" if len(done) > 1 else done.pop())
     for color, marker in ((START, "o"), (GOAL, "*")):
         handles.append(line_handle(color, marker=marker))
         handles[-1].set_markerfacecolor(color)
