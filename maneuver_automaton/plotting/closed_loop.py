@@ -37,7 +37,7 @@ from maneuver_automaton.receding_horizon import ClosedLoop
 
 LEFT, RIGHT = 0.7, 0.15  # [in] beside the axes on a page
 PLANE, BETWEEN = 0.55, 0.83  # share of the plane in the width, and [in] to what is beside it
-LEAST_PLANE = 1.0  # [in] height that a page of a stated height leaves
+LEAST_PLANE, LEAST_SHARE = 1.0, 0.6  # [in] of the plane in a page of stated height; of the rest
 VALUE, PANEL, GAP = 1.6, 0.95, 0.2  # [in] heights over time, and between them
 LEGEND = 0.42  # [in] above the value
 LABELS = 0.44  # [in] below axes that show their numbers
@@ -106,6 +106,7 @@ def _figure(loop: ClosedLoop, *, footprint: Any, look: Look) -> Figure:
     stacked = sum(each) + GAP * (len(each) - 1)
     shape = _shape(loop, footprint)
     flat = shape > FLAT or look.is_narrow or not loop.steps
+    over_time = bool(loop.steps)
     if not loop.steps:
         below, high = 0.0, 3.2
     elif look.is_narrow:
@@ -116,13 +117,16 @@ def _figure(loop: ClosedLoop, *, footprint: Any, look: Look) -> Figure:
     else:
         below, high = 0.0, max(3.9, stacked + LEGEND)
     if look.height is not None:
-        high = max(LEAST_PLANE, look.height - bottom - below - top)
+        room = look.height - bottom - top
+        if room < (below + LEAST_PLANE if flat else LEAST_SHARE * (stacked + LEGEND)):
+            over_time, below, flat = False, 0.0, True
+        high = max(LEAST_PLANE, room - below)
     figure = new_figure(look.width, bottom + below + high + top)
     plane = axes_at(
         figure, left=LEFT, bottom=bottom + below, width=inner if flat else PLANE * inner,
         height=high,
     )  # fmt: skip
-    if loop.steps:
+    if over_time:
         room = (below - LABELS if flat else high) - LEGEND
         value, middle, solve = _side_axes(
             figure, each, bottom=bottom, height=room, look=look, flat=flat

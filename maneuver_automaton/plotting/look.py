@@ -20,8 +20,9 @@ class Look:
     title : str
         The first line, above the numbers.
     size : (width, height), optional
-        Of the page [in]; the height None follows from what is shown. If left out, the page is
-        9.6 in wide, or 7.16 in, two columns, in a paper.
+        Of the page [in]; the height None follows from what is shown, and a page too low for all
+        leaves out what is over time. If left out, the page is 9.6 in wide, or 7.16 in, two
+        columns, in a paper.
     style : str
         "screen", or "paper": numbers and word are left to the caption.
 

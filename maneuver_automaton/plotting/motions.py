@@ -11,6 +11,7 @@ from maneuver_automaton.plotting.colors import Color, shaded, trim_colors, twist
 
 MOST_TRIMS = 12  # which have a colour and a name each
 NEGLIGIBLE = 1e-3  # of the largest component of a twist
+DIAGONAL = 0.4  # of the larger one of two components: less does not name the direction
 PALE, DARK = 0.5, -0.15  # shades of the slowest and the fastest of those that move alike
 
 
@@ -77,10 +78,10 @@ def motion(twist: Array) -> str:
         if turn:
             return f"turn {side} on the spot"
         return "rest" if not any(climb) else "climb" if climb[0] > 0.0 else "sink"
-    if abs(aside) > abs(ahead):
-        way = "to the left" if aside > 0.0 else "to the right"
-    else:
-        way = "ahead" if ahead > 0.0 else "back"
+    ahead, aside, _ = _typical(twist)[:3].tolist()
+    along = ["back", "", "ahead"][int(ahead) + 1]
+    across = ["to the right", "", "to the left"][int(aside) + 1]
+    way = " and ".join(part for part in (along, across) if part)
     return f"{way}, turning {side}" if turn else way
 
 
@@ -105,10 +106,8 @@ def _typical(twist: Array) -> Array:
     """The twist (3,) of the same direction at unit speed and turn rate; a climb stays one."""
     clear = _clear(twist)
     signs = np.sign(clear)
-    if abs(clear[1]) > abs(clear[0]):
-        signs[0] = 0.0
-    elif clear[0]:
-        signs[1] = 0.0
+    along, across = np.abs(clear[:2]).tolist()
+    signs[:2] *= [along >= DIAGONAL * across, across >= DIAGONAL * along]
     return np.asarray(signs)
 
 

@@ -59,7 +59,7 @@ PANEL, FLAT_PANEL, GAP = 1.25, 1.35, 0.75  # [in] heights over time, and beside 
 LABELS, BAR = 0.56, 0.3  # [in] below axes with numbers, and for a colour bar
 FLAT = 1.7  # a plane so much wider than high is given the width of the page
 LEAST_PANEL = 1.35  # [in] width of what is over time; more of it stands in rows
-LEAST_PLANE = 1.0  # [in] height that a page of a stated height leaves
+LEAST_PLANE, LEAST_HIGH = 1.0, 0.6  # [in] heights of plane and panels in a page of stated height
 WORD_LINES, CHARACTER = 2, 0.08  # lines of the word, and [in] of each character
 MOST_PANELS = 4  # over time: of reduced state and controls
 
@@ -222,6 +222,9 @@ def _plan_figure(sheet: _Sheet) -> Figure:
     shape = _shape(sheet)
     flat = shape > FLAT or not panels or look.is_narrow
     below = (FLAT_PANEL + LABELS) * _rows(panels, inner) if flat else 0.0
+    needed = below + LEAST_PLANE if flat else LEAST_HIGH * panels
+    if look.height is not None and look.height - bottom - top < needed:
+        panels, below, flat = 0, 0.0, True
     if flat:
         height = min(max(inner / shape, LOW_FLAT), HIGH_FLAT)
     else:

@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from maneuver_automaton.analysis.turnpike import Turnpike
 from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE
 from maneuver_automaton.plotting.controls import TIME_LABEL
+from maneuver_automaton.plotting.labels import control_labels
 from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
 from maneuver_automaton.plotting.style import tidy, upper_legend
 
@@ -49,7 +50,7 @@ def draw_turnpike_states(ax: Axes, study: Turnpike, *, component: int = 0) -> li
     level = float(study.trim.reduced_state[component])
     lines.append(ax.axhline(level, color=INK, linewidth=1.0, linestyle=(0, (3, 2))))
     names = [f"{case.duration:.3g} s" for case in study.cases] + ["trim"]
-    tidy(ax, x=TIME_LABEL, y=study.reduced_names[component])
+    tidy(ax, x=TIME_LABEL, y=control_labels([study.reduced_names[component]])[0])
     upper_legend(ax, lines, names)
     return lines
 

@@ -18,6 +18,7 @@ from tests.plotting.cases import assert_picture, parking_plan, result_of
         (Look(size=(3.5, None), style="paper"), (3.5, None)),
         (Look(size=(7.16, 4.0), style="paper"), (7.16, 4.0)),
         (Look(size=(12.0, 6.0), title="Parking"), (12.0, 6.0)),
+        (Look(size=(9.0, 2.6)), (9.0, 2.6)),  # nothing has room but the plane
         (Look(), (9.6, None)),
     ],
 )

@@ -35,6 +35,15 @@ def test_the_legend_of_a_long_plan_is_short_and_has_no_name_twice():
     assert names == ["ahead, turning left, 1 m/s", "start", "goal"]
 
 
+def test_a_platform_that_goes_any_way_is_named_by_eight_directions():
+    angles = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
+    ways = {f"{a:.2f}": np.array([np.cos(a), np.sin(a), 0.0]) for a in angles}
+    names = list(motion_names(ways, many=True))
+    assert len(names) == 8
+    assert names[:2] == ["ahead, 1 m/s", "ahead and to the left, 1 m/s"]
+    assert len({track_colors(ways)[name] for name in ways}) == 8
+
+
 def test_a_step_aside_is_told_from_one_ahead():
     colors = np.array(
         [twist_color(np.array([*v, 0.0])) for v in ((1, 0), (0, 1), (-1, 0), (0, -1))]
