@@ -48,6 +48,17 @@ Alternatives = Annotated[
     int, typer.Option("--alternatives", min=0, metavar="K", help="Dearer plans to list as well.")
 ]
 Plot = Annotated[bool, typer.Option("--plot/--no-plot", help="Draw the plan.")]
+Title = Annotated[
+    str | None,
+    typer.Option("--title", metavar="TEXT", help="Of the pictures (default: scenario's name)."),
+]
+Size = Annotated[
+    str | None,
+    typer.Option("--size", metavar="WxH", help="Of the main picture [in]: 7x4, or 3.5."),
+]
+Style = Annotated[
+    str, typer.Option("--style", metavar="NAME", help="screen, or paper: no numbers above.")
+]
 Animate = Annotated[
     bool, typer.Option("--animate", help="Animate it as well (plan: GIF; mpc: GIF and HTML).")
 ]
@@ -134,10 +145,14 @@ def plan(
     case: Case = None,
     model: OwnModel = None,
     gap: Gap = None,
+    title: Title = None,
+    size: Size = None,
+    style: Style = "screen",
 ) -> int:
     """Plan the problem of a file, or of every file of a folder."""
     from maneuver_automaton.cli import plan_command
     from maneuver_automaton.cli.inputs import Parts
+    from maneuver_automaton.cli.looks import LookOptions
 
     settings = plan_command.Settings(
         time_limit=time_limit,
@@ -146,6 +161,7 @@ def plan(
         animate=animate,
         quiet=quiet,
         gap=gap,
+        look=LookOptions(title=title, size=size, style=style),
     )
     parts = Parts(beside=with_file, case=case, model=model)
     if file.is_dir():
@@ -192,10 +208,14 @@ def mpc(
         typer.Option("--resume", metavar="LOG", help="Go on from a closed_loop.json."),
     ] = None,
     model: OwnModel = None,
+    title: Title = None,
+    size: Size = None,
+    style: Style = "screen",
 ) -> int:
     """Drive a scenario in closed loop: plan, drive a step, plan again."""
     from maneuver_automaton.cli import mpc_command, plan_command
     from maneuver_automaton.cli.inputs import Parts
+    from maneuver_automaton.cli.looks import LookOptions
 
     plan_command.Settings(time_limit=time_limit, gap=gap)  # checked alike
     if alternatives:
@@ -215,6 +235,7 @@ def mpc(
         plot=plot,
         animate=animate,
         quiet=quiet,
+        look=LookOptions(title=title, size=size, style=style),
     )
     parts = Parts(beside=with_file, case=case, model=model)
     if file.is_dir():
@@ -314,14 +335,19 @@ def plot(
     file: Annotated[Path, typer.Argument(metavar="PLAN.json")],
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="The picture.")] = None,
     animate: Animate = False,
+    title: Title = None,
+    size: Size = None,
+    style: Style = "screen",
 ) -> int:
     """Draw a plan.json again: PLAN.png beside it, or the file given.
 
     With --animate it is an animation, PLAN.gif.
     """
     from maneuver_automaton.cli import convert_command
+    from maneuver_automaton.cli.looks import LookOptions
 
-    return convert_command.plot(file, out, animate=animate)
+    look = LookOptions(title=title, size=size, style=style)
+    return convert_command.plot(file, out, animate=animate, look=look)
 
 
 @app.command()

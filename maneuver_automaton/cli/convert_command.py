@@ -18,6 +18,7 @@ from maneuver_automaton.cli.inputs import (
     not_written,
     scenario_of,
 )
+from maneuver_automaton.cli.looks import LookOptions
 from maneuver_automaton.cli.tables import console
 from maneuver_automaton.collision import AnyObstacle, OccupancyMap
 from maneuver_automaton.errors import InvalidLibrary, InvalidScenario
@@ -137,7 +138,7 @@ def _write_scenario(scenario: Scenario, source: Path, target: Path) -> None:
     write_text_atomically(target, text)
 
 
-def plot(file: Path, out: Path | None, *, animate: bool) -> int:
+def plot(file: Path, out: Path | None, *, animate: bool, look: LookOptions) -> int:
     """Draw a plan.json again, still or in motion."""
     from maneuver_automaton.formats.plan_json import load_plan, read_plan_document
 
@@ -158,7 +159,7 @@ def plot(file: Path, out: Path | None, *, animate: bool) -> int:
         if animate:
             plotting.save_plan_animation(load_plan(file), path)
         else:
-            plotting.save_plan_file_figure(document, path)
+            plotting.save_plan_file_figure(document, path, look=look.look())
     except OSError as error:
         raise not_written(path, error) from error
     except (KeyError, ValueError, TypeError, IndexError) as error:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ from maneuver_automaton.cli import road_command
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, scenario_of
+from maneuver_automaton.cli.looks import LookOptions
 from maneuver_automaton.cli.progress import progress_bar
 from maneuver_automaton.errors import InvalidScenario
 
@@ -38,6 +39,7 @@ class Settings:
     plot: bool = True
     animate: bool = False
     quiet: bool = False
+    look: LookOptions = field(default_factory=LookOptions)
 
 
 def drive_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> int:
@@ -56,7 +58,7 @@ def drive_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> in
         return _statistics(path, scenario, out, settings)
     loop = _loop(path, scenario, settings)
     try:
-        _write(loop, out, settings)
+        _write(loop, scenario.name, out, settings)
     except OSError as error:
         raise not_written(Path(error.filename or out), error) from error
     if not settings.quiet:
@@ -205,18 +207,19 @@ def _disturbance(part: Any, seed: int | None) -> Disturbance | None:
     )
 
 
-def _write(loop: ClosedLoop, out: Path, settings: Settings) -> None:
+def _write(loop: ClosedLoop, name: str, out: Path, settings: Settings) -> None:
     from maneuver_automaton.formats.closed_loop_json import save_closed_loop
 
     save_closed_loop(loop, out / "closed_loop.json", interrupted=stopped())
-    for name in PICTURES:
-        (out / name).unlink(missing_ok=True)  # of an earlier loop
+    for picture in PICTURES:
+        (out / picture).unlink(missing_ok=True)  # of an earlier loop
     if stopped() or not (settings.plot or settings.animate):
         return
     from maneuver_automaton import plotting
 
     if settings.plot:
-        plotting.save_closed_loop_figure(loop, out / "closed_loop.png")
+        look = settings.look.look(name)
+        plotting.save_closed_loop_figure(loop, out / "closed_loop.png", look=look)
     if settings.animate:
-        for name in FILMS:
-            plotting.save_closed_loop_animation(loop, out / name)
+        for film in FILMS:
+            plotting.save_closed_loop_animation(loop, out / film)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,7 @@ from maneuver_automaton.cli import road_command
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, scenario_of
+from maneuver_automaton.cli.looks import LookOptions
 from maneuver_automaton.cli.progress import progress_bar, waiting
 from maneuver_automaton.errors import InvalidScenario
 
@@ -36,6 +37,7 @@ class Settings:
     animate: bool = False
     quiet: bool = False
     gap: float | None = None  # share of the cost, None: nothing is proven beside the search
+    look: LookOptions = field(default_factory=LookOptions)
 
     def __post_init__(self) -> None:
         if self.time_limit is not None and not 0.0 < self.time_limit < math.inf:
@@ -148,30 +150,31 @@ def _plan(
         result = replace(result, reason="interrupted before there was a plan")
     result = replace(result, timing_s={**scenario.timing_s, **result.timing_s})
     try:
-        _write(result, out, settings)
+        _write(result, scenario.name, out, settings)
     except OSError as error:
         raise not_written(Path(error.filename or out), error) from error
     return result
 
 
-def _write(result: PlanResult, out: Path, settings: Settings) -> None:
+def _write(result: PlanResult, name: str, out: Path, settings: Settings) -> None:
     from maneuver_automaton.formats.plan_json import save_plan
 
     save_plan(result, out / "plan.json", interrupted=stopped())
-    for name in PICTURES:
-        (out / name).unlink(missing_ok=True)  # of an earlier plan
+    for picture in PICTURES:
+        (out / picture).unlink(missing_ok=True)  # of an earlier plan
     if stopped() or not (settings.plot or settings.animate):
         return
     from maneuver_automaton import plotting
 
     if settings.plot:
-        plotting.save_plan_figure(result, out / "plan.png", nodes=result.nodes)
+        look = settings.look.look(name)
+        plotting.save_plan_figure(result, out / "plan.png", nodes=result.nodes, look=look)
         if plotting.flies_among_heights(result.problem):
-            plotting.save_space_figure(result, out / "plan_3d.png")
+            plotting.save_space_figure(result, out / "plan_3d.png", title=look.title)
         if settings.gap is not None and result.plan is not None:
-            plotting.save_progress_figure(result, out / "progress.png")
+            plotting.save_progress_figure(result, out / "progress.png", title=look.title)
         if result.alternatives:
-            plotting.save_alternatives_figure(result, out / "alternatives.png")
+            plotting.save_alternatives_figure(result, out / "alternatives.png", title=look.title)
     if settings.animate and result.plan is not None:
         plotting.save_plan_animation(result.plan, out / "plan.gif", problem=result.problem)
 

@@ -13,6 +13,7 @@ from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written
+from maneuver_automaton.cli.looks import LookOptions
 from maneuver_automaton.cli.progress import progress_bar, waiting
 from maneuver_automaton.errors import InvalidScenario
 
@@ -37,6 +38,8 @@ def plan_file(
 ) -> RoadPlanResult:
     """Plan one drive into the folder `out`, and print the plan; the result."""
     from maneuver_automaton.formats.plan_json import write_document
+
+    _check_look(settings.look)
     from maneuver_automaton.formats.road_json import road_plan_to_dict
     from maneuver_automaton.roads import plan_road
 
@@ -61,7 +64,8 @@ def plan_file(
             (out / name).unlink(missing_ok=True)  # of an earlier plan
         if result.plan is not None:
             named = (out / "plan.png", [out / "plan.gif"])
-            _draw(scene, vehicle, result.plan, named, settings.plot, settings.animate)
+            shown = _titled(scene, settings.look)
+            _draw(shown, vehicle, result.plan, named, settings.plot, settings.animate)
 
     _written(write, out)
     if result.plan is not None and not settings.quiet:
@@ -86,6 +90,7 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
     from maneuver_automaton.formats.road_json import road_drive_to_dict
     from maneuver_automaton.roads import drive_scene, plan_before, road_planner
 
+    _check_look(settings.look)
     for name, value in (("--seeds", settings.seeds), ("--resume", settings.resume)):
         if value is not None:
             raise InvalidScenario(f"{name}: drives on roads have no such option; leave it out")
@@ -115,7 +120,8 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
         for file in (out / "closed_loop.png", *films):
             file.unlink(missing_ok=True)  # of an earlier loop
         named = (out / "closed_loop.png", films)
-        _draw(scene, vehicle, drive.driven, named, settings.plot, settings.animate)
+        shown = _titled(scene, settings.look)
+        _draw(shown, vehicle, drive.driven, named, settings.plot, settings.animate)
 
     _written(write, out)
     if not settings.quiet:
@@ -137,6 +143,18 @@ def _road(path: Path, parts: Parts) -> tuple[RoadScene, RoadVehicle]:
     found = load_scenario(path, beside=parts.beside, case=parts.case)
     assert isinstance(found, RoadScenario)  # by its ending
     return found.scene, found.vehicle
+
+
+def _check_look(look: LookOptions) -> None:
+    if look.is_stated:
+        raise InvalidScenario(
+            "--size, --style: a drive on roads has one picture of its own; need neither"
+        )
+
+
+def _titled(scene: RoadScene, look: LookOptions) -> RoadScene:
+    """The scene under the title that its pictures are to have."""
+    return scene if look.title is None else replace(scene, name=look.title)
 
 
 def _draw(

@@ -32,8 +32,10 @@ from maneuver_automaton.plotting.footprint import footprint_polygons as footprin
 from maneuver_automaton.plotting.labels import control_labels as control_labels
 from maneuver_automaton.plotting.lessons import figure_shift as figure_shift
 from maneuver_automaton.plotting.lessons import figure_symmetry as figure_symmetry
+from maneuver_automaton.plotting.look import Look as Look
 from maneuver_automaton.plotting.maneuvers import draw_maneuvers as draw_maneuvers
 from maneuver_automaton.plotting.maneuvers import save_maneuvers_figure as save_maneuvers_figure
+from maneuver_automaton.plotting.motions import track_colors as track_colors
 from maneuver_automaton.plotting.nodes import draw_nodes as draw_nodes
 from maneuver_automaton.plotting.obstacles import draw_obstacles as draw_obstacles
 from maneuver_automaton.plotting.paths import draw_plan as draw_plan

@@ -28,7 +28,7 @@ from maneuver_automaton.plotting.scene import (
     set_view,
     view_box,
 )
-from maneuver_automaton.plotting.style import corner_legend
+from maneuver_automaton.plotting.style import upper_legend
 from maneuver_automaton.plotting.track import Track, track_of_plan
 from maneuver_automaton.problem import Goal, Problem
 
@@ -151,8 +151,7 @@ def _legend(
         alternative_text(plan, costs[rank] if costs else None, width=60)
         for rank, plan in enumerate(plans)
     ]
-    points = np.concatenate([np.stack(path.get_data(), axis=-1) for path in paths])
-    return corner_legend(ax, paths, labels, points=points, length=80)
+    return upper_legend(ax, paths, labels, length=80)
 
 
 def _scene(plans: Sequence[Plan], problem: Problem | None, footprint: Any) -> Scene:

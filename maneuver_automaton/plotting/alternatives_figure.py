@@ -14,7 +14,15 @@ from maneuver_automaton.plotting.alternatives import alternative_text, draw_alte
 from maneuver_automaton.plotting.colors import INK
 from maneuver_automaton.plotting.controls import draw_over_time, step_curves
 from maneuver_automaton.plotting.labels import control_labels
-from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
+from maneuver_automaton.plotting.look import Look
+from maneuver_automaton.plotting.pages import (
+    axes_at,
+    heading_height,
+    heading_text,
+    new_figure,
+    title_lines,
+    write_figure,
+)
 from maneuver_automaton.plotting.style import SMALL_PT, TEXT_PT, share_limits
 from maneuver_automaton.plotting.track import track_of_plan
 
@@ -23,11 +31,11 @@ ROW = 0.95  # [in]
 
 
 def save_alternatives_figure(
-    result: PlanResult, path: str | Path, *, footprint: Any = None
+    result: PlanResult, path: str | Path, *, footprint: Any = None, title: str = ""
 ) -> None:
     """Write a picture of all plans of a `result`: overlaid on the left, their controls beside.
 
-    The body is that of the problem if no `footprint` is given.
+    The body is that of the problem if no `footprint` is given. A `title` stands above.
 
     Raises
     ------
@@ -40,8 +48,9 @@ def save_alternatives_figure(
     costs = [result.cost, *(other.cost for other in result.alternatives)]
     labels = control_labels(result.problem.automaton.model.control_names)
     body = max(3.6, ROW * len(plans))
-    figure = new_figure(WIDTH, 0.52 + body + 0.5)
-    heading_text(figure, [(_count_text(len(plans)), 10.0, "bold")], left=LEFT)
+    lines = title_lines(Look(title=title), WIDTH - LEFT, _count_text(len(plans)))
+    figure = new_figure(WIDTH, 0.5 + body + 0.2 + heading_height(lines))
+    heading_text(figure, lines, left=LEFT)
     tall = min(body, 4.6)
     ax = axes_at(figure, left=LEFT, bottom=0.5 + body - tall, width=3.82, height=tall)
     draw_alternatives(

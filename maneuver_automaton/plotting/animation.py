@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,10 @@ from matplotlib.collections import LineCollection, PolyCollection
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.plotting.bodies import DART, DART_SIZE
-from maneuver_automaton.plotting.colors import GREY, INK, Color, trim_colors
+from maneuver_automaton.plotting.colors import GREY, INK, Color
 from maneuver_automaton.plotting.film import Film, picture_times, write_film
 from maneuver_automaton.plotting.footprint import placed
+from maneuver_automaton.plotting.motions import track_colors
 from maneuver_automaton.plotting.paths import bare_scene
 from maneuver_automaton.plotting.scene import (
     mark_size,
@@ -64,8 +66,10 @@ def _film(plan: Plan, problem: Problem | None, footprint: Any) -> Film:
     size = scene_size(scene, track)
     body = scene.body or (DART_SIZE * size * DART,)
     everywhere = [scene_points(scene, track, size=size), *placed(body, track.pose)]
+    for one in scene.carried:
+        everywhere += placed(one.body, one.track.pose)
     box = view_box(scene, np.concatenate(everywhere), size=size)
-    colors = trim_colors(track.twists)
+    colors = track_colors(track.twists)
     marks = mark_size(scene, box, size=size)
     stage = stage_of(scene, track, colors=colors, box=box, size=marks)
     line = LineCollection([track.pose[:, :2]], colors=[(*GREY, 0.7)], linewidths=0.9, zorder=1.8)
@@ -79,7 +83,8 @@ def _film(plan: Plan, problem: Problem | None, footprint: Any) -> Film:
         driven = track.between(plan.start_time, time)
         trail.set_segments([places for _, places in driven])
         trail.set_color([colors[name] for name, _ in driven])
-        vehicle.set_verts(placed(body, plan.pose_at(time)[None]))
+        parts = [placed(one.body, one.track.at(np.array([time]))) for one in scene.carried]
+        vehicle.set_verts([*placed(body, plan.pose_at(time)[None]), *chain.from_iterable(parts)])
         vehicle.set_facecolor((*_color_at(track, time, colors), 0.55))
         stage.clock.set_text(f"{time:.2f} s")
 

@@ -13,20 +13,35 @@ from matplotlib.patches import FancyArrowPatch
 from matplotlib.text import Text
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.plotting.automata_arrows import (
+    MOST_HEADED,
+    arrow_head,
+    disc,
+    draw_maneuver_arrows,
+    draw_switch_heads,
+    motion,
+    trim_pictures,
+)
 from maneuver_automaton.plotting.bodies import DART
-from maneuver_automaton.plotting.colors import GREY, INK, Color, trim_colors, twist_color
+from maneuver_automaton.plotting.colors import GREY, INK, Color, twist_color
+from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.maneuvers import draw_maneuvers
-from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
-from maneuver_automaton.plotting.paths import ARC_POINTS
+from maneuver_automaton.plotting.motions import track_colors
+from maneuver_automaton.plotting.pages import (
+    axes_at,
+    heading_height,
+    heading_text,
+    new_figure,
+    title_lines,
+    write_figure,
+)
 from maneuver_automaton.plotting.style import TEXT_PT, shortened, tidy
-from maneuver_automaton.primitives import Trim
 
 MOST_NODES = 30
 MOST_LEVEL_NAMES = 12
-NAME_PT, NAME_LENGTH, CHARACTER = 7.5, 24, 0.058  # [pt], characters, [in]
-SHOWN_S = 1.0  # how long each trim is shown [s]
-SPIN_SIZE = 0.45  # of a node, for turns on the spot
+NAME_PT, NAME_LENGTH, CHARACTER = 7.5, 40, 0.058  # [pt], characters, [in]
+RING = 4.2  # [in] of a ring of nodes whose names stick out
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -64,13 +79,21 @@ def draw_automaton(ax: Axes, automaton: Automaton) -> AutomatonArtists:
 def draw_motions(ax: Axes, automaton: Automaton) -> LineCollection:
     """Draw one second of every trim from the same pose, to scale, in the colours of the trims."""
     many = len(automaton) > MOST_NODES
-    paths = [_motion(trim)[:, :2] for trim in automaton.trims]
+    paths = [motion(trim)[:, :2] for trim in automaton.trims]
     size = max(float(np.abs(path).max()) for path in paths) or 1.0
+    colors = _colors(automaton)
     lines = LineCollection(
-        paths, colors=_colors(automaton), linewidths=0.7 if many else 2.2, zorder=3.0,
+        paths, colors=colors, linewidths=0.7 if many else 2.2, zorder=3.0,
         alpha=0.6 if many else 1.0,
     )  # fmt: skip
     ax.add_collection(lines)
+    moving = [] if many else [k for k, path in enumerate(paths) if np.ptp(path, axis=0).any()]
+    ax.add_collection(
+        PolyCollection(
+            [arrow_head(paths[k], 0.25 * size) for k in moving],
+            facecolors=[colors[k] for k in moving], linewidths=0.0, zorder=3.2,
+        )
+    )  # fmt: skip
     ax.add_collection(
         PolyCollection([0.08 * size * DART], facecolors=[INK], linewidths=0.0, zorder=4.0)
     )
@@ -82,15 +105,19 @@ def draw_motions(ax: Axes, automaton: Automaton) -> LineCollection:
     return lines
 
 
-def save_automaton_figure(automaton: Automaton, path: str | Path) -> None:
+def save_automaton_figure(automaton: Automaton, path: str | Path, *, title: str = "") -> None:
     """Write a picture of an `automaton`: its graph, and one second of each trim to scale.
 
-    The file is replaced in one step; its ending chooses the format.
+    A `title` stands above. The file is replaced in one step; its ending chooses the format.
     """
     points = len(automaton) > MOST_NODES
-    width = height = 4.1 if points or len(automaton) <= MOST_LEVEL_NAMES else 6.1
+    lines = title_lines(Look(title=title), 8.0, _summary(automaton))
+    width = height = 4.1
+    if not points and len(automaton) > MOST_LEVEL_NAMES:
+        longest = max(min(len(name), NAME_LENGTH) for name in automaton.trim_names)
+        width = height = RING + 2.0 * CHARACTER * longest  # names stick out like rays
     width += 1.0
-    figure = new_figure(width + 4.5, height + 0.8)
+    figure = new_figure(width + 4.5, height + 0.55 + heading_height(lines))
     edge = 0.62 if points else 0.1
     left = axes_at(
         figure, left=edge, bottom=0.5 if points else 0.15, width=width - edge,
@@ -102,12 +129,12 @@ def save_automaton_figure(automaton: Automaton, path: str | Path) -> None:
     draw_automaton(left, automaton)
     if automaton.maneuvers and not automaton.body_velocities.any():
         draw_maneuvers(right, automaton.maneuvers)
-        title = f"every maneuver, {np.ptp(right.get_xlim()):.3g} m wide"
+        said = f"every maneuver, {np.ptp(right.get_xlim()):.3g} m wide"
     else:
         draw_motions(right, automaton)
-        title = "1 s of each trim from the same pose"
-    right.set_title(title, fontsize=TEXT_PT, color=INK, loc="left")
-    heading_text(figure, [(_summary(automaton), 10.0, "bold")], left=0.62 if points else 0.3)
+        said = "1 s of each trim from the same pose"
+    right.set_title(said, fontsize=TEXT_PT, color=INK, loc="left")
+    heading_text(figure, lines, left=0.62 if points else 0.3)
     write_figure(figure, path)
 
 
@@ -123,14 +150,8 @@ def _summary(automaton: Automaton) -> str:
 def _colors(automaton: Automaton) -> list[Color]:
     if len(automaton) > MOST_NODES:
         return [twist_color(trim.body_velocity) for trim in automaton.trims]
-    named = trim_colors({trim.name: trim.body_velocity for trim in automaton.trims})
+    named = track_colors({trim.name: trim.body_velocity for trim in automaton.trims})
     return [named[name] for name in automaton.trim_names]
-
-
-def _motion(trim: Trim) -> Array:
-    """Poses (n, dof) during the time that is shown."""
-    plan = Plan(np.zeros(trim.body_velocity.size), (trim,), durations=np.array([SHOWN_S]))
-    return plan.pose_at(np.linspace(0.0, SHOWN_S, ARC_POINTS))
 
 
 def _draw_points(ax: Axes, automaton: Automaton) -> AutomatonArtists:
@@ -158,19 +179,18 @@ def _draw_graph(ax: Axes, automaton: Automaton) -> AutomatonArtists:
     colors = _colors(automaton)
     classes = automaton.trim_classes
     nodes = PolyCollection(
-        [centre + radius * _disc() for centre in centres], facecolors="white", edgecolors=colors,
+        [centre + radius * disc() for centre in centres], facecolors="white", edgecolors=colors,
         linewidths=1.6, zorder=3.0,
     )  # fmt: skip
+    pairs = combinations(range(len(automaton)), 2)
+    free = [centres[[a, b]] for a, b in pairs if classes[a] == classes[b]]
     switches = LineCollection(
-        [
-            centres[[a, b]]
-            for a, b in combinations(range(len(automaton)), 2)
-            if classes[a] == classes[b]
-        ],
-        colors=[GREY], linewidths=0.6,
+        free, colors=[GREY], linewidths=0.6,
         alpha=0.7 if len(automaton) <= MOST_LEVEL_NAMES else 0.25, zorder=1.0,
     )  # fmt: skip
-    pictures, heads = _pictures(automaton, radius)
+    if len(free) <= MOST_HEADED:
+        draw_switch_heads(ax, free, radius)
+    pictures, heads = trim_pictures(automaton, radius)
     motions = LineCollection(
         [picture + centre for picture, centre in zip(pictures, centres, strict=True)],
         colors=colors, linewidths=1.8, zorder=4.0,
@@ -183,7 +203,7 @@ def _draw_graph(ax: Axes, automaton: Automaton) -> AutomatonArtists:
             facecolors=colors, linewidths=0.0, zorder=4.1,
         )
     )  # fmt: skip
-    maneuvers = _draw_maneuvers(ax, automaton, centres, radius)
+    maneuvers = draw_maneuver_arrows(ax, automaton, centres, radius)
     names = _draw_names(ax, automaton, centres, radius)
     _make_room(ax, automaton, radius)
     ax.set_axis_off()
@@ -204,67 +224,6 @@ def _places(automaton: Automaton) -> tuple[Array, float]:
     angle[order] = 0.5 * np.pi - 2.0 * np.pi * np.arange(many) / many
     centres = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     return centres, float(min(0.26, 0.8 * np.sin(np.pi / many)))
-
-
-def _disc() -> Array:
-    angle = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
-    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-
-
-def _pictures(automaton: Automaton, radius: float) -> tuple[list[Array], list[Array]]:
-    """Paths (n, 2) of all trims to one scale, about the centre of their node, and arrow heads.
-
-    Seen with the vehicle heading up. A turn on the spot is an arc, rest a dot.
-    """
-    poses = [_motion(trim) for trim in automaton.trims]
-    lines = [np.stack([-pose[:, 1], pose[:, 0]], axis=-1) for pose in poses]
-    widest = max(float(np.linalg.norm(np.ptp(line, axis=0))) for line in lines)
-    scale = 1.25 * radius / widest if widest > 0.0 else 1.0
-    pictures, heads = [], []
-    for pose, line in zip(poses, lines, strict=True):
-        turn = float(np.clip(pose[-1, 2], -1.8 * np.pi, 1.8 * np.pi))
-        if not line.any() and turn:
-            angle = 0.5 * np.pi + np.linspace(0.0, turn, ARC_POINTS)
-            picture = SPIN_SIZE * radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        elif line.any():
-            picture = scale * (line - 0.5 * (line.min(axis=0) + line.max(axis=0)))
-        else:
-            picture = np.zeros((2, 2))
-        pictures.append(picture)
-        heads.append(_head(picture, radius))
-    return pictures, heads
-
-
-def _head(picture: Array, radius: float) -> Array:
-    """Arrow head at the end of a picture; a dot for one that does not move."""
-    step = picture[-1] - picture[-2]
-    length = float(np.linalg.norm(step))
-    if length == 0.0:
-        return 0.12 * radius * _disc()
-    along = step / length
-    aside = np.array([-along[1], along[0]])
-    tip = picture[-1] + 0.2 * radius * along
-    return np.array([tip, picture[-1] + 0.13 * radius * aside, picture[-1] - 0.13 * radius * aside])
-
-
-def _draw_maneuvers(
-    ax: Axes, automaton: Automaton, centres: Array, radius: float
-) -> tuple[FancyArrowPatch, ...]:
-    """One curved arrow for each ordered pair of trims that a maneuver joins."""
-    arrows = []
-    pairs = dict.fromkeys((maneuver.source, maneuver.target) for maneuver in automaton.maneuvers)
-    for source, target in pairs:
-        begin, end = centres[automaton.index_of(source)], centres[automaton.index_of(target)]
-        apart = end - begin
-        gap = 1.12 * radius * apart / max(float(np.linalg.norm(apart)), 1e-12)
-        arrow = FancyArrowPatch(
-            tuple(begin + gap), tuple(end - gap), connectionstyle="arc3,rad=0.14",
-            arrowstyle="-|>", mutation_scale=9.0, color=INK, linewidth=0.9, shrinkA=0.0,
-            shrinkB=0.0, zorder=2.0,
-        )  # fmt: skip
-        ax.add_patch(arrow)
-        arrows.append(arrow)
-    return tuple(arrows)
 
 
 def _draw_names(ax: Axes, automaton: Automaton, centres: Array, radius: float) -> tuple[Text, ...]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import chain
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection, PolyCollection
@@ -10,10 +12,10 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.plotting.colors import GREY, INK, Color
 from maneuver_automaton.plotting.ends import SET
 from maneuver_automaton.plotting.footprint import placed
-from maneuver_automaton.plotting.obstacles import moment_colors
+from maneuver_automaton.plotting.obstacles import ROBOT, moment_colors
 from maneuver_automaton.plotting.regions import region_path
 from maneuver_automaton.plotting.scene import Scene
-from maneuver_automaton.plotting.swept import swept_region
+from maneuver_automaton.plotting.swept import merged, swept_region
 from maneuver_automaton.plotting.track import Track
 
 FAINT_DARTS = 9  # along a path
@@ -21,12 +23,15 @@ DART = np.array([[0.6, 0.0], [-0.4, 0.32], [-0.22, 0.0], [-0.4, -0.32]])
 DART_SIZE = 0.066  # of the size of the path
 SWEPT: Color = (0.36, 0.60, 0.85)
 SWEPT_ALPHA = 0.20
+MOST_MOTIONS, INNER_BODIES = 2, 3  # so few motions have bodies within
 FEW_BODIES, LEAST_ALPHA = 8, 0.3  # more bodies than that are fainter, but not more than this
 
 
 def swept_area(track: Track, scene: Scene) -> PathCollection:
     """Area that the body covers along a track; empty where the body is not known."""
     region = swept_region(track, scene.body) if scene.body and track.pieces else []
+    carried = [swept_region(part.track, part.body) for part in scene.carried]
+    region = merged([*region, *chain.from_iterable(carried)]) if carried else region
     return PathCollection(
         [region_path(region)] if region else [], facecolors=[(*SWEPT, SWEPT_ALPHA)],
         linewidths=0.0, zorder=1.4,
@@ -50,25 +55,36 @@ def darts(track: Track, scene: Scene, *, size: float) -> PolyCollection:
 
 
 def switch_bodies(track: Track, scene: Scene) -> PolyCollection:
-    """Outlines where trims begin and at the end, which is clear; many others are fainter."""
-    poses = track.switching_poses
+    """Outlines where trims begin and at the end, which is clear; many others are fainter.
+
+    Those of what it carries stand beside them; a motion by optimal control has a few within.
+    """
+    times = _shown_times(track, apart=INNER_BODIES * scene.reach)
+    poses = track.at(times) if len(times) > len(track.switching_times) else track.switching_poses
+    outlines = placed(scene.body, poses)
+    for part in scene.carried:
+        outlines += placed(part.body, part.track.at(times))
     alpha = max(LEAST_ALPHA, 0.8 * min(1.0, FEW_BODIES / len(poses)))
-    inner = len(poses) - 2
+    inner, bodies = len(poses) - 2, len(outlines) // len(poses)
     return PolyCollection(
-        placed(scene.body, poses),
+        outlines,
         facecolors="none",
-        edgecolors=[(*INK, 0.95), *[(*INK, alpha)] * inner, (*INK, 0.95)] * len(scene.body),
-        linewidths=[1.3, *[0.7] * inner, 1.3] * len(scene.body),
+        edgecolors=[(*INK, 0.95), *[(*INK, alpha)] * inner, (*INK, 0.95)] * bodies,
+        linewidths=[1.3, *[0.7] * inner, 1.3] * bodies,
         zorder=2.1,
     )
 
 
 def moment_bodies(track: Track, scene: Scene) -> PolyCollection:
-    """The body at the times at which moving obstacles are shown, in the colours of these times."""
+    """The body at the times at which moving obstacles are shown, the darker the later."""
     times = scene.times if scene.moves and track.pieces else scene.times[:0]
-    colors = [color for _ in scene.body for color in moment_colors(len(times))]
+    outlines = placed(scene.body, track.at(times))
+    for part in scene.carried:
+        outlines += placed(part.body, part.track.at(times))
+    bodies = len(outlines) // max(len(times), 1)
+    colors = moment_colors(len(times), color=ROBOT) * bodies
     return PolyCollection(
-        placed(scene.body, track.at(times)), facecolors=[(*color, 0.85) for color in colors],
+        outlines, facecolors=[(*color, 0.85) for color in colors],
         edgecolors=[INK], linewidths=1.1, zorder=3.7,
     )  # fmt: skip
 
@@ -84,6 +100,20 @@ def goal_bodies(scene: Scene) -> PolyCollection:
         placed(scene.body, np.array(poses)) if poses else [], facecolors="none",
         edgecolors=[SET], linewidths=1.2, linestyles=[(0, (3, 2))], zorder=2.0,
     )  # fmt: skip
+
+
+def _shown_times(track: Track, *, apart: float) -> Array:
+    """Switching times (n,), and a few within one or two motions that leave their place [s]."""
+    times = track.switching_times
+    if not 1 <= len(track.pieces) <= MOST_MOTIONS:
+        return times
+    shares = np.linspace(0.0, 1.0, INNER_BODIES + 2)[1:-1]
+    inner = [
+        piece.time[0] + shares * (piece.time[-1] - piece.time[0])
+        for piece in track.pieces
+        if np.ptp(piece.control, axis=0).any() and np.ptp(piece.pose[:, :2], axis=0).max() > apart
+    ]
+    return np.sort(np.concatenate([times, *inner]))
 
 
 def draw_switches(ax: Axes, track: Track, scene: Scene, *, size: float) -> PathCollection:

@@ -21,28 +21,33 @@ from maneuver_automaton.plotting.closed_loop_track import (
 )
 from maneuver_automaton.plotting.controls import draw_track_altitude, draw_track_controls
 from maneuver_automaton.plotting.labels import control_labels
+from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.pages import (
     axes_at,
     bottom_legend,
+    heading_height,
     heading_text,
+    hide_times,
     legend_rows,
     new_figure,
+    title_lines,
     write_figure,
 )
-from maneuver_automaton.plotting.style import TEXT_PT, line_handle
 from maneuver_automaton.receding_horizon import ClosedLoop
 
-WIDTH, LEFT, RIGHT = 9.6, 0.7, 0.15  # [in] of the page, and beside the axes on it
-INNER = WIDTH - LEFT - RIGHT
-PLANE, SIDE = 4.82, 6.35  # [in] width of the plane, and where what is beside it begins
+LEFT, RIGHT = 0.7, 0.15  # [in] beside the axes on a page
+PLANE, BETWEEN = 0.55, 0.83  # share of the plane in the width, and [in] to what is beside it
+LEAST_PLANE, LEAST_SHARE = 1.0, 0.6  # [in] of the plane in a page of stated height; of the rest
 VALUE, PANEL, GAP = 1.6, 0.95, 0.2  # [in] heights over time, and between them
 LEGEND = 0.42  # [in] above the value
 LABELS = 0.44  # [in] below axes that show their numbers
 FLAT = 2.4  # a plane so much wider than high is given the width of the page
-MOST_NAMES, MOST_REASONS, TEXT_WIDTH = 26, 2, 132
+MOST_REASONS, TEXT_WIDTH = 2, 132
 
 
-def save_closed_loop_figure(loop: ClosedLoop, path: str | Path, *, footprint: Any = None) -> None:
+def save_closed_loop_figure(
+    loop: ClosedLoop, path: str | Path, *, footprint: Any = None, look: Look | None = None
+) -> None:
     """Write the picture of a closed `loop`.
 
     It shows the plane, the value and the cost over time, the controls as applied, and how long
@@ -56,6 +61,8 @@ def save_closed_loop_figure(loop: ClosedLoop, path: str | Path, *, footprint: An
         Where to write.
     footprint : any form of `footprint_polygons`, optional
         The body of the vehicle; that of the problem if left out.
+    look : Look, optional
+        Title, size and style.
 
     Raises
     ------
@@ -64,7 +71,7 @@ def save_closed_loop_figure(loop: ClosedLoop, path: str | Path, *, footprint: An
     OSError
         If the file cannot be written; an old one stays as it was.
     """
-    write_figure(_figure(loop, footprint=footprint), path)
+    write_figure(_figure(loop, footprint=footprint, look=look or Look()), path)
 
 
 def loop_text(loop: ClosedLoop) -> str:
@@ -87,58 +94,78 @@ def loop_text(loop: ClosedLoop) -> str:
     return f"{ended} · {loop.times[-1] - loop.times[0]:.5g} s · cost {loop.cost:.6g}"
 
 
-def _figure(loop: ClosedLoop, *, footprint: Any) -> Figure:
+def _figure(loop: ClosedLoop, *, footprint: Any, look: Look) -> Figure:
     colors, track = loop_colors(loop), driven_track(loop)
+    inner = look.width - LEFT - RIGHT
     handles, names = loop_handles(loop, track, colors)
-    trims = len(track.twists)
-    if trims > MOST_NAMES:
-        handles[MOST_NAMES:trims] = [line_handle((1.0, 1.0, 1.0))]
-        names[MOST_NAMES:trims] = [f"and {trims - MOST_NAMES} more"]
-    lines = _heading(loop)
-    top = 0.26 + sum(1.42 * size / 72.0 * (1 + text.count("\n")) for text, size, _ in lines)
-    bottom = 0.16 + 0.2 * legend_rows(names, INNER) + LABELS
+    lines = title_lines(look, inner, loop_text(loop), *_remarks(loop))
+    top = heading_height(lines) + 0.14
+    bottom = 0.16 + 0.2 * legend_rows(names, inner) + LABELS
     controls = track.pieces[0].control.shape[1] + track.climbs if track.pieces else 0
+    each = [VALUE, *[PANEL] * controls, PANEL]
+    stacked = sum(each) + GAP * (len(each) - 1)
     shape = _shape(loop, footprint)
+    flat = shape > FLAT or look.is_narrow or not loop.steps
+    over_time = bool(loop.steps)
     if not loop.steps:
-        high = 3.2
-        figure = new_figure(WIDTH, bottom + high + top)
-        plane = axes_at(figure, left=LEFT, bottom=bottom, width=INNER, height=high)
-    elif shape > FLAT:
-        high = min(max(INNER / shape, 1.3), 3.2)
-        below = max(VALUE + GAP + PANEL, controls * PANEL + (controls - 1) * GAP)
-        figure = new_figure(WIDTH, bottom + below + LEGEND + LABELS + high + top)
-        at = bottom + below + LEGEND + LABELS
-        plane = axes_at(figure, left=LEFT, bottom=at, width=INNER, height=high)
-        half = (INNER - 0.75) / 2.0
-        value, solve = _stacked(
-            figure, [VALUE, PANEL], left=LEFT, bottom=bottom, width=half, height=below
-        )
-        middle = _stacked(
-            figure, [PANEL] * controls, left=WIDTH - RIGHT - half, bottom=bottom, width=half,
-            height=below,
-        )  # fmt: skip
-        _draw_over_time(loop, value=value, middle=middle, solve=solve)
+        below, high = 0.0, 3.2
+    elif look.is_narrow:
+        below, high = stacked + LEGEND + LABELS, min(max(inner / shape, 1.3), 3.9)
+    elif flat:
+        half = max(VALUE + GAP + PANEL, controls * PANEL + (controls - 1) * GAP)
+        below, high = half + LEGEND + LABELS, min(max(inner / shape, 1.3), 3.2)
     else:
-        each = [VALUE, *[PANEL] * controls, PANEL]
-        high = max(3.9, sum(each) + GAP * (len(each) - 1) + LEGEND)
-        figure = new_figure(WIDTH, bottom + high + top)
-        plane = axes_at(figure, left=LEFT, bottom=bottom, width=PLANE, height=high)
-        value, *middle, solve = _stacked(
-            figure, each, left=SIDE, bottom=bottom, width=WIDTH - SIDE - RIGHT,
-            height=high - LEGEND,
-        )  # fmt: skip
+        below, high = 0.0, max(3.9, stacked + LEGEND)
+    if look.height is not None:
+        room = look.height - bottom - top
+        if room < (below + LEAST_PLANE if flat else LEAST_SHARE * (stacked + LEGEND)):
+            over_time, below, flat = False, 0.0, True
+        high = max(LEAST_PLANE, room - below)
+    figure = new_figure(look.width, bottom + below + high + top)
+    plane = axes_at(
+        figure, left=LEFT, bottom=bottom + below, width=inner if flat else PLANE * inner,
+        height=high,
+    )  # fmt: skip
+    if over_time:
+        room = (below - LABELS if flat else high) - LEGEND
+        value, middle, solve = _side_axes(
+            figure, each, bottom=bottom, height=room, look=look, flat=flat
+        )
         _draw_over_time(loop, value=value, middle=middle, solve=solve)
-        for ax in middle:
-            _hide_times(ax)
+        if look.is_narrow or not flat:
+            hide_times(middle)
     draw_closed_loop(plane, loop, footprint=footprint, colors=colors, legend=False)
     heading_text(figure, lines, left=LEFT)
-    bottom_legend(figure, handles, names, left=LEFT, width=INNER)
+    bottom_legend(figure, handles, names, left=LEFT, width=inner)
     return figure
+
+
+def _side_axes(
+    figure: Figure, heights: Sequence[float], *, bottom: float, height: float, look: Look,
+    flat: bool,
+) -> tuple[Axes, list[Axes], Axes]:  # fmt: skip
+    """Axes for the value, for controls and altitude, and for the time per step."""
+    inner = look.width - LEFT - RIGHT
+    if flat and not look.is_narrow:
+        half = (inner - 0.75) / 2.0
+        value, solve = _stacked(
+            figure, [VALUE, PANEL], left=LEFT, bottom=bottom, width=half, height=height
+        )
+        middle = _stacked(
+            figure, heights[1:-1], left=look.width - RIGHT - half, bottom=bottom, width=half,
+            height=height,
+        )  # fmt: skip
+        return value, middle, solve
+    left = LEFT if flat else LEFT + PLANE * inner + BETWEEN
+    value, *middle, solve = _stacked(
+        figure, heights, left=left, bottom=bottom, width=look.width - left - RIGHT, height=height
+    )
+    return value, middle, solve
 
 
 def _draw_over_time(loop: ClosedLoop, *, value: Axes, middle: list[Axes], solve: Axes) -> None:
     draw_value(value, loop)
-    _hide_times(value)
+    hide_times([value])
     draw_solve_times(solve, loop)
     if middle:
         track, colors = driven_track(loop), loop_colors(loop)
@@ -148,13 +175,7 @@ def _draw_over_time(loop: ClosedLoop, *, value: Axes, middle: list[Axes], solve:
             draw_track_altitude(middle[-1], track, colors=colors)
     for ax in middle:
         set_times(ax, loop)
-    for ax in middle[:-1]:
-        _hide_times(ax)
-
-
-def _hide_times(ax: Axes) -> None:
-    ax.set_xlabel("")
-    ax.tick_params(labelbottom=False)
+    hide_times(middle[:-1])
 
 
 def _stacked(
@@ -171,24 +192,20 @@ def _stacked(
     return axes
 
 
-def _heading(loop: ClosedLoop) -> list[tuple[str, float, str]]:
-    """How the loop ended, how it went, and what was broken."""
-    lines = [(textwrap.fill(loop_text(loop), 96), 10.0, "bold")]
+def _remarks(loop: ClosedLoop) -> list[str]:
+    """How the loop went, and what was broken, in lines."""
+    lines = []
     if loop.steps:
         time = loop.problem.horizon.time
         horizon = "free final time" if time is None else f"horizon {time:g} s"
         replanned = sum(step.replanned for step in loop.steps)
-        lines.append(
-            (f"a step every {loop.step:g} s · {horizon} · {_times(replanned)}", TEXT_PT,
-             "normal")
-        )  # fmt: skip
+        lines.append(f"a step every {loop.step:g} s · {horizon} · {_times(replanned)}")
     broken = list(loop.violations)
     for number, violation in broken[:MOST_REASONS]:
-        text = textwrap.shorten(f"step {number}: {violation}", TEXT_WIDTH, placeholder=" …")
-        lines.append((text, TEXT_PT, "normal"))
-    if len(broken) > MOST_REASONS:
-        more = f"and {len(broken) - MOST_REASONS} more guarantees broken"
-        lines.append((more, TEXT_PT, "normal"))
+        text = f"step {number}: {violation}"
+        lines.append(textwrap.shorten(text, TEXT_WIDTH, placeholder=" …"))
+    if (more := len(broken) - MOST_REASONS) > 0:
+        lines.append(f"and {more} more guarantee{'s' if more > 1 else ''} broken")
     return lines
 
 

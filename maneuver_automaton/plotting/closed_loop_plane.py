@@ -17,9 +17,9 @@ from maneuver_automaton._arrays import Array, wrapped
 from maneuver_automaton.plotting.bodies import DART, DART_SIZE
 from maneuver_automaton.plotting.closed_loop_track import (
     END_TOLERANCE,
+    carried_poses,
     driven_track,
     loop_colors,
-    loop_points,
     loop_scene,
     loop_view,
     planned_places,
@@ -38,11 +38,12 @@ from maneuver_automaton.plotting.paths import (
     trim_handles,
 )
 from maneuver_automaton.plotting.scene import set_view
-from maneuver_automaton.plotting.style import corner_legend, line_handle
+from maneuver_automaton.plotting.style import line_handle, side_legend
 from maneuver_automaton.plotting.track import Track
 from maneuver_automaton.receding_horizon import ClosedLoop, Step
 
 APART, APART_RAD = 0.4, 0.3  # between bodies, of their reach; turned further, both are drawn
+MOST_SPINS = 12  # whose arrows can be told apart
 PALE: tuple[float, ...] = (*GREY, 0.5)
 JUMP: Color = (0.85, 0.15, 0.45)
 JUMP_STYLE, NEW_STYLE = (0, (1.0, 1.2)), (0, (5.0, 2.0))
@@ -92,7 +93,7 @@ def draw_closed_loop(
     colors : mapping, optional
         Colour of each trim by name; `loop_colors` if left out.
     legend : bool
-        Whether to name the trims and marks in the emptiest corner.
+        Whether to name the trims and marks in the legend beside the axes.
 
     Returns
     -------
@@ -118,8 +119,8 @@ def draw_closed_loop(
     box, size = loop_view(loop, scene)
     new = [step for step in loop.steps if step.replanned]
     spins = [piece for piece in track.pieces if not piece.drives and piece.turn]
-    arcs, heads = spin_symbols(spins, size=size)
-    spin_colors = [used[piece.name] for piece in spins]
+    arcs, heads = spin_symbols(spins if len(spins) <= MOST_SPINS else [], size=size)
+    spin_colors = [used[piece.name] for piece in spins[: len(arcs)]]
     driving = [piece for piece in track.pieces if piece.drives]
     artists = ClosedLoopArtists(
         path=LineCollection(
@@ -136,13 +137,16 @@ def draw_closed_loop(
         jumps=LineCollection(
             _jumps(loop), colors=[JUMP], linewidths=1.5, linestyles=[JUMP_STYLE], zorder=3.4
         ),
-        bodies=_bodies(body or (DART_SIZE * size * DART,), loop.poses, outlined=bool(body)),
+        bodies=_bodies(
+            body or (DART_SIZE * size * DART,), loop.poses, outlined=bool(body),
+            carried=carried_poses(loop),
+        ),
         spins=LineCollection(arcs, colors=spin_colors, linewidths=1.8, zorder=4.0),
         spin_heads=PolyCollection(heads, facecolors=spin_colors, linewidths=0.0, zorder=4.0),
         still=draw_still(ax, track, used),
         ends=draw_ends(ax, loop.poses[0], loop.problem.goals, size=size),
         obstacles=draw_obstacles(ax, loop.problem.obstacles, time=scene.times),
-        legend=_legend(ax, loop, track, used, points=loop_points(loop)) if legend else None,
+        legend=_legend(ax, loop, track, used) if legend else None,
     )  # fmt: skip
     for part in (
         artists.path, artists.plans, artists.new_plans, artists.jumps, artists.bodies,
@@ -158,10 +162,10 @@ def loop_handles(
 ) -> tuple[list[Artist], list[str]]:
     """Legend handles and names: the trims driven, start and goal, plans, and what else there is."""
     handles: list[Artist]
-    handles, names = [*trim_handles(track, colors)[0]], [*track.twists]
+    trims, names = trim_handles(track, colors)
     marks, mark_names = end_handles(loop.problem.goals)
     around, around_names = obstacle_handles(loop.problem.obstacles, loop_scene(loop).times)
-    handles, names = [*handles, *marks, *around], [*names, *mark_names, *around_names]
+    handles, names = [*trims, *marks, *around], [*names, *mark_names, *around_names]
     if loop.steps:
         handles.append(line_handle(GREY, width=0.9))
         names.append("plan of a step")
@@ -200,18 +204,25 @@ def _draw_replanned(ax: Axes, steps: Sequence[Step]) -> PathCollection:
     )
 
 
-def _bodies(body: Sequence[Array], poses: Array, *, outlined: bool) -> PolyCollection:
-    """The body at those of the `poses` (n, dof) that are apart, the first and last among them."""
+def _bodies(
+    body: Sequence[Array], poses: Array, *, outlined: bool,
+    carried: Sequence[tuple[Sequence[Array], Array]],
+) -> PolyCollection:  # fmt: skip
+    """The body at those of the `poses` (n, dof) that are apart, the first and last among them.
+
+    So is what it carries, each with its poses (n, dof).
+    """
     reach = max(float(np.linalg.norm(outline, axis=1).max()) for outline in body)
-    shown = [poses[0]] if len(poses) == 1 else [poses[0], poses[-1]]
-    for pose in poses[1:-1]:
-        gaps = np.array(shown)[:, :3] - pose[:3]
+    shown = [0] if len(poses) == 1 else [0, len(poses) - 1]
+    for k, pose in enumerate(poses[1:-1], start=1):
+        gaps = poses[shown, :3] - pose[:3]
         apart = np.hypot(gaps[:, 0], gaps[:, 1]) > APART * reach
         turned = np.abs(wrapped(gaps[:, 2])) > APART_RAD
         if (apart | turned).all():
-            shown.append(pose)
+            shown.append(k)
     return PolyCollection(
-        placed(body, np.array(shown)),
+        placed(body, poses[shown])
+        + [at for outlines, seen in carried for at in placed(outlines, seen[shown])],
         facecolors=[(*GREY, 0.06 if outlined else 0.35)],
         edgecolors=[(*INK, 0.55)],
         linewidths=0.7,
@@ -226,8 +237,6 @@ def _dot(marker: str, *, size: float, face: Any, edge: Any) -> Line2D:
     )  # fmt: skip
 
 
-def _legend(
-    ax: Axes, loop: ClosedLoop, track: Track, colors: Mapping[str, Color], *, points: Array
-) -> Legend:
+def _legend(ax: Axes, loop: ClosedLoop, track: Track, colors: Mapping[str, Color]) -> Legend:
     handles, names = loop_handles(loop, track, colors)
-    return corner_legend(ax, handles, names, points=points)
+    return side_legend(ax, handles, names)

@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.plotting.colors import Color, trim_colors
-from maneuver_automaton.plotting.footprint import placed
+from maneuver_automaton.automaton.carried import carried
+from maneuver_automaton.plotting.colors import Color
+from maneuver_automaton.plotting.footprint import footprint_polygons, placed
+from maneuver_automaton.plotting.motions import track_colors
 from maneuver_automaton.plotting.scene import (
     STILL_SIZE_M,
     Scene,
@@ -32,7 +34,7 @@ def loop_colors(loop: ClosedLoop) -> dict[str, Color]:
             continue
         for trim in plan.trims:
             twists.setdefault(trim.name, trim.body_velocity)
-    return trim_colors(twists)
+    return track_colors(twists)
 
 
 def driven_track(loop: ClosedLoop) -> Track:
@@ -45,6 +47,17 @@ def driven_track(loop: ClosedLoop) -> Track:
             else:
                 pieces.append(piece)
     return Track(loop.poses[0], tuple(pieces))
+
+
+def carried_poses(loop: ClosedLoop) -> list[tuple[list[Array], Array]]:
+    """Outlines of what a vehicle carries, and its poses (n + 1, dof) at the times of a `loop`."""
+    model = loop.problem.automaton.model
+    parts = []
+    for name, shapes in loop.problem.parts.items() if loop.driven else ():
+        plans = [carried(plan, model, name) for plan in loop.driven]
+        poses = np.array([*(plan.start for plan in plans), plans[-1].end])
+        parts.append((footprint_polygons(shapes), poses))
+    return parts
 
 
 def planned_places(loop: ClosedLoop) -> list[Array]:

@@ -32,6 +32,8 @@ WHEEL = np.array(
         [0.28, 0.68, 0.90],  # ahead and right
     ]
 )
+ASIDE = np.array([[0.53, 0.70, 0.10], [0.66, 0.34, 0.36]])  # to the left, to the right
+SLIP = 0.2  # of the speed: less motion aside does not show
 # for whole plans: the first is the best one
 SEQUENCE: tuple[Color, ...] = (
     (0.00, 0.40, 0.70),
@@ -79,6 +81,9 @@ def twist_color(twist: Array) -> Color:
     corner = int(np.floor(place))
     share = place - corner
     hue = (1.0 - share) * WHEEL[corner % 8] + share * WHEEL[(corner + 1) % 8]
+    if drive:
+        sideways = max(0.0, (abs(aside) / drive - SLIP) / (1.0 - SLIP))
+        hue = hue + sideways * (ASIDE[0 if aside > 0.0 else 1] - hue)
     red, green, blue = hue.tolist()
     pace = np.hypot(drive, turn)
     return _rounded(shaded((red, green, blue), 0.5 * (0.5 - pace / (1.0 + pace))))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -14,8 +15,9 @@ from matplotlib.lines import Line2D
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.plotting.colors import GREY, INK, Color, trim_colors
-from maneuver_automaton.plotting.style import corner_legend, tidy
+from maneuver_automaton.plotting.colors import GREY, INK, Color
+from maneuver_automaton.plotting.motions import track_colors
+from maneuver_automaton.plotting.style import side_legend, tidy
 from maneuver_automaton.plotting.track import Piece, Track, track_of_plan
 
 STYLES: tuple[tuple[float, Sequence[float]] | Literal["-"], ...] = (
@@ -25,6 +27,9 @@ STYLES: tuple[tuple[float, Sequence[float]] | Literal["-"], ...] = (
     (0, (5, 1.5, 1.2, 1.5)),
 )
 TIME_LABEL = "time [s]"
+CONSTANT, NEAR = 0.02, 0.2  # of the largest value: varies less, or more, then zero is in view
+CROWDED = 30  # pieces from which on lines where trims change would hide what they part
+CHARACTER, OVER = 0.061, 0.14  # [in] of a label, and how far it may stand over its axes
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -54,7 +59,7 @@ def draw_controls(
     labels : sequence of str
         What to call each control, with its unit; "control 1" and so on if left out.
     colors : mapping, optional
-        Colour of each trim by name; `trim_colors` of the plan's trims if left out.
+        Colour of each trim by name; `track_colors` of the plan's trims if left out.
 
     Returns
     -------
@@ -77,7 +82,7 @@ def draw_controls(
     [[0.0, 0.5], [2.0, 0.5]]
     """
     track = track_of_plan(plan)
-    used = dict(trim_colors(track.twists) if colors is None else colors)
+    used = dict(track_colors(track.twists) if colors is None else colors)
     return draw_track_controls(axes, track, labels=labels, colors=used)
 
 
@@ -108,8 +113,7 @@ def draw_track_controls(
         for k in range(many)
     )
     handles = [Line2D([], [], color=INK, linestyle=STYLES[k % len(STYLES)]) for k in range(many)]
-    points = np.concatenate([part for artists in drawn for part in artists.steps.get_segments()])
-    corner_legend(ax, handles, names, points=points)
+    side_legend(ax, handles, names)
     return drawn
 
 
@@ -124,7 +128,7 @@ def draw_altitude(
         If the plan lies in the plane.
     """
     track = track_of_plan(plan)
-    used = dict(trim_colors(track.twists) if colors is None else colors)
+    used = dict(track_colors(track.twists) if colors is None else colors)
     return draw_track_altitude(ax, track, colors=used)
 
 
@@ -172,6 +176,7 @@ def draw_over_time(
         colors[piece.name] if isinstance(colors, Mapping) else colors for piece in track.pieces
     ]
     times = track.switching_times
+    crowded = len(track.pieces) > CROWDED
     artists = StepArtists(
         steps=LineCollection(
             curves, colors=shown, linewidths=2.4, linestyles=[STYLES[style % len(STYLES)]],
@@ -179,10 +184,11 @@ def draw_over_time(
         ),
         jumps=LineCollection(
             [np.stack([a[-1], b[0]]) for a, b in pairwise(curves)],
-            colors=[one_color or GREY], linewidths=0.9, zorder=2.5,
+            colors=[one_color or GREY], linewidths=0.35 if crowded else 0.9, zorder=2.5,
         ),
         switches=LineCollection(
-            [[(t, 0.0), (t, 1.0)] for t in times], colors=[(*GREY, 0.6)], linewidths=0.6,
+            [] if crowded else [[(t, 0.0), (t, 1.0)] for t in times],
+            colors=[(*GREY, 0.6)], linewidths=0.6,
             transform=ax.get_xaxis_transform(), zorder=1.5,
         ),
     )  # fmt: skip
@@ -190,9 +196,16 @@ def draw_over_time(
     ax.add_collection(artists.jumps)
     ax.add_collection(artists.switches, autolim=False)
     _set_limits(ax, times, curves)
-    tidy(ax, x=TIME_LABEL, y=label)
+    tidy(ax, x=TIME_LABEL, y=_within(ax, label))
     ax.grid(visible=False, axis="x")
     return artists
+
+
+def _within(ax: Axes, label: str) -> str:
+    """The label, in lines where it is longer than the axes are high."""
+    high = ax.bbox.height / ax.get_figure(root=True).dpi  # type: ignore[union-attr]
+    most = max(12, int((high + OVER) / CHARACTER))
+    return label if len(label) <= most else "\n".join(textwrap.wrap(label, most))
 
 
 def _steps(piece: Piece, k: int) -> Array:
@@ -210,7 +223,8 @@ def _set_limits(ax: Axes, times: Array, curves: Sequence[Array]) -> None:
     low, high = ax.dataLim.intervaly if np.isfinite(ax.dataLim.intervaly).all() else (0.0, 0.0)
     values = np.concatenate([[low, high], *(curve[:, 1] for curve in curves)])
     low, high = float(values.min()), float(values.max())
-    if high - low > 0.2 * max(abs(low), abs(high)) or low == high:
+    size = max(abs(low), abs(high))
+    if not CONSTANT * size < high - low <= NEAR * size:
         low, high = min(low, 0.0), max(high, 0.0)
     room = 0.12 * (high - low) or 1.0
     ax.set_xlim(begin - 0.01 * (end - begin), end + 0.01 * (end - begin))

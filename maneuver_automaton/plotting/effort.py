@@ -17,7 +17,7 @@ from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE, Color
 from maneuver_automaton.plotting.controls import TIME_LABEL
 from maneuver_automaton.plotting.ends import draw_headings
 from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
-from maneuver_automaton.plotting.style import corner_legend, line_handle, tidy
+from maneuver_automaton.plotting.style import line_handle, tidy, upper_legend
 from maneuver_automaton.refinement.effort import EffortReport
 from maneuver_automaton.refinement.retiming import Retiming
 
@@ -105,7 +105,7 @@ def draw_accumulated(ax: Axes, example: UniformEffortExample) -> tuple[Line2D, .
     ]
     lines = (*drawn, straight)
     tidy(ax, x=TIME_LABEL, y="sum up to here")
-    corner_legend(ax, lines, names, points=np.column_stack([np.tile(time, 2), rows.T.ravel()]))
+    upper_legend(ax, lines, names)
     return lines
 
 
@@ -113,7 +113,7 @@ def draw_node_efforts(
     ax: Axes, examples: Sequence[UniformEffortExample]
 ) -> tuple[PathCollection, ...]:
     """Draw the effort at each node; the two at each end, which the rule spoils, as rings."""
-    points, rings, lines, names = [], [], [], []
+    rings, lines, names = [], [], []
     for k, example in enumerate(examples):
         color, time = SEQUENCE[k % len(SEQUENCE)], _control_times(example)
         ends = np.r_[0:END_NODES, len(time) - END_NODES : len(time)]
@@ -127,14 +127,13 @@ def draw_node_efforts(
                 linewidths=1.2, zorder=3.0 + 0.1 * k,
             )
         )  # fmt: skip
-        points.append(np.column_stack([time, example.effort]))
         lines.append(line)
         names.append(f"{len(example.solution.time)} nodes")
     tidy(ax, x=TIME_LABEL, y=EFFORT_LABEL)
     handles = [*lines, line_handle(GREY, marker="o")]
     legend_names = [*names, "two nodes at each end"]
     ax.margins(0.06, 0.1)
-    corner_legend(ax, handles, legend_names, points=np.concatenate(points))
+    upper_legend(ax, handles, legend_names)
     return tuple(rings)
 
 
@@ -157,8 +156,7 @@ def draw_spreads(ax: Axes, examples: Sequence[UniformEffortExample]) -> tuple[Li
     ax.set_xticks(nodes[order], [str(n) for n in nodes[order].tolist()])
     ax.minorticks_off()
     ax.yaxis.set_major_formatter("{x:g}")
-    points = np.column_stack([np.tile(np.log(nodes[order]), 2), np.log(spreads.T.ravel())])
-    corner_legend(ax, lines, names, points=points)
+    upper_legend(ax, lines, names)
     return lines
 
 
@@ -221,9 +219,8 @@ def draw_efforts(ax: Axes, retiming: Retiming) -> tuple[LineCollection, ...]:
         Line2D([], [], color=BEFORE, linewidth=2.4),
         Line2D([], [], color=AFTER, linewidth=2.4),
     ]
-    corners = np.concatenate([np.concatenate(list(s.get_segments())) for s in steps])
     names = ("before", "after", "uniform, without limits")
-    corner_legend(ax, [*handles, uniform], names, points=corners)
+    upper_legend(ax, [*handles, uniform], names)
     return steps
 
 
@@ -245,7 +242,7 @@ def draw_paces(ax: Axes, retiming: Retiming) -> tuple[Line2D, ...]:
     tidy(ax, x="x [m]", y="y [m]")
     step = retiming.before.duration / DOTS
     names = [f"every {step:.3g} s before", f"every {step:.3g} s after"]
-    corner_legend(ax, drawn, names, points=line[:, :2])
+    upper_legend(ax, drawn, names)
     return tuple(drawn)
 
 
@@ -265,8 +262,7 @@ def _draw_lines(
         for k, column in enumerate(rows.T)
     )
     tidy(ax, x=TIME_LABEL, y=label)
-    points = np.column_stack([np.tile(time, len(lines)), rows.T.ravel()])
-    corner_legend(ax, lines, names, points=points)
+    upper_legend(ax, lines, names)
     return lines
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,15 +17,23 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.plotting.bodies import DART
 from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE, Color
 from maneuver_automaton.plotting.footprint import placed
-from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
+from maneuver_automaton.plotting.look import Look
+from maneuver_automaton.plotting.pages import (
+    axes_at,
+    heading_height,
+    heading_text,
+    new_figure,
+    title_lines,
+    write_figure,
+)
 from maneuver_automaton.plotting.style import SMALL_PT, shortened
 from maneuver_automaton.primitives import Maneuver
 
 MOST_SINGLE = 48  # maneuvers that have a panel each
 MOST_PANELS = 120
-PANEL, TITLE, GAP, EDGE = 1.35, 0.34, 0.2, 0.34  # [in]
+PANEL, LINE, GAP, EDGE = 1.35, 0.11, 0.2, 0.34  # [in]
 COLUMNS = 8
-NAME_LENGTH = 25
+NAME_LENGTH, HARD = 25, "\N{NO-BREAK SPACE}"
 FULL_COLOR = 0.6  # [rad] of a change of heading
 ROOM = 1.35  # side of a panel, over the size of what is in it
 DART_SIZE = 0.075  # of the side of a panel
@@ -75,11 +84,12 @@ def draw_maneuvers(ax: Axes, maneuvers: Sequence[Maneuver]) -> ManeuverArtists:
     return ManeuverArtists(paths=paths, darts=darts)
 
 
-def save_maneuvers_figure(automaton: Automaton, path: str | Path) -> None:
+def save_maneuvers_figure(automaton: Automaton, path: str | Path, *, title: str = "") -> None:
     """Write pictures of every maneuver of an `automaton`, each panel to its own scale.
 
     Up to 48 have a panel each; more are drawn together with those that leave the same trim, in at
-    most 120 panels. The file is replaced in one step; its ending chooses the format.
+    most 120 panels. A `title` stands above. The file is replaced in one step; its ending chooses
+    the format.
 
     Raises
     ------
@@ -92,51 +102,60 @@ def save_maneuvers_figure(automaton: Automaton, path: str | Path) -> None:
     left_out, panels = len(panels) - MOST_PANELS, panels[:MOST_PANELS]
     columns = min(COLUMNS, len(panels))
     rows = math.ceil(len(panels) / columns)
-    top, width = 0.62, max(columns * (PANEL + GAP) - GAP + 2.0 * EDGE, 4.8)
-    figure = new_figure(width, top + rows * (PANEL + TITLE + GAP) + 0.1)
+    width = max(columns * (PANEL + GAP) - GAP + 2.0 * EDGE, 4.8)
+    lines = _heading(automaton, title, left_out, width)
+    above = LINE * max(name.count("\n") + 1 for name, _ in panels) + 0.08
+    top, step = heading_height(lines) + 0.1, PANEL + above + GAP
+    figure = new_figure(width, top + rows * step)
     high = float(figure.get_size_inches()[1])
-    for k, (title, maneuvers) in enumerate(panels):
+    for k, (name, maneuvers) in enumerate(panels):
         row, column = divmod(k, columns)
         ax = axes_at(
             figure, left=EDGE + column * (PANEL + GAP),
-            bottom=high - top - (row + 1) * (PANEL + TITLE + GAP) + GAP, width=PANEL, height=PANEL,
+            bottom=high - top - (row + 1) * step + GAP, width=PANEL, height=PANEL,
         )  # fmt: skip
         draw_maneuvers(ax, maneuvers)
         ax.text(
             0.04, 0.04, f"{np.ptp(ax.get_xlim()):.2g} m", transform=ax.transAxes, color=INK,
             fontsize=SMALL_PT - 2.0,
         )  # fmt: skip
-        ax.set_title(title, fontsize=SMALL_PT - 2.0, color=INK, parse_math=False, pad=2.5)
+        ax.set_title(name, fontsize=SMALL_PT - 2.0, color=INK, parse_math=False, pad=2.5)
+    heading_text(figure, lines, left=EDGE)
+    write_figure(figure, path)
+
+
+def _heading(
+    automaton: Automaton, title: str, left_out: int, width: float
+) -> list[tuple[str, float, str]]:
+    """Title, what is drawn, and how to read it."""
     more = f"; {left_out} more trims are left out" if left_out > 0 else ""
     name = shortened(automaton.name or automaton.model.name, 40)
     legend = "how wide a panel is stands in it; dots are 1 s apart; orange turns left, blue right"
-    lines = [
-        (f"{name}: {_count(automaton)}", 10.0, "bold"),
-        (legend + more, SMALL_PT, "normal"),
-    ]
-    heading_text(figure, lines, left=EDGE)
-    write_figure(figure, path)
+    said = f"{name}: {_count(automaton)}"
+    return title_lines(Look(title=title), width - EDGE, said, legend + more)
 
 
 def _panels(automaton: Automaton) -> list[tuple[str, list[Maneuver]]]:
     """Titles, and the maneuvers under each."""
     if len(automaton.maneuvers) <= MOST_SINGLE:
         return [
-            (f"{_short(one.source)}\nto {_short(one.target)}, {one.duration:.3g} s", [one])
+            (f"{_wrapped(one.source)}\n{_wrapped(f'to {one.target}, {one.duration:.3g} s')}", [one])
             for one in automaton.maneuvers
         ]
     leaving: dict[str, list[Maneuver]] = {}
     for one in automaton.maneuvers:
         leaving.setdefault(one.source, []).append(one)
     return [
-        (f"from {_short(name)}\n{len(many)} maneuver{'s' if len(many) > 1 else ''}", many)
+        (f"{_wrapped(f'from {name}')}\n{len(many)} maneuver{'s' if len(many) > 1 else ''}", many)
         for name in automaton.trim_names
         if (many := leaving.get(name))
     ]
 
 
-def _short(name: str) -> str:
-    return shortened(name, NAME_LENGTH)
+def _wrapped(name: str) -> str:
+    """A name in lines as wide as a panel, broken between its parts rather than within them."""
+    held = shortened(name, 3 * NAME_LENGTH).replace(" ", HARD).replace(f",{HARD}", ", ")
+    return textwrap.fill(held, NAME_LENGTH).replace(HARD, " ")
 
 
 def _count(automaton: Automaton) -> str:

@@ -21,6 +21,7 @@ from maneuver_automaton.plotting.regions import map_paths, moved_path, shape_pat
 
 SOLID: Color = (0.36, 0.38, 0.42)
 MOVING: Color = (0.44, 0.22, 0.58)
+ROBOT: Color = (0.90, 0.58, 0.05)  # the vehicle, at the times at which moving obstacles are shown
 PALEST, DARKEST = 0.72, -0.15  # of moving obstacles, at the first of several times and at the last
 TRACK_POINTS = 60
 MOST_STEPS = 5  # between the times at which moving obstacles are shown
@@ -155,11 +156,11 @@ def round_times(begin: float, end: float) -> Array:
     return np.array([begin, *apart.tolist(), end])
 
 
-def moment_colors(count: int) -> list[Color]:
-    """A colour for each of `count` times, pale to dark."""
+def moment_colors(count: int, *, color: Color = MOVING) -> list[Color]:
+    """A shade of a colour for each of `count` times, pale to dark."""
     if count == 1:
-        return [MOVING]
-    return [shaded(MOVING, amount) for amount in np.linspace(PALEST, DARKEST, count).tolist()]
+        return [color]
+    return [shaded(color, amount) for amount in np.linspace(PALEST, DARKEST, count).tolist()]
 
 
 def obstacle_handles(

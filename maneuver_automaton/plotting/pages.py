@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import io
 import math
+import textwrap
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
+from matplotlib import rc_context
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -15,9 +18,18 @@ from matplotlib.figure import Figure
 
 from maneuver_automaton._files import write_bytes_atomically
 from maneuver_automaton.plotting.colors import INK
-from maneuver_automaton.plotting.style import NAME_LENGTH, SMALL_PT, plain
+from maneuver_automaton.plotting.look import HEAD_PT, TITLE_PT, Look
+from maneuver_automaton.plotting.style import NAME_LENGTH, SMALL_PT, TEXT_PT, plain
 
 DPI = 130
+# text as text, in fonts that journals take; the same picture gives the same bytes
+VECTOR: Any = {
+    "pdf.fonttype": 42,
+    "ps.fonttype": 42,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "picture",
+}
+UNDATED: dict[str, dict[str, Any]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -45,6 +57,13 @@ def stacked_axes(
     ]
 
 
+def hide_times(column: Sequence[Axes]) -> None:
+    """Leave the times to the axes below."""
+    for ax in column:
+        ax.set_xlabel("")
+        ax.tick_params(labelbottom=False)
+
+
 def heading_text(figure: Figure, lines: Sequence[tuple[str, float, str]], *, left: float) -> None:
     """Lines of (text, size [pt], weight) from the upper left corner down, `left` in inches."""
     wide, high = figure.get_size_inches()
@@ -55,6 +74,31 @@ def heading_text(figure: Figure, lines: Sequence[tuple[str, float, str]], *, lef
             va="top", ha="left", parse_math=False, linespacing=1.25,
         )  # fmt: skip
         top += 1.42 * size / 72.0 * (1 + text.count("\n"))
+
+
+def heading_height(lines: Sequence[tuple[str, float, str]]) -> float:
+    """Height [in] that lines of `heading_text` take, from the upper edge down."""
+    return 0.12 + sum(1.42 * size / 72.0 * (1 + text.count("\n")) for text, size, _ in lines)
+
+
+def title_lines(look: Look, width: float, *others: str) -> list[tuple[str, float, str]]:
+    """Lines of `heading_text`: the title, then `others`, the first of which is bold without one.
+
+    All are wrapped to a `width` [in]. In a paper the title stands alone.
+    """
+    said = [look.title, *([] if look.is_paper else others)]
+    shown = [(text, k) for k, text in enumerate(said) if text]
+    lines = []
+    for place, (text, k) in enumerate(shown):
+        size = TITLE_PT if k == 0 else HEAD_PT if place == 0 else TEXT_PT
+        most = max(20, int(width / ((0.0077 if place else 0.0092) * size)))
+        lines.append((fill(text, most), size, "normal" if place else "bold"))
+    return lines
+
+
+def fill(text: str, most: int) -> str:
+    """The text in lines of at most so many characters; lines that it has stay lines."""
+    return "\n".join(textwrap.fill(line, most) for line in text.split("\n"))
 
 
 def legend_rows(labels: Sequence[str], width: float, *, length: int = NAME_LENGTH) -> int:
@@ -90,18 +134,18 @@ def write_figure(figure: Figure, path: str | Path) -> None:
     target = Path(path)
     ending = target.suffix.lstrip(".").lower() or "png"
     stream = io.BytesIO()
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), rc_context(VECTOR):
         # a trim may be named in a script that the font lacks
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         if ending == "png":
             # a fast level: the size of the file hardly depends on it, the time does
             figure.savefig(stream, format="png", dpi=DPI, pil_kwargs={"compress_level": 2})
         else:
-            figure.savefig(stream, format=ending)
+            figure.savefig(stream, format=ending, metadata=UNDATED.get(ending))
     write_bytes_atomically(target, stream.getvalue())
 
 
 def _columns(labels: Sequence[str], width: float, length: int) -> int:
     longest = max((min(len(label), length) for label in labels), default=1)
-    most = max(1, min(len(labels), int(width / (0.062 * longest + 0.48))))
+    most = max(1, min(len(labels), int(width / (0.062 * longest + 0.44))))
     return math.ceil(len(labels) / math.ceil(len(labels) / most))

@@ -27,10 +27,13 @@ from maneuver_automaton.plotting.bodies import (
     swept_area,
     switch_bodies,
 )
-from maneuver_automaton.plotting.colors import Color, trim_colors
+from maneuver_automaton.plotting.colors import INK, Color
 from maneuver_automaton.plotting.ends import EndArtists, draw_ends, end_handles
 from maneuver_automaton.plotting.footprint import footprint_polygons
+from maneuver_automaton.plotting.labels import shown_name
+from maneuver_automaton.plotting.motions import MOST_TRIMS, motion_names, track_colors
 from maneuver_automaton.plotting.obstacles import (
+    ROBOT,
     ObstacleArtists,
     draw_obstacles,
     obstacle_handles,
@@ -44,7 +47,7 @@ from maneuver_automaton.plotting.scene import (
     set_view,
     view_box,
 )
-from maneuver_automaton.plotting.style import corner_legend, line_handle
+from maneuver_automaton.plotting.style import line_handle, side_legend
 from maneuver_automaton.plotting.track import Piece, Track, track_of_plan
 from maneuver_automaton.problem import Goal, Problem
 
@@ -102,9 +105,9 @@ def draw_plan(
         Pose of the goal [m, m, rad(, m)]; those of the problem, or else the end of the plan, if
         left out.
     colors : mapping, optional
-        Colour of each trim by name; `trim_colors` of the plan's trims if left out.
+        Colour of each trim by name; `track_colors` of the plan's trims if left out.
     legend : bool
-        Whether to name the trims in the emptiest corner.
+        Whether to name the trims beside the axes.
 
     Returns
     -------
@@ -122,7 +125,7 @@ def draw_plan(
     [[0.0, 0.0], [2.0, 0.0]]
     """
     track = track_of_plan(plan)
-    used = dict(trim_colors(track.twists) if colors is None else colors)
+    used = dict(track_colors(track.twists) if colors is None else colors)
     if problem is None:
         scene = bare_scene(track, footprint=footprint)
     else:
@@ -182,10 +185,11 @@ def draw_track(
 
 
 def trim_handles(track: Track, colors: Mapping[str, Color]) -> tuple[list[Line2D], list[str]]:
-    """Legend handles and names of the trims of a `track`, in order."""
+    """Legend handles and names of the trims of a `track`, in order; of how they move, if many."""
     symbols = {piece.name: _symbol(piece) for piece in reversed(track.pieces)}
-    names = list(track.twists)
-    return [line_handle(colors[name], marker=symbols[name]) for name in names], names
+    entries = motion_names(track.twists, many=len(colors) > MOST_TRIMS)
+    handles = [line_handle(colors[name], marker=symbols[name]) for name in entries.values()]
+    return handles, [shown_name(name) for name in entries]
 
 
 def scene_handles(track: Track, scene: Scene) -> tuple[list[Artist], list[str]]:
@@ -194,7 +198,12 @@ def scene_handles(track: Track, scene: Scene) -> tuple[list[Artist], list[str]]:
     around, around_names = obstacle_handles(scene.obstacles, scene.times)
     swept = bool(scene.body and track.pieces)
     patches = [Patch(facecolor=(*SWEPT, SWEPT_ALPHA))] if swept else []
-    return [*ends, *patches, *around], [*names, *["swept by the body"] * swept, *around_names]
+    by = " and the ".join(["swept by the body", *(part.name for part in scene.carried)])
+    said = [by] if swept else []
+    if swept and scene.moves:
+        patches.append(Patch(facecolor=(*ROBOT, 0.85), edgecolor=INK))
+        said.append("body at the same times")
+    return [*ends, *patches, *around], [*names, *said, *around_names]
 
 
 def _symbol(piece: Piece) -> str:
@@ -237,5 +246,4 @@ def draw_still(ax: Axes, track: Track, colors: Mapping[str, Color]) -> tuple[Pat
 def _legend(ax: Axes, track: Track, scene: Scene, colors: Mapping[str, Color]) -> Legend:
     handles, labels = trim_handles(track, colors)
     marks, names = scene_handles(track, scene)
-    points = np.concatenate([track.pose[:, :2], [goal.pose[:2] for goal in scene.goals]])
-    return corner_legend(ax, [*handles, *marks], [*labels, *names], points=points)
+    return side_legend(ax, [*handles, *marks], [*labels, *names])

@@ -9,15 +9,24 @@ from matplotlib.ticker import NullFormatter
 
 from maneuver_automaton.planning import PlanResult
 from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE
-from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
+from maneuver_automaton.plotting.look import Look
+from maneuver_automaton.plotting.pages import (
+    axes_at,
+    heading_text,
+    new_figure,
+    title_lines,
+    write_figure,
+)
 from maneuver_automaton.plotting.style import tidy
 
 EARLIEST = 1e-3  # [s] from where time is drawn, on a logarithmic axis
 ABOVE = 1.35  # times the final cost, up to which first plans are drawn
 
 
-def save_progress_figure(result: PlanResult, path: str | Path) -> None:
+def save_progress_figure(result: PlanResult, path: str | Path, *, title: str = "") -> None:
     """Write the picture of a search: what the best plan cost, and what was proven, over time.
+
+    A `title` stands above the numbers.
 
     Raises
     ------
@@ -27,12 +36,13 @@ def save_progress_figure(result: PlanResult, path: str | Path) -> None:
     if result.plan is None or result.cost is None or result.bound is None:
         raise ValueError("progress: the result holds no plan, so there is nothing to draw")
     figure = new_figure(6.4, 3.9)
+    look = Look(title=title)
     ax = axes_at(figure, left=0.75, bottom=0.6, width=4.3, height=2.65)
     draw_progress(ax, result)
     gap = 0.0 if result.gap is None else 100.0 * result.gap
     said = "proven optimal" if result.bound.optimal else f"gap {gap:.2g} % by {result.bound.kind}"
     headline = f"Cost {result.cost:.6g}, {said}"
-    heading_text(figure, [(headline, 10.0, "bold")], left=0.3)
+    heading_text(figure, title_lines(look, 5.8, headline), left=0.3)
     write_figure(figure, path)
 
 
@@ -45,8 +55,9 @@ def draw_progress(ax: Axes, result: PlanResult) -> None:
     costs = costs or [(EARLIEST, result.cost)]
     bounds = bounds or [(EARLIEST, result.bound.value)]
     end = 1.1 * max(costs[-1][0], bounds[-1][0], 10.0 * EARLIEST)
-    costs.append((end, result.cost))
-    bounds.append((end, result.bound.value))
+    known = end / 1.1 * 1.02  # what ended the search may be in neither history
+    costs += [(known, result.cost), (end, result.cost)]
+    bounds += [(known, result.bound.value), (end, result.bound.value)]
     times = sorted({at for at, _ in (*costs, *bounds) if at >= max(costs[0][0], bounds[0][0])})
     upper = [min(cost for at, cost in costs if at <= time) for time in times]
     lower = [max(bound for at, bound in bounds if at <= time) for time in times]
@@ -69,3 +80,4 @@ def draw_progress(ax: Axes, result: PlanResult) -> None:
     ax.set_xlim(EARLIEST, end)
     ax.set_ylim(0.0, ABOVE * result.cost if result.cost > 0.0 else 1.0)
     tidy(ax, x="time since the search began [s]", y="cost")
+    ax.tick_params(which="minor", length=1.5, width=0.4, color=GREY)

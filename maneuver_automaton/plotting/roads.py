@@ -138,7 +138,10 @@ def save_road_figure(
         linewidth=1.4,
         label="across",
     )
-    rates.legend(frameon=False, fontsize=8.0, ncols=2, loc="upper right")
+    rates.legend(
+        frameon=False, fontsize=8.0, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0),
+        borderaxespad=0.0,
+    )  # fmt: skip
     tidy(rates, x="time [s]", y="acceleration [m/s²]")
     write_figure(figure, path)
 

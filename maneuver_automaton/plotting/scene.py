@@ -11,13 +11,14 @@ from matplotlib.axes import Axes
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.collision import AnyObstacle, Obstacle, OccupancyMap
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.footprint import footprint_polygons, placed
 from maneuver_automaton.plotting.obstacles import moving_shapes, round_times, static_shapes
 from maneuver_automaton.plotting.regions import shape_path
 from maneuver_automaton.plotting.style import count_from_near, tidy
-from maneuver_automaton.plotting.track import Track
+from maneuver_automaton.plotting.track import Track, track_of_plan
 from maneuver_automaton.problem import Goal, Problem
 
 STILL_SIZE_M = 1.0  # size of a path that goes nowhere
@@ -30,6 +31,15 @@ IN_VIEW = 0.5  # or, among obstacles, one that takes this share of the picture
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Carried:
+    """What a vehicle carries, say a trailer: its body, and the track of its own frame."""
+
+    name: str
+    body: tuple[Array, ...]  # outlines (n, 2) [m]
+    track: Track
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Scene:
     """Goals, obstacles and a body."""
 
@@ -37,6 +47,7 @@ class Scene:
     reached: int | None = None  # which of the goals
     obstacles: tuple[AnyObstacle, ...] = ()
     body: tuple[Array, ...] = ()  # outlines (n, 2) [m]; none: it is not known
+    carried: tuple[Carried, ...] = ()
     times: Array  # (n,) at which moving obstacles are shown [s]
 
     @property
@@ -63,7 +74,21 @@ def plan_scene(problem: Problem, plan: Plan | None, *, footprint: Any = None) ->
     begin, end = plan.switching_times[[0, -1]].tolist()
     off = [sum(goal.off(plan.end)) for goal in problem.goals]
     scene = scene_of(problem, begin, end, footprint=footprint)
-    return replace(scene, reached=int(np.argmin(off)))
+    return replace(scene, reached=int(np.argmin(off)), carried=carried_parts(problem, plan))
+
+
+def carried_parts(problem: Problem, plan: Plan) -> tuple[Carried, ...]:
+    """The parts of a vehicle and their tracks along a `plan`."""
+    model = problem.automaton.model
+    return tuple(
+        Carried(
+            name=name,
+            body=tuple(footprint_polygons(shapes)),
+            track=track_of_plan(carried(plan, model, name)),
+        )
+        for name, shapes in problem.parts.items()
+        if plan.trims
+    )
 
 
 def scene_of(problem: Problem, begin: float, end: float, *, footprint: Any = None) -> Scene:
@@ -132,6 +157,8 @@ def scene_points(scene: Scene, track: Track, *, size: float) -> Array:
     """Places (n, 2) where something happens: the track, the body along it, start and goals."""
     ends = np.array([track.start, *(goal.pose for goal in scene.goals)])
     bodies = placed(scene.body, np.concatenate([track.switching_poses, ends]))
+    for part in scene.carried:
+        bodies += placed(part.body, part.track.switching_poses)
     room = 0.0 if scene.body else ROOM * size
     return np.concatenate([track.pose[:, :2], ends[:, :2] - room, ends[:, :2] + room, *bodies])
 

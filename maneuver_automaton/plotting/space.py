@@ -21,13 +21,16 @@ from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanResult
 from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded, trim_colors
-from maneuver_automaton.plotting.labels import result_text
+from maneuver_automaton.plotting.labels import result_text, shown_name
+from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.pages import (
     axes_at,
     bottom_legend,
+    heading_height,
     heading_text,
     legend_rows,
     new_figure,
+    title_lines,
     write_figure,
 )
 from maneuver_automaton.plotting.regions import shape_path
@@ -36,7 +39,7 @@ from maneuver_automaton.plotting.track import Track, track_of_plan
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
 
-WIDTH, SPACE, FLAT = 9.6, 5.3, 1.75  # [in] of the page; heights of the axes
+WIDTH, SPACE, FLAT = 9.6, 5.2, 1.75  # [in] of the page; heights of the axes
 HIGHEST = 2.6  # [in] of the plane
 LEFT, GAP = 0.7, 0.62  # [in]
 ELEVATION, AZIMUTH = 42.0, -68.0  # [deg] from where space is seen
@@ -122,8 +125,10 @@ def draw_space(ax: Axes3D, result: PlanResult) -> SpaceArtists:
     return SpaceArtists(faces=collection, ends=tuple(ends))
 
 
-def save_space_figure(result: PlanResult, path: str | Path) -> None:
+def save_space_figure(result: PlanResult, path: str | Path, *, title: str = "") -> None:
     """Write a picture of a flight: in space, from above, and from the side, all to scale.
+
+    A `title` stands above the numbers.
 
     Raises
     ------
@@ -136,10 +141,10 @@ def save_space_figure(result: PlanResult, path: str | Path) -> None:
         raise ValueError(
             f"a picture in space: the {result.problem.automaton.model.name} has no altitude"
         )
-    write_figure(_figure(result), path)
+    write_figure(_figure(result, title), path)
 
 
-def _figure(result: PlanResult) -> Figure:
+def _figure(result: PlanResult, title: str) -> Figure:
     import mpl_toolkits.mplot3d  # noqa: F401 - Matplotlib knows the projection from then on
 
     track, problem = _track(result), result.problem
@@ -150,10 +155,11 @@ def _figure(result: PlanResult) -> Figure:
     room = WIDTH - LEFT - 0.2 - GAP
     each = 0.5 * room
     height = max(FLAT, min(each * span[1] / span[0], HIGHEST))
-    figure = new_figure(WIDTH, bottom + height + 0.35 + SPACE)
+    lines = title_lines(Look(title=title), WIDTH - LEFT, _headline(result))
+    figure = new_figure(WIDTH, bottom + height + 0.15 + SPACE + heading_height(lines))
     tall = float(figure.get_size_inches()[1])
     base = bottom + height + 0.15
-    box = (0.0, base / tall, 1.0, (tall - base - 0.3) / tall)
+    box = (0.0, base / tall, 1.0, SPACE / tall)
     space: Any = figure.add_axes(box, projection="3d", computed_zorder=False)
     space.patch.set_alpha(0.0)
     draw_space(space, result)
@@ -161,7 +167,7 @@ def _figure(result: PlanResult) -> Figure:
     aside = axes_at(figure, left=LEFT + each + GAP, bottom=bottom, width=each, height=height)
     _draw_flat(from_above, result, track, across=1, low=low, high=high)
     _draw_flat(aside, result, track, across=2, low=low, high=high)
-    heading_text(figure, [(_headline(result), 10.0, "bold")], left=0.35)
+    heading_text(figure, lines, left=0.35)
     bottom_legend(figure, handles, names, left=LEFT, width=WIDTH - 2 * LEFT, length=NAMES)
     return figure
 
@@ -318,9 +324,11 @@ def _legend(result: PlanResult, track: Track) -> tuple[list[Line2D], list[str]]:
     names = list(colors)
     if result.plan is not None and any(result.plan.maneuvers):
         handles.append(line_handle(INK))
-        names.append("maneuvers")
-    handles.append(line_handle(START, marker="o"))
-    handles.append(line_handle(GOAL, marker="*"))
+        done = {shown_name(one.name) for one in result.plan.maneuvers if one is not None}
+        names.append("maneuvers" if len(done) > 1 else done.pop())
+    for color, marker in ((START, "o"), (GOAL, "*")):
+        handles.append(line_handle(color, marker=marker))
+        handles[-1].set_markerfacecolor(color)
     return handles, [*names, "start", "goal"]
 
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, ScalarFormatter
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.plotting.colors import GREY, INK, Color
@@ -18,9 +18,9 @@ from maneuver_automaton.plotting.colors import GREY, INK, Color
 TEXT_PT = 9.0
 SMALL_PT = 8.0
 FAR_M = 1e5  # from here on coordinates are counted from a round number
-NAME_LENGTH = 28  # characters of a name before it is cut
-Corner = Literal["upper left", "upper right", "lower left", "lower right"]
-CORNERS: tuple[Corner, ...] = ("upper left", "upper right", "lower left", "lower right")
+NAME_LENGTH = 60  # characters of a name before it is cut
+LEAST_SHARE = 0.3  # of the width of axes that a legend beside them leaves
+CHARACTER, ROW = 0.062, 0.19  # [in] of a letter in a legend, and from row to row
 
 
 def tidy(ax: Axes, *, x: str, y: str) -> None:
@@ -32,6 +32,9 @@ def tidy(ax: Axes, *, x: str, y: str) -> None:
     ax.spines[["left", "bottom"]].set(color=GREY, linewidth=0.6)
     ax.grid(visible=True, color=GREY, alpha=0.22, linewidth=0.5)
     ax.set_axisbelow(True)
+    for axis in (ax.xaxis, ax.yaxis):
+        if isinstance(formatter := axis.get_major_formatter(), ScalarFormatter):
+            formatter.set_useOffset(False)
 
 
 def count_from_near(ax: Axes, place: Array) -> None:
@@ -73,37 +76,55 @@ def plain(legend: Legend, labels: Sequence[str], *, length: int = NAME_LENGTH) -
     return legend
 
 
-def corner_legend(
-    ax: Axes,
-    handles: Sequence[Artist],
-    labels: Sequence[str],
-    *,
-    points: Array,
-    length: int = NAME_LENGTH,
+def upper_legend(
+    ax: Axes, handles: Sequence[Artist], labels: Sequence[str], *, length: int = NAME_LENGTH
 ) -> Legend:
-    """A legend in the corner of `ax` that covers fewest of the `points` (n, 2)."""
+    """A legend above `ax`, which makes room for it unless a layout engine does."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    wide, high = figure.get_size_inches()
+    place = ax.get_position()
+    longest = max((min(len(label), length) for label in labels), default=1)
+    columns = max(1, min(len(labels), int(place.width * wide / (CHARACTER * longest + 0.5))))
+    room = (ROW * math.ceil(len(labels) / columns) + 0.08) / high
+    if figure.get_layout_engine() is None and place.height - room > LEAST_SHARE * place.height:
+        ax.set_position((place.x0, place.y0, place.width, place.height - room))
     legend = ax.legend(
         handles,
         [str(k) for k in range(len(labels))],
-        loc=_emptiest_corner(points),
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=columns,
         fontsize=SMALL_PT,
-        frameon=True,
-        framealpha=0.85,
-        edgecolor="none",
-        borderaxespad=0.3,
+        frameon=False,
+        borderaxespad=0.2,
+        borderpad=0.1,
+        labelspacing=0.3,
+        columnspacing=1.2,
         handlelength=1.6,
     )
     return plain(legend, labels, length=length)
 
 
-def _emptiest_corner(points: Array) -> Corner:
-    low, high = points.min(axis=0), points.max(axis=0)
-    at = (points - low) / np.where(high > low, high - low, 1.0)
-    crowds = [
-        np.count_nonzero((abs(at[:, 0] - x) < 0.45) & (abs(at[:, 1] - y) < 0.45))
-        for x, y in ((0.0, 1.0), (1.0, 1.0), (0.0, 0.0), (1.0, 0.0))
-    ]
-    return CORNERS[int(np.argmin(crowds))]
+def side_legend(ax: Axes, handles: Sequence[Artist], labels: Sequence[str]) -> Legend:
+    """A legend on the right of `ax`, which makes room for it unless a layout engine does."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    longest = max((min(len(label), NAME_LENGTH) for label in labels), default=0)
+    place, room = ax.get_position(), (CHARACTER * longest + 0.6) / figure.get_size_inches()[0]
+    if figure.get_layout_engine() is None and place.width - room > LEAST_SHARE * place.width:
+        ax.set_position((place.x0, place.y0, place.width - room, place.height))
+    legend = ax.legend(
+        handles,
+        [str(k) for k in range(len(labels))],
+        loc="upper left",
+        bbox_to_anchor=(1.02, 1.0),
+        fontsize=SMALL_PT,
+        frameon=False,
+        borderaxespad=0.0,
+        handlelength=1.6,
+    )
+    return plain(legend, labels)
 
 
 def share_limits(column: Sequence[Axes]) -> None:

@@ -13,7 +13,7 @@ from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.plotting.footprint import placed
 from maneuver_automaton.plotting.track import Piece, Track
 
-STRAIGHT_RAD = 1e-9  # a piece that turns less is drawn by its two ends
+STRAIGHT_RAD, DETOUR = 1e-9, 1e-12  # turn, and way over chord, of a piece drawn by its two ends
 
 
 def swept_region(track: Track, outlines: Sequence[Array]) -> list[Any]:
@@ -43,10 +43,26 @@ def swept_region(track: Track, outlines: Sequence[Array]) -> list[Any]:
             places = np.array(placed([corners], poses))
             pairs = np.concatenate([places[:-1], places[1:]], axis=1) if len(places) > 1 else places
             parts += shapely.convex_hull(shapely.multipoints(pairs)).tolist()
+    return merged(parts)
+
+
+def merged(parts: Sequence[Any]) -> list[Any]:
+    """Shapely polygons that cover what the `parts` cover, each place once."""
+    import shapely
+
     whole = shapely.union_all(np.array(parts))
     return [part for part in shapely.get_parts(whole).tolist() if part.geom_type == "Polygon"]
 
 
 def _samples(piece: Piece) -> Array:
-    """Poses (n, dof) of a piece, no more than it takes."""
-    return piece.pose if abs(piece.turn) > STRAIGHT_RAD else piece.pose[[0, -1]]
+    """Poses (n, dof) of a piece, no more than it takes.
+
+    That it turns by nothing in all is not enough: a lane change goes left and right again.
+    """
+    pose = piece.pose
+    chord = pose[-1, :2] - pose[0, :2]
+    steps = np.diff(pose[:, :2], axis=0)
+    length = float(np.linalg.norm(chord))
+    detour = float(np.linalg.norm(steps, axis=1).sum()) - length
+    straight = np.ptp(pose[:, 2]) <= STRAIGHT_RAD and detour <= DETOUR * (1.0 + length)
+    return pose[[0, -1]] if straight else pose

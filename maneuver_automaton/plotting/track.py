@@ -25,7 +25,7 @@ class Piece:
     """One trim or maneuver of a plan that takes time, as samples."""
 
     name: str
-    twist: Array  # (dof,) at its beginning [m/s, m/s, rad/s(, m/s)]
+    twist: Array  # (dof,) of a trim, or the mean of a maneuver [m/s, m/s, rad/s(, m/s)]
     time: Array  # (n,) [s]
     pose: Array  # (n, dof), headings continuous
     control: Array  # (n, n_u), row i holds from time i on
@@ -263,8 +263,7 @@ def _held(control: Array) -> Array:
 
 
 def _twist(time: Array, pose: Array) -> Array:
-    """Twist (dof,) over the longest step between samples of one piece."""
-    k = int(np.argmax(np.diff(time)))
-    gained = (SE2(pose[k, :3]).inverse() @ SE2(pose[k + 1, :3])).log()
-    climbed = pose[k + 1, 3:] - pose[k, 3:]
-    return np.asarray(np.concatenate([gained, climbed]) / (time[k + 1] - time[k]))
+    """Mean twist (dof,) of one piece: what it gains from sample to sample, over its duration."""
+    gained = (SE2(pose[:-1, :3]).inverse() @ SE2(pose[1:, :3])).log().sum(axis=0)
+    climbed = pose[-1, 3:] - pose[0, 3:]
+    return np.asarray(np.concatenate([gained, climbed]) / (time[-1] - time[0]))

@@ -11,8 +11,9 @@ from matplotlib.lines import Line2D
 from maneuver_automaton.analysis.turnpike import Turnpike
 from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE
 from maneuver_automaton.plotting.controls import TIME_LABEL
+from maneuver_automaton.plotting.labels import control_labels
 from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
-from maneuver_automaton.plotting.style import corner_legend, tidy
+from maneuver_automaton.plotting.style import tidy, upper_legend
 
 WIDEST = 2.4  # line of the shortest path, which the longer ones would hide
 
@@ -40,18 +41,17 @@ def save_turnpike_figure(study: Turnpike, path: str | Path) -> None:
 
 def draw_turnpike_states(ax: Axes, study: Turnpike, *, component: int = 0) -> list[Line2D]:
     """Draw a component of the reduced state over time, one line for each path, and the trim's."""
-    lines, points = [], []
+    lines = []
     for k, case in enumerate(study.cases):
         time = case.optimum.time
         values = case.optimum.state[:, case.goal.size + component]
         width = max(1.0, WIDEST - 0.4 * k)
         lines += ax.plot(time, values, color=SEQUENCE[k % len(SEQUENCE)], linewidth=width)
-        points.append(np.column_stack([time, values]))
     level = float(study.trim.reduced_state[component])
     lines.append(ax.axhline(level, color=INK, linewidth=1.0, linestyle=(0, (3, 2))))
     names = [f"{case.duration:.3g} s" for case in study.cases] + ["trim"]
-    tidy(ax, x=TIME_LABEL, y=study.reduced_names[component])
-    corner_legend(ax, lines, names, points=np.concatenate(points))
+    tidy(ax, x=TIME_LABEL, y=control_labels([study.reduced_names[component]])[0])
+    upper_legend(ax, lines, names)
     return lines
 
 
@@ -68,8 +68,7 @@ def draw_turnpike_costs(ax: Axes, study: Turnpike) -> list[Line2D]:
         for values, color in zip(beyond.values(), (GREY, SEQUENCE[0]), strict=True)
     ]
     tidy(ax, x="time in the trim [s]", y="cost beyond the trim's")
-    points = np.concatenate([np.column_stack([coast, values]) for values in beyond.values()])
-    corner_legend(ax, lines, list(beyond), points=points)
+    upper_legend(ax, lines, list(beyond))
     return lines
 
 
@@ -82,6 +81,5 @@ def draw_time_away(ax: Axes, study: Turnpike) -> list[Line2D]:
         *ax.plot(duration, away, color=SEQUENCE[0], linewidth=1.8, marker="o", markersize=4.0),
     ]
     tidy(ax, x="duration [s]", y=f"time farther than {study.distance:g} [s]")
-    points = np.column_stack([np.tile(duration, 2), np.concatenate([duration, away])])
-    corner_legend(ax, lines, ["all of it", "away"], points=points)
+    upper_legend(ax, lines, ["all of it", "away"])
     return lines

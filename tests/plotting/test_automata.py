@@ -1,7 +1,10 @@
 from __future__ import annotations
 
+from itertools import permutations
+
 import numpy as np
 import pytest
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
@@ -99,3 +102,38 @@ def test_pictures_of_all_sizes_are_written(automaton, tmp_path):
 
 def _origin():
     return Unicycle().group.identity()
+
+
+def test_switches_and_motions_have_arrow_heads():
+    ax = Figure(figsize=(4.0, 4.0)).add_subplot()
+    artists = draw_automaton(ax, ROBOT)
+    many = len(artists.switches.get_segments())
+    heads = [len(part.get_paths()) for part in ax.collections if isinstance(part, PolyCollection)]
+    assert many == 10
+    assert 2 * many in heads  # at both ends: they go either way
+    ax = Figure().add_subplot()
+    draw_motions(ax, ROBOT)
+    heads = [len(part.get_paths()) for part in ax.collections if isinstance(part, PolyCollection)]
+    assert heads[0] == 3  # of those that leave their place
+
+
+def test_hundreds_of_maneuvers_are_thin_pale_lines_that_join_both_ways():
+    few = with_inertia()
+    trims = [
+        Trim(
+            name=f"speed {k}", body_velocity=[1.0 + k, 0.0, 0.0], control=np.zeros(2),
+            reduced_state=[1.0 + k, 0.0],
+        )
+        for k in range(20)
+    ]  # fmt: skip
+    maneuvers = [
+        Maneuver(
+            name=f"{a} to {b}", source=f"speed {a}", target=f"speed {b}",
+            displacement=[1.0, 0.0, 0.0], duration=1.0,
+        )
+        for a, b in permutations(range(20), 2)
+    ]  # fmt: skip
+    ax = Figure(figsize=(4.0, 4.0)).add_subplot()
+    arrows = draw_automaton(ax, Automaton(few.model, tuple(trims), tuple(maneuvers))).maneuvers
+    assert len(arrows) == 20 * 19 // 2
+    assert all(arrow.get_alpha() < 0.5 for arrow in arrows)

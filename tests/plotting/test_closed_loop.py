@@ -15,6 +15,7 @@ from maneuver_automaton.plotting import (
 )
 from maneuver_automaton.plotting.closed_loop import _figure, loop_text
 from maneuver_automaton.plotting.closed_loop_track import driven_track, loop_colors
+from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon import simulate
@@ -171,8 +172,16 @@ def test_a_flight_shows_its_altitude():
     loop = flight_loop()
     assert loop.reached
     assert driven_track(loop).climbs
-    labels = [ax.get_ylabel() for ax in _figure(loop, footprint=None).axes]
-    assert labels == ["y [m]", "cost", "speed [m/s]", "turn", "climb", "z [m]", "to decide [s]"]
+    labels = [ax.get_ylabel() for ax in _figure(loop, footprint=None, look=Look()).axes]
+    assert labels == [
+        "y [m]",
+        "cost",
+        "speed [m/s]",
+        "turn",
+        "climb [m/s]",
+        "z [m]",
+        "to decide [s]",
+    ]
 
 
 @compiled_only

@@ -6,7 +6,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from maneuver_automaton.plotting import draw_altitude, draw_controls, draw_plan
-from maneuver_automaton.plotting.controls import draw_track_controls
+from maneuver_automaton.plotting.controls import draw_track_controls, draw_track_states
 from maneuver_automaton.plotting.track import track_of_document
 from tests.plotting.cases import document_of, flight_plan, parking_plan, plan_of
 
@@ -39,6 +39,10 @@ def test_one_axes_takes_all_controls_in_different_styles():
     ax = Figure().add_subplot()
     drawn = draw_controls(ax, parking_plan(), labels=["speed", "turn rate"])
     assert [text.get_text() for text in ax.get_legend().get_texts()] == ["speed", "turn rate"]
+    ax.figure.canvas.draw()
+    legend, inner = ax.get_legend().get_window_extent(), ax.get_window_extent()
+    assert legend.x0 >= inner.x1  # beside the curves, and within the page
+    assert legend.x1 <= ax.figure.bbox.x1
     dashes = [str(artists.steps.get_linestyle()[0]) for artists in drawn]
     assert dashes[0] != dashes[1]
     low, high = ax.get_ylim()
@@ -93,3 +97,39 @@ def test_axes_and_labels_must_match_the_controls():
         draw_controls(Figure().subplots(3, 1), parking_plan())
     with pytest.raises(ValueError, match="1 labels"):
         draw_controls(Figure().subplots(2, 1), parking_plan(), labels=["speed"])
+
+
+def test_values_that_hardly_vary_are_a_line_above_zero_without_an_offset():
+    document = document_of(plan_of(["straight"], [1.0]), rate=4.0)
+    document["trajectory"]["control"] = [[2.99999 + 1e-6 * k, 1e6 + k] for k in range(5)]
+    axes = Figure().subplots(2, 1)
+    colors = {"straight": (0.0, 0.0, 0.0)}
+    draw_track_controls(axes, track_of_document(document), labels=(), colors=colors)
+    axes[0].figure.canvas.draw()
+    for ax in axes:
+        assert ax.yaxis.get_offset_text().get_text() == ""
+        assert ax.get_ylim()[0] < 0.0
+
+
+def test_so_many_switches_that_lines_would_hide_the_steps_have_none():
+    axes = Figure().subplots(2, 1)
+    few, _ = draw_controls(axes, plan_of(["straight", "spin"] * 5, [0.1] * 10))
+    many, _ = draw_controls(axes, plan_of(["straight", "spin"] * 20, [0.1] * 40))
+    assert len(few.switches.get_segments()) == 11
+    assert len(many.switches.get_segments()) == 0
+    assert many.jumps.get_linewidths()[0] < few.jumps.get_linewidths()[0]
+
+
+def test_a_label_longer_than_its_axes_is_in_lines():
+    column = Figure(figsize=(4.0, 5.0)).subplots(4, 1)
+    draw_track_states(
+        column[:1], track_of_document(_with_state()), labels=["angular acceleration [rad/s²]"],
+        colors={"straight": (0.0, 0.0, 0.0)},
+    )  # fmt: skip
+    assert "\n" in column[0].get_ylabel()
+
+
+def _with_state():
+    document = document_of(plan_of(["straight"], [1.0]), rate=4.0)
+    document["trajectory"]["reduced_state"] = [[0.1 * k] for k in range(5)]
+    return document

@@ -188,8 +188,9 @@ def test_the_problem_gives_body_goals_and_obstacles():
     assert len(artists.obstacles.static.get_paths()) == 3
     shown = names(artists.legend)
     assert shown[1:5] == ["start", "goal", "any heading", "other goal"]
-    assert shown[5:8] == ["goal tolerance", "swept by the body", "obstacle"]
-    assert shown[8:] == [
+    assert shown[5:7] == ["goal tolerance", "swept by the body"]
+    assert shown[7:9] == ["body at the same times", "obstacle"]
+    assert shown[9:] == [
         "moving, at 0 s", *(f"at {t:g} s" for t in (0.5, 1.0, 1.5, 2.0)),
     ]  # fmt: skip
 
@@ -200,11 +201,14 @@ def test_a_footprint_comes_before_that_of_the_problem():
     assert np.ptp(outlines(artists.bodies)[0][:, 0]) == pytest.approx(1.4)
 
 
-def test_the_body_and_what_moves_have_the_colours_of_their_time():
+def test_the_body_and_what_moves_grow_darker_in_colours_of_their_own():
     plan = parking_plan()
     _, artists = drawn(plan, problem=slalom_problem(plan))
     bodies = artists.moment_bodies.get_facecolor()[:, :3]
-    np.testing.assert_array_equal(bodies, artists.obstacles.moving.get_facecolor()[:, :3])
+    movers = artists.obstacles.moving.get_facecolor()[:, :3]
+    assert (np.diff(bodies.sum(axis=1)) < 0.0).all()
+    assert (np.diff(movers.sum(axis=1)) < 0.0).all()
+    assert np.linalg.norm(bodies[:, None] - movers, axis=-1).min() > 0.15
     assert len(np.unique(bodies, axis=0)) == len(bodies) == 5
     middles = [outline[:4].mean(axis=0) for outline in outlines(artists.moment_bodies)]
     np.testing.assert_allclose(middles, plan.pose_at([0, 2, 4, 6, 8])[:, :2], atol=1e-3)

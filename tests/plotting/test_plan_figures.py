@@ -12,6 +12,7 @@ from maneuver_automaton.plotting import (
     save_plan_file_figure,
 )
 from maneuver_automaton.plotting.labels import word_text
+from maneuver_automaton.plotting.plan_figures import plan_figure
 from maneuver_automaton.problem import Goal, Problem
 from tests.plotting.cases import (
     ROBOT,
@@ -129,9 +130,24 @@ def test_alternatives_are_written(count, tmp_path):
     assert_picture(tmp_path / "alternatives.png")
 
 
-def test_the_ending_chooses_the_format(tmp_path):
-    save_plan_figure(result_of(parking_plan()), tmp_path / "plan.pdf")
-    assert (tmp_path / "plan.pdf").read_bytes().startswith(b"%PDF")
+def test_the_ending_chooses_the_format_and_text_stays_text(tmp_path):
+    for name in ("plan.pdf", "again.pdf", "plan.svg"):
+        save_plan_figure(result_of(parking_plan()), tmp_path / name)
+    pdf = (tmp_path / "plan.pdf").read_bytes()
+    assert pdf.startswith(b"%PDF")
+    assert b"/CIDFontType2" in pdf  # a Type 42 font, in the words of PDF
+    assert b"/Type3" not in pdf
+    assert pdf == (tmp_path / "again.pdf").read_bytes()
+    assert "turn rate [rad/s]</text>" in (tmp_path / "plan.svg").read_text(encoding="utf-8")
+
+
+def test_a_polished_motion_is_never_called_polished_alone():
+    plan = parking_plan()
+    trims = tuple(dataclasses.replace(trim, name="polished") for trim in plan.trims)
+    figure = plan_figure(result_of(dataclasses.replace(plan, trims=trims)))
+    words = [text.get_text() for text in (*figure.texts, *figure.legends[0].get_texts())]
+    assert any("polished motion" in word for word in words)
+    assert "polished" not in words
 
 
 def test_an_old_file_is_replaced_whole_or_not_at_all(tmp_path):
