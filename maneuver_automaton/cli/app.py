@@ -51,6 +51,9 @@ Plot = Annotated[bool, typer.Option("--plot/--no-plot", help="Draw the plan.")]
 Animate = Annotated[
     bool, typer.Option("--animate", help="Animate it as well (plan: GIF; mpc: GIF and HTML).")
 ]
+Html = Annotated[
+    bool, typer.Option("--html", help="Write a page that plays it: one file, no network.")
+]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")]
 Jobs = Annotated[int, typer.Option("--jobs", min=1, metavar="N", help="Files planned at a time.")]
 With = Annotated[
@@ -120,6 +123,7 @@ def plan(
     case: Case = None,
     model: OwnModel = None,
     gap: Gap = None,
+    html: Html = False,
 ) -> int:
     """Plan the problem of a file, or of every file of a folder."""
     from maneuver_automaton.cli import plan_command
@@ -130,6 +134,7 @@ def plan(
         alternatives=alternatives,
         plot=plot,
         animate=animate,
+        html=html,
         quiet=quiet,
         gap=gap,
     )
@@ -178,6 +183,7 @@ def mpc(
         typer.Option("--resume", metavar="LOG", help="Go on from a closed_loop.json."),
     ] = None,
     model: OwnModel = None,
+    html: Html = False,
 ) -> int:
     """Drive a scenario in closed loop: plan, drive a step, plan again."""
     from maneuver_automaton.cli import mpc_command, plan_command
@@ -200,6 +206,7 @@ def mpc(
         gap=gap,
         plot=plot,
         animate=animate,
+        html=html,
         quiet=quiet,
     )
     parts = Parts(beside=with_file, case=case, model=model)
@@ -300,14 +307,15 @@ def plot(
     file: Annotated[Path, typer.Argument(metavar="PLAN.json")],
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="The picture.")] = None,
     animate: Animate = False,
+    html: Html = False,
 ) -> int:
     """Draw a plan.json again: PLAN.png beside it, or the file given.
 
-    With --animate it is an animation, PLAN.gif.
+    With --animate it is an animation, PLAN.gif; with --html a page that plays it, PLAN.html.
     """
     from maneuver_automaton.cli import convert_command
 
-    return convert_command.plot(file, out, animate=animate)
+    return convert_command.plot(file, out, animate=animate, html=html)
 
 
 @app.command()

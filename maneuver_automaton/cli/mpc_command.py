@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.scenario import Scenario
 
 STEPS = 100  # at most, where neither file nor option says
-FILMS = ("closed_loop.gif", "closed_loop.html")
-PICTURES = ("closed_loop.png", *FILMS)
+PICTURES = ("closed_loop.png", "closed_loop.gif", "closed_loop.html")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,6 +36,7 @@ class Settings:
     gap: float | None = None  # share of the cost, None: nothing is proven
     plot: bool = True
     animate: bool = False
+    html: bool = False
     quiet: bool = False
 
 
@@ -56,7 +56,7 @@ def drive_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> in
         return _statistics(path, scenario, out, settings)
     loop = _loop(path, scenario, settings)
     try:
-        _write(loop, out, settings)
+        _write(loop, out, settings, title=scenario.name)
     except OSError as error:
         raise not_written(Path(error.filename or out), error) from error
     if not settings.quiet:
@@ -205,18 +205,19 @@ def _disturbance(part: Any, seed: int | None) -> Disturbance | None:
     )
 
 
-def _write(loop: ClosedLoop, out: Path, settings: Settings) -> None:
+def _write(loop: ClosedLoop, out: Path, settings: Settings, *, title: str) -> None:
     from maneuver_automaton.formats.closed_loop_json import save_closed_loop
 
     save_closed_loop(loop, out / "closed_loop.json", interrupted=stopped())
     for name in PICTURES:
         (out / name).unlink(missing_ok=True)  # of an earlier loop
-    if stopped() or not (settings.plot or settings.animate):
+    if stopped() or not (settings.plot or settings.animate or settings.html):
         return
     from maneuver_automaton import plotting
 
     if settings.plot:
         plotting.save_closed_loop_figure(loop, out / "closed_loop.png")
     if settings.animate:
-        for name in FILMS:
-            plotting.save_closed_loop_animation(loop, out / name)
+        plotting.save_closed_loop_animation(loop, out / "closed_loop.gif")
+    if settings.animate or settings.html:
+        loop.player(title=title).save(out / "closed_loop.html")

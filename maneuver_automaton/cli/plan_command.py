@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from maneuver_automaton.planning import PlanResult
     from maneuver_automaton.scenario import Scenario
 
-PICTURES = ("plan.png", "plan_3d.png", "alternatives.png", "plan.gif", "progress.png")
+PICTURES = (
+    "plan.png", "plan_3d.png", "alternatives.png", "plan.gif", "plan.html", "progress.png",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,6 +36,7 @@ class Settings:
     alternatives: int = 0
     plot: bool = True
     animate: bool = False
+    html: bool = False
     quiet: bool = False
     gap: float | None = None  # share of the cost, None: nothing is proven beside the search
 
@@ -148,19 +151,19 @@ def _plan(
         result = replace(result, reason="interrupted before there was a plan")
     result = replace(result, timing_s={**scenario.timing_s, **result.timing_s})
     try:
-        _write(result, out, settings)
+        _write(result, out, settings, title=scenario.name)
     except OSError as error:
         raise not_written(Path(error.filename or out), error) from error
     return result
 
 
-def _write(result: PlanResult, out: Path, settings: Settings) -> None:
+def _write(result: PlanResult, out: Path, settings: Settings, *, title: str) -> None:
     from maneuver_automaton.formats.plan_json import save_plan
 
     save_plan(result, out / "plan.json", interrupted=stopped())
     for name in PICTURES:
         (out / name).unlink(missing_ok=True)  # of an earlier plan
-    if stopped() or not (settings.plot or settings.animate):
+    if stopped() or not (settings.plot or settings.animate or settings.html):
         return
     from maneuver_automaton import plotting
 
@@ -174,6 +177,8 @@ def _write(result: PlanResult, out: Path, settings: Settings) -> None:
             plotting.save_alternatives_figure(result, out / "alternatives.png")
     if settings.animate and result.plan is not None:
         plotting.save_plan_animation(result.plan, out / "plan.gif", problem=result.problem)
+    if settings.html:
+        result.player(title=title).save(out / "plan.html")
 
 
 def _row(problem: tuple[Path, Parts], *, out: Path, settings: Settings, folder: Path) -> Row:
