@@ -22,7 +22,7 @@ class Chart {
     if (last) this.holder.style.flexBasis = "100px";
     parent.append(this.holder);
     this.range = roomFor(points.map((point) => point[1]));
-    this.still = document.createElement("canvas");
+    this.still = new Still();
   }
 
   get area() {
@@ -47,15 +47,8 @@ class Chart {
 
   draw(motion, time, hover, colors, trims, stamp) {
     this.span = { begin: motion.begin, end: motion.end };
-    const { context, width, height, ratio } = prepared(this.canvas);
-    if (this.stamp !== stamp + width + "x" + height) {
-      this.stamp = stamp + width + "x" + height;
-      [this.still.width, this.still.height] = [this.canvas.width, this.canvas.height];
-      const below = this.still.getContext("2d");
-      below.setTransform(ratio, 0, 0, ratio, 0, 0);
-      this.curve(below, motion, colors, trims, width);
-    }
-    context.drawImage(this.still, 0, 0, width, height);
+    const sheet = prepared(this.canvas), { context } = sheet;
+    this.still.put(sheet, stamp, (below) => this.curve(below, motion, colors, trims));
     const area = this.area;
     context.lineWidth = 1;
     for (const [at, color] of [[hover, colors.dim], [time, colors.ink]]) {
@@ -75,9 +68,8 @@ class Chart {
   }
 
   /** Everything that does not move with the time. */
-  curve(context, motion, colors, trims, width) {
+  curve(context, motion, colors, trims) {
     const area = this.area, [low, high] = this.range;
-    context.clearRect(0, 0, width, 1000);
     context.font = "12.5px system-ui, sans-serif";
     context.textBaseline = "top";
     context.fillStyle = colors.ink;

@@ -182,23 +182,22 @@ function hull(places) {
 }
 
 /**
- * What the bodies sweep on every arc: [{end, path}]. Each convex piece of a body fills the hull of
- * its places at two samples. All hulls turn the same way, so filled together they are their union.
+ * What the bodies sweep. On every arc each convex piece of a body fills the hull of its places at
+ * two samples. All hulls turn the same way, so filled together they are their union.
  */
 function sweptRegion(motion, bodies) {
-  return motion.twists.map((_, k) => {
-    const path = new Path2D();
-    const times = motion.arcTimes(k), stroke = motion.strokes[k];
-    const frames = times.map((time, n) => [
-      stroke.poses[n], ...motion.parts.map((one) => composed(stroke.poses[n], posedAt(one, time)))]);
+  const path = new Path2D();
+  for (const { times, poses } of motion.strokes) {
+    const frames = times.map((time, n) =>
+      [poses[n], ...motion.parts.map((one) => composed(poses[n], posedAt(one, time)))]);
     for (const body of bodies) {
       for (const piece of body.convex) {
         const at = frames.map((frame) => piece.map((place) => acted(frame[body.frame], place)));
         for (let n = 1; n < at.length; n++) trace(path, hull([...at[n - 1], ...at[n]]));
       }
     }
-    return { end: motion.times[k + 1], path };
-  });
+  }
+  return path;
 }
 
 /** Add a closed ring of places to a path. */

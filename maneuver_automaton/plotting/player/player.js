@@ -11,7 +11,7 @@ const KEYS = [
   ["[ ]", "to where the trim begins, or the next one"],
   ["home end", "to the begin or the end"],
   ["+ − f", "closer, farther, show all; or wheel, drag, pinch, double click"],
-  ["s, shift s", "faster, slower"],
+  ["s S", "faster, slower"],
   ["1 … 9", "the plan, and its alternatives"],
   ["b w p", "bodies, swept region, path"],
   ["d", "dark or light"],
@@ -78,11 +78,12 @@ function redraw() {
 function drawAll() {
   const colors = themeColors(), { time, hover } = state;
   const others = motions.filter((_, k) => k !== state.choice);
-  stage.draw(motion(), time, { colors, layers: state.layers, hover, others, steps });
-  if (space && !find("space-plane").hidden) space.draw(motion(), time, { colors, hover });
-  const stamp = `${state.choice} ${document.documentElement.dataset.theme} `;
+  const stamp = `${state.choice} ${document.documentElement.dataset.theme}`;
+  const seen = `${stamp} ${Object.values(state.layers)}`;
+  stage.draw(motion(), time, { colors, layers: state.layers, hover, others, steps, stamp: seen });
+  if (space) space.draw(motion(), time, { colors, hover, stamp });
   charts.forEach((chart) => chart.draw(motion(), time, hover, colors, data.trims, stamp));
-  minis.forEach((mini) => mini(colors, time));
+  minis.forEach((mini) => mini(colors, time, stamp));
   if (searchChart) searchChart.draw(colors, searchHover);
   drawBar();
   drawClock();
@@ -339,7 +340,8 @@ function buildAlternatives() {
   const figure = find("alternatives"), cards = figure.querySelector(".cards");
   figure.hidden = false;
   figure.querySelector("figcaption").textContent =
-    `The plan and ${motions.length - 1} alternatives, each at the time of the bar`;
+    `The plan and ${motions.length > 2 ? `${motions.length - 1} alternatives` : "an alternative"}, `
+    + "each at the time of the bar";
   motions.forEach((one, k) => {
     const card = element("button", "card"), canvas = element("canvas");
     card.type = "button";
@@ -354,8 +356,9 @@ function buildAlternatives() {
     small.view.margins = { left: 0, right: 0, top: 0, bottom: 0 };
     small.axes = () => {};
     const layers = { path: true, bodies: false };
-    minis.push((colors, time) =>
-      small.draw(one, Math.min(time, one.end), { colors, layers, hover: null, others: [], steps: null }));
+    const rest = { layers, hover: null, others: [], steps: null };
+    minis.push((colors, time, stamp) =>
+      small.draw(one, Math.min(time, one.end), { ...rest, colors, stamp }));
   });
 }
 

@@ -6,6 +6,8 @@ import functools
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.planning import PlanResult
 from maneuver_automaton.plotting.closed_loop_track import (
@@ -142,8 +144,7 @@ def _(loop: ClosedLoop) -> dict[str, Any]:
     motion = played(track, local, names, scene=scene, problem=problem)
     motion["poses"][-1] = local.poses(loop.poses[-1])  # what pushed it at the end included
     motion["times"][-1] = float(loop.times[-1])
-    values = [*(step.value for step in loop.steps), loop.value]
-    motion["curves"].append({"label": "value", "t": rounded(loop.times), "v": rounded(values)})
+    motion["curves"].append(_values(loop))
     box, size = loop_view(loop, scene)
     return {
         "title": "Closed loop",
@@ -227,6 +228,16 @@ def _loop_facts(loop: ClosedLoop) -> list[Fact]:
         facts.append(("clearance", f"{loop.min_clearance_m:.3g} m"))
     broken = sum(1 for _ in loop.violations)
     return [*facts, ("guarantees", f"{broken} broken" if broken else "all kept")]
+
+
+def _values(loop: ClosedLoop) -> dict[str, Any]:
+    """The value over time, held from step to step."""
+    values = [step.value for step in loop.steps]
+    return {
+        "label": "value",
+        "t": rounded(np.append(np.repeat(loop.times, 2)[1:-1], loop.times[-1])),
+        "v": rounded(np.append(np.repeat(values, 2), loop.value)),
+    }
 
 
 def _search(result: PlanResult, local: Local) -> dict[str, Any]:

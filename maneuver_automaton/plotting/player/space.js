@@ -7,6 +7,7 @@ class Space {
   constructor(canvas, data) {
     Object.assign(this, { canvas, data, azimuth: -1.19, elevation: 0.73, scale: 1, shift: [0, 0] });
     const tall = data.obstacles.filter((one) => !one.t && !one.cells && one.height);
+    this.still = new Still();
     this.prisms = tall.map((one) => ({ ring: one.rings[0], low: one.height[0], high: one.height[1] }));
     this.listening();
   }
@@ -38,8 +39,8 @@ class Space {
     return [right, -(away * flat + z * up), away * up - z * flat];
   }
 
-  draw(motion, time, { colors, hover }) {
-    const { context, width, height } = prepared(this.canvas);
+  draw(motion, time, { colors, hover, stamp }) {
+    const sheet = prepared(this.canvas), { context, width, height } = sheet;
     const ground = Math.min(0, ...motion.poses.map((pose) => pose[3]));
     this.highest = Math.max(...motion.poses.map((pose) => pose[3]));
     const corners = this.corners(motion, ground).map((place) => this.turned(place));
@@ -52,11 +53,13 @@ class Space {
       const [right, down] = this.turned(place);
       return [width / 2 + scale * (right - middle[0]), height / 2 + scale * (down - middle[1])];
     };
-    this.groundGrid(context, colors, ground);
-    this.shadow(context, colors, motion, ground);
-    this.buildings(context, colors);
-    this.path(context, motion);
-    this.marks(context, colors, motion);
+    this.still.put(sheet, `${stamp} ${this.azimuth} ${this.elevation} ${this.scale}`, (below) => {
+      this.groundGrid(below, colors, ground);
+      this.shadow(below, colors, motion, ground);
+      this.buildings(below, colors);
+      this.path(below, motion);
+      this.marks(below, colors, motion);
+    });
     if (hover !== null) this.vehicle(context, colors, motion, hover, ground, 0.35);
     this.vehicle(context, colors, motion, time, ground, 1);
   }

@@ -1,7 +1,7 @@
 "use strict";
 // The plane seen from above: what is around a motion, the motion, and the body at a time.
 
-const MARGINS = { left: 54, right: 12, top: 12, bottom: 40 };
+const MARGINS = { left: 54, right: 12, top: 12, bottom: 46 };
 const DART = [[0.6, 0], [-0.4, 0.32], [-0.22, 0], [-0.4, -0.32]];
 const DART_SIZE = 0.066; // of the size of the path
 const ARROW_SIZE = 0.13;
@@ -23,38 +23,58 @@ class Stage {
       return path;
     });
     this.swept = new Map();
+    this.below = new Still();
+    this.above = new Still();
     // a vehicle without a body is shown as a dart
     this.bodies = data.bodies.length
       ? data.bodies
       : [{ frame: 0, ring: DART.map((place) => place.map((c) => c * DART_SIZE * data.mark)) }];
   }
 
-  /** Draw everything at a `time`; `hover` is the time under the cursor, or null. */
-  draw(motion, time, { colors, layers, hover, others, steps }) {
-    const { context, width, height } = prepared(this.canvas);
-    const view = this.view;
+  /**
+   * Draw everything at a `time`; `hover` is the time under the cursor, or null. What does not move is
+   * kept until the `stamp`, which names all that it shows, or the view changes.
+   */
+  draw(motion, time, { colors, layers, hover, others, steps, stamp }) {
+    const sheet = prepared(this.canvas), { view } = this;
     view.refit();
-    this.axes(context, colors, width, height);
+    this.thin = 1 / view.scale; // a line of one pixel
+    const whole = `${stamp} ${view.scale} ${view.middle}`;
+    this.below.put(sheet, whole, (context) => {
+      this.axes(context, colors, sheet.width, sheet.height);
+      this.inMetres(context, () => {
+        this.standing(context, colors);
+        if (layers.search) this.search(context, colors);
+        if (layers.swept && this.data.bodies.length) this.sweep(context, colors, motion);
+      });
+    });
+    this.inMetres(sheet.context, () => {
+      this.traffic(sheet.context, colors, time);
+      if (steps) this.plans(sheet.context, colors, time, steps);
+    });
+    this.above.put(sheet, whole, (context) => this.inMetres(context, () => {
+      if (layers.others) {
+        others.forEach((other) => this.path(context, other, { width: 1.2, alpha: 0.55 }));
+      }
+      if (layers.path) this.path(context, motion, { width: 3.2, casing: colors.casing });
+      this.ends(context, colors, motion);
+      if (layers.bodies) this.switches(context, colors, motion);
+    }));
+    this.inMetres(sheet.context, () => {
+      if (hover !== null) this.body(sheet.context, colors, motion, hover, 0.25);
+      this.body(sheet.context, colors, motion, time, 0.6);
+    });
+  }
+
+  /** Draw in metres, within the area of the plane. */
+  inMetres(context, draw) {
+    const { area } = this.view;
     context.save();
     context.beginPath();
-    context.rect(view.area.x, view.area.y, view.area.width, view.area.height);
+    context.rect(area.x, area.y, area.width, area.height);
     context.clip();
-    context.save();
-    view.apply(context);
-    this.thin = 1 / view.scale; // a line of one pixel
-    this.surroundings(context, colors, time);
-    if (layers.search) this.search(context, colors);
-    if (layers.swept && this.data.bodies.length) this.sweep(context, colors, motion, time);
-    if (steps) this.plans(context, colors, time, steps);
-    if (layers.others) {
-      others.forEach((other) => this.path(context, other, { width: 1.2, alpha: 0.55 }));
-    }
-    if (layers.path) this.path(context, motion, { width: 3.2, casing: colors.casing });
-    this.ends(context, colors, motion);
-    if (layers.bodies) this.switches(context, colors, motion);
-    if (hover !== null) this.body(context, colors, motion, hover, 0.25);
-    this.body(context, colors, motion, time, 0.6);
-    context.restore();
+    this.view.apply(context);
+    draw();
     context.restore();
   }
 
@@ -87,7 +107,7 @@ class Stage {
     context.fillStyle = colors.ink;
     context.textAlign = "center";
     context.textBaseline = "bottom";
-    context.fillText("x [m]", area.x + area.width / 2, height - 4);
+    context.fillText("x [m]", area.x + area.width / 2, height - 6);
     context.save();
     context.translate(5, area.y + area.height / 2);
     context.rotate(-Math.PI / 2);
@@ -96,7 +116,7 @@ class Stage {
     context.restore();
   }
 
-  surroundings(context, colors, time) {
+  standing(context, colors) {
     context.lineWidth = this.thin;
     context.strokeStyle = colors.paper;
     context.fillStyle = colors.lane;
@@ -113,6 +133,10 @@ class Stage {
       context.fill(path, "evenodd");
       context.stroke(path);
     }
+  }
+
+  traffic(context, colors, time) {
+    context.lineWidth = this.thin;
     for (const one of this.moving) {
       context.strokeStyle = withAlpha(colors.moving, 0.4);
       context.setLineDash([5 * this.thin, 4 * this.thin]);
@@ -147,12 +171,10 @@ class Stage {
     });
   }
 
-  sweep(context, colors, motion, time) {
+  sweep(context, colors, motion) {
     if (!this.swept.has(motion)) this.swept.set(motion, sweptRegion(motion, this.data.bodies));
-    const whole = new Path2D();
-    this.swept.get(motion).forEach((arc) => whole.addPath(arc.path));
     context.fillStyle = colors.swept;
-    context.fill(whole, "nonzero");
+    context.fill(this.swept.get(motion), "nonzero");
   }
 
   /** The plan of the step under way from `time` on, and pale those of the steps before. */

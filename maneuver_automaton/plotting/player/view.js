@@ -13,6 +13,27 @@ function prepared(canvas) {
   return { context, width: box.width, height: box.height, ratio };
 }
 
+/** A picture of what does not move with the time, drawn again only when its `stamp` changes. */
+class Still {
+  constructor() {
+    this.canvas = document.createElement("canvas");
+  }
+
+  /** Put the picture on a canvas that is `prepared`; `draw(context)` makes it. */
+  put({ context, width, height, ratio }, stamp, draw) {
+    const whole = `${stamp} ${width} ${height} ${ratio}`;
+    if (this.stamp !== whole) {
+      this.stamp = whole;
+      this.canvas.width = Math.max(1, Math.round(width * ratio));
+      this.canvas.height = Math.max(1, Math.round(height * ratio));
+      const own = this.canvas.getContext("2d");
+      own.setTransform(ratio, 0, 0, ratio, 0, 0);
+      draw(own);
+    }
+    context.drawImage(this.canvas, 0, 0, width, height);
+  }
+}
+
 /** Colours of the theme by name, as the style sheet has them. */
 function themeColors() {
   const style = getComputedStyle(document.documentElement);
