@@ -10,7 +10,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 
-POSE_DIGITS, PLACE_DIGITS, VALUE_DIGITS = 9, 4, 6  # decimals
+POSE_DIGITS, PLACE_DIGITS, VALUE_DIGITS = 9, 4, 5  # decimals
 
 
 @dataclass(frozen=True, slots=True, eq=False)

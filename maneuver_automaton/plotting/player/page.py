@@ -13,7 +13,7 @@ from typing import Any
 
 from maneuver_automaton._files import write_text_atomically
 
-SCRIPTS = ("motion.js", "view.js", "stage.js", "space.js", "charts.js", "player.js")
+SCRIPTS = ("motion.js", "view.js", "stage.js", "space.js", "charts.js", "panels.js", "player.js")
 FRAME_HEIGHT = 720  # [px] in a notebook
 
 

@@ -297,24 +297,3 @@ function obstaclePath(one) {
   }
   return path;
 }
-
-function line(context, from, to) {
-  context.beginPath();
-  context.moveTo(from[0], from[1]);
-  context.lineTo(to[0], to[1]);
-  context.stroke();
-}
-
-function circle(context, middle, radius, fill) {
-  context.beginPath();
-  context.arc(middle[0], middle[1], radius, 0, 2 * Math.PI);
-  context.fillStyle = fill;
-  context.fill();
-  context.stroke();
-}
-
-/** A colour "#rrggbb" that lets through what is below. */
-function withAlpha(color, alpha) {
-  const share = Math.round(255 * Math.min(Math.max(alpha, 0), 1));
-  return color + share.toString(16).padStart(2, "0");
-}
