@@ -49,7 +49,7 @@ function buildBar() {
     const share = (run.end - run.begin) / (now.end - now.begin || 1);
     const fits = share * wide > 16 + 7 * Math.min(name.length, 9);
     const part = element("div", "trim", fits ? name : "");
-    part.style.flexGrow = String(share);
+    part.style.width = `${100 * share}%`;
     if (!fits) part.style.padding = "0";
     part.style.background = color;
     part.style.color = inkOn(color);

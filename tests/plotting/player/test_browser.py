@@ -62,6 +62,9 @@ def _follows(page, plan):
 def _is_scrubbed(page, plan):
     """Keys, the bar and a script set the time, and what is drawn changes with it."""
     box = page.locator("#bar").bounding_box()
+    begins = [one.bounding_box()["x"] for one in page.locator("#bar .trim").all()]
+    shares = plan.switching_times[:-1] / plan.duration
+    np.testing.assert_allclose(begins, box["x"] + box["width"] * shares, atol=1.0)
     page.mouse.click(box["x"] + 0.25 * box["width"], box["y"] + 10)
     assert page.evaluate("player.time") == pytest.approx(0.25 * plan.duration, rel=0.01)
     assert page.is_visible("#tip")
