@@ -10,7 +10,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.colors import Color, trim_colors, twist_color
-from maneuver_automaton.plotting.footprint import footprint_polygons
+from maneuver_automaton.plotting.footprint import footprint_polygons, placed
 from maneuver_automaton.plotting.player.clearances import clearance_entry, sample_times
 from maneuver_automaton.plotting.player.local import Local, hex_color, rounded
 from maneuver_automaton.plotting.player.motions import (
@@ -92,8 +92,9 @@ def around(
 
 
 def plan_view(scene: Scene, tracks: Sequence[Track]) -> tuple[Array, float]:
-    """The box (2, 2) around tracks in a scene, as in their picture, and the size of its marks."""
+    """The box (2, 2) around tracks in a scene and all that a body sweeps; the size of its marks."""
     size = max(scene_size(scene, track) for track in tracks)
-    points = np.concatenate([scene_points(scene, track, size=size) for track in tracks])
-    box = view_box(scene, points, size=size)
+    points = [scene_points(scene, track, size=size) for track in tracks]
+    bodies = [corners for track in tracks for corners in placed(scene.body, track.pose)]
+    box = view_box(scene, np.concatenate([*points, *bodies]), size=size)
     return box, mark_size(scene, box, size=size)

@@ -135,8 +135,9 @@ function buildLayers() {
     swept: "swept region", bodies: "bodies at switches", path: "path",
     others: "alternatives", search: "search",
   };
+  const moves = motion().runs.length > 0, swept = moves && data.bodies.length > 0;
   const known = {
-    swept: data.bodies.length > 0, bodies: data.bodies.length > 0, path: true,
+    swept, bodies: swept, path: moves,
     others: motions.length > 1,
     search: Boolean(data.search && (data.search.nodes || data.search.reached)),
   };

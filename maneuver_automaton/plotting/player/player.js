@@ -95,6 +95,7 @@ function drawBar() {
 }
 
 function drawClock() {
+  find("clock").hidden = !motion().runs.length;
   const parts = [`${state.time.toFixed(2)} s`];
   if (steps) {
     const entry = steps.entries[steps.at(state.time)];

@@ -126,8 +126,8 @@ def _(result: PlanResult) -> dict[str, Any]:
         motion["cost"] = cost
     box, size = plan_view(scene, tracks)
     return {
-        "title": "Plan" if plan is not None else result.status.value.replace("_", " "),
-        "facts": [] if plan is None else _result_facts(result, plan),
+        "title": "Plan",
+        "facts": _result_facts(result),
         "trims": trim_entries(colors),
         "motions": motions,
         "bodies": body_entries(problem.footprint, problem.parts),
@@ -206,8 +206,10 @@ def _plan_facts(
     return facts
 
 
-def _result_facts(result: PlanResult, plan: Plan) -> list[Fact]:
-    error = result.terminal_error
+def _result_facts(result: PlanResult) -> list[Fact]:
+    plan, error = result.plan, result.terminal_error
+    if plan is None:
+        return [("no plan", f"{result.status.value.replace('_', ' ')}: {result.reason}")]
     return _plan_facts(
         cost=result.cost,
         duration=plan.duration,

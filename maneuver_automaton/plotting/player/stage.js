@@ -5,6 +5,7 @@ const MARGINS = { left: 54, right: 12, top: 12, bottom: 46 };
 const DART = [[0.6, 0], [-0.4, 0.32], [-0.22, 0], [-0.4, -0.32]];
 const DART_SIZE = 0.066; // of the size of the path
 const ARROW_SIZE = 0.13;
+const LONGEST_ARROW = 64; // px
 const FADING = 6; // old plans of a closed loop that are shown
 
 class Stage {
@@ -220,7 +221,7 @@ class Stage {
   }
 
   ends(context, colors, motion) {
-    const size = ARROW_SIZE * this.data.mark;
+    const size = Math.min(ARROW_SIZE * this.data.mark, LONGEST_ARROW * this.thin);
     const start = motion.poses[0];
     context.lineWidth = 1.6 * this.thin;
     const arrow = (pose, color) => {

@@ -10,6 +10,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap
 from maneuver_automaton.groups import SE2, group_of
+from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.plotting import Player, player_of, player_of_file
 from maneuver_automaton.plotting.colors import trim_colors
 from maneuver_automaton.plotting.player.clearances import clearance_entry
@@ -18,6 +19,7 @@ from maneuver_automaton.plotting.player.local import Local, hex_color
 from maneuver_automaton.plotting.player.motions import motion_entry, part_frames
 from maneuver_automaton.plotting.track import track_of_plan
 from maneuver_automaton.primitives import Maneuver, Trajectory
+from maneuver_automaton.problem import Problem
 from tests.plotting.cases import (
     ROBOT,
     document_of,
@@ -186,3 +188,12 @@ def test_other_values_are_refused():
     assert str(error.value) == (
         "player: got int, need a Plan, PlanResult, ClosedLoop, RoadPlanResult or RoadDrive"
     )
+
+
+def test_without_a_plan_the_page_says_why():
+    problem = Problem(ROBOT, [0, 0, 0], [1, 0, 0])
+    result = PlanResult(problem=problem, status=PlanStatus.NO_PLAN, reason="too narrow")
+    content = result.player().content
+    assert content["facts"] == [("no plan", "no plan: too narrow")]
+    assert content["motions"][0]["poses"] == [[0.0, 0.0, 0.0]]
+    assert result._repr_png_()[1:4] == b"PNG"
