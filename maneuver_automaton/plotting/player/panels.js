@@ -139,7 +139,7 @@ function buildLayers() {
   const known = {
     swept, bodies: swept, path: moves,
     others: motions.length > 1,
-    search: Boolean(data.search && (data.search.nodes || data.search.reached)),
+    search: ["nodes", "reached", "narrowest"].some((one) => data.search && data.search[one]),
   };
   if (known.search) state.layers.search = true;
   for (const name of Object.keys(labels).filter((one) => known[one])) {

@@ -258,6 +258,8 @@ def _search(result: PlanResult, local: Local) -> dict[str, Any]:
         entry["node_costs"] = rounded(some[:, 3], 4) if some.shape[1] > 3 else []
     if result.reached is not None:
         entry["reached"] = local.places(result.reached)
+    if result.narrowest is not None:
+        entry["narrowest"] = local.places(np.array(result.narrowest.place))
     return entry
 
 

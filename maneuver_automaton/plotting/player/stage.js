@@ -156,12 +156,17 @@ class Stage {
   }
 
   search(context, colors) {
-    const { nodes, node_costs: costs, reached } = this.data.search || {};
+    const { nodes, node_costs: costs, reached, narrowest } = this.data.search || {};
     if (reached) {
       const path = new Path2D();
       reached.forEach((ring) => trace(path, ring));
       context.fillStyle = withAlpha(colors.accent, 0.18);
       context.fill(path);
+    }
+    if (narrowest) {
+      context.strokeStyle = colors.broken;
+      context.lineWidth = 2.5 * this.thin;
+      circle(context, narrowest, 14 * this.thin, withAlpha(colors.broken, 0.2));
     }
     if (!nodes) return;
     const most = costs.reduce((a, b) => Math.max(a, b), 1e-9), size = 2.4 * this.thin;

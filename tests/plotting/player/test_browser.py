@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from maneuver_automaton.bounds import Narrowest
 from maneuver_automaton.cli import run
 from maneuver_automaton.collision import Box
 from maneuver_automaton.formats.plan_json import load_plan
-from maneuver_automaton.planning import LowerBound
+from maneuver_automaton.planning import LowerBound, PlanResult, PlanStatus
 from tests.plotting.cases import flight_plan, parking_plan, plan_of, result_of, slalom_problem
 from tests.plotting.loops import pushed_loop
 from tests.plotting.player.browser import browser, opened, poses
@@ -34,9 +35,21 @@ def parking_result():
     )
 
 
+def unreachable():
+    squares = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1]]) + np.zeros((3, 1, 2))
+    return PlanResult(
+        problem=slalom_problem(parking_plan()),
+        status=PlanStatus.UNREACHABLE,
+        reason="too narrow",
+        reached=squares,
+        narrowest=Narrowest(place=(0.5, 0.2), missing=0.1),
+    )
+
+
 def test_the_page_plays_what_was_planned(tmp_path):
     result, loop, flight = parking_result(), pushed_loop(), flight_plan()
-    for name, value in (("plan", result), ("loop", loop), ("flight", flight)):
+    values = {"plan": result, "loop": loop, "flight": flight, "none": unreachable()}
+    for name, value in values.items():
         value.player().save(tmp_path / f"{name}.html")
     with browser() as running:
         with opened(running, tmp_path / "plan.html") as page:
@@ -52,6 +65,10 @@ def test_the_page_plays_what_was_planned(tmp_path):
         with opened(running, tmp_path / "flight.html") as page:
             _follows(page, flight)
             assert page.is_visible("#space")
+        with opened(running, tmp_path / "none.html") as page:
+            assert "unreachable: too narrow" in page.inner_text("#facts")
+            assert page.is_hidden("#transport")
+            assert page.locator("#layers input").count() == 1
 
 
 def _follows(page, plan):
