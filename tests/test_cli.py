@@ -416,6 +416,21 @@ def test_an_animation_on_demand(folder):
     assert [path.name for path in Path("out").iterdir()] == ["plan.json"]
 
 
+def test_a_page_on_demand(folder, capsys):
+    assert run(["plan", "x.yaml", "--quiet", "--html", "--no-plot"]) == 0
+    assert sorted(path.name for path in Path("out").iterdir()) == ["plan.html", "plan.json"]
+    page = Path("out/plan.html").read_text()
+    assert run(["plot", "out/plan.json", "--html", "--out", "a.html"]) == 0
+    assert Path("a.html").read_text().startswith("<!doctype html>")
+    assert run(["plot", "out/plan.json", "--html", "--animate"]) == 2
+    assert capsys.readouterr().err == (
+        "--html: writes a page, and --animate an animation; need one of them\n"
+    )
+    Path("x.yaml").write_text(AHEAD_ONLY)
+    assert run(["plan", "x.yaml", "--quiet", "--html", "--no-plot"]) == 1
+    assert Path("out/plan.html").read_text() != page  # start and goal, and why there is no plan
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -423,6 +438,8 @@ def test_an_animation_on_demand(folder):
          ".png, .pdf, .svg"),
         (["--out", "a.png", "--animate"], "a.png: is no animation that this version draws, need "
          "an ending of .gif"),
+        (["--out", "a.png", "--html"], "a.png: is no page that this version draws, need an ending "
+         "of .html"),
     ],
 )  # fmt: skip
 def test_a_picture_has_an_ending_of_one(folder, capsys, options, message):

@@ -354,8 +354,11 @@ def test_a_tiny_budget_still_arrives(folder):
 def test_an_animation_on_demand(folder):
     Path("x.yaml").write_text(LOOP.replace("step_s: 0.5", "step_s: 2.0"))
     assert run(["mpc", "x.yaml", "--quiet", "--no-plot", "--animate"]) == 0
-    assert {"closed_loop.gif", "closed_loop.json"} <= set(files())
+    assert {"closed_loop.gif", "closed_loop.html", "closed_loop.json"} <= set(files())
     assert "closed_loop.png" not in files()
+    assert run(["mpc", "x.yaml", "--quiet", "--no-plot", "--html"]) == 0
+    assert "closed_loop.gif" not in files()
+    assert "closed_loop.html" in files()
 
 
 def test_a_closed_loop_has_no_alternatives(folder, capsys):

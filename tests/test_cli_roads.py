@@ -54,7 +54,7 @@ def test_a_goal_that_is_missed_ends_with_one(folder, capsys):
 
 
 def test_one_plan(folder):
-    assert run(["plan", "road.xml", "--animate", "--quiet"]) == 0
+    assert run(["plan", "road.xml", "--animate", "--html", "--quiet"]) == 0
     document = json.loads(Path("out/plan.json").read_text())
     assert document["status"] == "found"
     assert document["audit"]["passed"] is True
@@ -63,6 +63,7 @@ def test_one_plan(folder):
     assert document["trajectory"]["time_s"][-1] == pytest.approx(lasting)
     assert Path("out/plan.png").is_file()
     assert Path("out/plan.gif").is_file()
+    assert Path("out/plan.html").is_file()
 
 
 def test_one_of_several_problems(folder, capsys):

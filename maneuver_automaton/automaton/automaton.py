@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, IntArray, as_array, vector_text
+from maneuver_automaton._display import picture
 from maneuver_automaton.errors import InvalidAutomaton, UnknownTrim
 from maneuver_automaton.models import Model, OnLattice, OnlyTranslated, in_world
 from maneuver_automaton.primitives import Maneuver, Trim, trims_of
@@ -78,6 +79,9 @@ class Automaton:
                 )
         for maneuver in self.maneuvers:
             _check_fit(maneuver, self[maneuver.source], self[maneuver.target])
+
+    def _repr_png_(self) -> bytes | None:
+        return picture(self)
 
     def _see_from_body(self, model: OnlyTranslated) -> None:
         """Trims and maneuvers that are stated along the world's axes get headings."""

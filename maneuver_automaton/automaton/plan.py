@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._display import Player, picture, player_frame, player_page
 from maneuver_automaton.groups import LieGroup, group_of
 from maneuver_automaton.groups.chain import chained
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
@@ -283,6 +284,16 @@ class Plan:
     def moved(self, by: LieGroup) -> Plan:
         """A plan of the same word from the start moved by `by`: the law of the project."""
         return replace(self, start=(by @ type(by)(self.start)).pose)
+
+    def player(self, *, title: str = "") -> Player:
+        """A page that plays it: `.html`, or `.save(path)`; `title` heads it."""
+        return player_page(self, title=title)
+
+    def _repr_html_(self) -> str:
+        return player_frame(self)
+
+    def _repr_png_(self) -> bytes | None:
+        return picture(self)
 
 
 def _within(maneuver: Maneuver, since: Array) -> Array:

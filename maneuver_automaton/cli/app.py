@@ -62,6 +62,9 @@ Style = Annotated[
 Animate = Annotated[
     bool, typer.Option("--animate", help="Animate it as well (plan: GIF; mpc: GIF and HTML).")
 ]
+Html = Annotated[
+    bool, typer.Option("--html", help="Write a page that plays it: one file, no network.")
+]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")]
 Jobs = Annotated[int, typer.Option("--jobs", min=1, metavar="N", help="Files planned at a time.")]
 With = Annotated[
@@ -148,6 +151,7 @@ def plan(
     title: Title = None,
     size: Size = None,
     style: Style = "screen",
+    html: Html = False,
 ) -> int:
     """Plan the problem of a file, or of every file of a folder."""
     from maneuver_automaton.cli import plan_command
@@ -159,6 +163,7 @@ def plan(
         alternatives=alternatives,
         plot=plot,
         animate=animate,
+        html=html,
         quiet=quiet,
         gap=gap,
         look=LookOptions(title=title, size=size, style=style),
@@ -211,6 +216,7 @@ def mpc(
     title: Title = None,
     size: Size = None,
     style: Style = "screen",
+    html: Html = False,
 ) -> int:
     """Drive a scenario in closed loop: plan, drive a step, plan again."""
     from maneuver_automaton.cli import mpc_command, plan_command
@@ -234,6 +240,7 @@ def mpc(
         gap=gap,
         plot=plot,
         animate=animate,
+        html=html,
         quiet=quiet,
         look=LookOptions(title=title, size=size, style=style),
     )
@@ -338,16 +345,17 @@ def plot(
     title: Title = None,
     size: Size = None,
     style: Style = "screen",
+    html: Html = False,
 ) -> int:
     """Draw a plan.json again: PLAN.png beside it, or the file given.
 
-    With --animate it is an animation, PLAN.gif.
+    With --animate it is an animation, PLAN.gif; with --html a page that plays it, PLAN.html.
     """
     from maneuver_automaton.cli import convert_command
     from maneuver_automaton.cli.looks import LookOptions
 
     look = LookOptions(title=title, size=size, style=style)
-    return convert_command.plot(file, out, animate=animate, look=look)
+    return convert_command.plot(file, out, animate=animate, html=html, look=look)
 
 
 @app.command()

@@ -41,6 +41,7 @@ KEEP_MULTIPLIERS = (MPRIM, JSON)  # but Nav2's kind of JSON
 MAP_ENDINGS = (".map",)
 PICTURE_ENDINGS = (".png", ".pdf", ".svg")
 ANIMATION_ENDINGS = (".gif",)
+PAGE_ENDINGS = (".html",)
 
 
 def convert(source: Path, target: Path, *, parts: Parts) -> int:
@@ -138,17 +139,21 @@ def _write_scenario(scenario: Scenario, source: Path, target: Path) -> None:
     write_text_atomically(target, text)
 
 
-def plot(file: Path, out: Path | None, *, animate: bool, look: LookOptions) -> int:
-    """Draw a plan.json again, still or in motion."""
+def plot(
+    file: Path, out: Path | None, *, animate: bool, look: LookOptions, html: bool = False
+) -> int:
+    """Draw a plan.json again, still, in motion, or as a page that plays it."""
     from maneuver_automaton.formats.plan_json import load_plan, read_plan_document
 
     document = read_plan_document(file)
-    endings = ANIMATION_ENDINGS if animate else PICTURE_ENDINGS
+    if animate and html:
+        raise InvalidScenario("--html: writes a page, and --animate an animation; need one of them")
+    endings = ANIMATION_ENDINGS if animate else PAGE_ENDINGS if html else PICTURE_ENDINGS
     path = file.with_suffix(endings[0]) if out is None else out
     if path.is_dir():
         path = path / file.with_suffix(endings[0]).name
     if path.suffix.lower() not in endings:
-        what = "animation" if animate else "picture"
+        what = "animation" if animate else "page" if html else "picture"
         raise InvalidScenario(
             f"{path}: is no {what} that this version draws, need an ending of {', '.join(endings)}"
         )
@@ -158,6 +163,8 @@ def plot(file: Path, out: Path | None, *, animate: bool, look: LookOptions) -> i
     try:
         if animate:
             plotting.save_plan_animation(load_plan(file), path)
+        elif html:
+            plotting.player_of_file(document, load_plan(file), title=file.stem).save(path)
         else:
             plotting.save_plan_file_figure(document, path, look=look.look())
     except OSError as error:

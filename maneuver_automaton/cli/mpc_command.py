@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.scenario import Scenario
 
 STEPS = 100  # at most, where neither file nor option says
-FILMS = ("closed_loop.gif", "closed_loop.html")
-PICTURES = ("closed_loop.png", *FILMS)
+PICTURES = ("closed_loop.png", "closed_loop.gif", "closed_loop.html")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +37,7 @@ class Settings:
     gap: float | None = None  # share of the cost, None: nothing is proven
     plot: bool = True
     animate: bool = False
+    html: bool = False
     quiet: bool = False
     look: LookOptions = field(default_factory=LookOptions)
 
@@ -213,7 +213,7 @@ def _write(loop: ClosedLoop, name: str, out: Path, settings: Settings) -> None:
     save_closed_loop(loop, out / "closed_loop.json", interrupted=stopped())
     for picture in PICTURES:
         (out / picture).unlink(missing_ok=True)  # of an earlier loop
-    if stopped() or not (settings.plot or settings.animate):
+    if stopped() or not (settings.plot or settings.animate or settings.html):
         return
     from maneuver_automaton import plotting
 
@@ -221,5 +221,6 @@ def _write(loop: ClosedLoop, name: str, out: Path, settings: Settings) -> None:
         look = settings.look.look(name)
         plotting.save_closed_loop_figure(loop, out / "closed_loop.png", look=look)
     if settings.animate:
-        for film in FILMS:
-            plotting.save_closed_loop_animation(loop, out / film)
+        plotting.save_closed_loop_animation(loop, out / "closed_loop.gif")
+    if settings.animate or settings.html:
+        loop.player(title=settings.look.title or name).save(out / "closed_loop.html")

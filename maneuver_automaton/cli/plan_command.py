@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     from maneuver_automaton.planning import PlanResult
     from maneuver_automaton.scenario import Scenario
 
-PICTURES = ("plan.png", "plan_3d.png", "alternatives.png", "plan.gif", "progress.png")
+PICTURES = (
+    "plan.png", "plan_3d.png", "alternatives.png", "plan.gif", "plan.html", "progress.png",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,6 +37,7 @@ class Settings:
     alternatives: int = 0
     plot: bool = True
     animate: bool = False
+    html: bool = False
     quiet: bool = False
     gap: float | None = None  # share of the cost, None: nothing is proven beside the search
     look: LookOptions = field(default_factory=LookOptions)
@@ -162,7 +165,7 @@ def _write(result: PlanResult, name: str, out: Path, settings: Settings) -> None
     save_plan(result, out / "plan.json", interrupted=stopped())
     for picture in PICTURES:
         (out / picture).unlink(missing_ok=True)  # of an earlier plan
-    if stopped() or not (settings.plot or settings.animate):
+    if stopped() or not (settings.plot or settings.animate or settings.html):
         return
     from maneuver_automaton import plotting
 
@@ -177,6 +180,8 @@ def _write(result: PlanResult, name: str, out: Path, settings: Settings) -> None
             plotting.save_alternatives_figure(result, out / "alternatives.png", title=look.title)
     if settings.animate and result.plan is not None:
         plotting.save_plan_animation(result.plan, out / "plan.gif", problem=result.problem)
+    if settings.html:
+        result.player(title=settings.look.title or name).save(out / "plan.html")
 
 
 def _row(problem: tuple[Path, Parts], *, out: Path, settings: Settings, folder: Path) -> Row:

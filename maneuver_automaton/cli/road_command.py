@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -60,12 +60,12 @@ def plan_file(
 
     def write() -> None:
         write_document(document, out / "plan.json", interrupted=stopped())
-        for name in ("plan.png", "plan.gif"):
+        for name in ("plan.png", "plan.gif", "plan.html"):
             (out / name).unlink(missing_ok=True)  # of an earlier plan
         if result.plan is not None:
-            named = (out / "plan.png", [out / "plan.gif"])
-            shown = _titled(scene, settings.look)
-            _draw(shown, vehicle, result.plan, named, settings.plot, settings.animate)
+            _draw(_titled(scene, settings.look), vehicle, result.plan, out / "plan", settings)
+        if settings.html and not stopped():
+            result.player().save(out / "plan.html")
 
     _written(write, out)
     if result.plan is not None and not settings.quiet:
@@ -116,12 +116,12 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
 
     def write() -> None:
         write_document(document, out / "closed_loop.json", interrupted=stopped())
-        films = [out / "closed_loop.gif", out / "closed_loop.html"]
-        for file in (out / "closed_loop.png", *films):
-            file.unlink(missing_ok=True)  # of an earlier loop
-        named = (out / "closed_loop.png", films)
+        for name in ("closed_loop.png", "closed_loop.gif", "closed_loop.html"):
+            (out / name).unlink(missing_ok=True)  # of an earlier loop
         shown = _titled(scene, settings.look)
-        _draw(shown, vehicle, drive.driven, named, settings.plot, settings.animate)
+        _draw(shown, vehicle, drive.driven, out / "closed_loop", settings)
+        if (settings.animate or settings.html) and not stopped():
+            drive.player().save(out / "closed_loop.html")
 
     _written(write, out)
     if not settings.quiet:
@@ -161,19 +161,18 @@ def _draw(
     scene: RoadScene,
     vehicle: RoadVehicle,
     plan: Plan,
-    files: tuple[Path, Iterable[Path]],
-    plot: bool,
-    animate: bool,
+    file: Path,
+    settings: plan_command.Settings | mpc_command.Settings,
 ) -> None:
-    if stopped() or not (plot or animate):
+    """Write the pictures that were asked for, `file` with their endings."""
+    if stopped() or not (settings.plot or settings.animate):
         return
     from maneuver_automaton import plotting
 
-    if plot:
-        plotting.save_road_figure(scene, vehicle, plan, files[0])
-    if animate:
-        for file in files[1]:
-            plotting.save_road_animation(scene, vehicle, plan, file)
+    if settings.plot:
+        plotting.save_road_figure(scene, vehicle, plan, file.with_suffix(".png"))
+    if settings.animate:
+        plotting.save_road_animation(scene, vehicle, plan, file.with_suffix(".gif"))
 
 
 def _written(write: Callable[[], None], out: Path) -> None:

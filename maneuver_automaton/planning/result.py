@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._display import Player, picture, player_frame, player_page
 from maneuver_automaton.audit import Audit, TerminalError
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
@@ -84,6 +85,16 @@ class PlanResult:
     narrowest: Narrowest | None = None  # the passage that is too narrow, of a proof
     reached: Array | None = None  # (n, 4, 2) squares that the pose never leaves, of that proof
     nodes: Array | None = None  # (n, 4) x, y, heading, cost of what was expanded, if asked for
+
+    def player(self, *, title: str = "") -> Player:
+        """A page that plays it: `.html`, or `.save(path)`; `title` heads it."""
+        return player_page(self, title=title)
+
+    def _repr_html_(self) -> str:
+        return player_frame(self)
+
+    def _repr_png_(self) -> bytes | None:
+        return picture(self)
 
 
 class Answer(Protocol):

@@ -41,6 +41,9 @@ from maneuver_automaton.plotting.obstacles import draw_obstacles as draw_obstacl
 from maneuver_automaton.plotting.paths import draw_plan as draw_plan
 from maneuver_automaton.plotting.plan_figures import save_plan_figure as save_plan_figure
 from maneuver_automaton.plotting.plan_figures import save_plan_file_figure as save_plan_file_figure
+from maneuver_automaton.plotting.player import Player as Player
+from maneuver_automaton.plotting.player import player_of as player_of
+from maneuver_automaton.plotting.player import player_of_file as player_of_file
 from maneuver_automaton.plotting.progress import draw_progress as draw_progress
 from maneuver_automaton.plotting.progress import save_progress_figure as save_progress_figure
 from maneuver_automaton.plotting.roads import draw_road as draw_road

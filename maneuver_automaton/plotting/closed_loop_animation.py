@@ -40,8 +40,7 @@ def save_closed_loop_animation(
     loop : ClosedLoop
         What to show; without a step there is a single picture.
     path : str or Path
-        Where to write: a .gif, an .html that needs no other file, or an .mp4 where Matplotlib
-        finds ffmpeg.
+        Where to write: a .gif, or an .mp4 where Matplotlib finds ffmpeg.
     footprint : any form of `footprint_polygons`, optional
         The body of the vehicle; that of the problem if left out, a dart if it has none.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import math
-import re
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -24,19 +23,7 @@ MOST_FRAMES = 150  # longer motions are shown faster
 PAUSE_S = 1.0  # on the last picture
 PALETTE, MOST_SAMPLES = 128, 16  # colours, and pictures that they are taken from
 NEARLY_WHITE = 248  # of 255, in each channel
-EMBED_MB = 100.0  # of pictures in one page
-ENDINGS = (".gif", ".html", ".mp4")
-SYMBOLS = {  # of the buttons of a page, which would otherwise be loaded from elsewhere
-    "fa-minus": "−",
-    "fa-fast-backward": "⏮",
-    "fa-step-backward": "◁",
-    "fa-play fa-flip-horizontal": "◀",
-    "fa-pause": "⏸",
-    "fa-play": "▶",
-    "fa-step-forward": "▷",
-    "fa-fast-forward": "⏭",
-    "fa-plus": "+",
-}
+ENDINGS = (".gif", ".mp4")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -57,7 +44,7 @@ def picture_times(begin: float, end: float) -> Array:
 
 
 def check_film_path(path: str | Path) -> Path:
-    """The path, if a film can be written to it: by its ending, .gif, .html or .mp4.
+    """The path, if a film can be written to it: by its ending, .gif or .mp4.
 
     Raises
     ------
@@ -76,7 +63,7 @@ def check_film_path(path: str | Path) -> Path:
         if not FFMpegWriter.isAvailable():
             raise ValueError(
                 f"animation: got the file name {target.name}, but Matplotlib finds no ffmpeg, "
-                "which writes .mp4; install ffmpeg, or choose an ending of .gif or .html"
+                "which writes .mp4; install ffmpeg, or choose an ending of .gif"
             )
     return target
 
@@ -92,7 +79,7 @@ def write_film(film: Film, path: str | Path) -> None:
         If the file cannot be written; an old one stays as it was.
     """
     target = check_film_path(path)
-    writers = {".gif": _gif, ".html": _page, ".mp4": _video}
+    writers = {".gif": _gif, ".mp4": _video}
     write_bytes_atomically(target, writers[target.suffix.lower()](film))
 
 
@@ -141,17 +128,6 @@ def _video(film: Film) -> bytes:
     writer = FFMpegWriter(fps=FRAMES_PER_SECOND, codec="h264", extra_args=["-pix_fmt", "yuv420p"])
     pause = [film.times[-1]] * round(PAUSE_S * FRAMES_PER_SECOND)
     return _grabbed(film, writer, [*film.times, *pause], name="film.mp4")
-
-
-def _page(film: Film) -> bytes:
-    from matplotlib.animation import HTMLWriter
-
-    writer = HTMLWriter(fps=FRAMES_PER_SECOND, embed_frames=True, embed_limit=EMBED_MB)
-    text = _grabbed(film, writer, film.times, name="film.html").decode("utf-8")
-    text = re.sub(r"<link\b[^>]*>", "", text)  # symbols of the buttons, from the internet
-    for name, symbol in SYMBOLS.items():
-        text = text.replace(f'<i class="fa {name}"></i>', symbol)
-    return text.encode("utf-8")
 
 
 def _grabbed(film: Film, writer: Any, times: Sequence[float] | Array, *, name: str) -> bytes:

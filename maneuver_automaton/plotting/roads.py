@@ -94,7 +94,7 @@ def draw_road(
     )
     for artist in (lanes, goals, traffic, bodies, path):
         ax.add_collection(artist, autolim=False)
-    low, high = _box(scene, vehicle, plan)
+    low, high = road_box(scene, vehicle, plan)
     ax.set_xlim(low[0], high[0])
     ax.set_ylim(low[1], high[1])
     ax.set_aspect("equal")
@@ -149,7 +149,7 @@ def save_road_figure(
 def save_road_animation(
     scene: RoadScene, vehicle: RoadVehicle, plan: Plan, path: str | Path
 ) -> None:
-    """Write a moving picture of a drive, by its ending .gif, .html or .mp4.
+    """Write a moving picture of a drive, by its ending .gif or .mp4.
 
     Raises
     ------
@@ -181,7 +181,7 @@ def save_road_animation(
 def _page(
     scene: RoadScene, vehicle: RoadVehicle, plan: Plan, *, panels: int, said: str
 ) -> tuple[Figure, Axes]:
-    low, high = _box(scene, vehicle, plan)
+    low, high = road_box(scene, vehicle, plan)
     plane = float(np.clip(INNER * (high - low)[1] / (high - low)[0], FLATTEST, HIGHEST))
     under = BOTTOM + panels * (PANEL + GAP)
     figure = new_figure(WIDTH, TOP + plane + under)
@@ -190,7 +190,7 @@ def _page(
     return figure, axes_at(figure, left=LEFT, bottom=under, width=INNER, height=plane)
 
 
-def _box(scene: RoadScene, vehicle: RoadVehicle, plan: Plan) -> tuple[Array, Array]:
+def road_box(scene: RoadScene, vehicle: RoadVehicle, plan: Plan) -> tuple[Array, Array]:
     """Lower left and upper right corner around the drive, the road users beside it, the goals."""
     begin, end = plan.switching_times[[0, -1]].tolist()
     places = [vehicle.middle_of(plan.sample().pose)[:, :2]]

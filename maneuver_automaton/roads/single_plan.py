@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from maneuver_automaton._display import Player, picture, player_frame, player_page
 from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.roads.decision import RoadDecision, RoadSettings
@@ -47,6 +48,16 @@ class RoadPlanResult:
             return None
         n, decision = self.decision.lasting, self.decision
         return self.planner.plan_of(decision.states[n], decision.controls[n:], tick=n)
+
+    def player(self, *, title: str = "") -> Player:
+        """A page that plays it: `.html`, or `.save(path)`; `title` heads it."""
+        return player_page(self, title=title)
+
+    def _repr_html_(self) -> str:
+        return player_frame(self)
+
+    def _repr_png_(self) -> bytes | None:
+        return picture(self)
 
 
 def plan_road(

@@ -1,0 +1,154 @@
+"""The player in a browser: it shows what the plan says, and nothing goes wrong."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from maneuver_automaton.bounds import Narrowest
+from maneuver_automaton.cli import run
+from maneuver_automaton.collision import Box
+from maneuver_automaton.formats.plan_json import load_plan
+from maneuver_automaton.planning import LowerBound, PlanResult, PlanStatus
+from tests.plotting.cases import flight_plan, parking_plan, plan_of, result_of, slalom_problem
+from tests.plotting.loops import pushed_loop
+from tests.plotting.player.browser import browser, opened, poses
+
+SCENARIOS = Path(__file__).parents[3] / "scenarios"
+ROADS = Path(__file__).parents[4] / "shared" / "data" / "commonroad" / "scenarios"
+MILLIMETRE = 1e-3
+
+
+def parking_result():
+    plan = parking_plan()
+    other = plan_of(["straight", "spin"], [1.0, 2.0])
+    return replace(
+        result_of(plan, others=[other]),
+        problem=slalom_problem(plan, footprint=Box([0.5, 0.3])),
+        improvements=((0.01, 12.0), (0.2, 9.75)),
+        lower_bound=8.0,
+        gap=0.18,
+        bound=LowerBound(value=8.0, kind="cells", history=((0.005, 5.0), (0.3, 8.0))),
+        nodes=np.array([[-1.0, 0.5, 0.0, 1.0], [0.5, 0.5, 1.0, 3.0]]),
+    )
+
+
+def unreachable():
+    squares = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1]]) + np.zeros((3, 1, 2))
+    return PlanResult(
+        problem=slalom_problem(parking_plan()),
+        status=PlanStatus.UNREACHABLE,
+        reason="too narrow",
+        reached=squares,
+        narrowest=Narrowest(place=(0.5, 0.2), missing=0.1),
+    )
+
+
+def test_the_page_plays_what_was_planned(tmp_path):
+    result, loop, flight = parking_result(), pushed_loop(), flight_plan()
+    values = {"plan": result, "loop": loop, "flight": flight, "none": unreachable()}
+    for name, value in values.items():
+        value.player().save(tmp_path / f"{name}.html")
+    with browser() as running:
+        with opened(running, tmp_path / "plan.html") as page:
+            _follows(page, result.plan)
+            _is_scrubbed(page, result.plan)
+            _has_layers(page)
+        with opened(running, tmp_path / "loop.html") as page:
+            middle = 0.5 * (loop.times[:-1] + loop.times[1:])
+            there = [plan.pose_at(at) for plan, at in zip(loop.driven, middle, strict=True)]
+            np.testing.assert_allclose(poses(page, middle), there, atol=MILLIMETRE)
+            page.evaluate("player.seek(player.end)")
+            assert page.inner_text("#clock").endswith("goal reached")
+        with opened(running, tmp_path / "flight.html") as page:
+            _follows(page, flight)
+            assert page.is_visible("#space")
+        with opened(running, tmp_path / "none.html") as page:
+            assert "unreachable: too narrow" in page.inner_text("#facts")
+            assert page.is_hidden("#transport")
+            assert page.locator("#layers input").count() == 1
+
+
+def _follows(page, plan):
+    times = plan.start_time + plan.duration * np.array([0.2, 0.5, 0.9])
+    np.testing.assert_allclose(poses(page, times), plan.pose_at(times), rtol=0.0, atol=MILLIMETRE)
+
+
+def _is_scrubbed(page, plan):
+    """Keys, the bar and a script set the time, and what is drawn changes with it."""
+    box = page.locator("#bar").bounding_box()
+    begins = [one.bounding_box()["x"] for one in page.locator("#bar .trim").all()]
+    shares = plan.switching_times[:-1] / plan.duration
+    np.testing.assert_allclose(begins, box["x"] + box["width"] * shares, atol=1.0)
+    page.mouse.click(box["x"] + 0.25 * box["width"], box["y"] + 10)
+    assert page.evaluate("player.time") == pytest.approx(0.25 * plan.duration, rel=0.01)
+    assert page.is_visible("#tip")
+    for name in ("trim", "speed", "turn rate", "clearance"):
+        assert name in page.inner_text("#tip")
+    page.keyboard.press("]")
+    assert page.evaluate("player.time") == pytest.approx(plan.switching_times[3])
+    page.keyboard.press("Home")
+    assert page.evaluate("player.time") == 0.0
+    before = page.evaluate("document.getElementById('stage').toDataURL()")
+    page.evaluate("player.seek(3.0)")
+    assert page.inner_text("#clock") == "3.00 s"
+    assert page.evaluate("document.getElementById('stage').toDataURL()") != before
+    page.keyboard.press(" ")
+    page.wait_for_function("player.time > 3.05")
+    page.keyboard.press(" ")
+
+
+def _has_layers(page):
+    """Alternatives, search, theme and zoom do what they say."""
+    page.keyboard.press("2")
+    assert page.evaluate("player.end") == pytest.approx(3.0)
+    page.keyboard.press("1")
+    assert page.locator(".card").count() == 2
+    page.hover("#search canvas")
+    assert "gap" in page.inner_text("#tip")
+    theme = page.evaluate("document.documentElement.dataset.theme")
+    page.keyboard.press("d")
+    assert page.evaluate("document.documentElement.dataset.theme") != theme
+    for key in ("+", "f", "w", "b", "?", "?"):
+        page.keyboard.press(key)
+    assert page.locator("#layers input").count() == 5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "limit"),
+    [("parallel_parking", 3), ("crossing_traffic", 2), ("trailer", 4), ("helicopter_city", 5)],
+)
+def test_a_scenario_is_played_as_its_plan_json_says(name, limit, tmp_path):
+    options = ["--html", "--no-plot", "--quiet", "--out", str(tmp_path), "--alternatives", "2"]
+    assert run(["plan", str(SCENARIOS / f"{name}.yaml"), "--time-limit", str(limit), *options]) == 0
+    plan = load_plan(tmp_path / "plan.json")
+    with browser() as running, opened(running, tmp_path / "plan.html") as page:
+        _follows(page, plan)
+        nearest = page.evaluate("Math.min(...player.data.motions[0].clearance.v)")
+        stated = dict(page.evaluate("player.data.facts"))["clearance"]
+        assert nearest == pytest.approx(float(stated.split()[0]), abs=0.02, rel=0.05)
+
+
+@pytest.mark.slow
+def test_a_closed_loop_is_played_as_its_file_says(tmp_path):
+    file, options = SCENARIOS / "parking_noise.yaml", ["--html", "--no-plot", "--quiet"]
+    run(["mpc", str(file), "--out", str(tmp_path), *options])
+    steps = json.loads((tmp_path / "closed_loop.json").read_text())["steps"]
+    with browser() as running, opened(running, tmp_path / "closed_loop.html") as page:
+        shown = poses(page, [step["time_s"] for step in steps])
+        np.testing.assert_allclose(shown, [step["pose"] for step in steps], atol=MILLIMETRE)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not ROADS.is_dir(), reason="needs recordings of roads")
+def test_a_drive_is_played_as_its_file_says(tmp_path):
+    file, options = ROADS / "CHN_Sha-4_2_T-1.xml", ["--html", "--no-plot", "--quiet"]
+    run(["mpc", str(file), "--steps", "30", "--out", str(tmp_path), *options])
+    steps = json.loads((tmp_path / "closed_loop.json").read_text())["steps"]
+    with browser() as running, opened(running, tmp_path / "closed_loop.html") as page:
+        shown = poses(page, [step["time_s"] for step in steps[::7]])
+        there = [step["pose"] for step in steps[::7]]
+        np.testing.assert_allclose(shown, there, rtol=0.0, atol=MILLIMETRE)
