@@ -192,7 +192,8 @@ def test_unknown_trims_are_named_with_the_nearest(values):
         ({"start_time": math.nan}, "start: time must be finite, got nan s"),
         ({"start_time": -math.inf}, "start: time must be finite, got -inf s"),
         ({"obstacles": [{"disc_m": 1.0}]},
-         "obstacles: got {'disc_m': 1.0}, need Obstacle, OccupancyMap, Polygon, Disc or Box"),
+         "obstacles: got {'disc_m': 1.0}, need Obstacle, OccupancyMap, Polygon, Disc or "
+         "Box, geometry of shapely, or corners (n, 2)"),
     ],
 )  # fmt: skip
 def test_what_else_is_wrong_is_said(values, message):

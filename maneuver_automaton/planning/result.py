@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._brief import brief
 from maneuver_automaton.audit import Audit, TerminalError
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.bounds import Narrowest
@@ -42,6 +43,8 @@ class LowerBound:
     history: tuple[tuple[float, float], ...] = ()  # seconds, value
     work: int = 0  # steps times cells of linear programs
 
+    __repr__ = brief
+
     def gap(self, cost: float) -> float:
         """Share of a cost that is at most to be saved."""
         if cost == math.inf:
@@ -56,6 +59,8 @@ class Alternative:
     plan: Plan
     cost: float
     terminal_error: TerminalError
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -82,6 +87,8 @@ class PlanResult:
     narrowest: Narrowest | None = None  # the passage that is too narrow, of a proof
     reached: Array | None = None  # (n, 4, 2) squares that the pose never leaves, of that proof
     nodes: Array | None = None  # (n, 4) x, y, heading, cost of what was expanded, if asked for
+
+    __repr__ = brief
 
 
 class Answer(Protocol):

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._brief import brief
 from maneuver_automaton.collision import Box, Disc, Polygon, Shape
 
 Interval: TypeAlias = tuple[float, float]
@@ -36,6 +37,8 @@ class GoalRegion:
     speed: Interval | None = None  # [m/s]
     time: Interval = (0.0, math.inf)  # [s]
     lanelets: tuple[int, ...] = ()  # numbers of those that the places are, if they are lanelets
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         if self.places is not None and not self.places:
