@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.automaton import Automaton
@@ -138,33 +139,52 @@ def _write_scenario(scenario: Scenario, source: Path, target: Path) -> None:
 
 
 def plot(file: Path, out: Path | None, *, animate: bool) -> int:
-    """Draw a plan.json again, still or in motion."""
-    from maneuver_automaton.formats.plan_json import load_plan, read_plan_document
+    """Draw a plan.json or closed_loop.json again; a plan also in motion."""
+    from maneuver_automaton.formats.driven_json import read_closed_loop_document
+    from maneuver_automaton.formats.plan_json import read_plan_document
 
-    document = read_plan_document(file)
-    endings = ANIMATION_ENDINGS if animate else PICTURE_ENDINGS
-    path = file.with_suffix(endings[0]) if out is None else out
-    if path.is_dir():
-        path = path / file.with_suffix(endings[0]).name
-    if path.suffix.lower() not in endings:
-        what = "animation" if animate else "picture"
+    loop = read_closed_loop_document(file)
+    if loop is not None and animate:
         raise InvalidScenario(
-            f"{path}: is no {what} that this version draws, need an ending of {', '.join(endings)}"
+            f"{file}: is a closed loop, whose animation only `mpc --animate` draws; leave it out"
         )
+    document = read_plan_document(file) if loop is None else loop
+    path = _picture(file, out, ANIMATION_ENDINGS if animate else PICTURE_ENDINGS)
     make_folder(path.parent)
-    from maneuver_automaton import plotting
-
     try:
-        if animate:
-            plotting.save_plan_animation(load_plan(file), path)
-        else:
-            plotting.save_plan_file_figure(document, path)
+        _draw_again(file, document, path, looped=loop is not None, animate=animate)
     except OSError as error:
         raise not_written(path, error) from error
     except (KeyError, ValueError, TypeError, IndexError) as error:
         said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
         raise InvalidScenario(f"{file}: {said}") from error
     return FOUND
+
+
+def _draw_again(
+    file: Path, document: dict[str, Any], path: Path, *, looped: bool, animate: bool
+) -> None:
+    from maneuver_automaton import plotting
+    from maneuver_automaton.formats.driven_json import driven_document
+    from maneuver_automaton.formats.plan_json import load_plan
+
+    if animate:
+        plotting.save_plan_animation(load_plan(file), path)
+    else:
+        plotting.save_plan_file_figure(driven_document(document) if looped else document, path)
+
+
+def _picture(file: Path, out: Path | None, endings: tuple[str, ...]) -> Path:
+    """Where the picture goes: beside the file, into a folder, or to the file given."""
+    path = file.with_suffix(endings[0]) if out is None else out
+    if path.is_dir():
+        path = path / file.with_suffix(endings[0]).name
+    if path.suffix.lower() not in endings:
+        what = "animation" if endings == ANIMATION_ENDINGS else "picture"
+        raise InvalidScenario(
+            f"{path}: is no {what} that this version draws, need an ending of {', '.join(endings)}"
+        )
+    return path
 
 
 def print_schema() -> int:

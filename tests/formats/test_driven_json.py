@@ -1,0 +1,60 @@
+"""A closed loop drawn again from its file alone."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import maneuver_automaton as ma
+from maneuver_automaton.cli import run
+from maneuver_automaton.formats.closed_loop_json import closed_loop_to_dict, save_closed_loop
+from maneuver_automaton.formats.driven_json import driven_document
+
+ROBOT = ma.Automaton.of_controls(
+    ma.Unicycle(), {"rest": (0.0, 0.0), "ahead": (1.0, 0.0), "left": (1.0, 1.0)}
+)
+GOAL = [2.0 + np.sin(1.0), 1.0 - np.cos(1.0), 1.0]
+LOOP = ma.simulate(ma.Problem(ROBOT, [0, 0, 0], GOAL, horizon=ma.Horizon(max_trims=2)), step=0.5)
+
+
+def test_the_drive_is_that_of_the_loop():
+    document = driven_document(closed_loop_to_dict(LOOP))
+    assert [(one["name"], one["duration_s"]) for one in document["primitives"]] == [
+        ("ahead", pytest.approx(2.0)),
+        ("left", pytest.approx(1.0)),
+    ]
+    times, poses = (np.array(document["trajectory"][key]) for key in ("time_s", "pose"))
+    for time, pose in zip(times, poses, strict=True):
+        piece = LOOP.driven[min(int(time / 0.5 + 1e-9), len(LOOP.driven) - 1)]
+        np.testing.assert_allclose(pose, piece.pose_at(time), atol=1e-9)
+    assert np.abs(np.diff(poses[:, 2])).max() <= 0.05 + 1e-12
+
+
+def test_plot_draws_a_closed_loop(tmp_path, capsys):
+    file = tmp_path / "closed_loop.json"
+    save_closed_loop(LOOP, file)
+    assert run(["plot", str(file)]) == 0
+    assert (tmp_path / "closed_loop.png").exists()
+    assert run(["plot", str(file), "--out", str(tmp_path / "loop.svg")]) == 0
+    assert "ahead" in (tmp_path / "loop.svg").read_text()
+    assert run(["plot", str(file), "--animate"]) == 2
+    assert capsys.readouterr().err == (
+        f"{file}: is a closed loop, whose animation only `mpc --animate` draws; leave it out\n"
+    )
+
+
+def test_a_loop_of_no_step_is_drawn(tmp_path):
+    there = ma.simulate(ma.Problem(ROBOT, [0, 0, 0], [0, 0, 0]), step=0.5)
+    save_closed_loop(there, tmp_path / "closed_loop.json")
+    assert run(["plot", str(tmp_path / "closed_loop.json")]) == 0
+
+
+def test_a_broken_log_is_told(tmp_path, capsys):
+    document = closed_loop_to_dict(LOOP)
+    document["steps"][1]["pose"] = document["steps"][1]["vehicle_pose"] = "here"
+    Path(tmp_path / "a.json").write_text(json.dumps(document))
+    assert run(["plot", str(tmp_path / "a.json")]) == 2
+    assert capsys.readouterr().err.startswith(f"{tmp_path / 'a.json'}: steps: pose: got ")
