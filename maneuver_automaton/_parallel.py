@@ -13,7 +13,8 @@ from typing import Any, Literal, TypeVar
 from maneuver_automaton._interrupts import patient, serving, stopped, unheard
 
 LOCAL = "local"  # a cluster on this machine
-PATIENCE = 0.8  # [s] until a scheduler must have answered
+PATIENCE = 0.8  # [s] until something must have answered at its address
+CONNECTED = 10.0  # [s] until it must have agreed on the words to use
 _PLACE = re.compile(r"(?:\w+://)?(?P<host>[^:/@\s]+|\[[^\]]+\]):(?P<port>\d{1,5})")
 
 Piece = TypeVar("Piece")
@@ -148,13 +149,32 @@ def _on_dask(
     order: str,
 ) -> Iterator[Result]:
     """Results of a Dask cluster, each as it comes; what is not done when they end is called off."""
-    from distributed import Client, as_completed
+    client = _client(scheduler, jobs)
 
-    local = {"n_workers": jobs, "threads_per_worker": 1, "dashboard_address": None}
-    with Client(**local) if scheduler == LOCAL else Client(scheduler) as client:
-        futures = client.map(function, pieces, pure=False)
-        try:
-            for future in futures if order == "as given" else as_completed(futures):
-                yield future.result()
-        finally:
-            client.cancel(futures)
+    def results() -> Iterator[Result]:
+        from distributed import as_completed
+
+        with client:
+            futures = client.map(function, pieces, pure=False)
+            try:
+                for future in futures if order == "as given" else as_completed(futures):
+                    yield future.result()
+            finally:
+                client.cancel(futures)
+
+    return results()
+
+
+def _client(scheduler: str, jobs: int) -> Any:
+    """A client of a scheduler, or of a cluster on this machine."""
+    from distributed import Client
+
+    if scheduler == LOCAL:
+        return Client(n_workers=jobs, threads_per_worker=1, dashboard_address=None)
+    try:
+        return Client(scheduler, timeout=CONNECTED)
+    except Exception as error:  # whatever another server answers
+        raise ValueError(
+            f"scheduler: what answers at {scheduler} is no Dask scheduler of this version: "
+            f"{' '.join(str(error).split())[:200]}"
+        ) from error

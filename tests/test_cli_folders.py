@@ -100,6 +100,7 @@ def test_results_come_one_by_one_and_then_as_a_table(folder, capsys):
     assert any("clearance [m]" in line for line in lines[3:])
 
 
+@pytest.mark.slow  # two processes that import everything
 def test_loops_run_several_at_a_time(folder, capsys):
     Path("many/b.yaml").write_text(LOOP.replace("    - {name: spin, control: [0.0, 1.0]}\n", ""))
     assert run(["mpc", "many", *QUICK, "--jobs", "2"]) == 1

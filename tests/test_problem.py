@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import math
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -350,3 +352,9 @@ def test_a_cost_is_a_value():
 
     with pytest.raises(ValueError, match="Changing has no hash; need a value"):
         problem([0, 0, 0], [1, 2, 3], cost=Changing())
+
+
+def test_every_parameter_is_documented():
+    described = inspect.getdoc(Problem).split("Parameters\n")[1].split("Raises\n")[0]
+    for name in inspect.signature(Problem).parameters:
+        assert re.search(rf"^{name} : ", described, flags=re.MULTILINE), name
