@@ -140,19 +140,26 @@ def _write_scenario(scenario: Scenario, source: Path, target: Path) -> None:
 
 def plot(file: Path, out: Path | None, *, animate: bool) -> int:
     """Draw a plan.json or closed_loop.json again; a plan also in motion."""
-    from maneuver_automaton.formats.driven_json import read_closed_loop_document
-    from maneuver_automaton.formats.plan_json import read_plan_document
+    from maneuver_automaton.formats.plan_json import load_plan
 
-    loop = read_closed_loop_document(file)
-    if loop is not None and animate:
+    document = _drawn(file, moving=animate)
+    endings = ANIMATION_ENDINGS if animate else PICTURE_ENDINGS
+    path = file.with_suffix(endings[0]) if out is None else out
+    if path.is_dir():
+        path = path / file.with_suffix(endings[0]).name
+    if path.suffix.lower() not in endings:
+        what = "animation" if animate else "picture"
         raise InvalidScenario(
-            f"{file}: is a closed loop, whose animation only `mpc --animate` draws; leave it out"
+            f"{path}: is no {what} that this version draws, need an ending of {', '.join(endings)}"
         )
-    document = read_plan_document(file) if loop is None else loop
-    path = _picture(file, out, ANIMATION_ENDINGS if animate else PICTURE_ENDINGS)
     make_folder(path.parent)
+    from maneuver_automaton import plotting
+
     try:
-        _draw_again(file, document, path, looped=loop is not None, animate=animate)
+        if animate:
+            plotting.save_plan_animation(load_plan(file), path)
+        else:
+            plotting.save_plan_file_figure(document, path)
     except OSError as error:
         raise not_written(path, error) from error
     except (KeyError, ValueError, TypeError, IndexError) as error:
@@ -161,30 +168,23 @@ def plot(file: Path, out: Path | None, *, animate: bool) -> int:
     return FOUND
 
 
-def _draw_again(
-    file: Path, document: dict[str, Any], path: Path, *, looped: bool, animate: bool
-) -> None:
-    from maneuver_automaton import plotting
-    from maneuver_automaton.formats.driven_json import driven_document
-    from maneuver_automaton.formats.plan_json import load_plan
+def _drawn(file: Path, *, moving: bool) -> dict[str, Any]:
+    """What to draw of a plan.json, or of a closed_loop.json, whose drive is drawn as a plan."""
+    from maneuver_automaton.formats.driven_json import driven_document, read_closed_loop_document
+    from maneuver_automaton.formats.plan_json import read_plan_document
 
-    if animate:
-        plotting.save_plan_animation(load_plan(file), path)
-    else:
-        plotting.save_plan_file_figure(driven_document(document) if looped else document, path)
-
-
-def _picture(file: Path, out: Path | None, endings: tuple[str, ...]) -> Path:
-    """Where the picture goes: beside the file, into a folder, or to the file given."""
-    path = file.with_suffix(endings[0]) if out is None else out
-    if path.is_dir():
-        path = path / file.with_suffix(endings[0]).name
-    if path.suffix.lower() not in endings:
-        what = "animation" if endings == ANIMATION_ENDINGS else "picture"
+    loop = read_closed_loop_document(file)
+    if loop is None:
+        return read_plan_document(file)
+    if moving:
         raise InvalidScenario(
-            f"{path}: is no {what} that this version draws, need an ending of {', '.join(endings)}"
+            f"{file}: is a closed loop, whose animation only `mpc --animate` draws; leave it out"
         )
-    return path
+    try:
+        return driven_document(loop)
+    except (KeyError, ValueError, TypeError, IndexError, AttributeError) as error:
+        said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
+        raise InvalidScenario(f"{file}: {said}") from error
 
 
 def print_schema() -> int:
