@@ -364,14 +364,19 @@ def plot(
     ],
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="The picture.")] = None,
     animate: Animate = False,
+    with_file: Annotated[
+        Path | None,
+        typer.Option("--with", metavar="FILE", help="Scenario that a closed loop was driven in."),
+    ] = None,
 ) -> int:
     """Draw a plan.json, or a closed_loop.json, again: PLAN.png beside it, or the file given.
 
-    With --animate it is an animation, PLAN.gif.
+    With --animate it is an animation, PLAN.gif. A closed loop is drawn as mpc does --with its
+    scenario; from its file alone, it is drawn as an arc from step to step.
     """
     from maneuver_automaton.cli import convert_command
 
-    return convert_command.plot(file, out, animate=animate)
+    return convert_command.plot(file, out, animate=animate, beside=with_file)
 
 
 @app.command(epilog=ending("schema"))

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.automaton import Automaton
@@ -36,11 +36,13 @@ from maneuver_automaton.formats.recognition import YAML_ENDINGS
 from maneuver_automaton.formats.statement import MapFile
 from maneuver_automaton.scenario import Scenario, statements_of, to_yaml
 
+if TYPE_CHECKING:
+    from maneuver_automaton.receding_horizon import ClosedLoop
+
 KEEP_MULTIPLIERS = (MPRIM, JSON)  # but Nav2's kind of JSON
 
 MAP_ENDINGS = (".map",)
-PICTURE_ENDINGS = (".png", ".pdf", ".svg")
-ANIMATION_ENDINGS = (".gif",)
+DRAWN = {"picture": (".png", ".pdf", ".svg"), "animation": (".gif",)}  # by their endings
 
 
 def convert(source: Path, target: Path, *, parts: Parts) -> int:
@@ -138,25 +140,21 @@ def _write_scenario(scenario: Scenario, source: Path, target: Path) -> None:
     write_text_atomically(target, text)
 
 
-def plot(file: Path, out: Path | None, *, animate: bool) -> int:
-    """Draw a plan.json or closed_loop.json again; a plan also in motion."""
-    from maneuver_automaton.formats.plan_json import load_plan
-
-    document = _drawn(file, moving=animate)
-    endings = ANIMATION_ENDINGS if animate else PICTURE_ENDINGS
-    path = file.with_suffix(endings[0]) if out is None else out
-    if path.is_dir():
-        path = path / file.with_suffix(endings[0]).name
-    if path.suffix.lower() not in endings:
-        what = "animation" if animate else "picture"
-        raise InvalidScenario(
-            f"{path}: is no {what} that this version draws, need an ending of {', '.join(endings)}"
-        )
+def plot(file: Path, out: Path | None, *, animate: bool, beside: Path | None = None) -> int:
+    """Draw a plan.json or closed_loop.json again, still or in motion."""
+    loop = None if beside is None else _loop_of(file, beside)
+    document = {} if loop else _drawn(file, moving=animate)
+    path = _picture(file, out, "animation" if animate else "picture")
     make_folder(path.parent)
     from maneuver_automaton import plotting
+    from maneuver_automaton.formats.plan_json import load_plan
 
     try:
-        if animate:
+        if loop is not None and animate:
+            plotting.save_closed_loop_animation(loop, path)
+        elif loop is not None:
+            plotting.save_closed_loop_figure(loop, path)
+        elif animate:
             plotting.save_plan_animation(load_plan(file), path)
         else:
             plotting.save_plan_file_figure(document, path)
@@ -166,6 +164,26 @@ def plot(file: Path, out: Path | None, *, animate: bool) -> int:
         said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
         raise InvalidScenario(f"{file}: {said}") from error
     return FOUND
+
+
+def _picture(file: Path, out: Path | None, what: str) -> Path:
+    """Where the picture goes: beside the file, into a folder, or to the file given."""
+    endings = DRAWN[what]
+    path = file.with_suffix(endings[0]) if out is None else out
+    if path.is_dir():
+        path = path / file.with_suffix(endings[0]).name
+    if path.suffix.lower() not in endings:
+        raise InvalidScenario(
+            f"{path}: is no {what} that this version draws, need an ending of {', '.join(endings)}"
+        )
+    return path
+
+
+def _loop_of(file: Path, beside: Path) -> ClosedLoop:
+    """The closed loop of a file, in the world of the scenario that it was driven in."""
+    from maneuver_automaton.formats.driven_json import load_closed_loop
+
+    return load_closed_loop(file, scenario_of(beside).problem)
 
 
 def _drawn(file: Path, *, moving: bool) -> dict[str, Any]:
@@ -178,7 +196,8 @@ def _drawn(file: Path, *, moving: bool) -> dict[str, Any]:
         return read_plan_document(file)
     if moving:
         raise InvalidScenario(
-            f"{file}: is a closed loop, whose animation only `mpc --animate` draws; leave it out"
+            f"{file}: is a closed loop, whose animation needs --with and the scenario it was "
+            "driven in"
         )
     try:
         return driven_document(loop)

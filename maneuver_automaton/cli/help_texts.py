@@ -48,7 +48,7 @@ EXAMPLES = {
     "example": ("maneuver-automaton example", "maneuver-automaton example warehouse --out hall/"),
     "plot": (
         "maneuver-automaton plot out/plan.json --out plan.pdf",
-        "maneuver-automaton plot out/closed_loop.json",
+        "maneuver-automaton plot out/closed_loop.json --with scenarios/parking_loop.yaml",
     ),
     "schema": ("maneuver-automaton schema > scenario.schema.json",),
 }

@@ -1,9 +1,10 @@
-"""A closed_loop.json as the plan.json of what was driven, from the file alone, for pictures."""
+"""A closed_loop.json for pictures: as the plan.json of what was driven, or as the loop it was."""
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -12,8 +13,11 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.closed_loop_json import load_steps
 from maneuver_automaton.formats.plan_json import read_json
 from maneuver_automaton.groups import group_of
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.receding_horizon import ClosedLoop, within
 
 NEEDED = ("schema", "reached", "steps", "step_s")
 FINEST_M, FINEST_RAD = 0.05, 0.05  # between samples
@@ -25,6 +29,41 @@ def read_closed_loop_document(path: Path | str) -> dict[str, Any] | None:
     with contextlib.suppress(InvalidScenario):
         return read_json(path, needed=NEEDED, kind="closed loop")
     return None
+
+
+def load_closed_loop(path: Path | str, problem: Problem) -> ClosedLoop:
+    """The closed loop of a closed_loop.json; a file states neither its library nor its obstacles.
+
+    What was driven is each plan from where the vehicle was, and then what disturbed it at once.
+
+    Raises
+    ------
+    InvalidScenario
+        If the file cannot be read, or was planned with another library.
+    """
+    steps, poses = load_steps(path, problem.automaton)
+    document = read_json(path, needed=NEEDED, kind="closed loop")
+    try:
+        return ClosedLoop(
+            problem=problem,
+            step=float(document["step_s"]),
+            steps=steps,
+            poses=poses,
+            times=np.array([step["time_s"] for step in document["steps"]]),
+            reached=bool(document["reached"]),
+            status=str(document["status"]),
+            reason=str(document["reason"]),
+            cost=float(document["cost"]),
+            value=float(document["steps"][-1]["value"]),
+            driven=tuple(
+                replace(step.piece, start=pose) for step, pose in zip(steps, poses, strict=False)
+            ),
+            inside=tuple(any(within(pose, goal) for goal in problem.goals) for pose in poses),
+            steps_bound=document["steps_bound"],
+        )
+    except (ValueError, KeyError, TypeError) as error:
+        said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
+        raise InvalidScenario(f"{path}: {said}") from error
 
 
 def driven_document(document: Mapping[str, Any]) -> dict[str, Any]:
