@@ -9,6 +9,7 @@ import shapely
 import maneuver_automaton as ma
 from maneuver_automaton.collision import Zone, as_footprint, as_obstacles
 from maneuver_automaton.collision.outline import outlines
+from maneuver_automaton.roads import GoalRegion
 
 ROBOT = ma.Automaton.of_controls(ma.Unicycle(), {"ahead": (1.0, 0.0), "turn": (1.0, 1.0)})
 COURT = shapely.box(0, 0, 9, 9).difference(shapely.Point(4, 4).buffer(2))
@@ -74,6 +75,13 @@ def test_wherever_a_shape_is_taken_geometry_will_do():
     straight = ma.Automaton(truck, ma.trims_of(truck, {"speed": [0.0, 1.0]}).trims)
     problem = ma.Problem(straight, [0, 0, 0], [1, 0, 0], parts={"trailer": body})
     assert problem.parts["trailer"][0].corners.shape == (4, 2)
+
+
+def test_goals_on_roads_are_places_of_any_kind():
+    goal = GoalRegion(places=[shapely.box(0, 0, 2, 1), CORNERS], time=(0.0, 1.0))
+    assert goal.contains([1.5, 0.9, 0.0], speed=0.0, time=0.5)
+    assert not goal.contains([3.0, 0.5, 0.0], speed=0.0, time=0.5)
+    assert GoalRegion(places=shapely.box(0, 0, 2, 1)).contains([1.0, 0.5, 0.0], speed=0.0, time=0.0)
 
 
 def test_heights_of_points_are_left_out():
