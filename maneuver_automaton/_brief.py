@@ -54,9 +54,11 @@ def _fields(value: Any, depth: int) -> str:
 
 
 def _is_default(value: Any, one: dataclasses.Field[Any]) -> bool:
-    if one.default_factory is not dataclasses.MISSING:
-        return isinstance(value, tuple | list | Mapping) and not value
-    return value is one.default or (isinstance(value, str | float | int) and value == one.default)
+    if one.default_factory is dataclasses.MISSING:
+        plain = isinstance(value, str | float | int | tuple)
+        return value is one.default or (plain and value == one.default)
+    default = one.default_factory()
+    return type(value) is type(default) and _shown(value, 1) == _shown(default, 1)
 
 
 def _shown(value: Any, depth: int) -> str:
