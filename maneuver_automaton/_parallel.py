@@ -63,7 +63,7 @@ def in_parallel(
     if jobs < 1:
         raise ValueError(f"jobs must be at least 1, got {jobs}")
     if scheduler is not None:
-        _check_scheduler(scheduler)
+        check_scheduler(scheduler)
         return _on_dask(function, pieces, jobs, scheduler, order)
     return _results(function, pieces, jobs, order, ends_early)
 
@@ -118,8 +118,14 @@ def _tell_children() -> None:
         child.terminate()
 
 
-def _check_scheduler(scheduler: str) -> None:
-    """Say at once that Dask is not installed, or that nothing answers at an address."""
+def check_scheduler(scheduler: str) -> None:
+    """Say at once that Dask is not installed, or that nothing answers at an address.
+
+    Raises
+    ------
+    ValueError
+        If so.
+    """
     if importlib.util.find_spec("distributed") is None:
         raise ValueError(
             f"scheduler: got {scheduler!r}, but Dask is not installed; need `pip install "

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from maneuver_automaton._interrupts import stopped
-from maneuver_automaton._parallel import in_parallel
+from maneuver_automaton._parallel import check_scheduler, in_parallel
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
 from maneuver_automaton.cli.inputs import Parts, not_written
 from maneuver_automaton.cli.progress import progress_bar
@@ -83,6 +83,21 @@ def run_folder(
     return max((row.code for row in ordered), default=NO_PLAN)
 
 
+def check_address(scheduler: str | None) -> None:
+    """Refuse an address of --dask at which nothing answers, before any file is read."""
+    if scheduler is not None:
+        with _as_option():
+            check_scheduler(scheduler)
+
+
+@contextlib.contextmanager
+def _as_option() -> Iterator[None]:
+    try:
+        yield
+    except ValueError as error:
+        raise InvalidScenario(f"--dask: {str(error).removeprefix('scheduler: ')}") from error
+
+
 @dataclass(frozen=True, slots=True)
 class _Named:
     """A function whose result comes with the file that it is of."""
@@ -96,12 +111,10 @@ class _Named:
 def _results(
     one: Callable[[Problem], Row], left: Sequence[Problem], *, jobs: int, scheduler: str | None
 ) -> Iterator[tuple[Path, Row]]:
-    try:
+    with _as_option():
         return in_parallel(
             _Named(one), left, jobs=jobs, scheduler=scheduler, order="as done", ends_early=True
         )
-    except ValueError as error:
-        raise InvalidScenario(f"--dask: {str(error).removeprefix('scheduler: ')}") from error
 
 
 def _key(path: Path, parts: Parts, options: str) -> str:

@@ -77,12 +77,13 @@ def drive_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> in
 
 def drive_folder(folder: Path, out: Path, *, settings: Settings, parts: Parts) -> int:
     """Close the loop of every problem of a folder that has one, each into `out`/STEM."""
-    from maneuver_automaton.cli.folder_runs import run_folder
+    from maneuver_automaton.cli.folder_runs import check_address, run_folder
     from maneuver_automaton.cli.folders import problems_in
     from maneuver_automaton.cli.plan_command import compile_first
 
     if settings.resume is not None:
         raise InvalidScenario("--resume: goes on with one loop, and a folder has many; need a file")
+    check_address(settings.scheduler)
     problems = [one for one in problems_in(folder, parts) if _has_loop(*one)]
     if not problems:
         raise InvalidScenario(f"{folder}: no scenario in it has a receding_horizon, need one")

@@ -13,7 +13,7 @@ from maneuver_automaton._interrupts import stopped
 from maneuver_automaton.budget import Watch
 from maneuver_automaton.cli import road_command
 from maneuver_automaton.cli.compiling import announced
-from maneuver_automaton.cli.folder_runs import Row, run_folder
+from maneuver_automaton.cli.folder_runs import Row, check_address, run_folder
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, scenario_of
 from maneuver_automaton.cli.progress import waiting
@@ -87,6 +87,7 @@ def plan_folder(
     """Plan every problem of a folder into `out`/STEM, print a table, return the exit code."""
     from maneuver_automaton.cli.folders import problems_in
 
+    check_address(scheduler)
     problems = problems_in(folder, parts)
     make_folder(out)
     return run_folder(
