@@ -1,4 +1,4 @@
-"""Build the package with its kernels compiled, so that nobody waits for the compiler."""
+"""Build: kernels are compiled, and the scenarios, of which there is one copy, go into the wheel."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 from setuptools import Distribution, setup
 from setuptools.command.build_py import build_py
 
+SCENARIOS = ("*.yaml", "maps/*")  # of the folder `scenarios`; its pictures stay behind
 COMPILE = (
     "import sys, pathlib\n"
     "from maneuver_automaton._compile_all import ship\n"
@@ -17,21 +18,33 @@ COMPILE = (
 )
 
 
-class BuildWithKernels(build_py):
-    """Copies the package, and compiles its kernels where they are copied to."""
+class BuildWhole(build_py):
+    """Copies the modules, then what is made of them and what belongs to them."""
 
     def run(self) -> None:
-        """Copy, and compile unless the package stays where it is."""
+        """Build; an editable install finds scenarios where they are, and compiles at first use."""
         super().run()
         if self.editable_mode:
-            return  # they are compiled when they are used first
+            return
         package = Path(self.build_lib).absolute() / "maneuver_automaton"
-        found = os.environ.get("PYTHONPATH")  # pip names what a build needs there
-        paths = {
-            **os.environ,
-            "PYTHONPATH": os.pathsep.join(filter(None, (str(package.parent), found))),
-        }
-        if subprocess.run([sys.executable, "-c", COMPILE, str(package)], env=paths).returncode:
+        self._add_scenarios(package)
+        self._compile_kernels(package)
+
+    def _add_scenarios(self, package: Path) -> None:
+        folder = Path(__file__).parent / "scenarios"
+        files = sorted(path for pattern in SCENARIOS for path in folder.glob(pattern))
+        if not files:
+            raise FileNotFoundError(f"{folder}: holds no scenario, so the wheel would have none")
+        for path in files:
+            target = package / path.relative_to(folder.parent)
+            self.mkpath(str(target.parent))
+            self.copy_file(str(path), str(target))
+
+    def _compile_kernels(self, package: Path) -> None:
+        known = os.environ.get("PYTHONPATH")  # where pip puts what a build needs
+        paths = os.pathsep.join(filter(None, (str(package.parent), known)))
+        command = [sys.executable, "-c", COMPILE, str(package)]
+        if subprocess.run(command, env={**os.environ, "PYTHONPATH": paths}).returncode:
             self.warn("kernels were not compiled: they will be when they are used first")
 
 
@@ -43,4 +56,4 @@ class WithMachineCode(Distribution):
         return True
 
 
-setup(cmdclass={"build_py": BuildWithKernels}, distclass=WithMachineCode)
+setup(cmdclass={"build_py": BuildWhole}, distclass=WithMachineCode)

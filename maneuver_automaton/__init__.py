@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from maneuver_automaton import plotting as plotting
     from maneuver_automaton.automaton import Automaton as Automaton
     from maneuver_automaton.automaton import Plan as Plan
+    from maneuver_automaton.automaton.building import build_library as build_library
     from maneuver_automaton.automaton.library import load_library as load_library
     from maneuver_automaton.automaton.library import save_library as save_library
     from maneuver_automaton.automaton.stock import load_stock_library as load_stock_library
@@ -27,7 +28,10 @@ if TYPE_CHECKING:
     from maneuver_automaton.collision import Obstacle as Obstacle
     from maneuver_automaton.collision import OccupancyMap as OccupancyMap
     from maneuver_automaton.collision import Polygon as Polygon
+    from maneuver_automaton.collision import Zone as Zone
     from maneuver_automaton.costs import Cost as Cost
+    from maneuver_automaton.formats.maps import load_map as load_map
+    from maneuver_automaton.formats.plan_csv import save_csv as save_csv
     from maneuver_automaton.formats.plan_json import load_plan as load_plan
     from maneuver_automaton.formats.plan_json import save_plan as save_plan
     from maneuver_automaton.groups import SE2 as SE2
@@ -52,6 +56,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.primitives import Maneuver as Maneuver
     from maneuver_automaton.primitives import Trajectory as Trajectory
     from maneuver_automaton.primitives import Trim as Trim
+    from maneuver_automaton.primitives import trims_of as trims_of
     from maneuver_automaton.problem import Bounds as Bounds
     from maneuver_automaton.problem import Goal as Goal
     from maneuver_automaton.problem import Horizon as Horizon
@@ -64,6 +69,8 @@ if TYPE_CHECKING:
     from maneuver_automaton.roads import RoadVehicle as RoadVehicle
     from maneuver_automaton.roads import drive_road as drive_road
     from maneuver_automaton.roads import plan_road as plan_road
+    from maneuver_automaton.scenario import RoadScenario as RoadScenario
+    from maneuver_automaton.scenario import Scenario as Scenario
     from maneuver_automaton.scenario import load_scenario as load_scenario
 
 __version__ = "0.1.0"
@@ -94,10 +101,12 @@ _HOMES = {
     "Polygon": "collision",
     "Problem": "problem",
     "RecedingHorizon": "receding_horizon",
+    "RoadScenario": "scenario",
     "RoadScene": "roads",
     "RoadVehicle": "roads",
     "SE2": "groups",
     "SE2xR": "groups",
+    "Scenario": "scenario",
     "SearchSettings": "problem",
     "SecondOrderCar": "models",
     "SecondOrderUnicycle": "models",
@@ -106,18 +115,23 @@ _HOMES = {
     "Trim": "primitives",
     "Unicycle": "models",
     "UserModel": "models",
+    "Zone": "collision",
+    "build_library": "automaton.building",
     "drive_road": "roads",
     "load_library": "automaton.library",
+    "load_map": "formats.maps",
     "load_plan": "formats.plan_json",
     "load_scenario": "scenario",
     "load_stock_library": "automaton.stock",
     "lower_bound": "planning.lower_bound",
     "plan": "planning",
     "plan_road": "roads",
+    "save_csv": "formats.plan_csv",
     "save_library": "automaton.library",
     "save_plan": "formats.plan_json",
     "simulate": "receding_horizon",
     "translations": "groups",
+    "trims_of": "primitives",
 }
 
 __all__ = [*_HOMES, "plotting"]
@@ -133,4 +147,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return _names()
+    return sorted([*__all__, "__version__"])

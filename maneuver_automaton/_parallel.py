@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import multiprocessing
+import re
+import socket
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Literal, TypeVar
 
 from maneuver_automaton._interrupts import patient, serving, stopped, unheard
+
+LOCAL = "local"  # a cluster on this machine
+PATIENCE = 0.8  # [s] until something must have answered at its address
+CONNECTED = 10.0  # [s] until it must have agreed on the words to use
+_PLACE = re.compile(r"(?:\w+://)?(?P<host>[^:/@\s]+|\[[^\]]+\]):(?P<port>\d{1,5})")
 
 Piece = TypeVar("Piece")
 Result = TypeVar("Result")
@@ -44,7 +52,8 @@ def in_parallel(
     Raises
     ------
     ValueError
-        If `jobs` is no positive number, or Dask is asked for and not installed.
+        If `jobs` is no positive number, Dask is asked for and not installed, or nothing answers
+        at its address.
 
     Examples
     --------
@@ -53,31 +62,31 @@ def in_parallel(
     """
     if jobs < 1:
         raise ValueError(f"jobs must be at least 1, got {jobs}")
-    return _results(function, pieces, jobs, scheduler, order, ends_early)
+    if scheduler is not None:
+        check_scheduler(scheduler)
+        return _on_dask(function, pieces, jobs, scheduler, order)
+    return _results(function, pieces, jobs, order, ends_early)
 
 
 def _results(
     function: Callable[[Piece], Result],
     pieces: Sequence[Piece],
     jobs: int,
-    scheduler: str | None,
     order: str,
     ends_early: bool,
 ) -> Iterator[Result]:
-    if jobs == 1 and scheduler is None:
+    if jobs == 1:
         with patient() if ends_early else contextlib.nullcontext():
             yield from map(function, pieces)
         return
     from joblib import Parallel, delayed
 
-    with _backend(scheduler, jobs):
-        lazily = "generator" if order == "as given" else "generator_unordered"
-        returned = lazily if scheduler is None else "list"
-        work = Parallel(n_jobs=jobs if scheduler is None else -1, return_as=returned)
-        if ends_early and scheduler is None:
-            yield from _patiently(work, function, pieces)
-        else:
-            yield from work(delayed(function)(piece) for piece in pieces)
+    lazily = "generator" if order == "as given" else "generator_unordered"
+    work = Parallel(n_jobs=jobs, return_as=lazily)
+    if ends_early:
+        yield from _patiently(work, function, pieces)
+    else:
+        yield from work(delayed(function)(piece) for piece in pieces)
 
 
 def _patiently(
@@ -109,21 +118,69 @@ def _tell_children() -> None:
         child.terminate()
 
 
-@contextlib.contextmanager
-def _backend(scheduler: str | None, jobs: int) -> Iterator[None]:
-    """Where joblib sends the work: processes on this machine, or a Dask cluster."""
-    if scheduler is None:
-        yield
-        return
-    try:
-        from dask.distributed import Client
-    except ImportError as error:
+def check_scheduler(scheduler: str) -> None:
+    """Say at once that Dask is not installed, or that nothing answers at an address.
+
+    Raises
+    ------
+    ValueError
+        If so.
+    """
+    if importlib.util.find_spec("distributed") is None:
         raise ValueError(
             f"scheduler: got {scheduler!r}, but Dask is not installed; need `pip install "
             "distributed`"
+        )
+    if scheduler == LOCAL:
+        return
+    place = _PLACE.fullmatch(scheduler)
+    if place is None:
+        raise ValueError(
+            f"scheduler: got {scheduler!r}, need an address such as tcp://host:8786, or local"
+        )
+    try:
+        socket.create_connection((place["host"], int(place["port"])), timeout=PATIENCE).close()
+    except (OSError, OverflowError) as error:
+        raise ValueError(
+            f"scheduler: nothing answers at {scheduler} ({error}); need the address of a running "
+            "Dask scheduler, such as tcp://host:8786, or local"
         ) from error
-    from joblib import parallel_config
 
-    local = {"n_workers": jobs, "threads_per_worker": 1, "dashboard_address": None}
-    with Client(**local) if scheduler == "local" else Client(scheduler), parallel_config("dask"):
-        yield
+
+def _on_dask(
+    function: Callable[[Piece], Result],
+    pieces: Sequence[Piece],
+    jobs: int,
+    scheduler: str,
+    order: str,
+) -> Iterator[Result]:
+    """Results of a Dask cluster, each as it comes; what is not done when they end is called off."""
+    client = _client(scheduler, jobs)
+
+    def results() -> Iterator[Result]:
+        from distributed import as_completed
+
+        with client:
+            futures = client.map(function, pieces, pure=False)
+            try:
+                for future in futures if order == "as given" else as_completed(futures):
+                    yield future.result()
+            finally:
+                client.cancel(futures)
+
+    return results()
+
+
+def _client(scheduler: str, jobs: int) -> Any:
+    """A client of a scheduler, or of a cluster on this machine."""
+    from distributed import Client
+
+    if scheduler == LOCAL:
+        return Client(n_workers=jobs, threads_per_worker=1, dashboard_address=None)
+    try:
+        return Client(scheduler, timeout=CONNECTED)
+    except Exception as error:  # whatever another server answers
+        raise ValueError(
+            f"scheduler: what answers at {scheduler} is no Dask scheduler of this version: "
+            f"{' '.join(str(error).split())[:200]}"
+        ) from error

@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._brief import brief
 
 NORM_ORDERS = (1.0, 2.0, math.inf)
 
@@ -51,6 +52,8 @@ class Cost:
     length: float = 0.0  # [1/m]
     switch: float = 0.0  # per switch of trims
     direction_change: float = 0.0  # per change between forward and reverse
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         weights = {name: getattr(self, name) for name in WEIGHTS}

@@ -11,12 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, freeze
+from maneuver_automaton._brief import brief
 from maneuver_automaton._ceilings import MOST_TURNS, check_heading, check_size
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton, Plan, Primitive
 from maneuver_automaton.automaton.headings import motion_of, posed
 from maneuver_automaton.collision import (
     AnyObstacle,
+    AnyShape,
     Obstacle,
     Shape,
     Zone,
@@ -33,22 +35,30 @@ STANDING = 1e-3  # [m/s] slower is no direction of travel
 SEARCH_METHODS = ("auto", "words", "insertion", "lattice")
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Goal:
-    """Where a plan ends: exactly at `pose`, or at any heading there."""
+    """Where a plan ends: exactly at `pose`, or at any heading there.
+
+    Examples
+    --------
+    >>> Goal([5, 5, 0], tolerance_m=0.1).pose.tolist()
+    [5.0, 5.0, 0.0]
+    """
 
     pose: Array  # (dof,) [m, m, rad(, m)]; without heading if translations alone move the vehicle
-    trim: str | None = None
-    free_heading: bool = False
-    tolerance_m: float = 0.0
-    tolerance_rad: float = 0.0
+    trim: str | None = field(default=None, kw_only=True)
+    free_heading: bool = field(default=False, kw_only=True)
+    tolerance_m: float = field(default=0.0, kw_only=True)
+    tolerance_rad: float = field(default=0.0, kw_only=True)
+
+    __repr__ = brief
 
     if TYPE_CHECKING:  # any numbers will do for the pose
 
         def __init__(
             self,
-            *,
             pose: ArrayLike,
+            *,
             trim: str | None = None,
             free_heading: bool = False,
             tolerance_m: float = 0.0,
@@ -160,6 +170,48 @@ class SearchSettings:
 class Problem:
     """From a start pose to a goal with the trims of an automaton, as cheaply as can be.
 
+    Parameters
+    ----------
+    automaton : Automaton
+        The vehicle, its trims, and the maneuvers between them.
+    start : (dof,) array, or a group element
+        Pose at the start: x [m], y [m], heading [rad], and z [m] of a vehicle that flies.
+    goals : (dof,) or (n, dof) array, a group element, a Goal, or a sequence of these
+        Where the plan ends: at the one that is the cheapest to reach.
+    cost : StageCost
+        What a plan costs, such as a `Cost`; the time in seconds if left out.
+    horizon : Horizon
+        How long the plan lasts, and how many trims it may have; both free if left out.
+    start_trim : str, optional
+        Name of the trim in which the vehicle starts; rest if left out.
+    start_time : float
+        Time at the start [s], on the clock of the moving obstacles.
+    bounds : Bounds
+        Intervals in which the pose must stay; none if left out.
+    search : SearchSettings
+        How to search; the defaults suit most problems.
+    obstacles : obstacle, map, shape, shapely geometry, corners, or a sequence of these
+        What the body must not touch. A list of points (n, 2) [m] is a polygon; of a multipolygon
+        each part counts, and holes are free.
+    footprint : shape, shapely geometry, corners, or a sequence of these
+        The body, in the frame of the pose [m]; a point if left out.
+    parts : mapping of str to shapes
+        Bodies of what the vehicle carries, such as its trailer, each in the frame of its part.
+    body_height : (float, float)
+        Lowest and highest point of the body [m] about the altitude of the pose.
+    margin : float
+        Distance [m] that the body keeps from every obstacle.
+    zones : sequence of Zone
+        Where only some motions are admitted.
+
+    Raises
+    ------
+    ValueError
+        If one of them has a wrong shape, is not finite or out of its range, or does not suit the
+        vehicle.
+    UnknownTrim
+        If a trim is named that the automaton does not have.
+
     Examples
     --------
     >>> from maneuver_automaton.models import Unicycle
@@ -184,6 +236,8 @@ class Problem:
     margin: float = field(default=0.0, kw_only=True)  # [m] distance kept from every obstacle
     zones: tuple[Zone, ...] = field(default=(), kw_only=True)  # where not every motion is admitted
 
+    __repr__ = brief
+
     if TYPE_CHECKING:  # numbers, group elements, one goal or several will do
 
         def __init__(
@@ -198,9 +252,9 @@ class Problem:
             start_time: float = 0.0,
             bounds: Bounds = ...,
             search: SearchSettings = ...,
-            obstacles: AnyObstacle | Shape | Sequence[AnyObstacle | Shape] = (),
-            footprint: Shape | Sequence[Shape] = (),
-            parts: Mapping[str, Shape | Sequence[Shape]] = ...,
+            obstacles: AnyObstacle | AnyShape | Sequence[AnyObstacle | AnyShape] = (),
+            footprint: AnyShape | Sequence[AnyShape] = (),
+            parts: Mapping[str, AnyShape | Sequence[AnyShape]] = ...,
             body_height: tuple[float, float] = (0.0, 0.0),
             margin: float = 0.0,
             zones: Sequence[Zone] = (),
@@ -450,7 +504,7 @@ def _is_known(trim: Trim, known: dict[str, tuple[Trim, float]]) -> bool:
 
 
 def _as_parts(
-    model: Model, parts: Mapping[str, Shape | Sequence[Shape]]
+    model: Model, parts: Mapping[str, AnyShape | Sequence[AnyShape]]
 ) -> dict[str, tuple[Shape, ...]]:
     """Shapes of what the vehicle carries, by name; each in the frame of its part."""
     known: tuple[str, ...] = getattr(model, "part_names", ())

@@ -24,7 +24,7 @@ from maneuver_automaton._interrupts import (
     patient,
     stopped,
 )
-from maneuver_automaton.cli import plan_command, run
+from maneuver_automaton.cli import folder_runs, run
 from maneuver_automaton.planning import PlanStatus
 from maneuver_automaton.receding_horizon import RecedingHorizon, simulate
 from maneuver_automaton.roads import RoadPlanner
@@ -246,7 +246,7 @@ def test_a_folder_tells_of_every_file(monkeypatch, capfd, jobs):
     for name in "abcd":
         Path("many").mkdir(exist_ok=True)
         Path("many", f"{name}.yaml").write_text(SCENARIO if name == "a" else LONG)
-    results = plan_command.in_parallel
+    results = folder_runs.in_parallel
 
     def interrupted(function, problems, **settings):
         for number, row in enumerate(results(function, problems, **settings)):
@@ -254,7 +254,7 @@ def test_a_folder_tells_of_every_file(monkeypatch, capfd, jobs):
             if number == 0:
                 at_once()  # as the terminal's Ctrl-C, which processes of ours do not hear
 
-    monkeypatch.setattr(plan_command, "in_parallel", interrupted)
+    monkeypatch.setattr(folder_runs, "in_parallel", interrupted)
     with listening():
         assert run(["plan", "many", "--jobs", jobs, "--no-plot", "--time-limit", "30"]) == 130
     out, said = capfd.readouterr()

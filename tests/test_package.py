@@ -43,6 +43,10 @@ def test_every_name_is_there(name):
     assert name in dir(ma)
 
 
+def test_nothing_but_public_names_is_listed():
+    assert set(dir(ma)) == {*ma.__all__, "__version__"}
+
+
 def test_a_star_brings_every_name_once():
     assert len(set(ma.__all__)) == len(ma.__all__)
     namespace = {}

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import math
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -192,7 +194,8 @@ def test_unknown_trims_are_named_with_the_nearest(values):
         ({"start_time": math.nan}, "start: time must be finite, got nan s"),
         ({"start_time": -math.inf}, "start: time must be finite, got -inf s"),
         ({"obstacles": [{"disc_m": 1.0}]},
-         "obstacles: got {'disc_m': 1.0}, need Obstacle, OccupancyMap, Polygon, Disc or Box"),
+         "obstacles: got {'disc_m': 1.0}, need Obstacle, OccupancyMap, Polygon, Disc or "
+         "Box, geometry of shapely, or corners (n, 2)"),
     ],
 )  # fmt: skip
 def test_what_else_is_wrong_is_said(values, message):
@@ -349,3 +352,9 @@ def test_a_cost_is_a_value():
 
     with pytest.raises(ValueError, match="Changing has no hash; need a value"):
         problem([0, 0, 0], [1, 2, 3], cost=Changing())
+
+
+def test_every_parameter_is_documented():
+    described = inspect.getdoc(Problem).split("Parameters\n")[1].split("Raises\n")[0]
+    for name in inspect.signature(Problem).parameters:
+        assert re.search(rf"^{name} : ", described, flags=re.MULTILINE), name

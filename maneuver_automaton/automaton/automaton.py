@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, IntArray, as_array, vector_text
+from maneuver_automaton._brief import brief
 from maneuver_automaton._display import picture
 from maneuver_automaton.errors import InvalidAutomaton, UnknownTrim
 from maneuver_automaton.models import Model, OnLattice, OnlyTranslated, in_world
@@ -53,6 +54,8 @@ class Automaton:
     trims: tuple[Trim, ...]
     maneuvers: tuple[Maneuver, ...] = ()
     name: str = field(default="", kw_only=True)
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "trims", tuple(self.trims))

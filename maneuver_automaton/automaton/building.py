@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._brief import brief
 from maneuver_automaton._parallel import in_parallel
 from maneuver_automaton.automaton.automaton import Automaton
 from maneuver_automaton.automaton.journal import (
@@ -63,6 +64,8 @@ class LibraryBuild:
     resumed: int  # that a build before had finished
     mirrored: int  # that are the mirror image of another
     build_s: float
+
+    __repr__ = brief
 
 
 def build_library(

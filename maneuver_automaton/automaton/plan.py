@@ -5,16 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._brief import brief
 from maneuver_automaton._display import Player, picture, player_frame, player_page
+from maneuver_automaton.errors import MissingExtra
 from maneuver_automaton.groups import LieGroup, group_of
 from maneuver_automaton.groups.chain import chained
+from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
+
+if TYPE_CHECKING:
+    from maneuver_automaton.automaton.plan_arrays import PlanArrays
 
 Primitive: TypeAlias = Trim | Maneuver
 
@@ -46,6 +52,8 @@ class Plan:
     durations: Array = field(kw_only=True)  # (n,) [s] of the trims
     maneuvers: tuple[Maneuver | None, ...] = field(default=(), kw_only=True)  # (n - 1,) or none
     start_time: float = field(default=0.0, kw_only=True)  # [s]
+
+    __repr__ = brief
 
     if TYPE_CHECKING:  # any numbers will do
 
@@ -280,6 +288,50 @@ class Plan:
             ),
             control=np.concatenate([*(part.control[:-1] for part in parts), last.control[-1:]]),
         )
+
+    def as_arrays(self, *, step: float | None = None, model: Model | None = None) -> PlanArrays:
+        """Time, pose, twist, reduced state, control and primitive, one row an instant.
+
+        Parameters
+        ----------
+        step : float, optional
+            Time between two rows [s], and a row at the end; if left out, the samples of `sample`.
+        model : Model, optional
+            The vehicle, ``automaton.model``: it names the columns of reduced state and control, and
+            says the twists within maneuvers, else the mean from row to row.
+
+        Raises
+        ------
+        ValueError
+            If a maneuver has no course, or the step is not positive.
+
+        Examples
+        --------
+        >>> ahead = Trim(name="ahead", body_velocity=[1.0, 0.0, 0.0], control=[1.0, 0.0])
+        >>> rows = Plan([0.0, 0.0, 0.0], (ahead,), durations=[2.0]).as_arrays(step=1.0)
+        >>> rows.time.tolist(), rows.pose[:, 0].tolist(), rows.primitive.tolist()
+        ([0.0, 1.0, 2.0], [0.0, 1.0, 2.0], ['ahead', 'ahead', 'ahead'])
+        """
+        from maneuver_automaton.automaton.plan_arrays import plan_arrays
+
+        return plan_arrays(self, step=step, model=model)
+
+    def to_frame(self, *, step: float | None = None, model: Model | None = None) -> Any:
+        """The columns of `as_arrays` as a DataFrame of pandas, which must be installed.
+
+        Raises
+        ------
+        MissingExtra
+            If pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError as error:
+            raise MissingExtra(
+                "to_frame: pandas is not installed; need `pip install pandas`, or as_arrays or "
+                "save_csv, which do without"
+            ) from error
+        return pandas.DataFrame(self.as_arrays(step=step, model=model).columns())
 
     def moved(self, by: LieGroup) -> Plan:
         """A plan of the same word from the start moved by `by`: the law of the project."""

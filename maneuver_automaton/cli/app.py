@@ -8,24 +8,32 @@ from typing import Annotated
 import typer
 
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, complain, exits
+from maneuver_automaton.cli.help_texts import ending
 from maneuver_automaton.cli.streams import safe_streams
 from maneuver_automaton.errors import InvalidScenario
 
 PRINTED = (["schema"],)  # commands that do nothing but print
 
 app = typer.Typer(
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     help="Exact motion planning with symmetry: trims, maneuvers, and the words that join them.",
+    epilog=ending(""),
 )
 automaton_app = typer.Typer(
-    no_args_is_help=True, rich_markup_mode=None, help="Make, list or draw a library of trims."
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help="Make, list or draw a library of trims.",
+    epilog=ending("automaton"),
 )
 app.add_typer(automaton_app, name="automaton")
 cache_app = typer.Typer(
-    no_args_is_help=True, rich_markup_mode=None, help="List or clear what is kept on disk."
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help="List or clear what is kept on disk.",
+    epilog=ending("cache"),
 )
 app.add_typer(cache_app, name="cache")
 
@@ -66,7 +74,15 @@ Html = Annotated[
     bool, typer.Option("--html", help="Write a page that plays it: one file, no network.")
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")]
-Jobs = Annotated[int, typer.Option("--jobs", min=1, metavar="N", help="Files planned at a time.")]
+Jobs = Annotated[
+    int, typer.Option("--jobs", min=1, metavar="N", help="Files (of a folder) or seeds at a time.")
+]
+Dask = Annotated[
+    str | None,
+    typer.Option(
+        "--dask", metavar="ADDRESS", help="Dask scheduler for files of a folder or seeds, or local."
+    ),
+]
 With = Annotated[
     Path | None,
     typer.Option(
@@ -101,7 +117,25 @@ def run(argv: list[str]) -> int:
     return code
 
 
-@cache_app.command("show")
+def _version(asked: bool) -> None:
+    if asked:
+        from maneuver_automaton import __version__
+
+        typer.echo(f"maneuver-automaton {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def every_command(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_version, is_eager=True, help="Print the version."),
+    ] = False,
+) -> None:
+    """Options before the name of a command."""
+
+
+@cache_app.command("show", epilog=ending("cache show"))
 @exits
 def cache_show() -> int:
     """List what is kept on disk to be quicker the next time: compiled kernels, tables."""
@@ -110,7 +144,7 @@ def cache_show() -> int:
     return cache_command.show()
 
 
-@cache_app.command("clear")
+@cache_app.command("clear", epilog=ending("cache clear"))
 @exits
 def cache_clear() -> int:
     """Remove it; it is made again when it is needed."""
@@ -119,7 +153,7 @@ def cache_clear() -> int:
     return cache_command.clear()
 
 
-@app.command("compile")
+@app.command("compile", epilog=ending("compile"))
 @exits
 def compile_all(
     jobs: Annotated[
@@ -133,7 +167,7 @@ def compile_all(
     return compile_command.run(jobs=jobs)
 
 
-@app.command()
+@app.command(epilog=ending("plan"))
 @exits
 def plan(
     file: File,
@@ -152,8 +186,12 @@ def plan(
     size: Size = None,
     style: Style = "screen",
     html: Html = False,
+    dask: Dask = None,
 ) -> int:
-    """Plan the problem of a file, or of every file of a folder."""
+    """Plan the problem of a file, or of every file of a folder.
+
+    A folder that was interrupted goes on where it was when the same command is called again.
+    """
     from maneuver_automaton.cli import plan_command
     from maneuver_automaton.cli.inputs import Parts
     from maneuver_automaton.cli.looks import LookOptions
@@ -170,11 +208,15 @@ def plan(
     )
     parts = Parts(beside=with_file, case=case, model=model)
     if file.is_dir():
-        return plan_command.plan_folder(file, out, settings=settings, parts=parts, jobs=jobs)
+        return plan_command.plan_folder(
+            file, out, settings=settings, parts=parts, jobs=jobs, scheduler=dask
+        )
+    if dask is not None:
+        raise InvalidScenario(f"--dask: {file} is one file, need a folder of them")
     return plan_command.plan_file(file, out, settings=settings, parts=parts)
 
 
-@app.command()
+@app.command(epilog=ending("mpc"))
 @exits
 def mpc(
     file: File,
@@ -204,10 +246,7 @@ def mpc(
             "--seeds", min=1, metavar="K", help="Statistics over K seeds instead of one loop."
         ),
     ] = None,
-    dask: Annotated[
-        str | None,
-        typer.Option("--dask", metavar="ADDRESS", help="Dask scheduler for --seeds, or local."),
-    ] = None,
+    dask: Dask = None,
     resume: Annotated[
         Path | None,
         typer.Option("--resume", metavar="LOG", help="Go on from a closed_loop.json."),
@@ -218,7 +257,10 @@ def mpc(
     style: Style = "screen",
     html: Html = False,
 ) -> int:
-    """Drive a scenario in closed loop: plan, drive a step, plan again."""
+    """Drive a scenario, or every one of a folder, in closed loop: plan, drive a step, plan again.
+
+    A folder that was interrupted goes on where it was when the same command is called again.
+    """
     from maneuver_automaton.cli import mpc_command, plan_command
     from maneuver_automaton.cli.inputs import Parts
     from maneuver_automaton.cli.looks import LookOptions
@@ -250,7 +292,7 @@ def mpc(
     return mpc_command.drive_file(file, out, settings=settings, parts=parts)
 
 
-@app.command()
+@app.command(epilog=ending("check"))
 @exits
 def check(file: File, with_file: With = None, case: Case = None, model: OwnModel = None) -> int:
     """Report symmetry, consistency and feasibility, without a plan."""
@@ -261,7 +303,7 @@ def check(file: File, with_file: With = None, case: Case = None, model: OwnModel
     return check_command.check_file(file, parts=parts)
 
 
-@automaton_app.command("build")
+@automaton_app.command("build", epilog=ending("automaton build"))
 @exits
 def automaton_build(
     file: Library,
@@ -286,7 +328,7 @@ def automaton_build(
     return automaton_command.build(file, out, settings=settings)
 
 
-@automaton_app.command("show")
+@automaton_app.command("show", epilog=ending("automaton show"))
 @exits
 def automaton_show(
     file: Library,
@@ -302,7 +344,7 @@ def automaton_show(
     return automaton_command.show(file, coverage=coverage, model_text=model)
 
 
-@automaton_app.command("draw")
+@automaton_app.command("draw", epilog=ending("automaton draw"))
 @exits
 def automaton_draw(file: Library, out: Out = Path("out"), model: OwnModel = None) -> int:
     """Draw the trims and maneuvers of a scenario, a library or another file of primitives.
@@ -315,7 +357,7 @@ def automaton_draw(file: Library, out: Out = Path("out"), model: OwnModel = None
     return automaton_command.draw(file, out, model_text=model)
 
 
-@app.command()
+@app.command(epilog=ending("convert"))
 @exits
 def convert(
     source: Annotated[Path, typer.Argument(metavar="IN")],
@@ -336,29 +378,57 @@ def convert(
     return convert_command.convert(source, target, parts=Parts(beside=with_file, case=case))
 
 
-@app.command()
+@app.command(epilog=ending("example"))
+@exits
+def example(
+    name: Annotated[
+        str | None, typer.Argument(metavar="NAME", help="Of a scenario; left out, all are listed.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="FILE", help="File or folder (default: NAME.yaml)."),
+    ] = None,
+) -> int:
+    """Write one of the scenarios that come with the package, with its maps, or list them."""
+    from maneuver_automaton.cli import example_command
+
+    if name is None:
+        return example_command.show()
+    return example_command.write(name, out)
+
+
+@app.command(epilog=ending("plot"))
 @exits
 def plot(
-    file: Annotated[Path, typer.Argument(metavar="PLAN.json")],
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="PLAN.json", help="Of plan, or a closed_loop.json of mpc."),
+    ],
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="The picture.")] = None,
     animate: Animate = False,
     title: Title = None,
     size: Size = None,
     style: Style = "screen",
     html: Html = False,
+    with_file: Annotated[
+        Path | None,
+        typer.Option("--with", metavar="FILE", help="Scenario that a closed loop was driven in."),
+    ] = None,
 ) -> int:
-    """Draw a plan.json again: PLAN.png beside it, or the file given.
+    """Draw a plan.json, or a closed_loop.json, again: PLAN.png beside it, or the file given.
 
-    With --animate it is an animation, PLAN.gif; with --html a page that plays it, PLAN.html.
+    With --animate it is an animation, PLAN.gif; with --html a page that plays it, PLAN.html. A
+    closed loop is drawn as mpc does --with its scenario; from its file alone, it is drawn as an arc
+    from step to step.
     """
     from maneuver_automaton.cli import convert_command
     from maneuver_automaton.cli.looks import LookOptions
 
     look = LookOptions(title=title, size=size, style=style)
-    return convert_command.plot(file, out, animate=animate, html=html, look=look)
+    return convert_command.plot(file, out, animate=animate, html=html, look=look, beside=with_file)
 
 
-@app.command()
+@app.command(epilog=ending("schema"))
 @exits
 def schema() -> int:
     """Print the JSON Schema of scenario files, for editors."""

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.automaton import Automaton
@@ -36,12 +37,17 @@ from maneuver_automaton.formats.recognition import YAML_ENDINGS
 from maneuver_automaton.formats.statement import MapFile
 from maneuver_automaton.scenario import Scenario, statements_of, to_yaml
 
+if TYPE_CHECKING:
+    from maneuver_automaton.receding_horizon import ClosedLoop
+
 KEEP_MULTIPLIERS = (MPRIM, JSON)  # but Nav2's kind of JSON
 
 MAP_ENDINGS = (".map",)
-PICTURE_ENDINGS = (".png", ".pdf", ".svg")
-ANIMATION_ENDINGS = (".gif",)
-PAGE_ENDINGS = (".html",)
+DRAWN = {  # by their endings
+    "picture": (".png", ".pdf", ".svg"),
+    "animation": (".gif",),
+    "page": (".html",),
+}
 
 
 def convert(source: Path, target: Path, *, parts: Parts) -> int:
@@ -140,31 +146,37 @@ def _write_scenario(scenario: Scenario, source: Path, target: Path) -> None:
 
 
 def plot(
-    file: Path, out: Path | None, *, animate: bool, look: LookOptions, html: bool = False
+    file: Path,
+    out: Path | None,
+    *,
+    animate: bool,
+    look: LookOptions,
+    html: bool = False,
+    beside: Path | None = None,
 ) -> int:
-    """Draw a plan.json again, still, in motion, or as a page that plays it."""
-    from maneuver_automaton.formats.plan_json import load_plan, read_plan_document
-
-    document = read_plan_document(file)
+    """Draw a plan.json or closed_loop.json again, still, in motion, or as a page that plays it."""
     if animate and html:
         raise InvalidScenario("--html: writes a page, and --animate an animation; need one of them")
-    endings = ANIMATION_ENDINGS if animate else PAGE_ENDINGS if html else PICTURE_ENDINGS
-    path = file.with_suffix(endings[0]) if out is None else out
-    if path.is_dir():
-        path = path / file.with_suffix(endings[0]).name
-    if path.suffix.lower() not in endings:
-        what = "animation" if animate else "page" if html else "picture"
-        raise InvalidScenario(
-            f"{path}: is no {what} that this version draws, need an ending of {', '.join(endings)}"
-        )
+    loop = None if beside is None else _loop_of(file, beside)
+    document = {} if loop else _drawn(file, moving=animate or html)
+    path = _picture(file, out, "animation" if animate else "page" if html else "picture")
     make_folder(path.parent)
     from maneuver_automaton import plotting
+    from maneuver_automaton.formats.plan_json import load_plan
 
     try:
-        if animate:
+        if loop is not None and animate:
+            plotting.save_closed_loop_animation(loop, path)
+        elif loop is not None and html:
+            loop.player(title=look.title or file.stem).save(path)
+        elif loop is not None:
+            plotting.save_closed_loop_figure(loop, path, look=look.look())
+        elif animate:
             plotting.save_plan_animation(load_plan(file), path)
         elif html:
-            plotting.player_of_file(document, load_plan(file), title=file.stem).save(path)
+            plotting.player_of_file(document, load_plan(file), title=look.title or file.stem).save(
+                path
+            )
         else:
             plotting.save_plan_file_figure(document, path, look=look.look())
     except OSError as error:
@@ -173,6 +185,46 @@ def plot(
         said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
         raise InvalidScenario(f"{file}: {said}") from error
     return FOUND
+
+
+def _picture(file: Path, out: Path | None, what: str) -> Path:
+    """Where the picture goes: beside the file, into a folder, or to the file given."""
+    endings = DRAWN[what]
+    path = file.with_suffix(endings[0]) if out is None else out
+    if path.is_dir():
+        path = path / file.with_suffix(endings[0]).name
+    if path.suffix.lower() not in endings:
+        raise InvalidScenario(
+            f"{path}: is no {what} that this version draws, need an ending of {', '.join(endings)}"
+        )
+    return path
+
+
+def _loop_of(file: Path, beside: Path) -> ClosedLoop:
+    """The closed loop of a file, in the world of the scenario that it was driven in."""
+    from maneuver_automaton.formats.driven_json import load_closed_loop
+
+    return load_closed_loop(file, scenario_of(beside).problem)
+
+
+def _drawn(file: Path, *, moving: bool) -> dict[str, Any]:
+    """What to draw of a plan.json, or of a closed_loop.json, whose drive is drawn as a plan."""
+    from maneuver_automaton.formats.driven_json import driven_document, read_closed_loop_document
+    from maneuver_automaton.formats.plan_json import read_plan_document
+
+    loop = read_closed_loop_document(file)
+    if loop is None:
+        return read_plan_document(file)
+    if moving:
+        raise InvalidScenario(
+            f"{file}: is a closed loop, whose animation or page needs --with and the scenario it "
+            "was driven in"
+        )
+    try:
+        return driven_document(loop)
+    except (KeyError, ValueError, TypeError, IndexError, AttributeError) as error:
+        said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
+        raise InvalidScenario(f"{file}: {said}") from error
 
 
 def print_schema() -> int:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import functools
+import io
+import json
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,13 +13,14 @@ from typing import TYPE_CHECKING, Any
 from maneuver_automaton._interrupts import stopped
 from maneuver_automaton.cli import road_command
 from maneuver_automaton.cli.compiling import announced
-from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
+from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, scenario_of
 from maneuver_automaton.cli.looks import LookOptions
 from maneuver_automaton.cli.progress import progress_bar
 from maneuver_automaton.errors import InvalidScenario
 
 if TYPE_CHECKING:
+    from maneuver_automaton.cli.folder_runs import Row
     from maneuver_automaton.receding_horizon import ClosedLoop, Disturbance, Statistics
     from maneuver_automaton.scenario import Scenario
 
@@ -74,23 +79,73 @@ def drive_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> in
 
 def drive_folder(folder: Path, out: Path, *, settings: Settings, parts: Parts) -> int:
     """Close the loop of every problem of a folder that has one, each into `out`/STEM."""
+    from maneuver_automaton.cli.folder_runs import check_address, run_folder
     from maneuver_automaton.cli.folders import problems_in
-    from maneuver_automaton.cli.guard import BAD_INPUT, explained
+    from maneuver_automaton.cli.plan_command import compile_first
 
-    codes = []
-    for path, needs in problems_in(folder, parts):
-        try:
-            if not (
-                road_command.is_road(path) or scenario_of(path, needs).receding_horizon is not None
-            ):
-                continue  # for plan, not for mpc
-            codes.append(drive_file(path, out / path.stem, settings=settings, parts=needs))
-        except Exception as error:  # noqa: BLE001, one bad file must not stop the others
-            complain(explained(error))
-            codes.append(BAD_INPUT)
-    if not codes:
+    if settings.resume is not None:
+        raise InvalidScenario("--resume: goes on with one loop, and a folder has many; need a file")
+    check_address(settings.scheduler)
+    problems = [one for one in problems_in(folder, parts) if _has_loop(*one)]
+    if not problems:
         raise InvalidScenario(f"{folder}: no scenario in it has a receding_horizon, need one")
-    return max(codes)
+    make_folder(out)
+    alone = replace(settings, quiet=True, jobs=1, scheduler=None)
+    return run_folder(
+        functools.partial(_row, out=out, settings=alone, folder=Path.cwd()),
+        problems,
+        out,
+        options=f"mpc {alone}",
+        jobs=settings.jobs,
+        scheduler=settings.scheduler,
+        quiet=settings.quiet,
+        ready=functools.partial(compile_first, quiet=settings.quiet),
+    )
+
+
+def _has_loop(path: Path, parts: Parts) -> bool:
+    """Whether a file is for mpc: a drive on roads, a closed loop, or what cannot be read."""
+    if road_command.is_road(path):
+        return True
+    try:
+        return scenario_of(path, parts).receding_horizon is not None
+    except Exception:  # noqa: BLE001, told when it is driven
+        return True
+
+
+def _row(problem: tuple[Path, Parts], *, out: Path, settings: Settings, folder: Path) -> Row:
+    """Drive one file of a folder; what is complained of is told in the row.
+
+    Paths are relative to `folder`: a process that works for others may have begun elsewhere.
+    """
+    from maneuver_automaton.cli.folder_runs import Row
+
+    path, parts = problem
+    out = out / path.stem
+    if stopped():
+        reason = f"{path}: interrupted before it was driven"
+        return Row(name=path.name, code=NO_PLAN, status="interrupted", reason=reason)
+    said = io.StringIO()
+    try:
+        with contextlib.chdir(folder), contextlib.redirect_stderr(said):
+            code = drive_file(path, out, settings=settings, parts=parts)
+            numbers = _numbers(out, settings)
+    except Exception as error:  # noqa: BLE001, one bad file must not stop the others
+        return Row(name=path.name, code=BAD_INPUT, status="bad input", reason=explained(error))
+    return Row(name=path.name, code=code, reason=said.getvalue(), **numbers)
+
+
+def _numbers(out: Path, settings: Settings) -> dict[str, Any]:
+    """Status and numbers of a row, from the file that was written."""
+    if settings.seeds is not None:
+        return {"status": f"{settings.seeds} loops"}
+    document = json.loads((out / "closed_loop.json").read_text(encoding="utf-8"))
+    return {
+        "status": document["status"],
+        "cost": document["cost"],
+        "duration": document["duration_s"],
+        "clearance": document["min_clearance_m"],
+    }
 
 
 def _loop(path: Path, scenario: Scenario, settings: Settings) -> ClosedLoop:

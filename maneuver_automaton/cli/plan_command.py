@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from maneuver_automaton._interrupts import stopped
-from maneuver_automaton._parallel import in_parallel
 from maneuver_automaton.budget import Watch
 from maneuver_automaton.cli import road_command
 from maneuver_automaton.cli.compiling import announced
+from maneuver_automaton.cli.folder_runs import Row, check_address, run_folder
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, scenario_of
 from maneuver_automaton.cli.looks import LookOptions
-from maneuver_automaton.cli.progress import progress_bar, waiting
+from maneuver_automaton.cli.progress import waiting
 from maneuver_automaton.errors import InvalidScenario
 
 if TYPE_CHECKING:
@@ -53,20 +53,6 @@ class Settings:
             )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
-    """How planning one file of a folder ended, for the table at the end."""
-
-    name: str
-    code: int
-    status: str
-    reason: str = ""
-    cost: float | None = None
-    duration: float | None = None
-    clearance: float | None = None
-    first_plan: float | None = None
-
-
 def plan_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> int:
     """Plan one problem into the folder `out`, print the plan, return the exit code."""
     if road_command.is_road(path):
@@ -94,27 +80,31 @@ def plan_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> int
     return FOUND
 
 
-def plan_folder(folder: Path, out: Path, *, settings: Settings, parts: Parts, jobs: int) -> int:
+def plan_folder(
+    folder: Path,
+    out: Path,
+    *,
+    settings: Settings,
+    parts: Parts,
+    jobs: int,
+    scheduler: str | None = None,
+) -> int:
     """Plan every problem of a folder into `out`/STEM, print a table, return the exit code."""
     from maneuver_automaton.cli.folders import problems_in
 
+    check_address(scheduler)
     problems = problems_in(folder, parts)
     make_folder(out)
-    jobs = min(jobs, len(problems))
-    if jobs > 1:
-        _compile_first(settings)
-    one = functools.partial(_row, out=out, settings=settings, folder=Path.cwd())
-    rows: list[Row] = []
-    with progress_bar("planning", len(problems), quiet=settings.quiet) as advance:
-        for row in in_parallel(one, problems, jobs=jobs, ends_early=True):
-            rows.append(row)
-            advance()
-    for row in rows:
-        if row.code != FOUND:
-            complain(row.reason)
-    if not settings.quiet:
-        _print_rows(rows)
-    return max((row.code for row in rows), default=NO_PLAN)
+    return run_folder(
+        functools.partial(_row, out=out, settings=settings, folder=Path.cwd()),
+        problems,
+        out,
+        options=f"plan {replace(settings, quiet=True)}",
+        jobs=jobs,
+        scheduler=scheduler,
+        quiet=settings.quiet,
+        ready=functools.partial(compile_first, quiet=settings.quiet),
+    )
 
 
 def _so_far(watch: Watch | None) -> str:
@@ -233,33 +223,12 @@ def _road_row(path: Path, parts: Parts, out: Path, settings: Settings) -> Row:
     )
 
 
-def _compile_first(settings: Settings) -> None:
+def compile_first(*, quiet: bool) -> None:
     """Have the kernels in the cache, or every process would compile them for itself."""
     from maneuver_automaton.refinement.ready import load_lattice
     from maneuver_automaton.search.ready import load_insertion_kernels, load_word_kernels
 
-    with announced(quiet=settings.quiet):
+    with announced(quiet=quiet):
         load_word_kernels(4)
         load_insertion_kernels()
         load_lattice()
-
-
-def _print_rows(rows: list[Row]) -> None:
-    from maneuver_automaton.cli.tables import console, table
-
-    def shown(value: float | None, digits: int) -> str:
-        return "" if value is None else f"{value:.{digits}g}"
-
-    cells = [
-        [
-            row.name,
-            row.status,
-            shown(row.cost, 6),
-            shown(row.duration, 6),
-            shown(row.clearance, 2),
-            shown(row.first_plan, 2),
-        ]
-        for row in rows
-    ]
-    columns = ["file", "status", "cost", "duration [s]", "clearance [m]", "first plan [s]"]
-    console().print(table("", columns, cells, numbers=(2, 3, 4, 5)))

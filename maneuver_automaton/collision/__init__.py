@@ -6,6 +6,9 @@ from maneuver_automaton.collision.shapes import (
     AnyObstacle as AnyObstacle,
 )
 from maneuver_automaton.collision.shapes import (
+    AnyShape as AnyShape,
+)
+from maneuver_automaton.collision.shapes import (
     Box as Box,
 )
 from maneuver_automaton.collision.shapes import (
@@ -31,5 +34,8 @@ from maneuver_automaton.collision.shapes import (
 )
 from maneuver_automaton.collision.shapes import (
     as_obstacles as as_obstacles,
+)
+from maneuver_automaton.collision.shapes import (
+    as_shapes as as_shapes,
 )
 from maneuver_automaton.collision.zones import Zone as Zone

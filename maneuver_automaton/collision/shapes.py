@@ -8,13 +8,21 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from maneuver_automaton._arrays import Array, as_array, freeze
+from maneuver_automaton._brief import brief
 from maneuver_automaton._ceilings import FASTEST, FASTEST_TURN, LARGEST_BODY, check_size
+from maneuver_automaton.collision.geometry import (
+    Geometry,
+    are_points,
+    is_geometry,
+    one_ring,
+    rings_of_geometry,
+)
 from maneuver_automaton.groups import SE2, LieGroup
 
 
@@ -22,23 +30,39 @@ from maneuver_automaton.groups import SE2, LieGroup
 class Polygon:
     """A polygon, concave or with holes if need be, its corners in either order.
 
+    A polygon of shapely may stand for the corners: its holes are taken too.
+
     Examples
     --------
     >>> Polygon([[0, 0], [4, 0], [4, 2]]).moved(SE2([1.0, 0.0, 0.0])).corners.tolist()
     [[1.0, 0.0], [5.0, 0.0], [5.0, 2.0]]
+    >>> import shapely
+    >>> court = shapely.box(0, 0, 9, 9).difference(shapely.box(3, 3, 6, 6))
+    >>> len(Polygon(court).corners), len(Polygon(court).holes)
+    (4, 1)
     """
 
     corners: Array  # (n, 2) [m]
     holes: tuple[Array, ...] = ()  # (n, 2) each [m]
 
+    __repr__ = brief
+
     if TYPE_CHECKING:
 
-        def __init__(self, corners: ArrayLike, holes: Sequence[ArrayLike] = ()) -> None: ...
+        def __init__(
+            self, corners: ArrayLike | Geometry, holes: Sequence[ArrayLike] = ()
+        ) -> None: ...
 
     def __post_init__(self) -> None:
+        if is_geometry(self.corners):
+            if len(self.holes):
+                raise ValueError("polygon: got holes beside geometry of shapely, which has its own")
+            rings = one_ring("polygon", self.corners)
+            object.__setattr__(self, "corners", rings.corners)
+            object.__setattr__(self, "holes", rings.holes)
         object.__setattr__(self, "corners", _ring("polygon: corners", self.corners))
-        rings = tuple(_ring("polygon: a hole", hole) for hole in self.holes)
-        object.__setattr__(self, "holes", rings)
+        holes = tuple(_ring("polygon: a hole", hole) for hole in self.holes)
+        object.__setattr__(self, "holes", holes)
 
     def moved(self, by: LieGroup) -> Polygon:
         """The shape moved by a planar pose."""
@@ -57,6 +81,8 @@ class Disc:
 
     radius: float  # [m]
     center: Array = field(default_factory=lambda: np.zeros(2))  # (2,) [m]
+
+    __repr__ = brief
 
     if TYPE_CHECKING:
 
@@ -88,6 +114,8 @@ class Box:
     center: Array = field(default_factory=lambda: np.zeros(2))  # (2,) [m]
     heading: float = 0.0  # [rad]
 
+    __repr__ = brief
+
     if TYPE_CHECKING:
 
         def __init__(
@@ -116,6 +144,60 @@ class Box:
 
 
 Shape: TypeAlias = Polygon | Disc | Box
+AnyShape: TypeAlias = Shape | Geometry | ArrayLike  # what stands for a shape: points are corners
+
+
+def as_shapes(what: str, value: Any, *, or_else: str = "") -> tuple[Shape, ...]:
+    """Shapes from a shape, geometry of shapely, a list of corners, or a sequence of these.
+
+    A MultiPolygon or GeometryCollection becomes its polygons, with their holes.
+
+    Raises
+    ------
+    ValueError
+        If it is or holds anything else; the message begins with `what`, and names what would do
+        `or_else`.
+
+    Examples
+    --------
+    >>> import shapely
+    >>> shapes = as_shapes("body", [Disc(1.0), shapely.box(0, 0, 2, 1), [(0, 0), (1, 0), (1, 1)]])
+    >>> [type(shape).__name__ for shape in shapes]
+    ['Disc', 'Polygon', 'Polygon']
+    """
+    if isinstance(value, Polygon | Disc | Box):
+        return (value,)
+    if is_geometry(value):
+        return tuple(Polygon(*rings) for rings in rings_of_geometry(what, value))
+    if isinstance(value, np.ndarray | Sequence) and not isinstance(value, str):
+        if are_points(value):
+            return (_polygon_of_points(what, value),)
+        return tuple(one for part in value for one in as_shapes(what, part))
+    raise ValueError(
+        f"{what}: got {value!r}, need {or_else}Polygon, Disc or Box, geometry of shapely, or "
+        "corners (n, 2)"
+    )
+
+
+def as_shape(what: str, value: Any) -> Shape:
+    """The one shape that a shape, geometry of shapely or list of corners is.
+
+    Raises
+    ------
+    ValueError
+        As `as_shapes`, or if it is none or several.
+    """
+    shapes = as_shapes(what, value)
+    if len(shapes) != 1:
+        raise ValueError(f"{what}: got {len(shapes)} shapes, need one; give each by itself")
+    return shapes[0]
+
+
+def _polygon_of_points(what: str, points: Any) -> Polygon:
+    try:
+        return Polygon(points)
+    except ValueError as error:
+        raise ValueError(f"{what}: {str(error).removeprefix('polygon: ')}") from error
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,6 +212,8 @@ class Motion:
 
     time: Array  # (n,) [s], rising
     pose: Array  # (n, 3) [m, m, rad]
+
+    __repr__ = brief
 
     if TYPE_CHECKING:
 
@@ -180,6 +264,8 @@ class Motion:
 class Obstacle:
     """A shape in the world, or, with a motion, a shape in a frame that moves.
 
+    A polygon of shapely, or a list of corners, may stand for the shape.
+
     Examples
     --------
     >>> crossing = Obstacle(Disc(0.3), motion=Motion([0.0, 1.0], [[0, 0, 0], [2, 0, 0]]))
@@ -192,9 +278,21 @@ class Obstacle:
     motion: Motion | None = field(default=None, kw_only=True)
     name: str = field(default="", kw_only=True)
 
+    __repr__ = brief
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            shape: AnyShape,
+            *,
+            height: tuple[float, float] | None = None,
+            motion: Motion | None = None,
+            name: str = "",
+        ) -> None: ...
+
     def __post_init__(self) -> None:
-        if not isinstance(self.shape, Polygon | Disc | Box):
-            raise ValueError(f"obstacle: got {self.shape!r}, need a Polygon, a Disc or a Box")
+        object.__setattr__(self, "shape", as_shape("obstacle", self.shape))
         if self.height is not None and not (
             len(self.height) == 2
             and all(math.isfinite(z) for z in self.height)
@@ -221,6 +319,23 @@ class Obstacle:
 class OccupancyMap:
     """Square cells, each blocked or free; all outside the map is free.
 
+    Rows are counted upwards, from the origin along the map's y axis, and columns along its x axis:
+    cell (i, j) is the square from ``(j, i) * resolution`` to ``(j + 1, i + 1) * resolution``. So
+    the array's first row is the lowest one, and an array with the top row first, as pictures are
+    read, comes in through `of_picture`. What is not zero is blocked; ``data != 0`` of an
+    OccupancyGrid of ROS, in rows of its width, has this order, and blocks what is not known (-1).
+
+    Parameters
+    ----------
+    blocked : (rows, columns) array
+        True, or a number that is not 0, where blocked.
+    resolution : float
+        Size of a cell [m].
+    origin : (3,) array
+        Pose of the lower left corner of cell (0, 0) [m, m, rad].
+    name : str
+        What messages call it.
+
     Examples
     --------
     >>> room = OccupancyMap([[1, 1], [0, 1]], resolution=0.5, origin=[2.0, 0.0, 0.0])
@@ -234,6 +349,8 @@ class OccupancyMap:
     #   corner of cell (0, 0) [m, m, rad]
     name: str = field(default="map", kw_only=True)
 
+    __repr__ = brief
+
     if TYPE_CHECKING:
 
         def __init__(
@@ -246,9 +363,14 @@ class OccupancyMap:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        cells = np.array(self.blocked, dtype=np.bool_)
-        if cells.ndim != 2 or cells.size == 0:
-            raise ValueError(f"map: cells have shape {cells.shape}, need (rows, columns)")
+        given = np.asarray(self.blocked)
+        if given.ndim != 2 or given.size == 0:
+            raise ValueError(f"map: cells have shape {given.shape}, need (rows, columns)")
+        if given.dtype != np.bool_ and given.dtype.kind not in "iuf":
+            raise ValueError(f"map: cells have the type {given.dtype}, need booleans or numbers")
+        if given.dtype.kind == "f":
+            as_array("map: cells", given)
+        cells = given.astype(np.bool_)
         cells.setflags(write=False)
         object.__setattr__(self, "blocked", cells)
         freeze(self, "origin", last=3)
@@ -256,6 +378,40 @@ class OccupancyMap:
             raise ValueError(f"map: resolution must be positive, got {self.resolution} m")
         check_size("map: origin", self.origin[:2])
         check_size("map: size", self.extent)
+
+    @classmethod
+    def of_picture(
+        cls,
+        pixels: ArrayLike,
+        *,
+        resolution: float,
+        origin: ArrayLike = (0.0, 0.0, 0.0),
+        dark: float = 0.5,
+        name: str = "map",
+    ) -> OccupancyMap:
+        """The map of a picture, its top row first: dark pixels are blocked.
+
+        Parameters
+        ----------
+        pixels : (rows, columns) or (rows, columns, 1 to 4) array
+            Shades, or colours, of which the mean of red, green and blue counts: whole numbers from
+            0 to the largest of their type, or numbers from 0 (black) to 1 (white). What is
+            transparent (the last of 2 or 4 channels at most one half) is not known, and blocked.
+        resolution : float
+            Size of a pixel [m].
+        origin : (3,) array
+            Pose of the lower left corner of the picture [m, m, rad].
+        dark : float
+            Shade, from 0 to 1, below which a pixel is blocked.
+        name : str
+            What messages call it.
+
+        Examples
+        --------
+        >>> OccupancyMap.of_picture([[0.0, 1.0], [1.0, 1.0]], resolution=1.0).blocked.tolist()
+        [[False, False], [True, False]]
+        """
+        return cls(_dark(pixels, dark)[::-1], resolution=resolution, origin=origin, name=name)
 
     @property
     def extent(self) -> Array:
@@ -281,8 +437,8 @@ def name_of(obstacle: AnyObstacle, index: int, place: str) -> str:
     return f"obstacle {index} ({type(obstacle.shape).__name__.lower()} near {place})"
 
 
-def as_obstacles(value: object) -> tuple[AnyObstacle, ...]:
-    """Obstacles from obstacles, maps and bare shapes, or one of these.
+def as_obstacles(value: Any) -> tuple[AnyObstacle, ...]:
+    """Obstacles from obstacles, maps and all that `as_shapes` takes, or one of these.
 
     Raises
     ------
@@ -291,31 +447,34 @@ def as_obstacles(value: object) -> tuple[AnyObstacle, ...]:
     """
     if isinstance(value, Obstacle | OccupancyMap):
         return (value,)
-    if isinstance(value, Polygon | Disc | Box):
-        return (Obstacle(value),)
-    if isinstance(value, Sequence) and not isinstance(value, str):
+    if _holds_parts(value):
         return tuple(one for part in value for one in as_obstacles(part))
-    raise ValueError(f"obstacles: got {value!r}, need Obstacle, OccupancyMap, Polygon, Disc or Box")
+    shapes = as_shapes("obstacles", value, or_else="Obstacle, OccupancyMap, ")
+    return tuple(Obstacle(shape) for shape in shapes)
 
 
-def as_footprint(value: object) -> tuple[Shape, ...]:
-    """Parts of a body from one shape or several; empty for a vehicle that is a point.
+def as_footprint(value: Any) -> tuple[Shape, ...]:
+    """Parts of a body from all that `as_shapes` takes; empty for a vehicle that is a point.
 
     Raises
     ------
     ValueError
         If it holds anything else, or reaches too far.
     """
-    if isinstance(value, Polygon | Disc | Box):
-        reach = _reach(value)
+    shapes = as_shapes("footprint", value)
+    for shape in shapes:
+        reach = _reach(shape)
         if reach > LARGEST_BODY:
             raise ValueError(
                 f"footprint: reaches {reach:g} m from the pose, need at most {LARGEST_BODY:g} m"
             )
-        return (value,)
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return tuple(one for part in value for one in as_footprint(part))
-    raise ValueError(f"footprint: got {value!r}, need Polygon, Disc or Box, or several")
+    return shapes
+
+
+def _holds_parts(value: Any) -> bool:
+    """Whether it is a sequence, and not one of points."""
+    is_sequence = isinstance(value, np.ndarray | Sequence) and not isinstance(value, str)
+    return is_sequence and not are_points(value)
 
 
 def _reach(shape: Shape) -> float:
@@ -323,6 +482,27 @@ def _reach(shape: Shape) -> float:
     if isinstance(shape, Disc):
         return math.hypot(*shape.center) + shape.radius
     return float(np.hypot(*shape.corners.T).max())
+
+
+def _dark(pixels: ArrayLike, dark: float) -> NDArray[np.bool_]:
+    """Pixels that are dark or transparent, in the order of the picture."""
+    given = np.asarray(pixels)
+    white = np.iinfo(given.dtype).max if given.dtype.kind in "iu" else 1.0
+    shades = as_array("map: pixels", given) / white
+    if given.ndim not in (2, 3) or (given.ndim == 3 and given.shape[2] not in (1, 2, 3, 4)):
+        raise ValueError(
+            f"map: pixels have shape {given.shape}, need (rows, columns) or (rows, columns, 1 to 4)"
+        )
+    if shades.size and not (shades.min() >= 0.0 and shades.max() <= 1.0):
+        raise ValueError(
+            f"map: pixels reach from {given.min()} to {given.max()}, need 0 (black) to {white:g} "
+            f"(white) as their type is {given.dtype}"
+        )
+    if given.ndim == 2:
+        return np.asarray(shades < dark)
+    if given.shape[2] in (1, 3):
+        return np.asarray(shades.mean(axis=-1) < dark)
+    return np.asarray((shades[..., :-1].mean(axis=-1) < dark) | (shades[..., -1] <= 0.5))
 
 
 def _ring(name: str, corners: ArrayLike) -> Array:

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.collision.shapes import Shape
+from maneuver_automaton._brief import brief
+from maneuver_automaton.collision.shapes import AnyShape, Shape, as_shape
 from maneuver_automaton.groups import LieGroup
 
 EXCEEDED = 1e-9  # relative, by which a limit may be exceeded
@@ -39,12 +40,14 @@ class Zone:
     trims: tuple[str, ...] | None = None  # only these, and maneuvers between them; None: all
     name: str = ""
 
+    __repr__ = brief
+
     if TYPE_CHECKING:
 
         def __init__(
             self,
             *,
-            shape: Shape,
+            shape: AnyShape,
             max_speed: float | None = None,
             reverse: bool = True,
             max_lateral_acceleration: float | None = None,
@@ -53,6 +56,7 @@ class Zone:
         ) -> None: ...
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "shape", as_shape("zone", self.shape))
         for name in ("max_speed", "max_lateral_acceleration"):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value >= 0.0):

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, freeze
+from maneuver_automaton._brief import brief
 from maneuver_automaton.groups.lie_group import LieGroup
 
 
@@ -23,6 +24,8 @@ class Product:
     dof: ClassVar[int]
     space: ClassVar[int]
     coordinates: ClassVar[tuple[str, ...]]
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         freeze(self, "pose", last=self.dof)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, freeze
+from maneuver_automaton._brief import brief
 
 # |sin(w/2) / (w/2)| of the float64 nearest to a multiple of a full turn stays below this.
 FULL_TURN = 4 * float(np.finfo(np.float64).eps)
@@ -35,6 +36,8 @@ class SE2:
     dof: ClassVar[int] = 3
     space: ClassVar[int] = 2
     coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "heading")
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         freeze(self, "pose", last=3)

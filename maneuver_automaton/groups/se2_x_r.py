@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, freeze
+from maneuver_automaton._brief import brief
 from maneuver_automaton.groups.lie_group import LieGroup
 from maneuver_automaton.groups.se2 import SE2
 
@@ -34,6 +35,8 @@ class SE2xR:
     dof: ClassVar[int] = 4
     space: ClassVar[int] = 3
     coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "heading", "z")
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         freeze(self, "pose", last=4)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._brief import brief
 from maneuver_automaton.errors import BrokenSymmetry
 from maneuver_automaton.groups import LieGroup
 from maneuver_automaton.models._components import (
@@ -70,6 +71,8 @@ class UserModel:
     reduced_limits: Array = field(default_factory=unlimited)  # (n_z, 2)
     part_names: tuple[str, ...] = ()
     part_poses: Callable[[Array], Array] = no_parts
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         if self.reduced_names and self.dynamics is no_rates:

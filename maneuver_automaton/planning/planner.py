@@ -9,10 +9,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.headings import origin_of
 from maneuver_automaton.budget import Watch
-from maneuver_automaton.collision import AnyObstacle, Shape, Zone, as_footprint, as_obstacles
+from maneuver_automaton.collision import (
+    AnyObstacle,
+    AnyShape,
+    Shape,
+    Zone,
+    as_footprint,
+    as_obstacles,
+)
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.planning.plan import plan_in, prepare
 from maneuver_automaton.planning.result import PlanResult
@@ -53,6 +61,8 @@ class Planner:
     start_trim: str | None = field(default=None, kw_only=True)  # of queries that name none
     workspace: Workspace = field(init=False)  # what its queries share
 
+    __repr__ = brief
+
     if TYPE_CHECKING:
 
         def __init__(
@@ -63,9 +73,9 @@ class Planner:
             horizon: Horizon = ...,
             bounds: Bounds = ...,
             search: SearchSettings = ...,
-            obstacles: AnyObstacle | Shape | Sequence[AnyObstacle | Shape] = (),
-            footprint: Shape | Sequence[Shape] = (),
-            parts: Mapping[str, Shape | Sequence[Shape]] = ...,
+            obstacles: AnyObstacle | AnyShape | Sequence[AnyObstacle | AnyShape] = (),
+            footprint: AnyShape | Sequence[AnyShape] = (),
+            parts: Mapping[str, AnyShape | Sequence[AnyShape]] = ...,
             body_height: tuple[float, float] = (0.0, 0.0),
             margin: float = 0.0,
             zones: Sequence[Zone] = (),
@@ -139,7 +149,7 @@ class Planner:
         )
 
     def with_obstacles(
-        self, obstacles: AnyObstacle | Shape | Sequence[AnyObstacle | Shape]
+        self, obstacles: AnyObstacle | AnyShape | Sequence[AnyObstacle | AnyShape]
     ) -> Planner:
         """A planner like this one on another map."""
         return replace(self, obstacles=as_obstacles(obstacles))

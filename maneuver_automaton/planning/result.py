@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._brief import brief
 from maneuver_automaton._display import Player, picture, player_frame, player_page
 from maneuver_automaton.audit import Audit, TerminalError
 from maneuver_automaton.automaton import Plan
@@ -45,6 +46,8 @@ class LowerBound:
     history: tuple[tuple[float, float], ...] = ()  # seconds, value
     work: int = 0  # steps times cells of linear programs
 
+    __repr__ = brief
+
     def gap(self, cost: float) -> float:
         """Share of a cost that is at most to be saved."""
         if cost == math.inf:
@@ -59,6 +62,8 @@ class Alternative:
     plan: Plan
     cost: float
     terminal_error: TerminalError
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -95,6 +100,8 @@ class PlanResult:
 
     def _repr_png_(self) -> bytes | None:
         return picture(self)
+
+    __repr__ = brief
 
 
 class Answer(Protocol):

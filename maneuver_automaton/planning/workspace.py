@@ -6,6 +6,7 @@ import functools
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
+from maneuver_automaton._brief import brief
 from maneuver_automaton.audit import Surroundings, surroundings_around
 from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.collision.fcl_checker import FclChecker
@@ -35,6 +36,8 @@ class Workspace:
         default_factory=dict, init=False
     )
     _surroundings: dict[_Map, Surroundings] = field(default_factory=dict, init=False)
+
+    __repr__ = brief
 
     def on(self, obstacles: tuple[AnyObstacle, ...]) -> Workspace:
         """The workspace of these obstacles: itself if they are its own, otherwise a new one."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._brief import brief
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives.trim import Trim
 
@@ -37,6 +38,8 @@ class FoundTrims:
 
     trims: tuple[Trim, ...]
     missing: tuple[MissingTrim, ...]
+
+    __repr__ = brief
 
 
 def trims_of(

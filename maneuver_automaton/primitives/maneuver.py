@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._brief import brief
 from maneuver_automaton.primitives.trajectory import Trajectory
 
 CLOSED = 1e-9  # [m, rad, s] between what a maneuver states and where its course ends
@@ -37,6 +38,8 @@ class Maneuver:
     duration: float = 0.0  # [s]
     course: Trajectory | None = None
     cost_multiplier: float = 1.0
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         freeze(self, "displacement", last=(2, 3, 4))

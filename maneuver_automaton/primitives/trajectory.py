@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._brief import brief
 from maneuver_automaton.groups import group_of
 
 
@@ -27,6 +28,8 @@ class Trajectory:
     pose: Array  # (n, dof), headings continuous [m, m, rad(, m)]
     reduced_state: Array  # (n, n_z)
     control: Array  # (n, n_u)
+
+    __repr__ = brief
 
     def pose_at(self, time: ArrayLike) -> Array:
         """Poses (..., dof) at times (...,) [s]: exact at samples, by constant twists between them.

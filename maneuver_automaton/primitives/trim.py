@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._brief import brief
 from maneuver_automaton._ceilings import FASTEST, FASTEST_SPIN
 from maneuver_automaton.groups import LieGroup
 
@@ -35,6 +36,8 @@ class Trim:
     control: Array  # (n_u,), the model's units
     reduced_state: Array = field(default_factory=lambda: np.zeros(0))  # (n_z,), the model's units
     max_duration: float = math.inf  # [s]
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         freeze(self, "body_velocity", last=(2, 3, 4))

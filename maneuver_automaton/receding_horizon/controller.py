@@ -13,7 +13,7 @@ from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING, with_samples_at
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.collision import AnyObstacle, Shape, as_obstacles
+from maneuver_automaton.collision import AnyObstacle, AnyShape, as_obstacles
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.receding_horizon.candidates import cost_until, is_rest_of
 from maneuver_automaton.receding_horizon.decision import StepSearch, decide
@@ -159,7 +159,7 @@ class RecedingHorizon:
         measured_state: ArrayLike,
         *,
         elapsed: float | None = None,
-        obstacles: Sequence[AnyObstacle | Shape] | None = None,
+        obstacles: AnyObstacle | AnyShape | Sequence[AnyObstacle | AnyShape] | None = None,
     ) -> tuple[Array | None, Step]:
         """The control to apply from `measured_state`, and the log of the decision.
 
@@ -169,7 +169,7 @@ class RecedingHorizon:
             Pose [m, m, rad(, m)].
         elapsed : float, optional
             [s] since the last step; if omitted, the time for which its plan was to be applied.
-        obstacles : sequence of Obstacle or OccupancyMap, optional
+        obstacles : as the obstacles of a `Problem`, optional
             The obstacles from now on, with their predicted motions in the time of the world; if
             omitted, those seen last, at first those of the problem.
 
@@ -195,9 +195,10 @@ class RecedingHorizon:
         pose = np.array(as_array("measured_state", measured_state, last=dof))
         if pose.shape != (dof,):
             raise ValueError(f"measured_state: got shape {pose.shape}, need ({dof},)")
-        changed = obstacles is not None and as_obstacles(obstacles) != self.problem.obstacles
-        if obstacles is not None and changed:
-            self.problem = replace(self.problem, obstacles=as_obstacles(obstacles))
+        seen = self.problem.obstacles if obstacles is None else as_obstacles(obstacles)
+        changed = seen != self.problem.obstacles
+        if changed:
+            self.problem = replace(self.problem, obstacles=seen)
             self.settings.check(self.problem)
             load_search(self.problem)
         budget = Budget.from_now(self.settings.time_limit)

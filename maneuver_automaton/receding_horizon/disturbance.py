@@ -10,6 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Plan
 
 
@@ -34,6 +35,8 @@ class Disturbance:
     delay: int = 0  # steps, 0 or 1
     seed: int = 0
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         for name in ("position_m", "heading_rad", "measured_position_m", "measured_heading_rad"):
             value = getattr(self, name)
@@ -53,6 +56,8 @@ class Draw:
 
     noise: Array
     measurement: Array
+
+    __repr__ = brief
 
 
 def checked(upset: Disturbance, dof: int) -> Disturbance:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._brief import brief
 from maneuver_automaton._display import Player, picture, player_frame, player_page
 from maneuver_automaton.audit import Audit
 from maneuver_automaton.automaton import Plan
@@ -38,6 +39,8 @@ class Violation:
 
     guarantee: Guarantee
     reason: str  # one line, with the numbers
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         return f"{self.guarantee.value}: {self.reason}"
@@ -97,6 +100,8 @@ class Step:
     free_until: float | None = None  # [s] no contact is predicted until then; None: nothing there
     clearance_m: float | None = None  # least one while it was driven, by the audit
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         freeze(self, "pose", last=(3, 4))
 
@@ -145,6 +150,8 @@ class ClosedLoop:
     inside: tuple[bool, ...] = ()  # (n + 1) whether each pose is within the goal's tolerance
     steps_bound: int | None = None  # the paper's bound on the number of steps
     counts: dict[str, int] = field(default_factory=dict)
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         freeze(self, "poses", last=(3, 4))

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, freeze
+from maneuver_automaton._brief import brief
 from maneuver_automaton._interrupts import stopped
 from maneuver_automaton._parallel import in_parallel
 from maneuver_automaton.problem import Problem
@@ -38,6 +39,8 @@ class Outcome:
     reason: str  # why the goal was not reached, or not kept; empty if all is well
     solve_s: Array  # (steps,)
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         freeze(self, "start", last=(3, 4))
         freeze(self, "solve_s")
@@ -54,6 +57,8 @@ class Statistics:
     """Statistics of many closed loops."""
 
     outcomes: tuple[Outcome, ...]
+
+    __repr__ = brief
 
     @property
     def reached(self) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._brief import brief
 
 AT_REST = 1e-9  # [m/s]
 
@@ -22,6 +23,8 @@ class RoadSettings:
     greed: float = 1.0  # weight of the cost-to-go
     gain: float = 0.02  # share of the cost by which a new plan has to be better than the old one
 
+    __repr__ = brief
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RoadDecision:
@@ -36,6 +39,8 @@ class RoadDecision:
     controls: Array  # (n, 2) acceleration [m/s^2], steering rate [rad/s], the stop included
     lasting: int  # ticks before the stop begins
     reaches: bool  # whether it reaches a goal there
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         freeze(self, "states", last=5)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._brief import brief
 from maneuver_automaton._display import Player, picture, player_frame, player_page
 from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.automaton import Plan
@@ -37,6 +38,8 @@ class RoadStep:
     solve_s: float  # [s] to decide
     cpu_s: float  # [s] of it that the processor spent on this thread
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         freeze(self, "state", last=5)
 
@@ -57,6 +60,8 @@ class RoadDrive:
     status: str  # reached | missed | steps_spent
     reason: str  # one line; empty if reached
     verdict: RoadVerdict
+
+    __repr__ = brief
 
     @property
     def solve_s(self) -> Array:

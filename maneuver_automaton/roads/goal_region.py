@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.collision import Box, Disc, Polygon, Shape
+from maneuver_automaton._brief import brief
+from maneuver_automaton.collision import AnyShape, Box, Disc, Polygon, Shape, as_shapes
 
 Interval: TypeAlias = tuple[float, float]
 
@@ -37,9 +38,25 @@ class GoalRegion:
     time: Interval = (0.0, math.inf)  # [s]
     lanelets: tuple[int, ...] = ()  # numbers of those that the places are, if they are lanelets
 
+    __repr__ = brief
+
+    if TYPE_CHECKING:  # geometry of shapely, or lists of corners, will do
+
+        def __init__(
+            self,
+            *,
+            places: AnyShape | Sequence[AnyShape] | None = None,
+            heading: Interval | None = None,
+            speed: Interval | None = None,
+            time: Interval = ...,
+            lanelets: tuple[int, ...] = (),
+        ) -> None: ...
+
     def __post_init__(self) -> None:
-        if self.places is not None and not self.places:
+        if isinstance(self.places, tuple | list) and not self.places:
             raise ValueError("goal region: got no place, need at least one, or None for anywhere")
+        if self.places is not None:
+            object.__setattr__(self, "places", as_shapes("goal region", self.places))
         for name, interval in (("speed", self.speed), ("time", self.time)):
             if interval is not None and not interval[0] <= interval[1]:
                 raise ValueError(f"goal region: {name} must be [low, high], got {interval}")

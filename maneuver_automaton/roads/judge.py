@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from maneuver_automaton._brief import brief
 from maneuver_automaton.audit import Audit, audit_plan, closest_to
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Obstacle
@@ -31,6 +32,8 @@ class RoadVerdict:
     hit: tuple[str, ...]  # road users that the body touches
     clearance_m: float  # least distance to any of them; inf without any
     edge_m: float  # least distance of the body to the edge of the road, 0 outside
+
+    __repr__ = brief
 
     @property
     def collisions(self) -> int:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._brief import brief
 from maneuver_automaton.groups import LieGroup
 
 ROUNDED = 1e-5  # [m] gaps of less than twice this are what rounding left
@@ -33,6 +34,8 @@ class Lanelet:
     beside: tuple[int, ...] = ()  # neighbours in the same direction
     speed_limit: float | None = None  # [m/s]
     against: tuple[int, ...] = ()  # neighbours in the opposite direction
+
+    __repr__ = brief
 
     if TYPE_CHECKING:
 

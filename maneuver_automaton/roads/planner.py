@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads import (
@@ -62,6 +63,8 @@ class RoadPlanner:
     library: RoadLibrary
     horizon: Horizon
     room: BeamArrays = field(repr=False)
+
+    __repr__ = brief
 
     @property
     def tick(self) -> float:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._brief import brief
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Polygon, Shape
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads.goal_region import GoalRegion
@@ -25,6 +26,8 @@ class RoadStart:
     speed: float  # [m/s]
     turn_rate: float = 0.0  # [rad/s]
     time: float = 0.0  # [s]
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         freeze(self, "middle", last=3)
@@ -56,6 +59,8 @@ class RoadScene:
     traffic: tuple[Obstacle, ...] = ()
     source: str = ""  # author and place of the recording, for pictures
     step: float = 0.1  # [s] of the clock that the scene was recorded with
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         if not self.lanelets:

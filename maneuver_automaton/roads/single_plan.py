@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from maneuver_automaton._brief import brief
 from maneuver_automaton._display import Player, picture, player_frame, player_page
 from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.automaton import Plan
@@ -35,6 +36,8 @@ class RoadPlanResult:
     verdict: RoadVerdict | None
     reason: str  # empty if there is a plan
     search_s: float  # [s]
+
+    __repr__ = brief
 
     @property
     def cost(self) -> float | None:

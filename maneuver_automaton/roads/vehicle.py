@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._brief import brief
 from maneuver_automaton.collision import Box
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import SecondOrderCar
@@ -58,6 +59,8 @@ class RoadVehicle:
     engine: float = 8.0  # [m/s^2] the engine gives up to that speed
     lateral: float = 5.0  # [m/s^2] across, at most
     friction: float = 9.0  # [m/s^2] along and across together, at most
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         for name in ("length", "width", "power_speed", "engine", "lateral", "friction"):

@@ -11,6 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from annotated_types import Ge
 from pydantic import AfterValidator, AllowInfNan, BeforeValidator, Field, Strict
 
+from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton._library_models import model_of as model_of_entry
 from maneuver_automaton.automaton.building import (
@@ -134,6 +135,8 @@ class BuildFile:
     missing: tuple[MissingTrim, ...]
     maneuvers: ManeuversPart
 
+    __repr__ = brief
+
     @property
     def at_once(self) -> bool:
         """Whether the maneuvers come in closed form, without a solver and in no time."""
@@ -158,6 +161,8 @@ class Built:
     automaton: Automaton
     failures: tuple[Failure, ...]
     build: LibraryBuild | None  # of optimal control
+
+    __repr__ = brief
 
 
 def is_build_file(path: Path) -> bool:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._brief import brief
 from maneuver_automaton.collision import Box
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.commonroad import read_commonroad
@@ -30,6 +31,8 @@ class RoadScenario:
     name: str
     scene: RoadScene
     vehicle: RoadVehicle
+
+    __repr__ = brief
 
 
 def load_scenario(

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.costs import Cost
@@ -51,6 +52,8 @@ class Scenario:
     stated: AutomatonPart | None = None  # the automaton, as the file states it
     path: Path | None = None
     timing_s: Mapping[str, float] = field(default_factory=dict)  # load, automaton [s]
+
+    __repr__ = brief
 
     @property
     def footprint(self) -> Footprint:

@@ -1,0 +1,137 @@
+"""A plan as arrays, one row an instant, for other programs and tables."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._brief import brief
+from maneuver_automaton.groups import group_of
+from maneuver_automaton.models import Model
+from maneuver_automaton.primitives import Trajectory, Trim
+
+if TYPE_CHECKING:
+    from maneuver_automaton.automaton.plan import Plan
+
+POSE_COLUMNS = ("x_m", "y_m", "heading_rad", "z_m")
+TWIST_COLUMNS = ("v_x_m_s", "v_y_m_s", "turn_rate_rad_s", "v_z_m_s")
+ROUNDING = 1e-9  # steps, by which a duration may miss a whole number of them
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PlanArrays:
+    """Rows of a plan; twist and control are those that begin at the row's time.
+
+    The last row, at the end, has those of the last primitive.
+    """
+
+    time: Array  # (n,) [s]
+    pose: Array  # (n, dof), headings continuous [m, m, rad(, m)]
+    twist: Array  # (n, dof) in the body frame [m/s, m/s, rad/s(, m/s)]
+    reduced_state: Array  # (n, n_z)
+    control: Array  # (n, n_u)
+    index: IntArray  # (n,) of the primitive in `word`; -1 of an empty plan
+    word: tuple[str, ...]  # names of the primitives
+    reduced_names: tuple[str, ...]
+    control_names: tuple[str, ...]
+
+    __repr__ = brief
+
+    @property
+    def primitive(self) -> NDArray[np.str_]:
+        """Name (n,) of the trim or maneuver of each row; empty of an empty plan."""
+        return np.array([*self.word, ""], dtype=np.str_)[self.index]
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Arrays (n,) by name, with the unit at its end, as a table has them.
+
+        Names of reduced state and control begin with ``state_`` and ``control_``.
+        """
+        dof = self.pose.shape[1]
+        blocks = (
+            (POSE_COLUMNS[:dof], self.pose),
+            (TWIST_COLUMNS[:dof], self.twist),
+            ([f"state_{name}" for name in self.reduced_names], self.reduced_state),
+            ([f"control_{name}" for name in self.control_names], self.control),
+        )
+        named = {name: block[:, k] for names, block in blocks for k, name in enumerate(names)}
+        return {"time_s": self.time, **named, "primitive": self.primitive}
+
+
+def plan_arrays(plan: Plan, *, step: float | None, model: Model | None) -> PlanArrays:
+    """The arrays of `Plan.as_arrays`."""
+    samples = plan.sample()
+    if step is not None:
+        samples = _at_times(plan, samples, _times(plan, step))
+    after = np.searchsorted(plan.switching_times[1:-1], samples.time, side="right")
+    index = after if plan.primitives else np.full(samples.time.shape, -1)
+    n_states, n_controls = samples.reduced_state.shape[1], samples.control.shape[1]
+    return PlanArrays(
+        time=samples.time,
+        pose=samples.pose,
+        twist=_twists(plan, samples, index, model),
+        reduced_state=samples.reduced_state,
+        control=samples.control,
+        index=index,
+        word=plan.word,
+        reduced_names=_names(None if model is None else model.reduced_names, n_states),
+        control_names=_names(None if model is None else model.control_names, n_controls),
+    )
+
+
+def _times(plan: Plan, step: float) -> Array:
+    """Times (n,) from start to end [s]: every step, and the end."""
+    if not (math.isfinite(step) and step > 0.0):
+        raise ValueError(f"as_arrays: step must be positive, got {step} s")
+    count = max(0, math.ceil(plan.duration / step - ROUNDING))
+    return np.append(plan.start_time + step * np.arange(count), plan.switching_times[-1])
+
+
+def _at_times(plan: Plan, samples: Trajectory, times: Array) -> Trajectory:
+    """The plan at other times: poses exact, reduced states linear between samples."""
+    last = samples.time.size - 1
+    k = np.clip(np.searchsorted(samples.time, times, side="right") - 1, 0, max(last - 1, 0))
+    ahead = np.minimum(k + 1, last)
+    span = samples.time[ahead] - samples.time[k]
+    share = np.where(span > 0.0, (times - samples.time[k]) / np.where(span > 0.0, span, 1.0), 0.0)
+    before, change = samples.reduced_state[k], samples.reduced_state[ahead]
+    return Trajectory(
+        time=times,
+        pose=plan.pose_at(times),
+        reduced_state=before + share[:, None] * (change - before),
+        control=samples.control[k],
+    )
+
+
+def _twists(plan: Plan, samples: Trajectory, index: IntArray, model: Model | None) -> Array:
+    """Twists (n, dof): a trim's own; of a maneuver what its model says, or else the mean."""
+    twists = np.zeros_like(samples.pose)
+    for k, primitive in enumerate(plan.primitives):
+        here = np.flatnonzero(index == k)
+        if isinstance(primitive, Trim):
+            twists[here] = primitive.body_velocity
+        elif model is not None:
+            states, controls = samples.reduced_state[here], samples.control[here]
+            twists[here] = model.body_velocity(states, controls)
+        elif here.size:
+            twists[here] = _mean_twists(plan, samples.time, here)
+    return twists
+
+
+def _mean_twists(plan: Plan, times: Array, rows: IntArray) -> Array:
+    """Constant twist (m, dof) that leads from the pose of each row to that of the next."""
+    begin = np.minimum(rows, times.size - 2)
+    group = group_of(plan.start.size)
+    poses, span = plan.pose_at(times), times[begin + 1] - times[begin]
+    steps = (group(poses[begin]).inverse() @ group(poses[begin + 1])).log()
+    return np.asarray(steps / np.where(span > 0.0, span, np.inf)[:, None])
+
+
+def _names(known: tuple[str, ...] | None, n: int) -> tuple[str, ...]:
+    """Names of `n` numbers; counted from 0 where no model names them."""
+    return known if known is not None and len(known) == n else tuple(map(str, range(n)))

@@ -1,0 +1,62 @@
+"""What stands at the end of every ``--help``: exit codes, and examples that run."""
+
+from __future__ import annotations
+
+STOPPED = "130 interrupted (the best so far is written)"
+BAD = "2 bad input (one line says which)"
+CODES = {
+    "plan": f"0 a plan was found and audited, 1 no plan (one line says why), {BAD}, {STOPPED}; "
+    "of a folder: 0 all found, 1 some not, 2 some file bad",
+    "mpc": f"0 the goal was reached, 1 not, or a collision, {BAD}, {STOPPED}",
+    "check": f"0 all holds, 1 something does not, {BAD}",
+    "automaton build": f"0 all maneuvers were found, 1 some not, {BAD}, "
+    "130 interrupted (called again, it goes on)",
+    "plain": f"0 done, {BAD}",
+}
+EXAMPLES = {
+    "": (
+        "maneuver-automaton example parking",
+        "maneuver-automaton plan parking.yaml",
+        "maneuver-automaton --install-completion",
+    ),
+    "plan": (
+        "maneuver-automaton plan scenarios/parking.yaml",
+        "maneuver-automaton plan scenarios/car_slot.yaml --gap 0.1 --time-limit 20",
+        "maneuver-automaton plan scenarios --out out --jobs 2",
+        "maneuver-automaton plan Case1.csv --with scenarios/tpcap.yaml",
+    ),
+    "mpc": (
+        "maneuver-automaton mpc scenarios/parking_loop.yaml",
+        "maneuver-automaton mpc scenarios/parking_noise.yaml --seeds 20 --jobs 2",
+        "maneuver-automaton mpc scenarios --jobs 2",
+    ),
+    "check": ("maneuver-automaton check scenarios/parking.yaml",),
+    "automaton": ("maneuver-automaton automaton show scenarios/parking.yaml",),
+    "automaton build": (
+        "maneuver-automaton automaton build scenarios/grid_1681.yaml --out grid.json",
+        "maneuver-automaton automaton build hovercraft.yaml --out hovercraft.json --jobs 2",
+    ),
+    "automaton show": ("maneuver-automaton automaton show scenarios/parking.yaml --coverage",),
+    "automaton draw": ("maneuver-automaton automaton draw scenarios/parking.yaml --out trims.pdf",),
+    "cache": ("maneuver-automaton cache show",),
+    "cache show": ("maneuver-automaton cache show",),
+    "cache clear": ("maneuver-automaton cache clear",),
+    "compile": ("maneuver-automaton compile --jobs 4",),
+    "convert": (
+        "maneuver-automaton convert scenarios/maps/warehouse.yaml warehouse.map",
+        "maneuver-automaton convert scenarios/parking.yaml parking.mprim",
+    ),
+    "example": ("maneuver-automaton example", "maneuver-automaton example warehouse --out hall/"),
+    "plot": (
+        "maneuver-automaton plot out/plan.json --out plan.pdf",
+        "maneuver-automaton plot out/closed_loop.json --with scenarios/parking_loop.yaml",
+    ),
+    "schema": ("maneuver-automaton schema > scenario.schema.json",),
+}
+
+
+def ending(command: str) -> str:
+    """The end of the help of a command, as click lays it out."""
+    codes = CODES.get(command, CODES["plain"])
+    lines = "\n".join(f"  {example}" for example in EXAMPLES[command])
+    return f"Exit codes: {codes}.\n\n\b\nExamples:\n{lines}"
