@@ -112,12 +112,14 @@ def default(key: str, value: Mapping[str, Any], required: Iterable[str]) -> str:
     """What holds where the key is left out."""
     if key in required:
         return "required"
-    return f"`{cell(str(value['default']))}`" if value.get("default") is not None else ""
+    return f"`{value['default']}`" if value.get("default") is not None else ""
 
 
 def cell(text: str) -> str:
     """Text that may stand in a table."""
-    return " ".join(text.split()).replace("|", "\\|").replace("<", "&lt;")
+    for sign, written in (("|", "\\|"), ("<", "&lt;"), ("{", "&#123;"), ("*", "\\*")):
+        text = text.replace(sign, written)
+    return " ".join(text.split())
 
 
 def options() -> str:
