@@ -1,7 +1,11 @@
-"""README.md and the pages in docs/: their Python and commands run, their tables know every key."""
+"""README.md and the pages in docs/: their Python and commands run, their tables know every key.
+
+Notebooks are executed while the site is built; here their links alone are looked at.
+"""
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 import shutil
@@ -9,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from maneuver_automaton.cli import run
 from maneuver_automaton.formats.plan_json import plan_to_dict
@@ -16,14 +21,55 @@ from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.scenario import json_schema, load_scenario, scenario_of_text
 
 ROOT = Path(__file__).parents[1]
-PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
-TEXTS = {page: page.read_text(encoding="utf-8") for page in PAGES}
+DOCS = ROOT / "docs"
+PAGES = (
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    *sorted(DOCS.rglob("*.md")),
+    *sorted(DOCS.rglob("*.ipynb")),
+)
+
+
+def text_of(page: Path) -> str:
+    """The text of a page, of a notebook that of its cells of text."""
+    text = page.read_text(encoding="utf-8")
+    if page.suffix == ".md":
+        return text
+    cells = json.loads(text)["cells"]
+    return "\n\n".join("".join(one["source"]) for one in cells if one["cell_type"] == "markdown")
+
+
+TEXTS = {page: text_of(page) for page in PAGES}
 TEXT = "\n".join(TEXTS.values())
+LONG = {  # pages whose code takes seconds: it is what they measure
+    "best_so_far",
+    "gear_changes",
+    "replanning",
+    "smoothing",
+    "tight_aisle",
+    "trailers",
+    "tune",
+    "turn_on_the_spot",
+    "why_no_plan",
+}
 
 
-def blocks(language: str) -> list[str]:
+def blocks(language: str, text: str = TEXT) -> list[str]:
     """The fenced blocks of a language, those of README.md first."""
-    return re.findall(rf"^```{language}\n(.*?)^```", TEXT, flags=re.DOTALL | re.MULTILINE)
+    return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
+
+
+def code_of_pages() -> list[Any]:
+    """Every block of Python, named by its page and first line."""
+    return [
+        pytest.param(
+            code,
+            id=f"{page.stem}: {first_words(code)}",
+            marks=[pytest.mark.slow] if page.stem in LONG else [],
+        )
+        for page, text in TEXTS.items()
+        for code in blocks("python", text)
+    ]
 
 
 def first_words(text: str) -> str:
@@ -40,7 +86,7 @@ def clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("code", blocks("python"), ids=first_words)
+@pytest.mark.parametrize("code", code_of_pages())
 def test_python_runs(clone, code):
     exec(compile(code, "README.md", "exec"), {"__name__": "__main__"})
 
@@ -54,7 +100,8 @@ def test_the_first_plan_is_short_and_prints_what_it_says(clone, capsys):
 
 
 def test_the_first_plan_among_obstacles_is_short():
-    code = next(code for code in blocks("python") if "obstacles=" in code)
+    code = blocks("python", TEXTS[DOCS / "obstacles.md"])[0]
+    assert "obstacles=" in code
     assert len(code.splitlines()) <= 15
 
 
@@ -107,18 +154,50 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^a-z0-9 _-]", "", one.lower()).replace(" ", "-") for one in headings}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_every_link_leads_somewhere(page):
     for target in re.findall(r"\]\(([^)]+)\)", TEXTS[page]):
         name, _, anchor = target.partition("#")
+        if name.startswith("https://"):
+            continue
         there = (page.parent / name).resolve() if name else page
         assert there.is_file(), target
         assert not anchor or anchor in anchors(there), target
 
 
-def test_every_page_can_be_found_and_every_picture_is_shown():
-    for page in PAGES[1:]:
-        assert f"](docs/{page.name})" in TEXTS[PAGES[0]]
-    for picture in (ROOT / "scenarios" / "pictures").iterdir():
+def in_navigation(part: Any) -> set[str]:
+    """The pages that the navigation of the site lists."""
+    if isinstance(part, str):
+        return {part}
+    return set().union(*map(in_navigation, part.values() if isinstance(part, dict) else part))
+
+
+def test_every_page_is_in_the_navigation():
+    text = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    pages = {page.relative_to(DOCS).with_suffix(".md") for page in PAGES if DOCS in page.parents}
+    outside = {"README.md", "CONTRIBUTING.md", "CHANGELOG.md"}
+    assert in_navigation(yaml.safe_load(text)["nav"]) == outside | {one.as_posix() for one in pages}
+
+
+def test_the_readme_is_short_and_leads_to_every_page_of_the_first_level():
+    assert len(TEXTS[ROOT / "README.md"].splitlines()) <= 150
+    for page in DOCS.glob("*.md"):
+        assert f"](docs/{page.name})" in TEXTS[ROOT / "README.md"]
+
+
+def test_notebooks_are_kept_without_outputs():
+    for page in DOCS.rglob("*.ipynb"):
+        for cell in json.loads(page.read_text(encoding="utf-8"))["cells"]:
+            assert not cell.get("outputs")
+            assert cell.get("execution_count") is None
+
+
+def test_every_picture_is_small_and_shown():
+    for picture in [*(ROOT / "scenarios" / "pictures").iterdir(), *DOCS.glob("pictures/*.png")]:
         assert picture.stat().st_size < 120_000
         assert picture.name in TEXT
+
+
+def test_every_scenario_is_in_the_gallery():
+    drawn = {picture.stem for picture in DOCS.glob("pictures/gallery/*.png")}
+    assert drawn == {scenario.stem for scenario in (ROOT / "scenarios").glob("*.yaml")}

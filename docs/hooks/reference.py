@@ -1,0 +1,151 @@
+"""The reference: keys from the schema of scenario files, names and options from the package."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import typer
+
+import maneuver_automaton as ma
+from maneuver_automaton.cli.app import app
+from maneuver_automaton.scenario import json_schema
+
+ROOMS = {  # by the first part of where a name is at home
+    "planning": "Planning",
+    "problem": "Problems",
+    "costs": "Costs",
+    "automaton": "Libraries and plans",
+    "primitives": "Trims and maneuvers",
+    "models": "Vehicles",
+    "collision": "Bodies and obstacles",
+    "groups": "Groups of motions",
+    "receding_horizon": "Closed loop",
+    "roads": "Roads",
+    "scenario": "Files",
+    "formats": "Files",
+}
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """The text of a page, with what is generated where it is asked for."""
+    for place, written in (
+        ("<!-- names -->", names),
+        ("<!-- keys -->", keys),
+        ("<!-- options -->", options),
+    ):
+        if place in markdown:
+            markdown = markdown.replace(place, written())
+    return markdown
+
+
+def names() -> str:
+    """A section for every room, with the docstrings of its public names."""
+    sections: dict[str, list[str]] = {title: [] for title in ROOMS.values()}
+    for name in sorted(set(ma.__all__) - {"plotting"}, key=str.lower):
+        value = getattr(ma, name)
+        room = value.__module__.split(".")[1]
+        title = ROOMS.get(room, room.replace("_", " ").capitalize())
+        path = f"{value.__module__}.{value.__qualname__}"
+        sections.setdefault(title, []).append(f"::: {path}")
+    return "\n\n".join(
+        "\n\n".join([f"## {title}", *entries]) for title, entries in sections.items() if entries
+    )
+
+
+def keys() -> str:
+    """A table of keys for every part of a scenario file."""
+    schema = json_schema()
+    parts = {"The file": schema, **dict(sorted(schema["$defs"].items()))}
+    return "\n\n".join(
+        section(title, part) for title, part in parts.items() if "properties" in part
+    )
+
+
+def section(title: str, part: Mapping[str, Any]) -> str:
+    """The keys of one part."""
+    required = set(part.get("required", ()))
+    rows = [
+        f"| `{key}` | {kind(value)} | {meaning(value)} | {default(key, value, required)} |"
+        for key, value in part["properties"].items()
+    ]
+    head = "| key | value | meaning | default |\n| --- | --- | --- | --- |"
+    text = "" if title == "The file" else part.get("description", "")
+    return f"## {title.removesuffix('Part')}\n\n{text}\n\n{head}\n" + "\n".join(rows)
+
+
+def meaning(value: Mapping[str, Any]) -> str:
+    """What a key is for."""
+    return cell(value.get("description", ""))
+
+
+def kind(value: Mapping[str, Any]) -> str:
+    """What a key may hold, in words."""
+    if "$ref" in value:
+        title = value["$ref"].rsplit("/", 1)[1].removesuffix("Part")
+        return f"[{title}](#{title.lower()})"
+    if "const" in value:
+        return f"`{value['const']}`"
+    if "enum" in value:
+        return " or ".join(f"`{one}`" for one in value["enum"])
+    for union in ("oneOf", "anyOf"):
+        if union in value:
+            return " or ".join(dict.fromkeys(kind(one) for one in value[union]))
+    if value.get("type") == "array":
+        items = value.get("prefixItems")
+        if items:
+            return f"list of {len(items)}: {kind(items[0])}"
+        return f"list of: {kind(value.get('items', {}))}"
+    return {"boolean": "true or false", "string": "text"}.get(
+        value.get("type", ""), limited(value) or "any"
+    )
+
+
+def limited(value: Mapping[str, Any]) -> str:
+    """A number with its limits."""
+    limits = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
+    found = [f"{sign} {value[key]:g}" for key, sign in limits.items() if key in value]
+    return " ".join([value.get("type", ""), ", ".join(found)]).strip()
+
+
+def default(key: str, value: Mapping[str, Any], required: Iterable[str]) -> str:
+    """What holds where the key is left out."""
+    if key in required:
+        return "required"
+    return f"`{value['default']}`" if value.get("default") is not None else ""
+
+
+def cell(text: str) -> str:
+    """Text that may stand in a table."""
+    for sign, written in (("|", "\\|"), ("<", "&lt;"), ("{", "&#123;"), ("*", "\\*")):
+        text = text.replace(sign, written)
+    return " ".join(text.split())
+
+
+def options() -> str:
+    """A table of arguments and options for every command."""
+    return "\n\n".join(commands("maneuver-automaton", typer.main.get_command(app)))
+
+
+def commands(path: str, command: Any) -> Iterable[str]:
+    """A section for a command, and one for each below it."""
+    below = getattr(command, "commands", {})
+    if not below:
+        rows = [
+            f"| `{usage(one)}` | {cell(getattr(one, 'help', None) or '')} |"
+            for one in command.params
+        ]
+        table = "\n".join(["| argument or option | meaning |", "| --- | --- |", *rows])
+        yield f"## {path}\n\n{' '.join((command.help or '').split())}\n\n{table}"
+    for name, one in below.items():
+        if not one.hidden:
+            yield from commands(f"{path} {name}", one)
+
+
+def usage(parameter: Any) -> str:
+    """How an argument or option is written."""
+    shown = parameter.metavar or parameter.name.upper()
+    if parameter.param_type_name == "argument":
+        return str(shown)
+    flags = ", ".join([*parameter.opts, *parameter.secondary_opts])
+    return flags if parameter.is_flag else f"{flags} {shown}"

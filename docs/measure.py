@@ -1,0 +1,86 @@
+"""Run the code of the pages of questions and how-tos, and draw the gallery.
+
+``python docs/measure.py``: the code of each page runs in a folder with the scenarios; what it
+prints is written below it, and its picture, named after the page, into docs/pictures.
+``python docs/measure.py gallery`` draws every scenario for the gallery; names of pages or scenarios
+may follow, to do no more than these.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import re
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Collection
+from pathlib import Path
+
+from PIL import Image
+
+from maneuver_automaton.cli import run
+
+ROOT = Path(__file__).parents[1]
+PICTURES = ROOT / "docs" / "pictures"
+CODE = re.compile(r"```python\n(?P<code>.*?)```\n(?:\n```text\n.*?```\n)?", flags=re.DOTALL)
+WIDE, SMALL = 1000, 720  # [pixels] at most, of a page's picture and of the gallery's
+
+
+def run_page(page: Path) -> None:
+    """Write what the code of a page prints, and its picture."""
+    text = page.read_text(encoding="utf-8")
+    page.write_text(CODE.sub(lambda match: with_output(match["code"]), text), encoding="utf-8")
+    shrink(Path(f"{page.stem}.png"), PICTURES / f"{page.stem}.png", most=WIDE)
+
+
+def with_output(code: str) -> str:
+    """A block of code, and below it what it prints."""
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        exec(compile(code, "page", "exec"), {"__name__": "__main__"})
+    output = f"\n```text\n{printed.getvalue()}```\n" if printed.getvalue() else ""
+    return f"```python\n{code}```\n{output}"
+
+
+def draw_scenario(scenario: Path) -> None:
+    """Plan a scenario, or drive it in closed loop, and keep its picture."""
+    loop = "receding_horizon:" in scenario.read_text(encoding="utf-8")
+    run(["mpc" if loop else "plan", str(scenario), "--out", "out", "--quiet"])
+    picture = "closed_loop.png" if loop else "plan.png"
+    shrink(Path("out") / picture, PICTURES / "gallery" / f"{scenario.stem}.png", most=SMALL)
+    shutil.rmtree("out", ignore_errors=True)
+
+
+def shrink(picture: Path, to: Path, *, most: int) -> None:
+    """Keep a picture in few colours, at most so many pixels wide."""
+    if not picture.exists():
+        return
+    to.parent.mkdir(parents=True, exist_ok=True)
+    image = Image.open(picture).convert("RGB")
+    image.thumbnail((most, 2 * most))
+    image.quantize(128).save(to, optimize=True)
+
+
+def main(names: Collection[str]) -> None:
+    """Run what is named, or everything."""
+    pages = [*(ROOT / "docs" / "questions").glob("*.md"), *(ROOT / "docs" / "howto").glob("*.md")]
+    work: dict[str, Callable[[], None]] = {
+        page.stem: lambda page=page: run_page(page) for page in pages
+    }
+    if "gallery" in names:
+        names = set(names) - {"gallery"}
+        scenarios = (ROOT / "scenarios").glob("*.yaml")
+        work = {one.stem: lambda one=one: draw_scenario(one) for one in scenarios}
+    with tempfile.TemporaryDirectory() as folder:
+        shutil.copytree(ROOT / "scenarios", Path(folder) / "scenarios")
+        os.chdir(folder)
+        for name in sorted(names or work):
+            print(name, flush=True)
+            work[name]()
+        os.chdir(ROOT)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
