@@ -43,8 +43,8 @@ def test_plot_draws_a_closed_loop(tmp_path, capsys):
     assert "ahead" in (tmp_path / "loop.svg").read_text()
     assert run(["plot", str(file), "--animate"]) == 2
     assert capsys.readouterr().err == (
-        f"{file}: is a closed loop, whose animation or page needs --with and the scenario it was driven "
-        "in\n"
+        f"{file}: is a closed loop, whose animation or page needs --with and the scenario it was "
+        "driven in\n"
     )
 
 
