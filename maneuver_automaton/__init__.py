@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.planning import PlanResult as PlanResult
     from maneuver_automaton.planning import PlanStatus as PlanStatus
     from maneuver_automaton.planning import plan as plan
+    from maneuver_automaton.planning import plans as plans
     from maneuver_automaton.planning.lower_bound import lower_bound as lower_bound
     from maneuver_automaton.primitives import Maneuver as Maneuver
     from maneuver_automaton.primitives import Trajectory as Trajectory
@@ -126,6 +127,7 @@ _HOMES = {
     "lower_bound": "planning.lower_bound",
     "plan": "planning",
     "plan_road": "roads",
+    "plans": "planning",
     "save_csv": "formats.plan_csv",
     "save_library": "automaton.library",
     "save_plan": "formats.plan_json",

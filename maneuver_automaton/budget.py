@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 from maneuver_automaton._interrupts import stopped
 
@@ -32,6 +33,8 @@ class Watch:
     cost: float = math.inf  # of the best plan found
     bound: float = 0.0  # no plan is cheaper
     is_abandoned: bool = False  # nobody waits for a better bound any more
+    is_given_up: bool = False  # nor for a better plan
+    shows: Callable[[Any], None] | None = None  # called when a better plan has passed its checks
 
     @property
     def is_closed(self) -> bool:
@@ -103,8 +106,9 @@ class Budget:
 
     @property
     def is_stopped(self) -> bool:
-        """Whether the gap is closed, or a signal asks to come to an end."""
-        return stopped() or (self.watch is not None and self.watch.is_closed)
+        """Whether the gap is closed, or somebody asks to come to an end."""
+        watch = self.watch
+        return stopped() or (watch is not None and (watch.is_closed or watch.is_given_up))
 
     @property
     def is_over(self) -> bool:

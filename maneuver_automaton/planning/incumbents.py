@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.audit import Audit, TerminalError, terminal_error
@@ -181,7 +182,15 @@ class Incumbents:
             if self.plans[0] is one and cost < self.least_cost * (1.0 - CHEAPER):
                 self.improvements.append((self.budget.elapsed, cost))
                 self._tell(cost)
+            if self.plans[0] is one and self.shows is not None:
+                self.shows(self.found)
         return True
+
+    @property
+    def shows(self) -> Callable[[Any], None] | None:
+        """Who waits for each better plan of this very problem."""
+        watch = self.budget.watch
+        return watch.shows if watch is not None and watch.problem is self.problem else None
 
     def _tell(self, cost: float) -> None:
         """Tell a proof beside the search what a plan of this very problem costs."""

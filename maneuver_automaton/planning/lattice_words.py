@@ -90,6 +90,9 @@ class LatticeWords:
         self.words.append(word)
         if self.knows_all:
             self.found.note(word.cost + self.query.padding)
+            if self.found.shows is not None and self.found.may_check:
+                goal_index = self.query.goal_index[word.goal]
+                self.found.offer(plan_of_word(self.query, word), goal_index)
             return
         if not self.found.may_check:
             return

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import functools
+import math
+from collections.abc import Callable
+from dataclasses import replace
 
 from maneuver_automaton._interrupts import patient
 from maneuver_automaton.budget import Budget, Watch
@@ -13,7 +16,7 @@ from maneuver_automaton.planning.free_space import plan_by_words
 from maneuver_automaton.planning.in_steps import plan_in_steps
 from maneuver_automaton.planning.no_way import with_proof
 from maneuver_automaton.planning.off_lattice import goals_off_lattice
-from maneuver_automaton.planning.result import PlanResult
+from maneuver_automaton.planning.result import LowerBound, PlanResult
 from maneuver_automaton.planning.steps import has_inertia, load_steps, uses_lattice
 from maneuver_automaton.planning.within_tolerance import has_tolerance, plan_within_tolerance
 from maneuver_automaton.planning.workspace import Workspace, workspace_of
@@ -30,6 +33,7 @@ def plan(
     alternatives: int = 0,
     gap: float | None = None,
     watch: Watch | None = None,
+    on_better: Callable[[PlanResult], None] | None = None,
 ) -> PlanResult:
     """Cheapest plan found for `problem`, audited by an integration of its own.
 
@@ -46,6 +50,8 @@ def plan(
         runs beside the search, for as long as the time limit says.
     watch : Watch, optional
         Where to look, from another thread, for the cost and the bound meanwhile.
+    on_better : callable, optional
+        Called with each plan that is better than those before, audited; what it takes counts.
 
     Returns
     -------
@@ -68,6 +74,9 @@ def plan(
     (('spin', 'ahead', 'spin'), 7.6974, True)
     """
     workspace = workspace_of(problem.obstacles)
+    if on_better is not None:
+        watch = watch or Watch(gap=-math.inf)
+        watch.shows = functools.partial(_show, problem, watch, on_better)
     return plan_in(
         workspace,
         problem,
@@ -76,6 +85,21 @@ def plan(
         gap=gap,
         watch=watch,
     )
+
+
+def _show(
+    problem: Problem,
+    watch: Watch,
+    on_better: Callable[[PlanResult], None],
+    found: Callable[..., PlanResult],
+) -> None:
+    """Hand a better plan on, with the best bound that there is meanwhile."""
+    from maneuver_automaton.planning.lower_bound import known_bound
+
+    bound = known_bound(problem)
+    if watch.bound > bound.value:
+        bound = LowerBound(value=watch.bound, kind="cells")
+    on_better(found(bound=bound))
 
 
 def plan_in(
@@ -104,6 +128,9 @@ def plan_in(
     budget = Budget.from_now(time_limit, expansions=problem.search.max_expansions)
     with patient():
         if gap is None:
+            if watch is not None:
+                watch.problem = problem
+                budget = replace(budget, watch=watch)
             return plan_within(problem, budget, workspace, alternatives=alternatives)
         from maneuver_automaton.planning.kept_bounds import kept_bounds
         from maneuver_automaton.planning.to_gap import plan_to_gap
