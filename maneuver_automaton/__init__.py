@@ -139,7 +139,7 @@ _HOMES = {
 __all__ = [*_HOMES, "plotting"]
 
 
-_get, _names = lazily(__name__, _HOMES)
+_get, _ = lazily(__name__, _HOMES)
 
 
 def __getattr__(name: str) -> Any:

@@ -6,6 +6,7 @@ Each process is handed one kernel after the other, neighbours in the list: those
 from __future__ import annotations
 
 import contextlib
+import functools
 import gc
 import os
 import platform
@@ -20,7 +21,8 @@ from pathlib import Path
 from maneuver_automaton._kernel_folders import KERNELS, SHIPPED, kernel_folder, source_hash
 
 FIRST = ("refinement.", "search._kernels_lattice", "receding_horizon.")  # share most, take longest
-LOCK, STALE = ".compiling", 900.0  # name of the lock in the folder; [s] after which it is nobody's
+LOCK = ".compiling"  # name of the lock in the folder
+STALE = 20.0  # [s] after which a lock that is touched no more is nobody's
 WORKER = "MANEUVER_AUTOMATON_COMPILES"  # set in the environment of the processes that compile
 X86_64_V3 = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse4.2", "xsave")
 
@@ -95,11 +97,20 @@ def compile_missing(*, jobs: int | None = None) -> list[str] | None:
             if not (folder / LOCK).exists():
                 return []  # the other process has compiled them
         try:
-            with _bar() as report:
+            with _bar() as bar:
+                report = functools.partial(_report, folder / LOCK, bar)
                 return compile_kernels(jobs=jobs, report=report)
         finally:
             with contextlib.suppress(OSError):
                 (folder / LOCK).unlink()
+
+
+def _report(lock: Path, bar: Report | None, done: int, total: int) -> None:
+    """Say that this process is still at work, and how far it is."""
+    with contextlib.suppress(OSError):
+        os.utime(lock)
+    if bar is not None:
+        bar(done, total)
 
 
 def work() -> None:
@@ -163,7 +174,7 @@ def _worker(settings: dict[str, str]) -> subprocess.Popen[str]:
 
 
 def _locked(lock: Path) -> bool:
-    """Whether the lock is ours now: of somebody else, it is so for `STALE` seconds at most."""
+    """Whether the lock is ours now: one that its process touches no more is taken."""
     try:
         with contextlib.suppress(FileNotFoundError):
             if time.time() - lock.stat().st_mtime > STALE:

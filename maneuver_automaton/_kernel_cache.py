@@ -112,7 +112,11 @@ def _all_compiled() -> bool:
     """Have all kernels compiled, the first time that one of them is missing."""
     if shipped_folder():
         say_once("shipped", f"{shipped_folder()}: {OTHER}")
-    failed = compile_missing()
+    try:
+        failed = compile_missing()
+    except OSError as error:  # a full disk, no more processes: each kernel is compiled when used
+        say_once("alone", f"kernels are compiled one by one: {error.strerror or error}")
+        return False
     for failure in failed or ():
         say_once(failure, f"{failure}: compiled when it is used")
     return failed is not None

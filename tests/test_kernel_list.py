@@ -122,7 +122,20 @@ def test_the_lock_of_a_process_that_is_gone_is_taken(tmp_path):
     assert _compile_all._locked(lock)
     assert not _compile_all._locked(lock)
     os.utime(lock, (0.0, 0.0))
+    _compile_all._report(lock, None, 1, 2)  # its process is at work
+    assert not _compile_all._locked(lock)
+    os.utime(lock, (0.0, 0.0))
     assert _compile_all._locked(lock)
+
+
+def test_a_disk_that_is_full_ends_nothing(monkeypatch, caplog):
+    def full():
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(_kernel_cache, "compile_missing", full)
+    monkeypatch.setattr("maneuver_automaton._cache_files._said", set())
+    assert not _kernel_cache._all_compiled.__wrapped__()
+    assert caplog.messages[-1] == "kernels are compiled one by one: No space left on device"
 
 
 OWN = """

@@ -76,7 +76,7 @@ def plan(
     workspace = workspace_of(problem.obstacles)
     if on_better is not None:
         watch = watch or Watch(gap=-math.inf)
-        watch.shows = functools.partial(_show, problem, watch, on_better)
+        watch.shows = functools.partial(_show, _known_bound_of(problem), watch, on_better)
     return plan_in(
         workspace,
         problem,
@@ -87,16 +87,26 @@ def plan(
     )
 
 
+def _known_bound_of(problem: Problem) -> Callable[[], LowerBound]:
+    """The bound that takes no search, made when it is asked for first."""
+
+    @functools.cache
+    def bound() -> LowerBound:
+        from maneuver_automaton.planning.lower_bound import known_bound
+
+        return known_bound(problem)
+
+    return bound
+
+
 def _show(
-    problem: Problem,
+    known: Callable[[], LowerBound],
     watch: Watch,
     on_better: Callable[[PlanResult], None],
     found: Callable[..., PlanResult],
 ) -> None:
     """Hand a better plan on, with the best bound that there is meanwhile."""
-    from maneuver_automaton.planning.lower_bound import known_bound
-
-    bound = known_bound(problem)
+    bound = known()
     if watch.bound > bound.value:
         bound = LowerBound(value=watch.bound, kind="cells")
     on_better(found(bound=bound))

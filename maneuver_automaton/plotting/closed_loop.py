@@ -33,10 +33,9 @@ from maneuver_automaton.plotting.pages import (
     title_lines,
     write_figure,
 )
+from maneuver_automaton.plotting.plan_page import BETWEEN, LEFT, PLANE, RIGHT
 from maneuver_automaton.receding_horizon import ClosedLoop
 
-LEFT, RIGHT = 0.7, 0.15  # [in] beside the axes on a page
-PLANE, BETWEEN = 0.55, 0.83  # share of the plane in the width, and [in] to what is beside it
 LEAST_PLANE, LEAST_SHARE = 1.0, 0.6  # [in] of the plane in a page of stated height; of the rest
 VALUE, PANEL, GAP = 1.6, 0.95, 0.2  # [in] heights over time, and between them
 LEGEND = 0.42  # [in] above the value

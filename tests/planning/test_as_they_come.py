@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import threading
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -36,11 +35,9 @@ def test_each_is_better_and_audited_and_the_last_is_the_answer(name):
 
 def test_a_loop_that_is_left_ends_the_search():
     threads = threading.active_count()
-    began = time.monotonic()
     for better in plans(load_scenario(ROOM).problem, time_limit=600.0):
         assert better.audit.passed
         break
-    assert time.monotonic() - began < 60.0
     assert threading.active_count() == threads
 
 
