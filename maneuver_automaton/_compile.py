@@ -1,18 +1,58 @@
 """The `kernel` decorators: compile a loop once, and never run a stale one.
 
 Compiled code is kept on disk (`_kernel_folders`); where nothing can be written, kernels work
-without.
+without. numba is imported when the first kernel is called: what calls none does not wait for it.
 """
 
 from __future__ import annotations
 
 import contextlib
+import functools
+import os
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 from maneuver_automaton._kernel_folders import kernel_folder
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])  # the function that is compiled
+
+
+class CompiledLater:
+    """A function that numba takes over when it is called, or compiled into another one.
+
+    Parameters
+    ----------
+    function : callable
+        As Python has it.
+    make : callable
+        Hands it to numba.
+    """
+
+    def __init__(self, function: Callable[..., Any], make: Callable[..., Any]) -> None:
+        functools.update_wrapper(self, function)
+        self._function = function
+        self._make = make
+
+    @functools.cached_property
+    def compiled(self) -> Callable[..., Any]:
+        """What numba makes of it."""
+        _meet_numba()
+        made: Callable[..., Any] = self._make(self._function)
+        return made
+
+    def __call__(self, *args: Any) -> Any:
+        """Run it, compiled."""
+        return self.compiled(*args)
+
+    def __getattr__(self, name: str) -> Any:
+        """What numba knows of it: its signatures, its code."""
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return getattr(self.compiled, name)
+
+    def __reduce__(self) -> str:
+        """It is sent to other processes by its name."""
+        return self._function.__qualname__
 
 
 def kernel(function: Kernel) -> Kernel:
@@ -26,7 +66,7 @@ def kernel(function: Kernel) -> Kernel:
     >>> double(1.5)
     3.0
     """
-    return _cached(function, {})
+    return _later(function, _cached, {})
 
 
 def bare_kernel(function: Kernel) -> Kernel:
@@ -34,7 +74,7 @@ def bare_kernel(function: Kernel) -> Kernel:
 
     A call that takes a dozen arrays otherwise spends most of a microsecond on the counts.
     """
-    return _cached(function, NO_COUNTS)
+    return _later(function, _cached, NO_COUNTS)
 
 
 def inner_kernel(function: Kernel) -> Kernel:
@@ -42,12 +82,12 @@ def inner_kernel(function: Kernel) -> Kernel:
 
     Its code is part of the kernels that call it; without the wrapper it compiles in half the time.
     """
-    return _inner(function, {})
+    return _later(function, _inner, {})
 
 
 def bare_inner_kernel(function: Kernel) -> Kernel:
     """An `inner_kernel` that makes no array, and so counts no references."""
-    return _inner(function, NO_COUNTS)
+    return _later(function, _inner, NO_COUNTS)
 
 
 def inlined_kernel(function: Kernel) -> Kernel:
@@ -56,40 +96,59 @@ def inlined_kernel(function: Kernel) -> Kernel:
     A call hands over every field of every structure it is given, hundreds of words for a scene;
     merged, none is copied. It is typed once, on its own.
     """
-    return _inner(function, {"forceinline": True, **NO_COUNTS})
+    return _later(function, _inner, {"forceinline": True, **NO_COUNTS})
 
 
 NO_COUNTS: dict[str, Any] = {"_nrt": False}
+LINKED = (0, 63), (0, 68)  # the first and the last numba whose insides `_linking` is known to fit
 
 
-def _inner(function: Kernel, options: dict[str, Any]) -> Kernel:
+def _later(function: Kernel, make: Callable[..., Any], options: dict[str, Any]) -> Kernel:
+    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+        return function  # numba would hand it back as well
+    return cast("Kernel", CompiledLater(function, functools.partial(make, options=options)))
+
+
+@functools.cache
+def _meet_numba() -> None:
+    """Tell numba how to type functions that it has not taken over yet, where others call them."""
+    from numba.extending import typeof_impl
+
+    typeof_impl.register(CompiledLater, lambda value, context: typeof_impl(value.compiled, context))
+
+
+def _pipeline(name: str) -> dict[str, Any]:
+    """How `_linking` compiles, for a numba that it was tried with; others compile as they do."""
     import numba
 
-    from maneuver_automaton._linking import LinkedCompiler
+    if not LINKED[0] <= numba.version_info.short <= LINKED[1]:
+        return {}
+    from maneuver_automaton import _linking
 
-    return cast(
-        "Kernel",
-        numba.njit(
-            nogil=True,
-            error_model="numpy",
-            no_cpython_wrapper=True,
-            no_cfunc_wrapper=True,
-            pipeline_class=LinkedCompiler,
-            **options,
-        )(function),
-    )
+    return {"pipeline_class": getattr(_linking, name)}
 
 
-def _cached(function: Kernel, options: dict[str, Any]) -> Kernel:
+def _inner(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     import numba
 
-    from maneuver_automaton._linking import KernelCompiler
+    return numba.njit(
+        nogil=True,
+        error_model="numpy",
+        no_cpython_wrapper=True,
+        no_cfunc_wrapper=True,
+        **_pipeline("LinkedCompiler"),
+        **options,
+    )(function)
+
+
+def _cached(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    import numba
 
     compiled = numba.njit(
         nogil=True,
         error_model="numpy",
         no_cfunc_wrapper=True,
-        pipeline_class=KernelCompiler,
+        **_pipeline("KernelCompiler"),
         **options,
     )(function)
     folder = kernel_folder()
@@ -98,4 +157,4 @@ def _cached(function: Kernel, options: dict[str, Any]) -> Kernel:
 
         with contextlib.suppress(OSError):  # no source file: an interactive session, a doctest
             compiled._cache = KernelCache(function, folder)
-    return cast("Kernel", compiled)
+    return compiled

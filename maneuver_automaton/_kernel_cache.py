@@ -27,7 +27,7 @@ from maneuver_automaton._kernel_folders import shipped_folder
 
 ENDING = ".nbc"
 OTHER = "made for another processor, Python or numba: kernels are compiled anew, once"
-FORMAT = 1  # of the files; counts into their names
+FORMAT = 2  # of the files; counts into their names
 
 
 class KernelCache:

@@ -8,9 +8,10 @@ lowered here; the kernel that Python calls is optimised with all of them, which 
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Iterable
 from typing import Any, ClassVar
 
-from llvmlite.binding import Linkage
+from llvmlite.binding import Linkage, parse_assembly
 from numba import _dynfunc
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
@@ -19,6 +20,8 @@ from numba.core.typed_passes import NativeLowering
 
 CALLED = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.py_object, ctypes.py_object, ctypes.c_void_p)
 
+NAMES_ONLY = "maneuver_automaton.names_only"  # marks a module that defines no more than names
+
 
 class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
     """Code that is only linked into other code."""
@@ -26,6 +29,7 @@ class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
     def finalize(self) -> None:
         """Link what is called, and leave the rest to the kernel that it becomes part of."""
         self._raise_if_finalized()
+        _check_what_is_called(self)
         for library in dict.fromkeys(self._linking_libraries):
             self._reload_init.update(library._reload_init)
             self._final_module.link_in(library._get_module_for_linking(), preserve=True)
@@ -36,12 +40,48 @@ class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
 class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
     """Code that Python calls, with what it calls in its turn."""
 
+    def finalize(self) -> None:
+        """Link what is called."""
+        _check_what_is_called(self)
+        super().finalize()
+
+    def serialize_using_object_code(self) -> tuple[str, str, tuple[bytes, bytes]]:
+        """Its machine code and its names; what it was made from, thrice as long, serves nobody."""
+        name, kind, (machine_code, _) = super().serialize_using_object_code()
+        module = self._get_module_for_linking()
+        names = [  # numba reads them off a module in which they are defined
+            f'@"{NAMES_ONLY}" = common global i64 0',
+            *(
+                f'define void @"{one.name}"() {{ unreachable }}'
+                for one in _defined(module.functions)
+            ),
+            *(
+                f'@"{one.name}" = common global i64 0'
+                for one in _defined(module.global_variables)
+                if one.linkage == Linkage.common
+            ),
+        ]
+        return name, kind, (machine_code, parse_assembly("\n".join(names)).as_bitcode())
+
     def _optimize_final_module(self) -> None:
         """Optimise what is linked in as what nobody else calls."""
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == Linkage.linkonce_odr:
                 function.linkage = "internal"
         super()._optimize_final_module()
+
+
+def _check_what_is_called(caller: JITCodeLibrary) -> None:
+    """Refuse calls of kernels that Python calls: once loaded, there is nothing of them to link."""
+    for library in caller._linking_libraries:
+        module = library._shared_module
+        names_only = module and any(one.name == NAMES_ONLY for one in module.global_variables)
+        if isinstance(library, KernelLibrary) or names_only:
+            raise TypeError(f"{caller.name}: calls {library.name}, which is for Python to call")
+
+
+def _defined(values: Iterable[Any]) -> list[Any]:
+    return [one for one in values if not one.is_declaration and one.linkage != Linkage.internal]
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)

@@ -199,6 +199,86 @@ def test_kernels_of_an_interactive_session_work(tmp_path):
     assert run(code, tmp_path, NUMBA_CACHE_DIR=tmp_path) == 3.0
 
 
+LATER = """
+import json, pickle, sys
+import example_kernels
+from example_kernels import reciprocals
+before = "numba" in sys.modules
+same = pickle.loads(pickle.dumps(reciprocals)) is reciprocals
+import numpy as np
+print(json.dumps({
+    "numba": [before, "numba" in sys.modules, reciprocals(np.array([4.0])).tolist() == [0.25]
+              and "numba" in sys.modules],
+    "same": same, "name": reciprocals.__name__, "signatures": len(reciprocals.signatures),
+}))
+"""
+
+
+def test_numba_is_imported_when_a_kernel_is_called(example):
+    assert run(LATER, example, NUMBA_CACHE_DIR=example / "cache") == {
+        "numba": [False, False, True],
+        "same": True,
+        "name": "reciprocals",
+        "signatures": 1,
+    }
+
+
+UNKNOWN_NUMBA = """
+from maneuver_automaton import _compile
+_compile.LINKED = (0, 1), (0, 2)
+"""
+
+
+def test_a_numba_with_unknown_insides_compiles_as_it_does(example):
+    first = run(UNKNOWN_NUMBA + CALL, example, NUMBA_CACHE_DIR=example / "cache")
+    again = run(UNKNOWN_NUMBA + CALL, example, NUMBA_CACHE_DIR=example / "cache")
+    assert first["result"] == again["result"] == ["0.25", "inf"]
+    assert (first["hits"], again["hits"]) == (0, 1)
+
+
+KERNEL_IN_KERNEL = """
+
+
+@kernel
+def twice(x):
+    return reciprocals(reciprocals(x))
+
+
+@inner_kernel
+def inside(x):
+    return reciprocals(x)
+
+
+@kernel
+def around(x):
+    return inside(x)
+"""
+
+REFUSED = """
+import json
+import numpy as np
+import example_kernels
+example_kernels.reciprocals(np.array([4.0]))
+said = []
+for one in (example_kernels.twice, example_kernels.around):
+    try:
+        one(np.array([4.0]))
+    except TypeError as error:
+        said.append(str(error))
+print(json.dumps(said))
+"""
+
+
+def test_a_kernel_that_calls_a_kernel_is_refused_compiled_now_or_before(example):
+    with (example / "example_kernels.py").open("a") as file:
+        file.write(KERNEL_IN_KERNEL)
+    for _ in range(2):
+        assert run(REFUSED, example, NUMBA_CACHE_DIR=example / "cache") == [
+            "twice: calls reciprocals, which is for Python to call",
+            "inside: calls reciprocals, which is for Python to call",
+        ]
+
+
 def test_plans_are_the_same_without_a_compiler_and_without_a_cache(tmp_path):
     (tmp_path / "file").write_text("in the way")
     words = run(PLAN, tmp_path, NUMBA_DISABLE_JIT=1, NUMBA_CACHE_DIR=tmp_path / "file")

@@ -133,7 +133,7 @@ def limits_state(scene: PoseArrays, x: float, y: float, half_x: float, half_y: f
     return state
 
 
-@bare_kernel
+@bare_inner_kernel
 def box_state(
     scene: PoseArrays,
     x: float,

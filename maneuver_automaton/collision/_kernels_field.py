@@ -68,7 +68,7 @@ def write_pieces(
                 distance[j, i] = min(distance[j, i], value)
 
 
-@kernel
+@inner_kernel
 def rows_to(blocked: NDArray[np.bool_], wanted: bool) -> NDArray[np.int32]:
     """Rows (rows, columns) from each cell to the nearest of its column that is as `wanted`."""
     n_rows, n_columns = blocked.shape

@@ -1,63 +1,129 @@
 """Pictures: draw on the axes given and return the artists, or write a whole figure to a file."""
 
-from maneuver_automaton.plotting.alternatives import draw_alternatives as draw_alternatives
-from maneuver_automaton.plotting.alternatives_figure import (
-    save_alternatives_figure as save_alternatives_figure,
-)
-from maneuver_automaton.plotting.animation import save_plan_animation as save_plan_animation
-from maneuver_automaton.plotting.automata import draw_automaton as draw_automaton
-from maneuver_automaton.plotting.automata import draw_motions as draw_motions
-from maneuver_automaton.plotting.automata import save_automaton_figure as save_automaton_figure
-from maneuver_automaton.plotting.closed_loop import (
-    save_closed_loop_figure as save_closed_loop_figure,
-)
-from maneuver_automaton.plotting.closed_loop_animation import (
-    save_closed_loop_animation as save_closed_loop_animation,
-)
-from maneuver_automaton.plotting.closed_loop_plane import draw_closed_loop as draw_closed_loop
-from maneuver_automaton.plotting.closed_loop_time import draw_solve_times as draw_solve_times
-from maneuver_automaton.plotting.closed_loop_time import draw_value as draw_value
-from maneuver_automaton.plotting.colors import trim_colors as trim_colors
-from maneuver_automaton.plotting.controls import draw_altitude as draw_altitude
-from maneuver_automaton.plotting.controls import draw_controls as draw_controls
-from maneuver_automaton.plotting.effort import draw_efforts as draw_efforts
-from maneuver_automaton.plotting.effort import draw_node_efforts as draw_node_efforts
-from maneuver_automaton.plotting.effort import save_retiming_figure as save_retiming_figure
-from maneuver_automaton.plotting.effort import (
-    save_uniform_effort_figure as save_uniform_effort_figure,
-)
-from maneuver_automaton.plotting.feasible import draw_feasible_slice as draw_feasible_slice
-from maneuver_automaton.plotting.feasible import save_feasible_figure as save_feasible_figure
-from maneuver_automaton.plotting.footprint import footprint_polygons as footprint_polygons
-from maneuver_automaton.plotting.labels import control_labels as control_labels
-from maneuver_automaton.plotting.lessons import figure_shift as figure_shift
-from maneuver_automaton.plotting.lessons import figure_symmetry as figure_symmetry
-from maneuver_automaton.plotting.look import Look as Look
-from maneuver_automaton.plotting.maneuvers import draw_maneuvers as draw_maneuvers
-from maneuver_automaton.plotting.maneuvers import save_maneuvers_figure as save_maneuvers_figure
-from maneuver_automaton.plotting.motions import track_colors as track_colors
-from maneuver_automaton.plotting.nodes import draw_nodes as draw_nodes
-from maneuver_automaton.plotting.obstacles import draw_obstacles as draw_obstacles
-from maneuver_automaton.plotting.paths import draw_plan as draw_plan
-from maneuver_automaton.plotting.plan_figures import save_plan_figure as save_plan_figure
-from maneuver_automaton.plotting.plan_figures import save_plan_file_figure as save_plan_file_figure
-from maneuver_automaton.plotting.player import Player as Player
-from maneuver_automaton.plotting.player import player_of as player_of
-from maneuver_automaton.plotting.player import player_of_file as player_of_file
-from maneuver_automaton.plotting.progress import draw_progress as draw_progress
-from maneuver_automaton.plotting.progress import save_progress_figure as save_progress_figure
-from maneuver_automaton.plotting.roads import draw_road as draw_road
-from maneuver_automaton.plotting.roads import save_road_animation as save_road_animation
-from maneuver_automaton.plotting.roads import save_road_figure as save_road_figure
-from maneuver_automaton.plotting.space import SpaceArtists as SpaceArtists
-from maneuver_automaton.plotting.space import draw_space as draw_space
-from maneuver_automaton.plotting.space import flies_among_heights as flies_among_heights
-from maneuver_automaton.plotting.space import save_space_figure as save_space_figure
-from maneuver_automaton.plotting.stability import CertificateCurve as CertificateCurve
-from maneuver_automaton.plotting.stability import DrivenLoop as DrivenLoop
-from maneuver_automaton.plotting.stability import draw_distances as draw_distances
-from maneuver_automaton.plotting.stability import draw_growth as draw_growth
-from maneuver_automaton.plotting.stability import draw_indices as draw_indices
-from maneuver_automaton.plotting.stability import draw_loops as draw_loops
-from maneuver_automaton.plotting.stability import save_stability_figure as save_stability_figure
-from maneuver_automaton.plotting.turnpike import save_turnpike_figure as save_turnpike_figure
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from maneuver_automaton._lazy import lazily
+
+if TYPE_CHECKING:
+    from maneuver_automaton.plotting.alternatives import draw_alternatives as draw_alternatives
+    from maneuver_automaton.plotting.alternatives_figure import (
+        save_alternatives_figure as save_alternatives_figure,
+    )
+    from maneuver_automaton.plotting.animation import save_plan_animation as save_plan_animation
+    from maneuver_automaton.plotting.automata import draw_automaton as draw_automaton
+    from maneuver_automaton.plotting.automata import draw_motions as draw_motions
+    from maneuver_automaton.plotting.automata import save_automaton_figure as save_automaton_figure
+    from maneuver_automaton.plotting.closed_loop import (
+        save_closed_loop_figure as save_closed_loop_figure,
+    )
+    from maneuver_automaton.plotting.closed_loop_animation import (
+        save_closed_loop_animation as save_closed_loop_animation,
+    )
+    from maneuver_automaton.plotting.closed_loop_plane import draw_closed_loop as draw_closed_loop
+    from maneuver_automaton.plotting.closed_loop_time import draw_solve_times as draw_solve_times
+    from maneuver_automaton.plotting.closed_loop_time import draw_value as draw_value
+    from maneuver_automaton.plotting.colors import trim_colors as trim_colors
+    from maneuver_automaton.plotting.controls import draw_altitude as draw_altitude
+    from maneuver_automaton.plotting.controls import draw_controls as draw_controls
+    from maneuver_automaton.plotting.effort import draw_efforts as draw_efforts
+    from maneuver_automaton.plotting.effort import draw_node_efforts as draw_node_efforts
+    from maneuver_automaton.plotting.effort import save_retiming_figure as save_retiming_figure
+    from maneuver_automaton.plotting.effort import (
+        save_uniform_effort_figure as save_uniform_effort_figure,
+    )
+    from maneuver_automaton.plotting.feasible import draw_feasible_slice as draw_feasible_slice
+    from maneuver_automaton.plotting.feasible import save_feasible_figure as save_feasible_figure
+    from maneuver_automaton.plotting.footprint import footprint_polygons as footprint_polygons
+    from maneuver_automaton.plotting.labels import control_labels as control_labels
+    from maneuver_automaton.plotting.lessons import figure_shift as figure_shift
+    from maneuver_automaton.plotting.lessons import figure_symmetry as figure_symmetry
+    from maneuver_automaton.plotting.look import Look as Look
+    from maneuver_automaton.plotting.maneuvers import draw_maneuvers as draw_maneuvers
+    from maneuver_automaton.plotting.maneuvers import save_maneuvers_figure as save_maneuvers_figure
+    from maneuver_automaton.plotting.motions import track_colors as track_colors
+    from maneuver_automaton.plotting.nodes import draw_nodes as draw_nodes
+    from maneuver_automaton.plotting.obstacles import draw_obstacles as draw_obstacles
+    from maneuver_automaton.plotting.paths import draw_plan as draw_plan
+    from maneuver_automaton.plotting.plan_figures import save_plan_figure as save_plan_figure
+    from maneuver_automaton.plotting.plan_figures import (
+        save_plan_file_figure as save_plan_file_figure,
+    )
+    from maneuver_automaton.plotting.player import Player as Player
+    from maneuver_automaton.plotting.player import player_of as player_of
+    from maneuver_automaton.plotting.player import player_of_file as player_of_file
+    from maneuver_automaton.plotting.progress import draw_progress as draw_progress
+    from maneuver_automaton.plotting.progress import save_progress_figure as save_progress_figure
+    from maneuver_automaton.plotting.roads import draw_road as draw_road
+    from maneuver_automaton.plotting.roads import save_road_animation as save_road_animation
+    from maneuver_automaton.plotting.roads import save_road_figure as save_road_figure
+    from maneuver_automaton.plotting.space import SpaceArtists as SpaceArtists
+    from maneuver_automaton.plotting.space import draw_space as draw_space
+    from maneuver_automaton.plotting.space import flies_among_heights as flies_among_heights
+    from maneuver_automaton.plotting.space import save_space_figure as save_space_figure
+    from maneuver_automaton.plotting.stability import CertificateCurve as CertificateCurve
+    from maneuver_automaton.plotting.stability import DrivenLoop as DrivenLoop
+    from maneuver_automaton.plotting.stability import draw_distances as draw_distances
+    from maneuver_automaton.plotting.stability import draw_growth as draw_growth
+    from maneuver_automaton.plotting.stability import draw_indices as draw_indices
+    from maneuver_automaton.plotting.stability import draw_loops as draw_loops
+    from maneuver_automaton.plotting.stability import save_stability_figure as save_stability_figure
+    from maneuver_automaton.plotting.turnpike import save_turnpike_figure as save_turnpike_figure
+
+_HOMES = {
+    "draw_alternatives": "alternatives",
+    "save_alternatives_figure": "alternatives_figure",
+    "save_plan_animation": "animation",
+    "draw_automaton": "automata",
+    "draw_motions": "automata",
+    "save_automaton_figure": "automata",
+    "save_closed_loop_figure": "closed_loop",
+    "save_closed_loop_animation": "closed_loop_animation",
+    "draw_closed_loop": "closed_loop_plane",
+    "draw_solve_times": "closed_loop_time",
+    "draw_value": "closed_loop_time",
+    "trim_colors": "colors",
+    "draw_altitude": "controls",
+    "draw_controls": "controls",
+    "draw_efforts": "effort",
+    "draw_node_efforts": "effort",
+    "save_retiming_figure": "effort",
+    "save_uniform_effort_figure": "effort",
+    "draw_feasible_slice": "feasible",
+    "save_feasible_figure": "feasible",
+    "footprint_polygons": "footprint",
+    "control_labels": "labels",
+    "figure_shift": "lessons",
+    "figure_symmetry": "lessons",
+    "Look": "look",
+    "draw_maneuvers": "maneuvers",
+    "save_maneuvers_figure": "maneuvers",
+    "track_colors": "motions",
+    "draw_nodes": "nodes",
+    "draw_obstacles": "obstacles",
+    "draw_plan": "paths",
+    "save_plan_figure": "plan_figures",
+    "save_plan_file_figure": "plan_figures",
+    "Player": "player",
+    "player_of": "player",
+    "player_of_file": "player",
+    "draw_progress": "progress",
+    "save_progress_figure": "progress",
+    "draw_road": "roads",
+    "save_road_animation": "roads",
+    "save_road_figure": "roads",
+    "SpaceArtists": "space",
+    "draw_space": "space",
+    "flies_among_heights": "space",
+    "save_space_figure": "space",
+    "CertificateCurve": "stability",
+    "DrivenLoop": "stability",
+    "draw_distances": "stability",
+    "draw_growth": "stability",
+    "draw_indices": "stability",
+    "draw_loops": "stability",
+    "save_stability_figure": "stability",
+    "save_turnpike_figure": "turnpike",
+}
+__getattr__, __dir__ = lazily(__name__, _HOMES)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import as_array
-from maneuver_automaton.bounds import Narrowest
 from maneuver_automaton.plotting.colors import INK, SEQUENCE
 from maneuver_automaton.plotting.style import SMALL_PT
+
+if TYPE_CHECKING:
+    from maneuver_automaton.bounds import Narrowest
 
 REACHED = (0.82, 0.89, 0.95)  # not through: squares of several sizes lie upon each other
 RING_PT = 16.0  # size of the ring around the passage
@@ -38,6 +42,7 @@ def draw_cut_off(
     --------
     >>> from matplotlib.figure import Figure
     >>> square = [[[0, 0], [1, 0], [1, 1], [0, 1]]]
+    >>> from maneuver_automaton.bounds import Narrowest
     >>> passage = Narrowest(place=(1.0, 0.5), missing=0.1)
     >>> len(draw_cut_off(Figure().add_subplot(), square, narrowest=passage).get_paths())
     1

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -13,7 +14,6 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.bounds import Narrowest
 from maneuver_automaton.plotting.colors import Color
 from maneuver_automaton.plotting.controls import (
     draw_track_altitude,
@@ -44,6 +44,9 @@ from maneuver_automaton.plotting.scene import (
     view_box,
 )
 from maneuver_automaton.plotting.track import Track
+
+if TYPE_CHECKING:
+    from maneuver_automaton.bounds import Narrowest
 
 LEFT, RIGHT = 0.7, 0.15  # [in] beside the axes on a page
 PLANE, BETWEEN = 0.55, 0.83  # share of the plane in the width, and [in] to what is beside it

@@ -77,6 +77,14 @@ def roll_out(
     tables: IntervalTables, pose: Array, sequence: IntArray, poses: Array, costs: Array
 ) -> float:
     """Fill `poses` (n + 1, 3) and `costs` (n,) of a sequence (n,) of trims; the total cost."""
+    return follow(tables, pose, sequence, poses, costs)
+
+
+@inner_kernel
+def follow(
+    tables: IntervalTables, pose: Array, sequence: IntArray, poses: Array, costs: Array
+) -> float:
+    """What `roll_out` does, for other kernels."""
     total = 0.0
     poses[0] = pose
     for k in range(sequence.size):
@@ -163,7 +171,7 @@ def improve(tables: IntervalTables, pose: Array, sequence: IntArray, gain: float
     n = sequence.size
     # Poses between the intervals, and the cost of each: `poses[i]` is up to date when i is changed.
     poses, costs = np.empty((n + 1, 3)), np.empty(n)
-    total = roll_out(tables, pose, sequence, poses, costs)
+    total = follow(tables, pose, sequence, poses, costs)
     # It ends: each change lowers the cost by more than `gain`, and sequences are finitely many.
     changed = True
     while changed:
@@ -182,7 +190,7 @@ def improve(tables: IntervalTables, pose: Array, sequence: IntArray, gain: float
             c, s = math.cos(heading), math.sin(heading)
             rest -= interval_cost(tables, sequence[i], x, y, heading, c, s)
             poses[i + 1] = next_pose(tables, sequence[i], x, y, heading)
-        total = roll_out(tables, pose, sequence, poses, costs)
+        total = follow(tables, pose, sequence, poses, costs)
     return total
 
 

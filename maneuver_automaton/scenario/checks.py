@@ -109,7 +109,7 @@ Interval = Annotated[
 class Part(BaseModel):
     """A mapping of the scenario file: its keys are those of the class, no others."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
     one_of: ClassVar[tuple[str, ...]] = ()  # exactly one of these keys
     goes_with: ClassVar[Mapping[str, tuple[str, ...]]] = {}  # a key, and those it needs one of
