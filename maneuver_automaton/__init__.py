@@ -51,9 +51,9 @@ if TYPE_CHECKING:
     from maneuver_automaton.planning import Planner as Planner
     from maneuver_automaton.planning import PlanResult as PlanResult
     from maneuver_automaton.planning import PlanStatus as PlanStatus
-    from maneuver_automaton.planning import plan as plan
     from maneuver_automaton.planning import plans as plans
     from maneuver_automaton.planning.lower_bound import lower_bound as lower_bound
+    from maneuver_automaton.planning.plan import plan as plan
     from maneuver_automaton.primitives import Maneuver as Maneuver
     from maneuver_automaton.primitives import Trajectory as Trajectory
     from maneuver_automaton.primitives import Trim as Trim
