@@ -13,8 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import dijkstra
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.bounds import _kernels_certificate
@@ -330,6 +328,9 @@ def _nodes_of(cells: Cells, inside: list[Index], *, exact: Index | None) -> NDAr
 
 def _in_the_plane(cells: Cells, fixed: NDArray[np.bool_], gears: int) -> Array:
     """Distances in the plane to the goal (gears, nodes) [m], as a first guess."""
+    from scipy.sparse import coo_matrix  # not where kernels are compiled
+    from scipy.sparse.csgraph import dijkstra
+
     passable = cells.active.any(axis=2)
     n_i, n_j, _ = cells.nodes
     number = np.arange(n_i * n_j).reshape(n_i, n_j)

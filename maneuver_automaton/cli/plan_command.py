@@ -17,7 +17,7 @@ from maneuver_automaton.cli.folder_runs import Row, check_address, run_folder
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, scenario_of
 from maneuver_automaton.cli.looks import LookOptions
-from maneuver_automaton.cli.progress import waiting
+from maneuver_automaton.cli.progress import has_terminal, waiting
 from maneuver_automaton.errors import InvalidScenario
 
 if TYPE_CHECKING:
@@ -64,10 +64,10 @@ def plan_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> int
         return NO_PLAN if found.plan is None else FOUND
     scenario = scenario_of(path, parts)
     limit = settings.time_limit or scenario.time_limit_s
-    watch = None if settings.gap is None else Watch(gap=settings.gap)
     said = f"planning, at most {limit:g} s"
-    with waiting(said, quiet=settings.quiet, more=lambda: _so_far(watch)):
-        result = _plan(scenario, out, settings, watch)
+    shown = None if settings.quiet or not has_terminal() else SoFar.of_gap(settings.gap)
+    with waiting(said, quiet=settings.quiet, more=lambda: shown.text if shown else ""):
+        result = _plan(scenario, out, settings, shown)
     if result.plan is None:
         complain(f"{path}: {result.status.value}: {result.reason}")
         return NO_PLAN
@@ -107,16 +107,38 @@ def plan_folder(
     )
 
 
-def _so_far(watch: Watch | None) -> str:
-    """Cost, bound and gap while a plan is being improved."""
-    if watch is None or watch.cost == math.inf:
-        return ""
-    share = max(0.0, 1.0 - watch.bound / watch.cost) if watch.cost > 0.0 else 0.0
-    return f"cost {watch.cost:.6g}, at least {watch.bound:.6g}, gap {100.0 * share:.2g} %"
+@dataclass(slots=True, kw_only=True)
+class SoFar:
+    """The best plan while it is being improved, for a line on the terminal."""
+
+    watch: Watch
+    best: PlanResult | None = None
+
+    @classmethod
+    def of_gap(cls, gap: float | None) -> SoFar:
+        """Nothing yet of a search that ends with a `gap`, if one is stated."""
+        return cls(watch=Watch(gap=-math.inf if gap is None else gap))
+
+    def better(self, result: PlanResult) -> None:
+        """Take a plan that is better than the one before, and passed all checks."""
+        self.best = result
+
+    @property
+    def text(self) -> str:
+        """Cost, bound, gap and clearance."""
+        best = self.best
+        if best is None or best.cost is None:
+            return ""
+        bound = max(self.watch.bound, best.lower_bound or 0.0)
+        share = max(0.0, 1.0 - bound / best.cost) if best.cost > 0.0 else 0.0
+        parts = [f"cost {best.cost:.6g}, at least {bound:.6g}, gap {100.0 * share:.2g} %"]
+        if best.clearance_m is not None:
+            parts.append(f"clearance {best.clearance_m:.3g} m")
+        return ", ".join(parts)
 
 
 def _plan(
-    scenario: Scenario, out: Path, settings: Settings, watch: Watch | None = None
+    scenario: Scenario, out: Path, settings: Settings, shown: SoFar | None = None
 ) -> PlanResult:
     """Plan and write the files."""
     from maneuver_automaton import planning
@@ -129,7 +151,8 @@ def _plan(
                 time_limit=settings.time_limit or scenario.time_limit_s,
                 alternatives=settings.alternatives,
                 gap=settings.gap,
-                watch=watch,
+                watch=shown.watch if shown else None,
+                on_better=shown.better if shown else None,
             )
     except KeyboardInterrupt:
         if not stopped():

@@ -16,6 +16,11 @@ class Advance(Protocol):
         ...
 
 
+def has_terminal() -> bool:
+    """Whether somebody may be watching."""
+    return sys.stderr.isatty()
+
+
 def _nothing(n: int = 1) -> None:
     """Where there is no terminal."""
 
@@ -23,7 +28,7 @@ def _nothing(n: int = 1) -> None:
 @contextlib.contextmanager
 def progress_bar(what: str, total: int, *, quiet: bool) -> Iterator[Advance]:
     """A bar for `total` pieces of work; yields what to call after each."""
-    if quiet or not sys.stderr.isatty():
+    if quiet or not has_terminal():
         yield _nothing
         return
     from rich.console import Console
@@ -44,7 +49,7 @@ def waiting(what: str, *, quiet: bool, more: Callable[[], str] = lambda: "") -> 
 
     What `more` says is shown beside it, and asked for again and again.
     """
-    if quiet or not sys.stderr.isatty():
+    if quiet or not has_terminal():
         yield
         return
     from rich.console import Console

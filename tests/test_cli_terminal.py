@@ -1,0 +1,65 @@
+"""What a terminal shows while a plan is being improved; elsewhere there is silence."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pty = pytest.importorskip("pty")  # a terminal to write to, where the system has them
+
+SCENARIOS = Path(__file__).parent.parent / "scenarios"
+SHOWN = re.compile(r"cost ([\d.]+), at least ([\d.]+), gap ([\d.]+) %, clearance ([\d.]+) m")
+
+
+def on_a_terminal(*arguments, cwd):
+    """What the command writes to a terminal as wide as a line needs to be."""
+    reads, writes = pty.openpty()
+    command = [sys.executable, "-m", "maneuver_automaton", *map(str, arguments)]
+    process = subprocess.Popen(
+        command,
+        cwd=cwd,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=writes,
+        env={**os.environ, "COLUMNS": "140", "TERM": "xterm"},
+    )
+    os.close(writes)
+    seen = b""
+    while True:
+        try:
+            piece = os.read(reads, 65536)
+        except OSError:  # the other end is closed
+            break
+        if not piece:
+            break
+        seen += piece
+    os.close(reads)
+    assert process.wait() == 0
+    return re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", seen.decode())
+
+
+@pytest.mark.parametrize("more", [(), ("--gap", "0.001")])
+def test_cost_bound_gap_and_clearance_are_shown_in_place(tmp_path, more):
+    scenario = SCENARIOS / "cluttered_room.yaml"
+    text = on_a_terminal(
+        "plan", scenario, "--no-plot", "--time-limit", 2, *more, cwd=tmp_path
+    )  # fmt: skip
+    shown = [tuple(map(float, found)) for found in SHOWN.findall(text)]
+    assert shown
+    costs = [cost for cost, *_ in shown]
+    assert costs == sorted(costs, reverse=True)
+    for cost, bound, gap, clearance in shown:
+        assert bound <= cost
+        assert gap == pytest.approx(100.0 * (1.0 - bound / cost), abs=0.6)
+        assert clearance >= 0.0
+    assert "\n" not in text.strip()  # one line, written again and again
+
+
+def test_quiet_is_quiet_on_a_terminal_too(tmp_path):
+    scenario = SCENARIOS / "parking.yaml"
+    assert on_a_terminal("plan", scenario, "--no-plot", "--quiet", cwd=tmp_path) == ""
