@@ -152,6 +152,9 @@ def draw(file: Path, out: Path, *, model_text: str | None = None) -> int:
     path = target(out, "automaton.png")
     make_folder(path.parent)
     from maneuver_automaton import plotting
+    from maneuver_automaton.cli.pictures import skip_documentation
+
+    skip_documentation()
 
     try:
         plotting.save_automaton_figure(automaton, path)

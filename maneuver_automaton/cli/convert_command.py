@@ -162,6 +162,9 @@ def plot(
     path = _picture(file, out, "animation" if animate else "page" if html else "picture")
     make_folder(path.parent)
     from maneuver_automaton import plotting
+    from maneuver_automaton.cli.pictures import skip_documentation
+
+    skip_documentation()
     from maneuver_automaton.formats.plan_json import load_plan
 
     try:

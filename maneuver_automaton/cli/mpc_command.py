@@ -271,6 +271,9 @@ def _write(loop: ClosedLoop, name: str, out: Path, settings: Settings) -> None:
     if stopped() or not (settings.plot or settings.animate or settings.html):
         return
     from maneuver_automaton import plotting
+    from maneuver_automaton.cli.pictures import skip_documentation
+
+    skip_documentation()
 
     if settings.plot:
         look = settings.look.look(name)

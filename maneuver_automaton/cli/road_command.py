@@ -168,6 +168,9 @@ def _draw(
     if stopped() or not (settings.plot or settings.animate):
         return
     from maneuver_automaton import plotting
+    from maneuver_automaton.cli.pictures import skip_documentation
+
+    skip_documentation()
 
     if settings.plot:
         plotting.save_road_figure(scene, vehicle, plan, file.with_suffix(".png"))
