@@ -188,15 +188,13 @@ class TestStatistics:
         assert rows[1]["cost"] == log("one")["cost"]
         assert rows[1]["steps"] == len(log("one")["steps"]) - 1
 
-    @pytest.mark.skipif(
-        importlib.util.find_spec("distributed") is not None, reason="Dask is installed"
-    )
     @pytest.mark.parametrize("address", ["local", "tcp://host:8786"])
-    def test_without_dask(self, folder, capsys, address):
+    def test_without_dask(self, folder, monkeypatch, capsys, address):
+        monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
         assert run(["mpc", "x.yaml", "--seeds", "2", "--dask", address, *QUICK]) == 2
         assert capsys.readouterr().err == (
             f"x.yaml: receding_horizon: scheduler: got '{address}', but Dask is not installed; "
-            "need `pip install distributed`\n"
+            "need `pip install 'maneuver-automaton[distributed]'`\n"
         )
 
 
