@@ -19,13 +19,18 @@ _kernels = _kept / "kernels"
 os.environ.setdefault("NUMBA_CACHE_DIR", str(_kernels))
 os.environ.setdefault("HYPOTHESIS_STORAGE_DIRECTORY", str(_kept / "hypothesis"))
 
-settings.register_profile(
-    "maneuver_automaton",
-    deadline=None,
-    derandomize=bool(os.environ.get("CI")),
-    suppress_health_check=[HealthCheck.too_slow],
-)
-settings.load_profile("maneuver_automaton")
+for name, examples in (("few", 25), ("many", 100)):
+    settings.register_profile(
+        name,
+        max_examples=examples,
+        deadline=None,
+        derandomize=bool(os.environ.get("CI")),
+        suppress_health_check=[HealthCheck.too_slow],
+    )
+
+
+def _takes_long(config: pytest.Config) -> bool:
+    return "not slow" not in config.option.markexpr
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
@@ -35,7 +40,15 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Drop the kernels that were compiled from other sources."""
+    """Choose how often laws are tried, and drop the kernels compiled from other sources."""
+    settings.load_profile("many" if _takes_long(config) else "few")
     for folder in _kernels.glob(f"{KERNELS}*"):
         if folder.name != f"{KERNELS}{source_hash()}":
             shutil.rmtree(folder, ignore_errors=True)
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Let `-m slow` try the laws again, with more numbers."""
+    for item in items:
+        if _takes_long(config) and hasattr(getattr(item, "obj", None), "hypothesis"):
+            item.add_marker("slow")

@@ -210,7 +210,8 @@ PRICES = [
 @pytest.mark.parametrize(
     ("method", "prices"),
     [
-        *(("auto", prices) for prices in PRICES),
+        pytest.param("auto", PRICES[0]),
+        *(pytest.param("auto", prices, marks=pytest.mark.slow) for prices in PRICES[1:]),
         pytest.param(
             "insertion",
             PRICES[0],

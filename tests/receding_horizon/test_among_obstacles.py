@@ -19,6 +19,7 @@ from maneuver_automaton.receding_horizon import (
     RecedingHorizon,
     simulate,
 )
+from tests.quickly import quick_are
 from tests.receding_horizon.loops import off_goal, totals
 from tests.receding_horizon.scenes import among, clearances
 from tests.scenes import differential_robot, parallel_slot
@@ -39,7 +40,7 @@ def seeded(seed: int) -> Problem:
             return replace(problem, start=start)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", quick_are(range(2, 5), range(12)))
 def test_undisturbed_all_that_is_promised_is_kept(seed):
     loop = simulate(seeded(seed), step=1.0)
     assert loop.reached
@@ -58,7 +59,7 @@ def test_undisturbed_all_that_is_promised_is_kept(seed):
     assert len(loop.steps) <= loop.steps_bound
 
 
-@pytest.mark.parametrize("seed", [1, 2, 4])
+@pytest.mark.parametrize("seed", quick_are([4], [1, 2, 4]))
 def test_a_margin_is_kept_and_what_is_promised_too(seed):
     problem = replace(seeded(seed), margin=0.05)
     loop = simulate(problem, step=1.0)
@@ -67,7 +68,7 @@ def test_a_margin_is_kept_and_what_is_promised_too(seed):
     assert clearances(loop).min() >= 0.05
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", quick_are([4], range(6)))
 def test_with_noise_it_arrives_free_and_says_what_the_noise_broke(seed):
     problem = replace(
         seeded(seed), goals=(Goal(pose=[6, 0, 0], tolerance_m=0.1, tolerance_rad=0.1),)
@@ -157,7 +158,7 @@ def test_held_in_the_goal_beside_a_wall():
     assert list(loop.collisions) == []
 
 
-@pytest.mark.parametrize("seed", [0, 5])
+@pytest.mark.parametrize("seed", quick_are([0], [0, 5]))
 def test_a_moved_scene_has_the_moved_loop(seed):
     problem = replace(seeded(seed), bounds=Bounds())
     move = SE2(np.array([30.0, -7.0, 2.2]))

@@ -19,6 +19,7 @@ from maneuver_automaton.receding_horizon import (
     RecedingHorizon,
     simulate,
 )
+from tests.quickly import quick_are
 from tests.receding_horizon.loops import assert_same_steps, totals
 from tests.receding_horizon.scenes import (
     among,
@@ -104,7 +105,7 @@ class TestWaitingAndEvading:
         assert_free(loop)
         assert loop.times[-1] > 12.0
 
-    @pytest.mark.parametrize("seed", range(4))
+    @pytest.mark.parametrize("seed", quick_are([0], range(4)))
     def test_a_scene_of_a_dozen(self, seed):
         loop = simulate(moving_scene(seed), step=1.0, time_limit=2.0)
         assert loop.reached

@@ -189,6 +189,7 @@ def test_nothing_is_left_behind_when_writing_fails(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_two_processes_at_once_keep_one_whole_table(tmp_path):
     order = (
         "from tests.search.test_cost_to_go import kept_in; from pathlib import Path; import sys;"

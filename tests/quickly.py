@@ -1,0 +1,13 @@
+"""Which values of a test are tried in the default run; the others are tried with `-m slow`."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from typing import Any
+
+import pytest
+
+
+def quick_are(quick: Collection[Any], values: Iterable[Any]) -> list[Any]:
+    """The values as parameters of a test, all but `quick` of them marked as slow."""
+    return [pytest.param(one, marks=() if one in quick else pytest.mark.slow) for one in values]
