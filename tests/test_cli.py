@@ -162,6 +162,7 @@ def test_start_equal_to_goal_for_a_fixed_time_is_rest(folder):
     assert [primitive["name"] for primitive in document["primitives"]] == ["rest"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["car_slot", "grid_1681", "parking_min_time", "several_goals", "warehouse"]
 )
@@ -368,6 +369,7 @@ class TestCheck:
             assert what in printed
         assert "NO" not in printed
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         "text", [AHEAD_ONLY, SCENARIO + "bounds_m: {x: [0.5, 5]}\n"], ids=["ahead", "bounds"]
     )
@@ -376,6 +378,7 @@ class TestCheck:
         assert run(["check", "x.yaml"]) == 1
         assert "NO" in capsys.readouterr().out
 
+    @pytest.mark.slow
     def test_it_says_what_is_known_of_a_goal_without_a_plan(self, folder, capsys):
         """A narrow slot, and no time to look for a plan: nothing is proven either way."""
         Path("x.yaml").write_text(
@@ -388,6 +391,7 @@ class TestCheck:
         assert "not known: no plan within 1e-06 s" in printed
         assert "which does not prove that there is none" in printed
 
+    @pytest.mark.slow
     def test_a_library_of_1681_trims(self, folder):
         assert run(["check", str(SCENARIOS / "grid_1681.yaml")]) == 0
 
@@ -409,6 +413,7 @@ def test_plot_draws_from_the_file_alone(folder):
     assert Path("a/plan.gif").exists()
 
 
+@pytest.mark.slow
 def test_an_animation_on_demand(folder):
     assert run(["plan", "x.yaml", "--quiet", "--animate", "--no-plot"]) == 0
     assert sorted(path.name for path in Path("out").iterdir()) == ["plan.gif", "plan.json"]

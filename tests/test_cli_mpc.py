@@ -132,6 +132,7 @@ class TestAmongObstacles:
         assert f"least clearance:{log()['min_clearance_m']:.4g} m" in printed.replace(": ", ":")
         assert "harmful" not in printed
 
+    @pytest.mark.slow
     def test_over_seeds_it_counts_as_much(self, folder, capsys):
         Path("x.yaml").write_text(HIT)
         assert run(["mpc", "x.yaml", *SEEDS, "--no-plot"]) == 1
@@ -349,6 +350,7 @@ def test_a_tiny_budget_still_arrives(folder):
     assert kinds <= {"time budget"}
 
 
+@pytest.mark.slow
 def test_an_animation_on_demand(folder):
     Path("x.yaml").write_text(LOOP.replace("step_s: 0.5", "step_s: 2.0"))
     assert run(["mpc", "x.yaml", "--quiet", "--no-plot", "--animate"]) == 0

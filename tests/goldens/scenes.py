@@ -333,7 +333,7 @@ def _with_limits_in_free_space() -> Iterator[Scene]:
             of(free, rover, k, 3.0, horizon=Horizon(max_trims=4, min_coast=0.2 * (k + 1)))
             for k in range(3)
         ],
-        quick=1,
+        quick=0,
     )
     yield from numbered(
         "max_time",
@@ -400,7 +400,7 @@ def _with_limits_in_free_space() -> Iterator[Scene]:
         ]
         + [of(free, shepp, 0, 5.0, search=SearchSettings(method="words"),
               horizon=Horizon(max_trims=4))],
-        quick=1,
+        quick=0,
     )  # fmt: skip
 
 

@@ -62,27 +62,28 @@ SLOW = {
     *(("dear_switch_among_obstacles", vehicle) for vehicle in ("grid", "omni")),
     ("pictures", "dubins"),
 }
-WITH_INERTIA = ("plan_file",)
 ONE_BY_ONE = {  # so that every feature is tried with a few vehicles
     *(("car", feature) for feature in ("polygons", "max_time", "moving_obstacles")),
-    *(("car", feature) for feature in ("loop_noise", "several_parts")),
+    ("car", "loop_noise"),
     ("boat", "occupancy_map"),
     ("boat", "loop_noise"),
-    ("grid", "zones_crossed"),
     *(("stage", feature) for feature in ("discs", "moving_obstacles", "loop_obstacles")),
     ("stage", "moved_problem_among_obstacles"),
-    ("boat_in_current", "loop"),
-    ("glider", "heights"),
-    ("car_with_trailer", "carried_parts"),
-    *(("user", feature) for feature in ("moving_ends", "discs", "loop", "polishing")),
+    *(("user", feature) for feature in ("moving_ends", "loop", "polishing")),
+    ("boat_in_current", "plan_file"),
     ("second_order_unicycle", "loop_moving_obstacles"),
-    ("second_order_car", "fixed_time"),
 }
-WITH_INERTIA_LONG = ("fixed_time", "loop_moving_obstacles")
+WITH_INERTIA_LONG = ("plan_file", "fixed_time", "loop_moving_obstacles")
 LONG_ONE_BY_ONE = {  # with -m slow
     *(("car", feature) for feature in ("discs", "zones", "margin", "bounds", "min_coast")),
     *(("car", feature) for feature in ("planner_with_all", "free_heading_among_obstacles")),
     ("car_with_trailer", "planner_with_all"),
+    ("car_with_trailer", "carried_parts"),
+    ("glider", "heights"),
+    ("car", "several_parts"),
+    ("grid", "zones_crossed"),
+    ("boat_in_current", "loop"),
+    ("user", "discs"),
     ("boat", "max_time_among_obstacles"),
     ("boat", "moved_problem_among_obstacles"),
     ("boat", "pictures"),
@@ -98,8 +99,8 @@ def _quick() -> Iterator[tuple[str, str]]:
     for feature, vehicle in cells():
         if (feature, vehicle) in SLOW:
             continue
-        common = WITH_INERTIA if VEHICLES[vehicle].inertia else QUICK_FEATURES
-        chosen = vehicle in QUICK_VEHICLES or feature in common
+        common = feature in QUICK_FEATURES and not VEHICLES[vehicle].inertia
+        chosen = vehicle in QUICK_VEHICLES or common
         if chosen or (vehicle, feature) in ONE_BY_ONE:
             yield feature, vehicle
 
@@ -114,4 +115,14 @@ def _long() -> Iterator[tuple[str, str]]:
 
 QUICK = frozenset(_quick())
 LONG = frozenset(_long())  # with -m slow; all that is in neither takes longest, -m exhaustive
-SLOW_MUTANTS = frozenset({"polishing", "heights", "carried_parts"})
+SLOW_MUTANTS = frozenset(
+    {
+        "carried_parts",
+        "heights",
+        "moved_problem_among_obstacles",
+        "moving_ends",
+        "planner_with_all",
+        "polishing",
+        "same_plan_twice_among_obstacles",
+    }
+)

@@ -119,7 +119,9 @@ KINDS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", quick_are(KINDS.keys() - {"tolerance"}, KINDS))
+@pytest.mark.parametrize(
+    "name", quick_are(KINDS.keys() - {"long trims", "point", "tolerance"}, KINDS)
+)
 def test_plans_keep_what_is_promised(name):
     result = found(KINDS[name], alternatives=2)
     expected = {"search", "first_plan", "refine", "audit"}
@@ -162,6 +164,7 @@ def test_improvements_cost_what_the_plan_does():
     assert result.improvements[-1][1] == pytest.approx(result.cost, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_hardly_turning_costs_what_driving_straight_does():
     costs = []
     for turn in (0.0, 5.6e-17):
@@ -234,6 +237,7 @@ def test_the_lattice_and_altitude():
     assert result.plan is None or result.plan.end[3] == pytest.approx(0.1)
 
 
+@pytest.mark.slow
 def test_a_start_that_keeps_the_margin_at_a_corner_is_left():
     place = 1.0 - 0.27 / math.sqrt(2.0)  # corner to corner 0.27 m
     problem = replace(ROBOTS, start=np.array([place, place, 0.0]), footprint=(Box([2.0, 2.0]),),
@@ -436,6 +440,7 @@ def test_far_away(exponent):
             assert_moved(problem, SE2([far, -far, 0.0]))
 
 
+@pytest.mark.slow
 def test_among_what_moves():
     rng = np.random.default_rng(4)
     for seed in range(4):
@@ -444,6 +449,7 @@ def test_among_what_moves():
         assert_moved(problem, by)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("price", [24.0, 240.0])
 @pytest.mark.parametrize("name", ["car", "dubins"])
 def test_a_dear_price_of_a_switch_is_no_wall(name, price):
@@ -454,6 +460,7 @@ def test_a_dear_price_of_a_switch_is_no_wall(name, price):
     assert len(dear.plan.word) <= 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("heading", ["free", "several"])
 def test_the_table_of_costs_serves_every_goal(heading):
     # a bay: what guides the search is the cost to go without obstacles
@@ -469,6 +476,7 @@ def test_the_table_of_costs_serves_every_goal(heading):
     assert result.cost <= alone.cost * 1.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("radius", [0.05, 0.22])
 def test_a_small_disc_finds_the_way_round_a_thin_wall(radius):
     walls = [Box([60, 0.05], [50, 50]), Box([0.05, 60], [20, 20]), Box([0.05, 60], [80, 20])]

@@ -61,6 +61,7 @@ def test_what_no_zone_stands_in_the_way_of_is_as_before():
     assert result.cost == free.cost
 
 
+@pytest.mark.slow
 def test_a_zone_that_admits_nothing_is_gone_around():
     zone = Zone(shape=Box([1.0, 1.0], [3.0, 0.0]), max_speed=0.0)
     result = plan(posed(ALONG, zone), time_limit=3.0)
@@ -85,6 +86,7 @@ def test_grip_limits_turns_at_speed():
     assert not {"left", "right"} & set(result.plan.word)
 
 
+@pytest.mark.slow
 def test_trims_can_be_named():
     only = Zone(shape=ACROSS, trims=["slow", "rest"])
     result = plan(posed(ALONG, only), time_limit=3.0)
@@ -172,6 +174,7 @@ def test_a_moved_problem_has_the_moved_plan():
     assert there.cost == pytest.approx(here.cost, abs=0.05)
 
 
+@pytest.mark.slow
 def test_zones_hold_in_closed_loop():
     problem = posed(ALONG, Zone(shape=ACROSS, max_speed=0.5))
     loop = simulate(problem, step=0.5, time_limit=1.5, steps=40)

@@ -74,6 +74,7 @@ def usual():
     return result
 
 
+@pytest.mark.slow
 def test_any_heading_is_as_good_among_obstacles():
     """A goal whose heading points back costs a turn; where any will do, it costs none."""
     goal = Goal(pose=[6.0, 0.0, 3.0])
@@ -85,6 +86,7 @@ def test_any_heading_is_as_good_among_obstacles():
     assert_free(free.plan)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [1.3, 1.1])
 def test_a_longest_time_is_kept_among_obstacles(usual, share):
     """Effort alone would take its time; the longest time leaves it less."""
@@ -106,6 +108,7 @@ def test_words_may_be_late_at_first_where_cheaper_ones_are_quicker():
     assert late_at_first(by_effort).most_time == pytest.approx(5.0)
 
 
+@pytest.mark.slow
 def test_a_fixed_time_is_kept_among_obstacles(usual):
     total = 1.4 * usual.plan.duration
     result = plan(posed(horizon=Horizon(time=total)), time_limit=60.0)
@@ -114,6 +117,7 @@ def test_a_fixed_time_is_kept_among_obstacles(usual):
     assert_free(result.plan)
 
 
+@pytest.mark.slow
 def test_no_trim_lasts_less_than_it_must_among_obstacles():
     automaton = unicycle_automaton()
     problem = posed(horizon=Horizon(min_coast=0.4))
@@ -200,6 +204,7 @@ def test_a_fast_car_passes_a_box(along, aside):
     assert found.word.duration < 6.5
 
 
+@pytest.mark.slow
 def test_a_zone_is_crossed_slowly_and_left_fast():
     """A strip of 1 m at 0.4 m/s: neither the whole way slowly, nor 40 m around it."""
     strip = Zone(shape=Box([1.0, 60.0], [5.0, 0.0]), max_speed=0.4)

@@ -40,7 +40,7 @@ def seeded(seed: int) -> Problem:
             return replace(problem, start=start)
 
 
-@pytest.mark.parametrize("seed", quick_are(range(2, 5), range(12)))
+@pytest.mark.parametrize("seed", quick_are([6], range(12)))
 def test_undisturbed_all_that_is_promised_is_kept(seed):
     loop = simulate(seeded(seed), step=1.0)
     assert loop.reached
@@ -91,6 +91,7 @@ def test_a_car_that_cannot_rest_parks():
     assert clearances(loop).min() > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cost", [Cost(effort=1.0), Cost(effort=0.5, norm=0.5)])
 def test_a_fixed_time_is_kept(cost):
     problem = among(WALL, goal=[6.0, 0.0, 0.0], cost=cost, horizon=Horizon(time=15.0))
@@ -109,6 +110,7 @@ def test_where_the_goal_is_closed_in_it_says_so_and_stays():
     assert "no safe plan leads to the goal" in loop.reason
 
 
+@pytest.mark.slow
 def test_pushed_closer_than_the_margin_it_goes_on_with_what_it_has():
     problem = among(WALL, margin=0.3, start=(2.5, 1.5, np.pi))
     loop = simulate(problem, step=0.5)
@@ -141,6 +143,7 @@ def test_a_margin_for_new_words_keeps_the_old_one():
     assert list(loop.violations) == []
 
 
+@pytest.mark.slow
 def test_retimed_plans_stay_on_their_free_path():
     # continuous controls never quite arrive: each step leaves the same share of the effort
     problem = among(WALL, goal=[6.0, 0.0, 0.0], cost=Cost(effort=1.0), horizon=Horizon(time=20.0))
@@ -150,6 +153,7 @@ def test_retimed_plans_stay_on_their_free_path():
     assert loop.value < 0.25 * loop.steps[0].value
 
 
+@pytest.mark.slow
 def test_held_in_the_goal_beside_a_wall():
     goal = Goal(pose=[6.0, 0.0, 0.0], tolerance_m=0.2, tolerance_rad=0.3)
     problem = among(WALL, Disc(0.5, [7.1, 0.0]), goal=goal)

@@ -196,6 +196,7 @@ def test_what_makes_no_sense_is_refused(changed, asked, message):
     assert str(error.value).startswith(message)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.0, 0.003])
 def test_a_plan_that_ends_within_the_tolerance_is_kept(noise):
     """In a zone a vehicle without inertia ends where it likes within the goal's tolerance."""
@@ -223,6 +224,7 @@ def test_at_first_a_planner_has_all_the_time_where_there_are_zones(monkeypatch):
     assert step.deed is Deed.PLANNED
 
 
+@pytest.mark.slow
 def test_told_to_stay_it_comes_back_when_it_is_pushed_out():
     push = Disturbance(pushes={12: (0.2, 0.0, 0.0)})
     loop = simulate(posed(NEAR), step=0.5, steps=30, time_limit=5.0, stay=True, disturbance=push)
@@ -326,6 +328,7 @@ def crossing(begin=1.0, lasting=6.0, *, radius=0.4):
     return Obstacle(Disc(radius), motion=motion)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("begin", [0.0, 1.5, 3.0])
 def test_past_a_moving_obstacle_nothing_is_hit(begin):
     problem = posed(

@@ -138,6 +138,7 @@ def incumbents_until(deadline, name="car"):
     return incumbents
 
 
+@pytest.mark.slow
 def test_less_time_gives_the_beginning_of_what_more_time_gives():
     improved("car")
     whole = incumbents_until(math.inf)

@@ -94,6 +94,7 @@ def test_what_is_its_own_mirror_image(automaton, cost, mirrored):
     assert library.mirrored is mirrored
 
 
+@pytest.mark.slow
 def test_a_library_that_is_no_mirror_image_has_a_table_that_is_none():
     table = cost_to_go_table(Problem(controls(**TABLE_2), [0, 0, 0], [1, 0, 0]), reach=1.0)
     value = table.value

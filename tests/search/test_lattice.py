@@ -225,6 +225,7 @@ def test_compiled_and_not_the_first_plan_is_the_same_to_the_last_bit():
     assert said[0] == said[1]
 
 
+@pytest.mark.slow
 def test_who_waits_until_contact_is_still_somewhere():
     order = "from tests.search.test_lattice import *; grown(PROBLEMS['moving'], one=TIGHT, n=15)"
     done = subprocess.run(
