@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from maneuver_automaton import _kernel_folders
+from tests.quickly import quick_are
 
 EXAMPLE = """
 from maneuver_automaton._compile import inner_kernel, kernel
-from tests.quickly import quick_are
 
 
 @inner_kernel
