@@ -82,6 +82,7 @@ made.compile((numba.types.float64,))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(_compile_all.processors()[0] == "generic", reason="kinds of x86-64")
 def test_kernels_that_came_compiled_are_used_where_the_processor_has_what_they_need(
     tmp_path, monkeypatch

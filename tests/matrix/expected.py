@@ -21,7 +21,7 @@ EXPECTED: dict[tuple[str, str], str] = {
     for vehicle in GROUPS.get(vehicles, vehicles.split())
 }
 
-QUICK_VEHICLES = ("unicycle", "dubins")  # of which nearly all is tried
+QUICK_VEHICLE = "unicycle"  # of which all is tried
 QUICK_FEATURES = (  # that all kinematic vehicles are tried with
     "free_space",
     "free_heading",
@@ -60,7 +60,6 @@ SLOW = {
         )
     ),
     *(("dear_switch_among_obstacles", vehicle) for vehicle in ("grid", "omni")),
-    ("pictures", "dubins"),
 }
 ONE_BY_ONE = {  # so that every feature is tried with a few vehicles
     *(("car", feature) for feature in ("polygons", "max_time", "moving_obstacles")),
@@ -100,7 +99,7 @@ def _quick() -> Iterator[tuple[str, str]]:
         if (feature, vehicle) in SLOW:
             continue
         common = feature in QUICK_FEATURES and not VEHICLES[vehicle].inertia
-        chosen = vehicle in QUICK_VEHICLES or common
+        chosen = vehicle == QUICK_VEHICLE or common
         if chosen or (vehicle, feature) in ONE_BY_ONE:
             yield feature, vehicle
 
@@ -108,7 +107,8 @@ def _quick() -> Iterator[tuple[str, str]]:
 def _long() -> Iterator[tuple[str, str]]:
     for feature, vehicle in cells():
         with_inertia = VEHICLES[vehicle].inertia and feature in WITH_INERTIA_LONG
-        chosen = with_inertia or (feature, vehicle) in SLOW or (vehicle, feature) in LONG_ONE_BY_ONE
+        chosen = with_inertia or vehicle == "dubins" or (feature, vehicle) in SLOW
+        chosen = chosen or (vehicle, feature) in LONG_ONE_BY_ONE
         if chosen and (feature, vehicle) not in QUICK:
             yield feature, vehicle
 

@@ -125,6 +125,7 @@ def test_goals_of_every_kind(what):
         assert result.terminal_error.position_m <= 0.3 + 1e-9
 
 
+@pytest.mark.slow
 def test_times_and_prices():
     scene = replace(BASE, obstacles=(TOWER,))
     fixed = found(replace(scene, horizon=Horizon(time=17.0)))
@@ -133,6 +134,7 @@ def test_times_and_prices():
     assert len(dear.plan.word) <= len(found(scene).plan.word)
 
 
+@pytest.mark.slow
 def test_a_longest_time_and_few_trims_are_kept():
     scene = replace(BASE, obstacles=(TOWER,))
     usual = found(scene)

@@ -25,6 +25,7 @@ from maneuver_automaton.search.lattice_task import WEIGHT, Resolution, task_of
 from maneuver_automaton.search.reversal import forward_word, reversed_query
 from maneuver_automaton.search.word_plan import plan_of_word
 from tests.inertia import unicycle_automaton
+from tests.quickly import quick_are
 from tests.search.cases import compiled_only
 
 pytestmark = compiled_only
@@ -186,7 +187,7 @@ def test_it_says_how_near_it_came():
 
 
 @pytest.mark.parametrize("aside", [0.0, 1.5, -1.5])
-@pytest.mark.parametrize("along", [40.0, 60.0, 80.0])
+@pytest.mark.parametrize("along", quick_are([60.0], [40.0, 60.0, 80.0]))
 def test_a_fast_car_passes_a_box(along, aside):
     """Its turns are wide for its size: cells and coasts of that width find the way, soon."""
     box = Box([3.0, 3.0], [along, 0.1 * along + aside])
