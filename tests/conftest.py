@@ -10,6 +10,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from maneuver_automaton._kernel_folders import KERNELS, source_hash
+from tests.quickly import FEW, MANY
 
 # Compiled kernels and failing examples are kept beside pytest's own cache, apart from the user's. A
 # folder `.hypothesis` in the root, which is searched for tests, would be warned about, and warnings
@@ -19,7 +20,7 @@ _kernels = _kept / "kernels"
 os.environ.setdefault("NUMBA_CACHE_DIR", str(_kernels))
 os.environ.setdefault("HYPOTHESIS_STORAGE_DIRECTORY", str(_kept / "hypothesis"))
 
-for name, examples in (("few", 25), ("many", 100)):
+for name, examples in (("few", FEW), ("many", MANY)):
     settings.register_profile(
         name,
         max_examples=examples,

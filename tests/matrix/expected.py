@@ -70,7 +70,6 @@ ONE_BY_ONE = {  # so that every feature is tried with a few vehicles
     ("stage", "moved_problem_among_obstacles"),
     *(("user", feature) for feature in ("moving_ends", "loop", "polishing")),
     ("boat_in_current", "plan_file"),
-    ("second_order_unicycle", "loop_moving_obstacles"),
 }
 WITH_INERTIA_LONG = ("plan_file", "fixed_time", "loop_moving_obstacles")
 LONG_ONE_BY_ONE = {  # with -m slow

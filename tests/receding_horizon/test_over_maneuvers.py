@@ -135,6 +135,7 @@ def test_a_margin_keeps_the_known_word():
     assert not any(step.replanned for step in loop.steps)
 
 
+@pytest.mark.slow
 def test_among_obstacles_only_free_plans_are_driven():
     problem = posed(
         [4.0, 0.0, 0.0], obstacles=[Box([0.5, 2.0], [2.0, 0.0])], footprint=Box([0.4, 0.3])

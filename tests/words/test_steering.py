@@ -14,7 +14,7 @@ from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.words import steer
 from maneuver_automaton.words._kernels_steering import steer_batch
 from tests import reference
-from tests.quickly import quick_are
+from tests.quickly import draws, quick_are
 
 LEFT, RIGHT, AHEAD, BACK = [1.0, 0, 1.0], [1.0, 0, -1.0], [1.0, 0, 0], [-1.0, 0, 0]
 SPIN, SPIN_BACK = [0.0, 0, 1.0], [0.0, 0, -1.0]
@@ -80,7 +80,7 @@ def test_every_triple_of_times_ends_at_the_goal(kind):
             assert np.abs(reference.off_goal(end, goal)).max() < 1e-9
 
 
-@settings(max_examples=40)
+@settings(max_examples=draws(40))
 @given(
     arrays(np.float64, (3, 3), elements=st.sampled_from([-1.0, 0.0, 0.5, 1.0]) | st.floats(-2, 2)),
     arrays(np.float64, 3, elements=st.sampled_from([0.0, 1.0, 2.0, np.pi]) | st.floats(-4, 4)),
@@ -102,7 +102,7 @@ def test_root_finding_from_many_starts_finds_nothing_else(kind):
             assert np.abs(found - root).max(axis=1).min() < 1e-4
 
 
-@settings(max_examples=40)
+@settings(max_examples=draws(40))
 @given(
     arrays(np.float64, (3, 3), elements=SIZEABLE),
     *(arrays(np.float64, 3, elements=SIZEABLE) for _ in range(2)),
