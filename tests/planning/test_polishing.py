@@ -74,6 +74,7 @@ def test_a_fixed_time_is_kept_under_way_and_its_effort_falls():
     assert result.cost < 0.5 * unpolished(problem).cost
 
 
+@pytest.mark.slow
 def test_a_body_of_several_parts_is_polished_between_posts():
     """A shelf stands out to its sides, and its nose is round."""
     body = (CAR, Box([0.6, 2.6], [2.0, 0.0]), Disc(0.9, [3.2, 0.0]))
