@@ -31,6 +31,7 @@ def unpolished(problem):
         return plan(problem, time_limit=60.0)
 
 
+@pytest.mark.slow
 def test_a_trailer_without_maneuvers_is_led_by_paths_of_its_car():
     """Behind a wall that a library of rest alone leads past by no word."""
     trailer = {"trailer": (Box([3.2, 1.7], [-0.2, 0.0]), Box([0.4, 2.0], [-1.5, 0.0]))}
