@@ -128,8 +128,8 @@ def check_scheduler(scheduler: str) -> None:
     """
     if importlib.util.find_spec("distributed") is None:
         raise ValueError(
-            f"scheduler: got {scheduler!r}, but Dask is not installed; need `pip install "
-            "distributed`"
+            f"scheduler: got {scheduler!r}, but Dask is not installed; need "
+            "`pip install 'maneuver-automaton[distributed]'`"
         )
     if scheduler == LOCAL:
         return

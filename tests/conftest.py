@@ -1,35 +1,55 @@
-"""What every test session gets: a numba cache of its own, and Hypothesis without a deadline."""
+"""What every test session gets: kernels of its own, and Hypothesis without a deadline."""
 
 from __future__ import annotations
 
 import os
 import shutil
-import tempfile
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 
-# Set before anything imports numba; a caller who set it keeps compiled kernels between sessions.
-_own_cache: str | None = None
-if "NUMBA_CACHE_DIR" not in os.environ:
-    _own_cache = tempfile.mkdtemp(prefix="maneuver-automaton-kernels-")
-    os.environ["NUMBA_CACHE_DIR"] = _own_cache
+from maneuver_automaton._kernel_folders import KERNELS, source_hash
+from tests.quickly import FEW, MANY
 
-# Failing examples are kept beside pytest's own cache: a folder `.hypothesis` in the root, which is
-# searched for tests, would be warned about, and warnings are errors.
-_root = Path(__file__).parent.parent
-os.environ.setdefault("HYPOTHESIS_STORAGE_DIRECTORY", str(_root / ".pytest_cache" / "hypothesis"))
+# Compiled kernels and failing examples are kept beside pytest's own cache, apart from the user's. A
+# folder `.hypothesis` in the root, which is searched for tests, would be warned about, and warnings
+# are errors.
+_kept = Path(__file__).parent.parent / ".pytest_cache"
+_kernels = _kept / "kernels"
+os.environ.setdefault("NUMBA_CACHE_DIR", str(_kernels))
+os.environ.setdefault("HYPOTHESIS_STORAGE_DIRECTORY", str(_kept / "hypothesis"))
 
-settings.register_profile(
-    "maneuver_automaton",
-    deadline=None,
-    derandomize=bool(os.environ.get("CI")),
-    suppress_health_check=[HealthCheck.too_slow],
-)
-settings.load_profile("maneuver_automaton")
+for name, examples in (("few", FEW), ("many", MANY)):
+    settings.register_profile(
+        name,
+        max_examples=examples,
+        deadline=None,
+        derandomize=bool(os.environ.get("CI")),
+        suppress_health_check=[HealthCheck.too_slow],
+    )
 
 
-def pytest_unconfigure(config: pytest.Config) -> None:
-    if _own_cache is not None:
-        shutil.rmtree(_own_cache, ignore_errors=True)
+def _takes_long(config: pytest.Config) -> bool:
+    return "not slow" not in config.option.markexpr
+
+
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
+    """No further process for files that are named, -k, and -s: what a test prints is seen."""
+    files = any(".py" in one for one in config.args)
+    return 0 if files or config.option.keyword or config.option.capture == "no" else None
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Choose how often laws are tried, and drop the kernels compiled from other sources."""
+    settings.load_profile("many" if _takes_long(config) else "few")
+    for folder in _kernels.glob(f"{KERNELS}*"):
+        if folder.name != f"{KERNELS}{source_hash()}":
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Let `-m slow` try the laws again, with more numbers."""
+    for item in items:
+        if _takes_long(config) and hasattr(getattr(item, "obj", None), "hypothesis"):
+            item.add_marker("slow")

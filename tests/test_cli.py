@@ -162,6 +162,7 @@ def test_start_equal_to_goal_for_a_fixed_time_is_rest(folder):
     assert [primitive["name"] for primitive in document["primitives"]] == ["rest"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["car_slot", "grid_1681", "parking_min_time", "several_goals", "warehouse"]
 )
@@ -173,6 +174,7 @@ def test_shipped_scenarios_plan(folder, name):
     assert document["terminal_error"]["heading_rad"] <= 1e-9
 
 
+@pytest.mark.slow
 def test_a_flight_among_heights_is_drawn_in_space_too(folder):
     assert run(["plan", str(SCENARIOS / "helicopter_city.yaml"), "--time-limit", "12"]) == 0
     assert result_file()["audit"]["passed"] is True
@@ -367,6 +369,7 @@ class TestCheck:
             assert what in printed
         assert "NO" not in printed
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         "text", [AHEAD_ONLY, SCENARIO + "bounds_m: {x: [0.5, 5]}\n"], ids=["ahead", "bounds"]
     )
@@ -375,6 +378,7 @@ class TestCheck:
         assert run(["check", "x.yaml"]) == 1
         assert "NO" in capsys.readouterr().out
 
+    @pytest.mark.slow
     def test_it_says_what_is_known_of_a_goal_without_a_plan(self, folder, capsys):
         """A narrow slot, and no time to look for a plan: nothing is proven either way."""
         Path("x.yaml").write_text(
@@ -387,6 +391,7 @@ class TestCheck:
         assert "not known: no plan within 1e-06 s" in printed
         assert "which does not prove that there is none" in printed
 
+    @pytest.mark.slow
     def test_a_library_of_1681_trims(self, folder):
         assert run(["check", str(SCENARIOS / "grid_1681.yaml")]) == 0
 
@@ -408,6 +413,7 @@ def test_plot_draws_from_the_file_alone(folder):
     assert Path("a/plan.gif").exists()
 
 
+@pytest.mark.slow
 def test_an_animation_on_demand(folder):
     assert run(["plan", "x.yaml", "--quiet", "--animate", "--no-plot"]) == 0
     assert sorted(path.name for path in Path("out").iterdir()) == ["plan.gif", "plan.json"]

@@ -103,6 +103,7 @@ def test_what_is_missing_is_one_line(folder, capsys, command, arguments, message
     assert said in (f"{file}: {message}\n", message.format(file) + "\n")
 
 
+@pytest.mark.slow
 def test_check_looks_at_the_same_problem(folder, asked, capsys):
     assert run(["check", "many/Case0.csv"]) in (0, 1)
     (problem,) = asked

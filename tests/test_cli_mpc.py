@@ -132,6 +132,7 @@ class TestAmongObstacles:
         assert f"least clearance:{log()['min_clearance_m']:.4g} m" in printed.replace(": ", ":")
         assert "harmful" not in printed
 
+    @pytest.mark.slow
     def test_over_seeds_it_counts_as_much(self, folder, capsys):
         Path("x.yaml").write_text(HIT)
         assert run(["mpc", "x.yaml", *SEEDS, "--no-plot"]) == 1
@@ -188,15 +189,13 @@ class TestStatistics:
         assert rows[1]["cost"] == log("one")["cost"]
         assert rows[1]["steps"] == len(log("one")["steps"]) - 1
 
-    @pytest.mark.skipif(
-        importlib.util.find_spec("distributed") is not None, reason="Dask is installed"
-    )
     @pytest.mark.parametrize("address", ["local", "tcp://host:8786"])
-    def test_without_dask(self, folder, capsys, address):
+    def test_without_dask(self, folder, monkeypatch, capsys, address):
+        monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
         assert run(["mpc", "x.yaml", "--seeds", "2", "--dask", address, *QUICK]) == 2
         assert capsys.readouterr().err == (
             f"x.yaml: receding_horizon: scheduler: got '{address}', but Dask is not installed; "
-            "need `pip install distributed`\n"
+            "need `pip install 'maneuver-automaton[distributed]'`\n"
         )
 
 
@@ -351,6 +350,7 @@ def test_a_tiny_budget_still_arrives(folder):
     assert kinds <= {"time budget"}
 
 
+@pytest.mark.slow
 def test_an_animation_on_demand(folder):
     Path("x.yaml").write_text(LOOP.replace("step_s: 0.5", "step_s: 2.0"))
     assert run(["mpc", "x.yaml", "--quiet", "--no-plot", "--animate"]) == 0

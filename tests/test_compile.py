@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from maneuver_automaton import _kernel_folders
+from tests.quickly import quick_are
 
 EXAMPLE = """
 from maneuver_automaton._compile import inner_kernel, kernel
@@ -158,7 +159,9 @@ def test_without_a_word_it_is_in_the_home_folder(tmp_path, monkeypatch, platform
     assert _kernel_folders.user_cache_folder() == tmp_path / expected
 
 
-@pytest.mark.parametrize("variable", ["NUMBA_CACHE_DIR", "MANEUVER_AUTOMATON_CACHE_DIR"])
+@pytest.mark.parametrize(
+    "variable", quick_are(["NUMBA_CACHE_DIR"], ["NUMBA_CACHE_DIR", "MANEUVER_AUTOMATON_CACHE_DIR"])
+)
 def test_kernels_are_compiled_once_and_kept_where_it_is_said(example, variable):
     first = run(CALL, example, **{variable: example / "cache"})
     again = run(CALL, example, **{variable: example / "cache"})
@@ -172,7 +175,9 @@ def test_kernels_are_compiled_once_and_kept_where_it_is_said(example, variable):
     assert not list(example.rglob("__pycache__/*.nb?"))
 
 
-@pytest.mark.parametrize("variable", ["NUMBA_CACHE_DIR", "MANEUVER_AUTOMATON_CACHE_DIR"])
+@pytest.mark.parametrize(
+    "variable", quick_are(["NUMBA_CACHE_DIR"], ["NUMBA_CACHE_DIR", "MANEUVER_AUTOMATON_CACHE_DIR"])
+)
 def test_kernels_work_where_nothing_can_be_written(example, variable):
     (example / "file").write_text("in the way")
     ran = run(CALL, example, **{variable: example / "file" / "cache"})

@@ -2,16 +2,36 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.metadata
 import json
+import re
 import subprocess
 import sys
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
 
 import pytest
 
 import maneuver_automaton as ma
 
 HEAVY = ("numba", "scipy", "networkx", "matplotlib", "fcl", "casadi", "pydantic", "shapely", "yaml")
+
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+SAYS_EXTRA = {  # where an extra is asked for by its name
+    "optimal-control": "optimal_control/_casadi.py",
+    "distributed": "_parallel.py",
+    "pandas": "automaton/plan.py",
+}
+DISTRIBUTIONS = {  # of modules that are called otherwise
+    "PIL": "pillow",
+    "fcl": "python-fcl",
+    "mpl_toolkits": "matplotlib",
+    "yaml": "pyyaml",
+}
 
 
 def modules_after(code):
@@ -72,3 +92,33 @@ def test_an_unknown_name_is_an_attribute_error():
 
 def test_the_version_is_that_of_the_distribution():
     assert ma.__version__ == importlib.metadata.version("maneuver-automaton")
+
+
+def distributions_of(requirements: Iterable[str]) -> set[str]:
+    """The names in a list of requirements."""
+    return {re.match(r"[\w-]+", one)[0].lower() for one in requirements}
+
+
+def imported() -> set[str]:
+    """Distributions of all modules that the package imports, wherever in its files."""
+    names = set()
+    for path in (ROOT / "maneuver_automaton").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                names |= {alias.name.partition(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                names.add(node.module.partition(".")[0])
+    outside = names - set(sys.stdlib_module_names) - {"maneuver_automaton"}
+    return {DISTRIBUTIONS.get(name, name.replace("_", "-")) for name in outside}
+
+
+def test_all_that_is_imported_is_declared():
+    always = distributions_of(PROJECT["dependencies"])
+    extras = {distributions_of(PROJECT["optional-dependencies"][name]).pop() for name in SAYS_EXTRA}
+    assert imported() == always | extras
+
+
+@pytest.mark.parametrize("extra", SAYS_EXTRA)
+def test_an_extra_is_asked_for_by_its_name(extra):
+    text = (ROOT / "maneuver_automaton" / SAYS_EXTRA[extra]).read_text(encoding="utf-8")
+    assert f"pip install 'maneuver-automaton[{extra}]'" in text

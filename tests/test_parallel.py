@@ -28,12 +28,13 @@ def test_no_jobs():
     assert str(error.value) == "jobs must be at least 1, got 0"
 
 
-@pytest.mark.skipif(importlib.util.find_spec("distributed") is not None, reason="Dask is installed")
-def test_without_dask():
+def test_without_dask(monkeypatch):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
     with pytest.raises(ValueError) as error:
         list(in_parallel(abs, [1], scheduler="local"))
     assert str(error.value) == (
-        "scheduler: got 'local', but Dask is not installed; need `pip install distributed`"
+        "scheduler: got 'local', but Dask is not installed; need "
+        "`pip install 'maneuver-automaton[distributed]'`"
     )
 
 

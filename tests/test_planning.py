@@ -21,6 +21,7 @@ from maneuver_automaton.models import Car, Unicycle, UserModel
 from maneuver_automaton.planning import PlanResult, PlanStatus, plan
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
+from tests.quickly import quick_are
 
 LIMIT = 60.0  # [s] a bound that a busy machine does not reach
 
@@ -210,15 +211,19 @@ PRICES = [
 @pytest.mark.parametrize(
     ("method", "prices"),
     [
-        *(("auto", prices) for prices in PRICES),
+        pytest.param("auto", PRICES[0]),
+        *(pytest.param("auto", prices, marks=pytest.mark.slow) for prices in PRICES[1:]),
         pytest.param(
             "insertion",
             PRICES[0],
-            marks=pytest.mark.xfail(
-                strict=True, reason="words with fewer switches are only made from longer ones"
-            ),
+            marks=[
+                pytest.mark.slow,
+                pytest.mark.xfail(
+                    strict=True, reason="words with fewer switches are only made from longer ones"
+                ),
+            ],
         ),
-        ("insertion", PRICES[1]),
+        pytest.param("insertion", PRICES[1], marks=pytest.mark.slow),
     ],
 )
 def test_prices_of_switches_hold_for_words_of_any_length(method, prices):
@@ -332,7 +337,7 @@ def test_a_longest_time_binds_until_it_is_long_enough():
     assert costs[2] == pytest.approx(free.cost)
 
 
-@pytest.mark.parametrize("least", [0.1, 0.5, 1.0, 2.0])
+@pytest.mark.parametrize("least", quick_are([0.5], [0.1, 0.5, 1.0, 2.0]))
 @pytest.mark.parametrize(
     "horizon", [Horizon(time=8.0, max_trims=4), Horizon(max_trims=3), Horizon()]
 )
@@ -802,6 +807,7 @@ plan(Problem(GLIDER, [1.625, 0, 0, 0], [0, 0, 0, 0], cost=COST, horizon=Horizon(
 """
 
 
+@pytest.mark.slow
 def test_a_full_buffer_is_no_crash():
     done = subprocess.run([sys.executable, "-c", FULL], capture_output=True, check=False)
     assert done.returncode == 0

@@ -41,9 +41,11 @@ def text_of(page: Path) -> str:
 
 TEXTS = {page: text_of(page) for page in PAGES}
 TEXT = "\n".join(TEXTS.values())
-LONG = {  # pages whose code takes seconds: it is what they measure
+LONG = {  # pages whose code, and words in commands that, take seconds
     "best_so_far",
+    "exact_pose",
     "gear_changes",
+    "primitives",
     "replanning",
     "smoothing",
     "tight_aisle",
@@ -52,6 +54,7 @@ LONG = {  # pages whose code takes seconds: it is what they measure
     "turn_on_the_spot",
     "why_no_plan",
 }
+LONG_COMMANDS = ("--gap", "--animate", "--seeds", "car.json")
 
 
 def blocks(language: str, text: str = TEXT) -> list[str]:
@@ -65,7 +68,7 @@ def code_of_pages() -> list[Any]:
         pytest.param(
             code,
             id=f"{page.stem}: {first_words(code)}",
-            marks=[pytest.mark.slow] if page.stem in LONG else [],
+            marks=[pytest.mark.slow] if page.stem in LONG or "for name" in code else [],
         )
         for page, text in TEXTS.items()
         for code in blocks("python", text)
@@ -113,8 +116,15 @@ COMMANDS = [
 ]
 
 
+def test_quick_commands_run(clone):
+    quick = [line for line in COMMANDS if not any(word in line for word in LONG_COMMANDS)]
+    assert len(quick) >= 4
+    for line in quick:
+        assert run(shlex.split(line, comments=True)[1:]) == 0, line
+
+
+@pytest.mark.slow
 def test_commands_run(clone):
-    assert len(COMMANDS) >= 4
     for line in COMMANDS:
         assert run(shlex.split(line, comments=True)[1:]) == 0, line
     for name in ("plan.png", "alternatives.png", "plan.gif"):

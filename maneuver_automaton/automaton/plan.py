@@ -328,8 +328,9 @@ class Plan:
             import pandas
         except ImportError as error:
             raise MissingExtra(
-                "to_frame: pandas is not installed; need `pip install pandas`, or as_arrays or "
-                "save_csv, which do without"
+                "to_frame: pandas is not installed; need "
+                "`pip install 'maneuver-automaton[pandas]'`, or as_arrays or save_csv, "
+                "which do without"
             ) from error
         return pandas.DataFrame(self.as_arrays(step=step, model=model).columns())
 

@@ -122,6 +122,7 @@ def test_growth_rises_and_stays_below_resting():
     assert repr(bound) == f"GrowthBound(B(8 s) = {bound.bounds[-1]:.6g} s, sampled at 18 poses)"
 
 
+@pytest.mark.slow
 def test_growth_is_the_same_at_every_scale_where_speeds_scale_too():
     last = [
         growth_bound(

@@ -21,6 +21,7 @@ from maneuver_automaton.automaton.cutting import (
 )
 from maneuver_automaton.problem import Goal
 from tests.inertia import car_automaton
+from tests.quickly import draws
 
 
 @functools.cache
@@ -39,7 +40,7 @@ def driven() -> Plan:
 
 
 @given(share=st.floats(0.0, 1.0))
-@settings(max_examples=40)
+@settings(max_examples=draws(40))
 def test_head_and_tail_are_the_plan(share):
     plan, model = driven(), car_automaton().model
     at = share * plan.duration

@@ -101,8 +101,8 @@ def test_frames_are_of_pandas_where_it_is(monkeypatch):
     with pytest.raises(ImportError) as error:
         PLAN.to_frame()
     assert str(error.value) == (
-        "to_frame: pandas is not installed; need `pip install pandas`, or as_arrays or save_csv, "
-        "which do without"
+        "to_frame: pandas is not installed; need `pip install 'maneuver-automaton[pandas]'`, or "
+        "as_arrays or save_csv, which do without"
     )
 
 

@@ -217,6 +217,7 @@ def test_a_helicopter_that_can_turn_climb_and_sink():
     )
 
 
+@pytest.mark.slow
 def test_forty_thousand_trims():
     axis = np.linspace(-1.0, 1.0, 200)
     report = validate(Automaton.of_grid(Unicycle(), [axis, axis]))

@@ -12,6 +12,7 @@ from maneuver_automaton.bounds.cells import finer, first_cells, on_finer
 from maneuver_automaton.bounds.families import motions_of
 from maneuver_automaton.bounds.levels import _goal_cells, _in_the_plane, _nodes_of
 from maneuver_automaton.bounds.program import program_of, slope
+from tests.quickly import quick_are
 
 CAR = ma.Car(wheelbase=2.8, max_steering=0.6)
 SHUTTLE = ma.Automaton.of_controls(
@@ -111,7 +112,7 @@ def test_no_bound_in_free_space_exceeds_the_shortest_path(goal):
     assert 0.5 * shortest < bound.value <= shortest * (1.0 + 1e-9)
 
 
-@pytest.mark.parametrize("price", [0.0, 1.0])
+@pytest.mark.parametrize("price", quick_are([0.0], [0.0, 1.0]))
 def test_a_bound_among_obstacles_knows_no_plan_and_lies_below_it(price):
     problem = among(WALL, cost=ma.Cost(length=1.0, direction_change=price))
     cost = ma.plan(problem, time_limit=1.0).cost
@@ -148,6 +149,7 @@ def test_nothing_cheaper_than_a_straight_line_is_left():
     assert (bound.value, bound.optimal) == (8.0, True)
 
 
+@pytest.mark.slow
 def test_the_bound_of_a_time_counts_slow_reverse_and_a_start_from_rest():
     slow = {"ahead": (2, 0.0), "left": (2, 0.6), "right": (2, -0.6), "back": (-0.5, 0.0)}
     problem = ma.Problem(
@@ -174,6 +176,7 @@ def test_bad_limits_are_refused(more, message):
     assert str(caught.value) == message
 
 
+@pytest.mark.slow
 def test_plans_without_a_change_of_direction_cost_more_than_the_best_one():
     problem = among((), goal=(0.0, 2.0, 0.0))
     cheapest = ma.plan(problem).cost
@@ -187,6 +190,7 @@ def test_plans_without_a_change_of_direction_cost_more_than_the_best_one():
         ma.lower_bound(problem, max_direction_changes=-1)
 
 
+@pytest.mark.slow
 def test_a_trailer_moves_at_most_as_the_car_that_pulls_it():
     car = ma.CarWithTrailer(
         wheelbase=2.8, hitch_length=3.0, max_steering=0.6, max_speed=2.0, min_speed=-1.0

@@ -14,6 +14,7 @@ from maneuver_automaton.collision._kernels_clearance import NEAR, SHARP
 from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.groups import SE2
 from tests.collision import scenes
+from tests.quickly import draws
 from tests.reference_collision import moved, shapely_world, world_around
 
 ROUNDED = 1e-8  # [m] coordinates are rounded to 1e-9
@@ -105,7 +106,7 @@ def test_clearances_in_contact_to_the_last_digits():
     turn=st.floats(-7.0, 7.0),
     apart=st.floats(1e-6, 0.05),
 )
-@settings(max_examples=60)
+@settings(max_examples=draws(60))
 def test_by_hand_two_boxes_face_to_face(size, turn, apart):
     obstacle = Obstacle(Box(size, [0.5 * size[0] + 1.0 + apart, 0.0]))
     by = SE2([3.0, -2.0, turn])

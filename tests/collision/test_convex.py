@@ -16,6 +16,7 @@ from maneuver_automaton.collision.convex import convex_pieces, pieces_seen_from,
 from maneuver_automaton.collision.outline import outlines
 from maneuver_automaton.groups import SE2
 from tests.collision import scenes
+from tests.quickly import draws
 from tests.reference_collision import shapely_world, world_around
 
 
@@ -46,7 +47,7 @@ def assert_pieces_are(shape, *, atol=1e-9):
     clockwise=st.booleans(),
     hole=st.booleans(),
 )
-@settings(max_examples=80)
+@settings(max_examples=draws(80))
 def test_stars_with_and_without_holes(n, seed, clockwise, hole):
     rng = np.random.default_rng(seed)
     angles = 2.0 * math.pi * (np.arange(n) + rng.uniform(0.0, 0.8, n)) / n
@@ -56,7 +57,7 @@ def test_stars_with_and_without_holes(n, seed, clockwise, hole):
 
 
 @given(seed=st.integers(0, 10**6), n=st.integers(4, 9))
-@settings(max_examples=60)
+@settings(max_examples=draws(60))
 def test_rings_that_cross_themselves(seed, n):
     ring = np.random.default_rng(seed).uniform(-2.0, 2.0, (n, 2))
     assert_pieces_are(Polygon(ring))

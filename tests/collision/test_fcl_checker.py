@@ -25,6 +25,7 @@ from tests.collision.scenes import (
     random_scene,
     slow_distance,
 )
+from tests.quickly import quick_are
 
 PROVEN = 1e-3
 UNIT = (Box([2.0, 2.0]),)
@@ -74,7 +75,7 @@ def test_poses_against_shapely(name):
     assert hits > 3
 
 
-@pytest.mark.parametrize("name", FOOTPRINTS)
+@pytest.mark.parametrize("name", quick_are(["disc"], FOOTPRINTS))
 def test_motions_against_shapely(name):
     rng = np.random.default_rng(100 + len(name))
     footprint, counts = FOOTPRINTS[name], [0, 0]
@@ -99,7 +100,7 @@ def test_motions_against_shapely(name):
     assert min(counts) >= 4
 
 
-@pytest.mark.parametrize("name", ["car", "frame", "disc", "point"])
+@pytest.mark.parametrize("name", quick_are(["car"], ["car", "frame", "disc", "point"]))
 def test_motions_among_moving_obstacles_against_shapely(name):
     rng = np.random.default_rng(200 + len(name))
     footprint, counts = FOOTPRINTS[name], [0, 0]
@@ -407,6 +408,7 @@ def test_threads_do_not_disturb_each_other():
     assert answers == [expected] * 4
 
 
+@pytest.mark.slow
 def test_a_course_is_free_exactly_where_its_poses_are():
     """Courses past a corner at many distances: shapely on dense poses, to within a millimetre."""
     rng = np.random.default_rng(7)

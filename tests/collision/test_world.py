@@ -15,6 +15,7 @@ from maneuver_automaton.collision._kernels_moving import obstacle_pose
 from maneuver_automaton.collision.world import own_frame, world_of
 from maneuver_automaton.groups import SE2
 from tests.collision import scenes
+from tests.quickly import draws
 from tests.reference_collision import moved, world_around
 
 BODY = (Box([1.0, 0.5]),)
@@ -52,7 +53,7 @@ def arrays_of(world):
 
 
 @given(seeds=st.lists(st.integers(0, 10**6), min_size=1, max_size=5), far=st.integers(0, 30))
-@settings(max_examples=40)
+@settings(max_examples=draws(40))
 def test_a_shifted_world_is_the_same_to_the_last_bit(seeds, far):
     obstacles = tuple(shape_on_a_raster(seed) for seed in seeds)
     by = SE2([float(2**far), -float(2**far), 0.0])
@@ -66,7 +67,7 @@ def test_a_shifted_world_is_the_same_to_the_last_bit(seeds, far):
 
 
 @given(seeds=st.lists(st.integers(0, 10**6), min_size=1, max_size=4), turn=st.floats(-3.0, 3.0))
-@settings(max_examples=40)
+@settings(max_examples=draws(40))
 def test_a_turned_world_is_the_same(seeds, turn):
     obstacles = tuple(shape_on_a_raster(seed) for seed in seeds)
     by = SE2([3.0, -2.0, turn])

@@ -79,7 +79,7 @@ def slot() -> Problem:
 
 def _inertia() -> Iterator[Scene]:
     of = functools.partial
-    quick = {"second_order_unicycle", "hovercraft"}
+    quick = {"hovercraft"}
     for name in SIZES:
         for seed in range(2):
             yield _scene(f"{name}/free/{seed}", of(sent, name, seed), name in quick and not seed)
@@ -89,7 +89,7 @@ def _inertia() -> Iterator[Scene]:
     crossing = Obstacle(Disc(0.4), motion=Motion([0.0, 8.0], [[2.5, -3.0, 0.0], [2.5, 3.0, 0.0]]))
     beside = [Box([0.5, 1.5], [2.5, 0.5])]
     yield from (
-        _scene(f"robot/{name}", make, name in ("effort", "moving"))
+        _scene(f"robot/{name}", make, name == "moving")
         for name, make in {
             "time": of(robot, 0),
             "effort": of(robot, 1, cost=effort),
@@ -127,7 +127,7 @@ def _inertia() -> Iterator[Scene]:
     yield _scene("slot", slot)
     for path in sorted(SCENARIOS.glob("*.yaml")):
         if path.stem in WITH_INERTIA:
-            yield _scene(f"scenario/{path.stem}", of(scenario, path), path.stem == "lane_change")
+            yield _scene(f"scenario/{path.stem}", of(scenario, path))
 
 
 def _truck(goal, **changed) -> Problem:

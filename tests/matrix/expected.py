@@ -21,7 +21,7 @@ EXPECTED: dict[tuple[str, str], str] = {
     for vehicle in GROUPS.get(vehicles, vehicles.split())
 }
 
-QUICK_VEHICLES = ("unicycle", "dubins")  # of which all is tried
+QUICK_VEHICLE = "unicycle"  # of which all is tried
 QUICK_FEATURES = (  # that all kinematic vehicles are tried with
     "free_space",
     "free_heading",
@@ -46,37 +46,48 @@ QUICK_FEATURES = (  # that all kinematic vehicles are tried with
     "loop",
     "resume",
 )
-SLOW = {  # four coasting times at a climb take long
-    (feature, "glider")
-    for feature in ("fixed_time", "free_heading", "same_plan_twice", "loop", "resume")
+SLOW = {
+    *(  # four coasting times at a climb take long
+        (feature, "glider")
+        for feature in (
+            "dear_switch_among_obstacles",
+            "fixed_time",
+            "free_heading",
+            "goal_tolerance",
+            "loop",
+            "resume",
+            "same_plan_twice",
+        )
+    ),
+    *(("dear_switch_among_obstacles", vehicle) for vehicle in ("grid", "omni")),
 }
-WITH_INERTIA = ("plan_file", "fixed_time", "loop_moving_obstacles")
 ONE_BY_ONE = {  # so that every feature is tried with a few vehicles
-    *(("car", feature) for feature in ("discs", "polygons", "zones", "margin", "bounds")),
-    ("car", "planner_with_all"),
-    ("car_with_trailer", "planner_with_all"),
-    *(("car", feature) for feature in ("max_time", "min_coast", "loop_noise", "moving_obstacles")),
-    *(("car", feature) for feature in ("several_parts", "free_heading_among_obstacles")),
+    *(("car", feature) for feature in ("polygons", "max_time", "moving_obstacles")),
+    ("car", "loop_noise"),
     ("boat", "occupancy_map"),
     ("boat", "loop_noise"),
-    ("boat", "max_time_among_obstacles"),
-    ("boat", "moved_problem_among_obstacles"),
-    ("grid", "zones_crossed"),
     *(("stage", feature) for feature in ("discs", "moving_obstacles", "loop_obstacles")),
     ("stage", "moved_problem_among_obstacles"),
-    ("boat_in_current", "loop"),
-    ("glider", "heights"),
-    ("boat", "pictures"),
+    *(("user", feature) for feature in ("moving_ends", "loop", "polishing")),
+    ("boat_in_current", "plan_file"),
+}
+WITH_INERTIA_LONG = ("plan_file", "fixed_time", "loop_moving_obstacles")
+LONG_ONE_BY_ONE = {  # with -m slow
+    *(("car", feature) for feature in ("discs", "zones", "margin", "bounds", "min_coast")),
+    *(("car", feature) for feature in ("planner_with_all", "free_heading_among_obstacles")),
+    ("car_with_trailer", "planner_with_all"),
     ("car_with_trailer", "carried_parts"),
-    ("user", "moving_ends"),
+    ("glider", "heights"),
+    ("car", "several_parts"),
+    ("grid", "zones_crossed"),
+    ("boat_in_current", "loop"),
     ("user", "discs"),
-    ("user", "loop"),
-    ("user", "max_trims"),
-    ("hovercraft", "max_trims"),
-    ("user", "resume"),
-    ("user", "polishing"),
-    ("user", "alternatives"),
+    ("boat", "max_time_among_obstacles"),
+    ("boat", "moved_problem_among_obstacles"),
+    ("boat", "pictures"),
+    *(("user", feature) for feature in ("max_trims", "resume", "alternatives")),
     ("user", "same_plan_twice_among_obstacles"),
+    ("hovercraft", "max_trims"),
     ("second_order_unicycle", "loop_obstacles"),
     ("second_order_car", "resume"),
 }
@@ -86,11 +97,31 @@ def _quick() -> Iterator[tuple[str, str]]:
     for feature, vehicle in cells():
         if (feature, vehicle) in SLOW:
             continue
-        common = WITH_INERTIA if VEHICLES[vehicle].inertia else QUICK_FEATURES
-        chosen = vehicle in QUICK_VEHICLES or feature in common
+        common = feature in QUICK_FEATURES and not VEHICLES[vehicle].inertia
+        chosen = vehicle == QUICK_VEHICLE or common
         if chosen or (vehicle, feature) in ONE_BY_ONE:
             yield feature, vehicle
 
 
+def _long() -> Iterator[tuple[str, str]]:
+    for feature, vehicle in cells():
+        with_inertia = VEHICLES[vehicle].inertia and feature in WITH_INERTIA_LONG
+        chosen = with_inertia or vehicle == "dubins" or (feature, vehicle) in SLOW
+        chosen = chosen or (vehicle, feature) in LONG_ONE_BY_ONE
+        if chosen and (feature, vehicle) not in QUICK:
+            yield feature, vehicle
+
+
 QUICK = frozenset(_quick())
-SLOW_MUTANTS = frozenset({"polishing", "heights", "carried_parts"})
+LONG = frozenset(_long())  # with -m slow; all that is in neither takes longest, -m exhaustive
+SLOW_MUTANTS = frozenset(
+    {
+        "carried_parts",
+        "heights",
+        "moved_problem_among_obstacles",
+        "moving_ends",
+        "planner_with_all",
+        "polishing",
+        "same_plan_twice_among_obstacles",
+    }
+)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from tests.matrix.cells import cells
-from tests.matrix.expected import EXPECTED, QUICK, SLOW_MUTANTS
+from tests.matrix.expected import EXPECTED, LONG, QUICK, SLOW_MUTANTS
 from tests.matrix.features import FEATURES
 from tests.matrix.vehicles import VEHICLES
 from tests.search.cases import compiled_only
@@ -19,6 +19,8 @@ pytestmark = compiled_only
 def _parameters() -> Iterator[object]:
     for feature, vehicle in cells():
         marks = [] if (feature, vehicle) in QUICK else [pytest.mark.slow]
+        if (feature, vehicle) not in QUICK | LONG:
+            marks.append(pytest.mark.exhaustive)
         fault = EXPECTED.get((feature, vehicle))
         if fault is not None:
             marks.append(pytest.mark.xfail(strict=True, reason=fault))

@@ -18,6 +18,7 @@ from maneuver_automaton.models import Unicycle, UserModel
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
 from tests import scenes
+from tests.quickly import quick_are
 from tests.solids import check_plan
 
 LIMIT = 60.0  # [s] a ceiling that a busy machine does not reach
@@ -118,7 +119,9 @@ KINDS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize(
+    "name", quick_are(KINDS.keys() - {"long trims", "point", "tolerance"}, KINDS)
+)
 def test_plans_keep_what_is_promised(name):
     result = found(KINDS[name], alternatives=2)
     expected = {"search", "first_plan", "refine", "audit"}
@@ -131,6 +134,7 @@ def test_plans_keep_what_is_promised(name):
     assert costs[-1] == pytest.approx(result.cost, rel=1e-7)  # before its end is closed
 
 
+@pytest.mark.slow
 def test_the_rest_that_pads_is_a_trim():
     fixed = replace(EASY, cost=Cost(effort=1.0), horizon=Horizon(time=20.0, max_trims=3))
     result = plan(fixed, time_limit=LIMIT)
@@ -160,6 +164,7 @@ def test_improvements_cost_what_the_plan_does():
     assert result.improvements[-1][1] == pytest.approx(result.cost, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_hardly_turning_costs_what_driving_straight_does():
     costs = []
     for turn in (0.0, 5.6e-17):
@@ -232,6 +237,7 @@ def test_the_lattice_and_altitude():
     assert result.plan is None or result.plan.end[3] == pytest.approx(0.1)
 
 
+@pytest.mark.slow
 def test_a_start_that_keeps_the_margin_at_a_corner_is_left():
     place = 1.0 - 0.27 / math.sqrt(2.0)  # corner to corner 0.27 m
     problem = replace(ROBOTS, start=np.array([place, place, 0.0]), footprint=(Box([2.0, 2.0]),),
@@ -405,7 +411,7 @@ def plan_is_worth_it(problem):
     return blocked_ends(replace(problem, bounds=Bounds())) is None and bool(problem.obstacles)
 
 
-@pytest.mark.parametrize("part", range(4))
+@pytest.mark.parametrize("part", quick_are([], range(4)))
 def test_turned_and_shifted_a_little(part):
     rng = np.random.default_rng([1, part])
     plans = 0
@@ -434,6 +440,7 @@ def test_far_away(exponent):
             assert_moved(problem, SE2([far, -far, 0.0]))
 
 
+@pytest.mark.slow
 def test_among_what_moves():
     rng = np.random.default_rng(4)
     for seed in range(4):
@@ -442,6 +449,7 @@ def test_among_what_moves():
         assert_moved(problem, by)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("price", [24.0, 240.0])
 @pytest.mark.parametrize("name", ["car", "dubins"])
 def test_a_dear_price_of_a_switch_is_no_wall(name, price):
@@ -452,6 +460,7 @@ def test_a_dear_price_of_a_switch_is_no_wall(name, price):
     assert len(dear.plan.word) <= 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("heading", ["free", "several"])
 def test_the_table_of_costs_serves_every_goal(heading):
     # a bay: what guides the search is the cost to go without obstacles
@@ -467,6 +476,7 @@ def test_the_table_of_costs_serves_every_goal(heading):
     assert result.cost <= alone.cost * 1.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("radius", [0.05, 0.22])
 def test_a_small_disc_finds_the_way_round_a_thin_wall(radius):
     walls = [Box([60, 0.05], [50, 50]), Box([0.05, 60], [20, 20]), Box([0.05, 60], [80, 20])]

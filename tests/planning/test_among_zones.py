@@ -14,7 +14,7 @@ from maneuver_automaton.planning import plan
 from maneuver_automaton.planning.among_zones import admitted_automaton, quickened
 from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.planning.result import PlanStatus
-from maneuver_automaton.problem import Horizon, Problem
+from maneuver_automaton.problem import Horizon, Problem, SearchSettings
 from maneuver_automaton.receding_horizon import RecedingHorizon, simulate
 from maneuver_automaton.search.insertion import search_insertion
 from maneuver_automaton.search.result import plan_of
@@ -35,16 +35,18 @@ CONTROLS = {
 ROBOT = Automaton.of_controls(Unicycle(), CONTROLS)
 ACROSS = Box([2.0, 40.0], [3.0, 0.0])  # from x = 2 to 4, cannot be gone around in passing
 ALONG = [6.0, 0.0, 0.0]
+WORK = SearchSettings(max_expansions=2000)
+LIMIT = 60.0  # [s] a limit that a busy machine does not reach
 
 
 def posed(goal=ALONG, *zones, **changed) -> Problem:
-    settings = {"footprint": Box([0.4, 0.4]), "automaton": ROBOT} | changed
+    settings = {"footprint": Box([0.4, 0.4]), "automaton": ROBOT, "search": WORK} | changed
     automaton = settings.pop("automaton")
     return Problem(automaton, [0.0, 0.0, 0.0], goal, zones=zones, **settings)
 
 
 def test_a_speed_limit_is_kept_where_it_holds_and_only_there():
-    result = plan(posed(ALONG, Zone(shape=ACROSS, max_speed=0.5)), time_limit=3.0)
+    result = plan(posed(ALONG, Zone(shape=ACROSS, max_speed=0.5)), time_limit=LIMIT)
     assert result.status is PlanStatus.FOUND, result.reason
     assert result.plan.word == ("fast", "slow", "fast")
     inside = 2.0 + 0.4  # the whole body counts
@@ -55,15 +57,16 @@ def test_a_speed_limit_is_kept_where_it_holds_and_only_there():
 
 def test_what_no_zone_stands_in_the_way_of_is_as_before():
     zone = Zone(shape=Box([1.0, 1.0], [3.0, 5.0]), max_speed=0.1)
-    free = plan(posed(), time_limit=2.0)
-    result = plan(posed(ALONG, zone), time_limit=2.0)
+    free = plan(posed(), time_limit=LIMIT)
+    result = plan(posed(ALONG, zone), time_limit=LIMIT)
     assert result.plan.word == free.plan.word
     assert result.cost == free.cost
 
 
+@pytest.mark.slow
 def test_a_zone_that_admits_nothing_is_gone_around():
     zone = Zone(shape=Box([1.0, 1.0], [3.0, 0.0]), max_speed=0.0)
-    result = plan(posed(ALONG, zone), time_limit=3.0)
+    result = plan(posed(ALONG, zone), time_limit=LIMIT)
     assert result.status is PlanStatus.FOUND, result.reason
     assert result.audit.passed
     assert result.cost > 6.0
@@ -71,23 +74,24 @@ def test_a_zone_that_admits_nothing_is_gone_around():
 
 def test_where_reverse_is_not_admitted_the_vehicle_turns_first():
     goal = [-4.0, 0.0, 0.0]
-    assert plan(posed(goal), time_limit=2.0).plan.word == ("back",)
+    assert plan(posed(goal), time_limit=LIMIT).plan.word == ("back",)
     everywhere = Zone(shape=Box([60.0, 60.0]), reverse=False)
-    result = plan(posed(goal, everywhere), time_limit=3.0)
+    result = plan(posed(goal, everywhere), time_limit=LIMIT)
     assert result.status is PlanStatus.FOUND, result.reason
     assert "back" not in result.plan.word
 
 
 def test_grip_limits_turns_at_speed():
     icy = Zone(shape=Box([60.0, 60.0]), max_lateral_acceleration=0.5)
-    result = plan(posed([3.0, 3.0, np.pi / 2], icy), time_limit=3.0)
+    result = plan(posed([3.0, 3.0, np.pi / 2], icy), time_limit=LIMIT)
     assert result.status is PlanStatus.FOUND, result.reason
     assert not {"left", "right"} & set(result.plan.word)
 
 
+@pytest.mark.slow
 def test_trims_can_be_named():
     only = Zone(shape=ACROSS, trims=["slow", "rest"])
-    result = plan(posed(ALONG, only), time_limit=3.0)
+    result = plan(posed(ALONG, only), time_limit=LIMIT)
     assert result.plan.word == ("fast", "slow", "fast")
 
 
@@ -131,13 +135,14 @@ def test_maneuvers_keep_to_zones_too():
     assert check_plan(problem, found, problem.goals[0]).passed
 
 
+@pytest.mark.slow
 def test_a_vehicle_with_inertia_slows_down():
     model_limit = Zone(shape=ACROSS, max_speed=0.5)
     problem = posed([6.0, 0.0, 0.0], model_limit, automaton=unicycle_automaton())
-    result = plan(problem, time_limit=4.0)
+    result = plan(problem, time_limit=LIMIT)
     assert result.status is PlanStatus.FOUND, result.reason
     assert result.audit.passed
-    assert result.cost > plan(replace_zones(problem), time_limit=2.0).cost
+    assert result.cost > plan(replace_zones(problem), time_limit=LIMIT).cost
 
 
 def replace_zones(problem: Problem) -> Problem:
@@ -166,14 +171,15 @@ def test_quickening_changes_no_path():
 
 def test_a_moved_problem_has_the_moved_plan():
     problem = posed(ALONG, Zone(shape=ACROSS, max_speed=0.5), horizon=Horizon(max_trims=4))
-    here = plan(problem, time_limit=5.0)
-    there = plan(problem.moved(SE2([3.0, -1.0, 0.8])), time_limit=5.0)
+    here = plan(problem, time_limit=LIMIT)
+    there = plan(problem.moved(SE2([3.0, -1.0, 0.8])), time_limit=LIMIT)
     assert there.plan.word == here.plan.word
     assert there.cost == pytest.approx(here.cost, abs=0.05)
 
 
+@pytest.mark.slow
 def test_zones_hold_in_closed_loop():
-    problem = posed(ALONG, Zone(shape=ACROSS, max_speed=0.5))
+    problem = posed(ALONG, Zone(shape=ACROSS, max_speed=0.5), search=SearchSettings())
     loop = simulate(problem, step=0.5, time_limit=1.5, steps=40)
     assert loop.reached, loop.reason
     assert all(audit.passed for audit in loop.audits)

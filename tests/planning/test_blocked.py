@@ -14,6 +14,7 @@ from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.planning.blocked import blocked_ends, why_goal_blocked
 from maneuver_automaton.problem import Bounds, Goal, Problem, SearchSettings
 from tests import scenes
+from tests.quickly import quick_are
 from tests.solids import clearance_at
 
 ROBOT, BODY = scenes.differential_robot(), Box([2.0, 1.0])
@@ -29,7 +30,7 @@ def is_outside(problem, pose):
     )
 
 
-@pytest.mark.parametrize("first", range(0, 300, 50))
+@pytest.mark.parametrize("first", quick_are([0], range(0, 300, 50)))
 def test_verdicts_agree_with_shapely(first):
     met = set()
     for seed in range(first, first + 50):

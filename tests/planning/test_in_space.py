@@ -54,6 +54,7 @@ def clearance(one, obstacle):
     return float(np.where(beside, aside - RADIUS, np.inf).min())
 
 
+@pytest.mark.slow
 def test_a_low_wall_is_flown_over_and_a_tower_round():
     free = found(BASE)
     over = found(replace(BASE, obstacles=(LOW,)))
@@ -69,6 +70,7 @@ def test_a_low_wall_is_flown_over_and_a_tower_round():
     assert clearance(other.plan, TOWER) > 0.0
 
 
+@pytest.mark.slow
 def test_a_margin_is_kept():
     result = found(replace(BASE, obstacles=(TOWER,), margin=0.3))
     assert clearance(result.plan, TOWER) >= 0.3 - 1e-6
@@ -83,6 +85,7 @@ def test_bounds_of_height_close_a_way():
     assert result.cost >= high.cost - 1e-9
 
 
+@pytest.mark.slow
 def test_an_occupancy_map_and_a_moving_obstacle():
     cells = np.random.default_rng(1).random((9, 12)) < 0.12
     found(replace(BASE, obstacles=(OccupancyMap(cells, resolution=0.25, origin=[3.0, -1.5, 0.3]),)))
@@ -94,6 +97,7 @@ def test_an_occupancy_map_and_a_moving_obstacle():
     assert clearance > 0.0
 
 
+@pytest.mark.slow
 def test_zones_hold_in_space():
     zone = Zone(shape=Box([1.0, 3.0], [4.0, 0.3]), trims=("up", "left up"))
     result = found(replace(BASE, zones=(zone,)))
@@ -104,6 +108,7 @@ def test_zones_hold_in_space():
         assert trim.name in zone.trims or not inside.any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["free heading", "several goals", "tolerance"])
 def test_goals_of_every_kind(what):
     goal = BASE.goals[0]
@@ -120,6 +125,7 @@ def test_goals_of_every_kind(what):
         assert result.terminal_error.position_m <= 0.3 + 1e-9
 
 
+@pytest.mark.slow
 def test_times_and_prices():
     scene = replace(BASE, obstacles=(TOWER,))
     fixed = found(replace(scene, horizon=Horizon(time=17.0)))
@@ -128,6 +134,7 @@ def test_times_and_prices():
     assert len(dear.plan.word) <= len(found(scene).plan.word)
 
 
+@pytest.mark.slow
 def test_a_longest_time_and_few_trims_are_kept():
     scene = replace(BASE, obstacles=(TOWER,))
     usual = found(scene)

@@ -53,6 +53,7 @@ def test_nothing_is_proven_of_other_verdicts_or_without_time():
         assert with_proof(late, Budget.from_now(seconds)) is late
 
 
+@pytest.mark.slow
 def test_no_plan_is_as_quick_as_the_horizon_admits():
     problem = among(WALL, cost=Cost(time=1.0))
     duration = plan(problem, time_limit=1.0).plan.duration
@@ -75,6 +76,7 @@ def test_work_that_nobody_can_stop_is_not_begun_late(monkeypatch, seconds, yield
             asked.append(work)
             yield Proof(value=0.0, optimal=False, cells=10**12, size=1.0, work=work)
 
+    lower_bound.load_proofs()  # proves something itself, the first time
     monkeypatch.setattr(lower_bound, "proofs_of", proofs_of)
     problem = dataclasses.replace(bend(3.2), horizon=Horizon(max_time=1e3))
     assert too_long(problem, Budget.from_now(seconds)) == ""

@@ -39,6 +39,7 @@ def posed(**changes):
     return Problem(ROBOT, [0.0, 0.0, 0.0], GOAL, **values)
 
 
+@pytest.mark.slow
 @compiled_only
 @needs_casadi
 def test_all_of_a_fixed_time_is_used_where_effort_is_priced():
@@ -51,6 +52,7 @@ def test_all_of_a_fixed_time_is_used_where_effort_is_priced():
     assert slow.plan.duration == pytest.approx(1.5 * quick.plan.duration, rel=1e-9)
 
 
+@pytest.mark.slow
 @compiled_only
 @needs_casadi
 def test_a_user_s_cost_is_polished_in_time():

@@ -31,6 +31,7 @@ def unpolished(problem):
         return plan(problem, time_limit=60.0)
 
 
+@pytest.mark.slow
 def test_a_trailer_without_maneuvers_is_led_by_paths_of_its_car():
     """Behind a wall that a library of rest alone leads past by no word."""
     trailer = {"trailer": (Box([3.2, 1.7], [-0.2, 0.0]), Box([0.4, 2.0], [-1.5, 0.0]))}
@@ -74,6 +75,7 @@ def test_a_fixed_time_is_kept_under_way_and_its_effort_falls():
     assert result.cost < 0.5 * unpolished(problem).cost
 
 
+@pytest.mark.slow
 def test_a_body_of_several_parts_is_polished_between_posts():
     """A shelf stands out to its sides, and its nose is round."""
     body = (CAR, Box([0.6, 2.6], [2.0, 0.0]), Disc(0.9, [3.2, 0.0]))

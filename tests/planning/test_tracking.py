@@ -92,6 +92,7 @@ class TestTrack:
         found = track(problem(cage), budget=Budget.from_now(20.0), max_expansions=10)
         assert (found.plan, found.reason) == (None, "no plan was found in the time given")
 
+    @pytest.mark.slow
     def test_a_fixed_time_is_filled_with_rest(self):
         found = track(problem(WALL, horizon=Horizon(time=20.0)), budget=Budget.from_now(20.0))
         assert found.plan is not None

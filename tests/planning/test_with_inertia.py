@@ -21,6 +21,7 @@ from maneuver_automaton.primitives import Maneuver
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.search.insertion import search_insertion
 from tests.inertia import CAR, resting, unicycle_automaton
+from tests.quickly import quick_are
 
 BODY = Box([4.689, 1.942], [1.4155, 0.0])
 SLOT = (
@@ -76,6 +77,7 @@ def test_costs_fall_and_the_first_plan_stops_and_steers():
     assert result.cost == costs[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not has_casadi(), reason="polishing needs CasADi")
 def test_polishing_makes_it_quick():
     """10.19 s by polishing, more than 20 s by stopping and steering."""
@@ -103,6 +105,7 @@ def test_a_moved_problem_has_the_moved_plan():
     assert other.terminal_error.position_m < 1e-9
 
 
+@pytest.mark.slow
 def test_a_fixed_time_is_filled_with_rest():
     problem = parking(horizon=Horizon(time=60.0))
     result = plan(problem, time_limit=2.0)
@@ -173,7 +176,7 @@ FREE = {
 
 
 @pytest.mark.parametrize("cost", [Cost(effort=1.0), Cost(length=1.0)], ids=["effort", "length"])
-@pytest.mark.parametrize("name", FREE)
+@pytest.mark.parametrize("name", quick_are(["single_track"], FREE))
 def test_words_come_first_where_nothing_is_in_the_way(name, cost):
     """No plan is dearer than what the search over words finds by itself."""
     problem = replace(FREE[name], cost=cost)
@@ -183,7 +186,7 @@ def test_words_come_first_where_nothing_is_in_the_way(name, cost):
     assert result.cost <= words.solutions[0].cost * (1.0 + 1e-9)
 
 
-@pytest.mark.parametrize("name", FREE)
+@pytest.mark.parametrize("name", quick_are(["hovercraft"], FREE))
 def test_counted_work_gives_the_same_plan_and_the_moved_one(name):
     problem = replace(FREE[name], obstacles=(Obstacle(Box([0.5, 0.5], [300.0, 50.0])),))
     one, again = plan(problem, time_limit=90.0), plan(problem, time_limit=90.0)
@@ -197,6 +200,7 @@ def test_counted_work_gives_the_same_plan_and_the_moved_one(name):
     np.testing.assert_allclose((by @ SE2(one.plan.end)).pose, moved.plan.end, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_alternatives_are_other_motions():
     problem = FREE["hovercraft"]
     result = plan(problem, time_limit=60.0, alternatives=3)

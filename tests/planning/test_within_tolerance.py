@@ -14,6 +14,7 @@ from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from tests import scenes
+from tests.quickly import quick_are
 from tests.search.cases import TABLE_2, robot
 from tests.solids import check_plan
 
@@ -67,7 +68,7 @@ def test_a_tolerance_is_used_in_free_space(name):
     assert both.cost <= min(near.cost, turned.cost) + 1e-6
 
 
-@pytest.mark.parametrize("name", ["unicycle", "car", "dubins"])
+@pytest.mark.parametrize("name", quick_are(["unicycle"], ["unicycle", "car", "dubins"]))
 def test_a_tolerance_is_used_among_obstacles(name):
     body = {"obstacles": [STONE], "footprint": Box([0.4, 0.3])}
     exact, near = found(to_goal(name, **body)), found(to_goal(name, FAR, TURNED, **body))
@@ -106,6 +107,7 @@ def test_other_conditions_hold_too(horizon):
     assert min(lasting) >= horizon.min_coast - 1e-9
 
 
+@pytest.mark.slow
 def test_a_blocked_goal_is_reached_beside_it():
     on_it = Disc(0.05, [4.5, 1.0])
     exact = to_goal("car", obstacles=[on_it], footprint=Disc(0.1))
@@ -133,6 +135,7 @@ def test_unreachable_exactly_but_within_tolerance():
     assert verdict.status is PlanStatus.UNREACHABLE  # the heading is beyond the tolerance
 
 
+@pytest.mark.slow
 def test_alternatives_end_within_too():
     result = found(to_goal("car", FAR, TURNED), alternatives=2)
     assert len(result.alternatives) == 2

@@ -184,6 +184,7 @@ def test_a_flight_shows_its_altitude():
     ]
 
 
+@pytest.mark.slow
 @compiled_only
 def test_a_loop_with_maneuvers_is_drawn_with_all_it_drove(tmp_path):
     problem = Problem(unicycle_automaton(), [0.0, 0.0, 0.0], [3.0, 0.5, 0.2])

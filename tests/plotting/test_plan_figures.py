@@ -25,11 +25,12 @@ from tests.plotting.cases import (
     result_of,
     slalom_problem,
 )
+from tests.quickly import quick_are
 
 CAR = {"rectangle_m": [0.9, 0.5], "reference_m": [-0.2, 0.0]}
 
 
-@pytest.mark.parametrize("footprint", [None, CAR, [{"disc_m": 0.2}, CAR]])
+@pytest.mark.parametrize("footprint", quick_are([CAR], [None, CAR, [{"disc_m": 0.2}, CAR]]))
 @pytest.mark.parametrize(
     "plan",
     [
@@ -100,6 +101,7 @@ def test_expanded_nodes_are_drawn_on_request(columns, tmp_path):
         save_plan_figure(result_of(parking_plan()), tmp_path / "plan.png", nodes=nodes[:, :2])
 
 
+@pytest.mark.slow
 def test_the_same_result_gives_the_same_bytes(tmp_path):
     plan = parking_plan()
     result = dataclasses.replace(result_of(plan), problem=slalom_problem(plan))

@@ -19,6 +19,7 @@ from maneuver_automaton.receding_horizon import (
     RecedingHorizon,
     simulate,
 )
+from tests.quickly import quick_are
 from tests.receding_horizon.loops import assert_same_steps, totals
 from tests.receding_horizon.scenes import (
     among,
@@ -46,6 +47,7 @@ def assert_free(loop) -> None:
 
 
 class TestWaitingAndEvading:
+    @pytest.mark.slow
     def test_as_predicted_the_first_plan_is_driven_and_its_value_falls(self):
         loop = simulate(among(crossing()), step=0.5)
         assert loop.reached
@@ -55,6 +57,7 @@ class TestWaitingAndEvading:
         assert (total[1:] <= total[:-1] + 1e-8).all()
         assert loop.cost < 7.0
 
+    @pytest.mark.slow
     def test_what_stands_on_the_goal_is_waited_for(self):
         loop = simulate(among(on_the_goal()), step=0.5, time_limit=0.3)
         assert loop.reached
@@ -62,6 +65,7 @@ class TestWaitingAndEvading:
         assert set(deeds(loop)[:10]) <= set(WAITING)
         assert 12.0 < loop.times[-1] < 14.0
 
+    @pytest.mark.slow
     def test_a_door_that_opens_is_waited_for(self):
         problem = among(*door(), bounds=Bounds(x=(-2, 8), y=(-5, 5)))
         loop = simulate(problem, step=0.5, time_limit=0.3)
@@ -69,6 +73,7 @@ class TestWaitingAndEvading:
         assert_free(loop)
         assert loop.times[-1] < 14.0
 
+    @pytest.mark.slow
     def test_the_goal_is_left_to_what_passes_over_it(self):
         # it could be there after 6 s, and 1.2 s later would be hit
         passing = moving_obstacle([0.0, 7.0, 13.0], [(6.0, -7.0), (6.0, -1.0), (6.0, 5.0)])
@@ -84,6 +89,7 @@ class TestWaitingAndEvading:
         loop = simulate(among(passing), step=0.5, stand=0.5)
         assert loop.times[-1] == pytest.approx(6.0)
 
+    @pytest.mark.slow
     def test_at_the_goal_it_makes_room_and_comes_back(self):
         passing = moving_obstacle([0.0, 14.0, 22.0], [(6.0, -9.0), (6.0, -4.0), (6.0, 4.0)])
         loop = simulate(among(passing), step=0.5, steps=60, stay=True)
@@ -98,18 +104,20 @@ class TestWaitingAndEvading:
         assert loop.reached
         assert_free(loop)
 
+    @pytest.mark.slow
     def test_what_cannot_stop_goes_round_until_the_goal_is_free(self):
         loop = simulate(among(on_the_goal(), robot=cannot_stop()), step=0.5, look_ahead=20.0)
         assert loop.reached
         assert_free(loop)
         assert loop.times[-1] > 12.0
 
-    @pytest.mark.parametrize("seed", range(4))
+    @pytest.mark.parametrize("seed", quick_are([0], range(4)))
     def test_a_scene_of_a_dozen(self, seed):
         loop = simulate(moving_scene(seed), step=1.0, time_limit=2.0)
         assert loop.reached
         assert_free(loop)
 
+    @pytest.mark.slow
     def test_a_fixed_time_is_exceeded_where_waiting_takes_longer(self):
         problem = among(
             on_the_goal(), goal=[6.0, 0.0, 0.0], cost=Cost(effort=1.0), horizon=Horizon(time=10.0)
@@ -161,6 +169,7 @@ class TestPredictions:
         _, fourth = controller.step(third.predicted, obstacles=[])
         assert fourth.value < third.value - 0.5
 
+    @pytest.mark.slow
     def test_the_time_of_the_world_goes_on(self):
         late = replace(
             among(moving_obstacle([50.0, 56.0], [(3.0, -3.0), (3.0, 3.0)])), start_time=50.0
@@ -182,6 +191,7 @@ class TestHarm:
         assert next(loop.collisions)[0] == 0
         assert deeds(loop)[-1] is not Deed.MITIGATED
 
+    @pytest.mark.slow
     def test_it_is_put_off_as_long_as_can_be(self):
         faster = moving_obstacle([0.0, 9.0], [(-4.0, 0.0), (14.0, 0.0)], Box([0.2, 40.0]))
         loop = simulate(among(faster, goal=[-9.0, 0.0, 0.0]), step=0.5, steps=6)
@@ -198,6 +208,7 @@ def test_a_moved_scene_has_the_moved_loop():
     assert (move @ SE2(one.poses)).pose == pytest.approx(two.poses, abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("after", [2, 8])
 def test_a_loop_goes_on_from_its_file(tmp_path, after):
     problem = among(on_the_goal(6.0))

@@ -135,6 +135,7 @@ def test_a_margin_keeps_the_known_word():
     assert not any(step.replanned for step in loop.steps)
 
 
+@pytest.mark.slow
 def test_among_obstacles_only_free_plans_are_driven():
     problem = posed(
         [4.0, 0.0, 0.0], obstacles=[Box([0.5, 2.0], [2.0, 0.0])], footprint=Box([0.4, 0.3])
@@ -196,6 +197,7 @@ def test_what_makes_no_sense_is_refused(changed, asked, message):
     assert str(error.value).startswith(message)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.0, 0.003])
 def test_a_plan_that_ends_within_the_tolerance_is_kept(noise):
     """In a zone a vehicle without inertia ends where it likes within the goal's tolerance."""
@@ -223,6 +225,7 @@ def test_at_first_a_planner_has_all_the_time_where_there_are_zones(monkeypatch):
     assert step.deed is Deed.PLANNED
 
 
+@pytest.mark.slow
 def test_told_to_stay_it_comes_back_when_it_is_pushed_out():
     push = Disturbance(pushes={12: (0.2, 0.0, 0.0)})
     loop = simulate(posed(NEAR), step=0.5, steps=30, time_limit=5.0, stay=True, disturbance=push)
@@ -282,6 +285,7 @@ def test_the_fail_safe_trajectory_looks_ahead_as_far_as_is_asked(look_ahead, sto
     assert step.plan.primitives[0].name == begun.plan.primitives[0].name  # is finished
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["stops and steers", "polished"])
 def test_a_loop_with_motions_of_its_own_goes_on_from_its_file(robot, tmp_path):
     """Neither strokes nor what polishing finds is in the library: the log tells their courses."""
@@ -325,6 +329,7 @@ def crossing(begin=1.0, lasting=6.0, *, radius=0.4):
     return Obstacle(Disc(radius), motion=motion)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("begin", [0.0, 1.5, 3.0])
 def test_past_a_moving_obstacle_nothing_is_hit(begin):
     problem = posed(

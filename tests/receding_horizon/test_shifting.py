@@ -11,11 +11,12 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import SE2, group_of
 from maneuver_automaton.receding_horizon.shifting import NOTHING, commute, costliest_first, rest_of
 from tests.compare import assert_same_motion
+from tests.quickly import draws
 from tests.search.cases import TABLE_2, helicopter, robot
 
 TRIMS = robot(TABLE_2 | {"back": (-0.5, 0.0), "slow spin": (0.0, 0.1), "wide": (1.5, 0.3)}).trims
 FLYING = helicopter().trims
-FEW = settings(max_examples=60)
+FEW = settings(max_examples=draws(60))
 
 
 def plan_of(trims, *names, durations, start=(0.0, 0.0, 0.0)) -> Plan:

@@ -22,6 +22,7 @@ from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word
 from tests import scenes
+from tests.quickly import quick_are
 from tests.reference import plain_end
 from tests.reference_collision import driven
 from tests.solids import World, outside
@@ -98,7 +99,7 @@ def assert_admitted(query, word, *, first=False):
         pose, now = way[-1], now + duration
 
 
-@pytest.mark.parametrize("name", PROBLEMS)
+@pytest.mark.parametrize("name", quick_are(list(PROBLEMS)[:4], PROBLEMS))
 def test_never_worse_always_admitted(name):
     query, first, incumbents, better = improved(name)
     costs = [first.cost, *(word.cost for word in incumbents)]
@@ -138,6 +139,7 @@ def incumbents_until(deadline, name="car"):
     return incumbents
 
 
+@pytest.mark.slow
 def test_less_time_gives_the_beginning_of_what_more_time_gives():
     improved("car")
     whole = incumbents_until(math.inf)

@@ -91,6 +91,7 @@ def off_goal(plan, goal):
     return float(np.abs(off).max())
 
 
+@pytest.mark.slow
 def test_plans_are_exact_free_inside_and_cheaper_one_by_one():
     here = query()
     result = search_maneuvers(here, max_expansions=600)
@@ -245,6 +246,7 @@ def test_wrong_queries_are_refused():
         posed(linked([[0.0] * 3, [1.0, 0, 0]]), START, GOAL, trims=("t0", "t0"))
 
 
+@pytest.mark.slow
 def test_a_switch_at_rest_proves_nothing():
     """Beside a wall, behind a switch of trims that takes no time, motions are looked at too."""
     automaton, trailer = truck_with_trailer(levels=3), Box([0.3, 0.25])

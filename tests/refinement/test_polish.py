@@ -206,6 +206,7 @@ def test_what_is_not_accepted_is_not_returned() -> None:
     assert result.reason == "what was found is not accepted"
 
 
+@pytest.mark.slow
 def test_gear_sequences_differ_and_come_in_order() -> None:
     car = car_library(wheelbase=2.8, max_steering=0.75)
     slot = [Box([4.689, 1.942], [x, 0.0]) for x in (-5.0, 8.0)]
@@ -247,6 +248,7 @@ def is_free(motion) -> bool:
     return not shapely.intersects(shapely.polygons(corners), shapely.box(6.9, -1.4, 9.9, 0.6)).any()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not has_casadi(), reason="polishing needs CasADi")
 def test_what_the_solver_did_not_finish_counts_if_it_is_sound() -> None:
     """Thirty iterations of fifty lead near the best motion, which was thrown away."""
@@ -299,6 +301,7 @@ def test_a_change_of_direction_by_millimetres_is_none_that_a_plan_keeps() -> Non
     assert without_shuffles(model, motion, 1e-6) is None  # all of its stretches are longer
 
 
+@pytest.mark.slow
 def test_what_closing_leads_beyond_a_limit_is_solved_with_more_room(monkeypatch) -> None:
     """Controls move a little once the end is closed, and states that follow from them add up."""
     refused = []

@@ -16,6 +16,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Car, Unicycle, UserModel
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.refinement.retiming import retime, shared_time
+from tests.quickly import draws
 
 MATRIX = np.array([[4.0, -1.5], [-1.5, 1.0]])
 CONTROLS = {
@@ -85,7 +86,7 @@ def test_a_moved_plan_has_the_moved_retiming(plan, cost, seed):
     assert there.cost_after == pytest.approx(here.cost_after, rel=1e-13)
 
 
-@settings(max_examples=40)
+@settings(max_examples=draws(40))
 @given(plan=plans, cost=costs, room=st.floats(1.02, 2.0), seed=st.integers(0, 1000))
 def test_with_limits_a_general_optimiser_finds_the_same(plan, cost, room, seed):
     rng = np.random.default_rng(seed)

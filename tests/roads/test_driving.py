@@ -100,6 +100,7 @@ def test_a_car_at_rest_with_no_way_on_stands_and_says_so(tmp_path):
     assert len(drive.steps) == 40
 
 
+@pytest.mark.slow
 def test_a_goal_behind_the_start_is_reached_around_a_loop(tmp_path):
     halves = [np.linspace(a, a + np.pi, 33) for a in (-0.5 * np.pi, 0.5 * np.pi)]
     inner, outer = (

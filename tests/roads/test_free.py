@@ -24,6 +24,7 @@ from maneuver_automaton.roads import (
     drivable_area,
 )
 from maneuver_automaton.roads.clearing import clearing_of
+from tests.quickly import draws
 
 TICK = 0.1
 OFF_EDGE, OFF_TRAFFIC = 0.03, 0.05
@@ -98,7 +99,7 @@ drives = st.tuples(
 CLEARING = clearing()
 
 
-@settings(max_examples=150)
+@settings(max_examples=draws(150))
 @given(drive=drives)
 def test_what_is_proven_free_is_free_and_what_is_not_is_near_something(drive):
     x, y, heading, speed, steering, acceleration, rate, tick = drive

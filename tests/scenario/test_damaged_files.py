@@ -21,6 +21,7 @@ from tests.formats import (
     test_sbpl_cfg,
     test_tpcap,
 )
+from tests.quickly import draws
 from tests.scenario.files import SCENARIO
 from tests.scenario.test_loading import BESIDE
 from tests.scenario.test_obstacles import WORLD
@@ -94,7 +95,7 @@ def test_it_is_a_problem_or_one_line(folder, name):
     beside = None if loaded in ALONE else folder / "beside.yaml"
     case = 0 if loaded.endswith("scen") else None
 
-    @settings(max_examples=60)
+    @settings(max_examples=draws(60))
     @given(damages(content))
     def tried(damaged: bytes) -> None:
         (folder / name).write_bytes(damaged)

@@ -113,6 +113,7 @@ def test_a_wall_across_every_altitude_exhausts_the_search():
     assert search_maneuvers(query, max_expansions=20000).best is None
 
 
+@pytest.mark.slow
 def test_plans_get_cheaper_and_pass_every_check():
     town = [
         (14.0, 8.0, 10.0, 12.0, 0.1, 14.0), (20.0, -14.0, 12.0, 10.0, -0.2, 30.0),

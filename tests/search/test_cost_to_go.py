@@ -94,6 +94,7 @@ def test_what_is_its_own_mirror_image(automaton, cost, mirrored):
     assert library.mirrored is mirrored
 
 
+@pytest.mark.slow
 def test_a_library_that_is_no_mirror_image_has_a_table_that_is_none():
     table = cost_to_go_table(Problem(controls(**TABLE_2), [0, 0, 0], [1, 0, 0]), reach=1.0)
     value = table.value
@@ -189,6 +190,7 @@ def test_nothing_is_left_behind_when_writing_fails(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_two_processes_at_once_keep_one_whole_table(tmp_path):
     order = (
         "from tests.search.test_cost_to_go import kept_in; from pathlib import Path; import sys;"

@@ -33,6 +33,7 @@ from maneuver_automaton.search.shortening import shortened
 from maneuver_automaton.search.timed_word import TimedWord
 from tests import reference
 from tests.inertia import unicycle_automaton
+from tests.quickly import quick_are
 from tests.search.cases import (
     DUBINS,
     INTERPRETED,
@@ -445,6 +446,7 @@ json.dump(answers, sys.stdout)
 """
 
 
+@pytest.mark.slow
 @compiled_only
 def test_interpreted_kernels_give_the_compiled_results():
     answers = {}
@@ -484,7 +486,7 @@ def test_a_moved_problem_has_the_moved_word_under_a_limit(start, most):
 
 
 @compiled_only
-@pytest.mark.parametrize("size", [1.0, 1e-4, 1e-7])
+@pytest.mark.parametrize("size", quick_are([1.0, 1e-4], [1.0, 1e-4, 1e-7]))
 def test_the_end_is_exact_however_near_the_goal(size):
     goal = np.array([0.3, 0.2, 0.5]) * size
     library = Automaton.of_grid(Unicycle(), [AXIS, AXIS])

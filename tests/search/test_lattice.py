@@ -33,6 +33,7 @@ from maneuver_automaton.search.lattice_task import Resolution, task_of
 from maneuver_automaton.words.transitions import SWITCH
 from tests import scenes
 from tests.collision.scenes import random_map
+from tests.quickly import quick_are
 from tests.reference import plain_end
 from tests.reference_collision import driven
 from tests.search.cases import compiled_only
@@ -96,7 +97,7 @@ def in_the_problem(query, nodes):
 TIGHT = Resolution(truncated=True, scale=0.5, durations=0.5, stop=False)
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("sign", quick_are([1.0], [1.0, -1.0]))
 @pytest.mark.parametrize("resolution", [Resolution(stop=False), TIGHT])
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_nodes_are_ends_of_free_ways(name, resolution, sign):
@@ -211,6 +212,7 @@ for name in ("robot", "prices", "map"):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not COMPILED, reason="compares compiled kernels with these")
 def test_compiled_and_not_the_first_plan_is_the_same_to_the_last_bit():
     said = [
@@ -224,6 +226,7 @@ def test_compiled_and_not_the_first_plan_is_the_same_to_the_last_bit():
     assert said[0] == said[1]
 
 
+@pytest.mark.slow
 def test_who_waits_until_contact_is_still_somewhere():
     order = "from tests.search.test_lattice import *; grown(PROBLEMS['moving'], one=TIGHT, n=15)"
     done = subprocess.run(

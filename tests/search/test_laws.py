@@ -111,6 +111,7 @@ def test_insertion_is_never_cheaper_than_an_exhaustive_search(start, cost):
         assert inserted.cost > exhaustive.cost - 1e-7
 
 
+@pytest.mark.slow
 @SEARCHES
 @FEW
 @given(start=NEAR, factor=st.sampled_from([0.5, 3.0]))

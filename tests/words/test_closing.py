@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.words.closing import EndConditions, closed_at, closest_times
+from tests.quickly import draws
 from tests.reference import plain_end
 
 TWISTS = np.array([[1, 0, 0.5], [1, 0, 0], [-1, 0, 0.25], [0, 0, 1], [0.5, 0.3, -0.8]], dtype=float)
@@ -27,7 +28,7 @@ def end_of(start, twists, durations):
     free_heading=st.booleans(),
     far=st.sampled_from([0.0, 1e3, 1e6]),
 )
-@settings(max_examples=150)
+@settings(max_examples=draws(150))
 def test_what_is_nearly_there_gets_there(word, seed, free_heading, far):
     rng = np.random.default_rng(seed)
     twists = TWISTS[word]
@@ -94,7 +95,7 @@ CLIMBING = np.column_stack([TWISTS, [0.2, 0.0, -0.3, 0.1, 0.0]])
 
 
 @given(seed=st.integers(0, 10**6), fixed=st.booleans())
-@settings(max_examples=100)
+@settings(max_examples=draws(100))
 def test_altitude_and_the_sum_of_times_are_met_too(seed, fixed):
     rng = np.random.default_rng(seed)
     twists = CLIMBING[[0, 2, 3, 1, 4, 0]]

@@ -19,6 +19,7 @@ from maneuver_automaton.words._kernels_times import (
 )
 from maneuver_automaton.words.conjugation import conjugated
 from tests import reference
+from tests.quickly import draws
 
 EVERYDAY = st.floats(-3.0, 3.0)
 TINY = st.floats(-1e-7, 1e-7)
@@ -55,7 +56,7 @@ def words(draw, dof=4, least=1):
     return twists, times, displacements
 
 
-@settings(max_examples=50)
+@settings(max_examples=draws(50))
 @given(words())
 def test_kernel_agrees_on_the_end_with_displacements(word):
     twists, times, displacements = word
@@ -76,7 +77,7 @@ def test_the_least_of_all_turn_rates_is_a_straight():
     assert end[0] == 1.5
 
 
-@settings(max_examples=50)
+@settings(max_examples=draws(50))
 @given(words())
 def test_columns_are_the_derivatives_of_the_end(word):
     twists, times, _ = word
@@ -94,7 +95,7 @@ def test_hessian_is_the_derivative_of_the_columns(word, p_x, p_y):
     assert hessian == pytest.approx(expected, abs=1e-3)
 
 
-@settings(max_examples=50)
+@settings(max_examples=draws(50))
 @given(words(), st.floats(0.0, 1.0))
 def test_a_trim_cut_in_two_ends_in_the_same_place(word, share):
     twists, times, _ = word
