@@ -108,7 +108,13 @@ def _text(
         cost_function=solution.CostFunction[cost_function],
         trajectory=trajectory,
     )
-    name = ScenarioID.from_benchmark_id(benchmark.scenario, benchmark.version)
+    try:
+        name = ScenarioID.from_benchmark_id(benchmark.scenario, benchmark.version)
+    except ValueError as error:
+        raise ValueError(
+            f"CommonRoad solution: the scenario is named {benchmark.scenario!r}, need a benchmark's"
+            f" name such as DEU_Ffb-1_6_T-1: {error}"
+        ) from error
     whole = solution.Solution(scenario_id=name, planning_problem_solutions=[answer], date=None)
     return str(solution.CommonRoadSolutionWriter(whole).dump())
 

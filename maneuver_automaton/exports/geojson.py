@@ -84,7 +84,7 @@ def _features(shown: Shown) -> Iterator[dict[str, Any]]:
 
 def _path(shown: Shown) -> Iterator[dict[str, Any]]:
     driven, track = shown.driven, shown.track
-    places = _places(track.pose)
+    places = _places(np.concatenate([track.pose, driven.end[None]]))  # pushed, it ends elsewhere
     length = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
     facts = {"duration_s": driven.duration, "length_m": length, "cost": driven.cost}
     yield _feature(_line(places), kind="path", **facts)

@@ -15,6 +15,7 @@ from maneuver_automaton.collision import Obstacle, OccupancyMap
 from maneuver_automaton.errors import MissingExtra
 from maneuver_automaton.exports.driven import driven_of
 from maneuver_automaton.exports.surroundings import Shown, shown_of, solid, solid_map
+from maneuver_automaton.plotting.bodies import SWEPT
 from maneuver_automaton.plotting.colors import Color
 from maneuver_automaton.plotting.motions import track_colors
 from maneuver_automaton.plotting.obstacles import MOVING, SOLID
@@ -139,7 +140,7 @@ def _log_motion(log: _Log, shown: Shown, rows: PlanArrays) -> None:
         )
     swept = merged([one for _, body, part in shown.parts for one in swept_region(part, body)])
     if rings := [ring for one in swept for ring in _rings(one, 0.0)]:
-        log.fixed(f"{WORLD}/swept", log.outlines(rings, EGO))
+        log.fixed(f"{WORLD}/swept", log.outlines(rings, SWEPT))
     problem = shown.driven.problem
     low, high = (0.0, 0.0) if problem is None else problem.body_height
     for name, body, part in shown.parts:
@@ -220,7 +221,8 @@ def _blueprint(views: Any) -> Any:
                 row_shares=[3, 1],
             ),
             column_shares=[2, 1],
-        )
+        ),
+        collapse_panels=True,
     )
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from maneuver_automaton._files import PART
 from maneuver_automaton.errors import MissingExtra
-from maneuver_automaton.exports.ros_messages import NANO, STEP, TYPES, ros_messages
+from maneuver_automaton.exports.messages import NANO, STEP, TYPES, ros_messages
 
 if TYPE_CHECKING:
     from maneuver_automaton.exports.driven import Exportable
