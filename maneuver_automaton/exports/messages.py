@@ -86,7 +86,8 @@ def ros_messages(
     driven = driven_of(value, model=model)
     rows = driven.rows(step=step)
     since = rows.time - rows.time[0]
-    stamps = [_time(stamp + one) for one in since.tolist()]
+    begin = round(stamp * NANO)  # whole: today's seconds leave a float no nanoseconds
+    stamps = [_time(one, begin) for one in since.tolist()]
     headers = [{"stamp": one, "frame_id": frame} for one in stamps]
     frames = [(body_frame, rows.pose), *_carried(driven, rows)]
     poses, twists = _poses(rows.pose), _twists(rows.twist)
@@ -241,7 +242,7 @@ def _twists(twist: Array) -> list[Message]:
     ]
 
 
-def _time(seconds: float) -> Message:
-    """A builtin_interfaces/Time or Duration."""
-    sec, nanosec = divmod(round(seconds * NANO), NANO)
+def _time(seconds: float, begin: int = 0) -> Message:
+    """A builtin_interfaces/Time or Duration: seconds since `begin` [ns]."""
+    sec, nanosec = divmod(begin + round(seconds * NANO), NANO)
     return {"sec": sec, "nanosec": nanosec}
