@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.models import Model
 
 SINGLE = ("path", "trajectory")  # topics of one message, at the beginning
-METADATA = "metadata.yaml"
+METADATA, STORED = "metadata.yaml", (".db3", ".mcap")  # what is in a bag
 VERSION: Literal[8] = 8  # of metadata.yaml: Humble and all later ones read it, 9 Humble does not
 # Source: ackermann_msgs, by J. O'Quin; the one package among these that is not part of ROS itself.
 ACKERMANN = {
@@ -46,8 +46,8 @@ def save_ros2_bag(
 ) -> None:
     """Write a plan, a closed loop or a drive as a bag of ROS 2, a folder with SQLite inside.
 
-    ``ros2 bag play`` and Foxglove play it: the topics are those of `ros_messages`, with a slash
-    before, the one `/path` and `/trajectory` at the beginning and latched.
+    ``ros2 bag play`` and Foxglove play it. The topics are those of `ros_messages`, each with a
+    slash before its name; `/path` and `/trajectory` come first, and are latched.
 
     Parameters
     ----------
@@ -86,9 +86,7 @@ def save_ros2_bag(
     beside.mkdir(parents=True)
     try:
         _write(messages, beside / folder.name)
-        if folder.exists():
-            folder.rename(beside / "old")
-        (beside / folder.name).rename(folder)
+        _replace(folder, by=beside / folder.name, old=beside / "old")
     finally:
         shutil.rmtree(beside, ignore_errors=True)
 
@@ -98,8 +96,21 @@ def _check_free(folder: Path) -> None:
         return
     if not folder.is_dir():
         raise FileExistsError(17, "is a file, need a folder for a bag", str(folder))
-    if any(folder.iterdir()) and not (folder / METADATA).is_file():
+    if any(one.name != METADATA and one.suffix not in STORED for one in folder.iterdir()):
         raise FileExistsError(17, "is a folder with other files, need a new one", str(folder))
+
+
+def _replace(folder: Path, *, by: Path, old: Path) -> None:
+    """Put a folder in the place of another; where that fails, the old one stays."""
+    there = folder.exists()
+    if there:
+        folder.rename(old)
+    try:
+        by.rename(folder)
+    except OSError:
+        if there:
+            old.rename(folder)
+        raise
 
 
 def _write(messages: dict[str, Any], folder: Path) -> None:
