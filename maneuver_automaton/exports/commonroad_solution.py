@@ -56,6 +56,15 @@ def save_commonroad_solution(
         CommonRoad's, or the cost function is unknown.
     OSError
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.automaton import Plan
+    >>> try:
+    ...     save_commonroad_solution(Plan([0, 0, 0], (), durations=[]), "solution.xml")
+    ... except ValueError as error:
+    ...     print(str(error).split(",")[0])
+    CommonRoad solution: got no drive on a CommonRoad scenario
     """
     driven = driven_of(value)
     if driven.scene is None or driven.vehicle is None or driven.scene.benchmark is None:

@@ -56,6 +56,14 @@ def save_rerun(value: Exportable, path: Path | str, *, step: float = STEP) -> No
         If a result has no plan, or `step` is not positive.
     OSError
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.automaton import Plan
+    >>> from maneuver_automaton.primitives import Trim
+    >>> ahead = Trim(name="ahead", body_velocity=[1.0, 0.0, 0.0], control=[1.0])
+    >>> plan = Plan([0, 0, 0], (ahead,), durations=[2.0])
+    >>> save_rerun(plan, getfixture("tmp_path") / "plan.rrd")  # doctest: +SKIP
     """
     try:
         import rerun

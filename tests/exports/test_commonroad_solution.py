@@ -104,7 +104,14 @@ def test_the_extra_is_named_where_it_is_missing(monkeypatch, tmp_path):
 
 @needs_data
 @quiet
-@pytest.mark.parametrize("name", ["DEU_Ffb-1_6_T-1", "USA_US101-1_1_S-1", "ZAM_Urban-3_1"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("DEU_Ffb-1_6_T-1", marks=pytest.mark.slow),
+        pytest.param("USA_US101-1_1_S-1", marks=pytest.mark.slow),
+        "ZAM_Urban-3_1",
+    ],
+)
 def test_the_official_checker_accepts_what_was_driven(name, tmp_path):
     pytest.importorskip("commonroad_dc")
     judges = pytest.importorskip(
