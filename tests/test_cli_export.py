@@ -159,6 +159,27 @@ def test_the_scenario_of_another_start_is_refused(plan, tmp_path, capsys):
     )
 
 
+def test_a_road_is_not_the_scenario_of_a_loop(loop, road, capsys):
+    asked = ["export", str(loop), "--to", "csv", "--with", str(road / "road.xml")]
+    assert run(asked) == 2
+    assert capsys.readouterr().err == (
+        f"{loop}: is a closed loop, but the scenario of --with is a road; need its own\n"
+    )
+
+
+@pytest.mark.parametrize("kind", ["csv", "geojson", "rerun", "ros2"])
+def test_a_place_that_cannot_be_written_is_told(plan, kind, tmp_path, capsys):
+    pytest.importorskip({"rerun": "rerun", "ros2": "rosbags"}.get(kind, "csv"))
+    (tmp_path / "file").write_text("")
+    ending = {"rerun": ".rrd", "ros2": ""}.get(kind, f".{kind}")
+    out = tmp_path / "file" / f"plan{ending}"
+    assert run(["export", str(plan), "--to", kind, "--out", str(out)]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith(str(tmp_path / "file"))
+    assert err.count("\n") == 1
+    assert "internal error" not in err
+
+
 @pytest.mark.parametrize("change", [{"steps": []}, {"steps": None}, {"step_s": "x"}])
 def test_a_damaged_drive_is_told_in_one_line(road, change, tmp_path, capsys):
     path = tmp_path / "closed_loop.json"

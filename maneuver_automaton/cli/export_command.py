@@ -53,7 +53,7 @@ def export(
     except OSError as error:
         if isinstance(error, ManeuverAutomatonError):
             raise
-        raise not_written(Path(error.filename or path), error) from error
+        raise not_written(path, error) from error
     except ValueError as error:
         if isinstance(error, ManeuverAutomatonError):
             raise

@@ -113,6 +113,8 @@ def _road_drive(loop: Mapping[str, Any], road: RoadScenario) -> Plan:
     from maneuver_automaton.roads.plans import plan_of_controls
 
     first, *_ = steps = loop["steps"]
+    if "vehicle_pose" in first:
+        raise ValueError("is a closed loop, but the scenario of --with is a road; need its own")
     state = as_array("steps[0]", [*first["pose"], *first["reduced_state"]], last=5)
     controls = [as_array("steps: control", step["control"], last=2) for step in steps[:-1]]
     return plan_of_controls(

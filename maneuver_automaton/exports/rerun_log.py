@@ -75,6 +75,7 @@ def save_rerun(value: Exportable, path: Path | str, *, step: float = STEP) -> No
     rows, shown, target = driven.rows(step=step), shown_of(driven), Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
     beside = target.parent / f"{PART}{uuid.uuid4().hex}"
+    beside.touch()  # where that fails, the error names the folder; that of rerun does not
     try:
         recording = rerun.RecordingStream(APPLICATION)
         recording.save(beside, default_blueprint=_blueprint(rerun.blueprint))
