@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -95,8 +98,6 @@ def test_a_wrong_stamp_or_step_is_told():
 
 
 def test_a_bag_needs_rosbags(monkeypatch, tmp_path):
-    import sys
-
     monkeypatch.setitem(sys.modules, "rosbags.rosbag2", None)
     with pytest.raises(ImportError) as error:
         ma.save_ros2_bag(parking_plan(), tmp_path / "bag")
@@ -104,6 +105,20 @@ def test_a_bag_needs_rosbags(monkeypatch, tmp_path):
         "ROS 2 bag: rosbags is not installed; need pip install 'maneuver-automaton[ros]'"
     )
     assert list(tmp_path.iterdir()) == []
+
+
+def test_messages_need_no_pictures():
+    """Within a node nothing is imported that a message has no use for."""
+    code = """
+import sys
+import maneuver_automaton as ma
+
+robot = ma.Automaton.of_controls(ma.Unicycle(), {"ahead": (1.0, 0.0), "spin": (0.0, 1.0)})
+ma.ros_messages(ma.Plan([0, 0, 0], (robot["ahead"],), durations=[1.0]), model=robot.model)
+print([name for name in ("matplotlib", "rosbags", "typer") if name in sys.modules])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
 
 
 def read_bag(folder):
