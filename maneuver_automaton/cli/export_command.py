@@ -18,16 +18,23 @@ class Format:
     """A format that is written."""
 
     function: str  # of `exports`, that writes it
-    ending: str  # of its files; a folder has none
+    name: str  # of what is written: that of the file stands for {}
     steps: bool  # whether it has rows in time
+
+    @property
+    def ending(self) -> str:
+        """Ending of its files; a folder has none."""
+        return Path(self.name).suffix
 
 
 FORMATS: Mapping[str, Format] = {
-    "commonroad": Format(function="save_commonroad_solution", ending=".xml", steps=False),
-    "csv": Format(function="save_csv", ending=".csv", steps=True),
-    "geojson": Format(function="save_geojson", ending=".geojson", steps=False),
-    "rerun": Format(function="save_rerun", ending=".rrd", steps=True),
-    "ros2": Format(function="save_ros2_bag", ending="", steps=True),
+    "commonroad": Format(
+        function="save_commonroad_solution", name="{}_commonroad.xml", steps=False
+    ),
+    "csv": Format(function="save_csv", name="{}.csv", steps=True),
+    "geojson": Format(function="save_geojson", name="{}.geojson", steps=False),
+    "rerun": Format(function="save_rerun", name="{}.rrd", steps=True),
+    "ros2": Format(function="save_ros2_bag", name="{}_ros2", steps=True),
 }
 
 
@@ -50,13 +57,11 @@ def export(
     make_folder(path.parent)
     try:
         write(driven, path, **options)
+    except ManeuverAutomatonError:
+        raise
     except OSError as error:
-        if isinstance(error, ManeuverAutomatonError):
-            raise
         raise not_written(path, error) from error
     except ValueError as error:
-        if isinstance(error, ManeuverAutomatonError):
-            raise
         raise InvalidScenario(f"{file}: {error}") from error
     if kind == "commonroad" and not driven.reached:
         complain(f"{file}: the goal was not reached: the official checker refuses {path}")
@@ -64,9 +69,8 @@ def export(
 
 
 def _target(file: Path, out: Path | None, form: Format, kind: str) -> Path:
-    """Where it goes: beside the file, into a folder, or to the file given."""
-    name = f"{file.stem}_{kind}" if form.ending in ("", ".xml") else file.stem + form.ending
-    name += form.ending if form.ending == ".xml" else ""
+    """Where it goes: beside the file, into a folder, or to the file or folder given."""
+    name = form.name.format(file.stem)
     if out is None:
         return file.with_name(name)
     if form.ending and out.is_dir():

@@ -9,6 +9,7 @@ it. A `crs` of null is no way to say it: GDAL takes that for longitude and latit
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +18,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import write_text_atomically
-from maneuver_automaton.collision import Obstacle
+from maneuver_automaton.collision import Obstacle, Polygon
 from maneuver_automaton.exports.driven import driven_of
 from maneuver_automaton.exports.surroundings import Shown, placed_solids, shown_of, solid
 from maneuver_automaton.plotting.footprint import placed
@@ -110,7 +111,7 @@ def _bodies(shown: Shown) -> Iterator[dict[str, Any]]:
     times = np.array([shown.driven.start_time]) if not len(times) else times
     for name, body, track in parts:
         for time, pose in zip(times.tolist(), track.at(times), strict=True):
-            outlines = [shapely.Polygon(ring) for ring in placed(body, pose[None])]
+            outlines = [solid(Polygon(ring)) for ring in placed(body, pose[None])]
             yield _feature(
                 _geometry(shapely.union_all(outlines)), kind="body", part=name, time_s=time,
                 heading_rad=float(pose[2]),
@@ -127,7 +128,7 @@ def _ends(shown: Shown) -> Iterator[dict[str, Any]]:
         )
     for region in driven.scene.goals if driven.scene else ():
         for place in region.places or ():
-            yield _feature(_geometry(solid(place)), kind="goal", time_s=list(region.time))
+            yield _feature(_geometry(solid(place)), kind="goal", time_s=_limits(region.time))
 
 
 def _around(shown: Shown) -> Iterator[dict[str, Any]]:
@@ -149,6 +150,11 @@ def _around(shown: Shown) -> Iterator[dict[str, Any]]:
 
 def _feature(geometry: Mapping[str, Any], *, kind: str, **facts: Any) -> dict[str, Any]:
     return {"type": "Feature", "properties": {"kind": kind, **facts}, "geometry": geometry}
+
+
+def _limits(values: tuple[float, float]) -> list[float | None]:
+    """An interval; null where it has no end."""
+    return [value if math.isfinite(value) else None for value in values]
 
 
 def _places(poses: Array) -> Array:

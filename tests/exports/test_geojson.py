@@ -11,6 +11,7 @@ import shapely
 from shapely.geometry import shape
 
 import maneuver_automaton as ma
+from maneuver_automaton.exports import driven_of
 from maneuver_automaton.groups import SE2
 from tests.exports.cases import VALUES, assert_close, drive_on_lanes, ends, slalom, trailer
 from tests.plotting.cases import parking_plan
@@ -98,6 +99,14 @@ def test_a_road_has_lanelets_goals_and_those_who_are_there(tmp_path):
     assert times == [0.0]  # it leaves after 0.4 s
     ((goal, facts),) = features(document, "goal")
     assert_close([goal.area, *facts["time_s"]], [800.0, 2.0, 4.0])
+
+
+def test_no_limit_is_null(tmp_path):
+    driven = driven_of(drive_on_lanes(tmp_path))
+    goal = replace(driven.scene.goals[0], time=(2.0, np.inf))
+    endless = replace(driven, scene=replace(driven.scene, goals=(goal,)))
+    ((_, facts),) = features(written(endless, tmp_path), "goal")
+    assert facts["time_s"] == [2.0, None]
 
 
 def test_a_moved_plan_has_moved_features(tmp_path):
