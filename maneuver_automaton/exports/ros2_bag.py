@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 SINGLE = ("path", "trajectory")  # topics of one message, at the beginning
 METADATA, STORED = "metadata.yaml", (".db3", ".mcap")  # what is in a bag
-VERSION: Literal[8] = 8  # of metadata.yaml: Humble and all later ones read it, 9 Humble does not
+VERSION: Literal[8] = 8  # of metadata.yaml: Humble cannot read the profiles of 9
 # Source: ackermann_msgs, by J. O'Quin; the one package among these that is not part of ROS itself.
 ACKERMANN = {
     "ackermann_msgs/msg/AckermannDrive": """
