@@ -30,8 +30,13 @@ if TYPE_CHECKING:
     from maneuver_automaton.collision import Polygon as Polygon
     from maneuver_automaton.collision import Zone as Zone
     from maneuver_automaton.costs import Cost as Cost
+    from maneuver_automaton.exports import ros_messages as ros_messages
+    from maneuver_automaton.exports import save_commonroad_solution as save_commonroad_solution
+    from maneuver_automaton.exports import save_csv as save_csv
+    from maneuver_automaton.exports import save_geojson as save_geojson
+    from maneuver_automaton.exports import save_rerun as save_rerun
+    from maneuver_automaton.exports import save_ros2_bag as save_ros2_bag
     from maneuver_automaton.formats.maps import load_map as load_map
-    from maneuver_automaton.formats.plan_csv import save_csv as save_csv
     from maneuver_automaton.formats.plan_json import load_plan as load_plan
     from maneuver_automaton.formats.plan_json import save_plan as save_plan
     from maneuver_automaton.groups import SE2 as SE2
@@ -128,9 +133,14 @@ _HOMES = {
     "plan": "planning",
     "plan_road": "roads",
     "plans": "planning",
-    "save_csv": "formats.plan_csv",
+    "ros_messages": "exports",
+    "save_commonroad_solution": "exports",
+    "save_csv": "exports",
+    "save_geojson": "exports",
     "save_library": "automaton.library",
     "save_plan": "formats.plan_json",
+    "save_rerun": "exports",
+    "save_ros2_bag": "exports",
     "simulate": "receding_horizon",
     "translations": "groups",
     "trims_of": "primitives",

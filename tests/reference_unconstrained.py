@@ -14,9 +14,9 @@ from maneuver_automaton._compile import kernel
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.receding_horizon import _kernels_unconstrained as kernels
 from maneuver_automaton.receding_horizon._kernels_unconstrained import (
+    follow,
     interval_cost,
     next_pose,
-    roll_out,
 )
 from maneuver_automaton.receding_horizon.unconstrained import search_horizon
 
@@ -106,7 +106,7 @@ def exhaust(tables, pose, sequence, most):
     """
     n, m = sequence.size, tables.effort.size
     poses, costs = np.empty((n + 1, 3)), np.empty(n)
-    best = roll_out(tables, pose, sequence, poses, costs)
+    best = follow(tables, pose, sequence, poses, costs)
     word, spent, tried = np.zeros(n, np.int64), np.zeros(n + 1), 0
     orders, steps, place = np.empty((n, m), np.int64), np.empty((n, m)), np.zeros(n, np.int64)
     level, fresh = 0, True

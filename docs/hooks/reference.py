@@ -24,6 +24,7 @@ ROOMS = {  # by the first part of where a name is at home
     "roads": "Roads",
     "scenario": "Files",
     "formats": "Files",
+    "exports": "To other programs",
 }
 
 

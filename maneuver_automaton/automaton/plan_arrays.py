@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 POSE_COLUMNS = ("x_m", "y_m", "heading_rad", "z_m")
 TWIST_COLUMNS = ("v_x_m_s", "v_y_m_s", "turn_rate_rad_s", "v_z_m_s")
+COLUMNS = ("time", "pose", "twist", "reduced_state", "control")  # arrays with a row an instant
 ROUNDING = 1e-9  # steps, by which a duration may miss a whole number of them
 
 
@@ -67,7 +69,36 @@ def plan_arrays(plan: Plan, *, step: float | None, model: Model | None) -> PlanA
     """The arrays of `Plan.as_arrays`."""
     samples = plan.sample()
     if step is not None:
-        samples = _at_times(plan, samples, _times(plan, step))
+        times = step_times(plan.start_time, plan.duration, step)
+        samples = _at_times(plan, samples, times)
+    return _arrays(plan, samples, model)
+
+
+def arrays_at(plan: Plan, times: Array, *, model: Model | None) -> PlanArrays:
+    """As `Plan.as_arrays`, at times (n,) that rise [s]."""
+    return _arrays(plan, _at_times(plan, plan.sample(), times), model)
+
+
+def joined(parts: Sequence[PlanArrays]) -> PlanArrays:
+    """Rows of one plan after the other; where one ends, those of the next count."""
+    upto = [slice(0, -1)] * (len(parts) - 1) + [slice(None)]
+
+    def stacked(name: str) -> Array:
+        rows = [getattr(one, name)[rows] for one, rows in zip(parts, upto, strict=True)]
+        return np.concatenate(rows)
+
+    before = np.cumsum([0, *(len(one.word) for one in parts[:-1])])
+    index = [one.index[rows] + k for one, rows, k in zip(parts, upto, before, strict=True)]
+    return PlanArrays(
+        **{name: stacked(name) for name in COLUMNS},
+        index=np.concatenate(index),
+        word=tuple(name for one in parts for name in one.word),
+        reduced_names=parts[0].reduced_names,
+        control_names=parts[0].control_names,
+    )
+
+
+def _arrays(plan: Plan, samples: Trajectory, model: Model | None) -> PlanArrays:
     after = np.searchsorted(plan.switching_times[1:-1], samples.time, side="right")
     index = after if plan.primitives else np.full(samples.time.shape, -1)
     n_states, n_controls = samples.reduced_state.shape[1], samples.control.shape[1]
@@ -84,12 +115,12 @@ def plan_arrays(plan: Plan, *, step: float | None, model: Model | None) -> PlanA
     )
 
 
-def _times(plan: Plan, step: float) -> Array:
+def step_times(start: float, duration: float, step: float) -> Array:
     """Times (n,) from start to end [s]: every step, and the end."""
     if not (math.isfinite(step) and step > 0.0):
         raise ValueError(f"as_arrays: step must be positive, got {step} s")
-    count = max(0, math.ceil(plan.duration / step - ROUNDING))
-    return np.append(plan.start_time + step * np.arange(count), plan.switching_times[-1])
+    count = max(0, math.ceil(duration / step - ROUNDING))
+    return np.append(start + step * np.arange(count), start + duration)
 
 
 def _at_times(plan: Plan, samples: Trajectory, times: Array) -> Trajectory:

@@ -428,6 +428,47 @@ def plot(
     return convert_command.plot(file, out, animate=animate, html=html, look=look, beside=with_file)
 
 
+@app.command(epilog=ending("export"))
+@exits
+def export(
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="PLAN.json", help="Of plan, or a closed_loop.json of mpc."),
+    ],
+    to: Annotated[
+        str,
+        typer.Option(
+            "--to", metavar="FORMAT", help="commonroad, csv, geojson, rerun or ros2 (a bag)."
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="FILE", help="The file, or the folder of a bag."),
+    ] = None,
+    with_file: Annotated[
+        Path | None,
+        typer.Option("--with", metavar="FILE", help="Scenario that was planned or driven."),
+    ] = None,
+    case: Case = None,
+    model: OwnModel = None,
+    step: Annotated[
+        float | None,
+        typer.Option("--step", metavar="S", help="Time between rows [s] (csv, rerun, ros2)."),
+    ] = None,
+) -> int:
+    """Write a plan.json, or a closed_loop.json, for another program.
+
+    It goes to PLAN.csv, PLAN.geojson, PLAN.rrd, PLAN_ros2 or PLAN_commonroad.xml beside it, or to
+    the file given. --with its scenario it holds the body and what is around it; a closed loop and a
+    solution for CommonRoad need that.
+    """
+    from maneuver_automaton.cli import export_command
+    from maneuver_automaton.cli.inputs import Parts
+
+    parts = Parts(beside=with_file, case=case, model=model)
+    return export_command.export(file, to, out, parts=parts, step=step)
+
+
 @app.command(epilog=ending("schema"))
 @exits
 def schema() -> int:

@@ -47,6 +47,12 @@ EXAMPLES = {
         "maneuver-automaton convert scenarios/parking.yaml parking.mprim",
     ),
     "example": ("maneuver-automaton example", "maneuver-automaton example warehouse --out hall/"),
+    "export": (
+        "maneuver-automaton export out/plan.json --to csv --step 0.1",
+        "maneuver-automaton export out/plan.json --to geojson --with scenarios/parking.yaml",
+        "maneuver-automaton export out/closed_loop.json --to ros2 "
+        "--with scenarios/parking_loop.yaml",
+    ),
     "plot": (
         "maneuver-automaton plot out/plan.json --out plan.pdf",
         "maneuver-automaton plot out/closed_loop.json --with scenarios/parking_loop.yaml",

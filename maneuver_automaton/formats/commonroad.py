@@ -28,7 +28,7 @@ from maneuver_automaton.formats.polygons import simple_polygon
 from maneuver_automaton.formats.statement import Statement
 from maneuver_automaton.formats.xml_source import Element, read_xml
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.roads import GoalRegion, Lanelet, RoadScene, RoadStart
+from maneuver_automaton.roads import GoalRegion, Lanelet, RoadBenchmark, RoadScene, RoadStart
 from maneuver_automaton.roads.scene import unwrapped
 
 FORMAT = "CommonRoad"
@@ -75,10 +75,19 @@ def read_commonroad(path: Path) -> tuple[Statement, ...]:
             source=", ".join(
                 root.attributes[key] for key in ("author", "source") if root.attributes.get(key)
             ),
+            benchmark=_benchmark(root, problem, name),
         )
         for k, problem in enumerate(problems)
     ]
     return tuple(Statement(format=FORMAT, name=scene.name, road=scene) for scene in scenes)
+
+
+def _benchmark(root: Element, problem: Element, name: str) -> RoadBenchmark | None:
+    """What names a problem in solutions; none where it has no id."""
+    if "id" not in problem.attributes:
+        return None
+    version = root.attributes.get("commonRoadVersion", "")
+    return RoadBenchmark(scenario=name, version=version, problem=problem.whole("id"))
 
 
 def _lanelets(root: Element) -> dict[int, Lanelet]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.plotting.colors import Color
 from maneuver_automaton.plotting.footprint import footprint_polygons, placed
@@ -38,15 +40,20 @@ def loop_colors(loop: ClosedLoop) -> dict[str, Color]:
 
 
 def driven_track(loop: ClosedLoop) -> Track:
-    """Track driven in a `loop`; a trim that goes on in the next step is one piece."""
+    """Track driven in a `loop`."""
+    return joined_track(loop.poses[0], loop.driven)
+
+
+def joined_track(start: Array, plans: Sequence[Plan]) -> Track:
+    """Track of one plan after the other; a trim that goes on in the next plan is one piece."""
     pieces: list[Piece] = []
-    for plan in loop.driven:
+    for plan in plans:
         for piece in track_of_plan(plan).pieces:
             if pieces and _goes_on(pieces[-1], piece):
                 pieces[-1] = _one_piece(pieces[-1], piece)
             else:
                 pieces.append(piece)
-    return Track(loop.poses[0], tuple(pieces))
+    return Track(start, tuple(pieces))
 
 
 def carried_poses(loop: ClosedLoop) -> list[tuple[list[Array], Array]]:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.roads.lanelets import drivable_area as drivable_area
     from maneuver_automaton.roads.planner import RoadPlanner as RoadPlanner
     from maneuver_automaton.roads.planner import road_planner as road_planner
+    from maneuver_automaton.roads.scene import RoadBenchmark as RoadBenchmark
     from maneuver_automaton.roads.scene import RoadScene as RoadScene
     from maneuver_automaton.roads.scene import RoadStart as RoadStart
     from maneuver_automaton.roads.single_plan import RoadPlanResult as RoadPlanResult
@@ -38,6 +39,7 @@ _HOMES = {
     "drivable_area": "lanelets",
     "RoadPlanner": "planner",
     "road_planner": "planner",
+    "RoadBenchmark": "scene",
     "RoadScene": "scene",
     "RoadStart": "scene",
     "RoadPlanResult": "single_plan",

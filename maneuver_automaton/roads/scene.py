@@ -36,6 +36,17 @@ class RoadStart:
                 raise ValueError(f"road start: {name} must be finite, got {value}")
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RoadBenchmark:
+    """What names a scene to CommonRoad, whose solutions say which problem they solve."""
+
+    scenario: str  # DEU_Ffb-1_6_T-1
+    version: str  # of the format: 2018b
+    problem: int  # id of the planning problem
+
+    __repr__ = brief
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RoadScene:
     """One problem of driving on roads.
@@ -59,6 +70,7 @@ class RoadScene:
     traffic: tuple[Obstacle, ...] = ()
     source: str = ""  # author and place of the recording, for pictures
     step: float = 0.1  # [s] of the clock that the scene was recorded with
+    benchmark: RoadBenchmark | None = None  # None: it is none of CommonRoad
 
     __repr__ = brief
 

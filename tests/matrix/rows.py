@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from maneuver_automaton.costs import Cost
+from maneuver_automaton.exports import save_csv
 from maneuver_automaton.formats.closed_loop_json import load_steps
 from maneuver_automaton.formats.plan_json import save_plan
 from maneuver_automaton.planning import Planner, PlanResult, plan
@@ -30,6 +31,7 @@ class Engine:
     simulate: Callable[..., ClosedLoop] = simulate
     planner: Callable[..., Planner] = Planner
     save_plan: Callable[[PlanResult, Path], None] = save_plan
+    save_table: Callable[..., None] = save_csv
     save_figure: Callable[[PlanResult, Path], None] | None = None
     load_last: Callable[..., Any] = load_steps
 

@@ -1,7 +1,8 @@
-"""Features of what is saved of a plan: its picture and its file."""
+"""Features of what is saved of a plan: its picture, its file, and what other programs read."""
 
 from __future__ import annotations
 
+import csv
 import json
 import tempfile
 from dataclasses import replace
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from maneuver_automaton.exports import ros_messages, save_csv, save_geojson
 from maneuver_automaton.formats.plan_json import load_plan, save_plan
 from maneuver_automaton.planning import PlanResult
 from tests.matrix import outside
@@ -64,3 +66,34 @@ def plan_file(vehicle: Vehicle, engine: Engine) -> None:
     last = np.array(document["trajectory"]["pose"][-1])
     way, turn = outside.off_goal(last, vehicle.target())
     assert max(way, turn) <= 1e-8, "the trajectory misses the goal"
+
+
+def _moved_table(result: PlanResult, path: Path, **options: float) -> None:
+    assert result.plan is not None
+    moved = replace(result.plan, start=result.plan.start + 0.01)
+    save_csv(replace(result, plan=moved), path, **options)
+
+
+@feature(Engine(save_table=_moved_table), says="the table holds another motion")
+def exports(vehicle: Vehicle, engine: Engine) -> None:
+    """A table, GeoJSON and messages of ROS hold the plan: its poses at its times."""
+    result = base(vehicle)
+    plan = found(result)
+    with tempfile.TemporaryDirectory() as folder:
+        table, places = Path(folder) / "plan.csv", Path(folder) / "plan.geojson"
+        engine.save_table(result, table, step=0.1)
+        save_geojson(result, places)
+        with table.open(newline="") as stream:
+            rows = list(csv.DictReader(stream))
+        features = json.loads(places.read_text())["features"]
+    times = np.array([float(row["time_s"]) for row in rows])
+    names = ["x_m", "y_m", "heading_rad", "z_m"][: plan.start.size]
+    poses = np.array([[float(row[name]) for name in names] for row in rows])
+    there = plan.pose_at(times)
+    assert np.abs(poses - there).max() <= 1e-9, "the table holds another motion"
+    (line,) = (one["geometry"] for one in features if one["properties"]["kind"] == "path")
+    end = plan.end[[0, 1, 3][: plan.end.size - 1]]
+    assert np.abs(np.array(line["coordinates"])[-1] - end).max() <= 1e-9, "the path ends elsewhere"
+    message = ros_messages(result, step=0.1)["path"]["poses"][-1]["pose"]
+    place = np.array(list(message["position"].values()))[: end.size]
+    assert np.abs(place - end).max() <= 1e-9, "the message ends elsewhere"

@@ -1,0 +1,183 @@
+"""GeoJSON: path, swept region, bodies, goals and obstacles, for maps and for shapely.
+
+Source: Butler et al. (2016), *The GeoJSON Format*, RFC 7946. That document wants longitude and
+latitude; plans have metres in a frame of their own. The member `crs` of the format's first version
+(2008) says so in well-known text, which GDAL reads, and with it QGIS and geopandas; others ignore
+it. A `crs` of null is no way to say it: GDAL takes that for longitude and latitude.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton._files import write_text_atomically
+from maneuver_automaton.collision import Obstacle, Polygon
+from maneuver_automaton.exports.driven import driven_of
+from maneuver_automaton.exports.surroundings import Shown, placed_solids, shown_of, solid
+from maneuver_automaton.plotting.footprint import placed
+from maneuver_automaton.plotting.swept import merged, swept_region
+
+if TYPE_CHECKING:
+    from maneuver_automaton.exports.driven import Exportable
+
+PLACES = (0, 1, 3)  # x, y and altitude of a pose
+METRES = 'LOCAL_CS["plan",LOCAL_DATUM["plan",32767],UNIT["metre",1],AXIS["x",EAST],AXIS["y",NORTH]]'
+
+
+def save_geojson(value: Exportable, path: Path | str) -> None:
+    """Write a plan, a closed loop or a drive as a FeatureCollection of GeoJSON.
+
+    Coordinates are metres in the plan's own frame, x and y, and the altitude of a vehicle that
+    flies; they are no longitudes and latitudes. The property `kind` tells the features apart:
+    path, primitive (a trim or maneuver), swept, body, start, goal, obstacle, zone, lanelet.
+
+    Parameters
+    ----------
+    value : Plan, PlanResult, ClosedLoop, RoadPlanResult or RoadDrive
+        A Plan alone knows neither body nor obstacles.
+    path : Path or str
+        The file.
+
+    Raises
+    ------
+    ValueError
+        If a result has no plan.
+    OSError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.automaton import Plan
+    >>> from maneuver_automaton.primitives import Trim
+    >>> ahead = Trim(name="ahead", body_velocity=[1.0, 0.0, 0.0], control=[1.0])
+    >>> file = getfixture("tmp_path") / "plan.geojson"
+    >>> save_geojson(Plan([0, 0, 0], (ahead,), durations=[2.0]), file)
+    >>> first = json.loads(file.read_text())["features"][0]
+    >>> first["properties"]["kind"], first["geometry"]["coordinates"]
+    ('path', [[0.0, 0.0], [2.0, 0.0]])
+    """
+    shown = shown_of(driven_of(value))
+    features = ",\n".join(json.dumps(one, allow_nan=False) for one in _features(shown))
+    head = {
+        "type": "FeatureCollection",
+        "name": shown.driven.name or Path(path).stem,
+        "crs": {"type": "name", "properties": {"name": METRES}},
+        "units": "m",
+        "frame": "x and y in metres in the plan's own frame, not longitude and latitude",
+    }
+    text = f'{json.dumps(head, ensure_ascii=False)[:-1]}, "features": [\n{features}\n]}}\n'
+    write_text_atomically(Path(path), text)
+
+
+def _features(shown: Shown) -> Iterator[dict[str, Any]]:
+    yield from _path(shown)
+    yield from _bodies(shown)
+    yield from _ends(shown)
+    yield from _around(shown)
+
+
+def _path(shown: Shown) -> Iterator[dict[str, Any]]:
+    driven, track = shown.driven, shown.track
+    places = _places(np.concatenate([track.pose, driven.end[None]]))  # pushed, it ends elsewhere
+    length = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+    facts = {"duration_s": driven.duration, "length_m": length, "cost": driven.cost}
+    yield _feature(_line(places), kind="path", **facts)
+    for piece in track.pieces:
+        yield _feature(
+            _line(_places(piece.pose)),
+            kind="primitive",
+            name=piece.name,
+            begin_s=float(piece.time[0]),
+            end_s=float(piece.time[-1]),
+        )
+
+
+def _bodies(shown: Shown) -> Iterator[dict[str, Any]]:
+    """The region that all bodies sweep, and where they are when primitives begin and end."""
+    import shapely
+
+    parts = [one for one in shown.parts if one[1]]
+    swept = merged([piece for _, body, track in parts for piece in swept_region(track, body)])
+    if swept:
+        yield _feature(_geometry(shapely.union_all(swept)), kind="swept")
+    times = shown.track.switching_times
+    times = np.array([shown.driven.start_time]) if not len(times) else times
+    for name, body, track in parts:
+        for time, pose in zip(times.tolist(), track.at(times), strict=True):
+            outlines = [solid(Polygon(ring)) for ring in placed(body, pose[None])]
+            yield _feature(
+                _geometry(shapely.union_all(outlines)), kind="body", part=name, time_s=time,
+                heading_rad=float(pose[2]),
+            )  # fmt: skip
+
+
+def _ends(shown: Shown) -> Iterator[dict[str, Any]]:
+    driven = shown.driven
+    yield _feature(_point(driven.start), kind="start", heading_rad=float(driven.start[2]))
+    for goal in shown.scene.goals:
+        heading = None if goal.free_heading else float(goal.pose[2])
+        yield _feature(
+            _point(goal.pose), kind="goal", heading_rad=heading, tolerance_m=goal.tolerance_m
+        )
+    for region in driven.scene.goals if driven.scene else ():
+        for place in region.places or ():
+            yield _feature(_geometry(solid(place)), kind="goal", time_s=_limits(region.time))
+
+
+def _around(shown: Shown) -> Iterator[dict[str, Any]]:
+    import shapely
+
+    for one, geometry, time in placed_solids(shown.scene.obstacles, shown):
+        facts: dict[str, Any] = {"name": one.name}
+        if isinstance(one, Obstacle) and one.height is not None:
+            facts["height_m"] = list(one.height)
+        if isinstance(one, Obstacle) and one.motion is not None:
+            facts["time_s"] = time
+        yield _feature(_geometry(geometry), kind="obstacle", **facts)
+    for zone in shown.driven.problem.zones if shown.driven.problem else ():
+        yield _feature(_geometry(solid(zone.shape)), kind="zone", name=zone.name)
+    for lanelet in shown.driven.scene.lanelets if shown.driven.scene else ():
+        area = shapely.make_valid(shapely.Polygon(lanelet.ring), method="structure")
+        yield _feature(_geometry(area), kind="lanelet", id=lanelet.number)
+
+
+def _feature(geometry: Mapping[str, Any], *, kind: str, **facts: Any) -> dict[str, Any]:
+    return {"type": "Feature", "properties": {"kind": kind, **facts}, "geometry": geometry}
+
+
+def _limits(values: tuple[float, float]) -> list[float | None]:
+    """An interval; null where it has no end."""
+    return [value if math.isfinite(value) else None for value in values]
+
+
+def _places(poses: Array) -> Array:
+    return poses[:, [k for k in PLACES if k < poses.shape[1]]]
+
+
+def _line(places: Array) -> dict[str, Any]:
+    """A line along places (n, 2) or (n, 3); a point where they are all the same."""
+    new = np.append(True, (np.diff(places, axis=0) != 0.0).any(axis=1))
+    kept = places[new]
+    if len(kept) == 1:
+        return {"type": "Point", "coordinates": kept[0].tolist()}
+    return {"type": "LineString", "coordinates": kept.tolist()}
+
+
+def _point(pose: Array) -> dict[str, Any]:
+    return {"type": "Point", "coordinates": _places(pose[None])[0].tolist()}
+
+
+def _geometry(geometry: Any) -> dict[str, Any]:
+    """A polygon, or several, outer rings to the left as RFC 7946 wants them."""
+    import shapely
+
+    turned = shapely.orient_polygons(geometry)
+    said: dict[str, Any] = json.loads(shapely.to_geojson(turned))
+    return said
