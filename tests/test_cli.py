@@ -465,7 +465,7 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def plan(problem: object, *, time_limit: float, alternatives: int, **more: Any) -> PlanResult:
         assert (time_limit, alternatives) == (0.25, 2)
-        assert more == {"gap": None, "watch": None}
+        assert more == {"gap": None, "watch": None, "on_better": None}
         return PlanResult(
             problem=problem,  # type: ignore[arg-type]
             status=PlanStatus.OUT_OF_BUDGET,
