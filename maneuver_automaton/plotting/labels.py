@@ -70,6 +70,8 @@ def word_text(word: Sequence[str], *, width: int, lines: int) -> str:
     """
     if not word:
         return "no motion"
+    if list(word) == [POLISHED]:
+        return "one motion by optimal control"
     names = [shortened(shown_name(name), 80) for name in word]
     whole = textwrap.wrap(ARROW.join(names), width, break_long_words=False)
     if len(whole) <= lines or len(names) < 4:
