@@ -86,6 +86,7 @@ def driven_document(document: Mapping[str, Any]) -> dict[str, Any]:
     names = [_driven(step, lasting) for step, lasting in zip(steps, np.diff(time), strict=False)]
     runs = [(name, [k for k, _ in run]) for name, run in groupby(enumerate(names), lambda p: p[1])]
     return {
+        "name": document.get("name", ""),
         "status": "found",
         "cost": document["cost"],
         "duration_s": float(time[-1] - time[0]),

@@ -39,8 +39,8 @@ LISTS = ("primitives", "stop", "alternatives", "steps", "broken_guarantees")  # 
 TIME_TOLERANCE = 1e-9  # [s], relative to the duration, between a switch and its sample
 
 
-def plan_to_dict(result: PlanResult) -> dict[str, Any]:
-    """The content of plan.json, as plain values.
+def plan_to_dict(result: PlanResult, *, name: str = "") -> dict[str, Any]:
+    """The content of plan.json, as plain values; `name` is that of the scenario.
 
     Examples
     --------
@@ -63,6 +63,7 @@ def plan_to_dict(result: PlanResult) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "version": package_version(),
+        "name": name,
         "automaton_hash": automaton_hash(result.problem.automaton),
         "status": result.status.value,
         "reason": result.reason,
@@ -99,15 +100,19 @@ def _narrowest(passage: Narrowest | None) -> dict[str, Any]:
     return {"narrowest": {"place": list(passage.place), "missing_m": passage.missing}}
 
 
-def save_plan(result: PlanResult, path: Path | str, *, interrupted: bool = False) -> None:
+def save_plan(
+    result: PlanResult, path: Path | str, *, name: str = "", interrupted: bool = False
+) -> None:
     """Write plan.json in one step; `interrupted` by a signal it says so.
+
+    The `name` of the scenario heads the pictures that are drawn of the file.
 
     Raises
     ------
     OSError
         If the file cannot be written.
     """
-    write_document(plan_to_dict(result), path, interrupted=interrupted)
+    write_document(plan_to_dict(result, name=name), path, interrupted=interrupted)
 
 
 def write_document(

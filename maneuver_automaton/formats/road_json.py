@@ -35,6 +35,7 @@ def road_plan_to_dict(result: RoadPlanResult) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "version": package_version(),
+        "name": result.planner.scene.name,
         "automaton_hash": library_hash(result.planner.library),
         "status": "no_plan" if plan is None else "found",
         "reason": result.reason,
@@ -67,6 +68,7 @@ def road_drive_to_dict(drive: RoadDrive, *, before: RoadPlanResult | None = None
     return {
         "schema": SCHEMA,
         "version": package_version(),
+        "name": drive.planner.scene.name,
         "automaton_hash": library_hash(drive.planner.library),
         "status": drive.status,
         "reason": drive.reason,

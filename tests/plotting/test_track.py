@@ -82,8 +82,7 @@ def test_a_long_motion_is_told_apart_by_gear_and_turn():
 
 
 def test_a_maneuver_of_one_turn_is_one_piece():
-    plan = plan_of(["straight", "clockwise"], [1.0, 1e-3])
-    (piece,) = maneuver_of(plan, name="to a curve").pieces
+    (piece,) = maneuver_of(plan_of(["clockwise"], [1.0]), name="to a curve").pieces
     assert piece.name == "to a curve"
     (piece,) = maneuver_of(plan_of(["straight"], [1.0]), name="polished").pieces
     assert piece.name == "polished, ahead"  # never alone: it says little
