@@ -20,7 +20,12 @@ from maneuver_automaton.automaton.cutting import tail_of, with_samples_at
 from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.json_source import Place
-from maneuver_automaton.formats.plan_json import package_version, read_json, write_document
+from maneuver_automaton.formats.plan_json import (
+    package_version,
+    read_json,
+    vehicle_entry,
+    write_document,
+)
 from maneuver_automaton.formats.yaml_source import shown
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 from maneuver_automaton.receding_horizon import (
@@ -57,6 +62,7 @@ def closed_loop_to_dict(loop: ClosedLoop, *, name: str = "") -> dict[str, Any]:
         "schema": SCHEMA,
         "version": package_version(),
         "name": name,
+        "vehicle": vehicle_entry(loop.problem.automaton.model),
         "automaton_hash": automaton_hash(loop.problem.automaton),
         "status": loop.status,
         "reason": loop.reason,

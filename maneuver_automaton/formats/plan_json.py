@@ -24,6 +24,7 @@ from maneuver_automaton.automaton import Plan, Primitive
 from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.groups import group_of
+from maneuver_automaton.models import Model
 from maneuver_automaton.planning import Alternative, LowerBound, PlanResult
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 
@@ -64,6 +65,7 @@ def plan_to_dict(result: PlanResult, *, name: str = "") -> dict[str, Any]:
         "schema": SCHEMA,
         "version": package_version(),
         "name": name,
+        "vehicle": vehicle_entry(result.problem.automaton.model),
         "automaton_hash": automaton_hash(result.problem.automaton),
         "status": result.status.value,
         "reason": result.reason,
@@ -83,6 +85,15 @@ def plan_to_dict(result: PlanResult, *, name: str = "") -> dict[str, Any]:
         "improvements": [[float(at), float(cost)] for at, cost in result.improvements],
         "timing_s": {**dict.fromkeys(TIMINGS), **_floats(result.timing_s)},
         "counts": {**dict.fromkeys(COUNTS, 0), **{k: int(v) for k, v in result.counts.items()}},
+    }
+
+
+def vehicle_entry(model: Model) -> dict[str, Any]:
+    """The vehicle by name, and what the columns of a trajectory are."""
+    return {
+        "model": model.name,
+        "reduced_state": list(model.reduced_names),
+        "control": list(model.control_names),
     }
 
 
@@ -190,7 +201,7 @@ def load_plan(path: Path | str) -> Plan:
     if document["status"] != "found":
         raise InvalidScenario(f"{path}: holds no plan, its status is {document['status']!r}")
     try:
-        return _plan_of(document)
+        return plan_of_document(document)
     except (ValueError, KeyError, TypeError, IndexError) as error:
         said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
         raise InvalidScenario(f"{path}: {said}") from error
@@ -299,7 +310,14 @@ def _refuse_constant(word: str) -> float:
     raise ValueError(f"{word} is no JSON")
 
 
-def _plan_of(document: Mapping[str, Any]) -> Plan:
+def plan_of_document(document: Mapping[str, Any]) -> Plan:
+    """The plan of a plan.json that is read already.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError, IndexError
+        If a key is missing, or holds no numbers.
+    """
     trajectory, primitives = document["trajectory"], document["primitives"]
     time = as_array("trajectory.time_s", trajectory["time_s"])
     pose = as_array("trajectory.pose", trajectory["pose"], last=(3, 4))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from maneuver_automaton.plotting.style import shortened
 
@@ -44,6 +45,20 @@ def control_labels(names: Sequence[str]) -> list[str]:
     return [
         name.replace("_", " ") + (f" [{UNITS[name]}]" if name in UNITS else "") for name in names
     ]
+
+
+def stated_labels(document: Mapping[str, Any], what: str) -> list[str]:
+    """Axis labels of the columns of a loaded plan.json, `what` is control or reduced_state.
+
+    Empty where it does not name them.
+
+    Examples
+    --------
+    >>> stated_labels({"vehicle": {"control": ["speed"]}}, "control"), stated_labels({}, "control")
+    (['speed [m/s]'], [])
+    """
+    vehicle = document.get("vehicle") or {}
+    return control_labels([str(name) for name in vehicle.get(what) or ()])
 
 
 def shown_name(name: str) -> str:

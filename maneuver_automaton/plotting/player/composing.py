@@ -11,6 +11,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.colors import Color, trim_colors, twist_color
 from maneuver_automaton.plotting.footprint import footprint_polygons, placed
+from maneuver_automaton.plotting.labels import shown_name
 from maneuver_automaton.plotting.player.clearances import clearance_entry, sample_times
 from maneuver_automaton.plotting.player.local import Local, hex_color, rounded
 from maneuver_automaton.plotting.player.motions import (
@@ -19,7 +20,11 @@ from maneuver_automaton.plotting.player.motions import (
     part_entries,
     part_frames,
 )
-from maneuver_automaton.plotting.player.surroundings import goal_entries, obstacle_entries
+from maneuver_automaton.plotting.player.surroundings import (
+    goal_entries,
+    limit_entries,
+    obstacle_entries,
+)
 from maneuver_automaton.plotting.scene import (
     Scene,
     mark_size,
@@ -49,7 +54,7 @@ def page_colors(twists: Mapping[str, Array]) -> dict[str, Color]:
 
 def trim_entries(colors: Mapping[str, Color]) -> list[dict[str, str]]:
     """Name and colour of each trim."""
-    return [{"name": name, "color": hex_color(color)} for name, color in colors.items()]
+    return [{"name": shown_name(name), "color": hex_color(color)} for name, color in colors.items()]
 
 
 def played(
@@ -88,6 +93,7 @@ def around(
         "mark": rounded([size])[0],
         "goals": goal_entries(scene.goals, local, scene.reached),
         "obstacles": obstacle_entries(scene.obstacles, local, leave=leave),
+        **limit_entries(scene.zones, scene.bounds, local),
     }
 
 

@@ -16,6 +16,7 @@ from maneuver_automaton.plotting.closed_loop_track import (
     loop_scene,
     loop_view,
 )
+from maneuver_automaton.plotting.labels import stated_labels
 from maneuver_automaton.plotting.paths import bare_scene
 from maneuver_automaton.plotting.player.composing import (
     Fact,
@@ -68,6 +69,10 @@ def player_of(value: Any, *, title: str = "") -> Player:
 
 def player_of_file(document: Mapping[str, Any], plan: Plan, *, title: str) -> Player:
     """The player of a loaded plan.json and its `plan`, without the body and the obstacles."""
+    content = content_of(plan)
+    named = stated_labels(document, "reduced_state") + stated_labels(document, "control")
+    for curve, label in zip(content["motions"][0]["curves"], named, strict=False):
+        curve["label"] = label
     bound, error = document.get("bound") or {}, document.get("terminal_error") or {}
     facts = _plan_facts(
         cost=document.get("cost"),
@@ -83,7 +88,8 @@ def player_of_file(document: Mapping[str, Any], plan: Plan, *, title: str) -> Pl
         "bound": document.get("lower_bound"),
         "kind": bound.get("kind") or "",
     }
-    return Player({**content_of(plan), "title": title, "facts": facts, "search": search})
+    facts.append(("known", "the motion alone; body and obstacles with the scenario"))
+    return Player({**content, "title": title, "facts": facts, "search": search})
 
 
 @functools.singledispatch
