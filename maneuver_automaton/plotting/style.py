@@ -20,7 +20,7 @@ SMALL_PT = 8.0
 FAR_M = 1e5  # from here on coordinates are counted from a round number
 NAME_LENGTH = 60  # characters of a name before it is cut
 LEAST_SHARE = 0.3  # of the width of axes that a legend beside them leaves
-CHARACTER, ROW = 0.062, 0.19  # [in] of a letter in a legend, and from row to row
+CHARACTER, ROW = 0.062, 0.19  # [in] of a character in a legend, and from row to row
 
 
 def tidy(ax: Axes, *, x: str, y: str) -> None:
