@@ -2,13 +2,14 @@
 
 ``python docs/measure.py``: the code of each page runs in a folder with the scenarios; what it
 prints is written below it, and its picture, named after the page, into docs/pictures.
-``python docs/measure.py gallery`` draws every scenario for the gallery; names of pages or scenarios
-may follow, to do no more than these.
+``python docs/measure.py gallery`` draws every scenario for the gallery, and keeps its plan, which
+the site plays; names of pages or scenarios may follow, to do no more than these.
 """
 
 from __future__ import annotations
 
 import contextlib
+import gzip
 import io
 import os
 import re
@@ -23,7 +24,7 @@ from PIL import Image
 from maneuver_automaton.cli import run
 
 ROOT = Path(__file__).parents[1]
-PICTURES = ROOT / "docs" / "pictures"
+PICTURES, PLANS = ROOT / "docs" / "pictures", ROOT / "docs" / "plans"
 CODE = re.compile(r"```python\n(?P<code>.*?)```\n(?:\n```text\n.*?```\n)?", flags=re.DOTALL)
 WIDE, SMALL = 1000, 720  # [pixels] at most, of a page's picture and of the gallery's
 
@@ -45,11 +46,14 @@ def with_output(code: str) -> str:
 
 
 def draw_scenario(scenario: Path) -> None:
-    """Plan a scenario, or drive it in closed loop, and keep its picture."""
+    """Plan a scenario, or drive it in closed loop, and keep its picture and its file."""
     loop = "receding_horizon:" in scenario.read_text(encoding="utf-8")
     run(["mpc" if loop else "plan", str(scenario), "--out", "out", "--quiet"])
-    picture = "closed_loop.png" if loop else "plan.png"
-    shrink(Path("out") / picture, PICTURES / "gallery" / f"{scenario.stem}.png", most=SMALL)
+    made = Path("out") / ("closed_loop" if loop else "plan")
+    shrink(made.with_suffix(".png"), PICTURES / "gallery" / f"{scenario.stem}.png", most=SMALL)
+    PLANS.mkdir(exist_ok=True)
+    kept = PLANS / f"{scenario.stem}.json.gz"
+    kept.write_bytes(gzip.compress(made.with_suffix(".json").read_bytes(), mtime=0))
     shutil.rmtree("out", ignore_errors=True)
 
 
@@ -60,7 +64,8 @@ def shrink(picture: Path, to: Path, *, most: int) -> None:
     to.parent.mkdir(parents=True, exist_ok=True)
     image = Image.open(picture).convert("RGB")
     image.thumbnail((most, 2 * most))
-    image.quantize(128).save(to, optimize=True)
+    # by coverage: thin lines keep their colours
+    image.quantize(256, method=Image.Quantize.MAXCOVERAGE).save(to, optimize=True)
 
 
 def main(names: Collection[str]) -> None:
