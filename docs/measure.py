@@ -25,8 +25,18 @@ from maneuver_automaton.cli import run
 
 ROOT = Path(__file__).parents[1]
 PICTURES, PLANS = ROOT / "docs" / "pictures", ROOT / "docs" / "plans"
+LARGE = {  # pictures of the README and of pages, by their scenarios
+    "parking": ("plan.png", "parking.png"),
+    "parking_loop": ("closed_loop.png", "closed_loop.png"),
+    "parallel_parking": ("plan.png", "parallel_parking.png"),
+    "crossing_traffic": ("plan.png", "crossing_traffic.png"),
+    "cluttered_room": ("plan.png", "cluttered_room.png"),
+    "tpcap_full": ("plan.png", "tpcap_full.png"),
+    "trailer": ("plan.png", "trailer.png"),
+    "helicopter_city": ("plan_3d.png", "helicopter_city.png"),
+}
 CODE = re.compile(r"```python\n(?P<code>.*?)```\n(?:\n```text\n.*?```\n)?", flags=re.DOTALL)
-WIDE, SMALL = 1000, 720  # [pixels] at most, of a page's picture and of the gallery's
+WHOLE, WIDE, SMALL = 1248, 1000, 720  # [pixels] at most: as drawn, in a page, in the gallery
 
 
 def run_page(page: Path) -> None:
@@ -51,6 +61,9 @@ def draw_scenario(scenario: Path) -> None:
     run(["mpc" if loop else "plan", str(scenario), "--out", "out", "--quiet"])
     made = Path("out") / ("closed_loop" if loop else "plan")
     shrink(made.with_suffix(".png"), PICTURES / "gallery" / f"{scenario.stem}.png", most=SMALL)
+    if scenario.stem in LARGE:
+        drawn, name = LARGE[scenario.stem]
+        shrink(Path("out") / drawn, ROOT / "scenarios" / "pictures" / name, most=WHOLE)
     PLANS.mkdir(exist_ok=True)
     kept = PLANS / f"{scenario.stem}.json.gz"
     kept.write_bytes(gzip.compress(made.with_suffix(".json").read_bytes(), mtime=0))

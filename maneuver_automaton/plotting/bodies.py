@@ -40,12 +40,15 @@ def swept_area(track: Track, scene: Scene) -> PathCollection:
 
 
 def darts(track: Track, scene: Scene, *, size: float) -> PolyCollection:
-    """Where the body is not known: darts along a path, and white ones where trims begin."""
+    """Where the body is not known: darts along a path, and white ones where trims begin.
+
+    No two of the white ones overlap.
+    """
     if scene.body:
         return PolyCollection([])
     dart = [DART_SIZE * size * DART]
     faint = track.spread(FAINT_DARTS, reach=0.0)
-    clear = _between_ends(track, scene, apart=1e-6 * size)
+    clear = _spread_out(_between_ends(track, scene, apart=1e-6 * size), apart=DART_SIZE * size)
     return PolyCollection(
         [*placed(dart, faint), *placed(dart, clear)],
         facecolors=[(*GREY, 0.6)] * len(faint) + [(1.0, 1.0, 1.0, 1.0)] * len(clear),
@@ -129,6 +132,15 @@ def draw_switches(ax: Axes, track: Track, scene: Scene, *, size: float) -> PathC
         poses[:, 0], poses[:, 1], s=8.0, facecolors="white", edgecolors=[INK], linewidths=0.7,
         zorder=3.6,
     )  # fmt: skip
+
+
+def _spread_out(poses: Array, *, apart: float) -> Array:
+    """Those of the poses (n, dof) that are `apart` [m] from the one before; others hide a path."""
+    kept: list[Array] = []
+    for pose in poses:
+        if not kept or float(np.linalg.norm(pose[:2] - kept[-1][:2])) >= apart:
+            kept.append(pose)
+    return np.array(kept).reshape(-1, poses.shape[1])
 
 
 def _between_ends(track: Track, scene: Scene, *, apart: float) -> Array:
