@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import gzip
 import io
+import json
 import os
 import re
 import shutil
@@ -19,6 +20,7 @@ import tempfile
 from collections.abc import Callable, Collection
 from pathlib import Path
 
+import numpy as np
 from PIL import Image
 
 from maneuver_automaton.cli import run
@@ -66,8 +68,18 @@ def draw_scenario(scenario: Path) -> None:
         shrink(Path("out") / drawn, ROOT / "scenarios" / "pictures" / name, most=WHOLE)
     PLANS.mkdir(exist_ok=True)
     kept = PLANS / f"{scenario.stem}.json.gz"
-    kept.write_bytes(gzip.compress(made.with_suffix(".json").read_bytes(), mtime=0))
+    kept.write_bytes(gzip.compress(shortened(made.with_suffix(".json")), mtime=0))
     shutil.rmtree("out", ignore_errors=True)
+
+
+def shortened(file: Path) -> bytes:
+    """A plan.json whose samples have no more digits than a player shows."""
+    document = json.loads(file.read_text(encoding="utf-8"))
+    samples = document.get("trajectory", {})
+    for key, digits in (("time_s", 12), ("pose", 9), ("reduced_state", 6), ("control", 6)):
+        if samples.get(key):
+            samples[key] = np.round(np.array(samples[key]), digits).tolist()
+    return json.dumps(document).encode()
 
 
 def shrink(picture: Path, to: Path, *, most: int) -> None:

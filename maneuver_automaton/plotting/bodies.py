@@ -21,6 +21,8 @@ from maneuver_automaton.plotting.track import Piece, Track
 FAINT_DARTS = 9  # along a path
 DART = np.array([[0.6, 0.0], [-0.4, 0.32], [-0.22, 0.0], [-0.4, -0.32]])
 DART_SIZE = 0.066  # of the size of the path
+DARTS_APART = 2.5  # of their size, at least, between those where trims begin
+TURNED_RAD = 0.3  # of two darts in one place, at least
 SWEPT: Color = (0.36, 0.60, 0.85)
 SWEPT_ALPHA = 0.20
 MOST_MOTIONS, INNER_BODIES = 6, 3  # so few motions have bodies within, at most so many each
@@ -42,13 +44,14 @@ def swept_area(track: Track, scene: Scene) -> PathCollection:
 def darts(track: Track, scene: Scene, *, size: float) -> PolyCollection:
     """Where the body is not known: darts along a path, and white ones where trims begin.
 
-    No two of the white ones overlap.
+    The white ones leave the path between them free.
     """
     if scene.body:
         return PolyCollection([])
     dart = [DART_SIZE * size * DART]
     faint = track.spread(FAINT_DARTS, reach=0.0)
-    clear = _spread_out(_between_ends(track, scene, apart=1e-6 * size), apart=DART_SIZE * size)
+    switches = _between_ends(track, scene, apart=1e-6 * size)
+    clear = _spread_out(switches, apart=DARTS_APART * DART_SIZE * size)
     return PolyCollection(
         [*placed(dart, faint), *placed(dart, clear)],
         facecolors=[(*GREY, 0.6)] * len(faint) + [(1.0, 1.0, 1.0, 1.0)] * len(clear),
@@ -135,10 +138,14 @@ def draw_switches(ax: Axes, track: Track, scene: Scene, *, size: float) -> PathC
 
 
 def _spread_out(poses: Array, *, apart: float) -> Array:
-    """Those of the poses (n, dof) that are `apart` [m] from the one before; others hide a path."""
+    """Those of the poses (n, dof) that are `apart` [m], or turned, from the one before.
+
+    Others would hide the path.
+    """
     kept: list[Array] = []
     for pose in poses:
-        if not kept or float(np.linalg.norm(pose[:2] - kept[-1][:2])) >= apart:
+        gap = np.inf if not kept else float(np.linalg.norm(pose[:2] - kept[-1][:2]))
+        if gap >= apart or abs(pose[2] - kept[-1][2]) > TURNED_RAD:
             kept.append(pose)
     return np.array(kept).reshape(-1, poses.shape[1])
 

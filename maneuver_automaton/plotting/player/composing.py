@@ -9,7 +9,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.plotting.colors import Color, trim_colors, twist_color
+from maneuver_automaton.plotting.colors import Color
 from maneuver_automaton.plotting.footprint import footprint_polygons, placed
 from maneuver_automaton.plotting.labels import shown_name
 from maneuver_automaton.plotting.player.clearances import clearance_entry, sample_times
@@ -35,21 +35,12 @@ from maneuver_automaton.plotting.scene import (
 from maneuver_automaton.plotting.track import Track
 from maneuver_automaton.problem import Problem
 
-MOST_COLORS = 40  # trims that are told apart; of more, the colour says how they move
-
 Fact = tuple[str, str]  # a name, and its value with the unit
 
 
 def names_of(colors: Mapping[str, Color]) -> dict[str, int]:
     """The number of each trim on the page, by name."""
     return {name: k for k, name in enumerate(colors)}
-
-
-def page_colors(twists: Mapping[str, Array]) -> dict[str, Color]:
-    """A colour for each trim by name: one of its own, as in the pictures, unless they are many."""
-    if len(twists) > MOST_COLORS:
-        return {name: twist_color(twist) for name, twist in twists.items()}
-    return trim_colors(twists)
 
 
 def trim_entries(colors: Mapping[str, Color]) -> list[dict[str, str]]:
