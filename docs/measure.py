@@ -2,14 +2,16 @@
 
 ``python docs/measure.py``: the code of each page runs in a folder with the scenarios; what it
 prints is written below it, and its picture, named after the page, into docs/pictures.
-``python docs/measure.py gallery`` draws every scenario for the gallery; names of pages or scenarios
-may follow, to do no more than these.
+``python docs/measure.py gallery`` draws every scenario for the gallery, and keeps its plan, which
+the site plays; names of pages or scenarios may follow, to do no more than these.
 """
 
 from __future__ import annotations
 
 import contextlib
+import gzip
 import io
+import json
 import os
 import re
 import shutil
@@ -18,14 +20,25 @@ import tempfile
 from collections.abc import Callable, Collection
 from pathlib import Path
 
+import numpy as np
 from PIL import Image
 
 from maneuver_automaton.cli import run
 
 ROOT = Path(__file__).parents[1]
-PICTURES = ROOT / "docs" / "pictures"
+PICTURES, PLANS = ROOT / "docs" / "pictures", ROOT / "docs" / "plans"
+LARGE = {  # pictures of the README and of pages, by their scenarios
+    "parking": ("plan.png", "parking.png"),
+    "parking_loop": ("closed_loop.png", "closed_loop.png"),
+    "parallel_parking": ("plan.png", "parallel_parking.png"),
+    "crossing_traffic": ("plan.png", "crossing_traffic.png"),
+    "cluttered_room": ("plan.png", "cluttered_room.png"),
+    "tpcap_full": ("plan.png", "tpcap_full.png"),
+    "trailer": ("plan.png", "trailer.png"),
+    "helicopter_city": ("plan_3d.png", "helicopter_city.png"),
+}
 CODE = re.compile(r"```python\n(?P<code>.*?)```\n(?:\n```text\n.*?```\n)?", flags=re.DOTALL)
-WIDE, SMALL = 1000, 720  # [pixels] at most, of a page's picture and of the gallery's
+WHOLE, WIDE, SMALL = 1248, 1000, 720  # [pixels] at most: as drawn, in a page, in the gallery
 
 
 def run_page(page: Path) -> None:
@@ -45,12 +58,28 @@ def with_output(code: str) -> str:
 
 
 def draw_scenario(scenario: Path) -> None:
-    """Plan a scenario, or drive it in closed loop, and keep its picture."""
+    """Plan a scenario, or drive it in closed loop, and keep its picture and its file."""
     loop = "receding_horizon:" in scenario.read_text(encoding="utf-8")
     run(["mpc" if loop else "plan", str(scenario), "--out", "out", "--quiet"])
-    picture = "closed_loop.png" if loop else "plan.png"
-    shrink(Path("out") / picture, PICTURES / "gallery" / f"{scenario.stem}.png", most=SMALL)
+    made = Path("out") / ("closed_loop" if loop else "plan")
+    shrink(made.with_suffix(".png"), PICTURES / "gallery" / f"{scenario.stem}.png", most=SMALL)
+    if scenario.stem in LARGE:
+        drawn, name = LARGE[scenario.stem]
+        shrink(Path("out") / drawn, ROOT / "scenarios" / "pictures" / name, most=WHOLE)
+    PLANS.mkdir(exist_ok=True)
+    kept = PLANS / f"{scenario.stem}.json.gz"
+    kept.write_bytes(gzip.compress(shortened(made.with_suffix(".json")), mtime=0))
     shutil.rmtree("out", ignore_errors=True)
+
+
+def shortened(file: Path) -> bytes:
+    """A plan.json whose samples have no more digits than a player shows."""
+    document = json.loads(file.read_text(encoding="utf-8"))
+    samples = document.get("trajectory", {})
+    for key, digits in (("time_s", 12), ("pose", 9), ("reduced_state", 6), ("control", 6)):
+        if samples.get(key):
+            samples[key] = np.round(np.array(samples[key]), digits).tolist()
+    return json.dumps(document).encode()
 
 
 def shrink(picture: Path, to: Path, *, most: int) -> None:
@@ -60,7 +89,8 @@ def shrink(picture: Path, to: Path, *, most: int) -> None:
     to.parent.mkdir(parents=True, exist_ok=True)
     image = Image.open(picture).convert("RGB")
     image.thumbnail((most, 2 * most))
-    image.quantize(128).save(to, optimize=True)
+    # by coverage: thin lines keep their colours
+    image.quantize(256, method=Image.Quantize.MAXCOVERAGE).save(to, optimize=True)
 
 
 def main(names: Collection[str]) -> None:

@@ -6,8 +6,10 @@ import json
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from maneuver_automaton.cli import run
+from maneuver_automaton.plotting.pages import DPI
 from tests.roads.files import GOAL, LANES, commonroad, interval, problem
 
 QUICK = ["--no-plot", "--quiet"]
@@ -99,3 +101,11 @@ def test_bad_input_is_told_in_one_line(folder, capsys, arguments, said):
     )
     assert run(arguments) == 2
     assert capsys.readouterr().err.startswith(said)
+
+
+def test_a_drive_is_drawn_in_the_look_asked_for(folder):
+    look = ["--title", "A drive", "--size", "5x6", "--style", "paper"]
+    assert run(["plan", "road.xml", "--quiet", "--html", *look]) == 0
+    with Image.open("out/plan.png") as picture:
+        assert picture.size == (5 * DPI, 6 * DPI)
+    assert "<title>A drive</title>" in Path("out/plan.html").read_text()

@@ -6,7 +6,9 @@ An error in a cell ends the build. What a cell prints and draws is shown below i
 from __future__ import annotations
 
 import base64
+import html
 import posixpath
+import re
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
@@ -17,6 +19,7 @@ import nbformat
 from mkdocs.structure.files import File
 
 SECONDS = 300  # [s] of one cell, compilation included
+PLAYER = re.compile(r'<iframe srcdoc="(?P<page>[^"]*)"')  # a page of its own in the site
 
 
 def on_files(files: Any, *, config: Any) -> Any:
@@ -58,8 +61,16 @@ def page_of(notebook: Any, uri: str) -> dict[str, str | bytes]:
             continue
         parts.append(f"```python\n{cell.source}\n```")
         for output in cell.outputs:
-            picture = output.get("data", {}).get("image/png")
-            if picture:
+            data = output.get("data", {})
+            picture, player = data.get("image/png"), PLAYER.match(str(data.get("text/html", "")))
+            if player and not picture:
+                name = f"{stem}_{len(made)}.html"
+                made[name] = html.unescape(player["page"])
+                parts.append(
+                    f'<iframe src="{posixpath.basename(name)}" class="player" loading="lazy" '
+                    'title="player"></iframe>'
+                )
+            elif picture:
                 name = f"{stem}_{len(made)}.png"
                 made[name] = base64.b64decode(picture)
                 parts.append(f"![Output of the cell above]({posixpath.basename(name)})")

@@ -28,7 +28,7 @@ LONGEST = 64.0  # of which the path of a small body has so many
 _ZERO: Array = np.zeros(1)
 SPARE = 1e-6  # [m] that nothing is left out for rounding
 GUESSES = 16  # places where an edge is looked for that is near
-NEAREST = 64  # pairs of what moves that are looked at first
+NEAREST = 64  # pairs with moving obstacles that are looked at first
 
 
 def spans_within(body: Body, first: float, last: float) -> Spans:
@@ -93,7 +93,9 @@ def instant(body: Body, around: Surroundings, time: float) -> Pairs:
     spans = spans_within(body, time, time)
     frames = np.zeros((edge.size, 2, 3))
     for number, motion in enumerate(around.motions):
-        frames[around.movers[edge] == number] = motion_at(motion, np.array([body.clock + time]))
+        frames[around.motion_of_edge[edge] == number] = motion_at(
+            motion, np.array([body.clock + time])
+        )
     return Pairs(spans, np.zeros_like(edge), edge, frames)
 
 
@@ -163,13 +165,13 @@ def moving_pairs(body: Body, around: Surroundings, spans: Spans) -> Iterator[tup
 
 def _expanded(around: Surroundings, spans: Spans, frames: Array, chosen: IntArray) -> Pairs:
     """Pairs of all edges of some pairs (k,) of motions and stretches, numbered in that order."""
-    mover, span = np.divmod(chosen, spans.element.size)
+    number, span = np.divmod(chosen, spans.element.size)
     firsts = around.firsts
-    count = np.diff(firsts)[mover]
+    count = np.diff(firsts)[number]
     rows = np.repeat(np.arange(chosen.size), count)
-    place = np.arange(rows.size) - (np.cumsum(count) - count)[rows] + firsts[mover][rows]
-    mover, span = mover[rows], span[rows]
-    return Pairs(spans, span, around.moving[place], frames[mover, :, span])
+    place = np.arange(rows.size) - (np.cumsum(count) - count)[rows] + firsts[number][rows]
+    number, span = number[rows], span[rows]
+    return Pairs(spans, span, around.moving[place], frames[number, :, span])
 
 
 def _cut_where_motions_change(

@@ -44,7 +44,7 @@ class Pairs(NamedTuple):
     spans: Spans
     span: IntArray  # (m,) numbers of stretches
     edge: IntArray  # (m,)
-    frames: Array | None  # (m, 2, 3) of what moves
+    frames: Array | None  # (m, 2, 3) of moving obstacles
 
 
 class Bounds(NamedTuple):

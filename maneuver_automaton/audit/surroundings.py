@@ -32,7 +32,7 @@ class Surroundings:
     outline: Outline
     owners: IntArray  # (n,) which obstacle each edge is of
     heights: Array  # (n, 2) [m] from where to where they stand
-    movers: IntArray  # (n,) which motion an edge has; -1 if it stands still
+    motion_of_edge: IntArray  # (n,) which motion an edge has; -1 if it stands still
     motions: tuple[Motion, ...]
     still: IntArray  # (k,) numbers of the edges that stand still
     moving: IntArray  # those of the others, motion by motion
@@ -99,7 +99,7 @@ def surroundings_around(
     """
     import shapely
 
-    outlines, heights, movers = [], [], []
+    outlines, heights, indices = [], [], []
     motions: list[Motion] = []
     for one in obstacles:
         if isinstance(one, OccupancyMap):
@@ -111,20 +111,20 @@ def surroundings_around(
             motions.append(Motion(motion.time, motion.pose - [*origin, 0.0]))
         outlines.append(outline)
         heights.append(height or (-math.inf, math.inf))
-        movers.append(-1 if motion is None else len(motions) - 1)
+        indices.append(-1 if motion is None else len(motions) - 1)
     counts = [outline.radius.size for outline in outlines]
     whole = joined(outlines)
-    mover = np.repeat(np.array(movers, dtype=np.int64), counts)
-    still = np.flatnonzero(mover < 0)
+    index = np.repeat(np.array(indices, dtype=np.int64), counts)
+    still = np.flatnonzero(index < 0)
     heights_of = np.repeat(np.array(heights).reshape(-1, 2), counts, axis=0)
-    moving = np.flatnonzero(mover >= 0)
-    firsts = np.searchsorted(mover[moving], np.arange(len(motions) + 1))
-    groups = tuple(whole.of(mover == number) for number in range(len(motions)))
+    moving = np.flatnonzero(index >= 0)
+    firsts = np.searchsorted(index[moving], np.arange(len(motions) + 1))
+    groups = tuple(whole.of(index == number) for number in range(len(motions)))
     return Surroundings(
         outline=whole,
         owners=np.repeat(np.arange(len(counts)), counts),
         heights=heights_of,
-        movers=mover,
+        motion_of_edge=index,
         motions=tuple(motions),
         still=still,
         moving=moving,

@@ -85,7 +85,7 @@ class PoseScene:
 def pose_scene(problem: Problem, *, frame: Array | None = None) -> PoseScene:
     """The scene of a problem, seen from the pose `frame` (3,); one that moves with it if omitted.
 
-    What moves, what stands at some of the altitudes only that the bounds admit, and what the
+    Moving obstacles, those at some of the altitudes only that the bounds admit, and what the
     vehicle carries are left out, and so are zones: fewer poses collide, so that every proof from
     the scene holds for the problem.
     """

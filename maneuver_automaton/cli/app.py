@@ -346,15 +346,24 @@ def automaton_show(
 
 @automaton_app.command("draw", epilog=ending("automaton draw"))
 @exits
-def automaton_draw(file: Library, out: Out = Path("out"), model: OwnModel = None) -> int:
+def automaton_draw(
+    file: Library,
+    out: Out = Path("out"),
+    model: OwnModel = None,
+    title: Title = None,
+    size: Size = None,
+    style: Style = "screen",
+) -> int:
     """Draw the trims and maneuvers of a scenario, a library or another file of primitives.
 
     The picture is DIR/automaton.png, or DIR itself if it ends in .png, .pdf or .svg; that of the
     maneuvers stands beside it, its name ending in _maneuvers.
     """
     from maneuver_automaton.cli import automaton_command
+    from maneuver_automaton.cli.looks import LookOptions
 
-    return automaton_command.draw(file, out, model_text=model)
+    look = LookOptions(title=title, size=size, style=style)
+    return automaton_command.draw(file, out, look=look, model_text=model)
 
 
 @app.command(epilog=ending("convert"))
@@ -412,14 +421,14 @@ def plot(
     html: Html = False,
     with_file: Annotated[
         Path | None,
-        typer.Option("--with", metavar="FILE", help="Scenario that a closed loop was driven in."),
+        typer.Option("--with", metavar="FILE", help="Scenario: its body, obstacles and goals."),
     ] = None,
 ) -> int:
     """Draw a plan.json, or a closed_loop.json, again: PLAN.png beside it, or the file given.
 
-    With --animate it is an animation, PLAN.gif; with --html a page that plays it, PLAN.html. A
-    closed loop is drawn as mpc does --with its scenario; from its file alone, it is drawn as an arc
-    from step to step.
+    With --animate it is an animation, PLAN.gif; with --html a page that plays it, PLAN.html. These
+    files state neither body nor obstacles: --with its scenario, all is drawn as plan and mpc do. A
+    closed loop alone is drawn as an arc from step to step.
     """
     from maneuver_automaton.cli import convert_command
     from maneuver_automaton.cli.looks import LookOptions

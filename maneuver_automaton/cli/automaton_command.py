@@ -12,7 +12,14 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import automaton_hash, save_library
 from maneuver_automaton.automaton.validation import AutomatonReport, validate
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
-from maneuver_automaton.cli.inputs import automaton_of, make_folder, not_written, target
+from maneuver_automaton.cli.inputs import (
+    automaton_of,
+    make_folder,
+    named_automaton,
+    not_written,
+    target,
+)
+from maneuver_automaton.cli.looks import LookOptions
 from maneuver_automaton.cli.progress import progress_bar
 from maneuver_automaton.cli.tables import console, table
 from maneuver_automaton.errors import InvalidScenario, ManeuverAutomatonError
@@ -146,9 +153,9 @@ def coverage_lines(automaton: Automaton) -> list[str]:
     ]
 
 
-def draw(file: Path, out: Path, *, model_text: str | None = None) -> int:
+def draw(file: Path, out: Path, *, look: LookOptions, model_text: str | None = None) -> int:
     """Draw the trims, and beside them the maneuvers."""
-    automaton = automaton_of(file, model_text)
+    automaton, name = named_automaton(file, model_text)
     path = target(out, "automaton.png")
     make_folder(path.parent)
     from maneuver_automaton import plotting
@@ -157,11 +164,11 @@ def draw(file: Path, out: Path, *, model_text: str | None = None) -> int:
     skip_documentation()
 
     try:
-        plotting.save_automaton_figure(automaton, path)
+        plotting.save_automaton_figure(automaton, path, look=look.look(name))
         console().print(str(path), soft_wrap=True)
         if automaton.maneuvers:
             path = path.with_name(f"{path.stem}_maneuvers{path.suffix}")
-            plotting.save_maneuvers_figure(automaton, path)
+            plotting.save_maneuvers_figure(automaton, path, look=look.look(name))
             console().print(str(path), soft_wrap=True)
     except OSError as error:
         raise not_written(path, error) from error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import sys
 from collections.abc import Callable
@@ -20,6 +21,7 @@ from maneuver_automaton.cli.inputs import (
     scenario_of,
 )
 from maneuver_automaton.cli.looks import LookOptions
+from maneuver_automaton.cli.pictures import skip_documentation
 from maneuver_automaton.cli.tables import console
 from maneuver_automaton.collision import AnyObstacle, OccupancyMap
 from maneuver_automaton.errors import InvalidLibrary, InvalidScenario
@@ -38,6 +40,8 @@ from maneuver_automaton.formats.statement import MapFile
 from maneuver_automaton.scenario import Scenario, statements_of, to_yaml
 
 if TYPE_CHECKING:
+    from maneuver_automaton.planning import PlanResult
+    from maneuver_automaton.problem import Problem
     from maneuver_automaton.receding_horizon import ClosedLoop
 
 KEEP_MULTIPLIERS = (MPRIM, JSON)  # but Nav2's kind of JSON
@@ -157,37 +161,66 @@ def plot(
     """Draw a plan.json or closed_loop.json again, still, in motion, or as a page that plays it."""
     if animate and html:
         raise InvalidScenario("--html: writes a page, and --animate an animation; need one of them")
-    loop = None if beside is None else _loop_of(file, beside)
-    document = {} if loop else _drawn(file, moving=animate or html)
-    path = _picture(file, out, "animation" if animate else "page" if html else "picture")
+    what = "animation" if animate else "page" if html else "picture"
+    path = _picture(file, out, what)
+    if beside is None:
+        document = _drawn(file)
+        draw = functools.partial(_draw_file, document, path, what, look)
+    else:
+        scenario = scenario_of(beside)
+        value = _value_of(file, scenario.problem)
+        draw = functools.partial(_draw_value, value, path, what, look, scenario.name)
     make_folder(path.parent)
-    from maneuver_automaton import plotting
-    from maneuver_automaton.cli.pictures import skip_documentation
-
     skip_documentation()
-    from maneuver_automaton.formats.plan_json import load_plan
-
     try:
-        if loop is not None and animate:
-            plotting.save_closed_loop_animation(loop, path)
-        elif loop is not None and html:
-            loop.player(title=look.title or file.stem).save(path)
-        elif loop is not None:
-            plotting.save_closed_loop_figure(loop, path, look=look.look())
-        elif animate:
-            plotting.save_plan_animation(load_plan(file), path)
-        elif html:
-            plotting.player_of_file(document, load_plan(file), title=look.title or file.stem).save(
-                path
-            )
-        else:
-            plotting.save_plan_file_figure(document, path, look=look.look())
+        draw()
     except OSError as error:
         raise not_written(path, error) from error
-    except (KeyError, ValueError, TypeError, IndexError) as error:
+    except (KeyError, ValueError, TypeError, IndexError, AttributeError) as error:
         said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
         raise InvalidScenario(f"{file}: {said}") from error
     return FOUND
+
+
+def _draw_file(document: dict[str, Any], path: Path, what: str, look: LookOptions) -> None:
+    """Draw what a file states: the motion, without body and obstacles."""
+    from maneuver_automaton import plotting
+    from maneuver_automaton.formats.plan_json import plan_of_document
+
+    name = str(document.get("name") or "")
+    if what == "picture":
+        plotting.save_plan_file_figure(document, path, look=look.look(name))
+        return
+    if document["status"] != "found":
+        raise ValueError(f"holds no plan, its status is {document['status']!r}")
+    plan = plan_of_document(document)
+    if what == "animation":
+        plotting.save_plan_animation(plan, path)
+        return
+    title = look.title or name or path.stem
+    plotting.player_of_file(document, plan, title=title).save(path)
+
+
+def _draw_value(
+    value: PlanResult | ClosedLoop, path: Path, what: str, look: LookOptions, name: str
+) -> None:
+    """Draw a plan or a closed loop as `plan` and `mpc` do."""
+    from maneuver_automaton import plotting
+    from maneuver_automaton.receding_horizon import ClosedLoop
+
+    if what == "page":
+        value.player(title=look.title or name).save(path)
+    elif isinstance(value, ClosedLoop):
+        if what == "animation":
+            plotting.save_closed_loop_animation(value, path)
+        else:
+            plotting.save_closed_loop_figure(value, path, look=look.look(name))
+    elif what == "picture":
+        plotting.save_plan_figure(value, path, look=look.look(name))
+    elif value.plan is None:
+        raise ValueError(f"holds no plan, its status is {value.status.value!r}")
+    else:
+        plotting.save_plan_animation(value.plan, path, problem=value.problem)
 
 
 def _picture(file: Path, out: Path | None, what: str) -> Path:
@@ -203,14 +236,17 @@ def _picture(file: Path, out: Path | None, what: str) -> Path:
     return path
 
 
-def _loop_of(file: Path, beside: Path) -> ClosedLoop:
-    """The closed loop of a file, in the world of the scenario that it was driven in."""
-    from maneuver_automaton.formats.driven_json import load_closed_loop
+def _value_of(file: Path, problem: Problem) -> PlanResult | ClosedLoop:
+    """The plan or closed loop of a file, in the world that it was made for."""
+    from maneuver_automaton.formats.driven_json import load_closed_loop, read_closed_loop_document
+    from maneuver_automaton.formats.result_json import load_result
 
-    return load_closed_loop(file, scenario_of(beside).problem)
+    if read_closed_loop_document(file) is None:
+        return load_result(file, problem)
+    return load_closed_loop(file, problem)
 
 
-def _drawn(file: Path, *, moving: bool) -> dict[str, Any]:
+def _drawn(file: Path) -> dict[str, Any]:
     """What to draw of a plan.json, or of a closed_loop.json, whose drive is drawn as a plan."""
     from maneuver_automaton.formats.driven_json import driven_document, read_closed_loop_document
     from maneuver_automaton.formats.plan_json import read_plan_document
@@ -218,11 +254,6 @@ def _drawn(file: Path, *, moving: bool) -> dict[str, Any]:
     loop = read_closed_loop_document(file)
     if loop is None:
         return read_plan_document(file)
-    if moving:
-        raise InvalidScenario(
-            f"{file}: is a closed loop, whose animation or page needs --with and the scenario it "
-            "was driven in"
-        )
     try:
         return driven_document(loop)
     except (KeyError, ValueError, TypeError, IndexError, AttributeError) as error:

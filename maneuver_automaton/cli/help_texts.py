@@ -55,6 +55,7 @@ EXAMPLES = {
     ),
     "plot": (
         "maneuver-automaton plot out/plan.json --out plan.pdf",
+        "maneuver-automaton plot out/plan.json --html --with scenarios/parking.yaml",
         "maneuver-automaton plot out/closed_loop.json --with scenarios/parking_loop.yaml",
     ),
     "schema": ("maneuver-automaton schema > scenario.schema.json",),

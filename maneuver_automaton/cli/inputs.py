@@ -40,6 +40,11 @@ def automaton_of(path: Path, model: str | None = None) -> Automaton:
 
     `model`, MODULE:OBJECT, is the vehicle of a library or scenario for a user's own.
     """
+    return named_automaton(path, model)[0]
+
+
+def named_automaton(path: Path, model: str | None = None) -> tuple[Automaton, str]:
+    """The automaton of a file, see `automaton_of`, and the name of the scenario or library."""
     from maneuver_automaton.automaton.library import load_library
     from maneuver_automaton.formats.libraries import read_primitives
 
@@ -50,10 +55,12 @@ def automaton_of(path: Path, model: str | None = None) -> Automaton:
                 f"--model: {path} is a file of {read.kind}, which has a vehicle of its own; need a "
                 "library or a scenario"
             )
-        return read.automaton
+        return read.automaton, read.automaton.name or path.stem
     if path.suffix == ".json":
-        return load_library(path, model=own)
-    return scenario_of(path, Parts(model=model)).problem.automaton
+        library = load_library(path, model=own)
+        return library, library.name or path.stem
+    scenario = scenario_of(path, Parts(model=model))
+    return scenario.problem.automaton, scenario.name or path.stem
 
 
 def target(out: Path, name: str) -> Path:

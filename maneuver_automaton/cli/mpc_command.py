@@ -265,7 +265,7 @@ def _disturbance(part: Any, seed: int | None) -> Disturbance | None:
 def _write(loop: ClosedLoop, name: str, out: Path, settings: Settings) -> None:
     from maneuver_automaton.formats.closed_loop_json import save_closed_loop
 
-    save_closed_loop(loop, out / "closed_loop.json", interrupted=stopped())
+    save_closed_loop(loop, out / "closed_loop.json", name=name, interrupted=stopped())
     for picture in PICTURES:
         (out / picture).unlink(missing_ok=True)  # of an earlier loop
     if stopped() or not (settings.plot or settings.animate or settings.html):

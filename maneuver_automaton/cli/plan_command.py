@@ -175,7 +175,7 @@ def _plan(
 def _write(result: PlanResult, name: str, out: Path, settings: Settings) -> None:
     from maneuver_automaton.formats.plan_json import save_plan
 
-    save_plan(result, out / "plan.json", interrupted=stopped())
+    save_plan(result, out / "plan.json", name=name, interrupted=stopped())
     for picture in PICTURES:
         (out / picture).unlink(missing_ok=True)  # of an earlier plan
     if stopped() or not (settings.plot or settings.animate or settings.html):

@@ -13,7 +13,6 @@ from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written
-from maneuver_automaton.cli.looks import LookOptions
 from maneuver_automaton.cli.progress import progress_bar, waiting
 from maneuver_automaton.errors import InvalidScenario
 
@@ -38,8 +37,6 @@ def plan_file(
 ) -> RoadPlanResult:
     """Plan one drive into the folder `out`, and print the plan; the result."""
     from maneuver_automaton.formats.plan_json import write_document
-
-    _check_look(settings.look)
     from maneuver_automaton.formats.road_json import road_plan_to_dict
     from maneuver_automaton.roads import plan_road
 
@@ -63,9 +60,9 @@ def plan_file(
         for name in ("plan.png", "plan.gif", "plan.html"):
             (out / name).unlink(missing_ok=True)  # of an earlier plan
         if result.plan is not None:
-            _draw(_titled(scene, settings.look), vehicle, result.plan, out / "plan", settings)
+            _draw(scene, vehicle, result.plan, out / "plan", settings)
         if settings.html and not stopped():
-            result.player().save(out / "plan.html")
+            result.player(title=settings.look.title or scene.name).save(out / "plan.html")
 
     _written(write, out)
     if result.plan is not None and not settings.quiet:
@@ -90,7 +87,6 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
     from maneuver_automaton.formats.road_json import road_drive_to_dict
     from maneuver_automaton.roads import drive_scene, plan_before, road_planner
 
-    _check_look(settings.look)
     for name, value in (("--seeds", settings.seeds), ("--resume", settings.resume)):
         if value is not None:
             raise InvalidScenario(f"{name}: drives on roads have no such option; leave it out")
@@ -118,10 +114,10 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
         write_document(document, out / "closed_loop.json", interrupted=stopped())
         for name in ("closed_loop.png", "closed_loop.gif", "closed_loop.html"):
             (out / name).unlink(missing_ok=True)  # of an earlier loop
-        shown = _titled(scene, settings.look)
-        _draw(shown, vehicle, drive.driven, out / "closed_loop", settings)
+        _draw(scene, vehicle, drive.driven, out / "closed_loop", settings)
         if (settings.animate or settings.html) and not stopped():
-            drive.player().save(out / "closed_loop.html")
+            page = drive.player(title=settings.look.title or scene.name)
+            page.save(out / "closed_loop.html")
 
     _written(write, out)
     if not settings.quiet:
@@ -145,18 +141,6 @@ def _road(path: Path, parts: Parts) -> tuple[RoadScene, RoadVehicle]:
     return found.scene, found.vehicle
 
 
-def _check_look(look: LookOptions) -> None:
-    if look.is_stated:
-        raise InvalidScenario(
-            "--size, --style: a drive on roads has one picture of its own; need neither"
-        )
-
-
-def _titled(scene: RoadScene, look: LookOptions) -> RoadScene:
-    """The scene under the title that its pictures are to have."""
-    return scene if look.title is None else replace(scene, name=look.title)
-
-
 def _draw(
     scene: RoadScene,
     vehicle: RoadVehicle,
@@ -173,9 +157,11 @@ def _draw(
     skip_documentation()
 
     if settings.plot:
-        plotting.save_road_figure(scene, vehicle, plan, file.with_suffix(".png"))
+        picture, look = file.with_suffix(".png"), settings.look.look(scene.name)
+        plotting.save_road_figure(scene, vehicle, plan, picture, look=look)
     if settings.animate:
-        plotting.save_road_animation(scene, vehicle, plan, file.with_suffix(".gif"))
+        titled = replace(scene, name=settings.look.title or scene.name)
+        plotting.save_road_animation(titled, vehicle, plan, file.with_suffix(".gif"))
 
 
 def _written(write: Callable[[], None], out: Path) -> None:

@@ -94,8 +94,18 @@ class Zone:
     @property
     def words(self) -> str:
         """Its name, or what it asks for."""
-        if self.name:
-            return self.name
+        return self.name or f"zone ({self.asks})"
+
+    @property
+    def asks(self) -> str:
+        """What it asks for.
+
+        Examples
+        --------
+        >>> from maneuver_automaton.collision import Box
+        >>> Zone(shape=Box([10.0, 4.0]), max_speed=1.0, reverse=False).asks
+        'at most 1 m/s, forwards only'
+        """
         asked = [
             f"at most {self.max_speed:g} m/s" if self.max_speed is not None else "",
             "forwards only" if not self.reverse else "",
@@ -104,4 +114,4 @@ class Zone:
             else "",
             f"only {', '.join(self.trims)}" if self.trims is not None else "",
         ]
-        return f"zone ({', '.join(words for words in asked if words)})"
+        return ", ".join(words for words in asked if words)

@@ -20,7 +20,12 @@ from maneuver_automaton.automaton.cutting import tail_of, with_samples_at
 from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.json_source import Place
-from maneuver_automaton.formats.plan_json import package_version, read_json, write_document
+from maneuver_automaton.formats.plan_json import (
+    package_version,
+    read_json,
+    vehicle_entry,
+    write_document,
+)
 from maneuver_automaton.formats.yaml_source import shown
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 from maneuver_automaton.receding_horizon import (
@@ -40,8 +45,8 @@ NEEDED = ("schema", "automaton_hash", "reached", "steps", "step_s")
 NOT_APPLIED = ("control", "word", "plan", "replanned", "solve_s")
 
 
-def closed_loop_to_dict(loop: ClosedLoop) -> dict[str, Any]:
-    """The content of closed_loop.json, as plain values.
+def closed_loop_to_dict(loop: ClosedLoop, *, name: str = "") -> dict[str, Any]:
+    """The content of closed_loop.json, as plain values; `name` is that of the scenario.
 
     Examples
     --------
@@ -56,6 +61,8 @@ def closed_loop_to_dict(loop: ClosedLoop) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "version": package_version(),
+        "name": name,
+        "vehicle": vehicle_entry(loop.problem.automaton.model),
         "automaton_hash": automaton_hash(loop.problem.automaton),
         "status": loop.status,
         "reason": loop.reason,
@@ -87,15 +94,19 @@ def closed_loop_to_dict(loop: ClosedLoop) -> dict[str, Any]:
     }
 
 
-def save_closed_loop(loop: ClosedLoop, path: Path | str, *, interrupted: bool = False) -> None:
+def save_closed_loop(
+    loop: ClosedLoop, path: Path | str, *, name: str = "", interrupted: bool = False
+) -> None:
     """Write closed_loop.json in one step; `interrupted` by a signal it says so.
+
+    The `name` of the scenario heads the pictures that are drawn of the file.
 
     Raises
     ------
     OSError
         If the file cannot be written.
     """
-    write_document(closed_loop_to_dict(loop), path, interrupted=interrupted)
+    write_document(closed_loop_to_dict(loop, name=name), path, interrupted=interrupted)
 
 
 def load_steps(path: Path | str, automaton: Automaton) -> tuple[tuple[Step, ...], Array]:

@@ -71,7 +71,7 @@ def driven_document(document: Mapping[str, Any]) -> dict[str, Any]:
 
     The vehicle is known where each step began; between, it is taken to move at a constant twist. A
     step is named after the primitives that were to be driven in it, and steps of one name in a row
-    are one primitive.
+    are one maneuver, as disturbances may have it turn otherwise in each.
 
     Raises
     ------
@@ -86,12 +86,20 @@ def driven_document(document: Mapping[str, Any]) -> dict[str, Any]:
     names = [_driven(step, lasting) for step, lasting in zip(steps, np.diff(time), strict=False)]
     runs = [(name, [k for k, _ in run]) for name, run in groupby(enumerate(names), lambda p: p[1])]
     return {
+        "name": document.get("name", ""),
+        "vehicle": document.get("vehicle"),
         "status": "found",
         "cost": document["cost"],
         "duration_s": float(time[-1] - time[0]),
         "clearance_m": document.get("min_clearance_m"),
         "primitives": [
-            {"kind": "trim", "name": name, "duration_s": float(time[rows[-1] + 1] - time[rows[0]])}
+            {
+                "kind": "maneuver",
+                "name": name,
+                "source": name,
+                "target": name,
+                "duration_s": float(time[rows[-1] + 1] - time[rows[0]]),
+            }
             for name, rows in runs
         ],
         "trajectory": _trajectory(steps, time, poses),
@@ -114,6 +122,7 @@ def _trajectory(steps: list[Mapping[str, Any]], time: Array, poses: Array) -> di
     arcs = (group(poses[:-1]).inverse() @ group(poses[1:])).log()
     n_controls = max((len(step["control"] or ()) for step in steps[:-1]), default=0)
     columns: dict[str, list[Any]] = {"time_s": [], "pose": [], "control": [], "reduced_state": []}
+    columns["origin"] = [0.0, 0.0]
     for k, (step, arc) in enumerate(zip(steps, arcs, strict=False)):
         reach = max(np.hypot(arc[0], arc[1]) / FINEST_M, abs(arc[2]) / FINEST_RAD, 1.0)
         shares = np.arange(np.ceil(reach)) / np.ceil(reach)

@@ -24,6 +24,7 @@ from maneuver_automaton.automaton import Plan, Primitive
 from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.groups import group_of
+from maneuver_automaton.models import Model
 from maneuver_automaton.planning import Alternative, LowerBound, PlanResult
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 
@@ -39,8 +40,8 @@ LISTS = ("primitives", "stop", "alternatives", "steps", "broken_guarantees")  # 
 TIME_TOLERANCE = 1e-9  # [s], relative to the duration, between a switch and its sample
 
 
-def plan_to_dict(result: PlanResult) -> dict[str, Any]:
-    """The content of plan.json, as plain values.
+def plan_to_dict(result: PlanResult, *, name: str = "") -> dict[str, Any]:
+    """The content of plan.json, as plain values; `name` is that of the scenario.
 
     Examples
     --------
@@ -63,6 +64,8 @@ def plan_to_dict(result: PlanResult) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "version": package_version(),
+        "name": name,
+        "vehicle": vehicle_entry(result.problem.automaton.model),
         "automaton_hash": automaton_hash(result.problem.automaton),
         "status": result.status.value,
         "reason": result.reason,
@@ -85,6 +88,15 @@ def plan_to_dict(result: PlanResult) -> dict[str, Any]:
     }
 
 
+def vehicle_entry(model: Model) -> dict[str, Any]:
+    """The vehicle by name, and what the columns of a trajectory are."""
+    return {
+        "model": model.name,
+        "reduced_state": list(model.reduced_names),
+        "control": list(model.control_names),
+    }
+
+
 def _bound(bound: LowerBound | None) -> dict[str, Any] | None:
     if bound is None:
         return None
@@ -99,15 +111,19 @@ def _narrowest(passage: Narrowest | None) -> dict[str, Any]:
     return {"narrowest": {"place": list(passage.place), "missing_m": passage.missing}}
 
 
-def save_plan(result: PlanResult, path: Path | str, *, interrupted: bool = False) -> None:
+def save_plan(
+    result: PlanResult, path: Path | str, *, name: str = "", interrupted: bool = False
+) -> None:
     """Write plan.json in one step; `interrupted` by a signal it says so.
+
+    The `name` of the scenario heads the pictures that are drawn of the file.
 
     Raises
     ------
     OSError
         If the file cannot be written.
     """
-    write_document(plan_to_dict(result), path, interrupted=interrupted)
+    write_document(plan_to_dict(result, name=name), path, interrupted=interrupted)
 
 
 def write_document(
@@ -185,7 +201,7 @@ def load_plan(path: Path | str) -> Plan:
     if document["status"] != "found":
         raise InvalidScenario(f"{path}: holds no plan, its status is {document['status']!r}")
     try:
-        return _plan_of(document)
+        return plan_of_document(document)
     except (ValueError, KeyError, TypeError, IndexError) as error:
         said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
         raise InvalidScenario(f"{path}: {said}") from error
@@ -294,7 +310,14 @@ def _refuse_constant(word: str) -> float:
     raise ValueError(f"{word} is no JSON")
 
 
-def _plan_of(document: Mapping[str, Any]) -> Plan:
+def plan_of_document(document: Mapping[str, Any]) -> Plan:
+    """The plan of a plan.json that is read already.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError, IndexError
+        If a key is missing, or holds no numbers.
+    """
     trajectory, primitives = document["trajectory"], document["primitives"]
     time = as_array("trajectory.time_s", trajectory["time_s"])
     pose = as_array("trajectory.pose", trajectory["pose"], last=(3, 4))

@@ -17,6 +17,7 @@ from maneuver_automaton.formats.plan_json import (
     package_version,
     primitive_entries,
     trajectory_entry,
+    vehicle_entry,
 )
 from maneuver_automaton.primitives import Maneuver
 from maneuver_automaton.roads import (
@@ -35,6 +36,8 @@ def road_plan_to_dict(result: RoadPlanResult) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "version": package_version(),
+        "name": result.planner.scene.name,
+        "vehicle": vehicle_entry(result.planner.vehicle.model),
         "automaton_hash": library_hash(result.planner.library),
         "status": "no_plan" if plan is None else "found",
         "reason": result.reason,
@@ -67,6 +70,8 @@ def road_drive_to_dict(drive: RoadDrive, *, before: RoadPlanResult | None = None
     return {
         "schema": SCHEMA,
         "version": package_version(),
+        "name": drive.planner.scene.name,
+        "vehicle": vehicle_entry(drive.planner.vehicle.model),
         "automaton_hash": library_hash(drive.planner.library),
         "status": drive.status,
         "reason": drive.reason,

@@ -1,4 +1,4 @@
-"""Poses in the plane, SE(2): what moves a vehicle on flat ground."""
+"""Poses in the plane, SE(2): the motions of vehicles on flat ground."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Planar poses with a height, SE(2) x R: what moves a vehicle under gravity."""
+"""Planar poses with a height, SE(2) x R: the motions of vehicles under gravity."""
 
 from __future__ import annotations
 

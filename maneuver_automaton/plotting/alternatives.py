@@ -18,6 +18,7 @@ from maneuver_automaton.plotting.colors import SEQUENCE, Color
 from maneuver_automaton.plotting.ends import EndArtists, draw_ends
 from maneuver_automaton.plotting.footprint import footprint_polygons, placed
 from maneuver_automaton.plotting.labels import word_text
+from maneuver_automaton.plotting.limits import LimitArtists, draw_limits
 from maneuver_automaton.plotting.obstacles import ObstacleArtists, draw_obstacles, round_times
 from maneuver_automaton.plotting.scene import (
     Scene,
@@ -28,7 +29,7 @@ from maneuver_automaton.plotting.scene import (
     set_view,
     view_box,
 )
-from maneuver_automaton.plotting.style import upper_legend
+from maneuver_automaton.plotting.style import outer_legend
 from maneuver_automaton.plotting.track import Track, track_of_plan
 from maneuver_automaton.problem import Goal, Problem
 
@@ -48,6 +49,7 @@ class AlternativesArtists:
     bodies: tuple[PolyCollection, ...]  # at the switching times, if there is a footprint
     ends: EndArtists
     obstacles: ObstacleArtists
+    limits: LimitArtists
     legend: Legend | None
 
 
@@ -107,6 +109,7 @@ def draw_alternatives(
         bodies=bodies,
         ends=draw_ends(ax, plans[0].start, scene.goals, size=mark_size(scene, box, size=size)),
         obstacles=draw_obstacles(ax, scene.obstacles, time=scene.times),
+        limits=draw_limits(ax, scene.zones, scene.bounds),
         legend=_legend(ax, plans, costs, paths) if legend else None,
     )
     set_view(ax, box, plans[0].start[:2])
@@ -151,7 +154,7 @@ def _legend(
         alternative_text(plan, costs[rank] if costs else None, width=60)
         for rank, plan in enumerate(plans)
     ]
-    return upper_legend(ax, paths, labels, length=80)
+    return outer_legend(ax, paths, labels, length=80, above=True)
 
 
 def _scene(plans: Sequence[Plan], problem: Problem | None, footprint: Any) -> Scene:

@@ -41,6 +41,9 @@ from maneuver_automaton.plotting.style import TEXT_PT, shortened, tidy
 MOST_NODES = 30
 MOST_LEVEL_NAMES = 12
 NAME_PT, NAME_LENGTH, CHARACTER = 7.5, 40, 0.058  # [pt], characters, [in]
+GRAPH, MOTIONS = 4.1, 3.35  # [in] of the graph, and of the motions beside it
+GUTTER, EDGE, LABELS = 0.95, 0.2, 0.5  # [in] between both, on the right, and below axes
+LEAST_GRAPH = 1.5  # [in]
 RING = 4.2  # [in] of a ring of nodes whose names stick out
 
 
@@ -105,27 +108,53 @@ def draw_motions(ax: Axes, automaton: Automaton) -> LineCollection:
     return lines
 
 
-def save_automaton_figure(automaton: Automaton, path: str | Path, *, title: str = "") -> None:
+def save_automaton_figure(
+    automaton: Automaton, path: str | Path, *, look: Look | None = None
+) -> None:
     """Write a picture of an `automaton`: its graph, and one second of each trim to scale.
 
-    A `title` stands above. The file is replaced in one step; its ending chooses the format.
+    The file is replaced in one step; its ending chooses the format.
+
+    Parameters
+    ----------
+    automaton : Automaton
+        What to draw.
+    path : str or Path
+        Where to write.
+    look : Look, optional
+        Title, size and style; a narrow page has the motions below the graph.
     """
+    look = look or Look()
     points = len(automaton) > MOST_NODES
-    lines = title_lines(Look(title=title), 8.0, _summary(automaton))
-    width = height = 4.1
+    stated = look.is_paper or look.size is not None
+    high = GRAPH
     if not points and len(automaton) > MOST_LEVEL_NAMES:
         longest = max(min(len(name), NAME_LENGTH) for name in automaton.trim_names)
-        width = height = RING + 2.0 * CHARACTER * longest  # names stick out like rays
-    width += 1.0
-    figure = new_figure(width + 4.5, height + 0.55 + heading_height(lines))
+        high = RING + 2.0 * CHARACTER * longest  # names stick out like rays
+    page = look.width if stated else high + 1.0 + GUTTER + MOTIONS + EDGE
+    lines = title_lines(look, page - 0.6, _summary(automaton))
+    top = heading_height(lines) + 0.05
+    if look.is_narrow:
+        side, wide = page - GUTTER, page
+        high = min(high, page)
+        below = min(side, MOTIONS) + LABELS
+    else:
+        side = min(MOTIONS, 0.36 * page)
+        wide = page - side - GUTTER - EDGE
+        high, below = min(high, wide), 0.0
+    if look.height is not None:
+        high = max(LEAST_GRAPH, look.height - top - LABELS - below)
+    figure = new_figure(page, look.height or top + high + LABELS + below)
     edge = 0.62 if points else 0.1
     left = axes_at(
-        figure, left=edge, bottom=0.5 if points else 0.15, width=width - edge,
-        height=height - (0.35 if points else 0.0),
+        figure, left=edge, bottom=below + (LABELS if points else 0.15), width=wide - edge,
+        height=high - (0.35 if points else 0.0),
     )  # fmt: skip
+    tall = below - LABELS - 0.25 if below else min(MOTIONS + 0.4, high - 0.35)
     right = axes_at(
-        figure, left=width + 0.95, bottom=0.5 + (height - 4.1) / 2.0, width=3.35, height=3.75
-    )
+        figure, left=0.75 if below else wide + GUTTER,
+        bottom=LABELS + (0.0 if below else (high - tall - 0.35) / 2.0), width=side, height=tall,
+    )  # fmt: skip
     draw_automaton(left, automaton)
     if automaton.maneuvers and not automaton.body_velocities.any():
         draw_maneuvers(right, automaton.maneuvers)
@@ -139,7 +168,7 @@ def save_automaton_figure(automaton: Automaton, path: str | Path, *, title: str 
 
 
 def _summary(automaton: Automaton) -> str:
-    name = automaton.name or automaton.model.name
+    name = automaton.name or automaton.model.name.replace("_", " ")
     counts = f"{len(automaton)} trim{'s' if len(automaton) > 1 else ''}"
     if automaton.maneuvers:
         many = len(automaton.maneuvers)

@@ -16,14 +16,17 @@ from maneuver_automaton.plotting.obstacles import ROBOT, moment_colors
 from maneuver_automaton.plotting.regions import region_path
 from maneuver_automaton.plotting.scene import Scene
 from maneuver_automaton.plotting.swept import merged, swept_region
-from maneuver_automaton.plotting.track import Track
+from maneuver_automaton.plotting.track import Piece, Track
 
 FAINT_DARTS = 9  # along a path
 DART = np.array([[0.6, 0.0], [-0.4, 0.32], [-0.22, 0.0], [-0.4, -0.32]])
 DART_SIZE = 0.066  # of the size of the path
+DARTS_APART = 2.5  # of their size, at least, between those where trims begin
+TURNED_RAD = 0.3  # of two darts in one place, at least
 SWEPT: Color = (0.36, 0.60, 0.85)
 SWEPT_ALPHA = 0.20
-MOST_MOTIONS, INNER_BODIES = 2, 3  # so few motions have bodies within
+MOST_MOTIONS, INNER_BODIES = 6, 3  # so few motions have bodies within, at most so many each
+BODIES_APART = 2.0  # of the reach, at least, between bodies within a motion
 FEW_BODIES, LEAST_ALPHA = 8, 0.3  # more bodies than that are fainter, but not more than this
 
 
@@ -39,12 +42,16 @@ def swept_area(track: Track, scene: Scene) -> PathCollection:
 
 
 def darts(track: Track, scene: Scene, *, size: float) -> PolyCollection:
-    """Where the body is not known: darts along a path, and white ones where trims begin."""
+    """Where the body is not known: darts along a path, and white ones where trims begin.
+
+    The white ones leave the path between them free.
+    """
     if scene.body:
         return PolyCollection([])
     dart = [DART_SIZE * size * DART]
     faint = track.spread(FAINT_DARTS, reach=0.0)
-    clear = _between_ends(track, scene, apart=1e-6 * size)
+    switches = _between_ends(track, scene, apart=1e-6 * size)
+    clear = _spread_out(switches, apart=DARTS_APART * DART_SIZE * size)
     return PolyCollection(
         [*placed(dart, faint), *placed(dart, clear)],
         facecolors=[(*GREY, 0.6)] * len(faint) + [(1.0, 1.0, 1.0, 1.0)] * len(clear),
@@ -59,7 +66,7 @@ def switch_bodies(track: Track, scene: Scene) -> PolyCollection:
 
     Those of what it carries stand beside them; a motion by optimal control has a few within.
     """
-    times = _shown_times(track, apart=INNER_BODIES * scene.reach)
+    times = _shown_times(track, apart=BODIES_APART * scene.reach)
     poses = track.at(times) if len(times) > len(track.switching_times) else track.switching_poses
     outlines = placed(scene.body, poses)
     for part in scene.carried:
@@ -103,17 +110,22 @@ def goal_bodies(scene: Scene) -> PolyCollection:
 
 
 def _shown_times(track: Track, *, apart: float) -> Array:
-    """Switching times (n,), and a few within one or two motions that leave their place [s]."""
+    """Switching times (n,), and a few within motions that are long and not steady [s]."""
     times = track.switching_times
     if not 1 <= len(track.pieces) <= MOST_MOTIONS:
         return times
-    shares = np.linspace(0.0, 1.0, INNER_BODIES + 2)[1:-1]
     inner = [
-        piece.time[0] + shares * (piece.time[-1] - piece.time[0])
+        np.linspace(piece.time[0], piece.time[-1], bodies_within(piece, apart=apart) + 2)[1:-1]
         for piece in track.pieces
-        if np.ptp(piece.control, axis=0).any() and np.ptp(piece.pose[:, :2], axis=0).max() > apart
+        if np.ptp(piece.control, axis=0).any()
     ]
     return np.sort(np.concatenate([times, *inner]))
+
+
+def bodies_within(piece: Piece, *, apart: float) -> int:
+    """How many bodies have room within a piece, `apart` [m] from each other and from its ends."""
+    length = float(np.linalg.norm(np.diff(piece.pose[:, :2], axis=0), axis=1).sum())
+    return min(INNER_BODIES, max(0, int(length / apart) - 1)) if apart > 0.0 else 0
 
 
 def draw_switches(ax: Axes, track: Track, scene: Scene, *, size: float) -> PathCollection:
@@ -123,6 +135,19 @@ def draw_switches(ax: Axes, track: Track, scene: Scene, *, size: float) -> PathC
         poses[:, 0], poses[:, 1], s=8.0, facecolors="white", edgecolors=[INK], linewidths=0.7,
         zorder=3.6,
     )  # fmt: skip
+
+
+def _spread_out(poses: Array, *, apart: float) -> Array:
+    """Those of the poses (n, dof) that are `apart` [m], or turned, from the one before.
+
+    Others would hide the path.
+    """
+    kept: list[Array] = []
+    for pose in poses:
+        gap = np.inf if not kept else float(np.linalg.norm(pose[:2] - kept[-1][:2]))
+        if gap >= apart or abs(pose[2] - kept[-1][2]) > TURNED_RAD:
+            kept.append(pose)
+    return np.array(kept).reshape(-1, poses.shape[1])
 
 
 def _between_ends(track: Track, scene: Scene, *, apart: float) -> Array:

@@ -27,6 +27,7 @@ from maneuver_automaton.plotting.closed_loop_track import (
 from maneuver_automaton.plotting.colors import GREY, INK, Color
 from maneuver_automaton.plotting.ends import EndArtists, draw_ends, end_handles
 from maneuver_automaton.plotting.footprint import placed
+from maneuver_automaton.plotting.limits import LimitArtists, draw_limits, limit_handles
 from maneuver_automaton.plotting.obstacles import (
     ObstacleArtists,
     draw_obstacles,
@@ -38,7 +39,7 @@ from maneuver_automaton.plotting.paths import (
     trim_handles,
 )
 from maneuver_automaton.plotting.scene import set_view
-from maneuver_automaton.plotting.style import line_handle, side_legend
+from maneuver_automaton.plotting.style import line_handle, outer_legend
 from maneuver_automaton.plotting.track import Track
 from maneuver_automaton.receding_horizon import ClosedLoop, Step
 
@@ -64,6 +65,7 @@ class ClosedLoopArtists:
     still: tuple[PathCollection, ...]
     ends: EndArtists
     obstacles: ObstacleArtists
+    limits: LimitArtists
     legend: Legend | None
 
 
@@ -145,7 +147,8 @@ def draw_closed_loop(
         spin_heads=PolyCollection(heads, facecolors=spin_colors, linewidths=0.0, zorder=4.0),
         still=draw_still(ax, track, used),
         ends=draw_ends(ax, loop.poses[0], loop.problem.goals, size=size),
-        obstacles=draw_obstacles(ax, loop.problem.obstacles, time=scene.times),
+        obstacles=draw_obstacles(ax, scene.obstacles, time=scene.times),
+        limits=draw_limits(ax, scene.zones, scene.bounds),
         legend=_legend(ax, loop, track, used) if legend else None,
     )  # fmt: skip
     for part in (
@@ -164,8 +167,11 @@ def loop_handles(
     handles: list[Artist]
     trims, names = trim_handles(track, colors)
     marks, mark_names = end_handles(loop.problem.goals)
-    around, around_names = obstacle_handles(loop.problem.obstacles, loop_scene(loop).times)
-    handles, names = [*trims, *marks, *around], [*names, *mark_names, *around_names]
+    scene = loop_scene(loop)
+    around, around_names = obstacle_handles(scene.obstacles, scene.times)
+    limits, limit_names = limit_handles(scene.zones, scene.bounds)
+    handles = [*trims, *marks, *around, *limits]
+    names = [*names, *mark_names, *around_names, *limit_names]
     if loop.steps:
         handles.append(line_handle(GREY, width=0.9))
         names.append("plan of a step")
@@ -239,4 +245,4 @@ def _dot(marker: str, *, size: float, face: Any, edge: Any) -> Line2D:
 
 def _legend(ax: Axes, loop: ClosedLoop, track: Track, colors: Mapping[str, Color]) -> Legend:
     handles, names = loop_handles(loop, track, colors)
-    return side_legend(ax, handles, names)
+    return outer_legend(ax, handles, names)

@@ -17,7 +17,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.plotting.colors import GREY, INK, Color
 from maneuver_automaton.plotting.motions import track_colors
-from maneuver_automaton.plotting.style import side_legend, tidy
+from maneuver_automaton.plotting.style import outer_legend, tidy
 from maneuver_automaton.plotting.track import Piece, Track, track_of_plan
 
 STYLES: tuple[tuple[float, Sequence[float]] | Literal["-"], ...] = (
@@ -113,7 +113,7 @@ def draw_track_controls(
         for k in range(many)
     )
     handles = [Line2D([], [], color=INK, linestyle=STYLES[k % len(STYLES)]) for k in range(many)]
-    side_legend(ax, handles, names)
+    outer_legend(ax, handles, names)
     return drawn
 
 

@@ -17,7 +17,7 @@ from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE, Color
 from maneuver_automaton.plotting.controls import TIME_LABEL
 from maneuver_automaton.plotting.ends import draw_headings
 from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
-from maneuver_automaton.plotting.style import line_handle, tidy, upper_legend
+from maneuver_automaton.plotting.style import line_handle, outer_legend, tidy
 from maneuver_automaton.refinement.effort import EffortReport
 from maneuver_automaton.refinement.retiming import Retiming
 
@@ -105,7 +105,7 @@ def draw_accumulated(ax: Axes, example: UniformEffortExample) -> tuple[Line2D, .
     ]
     lines = (*drawn, straight)
     tidy(ax, x=TIME_LABEL, y="sum up to here")
-    upper_legend(ax, lines, names)
+    outer_legend(ax, lines, names, above=True)
     return lines
 
 
@@ -133,7 +133,7 @@ def draw_node_efforts(
     handles = [*lines, line_handle(GREY, marker="o")]
     legend_names = [*names, "two nodes at each end"]
     ax.margins(0.06, 0.1)
-    upper_legend(ax, handles, legend_names)
+    outer_legend(ax, handles, legend_names, above=True)
     return tuple(rings)
 
 
@@ -156,7 +156,7 @@ def draw_spreads(ax: Axes, examples: Sequence[UniformEffortExample]) -> tuple[Li
     ax.set_xticks(nodes[order], [str(n) for n in nodes[order].tolist()])
     ax.minorticks_off()
     ax.yaxis.set_major_formatter("{x:g}")
-    upper_legend(ax, lines, names)
+    outer_legend(ax, lines, names, above=True)
     return lines
 
 
@@ -220,7 +220,7 @@ def draw_efforts(ax: Axes, retiming: Retiming) -> tuple[LineCollection, ...]:
         Line2D([], [], color=AFTER, linewidth=2.4),
     ]
     names = ("before", "after", "uniform, without limits")
-    upper_legend(ax, [*handles, uniform], names)
+    outer_legend(ax, [*handles, uniform], names, above=True)
     return steps
 
 
@@ -242,7 +242,7 @@ def draw_paces(ax: Axes, retiming: Retiming) -> tuple[Line2D, ...]:
     tidy(ax, x="x [m]", y="y [m]")
     step = retiming.before.duration / DOTS
     names = [f"every {step:.3g} s before", f"every {step:.3g} s after"]
-    upper_legend(ax, drawn, names)
+    outer_legend(ax, drawn, names, above=True)
     return tuple(drawn)
 
 
@@ -262,7 +262,7 @@ def _draw_lines(
         for k, column in enumerate(rows.T)
     )
     tidy(ax, x=TIME_LABEL, y=label)
-    upper_legend(ax, lines, names)
+    outer_legend(ax, lines, names, above=True)
     return lines
 
 

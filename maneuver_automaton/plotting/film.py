@@ -1,4 +1,4 @@
-"""Moving pictures as files: a figure, what moves in it, and the times of its pictures."""
+"""Moving pictures as files: a figure, its artists that move, and the times of its pictures."""
 
 from __future__ import annotations
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from maneuver_automaton.plotting.style import shortened
 
@@ -46,6 +47,20 @@ def control_labels(names: Sequence[str]) -> list[str]:
     ]
 
 
+def stated_labels(document: Mapping[str, Any], what: str) -> list[str]:
+    """Axis labels of the columns of a loaded plan.json, `what` is control or reduced_state.
+
+    Empty where it does not name them.
+
+    Examples
+    --------
+    >>> stated_labels({"vehicle": {"control": ["speed"]}}, "control"), stated_labels({}, "control")
+    (['speed [m/s]'], [])
+    """
+    vehicle = document.get("vehicle") or {}
+    return control_labels([str(name) for name in vehicle.get(what) or ()])
+
+
 def shown_name(name: str) -> str:
     """The name of a trim or maneuver as pictures show it: "polished" alone says little.
 
@@ -70,6 +85,8 @@ def word_text(word: Sequence[str], *, width: int, lines: int) -> str:
     """
     if not word:
         return "no motion"
+    if list(word) == [POLISHED]:
+        return "one motion by optimal control"
     names = [shortened(shown_name(name), 80) for name in word]
     whole = textwrap.wrap(ARROW.join(names), width, break_long_words=False)
     if len(whole) <= lines or len(names) < 4:

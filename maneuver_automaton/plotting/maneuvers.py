@@ -84,12 +84,22 @@ def draw_maneuvers(ax: Axes, maneuvers: Sequence[Maneuver]) -> ManeuverArtists:
     return ManeuverArtists(paths=paths, darts=darts)
 
 
-def save_maneuvers_figure(automaton: Automaton, path: str | Path, *, title: str = "") -> None:
+def save_maneuvers_figure(
+    automaton: Automaton, path: str | Path, *, look: Look | None = None
+) -> None:
     """Write pictures of every maneuver of an `automaton`, each panel to its own scale.
 
     Up to 48 have a panel each; more are drawn together with those that leave the same trim, in at
-    most 120 panels. A `title` stands above. The file is replaced in one step; its ending chooses
-    the format.
+    most 120 panels. The file is replaced in one step; its ending chooses the format.
+
+    Parameters
+    ----------
+    automaton : Automaton
+        What to draw.
+    path : str or Path
+        Where to write.
+    look : Look, optional
+        Title, width and style; the height follows from the panels.
 
     Raises
     ------
@@ -99,11 +109,15 @@ def save_maneuvers_figure(automaton: Automaton, path: str | Path, *, title: str 
     panels = _panels(automaton)
     if not panels:
         raise ValueError(f"{automaton.name or 'automaton'}: has no maneuver to draw")
+    look = look or Look()
     left_out, panels = len(panels) - MOST_PANELS, panels[:MOST_PANELS]
-    columns = min(COLUMNS, len(panels))
+    stated = look.is_paper or look.size is not None
+    room = int((look.width - 2.0 * EDGE + GAP) / (PANEL + GAP)) if stated else COLUMNS
+    columns = max(1, min(room, len(panels)))
     rows = math.ceil(len(panels) / columns)
     width = max(columns * (PANEL + GAP) - GAP + 2.0 * EDGE, 4.8)
-    lines = _heading(automaton, title, left_out, width)
+    width = look.width if stated else width
+    lines = _heading(automaton, look, left_out, width)
     above = LINE * max(name.count("\n") + 1 for name, _ in panels) + 0.08
     top, step = heading_height(lines) + 0.1, PANEL + above + GAP
     figure = new_figure(width, top + rows * step)
@@ -125,14 +139,14 @@ def save_maneuvers_figure(automaton: Automaton, path: str | Path, *, title: str 
 
 
 def _heading(
-    automaton: Automaton, title: str, left_out: int, width: float
+    automaton: Automaton, look: Look, left_out: int, width: float
 ) -> list[tuple[str, float, str]]:
     """Title, what is drawn, and how to read it."""
     more = f"; {left_out} more trims are left out" if left_out > 0 else ""
-    name = shortened(automaton.name or automaton.model.name, 40)
+    name = shortened(automaton.name or automaton.model.name.replace("_", " "), 40)
     legend = "how wide a panel is stands in it; dots are 1 s apart; orange turns left, blue right"
     said = f"{name}: {_count(automaton)}"
-    return title_lines(Look(title=title), width - EDGE, said, legend + more)
+    return title_lines(look, width - EDGE, said, legend + more)
 
 
 def _panels(automaton: Automaton) -> list[tuple[str, list[Maneuver]]]:

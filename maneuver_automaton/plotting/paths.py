@@ -31,6 +31,7 @@ from maneuver_automaton.plotting.colors import INK, Color
 from maneuver_automaton.plotting.ends import EndArtists, draw_ends, end_handles
 from maneuver_automaton.plotting.footprint import footprint_polygons
 from maneuver_automaton.plotting.labels import shown_name
+from maneuver_automaton.plotting.limits import LimitArtists, draw_limits, limit_handles
 from maneuver_automaton.plotting.motions import MOST_TRIMS, motion_names, track_colors
 from maneuver_automaton.plotting.obstacles import (
     ROBOT,
@@ -47,7 +48,7 @@ from maneuver_automaton.plotting.scene import (
     set_view,
     view_box,
 )
-from maneuver_automaton.plotting.style import line_handle, side_legend
+from maneuver_automaton.plotting.style import line_handle, outer_legend
 from maneuver_automaton.plotting.track import Piece, Track, track_of_plan
 from maneuver_automaton.problem import Goal, Problem
 
@@ -73,6 +74,7 @@ class PlanArtists:
     still: tuple[PathCollection, ...]  # a ring for each rest, a triangle for a climb on the spot
     ends: EndArtists
     obstacles: ObstacleArtists
+    limits: LimitArtists
     legend: Legend | None
 
 
@@ -173,6 +175,7 @@ def draw_track(
         still=draw_still(ax, track, colors),
         ends=draw_ends(ax, track.start, scene.goals, size=size, reached=scene.reached),
         obstacles=draw_obstacles(ax, scene.obstacles, time=scene.times),
+        limits=draw_limits(ax, scene.zones, scene.bounds),
         legend=_legend(ax, track, scene, colors) if legend else None,
     )  # fmt: skip
     for part in (
@@ -185,15 +188,19 @@ def draw_track(
 
 
 def trim_handles(track: Track, colors: Mapping[str, Color]) -> tuple[list[Line2D], list[str]]:
-    """Legend handles and names of the trims of a `track`, in order; of how they move, if many."""
+    """Legend handles and names of the trims of a `track` that can be seen, in order.
+
+    Of how they move, if they are many.
+    """
     symbols = {piece.name: _symbol(piece) for piece in reversed(track.pieces)}
-    entries = motion_names(track.twists, many=len(colors) > MOST_TRIMS)
+    seen = {name: twist for name, twist in track.twists.items() if name in track.seen}
+    entries = motion_names(seen, many=len(colors) > MOST_TRIMS)
     handles = [line_handle(colors[name], marker=symbols[name]) for name in entries.values()]
     return handles, [shown_name(name) for name in entries]
 
 
 def scene_handles(track: Track, scene: Scene) -> tuple[list[Artist], list[str]]:
-    """Legend handles and names of start, goals, obstacles, and what the body sweeps."""
+    """Legend handles and names of start, goals, obstacles, limits, and what the body sweeps."""
     ends, names = end_handles(scene.goals)
     around, around_names = obstacle_handles(scene.obstacles, scene.times)
     swept = bool(scene.body and track.pieces)
@@ -203,7 +210,8 @@ def scene_handles(track: Track, scene: Scene) -> tuple[list[Artist], list[str]]:
     if swept and scene.moves:
         patches.append(Patch(facecolor=(*ROBOT, 0.85), edgecolor=INK))
         said.append("body at the same times")
-    return [*ends, *patches, *around], [*names, *said, *around_names]
+    limits, limit_names = limit_handles(scene.zones, scene.bounds)
+    return [*ends, *patches, *around, *limits], [*names, *said, *around_names, *limit_names]
 
 
 def _symbol(piece: Piece) -> str:
@@ -239,11 +247,11 @@ def draw_still(ax: Axes, track: Track, colors: Mapping[str, Color]) -> tuple[Pat
             edgecolors=[colors[piece.name]], linewidths=1.8, zorder=4.5,
         )
         for piece in track.pieces
-        if _symbol(piece)
+        if _symbol(piece) and piece.name in track.seen
     )  # fmt: skip
 
 
 def _legend(ax: Axes, track: Track, scene: Scene, colors: Mapping[str, Color]) -> Legend:
     handles, labels = trim_handles(track, colors)
     marks, names = scene_handles(track, scene)
-    return side_legend(ax, [*handles, *marks], [*labels, *names])
+    return outer_legend(ax, [*handles, *marks], [*labels, *names])

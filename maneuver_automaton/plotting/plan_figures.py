@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import as_array
 from maneuver_automaton.planning import PlanResult
-from maneuver_automaton.plotting.labels import control_labels, result_text, word_text
+from maneuver_automaton.plotting.labels import control_labels, result_text, stated_labels, word_text
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.pages import (
     heading_height,
@@ -122,7 +122,7 @@ def save_plan_file_figure(
 ) -> None:
     """Write the picture of a loaded plan.json: that of `save_plan_figure`, from the file alone.
 
-    The file names neither controls nor obstacles: the former are numbered.
+    The file states neither body nor obstacles. Controls are numbered if it does not name them.
 
     Raises
     ------
@@ -149,7 +149,8 @@ def save_plan_file_figure(
             error_rad=error.get("heading_rad"),
             clearance_m=document.get("clearance_m"),
         ),
-        labels=(),
+        labels=stated_labels(document, "control"),
+        state_labels=stated_labels(document, "reduced_state"),
         look=look,
     )
     write_figure(plan_page(sheet), path)

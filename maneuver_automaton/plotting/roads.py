@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PathCollection, PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from matplotlib.text import Text
 
 from maneuver_automaton._arrays import Array
@@ -17,17 +19,26 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE, shaded
 from maneuver_automaton.plotting.film import Film, picture_times, write_film
+from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.obstacles import MOVING, SOLID
-from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
+from maneuver_automaton.plotting.pages import (
+    axes_at,
+    bottom_legend,
+    heading_height,
+    heading_text,
+    legend_rows,
+    new_figure,
+    title_lines,
+    write_figure,
+)
 from maneuver_automaton.plotting.regions import shape_path
-from maneuver_automaton.plotting.style import tidy
+from maneuver_automaton.plotting.style import line_handle, outer_legend, tidy
 from maneuver_automaton.roads import GoalRegion, RoadScene, RoadVehicle
 
 LANE = (0.91, 0.91, 0.92)
 EGO, GOAL = SEQUENCE[0], SEQUENCE[2]
-WIDTH, LEFT, BOTTOM = 9.6, 0.75, 0.6  # [in]
-INNER = WIDTH - LEFT - 0.2
-PANEL, GAP, TOP = 1.2, 0.75, 0.85  # [in]
+LEFT, RIGHT = 0.75, 0.2  # [in] beside the axes
+PANEL, GAP = 1.2, 0.75  # [in] height of what is over time, and above it
 MARGIN = 12.0  # [m] around all that drives
 FLATTEST, HIGHEST = 1.6, 5.4  # [in] of the plane
 MOMENTS = 5  # times at which bodies are shown
@@ -110,8 +121,23 @@ def save_road_figure(
     path: str | Path,
     *,
     said: str = "",
+    look: Look | None = None,
 ) -> None:
-    """Write the picture of a drive: the plane, and speed and controls over time.
+    """Write the picture of a drive: the plane, and speed and accelerations over time.
+
+    Parameters
+    ----------
+    scene : RoadScene
+    vehicle : RoadVehicle
+    plan : Plan
+        Of the rear axle, in the coordinates and on the clock of the scene.
+    path : str or Path
+        Where to write.
+    said : str
+        Stands below the title; the source of the scene if left out.
+    look : Look, optional
+        Title, size and style; the name of the scene is the title if left out. A page too low
+        leaves out what is over time.
 
     Raises
     ------
@@ -120,30 +146,26 @@ def save_road_figure(
     OSError
         If the file cannot be written.
     """
+    look = look or Look(title=scene.name)
+    page = _page(scene, vehicle, plan, panels=2, said=said or scene.source, look=look)
+    draw_road(page.plane, scene, vehicle, plan)
+    if page.panels:
+        speed, rates = page.panels
+        _draw_over_time(speed, rates, vehicle, plan)
+    write_figure(page.figure, path)
+
+
+def _draw_over_time(speed: Axes, rates: Axes, vehicle: RoadVehicle, plan: Plan) -> None:
+    """Draw the speed, and the acceleration along and across the road, over time."""
     driven = plan.sample()
-    figure, ax = _page(scene, vehicle, plan, panels=2, said=said)
-    draw_road(ax, scene, vehicle, plan)
-    speed = axes_at(figure, left=LEFT, bottom=BOTTOM + PANEL + GAP, width=INNER, height=PANEL)
     speed.plot(driven.time, driven.reduced_state[:, 0], color=EGO, linewidth=1.4)
     tidy(speed, x="", y="speed [m/s]")
     across = driven.reduced_state[:, 0] ** 2 * np.tan(driven.reduced_state[:, 1])
-    rates = axes_at(figure, left=LEFT, bottom=BOTTOM, width=INNER, height=PANEL)
-    rates.step(
-        driven.time, driven.control[:, 0], where="post", color=EGO, linewidth=1.4, label="along"
-    )
-    rates.plot(
-        driven.time,
-        across / vehicle.model.wheelbase,
-        color=SEQUENCE[1],
-        linewidth=1.4,
-        label="across",
-    )
-    rates.legend(
-        frameon=False, fontsize=8.0, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0),
-        borderaxespad=0.0,
-    )  # fmt: skip
-    tidy(rates, x="time [s]", y="acceleration [m/s²]")
-    write_figure(figure, path)
+    rates.step(driven.time, driven.control[:, 0], where="post", color=EGO, linewidth=1.4)
+    rates.plot(driven.time, across / vehicle.model.wheelbase, color=SEQUENCE[1], linewidth=1.4)
+    tidy(rates, x="time [s]", y="acceleration\n[m/s²]")
+    handles = [line_handle(color, width=1.4) for color in (EGO, SEQUENCE[1])]
+    outer_legend(rates, handles, ["along", "across"], above=True)
 
 
 def save_road_animation(
@@ -159,7 +181,8 @@ def save_road_animation(
         If the file cannot be written.
     """
     begin, end = plan.switching_times[[0, -1]].tolist()
-    figure, ax = _page(scene, vehicle, plan, panels=0, said="")
+    page = _page(scene, vehicle, plan, panels=0, said=scene.source, look=Look(title=scene.name))
+    figure, ax = page.figure, page.plane
     drawn = draw_road(ax, scene, vehicle, plan, times=[])
     clock: Text = ax.text(
         0.01, 0.98, "", transform=ax.transAxes, va="top", fontsize=9.0, color=INK, zorder=9.0
@@ -178,16 +201,58 @@ def save_road_animation(
     write_film(Film(figure=figure, moving=moving, show=show, times=times, samples=[begin]), path)
 
 
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Page:
+    """A figure with axes for the plane, and for what is over time where there is room."""
+
+    figure: Figure
+    plane: Axes
+    panels: tuple[Axes, ...]
+
+
 def _page(
-    scene: RoadScene, vehicle: RoadVehicle, plan: Plan, *, panels: int, said: str
-) -> tuple[Figure, Axes]:
+    scene: RoadScene, vehicle: RoadVehicle, plan: Plan, *, panels: int, said: str, look: Look
+) -> _Page:
     low, high = road_box(scene, vehicle, plan)
-    plane = float(np.clip(INNER * (high - low)[1] / (high - low)[0], FLATTEST, HIGHEST))
-    under = BOTTOM + panels * (PANEL + GAP)
-    figure = new_figure(WIDTH, TOP + plane + under)
-    lines = [(scene.name, 12.0, "bold"), (said or scene.source, 9.0, "normal")]
+    inner = look.width - LEFT - RIGHT
+    handles, names = _legend_entries(scene, moving=bool(panels))
+    lines = title_lines(look, inner, said)
+    top = heading_height(lines) + 0.1
+    bottom = 0.6 + 0.2 * legend_rows(names, inner)
+    under = panels * (PANEL + GAP)
+    height = float(np.clip(inner * (high - low)[1] / (high - low)[0], FLATTEST, HIGHEST))
+    if look.height is not None:
+        if look.height - top - bottom - under < FLATTEST:
+            panels, under = 0, 0.0
+        height = max(FLATTEST, look.height - top - bottom - under)
+    figure = new_figure(look.width, top + height + under + bottom)
     heading_text(figure, lines, left=LEFT)
-    return figure, axes_at(figure, left=LEFT, bottom=under, width=INNER, height=plane)
+    bottom_legend(figure, handles, names, left=LEFT, width=inner)
+    at = [bottom + k * (PANEL + GAP) for k in reversed(range(panels))]
+    return _Page(
+        figure=figure,
+        plane=axes_at(figure, left=LEFT, bottom=bottom + under, width=inner, height=height),
+        panels=tuple(
+            axes_at(figure, left=LEFT, bottom=low, width=inner, height=PANEL) for low in at
+        ),
+    )
+
+
+def _legend_entries(scene: RoadScene, *, moving: bool) -> tuple[list[Artist], list[str]]:
+    """Handles and names of the vehicle, of traffic and of goals; `moving`: at several times."""
+    later = ", the later the darker" if moving else ""
+    handles: list[Artist] = [Patch(facecolor=EGO), Patch(facecolor=LANE)]
+    names = [f"vehicle{later}", "lane"]
+    if any(one.motion is not None for one in scene.traffic):
+        handles.append(Patch(facecolor=MOVING))
+        names.append(f"traffic{later}")
+    if any(one.motion is None for one in scene.traffic):
+        handles.append(Patch(facecolor=SOLID))
+        names.append("obstacle")
+    if any(goal.places for goal in scene.goals):
+        handles.append(Patch(facecolor=(*GOAL, 0.18), edgecolor=GOAL))
+        names.append("goal")
+    return handles, names
 
 
 def road_box(scene: RoadScene, vehicle: RoadVehicle, plan: Plan) -> tuple[Array, Array]:

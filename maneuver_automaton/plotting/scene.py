@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,13 +13,15 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.collision import AnyObstacle, Obstacle, OccupancyMap
+from maneuver_automaton.collision.zones import Zone
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.footprint import footprint_polygons, placed
+from maneuver_automaton.plotting.limits import limit_boxes
 from maneuver_automaton.plotting.obstacles import moving_shapes, round_times, static_shapes
 from maneuver_automaton.plotting.regions import shape_path
 from maneuver_automaton.plotting.style import count_from_near, tidy
 from maneuver_automaton.plotting.track import Track, track_of_plan
-from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.problem import Bounds, Goal, Problem
 
 STILL_SIZE_M = 1.0  # size of a path that goes nowhere
 ROOM = 0.16  # around start and goals where the body is not known, of the size
@@ -41,11 +43,13 @@ class Carried:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Scene:
-    """Goals, obstacles and a body."""
+    """Goals, obstacles, limits and a body."""
 
     goals: tuple[Goal, ...]
     reached: int | None = None  # which of the goals
     obstacles: tuple[AnyObstacle, ...] = ()
+    zones: tuple[Zone, ...] = ()
+    bounds: Bounds = field(default_factory=Bounds)
     body: tuple[Array, ...] = ()  # outlines (n, 2) [m]; none: it is not known
     carried: tuple[Carried, ...] = ()
     times: Array  # (n,) at which moving obstacles are shown [s]
@@ -96,6 +100,8 @@ def scene_of(problem: Problem, begin: float, end: float, *, footprint: Any = Non
     return Scene(
         goals=problem.goals,
         obstacles=problem.obstacles,
+        zones=problem.zones,
+        bounds=problem.bounds,
         body=tuple(footprint_polygons(problem.footprint if footprint is None else footprint)),
         times=round_times(begin, end),
     )
@@ -112,10 +118,11 @@ def scene_size(scene: Scene, track: Track) -> float:
 def view_box(scene: Scene, points: Array, *, size: float) -> Array:
     """Corners (2, 2) of what a picture shows around `points` (n, 2), where something happens.
 
-    All obstacles, unless they are much larger than that: then those that are near.
+    All obstacles and limits, unless they are much larger than that: then those that are near.
     """
     low, high = points.min(axis=0), points.max(axis=0)
-    boxes = np.array(obstacle_boxes(scene.obstacles, scene.times)).reshape(-1, 2)
+    around = obstacle_boxes(scene.obstacles, scene.times) + limit_boxes(scene.zones, scene.bounds)
+    boxes = np.concatenate([np.zeros((0, 2)), *around])
     if not boxes.size:
         return np.array([low, high])
     all_low, all_high = np.minimum(low, boxes.min(axis=0)), np.maximum(high, boxes.max(axis=0))

@@ -20,9 +20,10 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanResult
-from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded, trim_colors
+from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded
 from maneuver_automaton.plotting.labels import result_text, shown_name
 from maneuver_automaton.plotting.look import Look
+from maneuver_automaton.plotting.motions import MOST_TRIMS, motion_names, track_colors
 from maneuver_automaton.plotting.pages import (
     axes_at,
     bottom_legend,
@@ -311,21 +312,23 @@ def _track(result: PlanResult) -> Track:
 
 
 def _colors(result: PlanResult, track: Track) -> dict[str, Color]:
-    """Colours of the trims in which the plan coasts."""
+    """Colours of the trims in which the plan coasts; without any, of the parts of its motion."""
     if result.plan is None:
         return {}
-    coasts = {one.name for one in result.plan.primitives if isinstance(one, Trim)}
-    return trim_colors({name: twist for name, twist in track.twists.items() if name in coasts})
+    coasts = {one.name for one in result.plan.primitives if isinstance(one, Trim)} & track.seen
+    shown = coasts or track.seen
+    return track_colors({name: twist for name, twist in track.twists.items() if name in shown})
 
 
 def _legend(result: PlanResult, track: Track) -> tuple[list[Line2D], list[str]]:
     colors = _colors(result, track)
-    handles = [line_handle(color) for color in colors.values()]
-    names = list(colors)
-    if result.plan is not None and any(result.plan.maneuvers):
+    shown = {name: twist for name, twist in track.twists.items() if name in colors}
+    entries = motion_names(shown, many=len(shown) > MOST_TRIMS)
+    handles = [line_handle(colors[name]) for name in entries.values()]
+    names = [shown_name(name) for name in entries]
+    if track.seen - colors.keys():
         handles.append(line_handle(INK))
-        done = {shown_name(one.name) for one in result.plan.maneuvers if one is not None}
-        names.append("maneuvers" if len(done) > 1 else done.pop())
+        names.append("maneuvers")
     for color, marker in ((START, "o"), (GOAL, "*")):
         handles.append(line_handle(color, marker=marker))
         handles[-1].set_markerfacecolor(color)

@@ -15,6 +15,7 @@ from matplotlib.text import Text
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.plotting.colors import INK, Color
 from maneuver_automaton.plotting.ends import draw_ends, end_handles
+from maneuver_automaton.plotting.limits import draw_limits, limit_handles
 from maneuver_automaton.plotting.obstacles import (
     MovingShape,
     draw_obstacles,
@@ -66,6 +67,7 @@ def stage_of(
     bottom_legend(figure, handles, names, left=LEFT, width=inner)
     draw_ends(ax, track.start, scene.goals, size=size, reached=scene.reached)
     obstacles = draw_obstacles(ax, scene.obstacles, time=scene.times[0])
+    draw_limits(ax, scene.zones, scene.bounds)
     set_view(ax, box, track.start[:2])
     return Stage(
         figure=figure,
@@ -87,9 +89,10 @@ def _legend_entries(
     few = len(trims) <= MOST_NAMES
     ends, end_names = end_handles(scene.goals)
     others, other_names = obstacle_handles(scene.obstacles, scene.times[:1])
+    limits, limit_names = limit_handles(scene.zones, scene.bounds)
     return (
-        [*trims[: None if few else 0], *ends, *others],
-        [*trim_names[: None if few else 0], *end_names, *other_names],
+        [*trims[: None if few else 0], *ends, *others, *limits],
+        [*trim_names[: None if few else 0], *end_names, *other_names, *limit_names],
     )
 
 

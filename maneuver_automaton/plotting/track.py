@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,10 +14,17 @@ import numpy as np
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import SE2, group_of
+from maneuver_automaton.plotting.labels import POLISHED
+from maneuver_automaton.plotting.motions import motion
 from maneuver_automaton.primitives import Maneuver
 
 TURNING_M = 1e-4  # [m] between samples: less is no direction of travel
 CHORD_RAD = 0.03  # [rad] between drawn points of an arc
+LEAST_TURN_RAD = 0.05  # [rad] that a part of a maneuver turns, if it is told apart
+STRAIGHT = 0.1  # of the fastest turn of a maneuver: slower is straight on
+LEAST_STRAIGHT = 0.05  # of its duration that a straight part takes
+TINIEST_S = 1e-12
+SEEN = 5e-3  # of the duration: what takes less can hardly be seen in a picture
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -25,11 +32,17 @@ class Piece:
     """One trim or maneuver of a plan that takes time, as samples."""
 
     name: str
-    twist: Array  # (dof,) of a trim, or the mean of a maneuver [m/s, m/s, rad/s(, m/s)]
+    # (dof,) of a trim, or the mean of a part of a maneuver [m/s, m/s, rad/s(, m/s)]
+    twist: Array
     time: Array  # (n,) [s]
     pose: Array  # (n, dof), headings continuous
     control: Array  # (n, n_u), row i holds from time i on
     state: Array  # (n, n_z) reduced state; no column for a kinematic vehicle
+
+    @property
+    def duration(self) -> float:
+        """How long it takes [s]."""
+        return float(self.time[-1] - self.time[0])
 
     @property
     def drives(self) -> bool:
@@ -90,6 +103,15 @@ class Track:
         return twists
 
     @property
+    def seen(self) -> set[str]:
+        """Names of the trims that take enough of the time to be seen."""
+        lasted: dict[str, float] = {}
+        for piece in self.pieces:
+            lasted[piece.name] = lasted.get(piece.name, 0.0) + piece.duration
+        least = SEEN * sum(lasted.values())
+        return {name for name, duration in lasted.items() if duration >= least}
+
+    @property
     def climbs(self) -> bool:
         """Whether the altitude varies."""
         return bool(self.start.size > 3 and np.ptp(self.pose[:, 3]) > 1e-9)
@@ -126,7 +148,7 @@ class Track:
 
 
 def track_of_plan(plan: Plan) -> Track:
-    """The track of a `plan`; a maneuver that changes its direction is a piece for each."""
+    """The track of a `plan`; a maneuver that turns back, or both ways, is a piece for each."""
     return Track(
         plan.start,
         tuple(
@@ -216,17 +238,19 @@ def _pieces(plan: Plan, k: int, duration: float) -> list[Piece]:
 
 
 def _sampled(name: str, kind: str, samples: _Samples) -> list[Piece]:
-    """Pieces of a primitive; a maneuver is cut where it turns from ahead to back."""
-    cuts = _turning_points(samples) if kind == "maneuver" else []
-    bounds = [0, *cuts, len(samples.time) - 1]
+    """Pieces of a primitive; a maneuver is cut where it turns back, or turns the other way."""
+    runs = _runs(samples) if kind == "maneuver" else []
+    whole = len(runs) < 2
     pieces = []
-    for first, last in pairwise(bounds):
-        part = samples.part(slice(first, last + 1))
+    for run in [_Run(0, len(samples.time) - 1, 0)] if whole else runs:
+        part = samples.part(slice(run.first, run.last + 1))
         twist = _twist(part.time, part.pose)
-        back = bool(cuts) and twist[0] < 0.0
+        if not whole and run.turn == 0:
+            twist[2] = 0.0  # what it still turns can hardly be seen
+        said = motion(twist)
         pieces.append(
             Piece(
-                name=f"{name}, {'back' if back else 'ahead'}" if cuts else name,
+                name=name if whole and name != POLISHED else f"{name}, {said}",
                 twist=twist,
                 time=part.time,
                 pose=part.pose,
@@ -235,6 +259,60 @@ def _sampled(name: str, kind: str, samples: _Samples) -> list[Piece]:
             )
         )
     return pieces
+
+
+class _Run(NamedTuple):
+    """Rows of samples between which a maneuver keeps its gear and the way it turns."""
+
+    first: int
+    last: int
+    turn: int  # 1 to the left, -1 to the right, 0 for straight on
+
+
+def _runs(samples: _Samples) -> list[_Run]:
+    """Runs of one gear and one turn; a single one unless the gear or the side changes."""
+    cuts = _turning_points(samples)
+    bounds = [0, *cuts, len(samples.time) - 1]
+    runs = [run for first, last in pairwise(bounds) for run in _turns(samples, first, last)]
+    sides = {run.turn for run in runs}
+    return runs if cuts or {-1, 1} <= sides else runs[:1]
+
+
+def _turns(samples: _Samples, first: int, last: int) -> list[_Run]:
+    """Runs of one turn among rows of one gear; what is too short to be seen joins its neighbour."""
+    spans = np.diff(samples.time)
+    gained = np.diff(samples.pose[:, 2])
+    rates = np.abs(gained) / np.maximum(spans, TINIEST_S)
+    sides = np.where(rates > STRAIGHT * rates.max(), np.sign(gained), 0.0)[first:last]
+    starts = np.flatnonzero(np.diff(sides, prepend=np.nan) != 0.0)
+    runs = [
+        _Run(first + int(a), first + int(b), int(sides[a]))
+        for a, b in pairwise([*starts.tolist(), last - first])
+    ]
+
+    def weight(run: _Run) -> float:
+        """From one on it is worth a run of its own."""
+        turned = abs(float(gained[run.first : run.last].sum())) / LEAST_TURN_RAD
+        lasted = float(spans[run.first : run.last].sum()) / (LEAST_STRAIGHT * float(spans.sum()))
+        return turned if run.turn else lasted
+
+    while len(runs) > 1 and min(map(weight, runs)) < 1.0:
+        k = min(range(len(runs)), key=lambda n: weight(runs[n]))
+        beside = [n for n in (k - 1, k + 1) if 0 <= n < len(runs)]
+        into = max(beside, key=lambda n: weight(runs[n]))
+        runs[k] = runs[k]._replace(turn=runs[into].turn)
+        runs = _joined(runs)
+    if len(runs) == 1 and weight(runs[0]) < 1.0:
+        return [runs[0]._replace(turn=0)]
+    return runs
+
+
+def _joined(runs: Sequence[_Run]) -> list[_Run]:
+    """Runs in which no two in a row turn alike."""
+    return [
+        _Run(alike[0].first, alike[-1].last, turn)
+        for turn, alike in ((turn, list(some)) for turn, some in groupby(runs, lambda r: r.turn))
+    ]
 
 
 def _turning_points(samples: _Samples) -> list[int]:

@@ -13,7 +13,7 @@ from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE
 from maneuver_automaton.plotting.controls import TIME_LABEL
 from maneuver_automaton.plotting.labels import control_labels
 from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
-from maneuver_automaton.plotting.style import tidy, upper_legend
+from maneuver_automaton.plotting.style import outer_legend, tidy
 
 WIDEST = 2.4  # line of the shortest path, which the longer ones would hide
 
@@ -51,7 +51,7 @@ def draw_turnpike_states(ax: Axes, study: Turnpike, *, component: int = 0) -> li
     lines.append(ax.axhline(level, color=INK, linewidth=1.0, linestyle=(0, (3, 2))))
     names = [f"{case.duration:.3g} s" for case in study.cases] + ["trim"]
     tidy(ax, x=TIME_LABEL, y=control_labels([study.reduced_names[component]])[0])
-    upper_legend(ax, lines, names)
+    outer_legend(ax, lines, names, above=True)
     return lines
 
 
@@ -68,7 +68,7 @@ def draw_turnpike_costs(ax: Axes, study: Turnpike) -> list[Line2D]:
         for values, color in zip(beyond.values(), (GREY, SEQUENCE[0]), strict=True)
     ]
     tidy(ax, x="time in the trim [s]", y="cost beyond the trim's")
-    upper_legend(ax, lines, list(beyond))
+    outer_legend(ax, lines, list(beyond), above=True)
     return lines
 
 
@@ -81,5 +81,5 @@ def draw_time_away(ax: Axes, study: Turnpike) -> list[Line2D]:
         *ax.plot(duration, away, color=SEQUENCE[0], linewidth=1.8, marker="o", markersize=4.0),
     ]
     tidy(ax, x="duration [s]", y=f"time farther than {study.distance:g} [s]")
-    upper_legend(ax, lines, ["all of it", "away"])
+    outer_legend(ax, lines, ["all of it", "away"], above=True)
     return lines

@@ -191,7 +191,7 @@ def without_shuffles(model: Model, found: Polished, shortest: float) -> Array | 
     """Gears (n - 1,) without stretches shorter than `shortest` [m]; None if there are none.
 
     A solver may go back and forth by millimetres about a change of direction, which gains nothing.
-    None for what moves sideways too: it has no gears.
+    None for vehicles that move sideways too: it has no gears.
     """
     speeds = _speeds(model, found)
     if speeds[:, 1].any():

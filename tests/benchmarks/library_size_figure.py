@@ -19,7 +19,7 @@ from matplotlib.ticker import (
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.plotting.colors import SEQUENCE
 from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
-from maneuver_automaton.plotting.style import tidy, upper_legend
+from maneuver_automaton.plotting.style import outer_legend, tidy
 
 WIDTH, LEFT, RIGHT, HEIGHT, BETWEEN = 9.6, 0.8, 0.2, 2.9, 0.95  # [in]
 COST, MEDIAN, SLOWEST = SEQUENCE[0], SEQUENCE[2], SEQUENCE[1]
@@ -112,7 +112,7 @@ def draw_library_sizes(cost_axes: Axes, time_axes: Axes, sizes: LibrarySizes) ->
         _number_trims(ax, sizes.trims)
     _number_costs(cost_axes, sizes.costs)
     _whole_decades(time_axes, np.concatenate([sizes.medians_s, sizes.slowest_s]))
-    upper_legend(time_axes, [slowest, medians], ["99th percentile", "median"])
+    outer_legend(time_axes, [slowest, medians], ["99th percentile", "median"], above=True)
     return LibrarySizeArtists(costs=costs, medians=medians, slowest=slowest)
 
 

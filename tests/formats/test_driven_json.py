@@ -12,6 +12,7 @@ import maneuver_automaton as ma
 from maneuver_automaton.cli import run
 from maneuver_automaton.formats.closed_loop_json import closed_loop_to_dict, save_closed_loop
 from maneuver_automaton.formats.driven_json import driven_document, load_closed_loop
+from maneuver_automaton.formats.plan_json import plan_of_document
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 ROBOT = ma.Automaton.of_controls(
@@ -41,11 +42,18 @@ def test_plot_draws_a_closed_loop(tmp_path, capsys):
     assert (tmp_path / "closed_loop.png").exists()
     assert run(["plot", str(file), "--out", str(tmp_path / "loop.svg")]) == 0
     assert "ahead" in (tmp_path / "loop.svg").read_text()
-    assert run(["plot", str(file), "--animate"]) == 2
-    assert capsys.readouterr().err == (
-        f"{file}: is a closed loop, whose animation or page needs --with and the scenario it was "
-        "driven in\n"
-    )
+    assert run(["plot", str(file), "--animate"]) == 0
+    assert run(["plot", str(file), "--html"]) == 0
+    assert capsys.readouterr().err == ""
+    page = (tmp_path / "closed_loop.html").read_text()
+    assert "the motion alone; body and obstacles with the scenario" in page
+    assert "turn rate [rad/s]" in page
+
+
+def test_what_is_played_of_a_file_is_where_the_vehicle_was():
+    plan = plan_of_document(driven_document(closed_loop_to_dict(LOOP)))
+    for time, pose in zip(LOOP.times, LOOP.poses, strict=True):
+        np.testing.assert_allclose(plan.pose_at(time), pose, atol=1e-9)
 
 
 def test_a_loop_of_no_step_is_drawn(tmp_path):

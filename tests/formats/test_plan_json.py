@@ -25,6 +25,8 @@ from tests.inertia import CAR, rest_of, resting
 KEYS = {
     "schema",
     "version",
+    "name",
+    "vehicle",
     "automaton_hash",
     "status",
     "reason",

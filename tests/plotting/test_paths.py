@@ -9,12 +9,13 @@ from hypothesis import strategies as st
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from maneuver_automaton.collision import Disc
+from maneuver_automaton.collision import Box, Disc, Zone
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting import draw_plan, trim_colors
 from maneuver_automaton.plotting.colors import GREY, INK
-from maneuver_automaton.problem import Goal
+from maneuver_automaton.problem import Bounds, Goal, Problem
 from tests.plotting.cases import (
+    ROBOT,
     flight_plan,
     parking_plan,
     plan_of,
@@ -265,3 +266,25 @@ def test_axes_may_be_shared():
 def test_a_goal_of_the_wrong_size_is_refused():
     with pytest.raises(ValueError, match="goal: got shape"):
         drawn(parking_plan(), goal=[0.0, 1.0])
+
+
+def test_the_legend_leaves_out_what_takes_next_to_no_time():
+    _, artists = drawn(plan_of(["spin", "straight", "rest"], [1e-3, 4.0, 1e-3]))
+    assert names(artists.legend) == ["straight", "start", "goal"]
+    assert not artists.still  # no ring for a rest of a millisecond
+
+
+def test_zones_and_bounds_are_drawn_and_named():
+    plan = parking_plan()
+    slow = [Zone(shape=Box([0.4, 0.4], [x, 0.0]), max_speed=0.5) for x in (0.0, 0.8)]
+    onwards = Zone(shape=Disc(0.3, [0.5, 1.0]), reverse=False)
+    bounds = Bounds(x=(-1.2, 1.4), y=(-0.4, 2.2))
+    problem = Problem(ROBOT, plan.start, plan.end, zones=[*slow, onwards], bounds=bounds)
+    ax, artists = drawn(plan, problem=problem)
+    assert [len(some.get_paths()) for some in artists.limits.zones] == [2, 1]
+    assert len(artists.limits.bounds.get_segments()) == 4
+    assert names(artists.legend)[-3:] == [
+        "zone: at most 0.5 m/s", "zone: forwards only", "bounds of the pose",
+    ]  # fmt: skip
+    assert ax.get_xlim()[0] <= -1.2
+    assert ax.get_ylim()[1] >= 2.2

@@ -60,3 +60,34 @@ def test_columns_of_different_length_are_refused():
     document["trajectory"]["pose"].pop()
     with pytest.raises(ValueError, match="poses for"):
         track_of_document(document)
+
+
+def maneuver_of(plan, *, name):
+    """The file of a plan in which all of it is one maneuver."""
+    document = document_of(plan, rate=50.0)
+    document["primitives"] = [{"kind": "maneuver", "name": name, "duration_s": plan.duration}]
+    return track_of_document(document)
+
+
+def test_a_long_motion_is_told_apart_by_gear_and_turn():
+    word = ["straight", "clockwise", "anticlockwise", "straight"]
+    plan = plan_of(word, [1.0, 0.8, 1.2, 1.0])
+    track = maneuver_of(plan, name="polished")
+    ahead, left, right = (
+        "polished, ahead", "polished, back, turning left", "polished, back, turning right",
+    )  # fmt: skip
+    assert [piece.name for piece in track.pieces] == [ahead, right, left, ahead]
+    np.testing.assert_allclose(track.switching_times, [0.0, 1.0, 1.8, 3.0, 4.0], atol=0.05)
+    np.testing.assert_allclose(track.end, plan.end, atol=1e-9)
+
+
+def test_a_maneuver_of_one_turn_is_one_piece():
+    (piece,) = maneuver_of(plan_of(["clockwise"], [1.0]), name="to a curve").pieces
+    assert piece.name == "to a curve"
+    (piece,) = maneuver_of(plan_of(["straight"], [1.0]), name="polished").pieces
+    assert piece.name == "polished, ahead"  # never alone: it says little
+
+
+def test_what_takes_next_to_no_time_is_not_seen():
+    track = track_of_plan(plan_of(["spin", "straight", "rest"], [1e-3, 4.0, 1.0]))
+    assert track.seen == {"straight", "rest"}

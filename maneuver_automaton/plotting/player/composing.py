@@ -9,8 +9,9 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.plotting.colors import Color, trim_colors, twist_color
+from maneuver_automaton.plotting.colors import Color
 from maneuver_automaton.plotting.footprint import footprint_polygons, placed
+from maneuver_automaton.plotting.labels import shown_name
 from maneuver_automaton.plotting.player.clearances import clearance_entry, sample_times
 from maneuver_automaton.plotting.player.local import Local, hex_color, rounded
 from maneuver_automaton.plotting.player.motions import (
@@ -19,7 +20,11 @@ from maneuver_automaton.plotting.player.motions import (
     part_entries,
     part_frames,
 )
-from maneuver_automaton.plotting.player.surroundings import goal_entries, obstacle_entries
+from maneuver_automaton.plotting.player.surroundings import (
+    goal_entries,
+    limit_entries,
+    obstacle_entries,
+)
 from maneuver_automaton.plotting.scene import (
     Scene,
     mark_size,
@@ -30,8 +35,6 @@ from maneuver_automaton.plotting.scene import (
 from maneuver_automaton.plotting.track import Track
 from maneuver_automaton.problem import Problem
 
-MOST_COLORS = 40  # trims that are told apart; of more, the colour says how they move
-
 Fact = tuple[str, str]  # a name, and its value with the unit
 
 
@@ -40,16 +43,9 @@ def names_of(colors: Mapping[str, Color]) -> dict[str, int]:
     return {name: k for k, name in enumerate(colors)}
 
 
-def page_colors(twists: Mapping[str, Array]) -> dict[str, Color]:
-    """A colour for each trim by name: one of its own, as in the pictures, unless they are many."""
-    if len(twists) > MOST_COLORS:
-        return {name: twist_color(twist) for name, twist in twists.items()}
-    return trim_colors(twists)
-
-
 def trim_entries(colors: Mapping[str, Color]) -> list[dict[str, str]]:
     """Name and colour of each trim."""
-    return [{"name": name, "color": hex_color(color)} for name, color in colors.items()]
+    return [{"name": shown_name(name), "color": hex_color(color)} for name, color in colors.items()]
 
 
 def played(
@@ -88,6 +84,7 @@ def around(
         "mark": rounded([size])[0],
         "goals": goal_entries(scene.goals, local, scene.reached),
         "obstacles": obstacle_entries(scene.obstacles, local, leave=leave),
+        **limit_entries(scene.zones, scene.bounds, local),
     }
 
 

@@ -10,12 +10,12 @@ import numpy as np
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.plotting.footprint import footprint_polygons
+from maneuver_automaton.plotting.motions import track_colors
 from maneuver_automaton.plotting.player.clearances import clearance_entry, sample_times
 from maneuver_automaton.plotting.player.composing import (
     Fact,
     around,
     names_of,
-    page_colors,
     trim_entries,
 )
 from maneuver_automaton.plotting.player.local import Local
@@ -37,7 +37,7 @@ def drive_content(
     track, local = track_of_plan(plan), Local(start[:2])
     body = tuple(footprint_polygons(vehicle.footprint))
     scene = Scene(goals=(), obstacles=tuple(road.traffic), body=body, times=np.zeros(1))
-    colors, times = page_colors(track.twists), sample_times(track.switching_times)
+    colors, times = track_colors(track.twists), sample_times(track.switching_times)
     bodies = [(ring, track.at(times)) for ring in body]
     places = [Obstacle(place) for goal in road.goals for place in goal.places or ()]
     return {

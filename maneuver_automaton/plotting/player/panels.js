@@ -3,6 +3,7 @@
 // `state` of player.js, and change it by its functions.
 
 const MOST_NAMES = 14; // of trims in the legend
+const SEEN = 0.005; // of the time: a trim that takes less can hardly be seen
 const KEYS = [
   ["space", "play or pause"],
   ["← →", "back or on by a fiftieth of the time; with shift, a tenth of that"],
@@ -63,9 +64,28 @@ function buildBar() {
     bar.append(mark);
   }
   find("legend").replaceChildren(...(manyTrims() ? [] : trimsShown().map(legendItem)));
+  find("limits").replaceChildren(...limitItems());
 }
 
-const trimsShown = () => [...new Set(motion().runs.map((run) => run.trim))];
+/** Trims of the motion that is shown, in order, but those that take next to no time. */
+function trimsShown() {
+  const now = motion(), lasted = new Map();
+  now.runs.forEach(({ trim, begin, end }) =>
+    lasted.set(trim, (lasted.get(trim) || 0) + end - begin));
+  return [...lasted.keys()].filter((trim) => lasted.get(trim) >= SEEN * (now.end - now.begin));
+}
+
+/** What zones ask for, and the bounds, as items of a legend. */
+function limitItems() {
+  const names = new Set((data.zones || []).map((zone) => zone.name));
+  const items = [...names].map((name) => [name, "zone"]);
+  if ((data.bounds || []).length) items.push(["bounds of the pose", "bounds"]);
+  return items.map(([name, kind]) => {
+    const item = element("li");
+    item.append(element("i", kind), element("span", "", name));
+    return item;
+  });
+}
 
 /** Whether the legend names only the trim under way. */
 const manyTrims = () => trimsShown().length > MOST_NAMES;

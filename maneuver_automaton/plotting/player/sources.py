@@ -16,12 +16,13 @@ from maneuver_automaton.plotting.closed_loop_track import (
     loop_scene,
     loop_view,
 )
+from maneuver_automaton.plotting.labels import stated_labels
+from maneuver_automaton.plotting.motions import track_colors
 from maneuver_automaton.plotting.paths import bare_scene
 from maneuver_automaton.plotting.player.composing import (
     Fact,
     around,
     names_of,
-    page_colors,
     plan_view,
     played,
     trim_entries,
@@ -68,6 +69,10 @@ def player_of(value: Any, *, title: str = "") -> Player:
 
 def player_of_file(document: Mapping[str, Any], plan: Plan, *, title: str) -> Player:
     """The player of a loaded plan.json and its `plan`, without the body and the obstacles."""
+    content = content_of(plan)
+    named = stated_labels(document, "reduced_state") + stated_labels(document, "control")
+    for curve, label in zip(content["motions"][0]["curves"], named, strict=False):
+        curve["label"] = label
     bound, error = document.get("bound") or {}, document.get("terminal_error") or {}
     facts = _plan_facts(
         cost=document.get("cost"),
@@ -83,7 +88,8 @@ def player_of_file(document: Mapping[str, Any], plan: Plan, *, title: str) -> Pl
         "bound": document.get("lower_bound"),
         "kind": bound.get("kind") or "",
     }
-    return Player({**content_of(plan), "title": title, "facts": facts, "search": search})
+    facts.append(("known", "the motion alone; body and obstacles with the scenario"))
+    return Player({**content, "title": title, "facts": facts, "search": search})
 
 
 @functools.singledispatch
@@ -98,7 +104,7 @@ def content_of(value: Any) -> dict[str, Any]:
 @content_of.register
 def _(plan: Plan) -> dict[str, Any]:
     track, local = track_of_plan(plan), Local(plan.start[:2])
-    scene, colors = bare_scene(track, footprint=None), page_colors(track.twists)
+    scene, colors = bare_scene(track, footprint=None), track_colors(track.twists)
     box, size = plan_view(scene, [track])
     return {
         "title": "Plan",
@@ -117,7 +123,8 @@ def _(result: PlanResult) -> dict[str, Any]:
     plans = [] if plan is None else [plan, *(one.plan for one in result.alternatives)]
     tracks = [track_of_plan(one) for one in plans] or [Track(problem.start, ())]
     every = {name: twist for track in tracks for name, twist in track.twists.items()}
-    colors = page_colors(every) | page_colors(tracks[0].twists)  # the best plan's as in its picture
+    # the best plan's as in its picture
+    colors = track_colors(every) | track_colors(tracks[0].twists)
     motions = [
         played(track, local, names_of(colors), scene=scene, problem=problem) for track in tracks
     ]

@@ -18,6 +18,12 @@ class Stage {
     this.moving = data.obstacles.filter((one) => one.t);
     this.regions = new Path2D();
     (data.regions || []).forEach((one) => this.regions.addPath(obstaclePath(one)));
+    this.zones = (data.zones || []).map(obstaclePath);
+    this.bounds = new Path2D();
+    (data.bounds || []).forEach(([from, to]) => {
+      this.bounds.moveTo(...from);
+      this.bounds.lineTo(...to);
+    });
     this.lanes = (data.lanes || []).map((ring) => {
       const path = new Path2D();
       trace(path, ring);
@@ -129,6 +135,16 @@ class Stage {
     context.strokeStyle = colors.goal;
     context.fill(this.regions);
     context.stroke(this.regions);
+    context.fillStyle = withAlpha(colors.zone, 0.16);
+    context.strokeStyle = colors.zone;
+    for (const path of this.zones) {
+      context.fill(path, "evenodd");
+      context.stroke(path);
+    }
+    context.strokeStyle = colors.dim;
+    context.setLineDash([7 * this.thin, 4 * this.thin]);
+    context.stroke(this.bounds);
+    context.setLineDash([]);
     context.fillStyle = context.strokeStyle = colors.obstacle;
     for (const path of this.still) {
       context.fill(path, "evenodd");

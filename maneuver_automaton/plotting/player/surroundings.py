@@ -10,9 +10,11 @@ from maneuver_automaton.collision import AnyObstacle, Disc, Obstacle, OccupancyM
 from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.collision.outline import outlines, rings_of
 from maneuver_automaton.collision.rectangles import blocked_rectangles
+from maneuver_automaton.collision.zones import Zone
 from maneuver_automaton.plotting.footprint import footprint_polygons
+from maneuver_automaton.plotting.limits import bound_lines
 from maneuver_automaton.plotting.player.local import PLACE_DIGITS, POSE_DIGITS, Local, rounded
-from maneuver_automaton.problem import Goal
+from maneuver_automaton.problem import Bounds, Goal
 
 
 def obstacle_entries(obstacles: Iterable[AnyObstacle], local: Local, *, leave: bool) -> list[Any]:
@@ -23,6 +25,20 @@ def obstacle_entries(obstacles: Iterable[AnyObstacle], local: Local, *, leave: b
         else _obstacle_entry(one, local, leave=leave)
         for one in obstacles
     ]
+
+
+def limit_entries(zones: Sequence[Zone], bounds: Bounds, local: Local) -> dict[str, Any]:
+    """Zones, each with what it asks for, and lines along the bounds of the pose."""
+    return {
+        "zones": [
+            {
+                "name": f"zone: {zone.asks}",
+                "rings": [local.places(ring) for ring in shape_rings(zone.shape)],
+            }
+            for zone in zones
+        ],
+        "bounds": [local.places(line) for line in bound_lines(bounds)],
+    }
 
 
 def goal_entries(goals: Sequence[Goal], local: Local, reached: int | None) -> list[Any]:

@@ -9,9 +9,10 @@ import pytest
 
 from maneuver_automaton.bounds import Narrowest
 from maneuver_automaton.cli import run
-from maneuver_automaton.collision import Box
+from maneuver_automaton.collision import Box, Zone
 from maneuver_automaton.formats.plan_json import load_plan
 from maneuver_automaton.planning import LowerBound, PlanResult, PlanStatus
+from maneuver_automaton.problem import Bounds
 from tests.plotting.cases import flight_plan, parking_plan, plan_of, result_of, slalom_problem
 from tests.plotting.loops import pushed_loop
 from tests.plotting.player.browser import browser, opened, poses
@@ -26,7 +27,12 @@ def parking_result():
     other = plan_of(["straight", "spin"], [1.0, 2.0])
     return replace(
         result_of(plan, others=[other]),
-        problem=slalom_problem(plan, footprint=Box([0.5, 0.3])),
+        problem=slalom_problem(
+            plan,
+            footprint=Box([0.5, 0.3]),
+            zones=[Zone(shape=Box([1.0, 1.0], [1.0, 0.0]), max_speed=1.0)],
+            bounds=Bounds(x=(-3.0, 3.0)),
+        ),
         improvements=((0.01, 12.0), (0.2, 9.75)),
         lower_bound=8.0,
         gap=0.18,
@@ -114,6 +120,9 @@ def _has_layers(page):
     for key in ("+", "f", "w", "b", "?", "?"):
         page.keyboard.press(key)
     assert page.locator("#layers input").count() == 5
+    assert page.locator("#limits li").all_inner_texts() == [
+        "zone: at most 1 m/s", "bounds of the pose",
+    ]  # fmt: skip
 
 
 @pytest.mark.slow

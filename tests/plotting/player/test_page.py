@@ -9,6 +9,7 @@ import pytest
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap
+from maneuver_automaton.formats.plan_json import plan_of_document
 from maneuver_automaton.groups import SE2, group_of
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.plotting import Player, player_of, player_of_file
@@ -25,6 +26,7 @@ from tests.plotting.cases import (
     document_of,
     flight_plan,
     parking_plan,
+    plan_of,
     plan_of_trims,
     result_of,
     slalom_problem,
@@ -162,6 +164,26 @@ def test_a_file_is_played_with_its_numbers():
     assert dict(content["facts"])["gap"] == "7.7 %"
     assert content["search"]["costs"] == [[0.1, 12.0], [0.4, 9.75]]
     assert content["search"]["bounds"] == [[0.2, 8.0]]
+
+
+def test_a_long_motion_is_told_apart_on_the_bar():
+    word = ["straight", "clockwise", "anticlockwise"]
+    document = document_of(plan_of(word, [1.0, 0.8, 1.2]), rate=50.0)
+    document["primitives"] = [
+        {
+            "kind": "maneuver",
+            "name": "polished",
+            "source": "rest",
+            "target": "rest",
+            "duration_s": 3.0,
+        }
+    ]
+    content = player_of_file(document, plan_of_document(document), title="long").content
+    assert [trim["name"] for trim in content["trims"]] == [
+        "polished motion, ahead",
+        "polished motion, back, turning right",
+        "polished motion, back, turning left",
+    ]
 
 
 def test_values_show_themselves():

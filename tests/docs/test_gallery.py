@@ -1,0 +1,26 @@
+"""The gallery has a picture and a plan of every scenario, and each plan is of its scenario."""
+
+from __future__ import annotations
+
+import gzip
+import json
+from pathlib import Path
+
+import pytest
+
+from maneuver_automaton.automaton.library import automaton_hash
+from maneuver_automaton.scenario import load_scenario
+
+ROOT = Path(__file__).parents[2]
+SCENARIOS = sorted((ROOT / "scenarios").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda path: path.stem)
+def test_every_scenario_has_a_picture_and_a_plan(scenario):
+    assert (ROOT / "docs" / "pictures" / "gallery" / f"{scenario.stem}.png").is_file()
+    kept = ROOT / "docs" / "plans" / f"{scenario.stem}.json.gz"
+    document = json.loads(gzip.decompress(kept.read_bytes()))
+    there = load_scenario(scenario)
+    assert document["name"] == there.name
+    assert document["automaton_hash"] == automaton_hash(there.problem.automaton)
+    assert document["status"] in ("found", "reached", "steps_spent")
