@@ -54,7 +54,7 @@ LONG = {  # pages whose code, and words in commands that, take seconds
     "turn_on_the_spot",
     "why_no_plan",
 }
-LONG_COMMANDS = ("--gap", "--animate", "--seeds", "car.json")
+LONG_COMMANDS = ("--gap", "--with", "--animate", "--seeds", "car.json")
 
 
 def blocks(language: str, text: str = TEXT) -> list[str]:
