@@ -47,7 +47,7 @@ def on_a_terminal(*arguments, cwd):
 def test_cost_bound_gap_and_clearance_are_shown_in_place(tmp_path, more):
     scenario = SCENARIOS / "cluttered_room.yaml"
     text = on_a_terminal(
-        "plan", scenario, "--no-plot", "--time-limit", 2, *more, cwd=tmp_path
+        "plan", scenario, "--no-plot", "--time-limit", 1, *more, cwd=tmp_path
     )  # fmt: skip
     shown = [tuple(map(float, found)) for found in SHOWN.findall(text)]
     assert shown

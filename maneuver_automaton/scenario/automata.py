@@ -11,7 +11,6 @@ from typing import Any
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import load_library
 from maneuver_automaton.automaton.stock import load_stock_library, stock_libraries
-from maneuver_automaton.formats.libraries import read_primitives
 from maneuver_automaton.formats.yaml_source import Document, Where, shown
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Trim, trims_of
@@ -235,6 +234,8 @@ def _values(axis: Axis) -> list[float]:
 
 
 def _from_library(document: Document, path: Path, model: Model) -> Automaton:
+    from maneuver_automaton.formats.libraries import read_primitives
+
     with at(document, (*WHERE, "file")):
         read = read_primitives(path)
         if read is not None:

@@ -23,7 +23,6 @@ from maneuver_automaton.collision import Shape
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.statement import StatedVehicle, Statement
-from maneuver_automaton.formats.tpcap import FORMAT
 from maneuver_automaton.problem import Bounds, Goal, Problem
 from maneuver_automaton.scenario.scenario import Scenario, scenario_of_text
 
@@ -85,6 +84,8 @@ def combined(statement: Statement, beside: Scenario | None, *, path: Path) -> Sc
 
 def _own(statement: Statement, path: Path) -> Scenario:
     """What a format means where no scenario stands beside the file."""
+    from maneuver_automaton.formats.tpcap import FORMAT
+
     if statement.format == FORMAT:
         return scenario_of_text(TPCAP, name=FORMAT)
     vehicle, start, goal = statement.vehicle, statement.start, statement.goal
