@@ -50,7 +50,9 @@ class Shape(Part):
         | None
     ) = Field(None, description="[length, width], ahead and aside")
     reference_m: Point | None = Field(
-        None, description="where the pose sits in the rectangle, from its centre: [ahead, left]"
+        None,
+        description="where the pose sits in the rectangle, from its centre: [ahead, left]; "
+        "a rear axle has ahead < 0",
     )
     polygon_m: Polygon | None = Field(None, description="corners [x, y]")
     disc_m: Positive | None = Field(None, description="radius of a disc around the pose")
