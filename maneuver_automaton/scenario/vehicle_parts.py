@@ -190,7 +190,7 @@ class HelicopterPart(Part):
 
 
 class LatticeBodyPart(Part):
-    """A body that moves by lattice primitives alone; its library is a file of Nav2 or SBPL."""
+    """A body that moves by lattice primitives alone, of a file of Nav2 or SBPL or of a preset."""
 
     model: Literal["lattice_body"] = Field(description="lattice_body")
     resolution_m: Positive = Field(description="side of a cell, a positive number")
