@@ -59,6 +59,8 @@ if TYPE_CHECKING:
     from maneuver_automaton.planning import plans as plans
     from maneuver_automaton.planning.lower_bound import lower_bound as lower_bound
     from maneuver_automaton.planning.plan import plan as plan
+    from maneuver_automaton.planning.verdict import Verdict as Verdict
+    from maneuver_automaton.planning.verdict import verify as verify
     from maneuver_automaton.primitives import Maneuver as Maneuver
     from maneuver_automaton.primitives import Trajectory as Trajectory
     from maneuver_automaton.primitives import Trim as Trim
@@ -121,6 +123,7 @@ _HOMES = {
     "Trim": "primitives",
     "Unicycle": "models",
     "UserModel": "models",
+    "Verdict": "planning.verdict",
     "Zone": "collision",
     "build_library": "automaton.building",
     "drive_road": "roads",
@@ -144,6 +147,7 @@ _HOMES = {
     "simulate": "receding_horizon",
     "translations": "groups",
     "trims_of": "primitives",
+    "verify": "planning.verdict",
 }
 
 __all__ = [*_HOMES, "plotting"]

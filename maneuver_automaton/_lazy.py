@@ -28,4 +28,8 @@ def lazily(
         setattr(sys.modules[package], name, value)
         return value
 
-    return get, lambda: sorted({*vars(sys.modules[package]), *homes})
+    def listed() -> list[str]:
+        own = {name for name in vars(sys.modules[package]) if name.startswith("__")}
+        return sorted(own | homes.keys())
+
+    return get, listed

@@ -210,6 +210,17 @@ def test_check_says_what_is_touched(folder, capsys):
     assert "the vehicle touches obstacle 'obstacle 1'" in rows[1]
 
 
+def test_check_says_how_far_the_body_reaches(folder, capsys):
+    body = "{rectangle_m: [4.0, 2.0], reference_m: [-1.5, 0.25]}"
+    Path("x.yaml").write_text(
+        AMONG.replace("{disc_m: 0.2}", body).replace("[2.0, 0.0", "[9.0, 0.0")
+    )
+    run(["check", "x.yaml"])
+    (row,) = [line for line in capsys.readouterr().out.splitlines() if "body: seen" in line]
+    assert "note" in row
+    assert "0.5 m behind to 3.5 m ahead, 1.25 m right to 0.75 m left" in row
+
+
 def test_the_shifted_example_has_the_same_plan(folder):
     for name in ("example10", "example10_shifted"):
         assert run(["plan", str(SCENARIOS / f"{name}.yaml"), "--out", name, "--no-plot"]) == 0

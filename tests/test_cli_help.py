@@ -49,6 +49,15 @@ def test_examples_are_commands_with_options_that_exist(example):
             assert (SCENARIOS.parent / word).exists()
 
 
+@pytest.mark.parametrize("example", EXAMPLES["convert"])
+def test_examples_of_conversions_run(example, tmp_path, monkeypatch):
+    words = example.split()[1:]
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scenarios").symlink_to(SCENARIOS)
+    if Path(words[1]).exists():
+        assert run(words) == 0
+
+
 def test_the_version_is_printed(capsys):
     assert run(["--version"]) == 0
     assert capsys.readouterr().out == f"maneuver-automaton {ma.__version__}\n"

@@ -47,11 +47,21 @@ def names() -> str:
         value = getattr(ma, name)
         room = value.__module__.split(".")[1]
         title = ROOMS.get(room, room.replace("_", " ").capitalize())
-        path = f"{value.__module__}.{value.__qualname__}"
-        sections.setdefault(title, []).append(f"::: {path}")
+        sections.setdefault(title, []).append(path_of(value))
+    sections["Pictures"] = [path_of(getattr(ma.plotting, name)) for name in drawing()]
     return "\n\n".join(
         "\n\n".join([f"## {title}", *entries]) for title, entries in sections.items() if entries
     )
+
+
+def drawing() -> list[str]:
+    """Functions of `ma.plotting` that draw on axes or write a file."""
+    return [name for name in dir(ma.plotting) if name.startswith(("draw_", "figure_", "save_"))]
+
+
+def path_of(value: Any) -> str:
+    """What mkdocstrings replaces by the docstring of a value."""
+    return f"::: {value.__module__}.{value.__qualname__}"
 
 
 def keys() -> str:

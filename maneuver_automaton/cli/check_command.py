@@ -22,6 +22,8 @@ from maneuver_automaton.cli.guard import FOUND, NO_PLAN
 from maneuver_automaton.cli.inputs import Parts, scenario_of
 from maneuver_automaton.cli.progress import waiting
 from maneuver_automaton.cli.tables import console, table
+from maneuver_automaton.collision import Shape
+from maneuver_automaton.collision.surroundings import parts_of
 from maneuver_automaton.models import Model, as_stated, rollout, vector_field
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.planning.blocked import where_touched
@@ -214,6 +216,8 @@ def _feasibility(problem: Problem, time_limit: float) -> Iterator[Finding]:
             worst=max(outside.values()) if outside else None,
             words=words if bounded else "there are none",
         )
+    if problem.footprint:
+        yield Finding(what="body: seen from the pose", holds=None, words=_reach(problem.footprint))
     if problem.obstacles:
         yield from _ends_free(problem)
     with announced(), waiting(f"planning, at most {time_limit:g} s", quiet=False):
@@ -223,6 +227,17 @@ def _feasibility(problem: Problem, time_limit: float) -> Iterator[Finding]:
         what="goal: can be reached",
         holds=None if result.status in UNDECIDED else found,
         words=_reached(result),
+    )
+
+
+def _reach(footprint: tuple[Shape, ...]) -> str:
+    """How far a body reaches, which shows a reference that is on the wrong side."""
+    parts = parts_of(footprint)
+    low = np.min([np.array(part.core.bounds[:2]) - part.radius for part in parts], axis=0)
+    high = np.max([np.array(part.core.bounds[2:]) + part.radius for part in parts], axis=0)
+    return (
+        f"{-low[0]:.6g} m behind to {high[0]:.6g} m ahead, "
+        f"{-low[1]:.6g} m right to {high[1]:.6g} m left"
     )
 
 

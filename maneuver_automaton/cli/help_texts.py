@@ -44,7 +44,8 @@ EXAMPLES = {
     "compile": ("maneuver-automaton compile --jobs 4",),
     "convert": (
         "maneuver-automaton convert scenarios/maps/warehouse.yaml warehouse.map",
-        "maneuver-automaton convert scenarios/parking.yaml parking.mprim",
+        "maneuver-automaton convert scenarios/car_slot.yaml listed.yaml",
+        "maneuver-automaton convert unicycle.mprim library.json",
     ),
     "example": ("maneuver-automaton example", "maneuver-automaton example warehouse --out hall/"),
     "export": (

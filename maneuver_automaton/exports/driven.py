@@ -49,6 +49,8 @@ class Driven:
     name: str = ""
     cost: float | None = None
     reached: bool = True  # whether a goal is
+    reduced_names: tuple[str, ...] = ()  # where no model says them, those of the file
+    control_names: tuple[str, ...] = ()
 
     __repr__ = brief
 
@@ -92,7 +94,20 @@ class Driven:
         whole = joined(moved or parts[:1])
         pose = whole.pose.copy()
         pose[-1] = self.end
-        return replace(whole, pose=pose)
+        return self._named(replace(whole, pose=pose))
+
+    def _named(self, rows: PlanArrays) -> PlanArrays:
+        """The rows with the names of a file, where no model has named what they hold."""
+        if self.model is not None:
+            return rows
+        states, controls = rows.reduced_names, rows.control_names
+        return replace(
+            rows,
+            reduced_names=self.reduced_names if len(self.reduced_names) == len(states) else states,
+            control_names=(
+                self.control_names if len(self.control_names) == len(controls) else controls
+            ),
+        )
 
     def carried(self, part: str) -> tuple[Plan, ...]:
         """The motion of a part that the vehicle carries, say its trailer, piece after piece."""

@@ -71,7 +71,13 @@ def _planned(path: Path, scenario: Scenario | None) -> Driven:
     """The plan of a plan.json, in the world of its scenario if that is known."""
     document, plan = read_plan_document(path), load_plan(path)
     if scenario is None:
-        return Driven(pieces=(plan,), end=plan.end, cost=document.get("cost"))
+        return Driven(
+            pieces=(plan,),
+            end=plan.end,
+            cost=document.get("cost"),
+            reduced_names=_names(document, "reduced_state"),
+            control_names=_names(document, "control"),
+        )
     problem = scenario.problem
     if document["automaton_hash"] != automaton_hash(problem.automaton):
         raise InvalidScenario(
@@ -86,6 +92,13 @@ def _planned(path: Path, scenario: Scenario | None) -> Driven:
         name=scenario.name,
         cost=document.get("cost"),
     )
+
+
+def _names(document: Mapping[str, Any], of: str) -> tuple[str, ...]:
+    """What a plan.json says that its reduced states or its controls are; nothing if it does not."""
+    vehicle = document.get("vehicle")
+    names = vehicle.get(of) if isinstance(vehicle, Mapping) else None
+    return tuple(map(str, names)) if isinstance(names, list) else ()
 
 
 def _on_road(path: Path, road: RoadScenario, loop: Mapping[str, Any] | None) -> Driven:

@@ -123,7 +123,8 @@ def lattice_of_automaton(automaton: Automaton, *, kind: str) -> Lattice:
     if not isinstance(body, LatticeBody):
         raise InvalidLibrary(
             f"{automaton.name or 'automaton'}: a file of {kind} states motions on a grid of cells "
-            f"and headings, got an automaton of the {body.name}; need one of lattice primitives"
+            f"and headings, got an automaton of the {body.name}; need one of lattice primitives, "
+            "say the preset lattice_ackermann or lattice_diff of a lattice_body"
         )
     states = np.array([trim.reduced_state for trim in automaton.trims])
     headings = np.mod(np.arctan2(states[:, 1], states[:, 0]), 2.0 * np.pi)

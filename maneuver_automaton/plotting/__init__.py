@@ -1,4 +1,8 @@
-"""Pictures: draw on the axes given and return the artists, or write a whole figure to a file."""
+"""Pictures: draw on the axes given and return the artists, or write a whole figure to a file.
+
+`draw_plan(ax, plan)` and others that begin with ``draw_`` draw on axes of Matplotlib; those with
+``save_`` and ``figure_`` write a file, whose ending says the format. ``dir`` lists them.
+"""
 
 from __future__ import annotations
 

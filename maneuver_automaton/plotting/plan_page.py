@@ -87,7 +87,8 @@ def plan_page(sheet: Sheet) -> Figure:
     lines = title_lines(look, inner, sheet.headline, sheet.word)
     states, many = _panels(track)
     panels = states + many + track.climbs if track.pieces else 0
-    bottom = 0.6 + 0.2 * legend_rows(names, inner)
+    edge = RIGHT if look.is_narrow else LEFT  # of the legend: a column has no room to spare
+    bottom = 0.6 + 0.2 * legend_rows(names, look.width - edge - RIGHT)
     top = heading_height(lines) + 0.08 + (BAR if _has_costs(sheet) else 0.0)
     shape = _shape(sheet)
     flat = shape > FLAT or not panels or look.is_narrow
@@ -96,7 +97,7 @@ def plan_page(sheet: Sheet) -> Figure:
     if look.height is not None and look.height - bottom - top < needed:
         panels, below, flat = 0, 0.0, True
     if flat:
-        height = min(max(inner / shape, LOW_FLAT), HIGH_FLAT)
+        height = min(max(inner / shape, LEAST_PLANE if look.is_narrow else LOW_FLAT), HIGH_FLAT)
     else:
         height = max(min(max(PLANE * inner / shape, LOW), HIGH), PANEL * panels)
     if look.height is not None:
@@ -120,7 +121,7 @@ def plan_page(sheet: Sheet) -> Figure:
     if not flat:
         hide_times(side[:-1])
     heading_text(figure, lines, left=LEFT)
-    bottom_legend(figure, handles, names, left=LEFT, width=inner)
+    bottom_legend(figure, handles, names, left=edge, width=look.width - edge - RIGHT)
     return figure
 
 

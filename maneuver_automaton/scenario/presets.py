@@ -18,7 +18,8 @@ Controls = Mapping[str, tuple[float, float]]
 
 KINEMATIC = ("table2", "reeds_shepp", "dubins")
 INERTIAL = ("parking", "road")
-PRESETS = (*KINEMATIC, *INERTIAL)
+LATTICES = {"lattice_ackermann": False, "lattice_diff": True}  # whether they turn on the spot
+PRESETS = (*KINEMATIC, *INERTIAL, *LATTICES)
 TABLE_2: Controls = {
     "rest": (0.0, 0.0),
     "straight": (1.5, 0.0),
@@ -47,6 +48,9 @@ def preset_automaton(name: str, model: Model) -> Automaton:
     lateral acceleration of 4 m/s^2 allows, maneuvers between neighbours, early and late. The
     libraries that come with the package have names of their own; see `load_stock_library`.
 
+    `lattice_ackermann` and `lattice_diff` are lattice primitives of a least turning radius, the
+    second with turns on the spot; see `lattice_of_arcs`.
+
     Source: the paper, Table 2; LaValle (2006), *Planning Algorithms*, Sec. 15.3.1 and 15.3.2.
 
     Raises
@@ -73,10 +77,27 @@ def preset_automaton(name: str, model: Model) -> Automaton:
                 f"got {name!r}, which is for vehicles without inertia, not the {model.name}"
             )
         return Automaton.of_controls(model, _controls(name, model))
+    if name in LATTICES:
+        return _lattice(name, model)
     if not isinstance(model, SecondOrderUnicycle | SecondOrderCar):
         need = "second_order_unicycle and second_order_car"
         raise ValueError(f"got {name!r}, which is for {need}, not the {model.name}")
     return _parking(model) if name == "parking" else _road(model)
+
+
+def _lattice(name: str, model: Model) -> Automaton:
+    from maneuver_automaton.formats.lattice import automaton_of_lattice
+    from maneuver_automaton.formats.lattice_making import lattice_of_arcs
+    from maneuver_automaton.models.lattice_body import LatticeBody
+
+    if not isinstance(model, LatticeBody):
+        raise ValueError(f"got {name!r}, which is for a lattice_body, not the {model.name}")
+    if model.turning_radius is None:
+        raise ValueError("needs the least radius of its arcs, state vehicle.turning_radius_m")
+    lattice = lattice_of_arcs(
+        resolution=model.resolution, turning_radius=model.turning_radius, spins=LATTICES[name]
+    )
+    return automaton_of_lattice(lattice)
 
 
 def _controls(name: str, vehicle: Unicycle | Car) -> Controls:

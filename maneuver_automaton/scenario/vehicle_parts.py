@@ -50,7 +50,9 @@ class Shape(Part):
         | None
     ) = Field(None, description="[length, width], ahead and aside")
     reference_m: Point | None = Field(
-        None, description="where the pose sits in the rectangle, from its centre: [ahead, left]"
+        None,
+        description="where the pose sits in the rectangle, from its centre: [ahead, left]; "
+        "a rear axle has ahead < 0",
     )
     polygon_m: Polygon | None = Field(None, description="corners [x, y]")
     disc_m: Positive | None = Field(None, description="radius of a disc around the pose")
@@ -188,7 +190,7 @@ class HelicopterPart(Part):
 
 
 class LatticeBodyPart(Part):
-    """A body that moves by lattice primitives alone; its library is a file of Nav2 or SBPL."""
+    """A body that moves by lattice primitives alone, of a file of Nav2 or SBPL or of a preset."""
 
     model: Literal["lattice_body"] = Field(description="lattice_body")
     resolution_m: Positive = Field(description="side of a cell, a positive number")

@@ -12,6 +12,7 @@ from maneuver_automaton.plotting import (
     save_plan_file_figure,
 )
 from maneuver_automaton.plotting.labels import word_text
+from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.plan_figures import plan_figure
 from maneuver_automaton.problem import Goal, Problem
 from tests.plotting.cases import (
@@ -179,3 +180,19 @@ def test_words_keep_within_their_lines(length):
     text = word_text(["anticlockwise", "straight"] * length, width=100, lines=2)
     assert text.count("\n") <= 1
     assert all(len(line) <= 100 for line in text.split("\n"))
+
+
+def test_a_flat_scene_takes_little_height_of_a_column():
+    look = Look(size=(3.5, None), style="paper")
+    figure = plan_figure(result_of(plan_of(["straight"], [20.0])), footprint=CAR, look=look)
+    width, height = figure.get_size_inches()
+    plane, *over_time = (ax.get_position().height * height for ax in figure.axes)
+    assert width == 3.5
+    assert plane < 1.1 < min(over_time)
+    (legend,) = figure.legends
+    box = legend.get_window_extent().transformed(figure.transFigure.inverted())
+    lowest = min(
+        ax.get_tightbbox().transformed(figure.transFigure.inverted()).y0 for ax in figure.axes
+    )
+    assert 0.0 <= box.x0 < box.x1 <= 1.0
+    assert 0.0 <= box.y0 < box.y1 <= lowest

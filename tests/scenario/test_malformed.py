@@ -218,8 +218,8 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
     "unknown preset": (
         automaton("preset: dubbins"),
         ":5: automaton.preset: got 'dubbins', need one of table2, reeds_shepp, dubins, parking, "
-        "road, car_with_trailer, helicopter, hovercraft, second_order_car, second_order_unicycle, "
-        "single_track",
+        "road, lattice_ackermann, lattice_diff, car_with_trailer, helicopter, hovercraft, "
+        "second_order_car, second_order_unicycle, single_track",
     ),
     "stock library of another vehicle": (
         inertia(automaton("preset: second_order_car")).replace("2.8", "3.0"),
