@@ -101,6 +101,7 @@ def test_quiet_prints_nothing(folder, capsys):
     assert [path.name for path in Path("here").iterdir()] == ["plan.json"]
 
 
+@pytest.mark.slow
 def test_alternatives_are_listed_and_drawn(folder, capsys):
     assert run(["plan", str(SCENARIOS / "parking.yaml"), "--alternatives", "3"]) == 0
     assert "Alternatives" in capsys.readouterr().out
@@ -183,6 +184,7 @@ def test_a_flight_among_heights_is_drawn_in_space_too(folder):
     assert sorted(names) == ["plan.json", "plan.png", "plan_3d.png"]
 
 
+@pytest.mark.slow
 def test_obstacles_are_told_of(folder, capsys):
     Path("x.yaml").write_text(AMONG)
     assert run(["plan", "x.yaml", "--time-limit", "1", "--animate"]) == 0
@@ -413,6 +415,7 @@ def test_convert_lists_the_trims(folder):
     assert len(load_scenario("new/y.yaml").problem.automaton) == 5
 
 
+@pytest.mark.slow
 def test_plot_draws_from_the_file_alone(folder):
     assert run(["plan", "x.yaml", "--no-plot", "--quiet"]) == 0
     Path("x.yaml").unlink()

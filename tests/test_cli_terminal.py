@@ -43,7 +43,7 @@ def on_a_terminal(*arguments, cwd):
     return re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", seen.decode())
 
 
-@pytest.mark.parametrize("more", [(), ("--gap", "0.001")])
+@pytest.mark.parametrize("more", [(), pytest.param(("--gap", "0.001"), marks=pytest.mark.slow)])
 def test_cost_bound_gap_and_clearance_are_shown_in_place(tmp_path, more):
     scenario = SCENARIOS / "cluttered_room.yaml"
     text = on_a_terminal(

@@ -234,6 +234,7 @@ _compile.LINKED = (0, 1), (0, 2)
 """
 
 
+@pytest.mark.slow
 def test_a_numba_with_unknown_insides_compiles_as_it_does(example):
     first = run(UNKNOWN_NUMBA + CALL, example, NUMBA_CACHE_DIR=example / "cache")
     again = run(UNKNOWN_NUMBA + CALL, example, NUMBA_CACHE_DIR=example / "cache")
@@ -274,6 +275,7 @@ print(json.dumps(said))
 """
 
 
+@pytest.mark.slow
 def test_a_kernel_that_calls_a_kernel_is_refused_compiled_now_or_before(example):
     with (example / "example_kernels.py").open("a") as file:
         file.write(KERNEL_IN_KERNEL)

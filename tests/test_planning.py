@@ -778,6 +778,7 @@ def robot_of_twists(twists):
     return robot({f"{k}": (v, w) for k, (v, _, w) in enumerate(twists)})
 
 
+@pytest.mark.slow
 @settings(max_examples=15)
 @given(problem=problems(FAMILIES["robot, words"]), factor=st.floats(0.01, 100.0))
 def test_the_unit_of_cost_does_not_matter(problem, factor):
@@ -788,6 +789,7 @@ def test_the_unit_of_cost_does_not_matter(problem, factor):
     assert other.cost == pytest.approx(factor * one.cost, rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.slow
 @settings(max_examples=15)
 @given(data=st.data())
 def test_bounds_of_insertion_hold_for_words(data):

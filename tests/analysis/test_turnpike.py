@@ -39,6 +39,7 @@ def study():
     return study_of([12.0, 24.0, 48.0])
 
 
+@pytest.mark.slow
 def test_the_time_away_does_not_grow(study):
     away = [case.away for case in study.cases]
     assert all(case.optimum.status is SolveStatus.SOLVED for case in study.cases)

@@ -51,6 +51,7 @@ build_library(CRAFT, TRIMS, path=sys.argv[1], jobs=int(sys.argv[2]))
 """
 
 
+@pytest.mark.slow
 def test_all_pairs_with_their_proof():
     build = build_library(CRAFT, TRIMS)
     assert build.failures == ()

@@ -112,6 +112,7 @@ def test_no_bound_in_free_space_exceeds_the_shortest_path(goal):
     assert 0.5 * shortest < bound.value <= shortest * (1.0 + 1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("price", quick_are([0.0], [0.0, 1.0]))
 def test_a_bound_among_obstacles_knows_no_plan_and_lies_below_it(price):
     problem = among(WALL, cost=ma.Cost(length=1.0, direction_change=price))

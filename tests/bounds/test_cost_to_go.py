@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 import maneuver_automaton as ma
 from maneuver_automaton.bounds import cell_proofs
@@ -29,6 +30,7 @@ def test_a_function_bounds_the_plans_from_other_starts():
     assert function.anywhere(np.array([1e3, 0.0, 0.0])) == 0.0  # no cell is known there
 
 
+@pytest.mark.slow
 def test_a_function_of_a_tube_bounds_the_rest_of_a_plan():
     problem = among(WALL)
     result = ma.plan(problem, time_limit=1.0)

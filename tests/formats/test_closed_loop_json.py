@@ -135,6 +135,7 @@ class TestReading:
             assert_same_steps(one, other)
             assert one.violations == other.violations
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("retimed", [False, True])
     def test_a_loop_goes_on_from_any_step(self, tmp_path, retimed):
         problem = parking_loop(goal=NEAR)

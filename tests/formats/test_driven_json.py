@@ -79,6 +79,7 @@ def test_with_its_scenario_it_is_the_loop_that_it_was(tmp_path):
         np.testing.assert_array_equal(ours.end, theirs.end)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["png", "gif"])
 def test_plot_with_a_scenario_draws_as_mpc_does(tmp_path, ending):
     scenario, out = str(SCENARIOS / "parking_loop.yaml"), str(tmp_path)

@@ -46,6 +46,7 @@ def test_another_scenario_is_told(tmp_path):
         load_result(tmp_path / "plan.json", other)
 
 
+@pytest.mark.slow
 def test_plot_with_a_scenario_draws_as_plan_does(tmp_path, capsys):
     scenario, plan = str(SCENARIOS / "car_slot.yaml"), str(tmp_path / "plan.json")
     assert run(["plan", scenario, "--out", str(tmp_path), "--quiet", "--html"]) == 0

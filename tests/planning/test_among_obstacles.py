@@ -421,6 +421,7 @@ def test_turned_and_shifted_a_little(part):
     assert plans >= 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("exponent", [6, 9])
 def test_far_away(exponent):
     # on a raster that numbers hold exactly, so that the far problem is the same one

@@ -76,6 +76,7 @@ def test_a_margin_is_kept():
     assert clearance(result.plan, TOWER) >= 0.3 - 1e-6
 
 
+@pytest.mark.slow
 def test_bounds_of_height_close_a_way():
     high = found(replace(BASE, obstacles=(LOW,)))
     closed = replace(BASE, obstacles=(LOW,), bounds=Bounds(z=(-4.0, 1.05), y=(-8.0, 8.0)))

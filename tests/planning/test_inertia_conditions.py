@@ -186,6 +186,7 @@ def test_it_says_how_near_it_came():
     assert result.reason.endswith("m off")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("aside", [0.0, 1.5, -1.5])
 @pytest.mark.parametrize("along", quick_are([60.0], [40.0, 60.0, 80.0]))
 def test_a_fast_car_passes_a_box(along, aside):

@@ -153,6 +153,7 @@ def test_with_a_fixed_time_it_does_not_rest_where_something_comes():
     assert check_plan(problem, result.plan, 0).clearance_m > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", quick_are(range(2), range(6)))
 def test_lively_places(seed):
     problem = replace(

@@ -141,6 +141,7 @@ def test_a_goal_beside_the_lattice_is_reached_within_its_tolerance():
     assert result.terminal_error.position_m == pytest.approx(math.hypot(0.1, 0.05))
 
 
+@pytest.mark.slow
 @needs_data
 @pytest.mark.parametrize(
     ("name", "goal"),

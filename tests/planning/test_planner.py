@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 
 import numpy as np
+import pytest
 
 from maneuver_automaton.collision import Box, Disc, Zone
 from maneuver_automaton.costs import Cost
@@ -22,6 +23,7 @@ def test_every_field_of_a_problem_is_stated_once():
     assert {one.name for one in fields(Planner)} == of_problem | {"workspace"}
 
 
+@pytest.mark.slow
 def test_zones_hold_in_every_query():
     zone = Zone(shape=Box([1.0, 2.0], [2.0, 0.0]), trims=("spin", "acw"))
     planner = Planner(robot(TABLE_2), zones=[zone], footprint=Disc(0.1))

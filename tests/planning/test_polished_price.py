@@ -97,6 +97,7 @@ def test_effort_alone_has_no_quickest_motion():
     assert not why_not_polished(posed(cost=Cost(effort=1.0), horizon=Horizon(max_time=9.0)))
 
 
+@pytest.mark.slow
 @compiled_only
 @needs_casadi
 def test_what_is_passed_above_or_below_does_not_keep_from_polishing():

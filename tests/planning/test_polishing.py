@@ -55,6 +55,7 @@ def test_a_trailer_without_maneuvers_is_led_by_paths_of_its_car():
     assert unpolished(problem).status is not PlanStatus.FOUND
 
 
+@pytest.mark.slow
 def test_a_fixed_time_is_kept_under_way_and_its_effort_falls():
     """It never rests, so that no wait can fill the time."""
     problem = Problem(

@@ -58,6 +58,7 @@ def test_a_gap_is_a_share():
     assert str(caught.value) == "gap must be a share from 0 to below 1, got 1.0"
 
 
+@pytest.mark.slow
 def test_a_planner_knows_at_once_what_it_has_proven_of_other_starts():
     planner = ma.Planner(
         SLOT.automaton, cost=SLOT.cost, obstacles=SLOT.obstacles, footprint=SLOT.footprint

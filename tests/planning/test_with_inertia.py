@@ -134,6 +134,7 @@ def test_start_and_goal_that_are_blocked():
     assert plan(blocked).status is PlanStatus.START_BLOCKED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["hovercraft", "second_order_unicycle", "car_with_trailer"])
 def test_stock_libraries_plan(name):
     library = load_stock_library(name)
@@ -175,6 +176,7 @@ FREE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cost", [Cost(effort=1.0), Cost(length=1.0)], ids=["effort", "length"])
 @pytest.mark.parametrize("name", quick_are(["single_track"], FREE))
 def test_words_come_first_where_nothing_is_in_the_way(name, cost):
@@ -186,6 +188,7 @@ def test_words_come_first_where_nothing_is_in_the_way(name, cost):
     assert result.cost <= words.solutions[0].cost * (1.0 + 1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", quick_are(["hovercraft"], FREE))
 def test_counted_work_gives_the_same_plan_and_the_moved_one(name):
     problem = replace(FREE[name], obstacles=(Obstacle(Box([0.5, 0.5], [300.0, 50.0])),))

@@ -56,6 +56,7 @@ def found(problem, **more):
     return result
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", VEHICLES)
 def test_a_tolerance_is_used_in_free_space(name):
     exact = found(to_goal(name))
@@ -92,6 +93,7 @@ HORIZONS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("horizon", HORIZONS.values(), ids=HORIZONS.keys())
 def test_other_conditions_hold_too(horizon):
     cost = Cost(effort=1.0) if horizon.time or horizon.max_time else Cost(time=1.0)

@@ -50,6 +50,7 @@ def test_the_path_grows():
     assert len(trail.get_segments()) == 4
 
 
+@pytest.mark.slow
 def test_films_of_scenes_are_small_and_white(tmp_path):
     plan = parking_plan()
     save_plan_animation(plan, tmp_path / "plan.gif", problem=slalom_problem(plan))

@@ -82,6 +82,7 @@ def test_motions_last_a_second_and_are_to_scale():
     assert ax.get_aspect() == 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "automaton",
     [

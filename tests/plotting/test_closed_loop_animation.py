@@ -27,6 +27,7 @@ def shown(film):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["unfinished", "empty", "helpless"])
 def test_frames_move_and_cover_the_loop(name, tmp_path):
     loop = LOOPS[name]()

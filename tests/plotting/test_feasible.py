@@ -30,6 +30,7 @@ def cone(*, headings=(0.0, 1.5), within=2.0, exhaustive=True, goal=(0.0, 0.0, 0.
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_a_picture(count, tmp_path):
     found = cone(headings=np.linspace(0.0, 5.0, count), exhaustive=count > 1)

@@ -12,6 +12,7 @@ from maneuver_automaton.plotting.plan_figures import plan_figure, save_plan_figu
 from tests.plotting.cases import assert_picture, parking_plan, result_of
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("look", "size"),
     [

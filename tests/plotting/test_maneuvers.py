@@ -43,6 +43,7 @@ def test_left_and_right_differ_in_colour():
     assert len({tuple(color) for color in colors}) == 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("automaton", [SMALL, LARGE, replace(SMALL, maneuvers=SMALL.maneuvers[:1])])
 def test_pictures_of_all_sizes_are_written(automaton, tmp_path):
     save_maneuvers_figure(automaton, tmp_path / "maneuvers.png")

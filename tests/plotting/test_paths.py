@@ -121,6 +121,7 @@ def test_without_a_footprint_a_dart_grows_with_the_path():
     assert sizes[1] > 5.0 * sizes[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("footprint", quick_are([None], [None, FOOTPRINT]))
 @settings(max_examples=30)
 @given(by=st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0), st.floats(-3.0, 3.0)))

@@ -93,6 +93,7 @@ def test_a_scene_without_a_plan_is_written(tmp_path):
     assert_picture(tmp_path / "plan.png")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("columns", [3, 4])
 def test_expanded_nodes_are_drawn_on_request(columns, tmp_path):
     nodes = np.random.default_rng(1).normal(size=(200, columns))
@@ -125,6 +126,7 @@ def test_a_file_without_a_plan_is_drawn(tmp_path):
     assert_picture(tmp_path / "plan.png")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [0, 1, 12])
 def test_alternatives_are_written(count, tmp_path):
     others = [plan_of(["spin", "straight", "spin"], [0.5 + 0.2 * k, 1, 1]) for k in range(count)]
@@ -133,6 +135,7 @@ def test_alternatives_are_written(count, tmp_path):
     assert_picture(tmp_path / "alternatives.png")
 
 
+@pytest.mark.slow
 def test_the_ending_chooses_the_format_and_text_stays_text(tmp_path):
     for name in ("plan.pdf", "again.pdf", "plan.svg"):
         save_plan_figure(result_of(parking_plan()), tmp_path / name)

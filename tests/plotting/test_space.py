@@ -34,6 +34,7 @@ def flight(obstacles=TOWN, plan=None):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("obstacles", [TOWN, TOWN[:1], ()], ids=["town", "one", "none"])
 def test_flights_are_written(obstacles, tmp_path):
     save_space_figure(flight(obstacles), tmp_path / "plan_3d.png")

@@ -34,6 +34,7 @@ CASES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("model", "grid"), CASES, ids=lambda case: getattr(case, "name", ""))
 def test_every_pair_ends_in_its_target_to_rounding(model, grid):
     trims = trims_of(model, grid).trims

@@ -87,6 +87,7 @@ def test_samples_are_close_and_carry_their_controls(model):
     np.testing.assert_array_equal(course.control[-1], controls[-1])
 
 
+@pytest.mark.slow
 @every_model
 @settings(max_examples=5)
 @given(cut=st.floats(0.1, 0.9))

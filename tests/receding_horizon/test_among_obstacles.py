@@ -68,6 +68,7 @@ def test_a_margin_is_kept_and_what_is_promised_too(seed):
     assert clearances(loop).min() >= 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", quick_are([4], range(6)))
 def test_with_noise_it_arrives_free_and_says_what_the_noise_broke(seed):
     problem = replace(
@@ -137,6 +138,7 @@ def test_pushed_into_a_wall_it_stays_and_says_so():
     assert "contact is predicted at 1 s" in loop.reason
 
 
+@pytest.mark.slow
 def test_a_margin_for_new_words_keeps_the_old_one():
     loop = simulate(seeded(3), step=1.0, margin=0.5)
     assert loop.reached

@@ -121,6 +121,7 @@ def test_parking_elsewhere_is_parking(controls, by):
     assert_same_motion(move @ SE2(one.poses), SE2(two.poses), atol=1e-9, modulo_turn=True)
 
 
+@pytest.mark.slow
 @given(
     to=st.tuples(
         st.floats(3.0, 6.0), st.floats(-6.0, 6.0), st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)

@@ -111,6 +111,7 @@ class TestWaitingAndEvading:
         assert_free(loop)
         assert loop.times[-1] > 12.0
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("seed", quick_are([0], range(4)))
     def test_a_scene_of_a_dozen(self, seed):
         loop = simulate(moving_scene(seed), step=1.0, time_limit=2.0)
@@ -126,6 +127,7 @@ class TestWaitingAndEvading:
         assert loop.reached
         assert_free(loop)
 
+    @pytest.mark.slow
     def test_with_noise_nothing_is_hit(self):
         upset = Disturbance(position_m=0.01, heading_rad=0.02, seed=4)
         goal = Goal(pose=[6.0, 0.0, 0.0], tolerance_m=0.1, free_heading=True)
@@ -136,6 +138,7 @@ class TestWaitingAndEvading:
 
 
 class TestPredictions:
+    @pytest.mark.slow
     def test_one_that_turns_out_wrong_is_flagged_and_evaded(self):
         problem = among(crossing())
         away = moving_obstacle([0.0, 9.0], [(3.0, -3.0), (3.0, -12.0)])

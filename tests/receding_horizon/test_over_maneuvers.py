@@ -53,6 +53,7 @@ def assert_nothing_interrupted(loop) -> None:
         assert then.plan.primitive_durations[0] == pytest.approx(busy, abs=10 * NOTHING)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "problem",
     [
@@ -78,6 +79,7 @@ def test_undisturbed_the_first_plan_is_what_it_costs(problem):
     assert_nothing_interrupted(loop)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 def test_disturbed_it_stays_feasible_and_interrupts_no_maneuver(seed):
     upset = Disturbance(position_m=0.004, heading_rad=0.004, seed=seed)
@@ -160,6 +162,7 @@ def test_the_log_can_be_written():
     assert document["steps"][0]["control"] == loop.steps[0].control.tolist()
 
 
+@pytest.mark.slow
 def test_a_loop_that_was_stopped_goes_on_from_its_file(tmp_path):
     problem = posed()
     whole = simulate(problem, step=0.4, time_limit=5.0)
@@ -263,6 +266,7 @@ def test_what_cannot_be_evaded_is_flagged_with_the_time_of_contact():
     assert step.free_until == pytest.approx(0.925, abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("look_ahead", "stops_at"), [(1.0, 1.0), (60.0, 5.0)])
 def test_the_fail_safe_trajectory_looks_ahead_as_far_as_is_asked(look_ahead, stops_at):
     """Where it could brake a disc passes later; farther on, where the last plan ends, none does."""

@@ -182,6 +182,7 @@ def test_what_moves_is_let_pass():
         assert least_clearance(plan, (crossing,)) > 0.0
 
 
+@pytest.mark.slow
 def test_a_trailer_stays_free_too():
     automaton, trailer = truck_with_trailer(levels=3), Box([0.3, 0.25])
     goal = np.array([3.0, 1.5, 1.0])

@@ -32,6 +32,7 @@ def path_of(pieces, start=(0.0, 0.0, 0.0)):
     return Plan(start, [trim for trim, _ in pieces], durations=[time for _, time in pieces])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS)
 @given(data=st.data())
 def test_it_ends_where_the_path_ends_and_obeys_the_model(name, data):
@@ -46,6 +47,7 @@ def test_it_ends_where_the_path_ends_and_obeys_the_model(name, data):
     assert audit.max_dynamics_defect < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS)
 @given(data=st.data())
 def test_every_pose_is_one_of_the_path(name, data):

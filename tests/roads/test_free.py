@@ -99,6 +99,7 @@ drives = st.tuples(
 CLEARING = clearing()
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(150))
 @given(drive=drives)
 def test_what_is_proven_free_is_free_and_what_is_not_is_near_something(drive):

@@ -97,6 +97,7 @@ def in_the_problem(query, nodes):
 TIGHT = Resolution(truncated=True, scale=0.5, durations=0.5, stop=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sign", quick_are([1.0], [1.0, -1.0]))
 @pytest.mark.parametrize("resolution", [Resolution(stop=False), TIGHT])
 @pytest.mark.parametrize("name", PROBLEMS)

@@ -65,6 +65,7 @@ def test_no_single_change_is_cheaper_at_the_end(goal):
                 assert other is None or other.cost > best.cost - 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("goal", GOALS)
 def test_with_exhaustive_search_it_is_as_cheap_as_all_words_of_four_trims(goal):
     one = posed(goal, unicycle_automaton(FEW))

@@ -92,6 +92,7 @@ def test_whatever_is_returned_ends_at_the_goal(twists, goal):
         assert np.abs(reference.off_goal(end, goal)).max() < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_root_finding_from_many_starts_finds_nothing_else(kind):
     rng = np.random.default_rng(4)
