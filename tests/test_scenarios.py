@@ -158,6 +158,7 @@ def test_the_plan_from_the_file_passes_the_audit_again(planned, tmp_path):
     ).passed
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("planned", LONG, indirect=True)
 def test_planning_again_writes_the_same(planned, request):
     document = plan_to_dict(planned[1])

@@ -64,11 +64,10 @@ def against_kept(name: str, before: Mapping[str, Any], now: Mapping[str, Any]) -
     return ""
 
 
-def params(quick: Mapping[str, bool]) -> list[Any]:
-    """The names as parameters of a test; what is not quick is marked as slow."""
-    return [
-        pytest.param(name, marks=() if fast else pytest.mark.slow) for name, fast in quick.items()
-    ]
+def params(quick: Mapping[str, bool], *, exhaustive: bool = False) -> list[Any]:
+    """The names as parameters of a test; what is not quick is marked as slow, or as exhaustive."""
+    slow = [pytest.mark.slow, *([pytest.mark.exhaustive] if exhaustive else [])]
+    return [pytest.param(name, marks=() if fast else slow) for name, fast in quick.items()]
 
 
 def rounded(number: float) -> float:

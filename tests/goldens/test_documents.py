@@ -30,7 +30,9 @@ def test_every_case_is_kept_and_no_other():
 
 
 @compiled_only
-@pytest.mark.parametrize("name", params({name: case.quick for name, case in CASES.items()}))
+@pytest.mark.parametrize(
+    "name", params({name: case.quick for name, case in CASES.items()}, exhaustive=True)
+)
 def test_the_file_has_the_same_keys(name):
     before, now = unpacked(kept("documents"), name), answer(CASES[name])
     for key in ("exit", "file", "status"):

@@ -26,7 +26,9 @@ def test_what_is_kept_is_the_cheapest_of_its_runs():
 
 
 @compiled_only
-@pytest.mark.parametrize("name", params({name: scene.quick for name, scene in SCENES.items()}))
+@pytest.mark.parametrize(
+    "name", params({name: scene.quick for name, scene in SCENES.items()}, exhaustive=True)
+)
 def test_the_plan_is_not_much_dearer(name):
     before, scene = kept("inertia")[name], SCENES[name]
     most = max(SHARE, dearer().get(name, {"share": 0.0})["share"])

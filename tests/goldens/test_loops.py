@@ -58,7 +58,7 @@ def test_a_loop_is_the_same_or_cheaper(name):
 
 
 @compiled_only
-@pytest.mark.parametrize("name", params(WITH_INERTIA))
+@pytest.mark.parametrize("name", params(WITH_INERTIA, exhaustive=True))
 def test_a_loop_with_inertia_is_not_much_dearer(name):
     before, problem = kept("loops")[name], ""
     for longer in LONGER:

@@ -71,7 +71,7 @@ ONE_BY_ONE = {  # so that every feature is tried with a few vehicles
     *(("user", feature) for feature in ("moving_ends", "loop", "polishing")),
     ("boat_in_current", "plan_file"),
 }
-WITH_INERTIA_LONG = ("plan_file", "fixed_time", "loop_moving_obstacles")
+WITH_INERTIA_LONG = ("plan_file",)
 LONG_ONE_BY_ONE = {  # with -m slow
     *(("car", feature) for feature in ("discs", "zones", "margin", "bounds", "min_coast")),
     *(("car", feature) for feature in ("planner_with_all", "free_heading_among_obstacles")),
@@ -106,8 +106,7 @@ def _quick() -> Iterator[tuple[str, str]]:
 def _long() -> Iterator[tuple[str, str]]:
     for feature, vehicle in cells():
         with_inertia = VEHICLES[vehicle].inertia and feature in WITH_INERTIA_LONG
-        chosen = with_inertia or vehicle == "dubins" or (feature, vehicle) in SLOW
-        chosen = chosen or (vehicle, feature) in LONG_ONE_BY_ONE
+        chosen = with_inertia or vehicle == "dubins" or (vehicle, feature) in LONG_ONE_BY_ONE
         if chosen and (feature, vehicle) not in QUICK:
             yield feature, vehicle
 

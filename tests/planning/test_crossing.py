@@ -26,6 +26,7 @@ def test_zones_are_crossed_where_a_plan_meets_them():
     assert not coasts_through(posed(ALONG, Zone(shape=ACROSS, max_speed=0.1)), known)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @compiled_only
 @pytest.mark.skipif(not has_casadi(), reason="polishing needs CasADi")

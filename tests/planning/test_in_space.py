@@ -109,6 +109,7 @@ def test_zones_hold_in_space():
         assert trim.name in zone.trims or not inside.any()
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.parametrize("what", ["free heading", "several goals", "tolerance"])
 def test_goals_of_every_kind(what):
@@ -126,6 +127,7 @@ def test_goals_of_every_kind(what):
         assert result.terminal_error.position_m <= 0.3 + 1e-9
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_times_and_prices():
     scene = replace(BASE, obstacles=(TOWER,))
@@ -135,6 +137,7 @@ def test_times_and_prices():
     assert len(dear.plan.word) <= len(found(scene).plan.word)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_longest_time_and_few_trims_are_kept():
     scene = replace(BASE, obstacles=(TOWER,))

@@ -75,6 +75,7 @@ def usual():
     return result
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_any_heading_is_as_good_among_obstacles():
     """A goal whose heading points back costs a turn; where any will do, it costs none."""
@@ -87,6 +88,7 @@ def test_any_heading_is_as_good_among_obstacles():
     assert_free(free.plan)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [1.3, 1.1])
 def test_a_longest_time_is_kept_among_obstacles(usual, share):
@@ -206,6 +208,7 @@ def test_a_fast_car_passes_a_box(along, aside):
     assert found.word.duration < 6.5
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_zone_is_crossed_slowly_and_left_fast():
     """A strip of 1 m at 0.4 m/s: neither the whole way slowly, nor 40 m around it."""

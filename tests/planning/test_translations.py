@@ -79,6 +79,7 @@ def crossing(**goal):
     )
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_boat_is_polished_though_its_heading_is_in_its_pose_and_in_its_state():
     """What the last pose says already is not asked of the last state too, or no solver ends."""

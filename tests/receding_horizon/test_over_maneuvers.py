@@ -289,6 +289,7 @@ def test_the_fail_safe_trajectory_looks_ahead_as_far_as_is_asked(look_ahead, sto
     assert step.plan.primitives[0].name == begun.plan.primitives[0].name  # is finished
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", ["stops and steers", "polished"])
 def test_a_loop_with_motions_of_its_own_goes_on_from_its_file(robot, tmp_path):

@@ -113,6 +113,7 @@ def test_a_wall_across_every_altitude_exhausts_the_search():
     assert search_maneuvers(query, max_expansions=20000).best is None
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_plans_get_cheaper_and_pass_every_check():
     town = [
