@@ -26,7 +26,10 @@ NEED_MORE = {
 UNHURRIED = 600.0  # [s], so that the clock decides nothing
 NAMES = {path.stem for path in FILES}
 LONG = [
-    pytest.param((path, MANY), id=f"{path.stem}, long", marks=pytest.mark.slow) for path in FILES
+    pytest.param(
+        (path, MANY), id=f"{path.stem}, long", marks=[pytest.mark.slow, pytest.mark.exhaustive]
+    )
+    for path in FILES
 ]
 SHORT = [pytest.param((path, NEED_MORE.get(path.stem, FEW)), id=path.stem) for path in FILES]
 
@@ -158,7 +161,6 @@ def test_the_plan_from_the_file_passes_the_audit_again(planned, tmp_path):
     ).passed
 
 
-@pytest.mark.exhaustive
 @pytest.mark.parametrize("planned", LONG, indirect=True)
 def test_planning_again_writes_the_same(planned, request):
     document = plan_to_dict(planned[1])
