@@ -13,7 +13,7 @@ import numpy as np
 WIDTH, MOST_LINES = 100, 10
 MOST_NUMBERS = 12  # of an array that is written out
 MOST_ITEMS = 3  # of a sequence or mapping that is written out
-MOST_LETTERS = 60  # of a text, or of another object
+MOST_CHARACTERS = 60  # of a text, or of another object
 DEEPEST = 2  # dataclasses within dataclasses
 
 
@@ -79,9 +79,9 @@ def _shown(value: Any, depth: int) -> str:
         comma = "," if isinstance(value, tuple) and len(value) == 1 else ""
         return f"{left}{_joined(items, len(value))}{comma}{right}"
     text = repr(value)
-    if isinstance(value, str) and len(text) > MOST_LETTERS:
-        return f"{text[: MOST_LETTERS - 4]}...{text[-1]}"
-    short = len(text) <= MOST_LETTERS and "\n" not in text
+    if isinstance(value, str) and len(text) > MOST_CHARACTERS:
+        return f"{text[: MOST_CHARACTERS - 4]}...{text[-1]}"
+    short = len(text) <= MOST_CHARACTERS and "\n" not in text
     return text if short else f"<{type(value).__name__}>"
 
 
