@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,14 +13,14 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.headings import origin_of
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.models.greatest_speed import greatest_speed
-from maneuver_automaton.planning.polishing import rests_at_both_ends, why_not_polished
+from maneuver_automaton.planning.needs import rests_at_both_ends
 from maneuver_automaton.planning.result import LowerBound
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinematic_problem
-from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.limits import closed_bounds
-from maneuver_automaton.search.plane_bound import plane_bound
 from maneuver_automaton.words.library import moving_trims
+
+if TYPE_CHECKING:
+    from maneuver_automaton.search.lattice_query import LatticeQuery
 
 
 def formula_bound(problem: Problem, goals: Sequence[Goal] = ()) -> LowerBound:
@@ -45,6 +46,8 @@ def lattice_bound(query: LatticeQuery) -> LowerBound:
         return closed
     per_metre = float((rates[drives] / library.speeds[drives]).min())
     fixed = library.rest_rate * (problem.horizon.time or 0.0) if pads else 0.0
+    from maneuver_automaton.search.plane_bound import plane_bound
+
     disc = fixed + per_metre * plane_bound(query)
     return LowerBound(value=disc, kind="disc") if disc > closed.value else closed
 
@@ -86,6 +89,10 @@ def bound_along_paths(problem: Problem) -> LowerBound:
     A path that the kinematic vehicle needs B seconds for at full speed v takes ``B + v / a`` with
     the acceleration a, or ``2 sqrt(B v / a)`` where v is not reached.
     """
+    from maneuver_automaton.planning.polishing import why_not_polished
+    from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinematic_problem
+    from maneuver_automaton.search.lattice_query import lattice_query
+
     model, cost = problem.automaton.model, problem.cost
     known = speed_bound(problem)
     if why_not_polished(problem) and not follows_paths(model):  # all plans are words

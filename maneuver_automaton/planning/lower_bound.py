@@ -19,9 +19,8 @@ from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.bounds import bound_along_paths, formula_bound, lattice_bound
 from maneuver_automaton.planning.kept_bounds import KeptBounds
-from maneuver_automaton.planning.polishing import rests_at_both_ends
+from maneuver_automaton.planning.needs import has_inertia, rests_at_both_ends
 from maneuver_automaton.planning.result import LowerBound
-from maneuver_automaton.planning.steps import has_inertia
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.kinematic_paths import extreme_automaton, follows_paths
 from maneuver_automaton.search.lattice_query import lattice_query

@@ -9,21 +9,15 @@ from dataclasses import replace
 
 from maneuver_automaton._interrupts import patient
 from maneuver_automaton.budget import Budget, Watch
-from maneuver_automaton.planning.among_zones import plan_among_zones
 from maneuver_automaton.planning.blocked import blocked_ends
-from maneuver_automaton.planning.checking import load_checking, load_checks
 from maneuver_automaton.planning.free_space import plan_by_words
-from maneuver_automaton.planning.in_steps import plan_in_steps
+from maneuver_automaton.planning.needs import has_inertia, has_tolerance, uses_lattice
 from maneuver_automaton.planning.no_way import with_proof
 from maneuver_automaton.planning.off_lattice import goals_off_lattice
 from maneuver_automaton.planning.result import LowerBound, PlanResult
-from maneuver_automaton.planning.steps import has_inertia, load_steps, uses_lattice
-from maneuver_automaton.planning.within_tolerance import has_tolerance, plan_within_tolerance
 from maneuver_automaton.planning.workspace import Workspace, workspace_of
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.search.choose import load_search
-from maneuver_automaton.search.lattice_query import lattice_query
 
 
 def plan(
@@ -159,6 +153,8 @@ def plan_within(
 ) -> PlanResult:
     """The answer to a problem within a budget, the checks included; kernels are loaded already."""
     if has_tolerance(problem):
+        from maneuver_automaton.planning.within_tolerance import plan_within_tolerance
+
         result = plan_within_tolerance(
             problem, _answered, budget, workspace, alternatives=alternatives
         )
@@ -175,6 +171,8 @@ def _answered(
     if blocked is not None:
         return blocked
     if problem.zones:
+        from maneuver_automaton.planning.among_zones import plan_among_zones
+
         return plan_among_zones(problem, _searched, budget, workspace, alternatives=alternatives)
     return _searched(problem, budget, workspace, alternatives=alternatives)
 
@@ -183,9 +181,11 @@ def _searched(
     problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
 ) -> PlanResult:
     """The answer of the search that suits a problem without zones."""
-    in_steps = has_inertia(problem) or uses_lattice(problem)
-    how = plan_in_steps if in_steps else plan_by_words
-    return how(problem, budget, workspace, alternatives=alternatives)
+    if has_inertia(problem) or uses_lattice(problem):
+        from maneuver_automaton.planning.in_steps import plan_in_steps
+
+        return plan_in_steps(problem, budget, workspace, alternatives=alternatives)
+    return plan_by_words(problem, budget, workspace, alternatives=alternatives)
 
 
 def prepare(problem: Problem, workspace: Workspace | None = None) -> None:
@@ -193,6 +193,9 @@ def prepare(problem: Problem, workspace: Workspace | None = None) -> None:
     workspace = workspace or workspace_of(problem.obstacles)
     _load(problem, workspace)
     if uses_lattice(problem):
+        from maneuver_automaton.planning.checking import load_checks
+        from maneuver_automaton.search.lattice_query import lattice_query
+
         goals = tuple(range(len(problem.goals)))
         lattice_query(problem, goals, prepared=workspace.prepared)
         load_checks(problem, workspace)
@@ -202,11 +205,17 @@ def _load(problem: Problem, workspace: Workspace) -> None:
     """Compile or load what planning needs, before the clock runs."""
     guarded = bool(problem.obstacles or problem.zones)
     if guarded:
+        from maneuver_automaton.planning.checking import load_checking
+
         load_checking()  # what is imported in the first check would make it late
     in_space = problem.start.size > 3 and guarded
     if has_inertia(problem) or uses_lattice(problem) or in_space:
+        from maneuver_automaton.planning.steps import load_steps
+
         load_steps(problem, workspace)
         return
     if guarded:
+        from maneuver_automaton.refinement.ready import load_lattice
+
         load_lattice()
     load_search(problem)

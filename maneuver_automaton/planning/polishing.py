@@ -25,6 +25,7 @@ from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.problem import Components, RunningCost
 from maneuver_automaton.optimal_control.separation import BodyPart
 from maneuver_automaton.planning.incumbents import Incumbents
+from maneuver_automaton.planning.needs import rests_at_both_ends
 from maneuver_automaton.planning.polished_price import (
     PolishedPrice,
     admitted_durations,
@@ -210,13 +211,6 @@ def _without_passed(problem: Problem, known: Plan) -> Problem:
         > problem.margin
     ]
     return replace(problem, obstacles=tuple(kept))
-
-
-def rests_at_both_ends(problem: Problem) -> bool:
-    """Whether the vehicle starts and ends at rest."""
-    return problem.first_trim.is_rest and all(
-        problem.last_trim(goal).is_rest for goal in problem.goals
-    )
 
 
 def is_led_by_paths(problem: Problem) -> bool:

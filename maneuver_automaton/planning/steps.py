@@ -7,17 +7,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from maneuver_automaton.automaton.same_motion import POLISHED, UNFINISHED, Likeness
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.bounds import least_price_per_metre
 from maneuver_automaton.planning.checking import load_checking
-from maneuver_automaton.planning.polishing import (
-    load_polishing,
+from maneuver_automaton.planning.needs import (
+    climbs_among_obstacles,
+    has_inertia,
     rests_at_both_ends,
-    why_not_polished,
 )
+from maneuver_automaton.planning.polishing import load_polishing, why_not_polished
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinematic_problem
@@ -71,47 +70,6 @@ def steps_of(problem: Problem) -> Steps:
         at_will=False,
         likeness=POLISHED,
     )
-
-
-def has_inertia(problem: Problem) -> bool:
-    """Whether the vehicle cannot switch at will between the trims that it needs."""
-    automaton = problem.automaton
-    return bool(automaton.model.reduced_names) or not automaton.is_kinematic
-
-
-def uses_lattice(problem: Problem) -> bool:
-    """Whether the lattice plans: it was asked for, or there is something in the way.
-
-    In the plane it needs trims of which one turns, or two that lead to different sides where none
-    does and the heading never changes; and a rest where the time is fixed. Otherwise words are
-    searched, and those that meet obstacles are refused.
-    """
-    if climbs_among_obstacles(problem):
-        return True
-    velocities = problem.automaton.body_velocities
-    moving = velocities[velocities.any(axis=1)]
-    turns = bool(moving[:, 2].any())
-    keeps_heading = problem.automaton.translated is not None and not has_inertia(problem)
-    sides = turns or (keeps_heading and np.linalg.matrix_rank(moving[:, :2]) == 2)
-    steers = len(moving) > 1 and sides and velocities.shape[1] == 3
-    if not steers or (problem.horizon.time is not None and len(moving) == len(velocities)):
-        return False
-    method = problem.search.method
-    return method == "lattice" or (method == "auto" and bool(problem.obstacles))
-
-
-def climbs_among_obstacles(problem: Problem) -> bool:
-    """Whether a vehicle that switches at will has more than a plane, and something is in its way.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Disc, Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "left": (0.0, 1.0)})
-    >>> climbs_among_obstacles(Problem(robot, [0, 0, 0], [9, 0, 0], obstacles=Disc(1.0, [4, 0])))
-    False
-    """
-    in_space = problem.start.size > 3 and problem.automaton.is_kinematic
-    return in_space and bool(problem.obstacles) and problem.search.method in ("auto", "lattice")
 
 
 def load_steps(problem: Problem, workspace: Workspace) -> None:

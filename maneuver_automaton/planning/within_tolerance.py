@@ -39,11 +39,6 @@ LEAST_TIME = 1e-3  # [s] for each question, also where the time is over
 SPARE = 3  # plans asked for each alternative: with loose ends some are one motion
 
 
-def has_tolerance(problem: Problem) -> bool:
-    """Whether a plan may end beside a goal."""
-    return any(goal.tolerance_m > 0.0 or goal.tolerance_rad > 0.0 for goal in problem.goals)
-
-
 def plan_within_tolerance(
     problem: Problem, answer: Answer, budget: Budget, workspace: Workspace, *, alternatives: int
 ) -> PlanResult:

@@ -2,8 +2,6 @@
 
 from maneuver_automaton.primitives.bang_bang import bang_bang as bang_bang
 from maneuver_automaton.primitives.bang_bang import connect_bang_bang as connect_bang_bang
-from maneuver_automaton.primitives.connecting import Connection as Connection
-from maneuver_automaton.primitives.connecting import connect as connect
 from maneuver_automaton.primitives.driving import drive as drive
 from maneuver_automaton.primitives.driving import drive_all as drive_all
 from maneuver_automaton.primitives.equilibrium import FoundTrims as FoundTrims

@@ -16,7 +16,7 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning import plan as planned
 from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.planning.checking import what_is_hit
-from maneuver_automaton.planning.steps import climbs_among_obstacles
+from maneuver_automaton.planning.needs import climbs_among_obstacles
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon.candidates import Candidate, allowed, bounded
 from maneuver_automaton.receding_horizon.failsafe import last_event

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.planning.steps import climbs_among_obstacles, has_inertia
+from maneuver_automaton.planning.needs import climbs_among_obstacles, has_inertia
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
 

@@ -12,7 +12,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING, committed, head_of, joined
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.planning.steps import has_inertia
+from maneuver_automaton.planning.needs import has_inertia
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.candidates import Candidate, candidate, within

@@ -1,10 +1,29 @@
 """Improvement of plans: words, smooth motions, and the pace along a path."""
 
-from maneuver_automaton.refinement.effort import EffortReport as EffortReport
-from maneuver_automaton.refinement.effort import effort_report as effort_report
-from maneuver_automaton.refinement.polish import PolishedMotion as PolishedMotion
-from maneuver_automaton.refinement.polish import PolishResult as PolishResult
-from maneuver_automaton.refinement.polish import PolishTask as PolishTask
-from maneuver_automaton.refinement.polish import polish_guesses as polish_guesses
-from maneuver_automaton.refinement.retiming import Retiming as Retiming
-from maneuver_automaton.refinement.retiming import retime as retime
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from maneuver_automaton._lazy import lazily
+
+if TYPE_CHECKING:
+    from maneuver_automaton.refinement.effort import EffortReport as EffortReport
+    from maneuver_automaton.refinement.effort import effort_report as effort_report
+    from maneuver_automaton.refinement.polish import PolishedMotion as PolishedMotion
+    from maneuver_automaton.refinement.polish import PolishResult as PolishResult
+    from maneuver_automaton.refinement.polish import PolishTask as PolishTask
+    from maneuver_automaton.refinement.polish import polish_guesses as polish_guesses
+    from maneuver_automaton.refinement.retiming import Retiming as Retiming
+    from maneuver_automaton.refinement.retiming import retime as retime
+
+_HOMES = {
+    "EffortReport": "effort",
+    "effort_report": "effort",
+    "PolishedMotion": "polish",
+    "PolishResult": "polish",
+    "PolishTask": "polish",
+    "polish_guesses": "polish",
+    "Retiming": "retiming",
+    "retime": "retiming",
+}
+__getattr__, __dir__ = lazily(__name__, _HOMES)
