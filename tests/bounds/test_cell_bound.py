@@ -81,6 +81,7 @@ def test_no_motion_in_an_active_cell_falls_faster_than_the_slope_says(price):
         assert np.abs(value[0] - value[1])[cells.active.shape[0] // 2].max() <= price * steep + 1e-6
 
 
+@pytest.mark.slow
 def test_a_function_raised_at_a_node_that_carries_flow_is_refused():
     _, program, at = solved(among(WALL), steps=1500)
     cells, value = program.cells, program.value.astype(float)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import itertools
-import sys
 from typing import Literal
 
 import pytest
 
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Disc
-from maneuver_automaton.planning import steps
+from maneuver_automaton.planning import checking, steps
 from maneuver_automaton.planning.plan import plan_within, prepare
 from maneuver_automaton.planning.result import PlanStatus
 from maneuver_automaton.planning.workspace import workspace_of
@@ -63,8 +62,7 @@ def test_a_plan_is_not_returned_late_for_its_checks() -> None:
 def test_what_checks_is_imported_before_the_clock_starts(monkeypatch: pytest.MonkeyPatch) -> None:
     """The first check of a process would be late for its imports, and its plan lost."""
     loaded: list[str] = []
-    module = sys.modules[plan_within.__module__]
-    monkeypatch.setattr(module, "load_checking", lambda: loaded.append("checks"))
+    monkeypatch.setattr(checking, "load_checking", lambda: loaded.append("checks"))
     prepare(TASKS["among obstacles"])
     assert loaded == ["checks"]
 
