@@ -27,7 +27,7 @@ class Schedule(NamedTuple):
 
 AT_WILL = Schedule(
     (
-        (0, (Resolution(),)),
+        (0, (Resolution(coarse=True),)),
         (
             300,
             (
