@@ -98,6 +98,11 @@ class Incumbents:
         return not self.plans or self.budget.left_to_check >= self.longest_check
 
     @property
+    def is_enough(self) -> bool:
+        """Whether no better plan is asked for than those there are."""
+        return not self.problem.search.improve and len(self.plans) > self.alternatives
+
+    @property
     def why_refused(self) -> str:
         """Why the first plan was refused; empty if none was."""
         return next(iter(self.reasons.values()), "")

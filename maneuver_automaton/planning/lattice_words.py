@@ -85,6 +85,11 @@ class LatticeWords:
         """
         return self.query.library.at_will
 
+    @property
+    def candidates(self) -> list[Candidate]:
+        """Words that are to be checked, the cheapest first."""
+        return [_candidate(self.query, word) for word in self.words[::-1] if self.knows_all]
+
     def gained(self, word: Word) -> None:
         """A better word was found."""
         self.words.append(word)
@@ -97,9 +102,8 @@ class LatticeWords:
         if not self.found.may_check:
             return
         self.found.offer(plan_of_word(self.query, word), self.query.goal_index[word.goal])
-        if (
-            not self.steps.polishes and not self.found.budget.is_over
-        ):  # which finds better times, and takes what time there is
+        # Polishing finds better times, and takes what time there is.
+        if not (self.steps.polishes or self.found.budget.is_over or self.found.is_enough):
             self.offer_best_times()
 
     def offer_best_times(self) -> None:
