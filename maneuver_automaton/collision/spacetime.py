@@ -13,23 +13,27 @@ build, here 10 ms. And with time as third axis no heights are left that tell a s
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision.shapes import Motion
 from maneuver_automaton.collision.swept import Twist
 from maneuver_automaton.groups import SE2
 
+Place: TypeAlias = tuple[float, float, float]
+"""A pose on plain numbers: x [m], y [m], heading [rad]."""
+
 
 class CoastingBody(NamedTuple):
     """A body whose frame coasts from a pose."""
 
-    start: Array  # (3,)
+    start: Place
     twist: Twist
     middle: complex  # x + i y of the middle of a disc around the body, in its frame [m]
     reach: float  # [m] radius of that disc
@@ -40,12 +44,20 @@ class CoastingBody(NamedTuple):
         v_x, v_y, turn_rate = self.twist
         return complex(v_x, v_y) + 1j * turn_rate * self.middle
 
-    def at(self, time: float) -> Array:
-        """Pose (3,) after `time` [s]."""
-        return (SE2(self.start) @ SE2.exp(time * np.array(self.twist))).pose
+    def at(self, time: float) -> Place:
+        """Pose after `time` [s].
 
-    def center(self, pose: Array) -> complex:
-        """Where the middle is at a pose (3,)."""
+        Source: Solà, Deray, Atchuthan (2018), Eqs. (156), (158), in half-angle form.
+        """
+        v_x, v_y, turn_rate = self.twist
+        x, y, heading = self.start
+        half = 0.5 * turn_rate * time
+        chord = complex(v_x, v_y) * time * (math.sin(half) / half if half else 1.0)
+        place = complex(x, y) + chord * cmath.rect(1.0, heading + half)
+        return place.real, place.imag, heading + turn_rate * time
+
+    def center(self, pose: Place) -> complex:
+        """Where the middle is at a pose."""
         return complex(pose[0], pose[1]) + _direction(pose) * self.middle
 
 
@@ -80,8 +92,8 @@ class MovingBody(NamedTuple):
         """Greatest speed of the middle of the disc [m/s]."""
         return self.speed + self.turn_rate * abs(self.middle)
 
-    def center(self, pose: Array) -> complex:
-        """Where the middle is at a pose (3,)."""
+    def center(self, pose: Place) -> complex:
+        """Where the middle is at a pose."""
         return complex(pose[0], pose[1]) + _direction(pose) * self.middle
 
     def centers(self, times: Array) -> Array:
@@ -97,23 +109,41 @@ class MovingBody(NamedTuple):
         times = np.asarray(time, dtype=np.float64)
         return np.stack([np.interp(times, self.knots, self.poses[:, k]) for k in range(3)], axis=-1)
 
-    def rates(self, time: float) -> tuple[complex, float, float]:
-        """Velocity [m/s], turn rate [rad/s] from `time` [s] on, and until when they last [s]."""
-        k = int(np.searchsorted(self.knots, time, side="right"))
-        if k == self.knots.size:
-            return 0j, 0.0, math.inf
-        if k == 0:
-            return 0j, 0.0, float(self.knots[0])
-        lasts = float(self.knots[k] - self.knots[k - 1])
-        x, y, turn = ((self.poses[k] - self.poses[k - 1]) / lasts).tolist()
-        return complex(x, y), turn, float(self.knots[k])
+    def stretch(self, time: float) -> Stretch:
+        """Where the frame is at a `time` [s], and how it goes on from there."""
+        knots = self.knots
+        k = int(knots.searchsorted(time, side="right"))
+        x, y, heading = self.poses[max(k - 1, 0)].tolist()
+        if k in (0, knots.size):
+            until = math.inf if k else float(knots[0])
+            return Stretch((x, y, heading), 0j, 0.0, until)
+        begin, end = knots[k - 1 : k + 1].tolist()
+        v_x, v_y, turn = ((self.poses[k] - self.poses[k - 1]) / (end - begin)).tolist()
+        since = time - begin
+        pose = x + since * v_x, y + since * v_y, heading + since * turn
+        return Stretch(pose, complex(v_x, v_y), turn, end)
 
 
-def may_meet(body: CoastingBody, other: MovingBody, *, duration: float, center: complex) -> bool:
-    """False where both are too far and too slow; `center` is the body's after half the time."""
-    there = other.center(other.at(0.5 * duration))
-    covered = 0.5 * duration * (abs(body.velocity) + other.fastest_middle)
-    return abs(center - there) <= covered + body.reach + other.radius
+class Stretch(NamedTuple):
+    """A pose at a time, and the rates from then on."""
+
+    pose: Place
+    velocity: complex  # [m/s]
+    turn_rate: float  # [rad/s]
+    until: float  # [s] how long the rates last
+
+
+def may_meet(
+    other: MovingBody, centers: Array, *, times: Array, halves: Array, speeds: Array, reach: float
+) -> NDArray[np.bool_]:
+    """False (n,) where bodies are too far and too slow to meet another.
+
+    Each lasts from `halves` (n,) [s] before one of `times` (n,) to as long after it; then its
+    middle is at one of `centers` (n, 2), and never faster than one of `speeds` (n,) [m/s]. No point
+    of it is further than `reach` [m] from its middle.
+    """
+    apart = np.hypot(*(centers - other.centers(times)).T) - reach - other.radius
+    return np.asarray(apart <= halves * (speeds + other.fastest_middle))
 
 
 def meet(
@@ -121,7 +151,7 @@ def meet(
     other: MovingBody,
     *,
     duration: float,
-    distance: Callable[[Array, Array], float],
+    distance: Callable[[Place, Place], float],
     contact: float,
 ) -> bool:
     """Whether two bodies come within `contact` > 0 [m] of each other until `duration` [s].
@@ -134,10 +164,10 @@ def meet(
 
     Examples
     --------
-    >>> still = CoastingBody(np.zeros(3), (0.0, 0.0, 0.0), 0j, 0.5)
+    >>> still = CoastingBody((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0j, 0.5)
     >>> crossing = MovingBody.of(Motion([0.0, 4.0], [[-4.0, 0, 0], [4.0, 0, 0]]), 0.5)
     >>> def distance(one, other):
-    ...     return max(0.0, math.hypot(*(one - other)[:2]) - 1.0)
+    ...     return max(0.0, math.dist(one[:2], other[:2]) - 1.0)
     >>> meet(still, crossing, duration=1.0, distance=distance, contact=1e-3)
     False
     >>> meet(still, crossing, duration=2.0, distance=distance, contact=1e-3)
@@ -149,13 +179,12 @@ def meet(
     near = 0.5 * (body.reach + other.radius)
     time = 0.0
     while True:
-        here, there = body.at(time), other.at(time)
+        here, (there, velocity, turn_rate, until) = body.at(time), other.stretch(time)
         clearance = abs(body.center(here) - other.center(there)) - body.reach - other.radius
         if clearance <= near:
             clearance = distance(here, there)
             if clearance <= contact:
                 return True
-        velocity, turn_rate, until = other.rates(time)
         closing = abs(_direction(here) * body.velocity - velocity)
         closing += turning + abs(turn_rate) * other.reach
         speed = closing + math.sqrt(closing * closing + 2.0 * bend * clearance)
@@ -166,5 +195,5 @@ def meet(
         time = after
 
 
-def _direction(pose: Array) -> complex:
-    return complex(math.cos(pose[2]), math.sin(pose[2]))
+def _direction(pose: Place) -> complex:
+    return cmath.rect(1.0, pose[2])
