@@ -300,22 +300,22 @@ class FclChecker:
                 _sliced(self._body, kinds[k], level)
                 for k, level in zip(of.tolist(), parts.level.tolist(), strict=True)
             ]
-            poses = along(starts[of], twists[of], parts.begins)
+            begins, middles = along(
+                starts[of], twists[of], np.stack([parts.begins, parts.begins + 0.5 * parts.lengths])
+            )
             objects = [solid.object for solid in solids]
-            hits = _touching(objects, poses, self._ground.static)
+            hits = _touching(objects, begins, self._ground.static)
             if not hits:
                 break
             for row, triangle in hits.items():  # in order: the first is the first coast's
                 if solids[row].excess <= 0.5 * self.proven and _is_sooner(of[row], first):
                     first = int(of[row]), int(self._ground.owners[triangle])
-            parts = parts.of([row for row in hits if _is_sooner(of[row], first)])
-            of = parts.coast
-            middles = along(starts[of], twists[of], parts.begins + 0.5 * parts.lengths)
-            hit = self._first_pose_hit(middles, np.arange(of.size))
+            rows = np.array([row for row in hits if _is_sooner(of[row], first)], dtype=np.int64)
+            hit = self._first_pose_hit(middles, rows)
             if hit is not None:
                 first = int(of[hit[0]]), hit[1]
-                parts = parts.of(of < first[0])
-            parts = halves(parts)
+                rows = rows[of[rows] < first[0]]
+            parts = halves(parts.of(rows))
         return first
 
     def _first_pose_hit(self, poses: Array, rows: IntArray) -> tuple[int, int] | None:

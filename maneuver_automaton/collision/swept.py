@@ -274,8 +274,8 @@ def halves(parts: Windows) -> Windows:
 
 
 def along(starts: Array, twists: Array, times: Array) -> Array:
-    """Poses (n, 3) of coasts from `starts` (n, 3) under `twists` (n, 3) after `times` (n,) [s]."""
-    return (SE2(starts) @ SE2.exp(times[:, None] * twists)).pose
+    """Poses (..., n, 3) of coasts from `starts` under `twists` (n, 3) after `times` (..., n) [s]."""
+    return (SE2(starts) @ SE2.exp(times[..., None] * twists)).pose
 
 
 def fastest(body: GrownBody, twists: Array) -> Array:
