@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.audit.apart import Points, points_of
 from maneuver_automaton.audit.stated import placed
 from maneuver_automaton.collision.shapes import Box, Disc, OccupancyMap, Shape
 
@@ -27,27 +28,30 @@ class Outline(NamedTuple):
         solid = np.unique(self.solid[kept], return_inverse=True)[1]
         return Outline(self.begins[kept], self.ends[kept], self.radius[kept], solid)
 
-    def holds(self, points: Array) -> Any:
-        """Whether points (m, 2) are in each solid (s, m): the rings run around them.
+    @property
+    def firsts(self) -> IntArray:
+        """Numbers of the first edges of the solids."""
+        return np.flatnonzero(np.diff(self.solid, prepend=-1))
+
+    def holds(self, points: Points) -> NDArray[np.bool_]:
+        """Whether points (m,) are in each solid (s, m): the rings run around them.
 
         Examples
         --------
         >>> square = outline_of((Box([2.0, 2.0]), Disc(1.0, [5.0, 0.0])))
-        >>> square.holds(np.array([[0.5, 0.5], [4.5, 0.0]])).tolist()
+        >>> square.holds(np.array([0.5 + 0.0j, 4.5 + 0.0j])).tolist()
         [[True, False], [False, True]]
         """
-        a, b, p = self.begins[:, None], self.ends[:, None], points[None]
-        rises = (b[..., 1] > p[..., 1]).astype(np.int64) - (a[..., 1] > p[..., 1])
-        to, along = p - a, b - a
-        side = along[..., 0] * to[..., 1] - along[..., 1] * to[..., 0]
-        turns = rises * (side * rises > 0.0)
+        if not self.radius.size:
+            return np.zeros((0, points.size), dtype=np.bool_)
+        a, b = points_of(self.begins)[:, None], points_of(self.ends)[:, None]
+        rises = (b.imag > points.imag).astype(np.int64) - (a.imag > points.imag)
+        to = points - a
+        turns = rises * (((b - a).conj() * to).imag * rises > 0.0)
         round_ = self.radius[:, None]
         if round_.any():
-            turns += (round_ > 0.0) & (np.hypot(to[..., 0], to[..., 1]) <= round_)
-        if not len(turns):
-            return np.zeros((0, len(points)), dtype=np.bool_)
-        firsts = np.flatnonzero(np.diff(self.solid, prepend=-1))
-        return np.add.reduceat(turns, firsts, axis=0) != 0
+            turns += (round_ > 0.0) & (np.abs(to) <= round_)
+        return np.asarray(np.add.reduceat(turns, self.firsts, axis=0) != 0)
 
 
 def outline_of(shapes: Sequence[Shape], origin: tuple[float, float] = (0.0, 0.0)) -> Outline:
@@ -168,5 +172,5 @@ def _faces(ring: Array) -> Any:
     lines = shapely.get_parts(shapely.node(shapely.LineString(np.vstack([ring, ring[:1]]))))
     faces = shapely.get_parts(shapely.polygonize(lines))
     inner = [[face.representative_point().x, face.representative_point().y] for face in faces]
-    around = _rings([ring]).holds(np.array(inner).reshape(-1, 2))[0]
+    around = _rings([ring]).holds(points_of(np.array(inner).reshape(-1, 2)))[0]
     return shapely.union_all(faces[around])

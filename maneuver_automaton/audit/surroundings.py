@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.audit.apart import Points
 from maneuver_automaton.audit.outlines import Outline, joined, map_outline, outline_of
 from maneuver_automaton.collision.shapes import AnyObstacle, Motion, OccupancyMap
 
@@ -51,20 +52,12 @@ class Surroundings:
         which, edges = self.tree.query(shapely.box(*boxes.T))
         return which, self.still[edges]
 
-    def about(self, low: Array, high: Array, points: Array) -> IntArray:
-        """Still edges in a box, and to the right of points (m, 2), which tell what holds these."""
-        right = np.column_stack([points, np.full(len(points), math.inf), points[:, 1]])
-        right[:, 2] = max(float(self.outline.begins[:, 0].max(initial=0.0)), float(high[0])) + 1.0
-        edges: IntArray = np.unique(self.near(np.vstack([[*low, *high], right]))[1])
-        return edges
-
-    def nearest(self, points: Array) -> IntArray:
-        """A still edge (m,) that is near each of points (m, 2)."""
-        import shapely
-
-        _, edges = self.tree.query_nearest(shapely.points(points), all_matches=False)
-        near: IntArray = self.still[edges]
-        return near
+    def right_of(self, points: Points) -> IntArray:
+        """Still edges to the right of points (m,): they tell what holds these."""
+        far = float(self.outline.begins[:, 0].max(initial=0.0)) + 1.0
+        x, y = points.real, points.imag
+        boxes = np.stack([x, y, np.maximum(x, far), y], axis=1)
+        return np.asarray(np.unique(self.near(boxes)[1]))
 
 
 def origin_of(place: ArrayLike) -> tuple[float, float]:
