@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from maneuver_automaton.audit.frames import Spans
 from maneuver_automaton.audit.pairs import moving_pairs, overlapped, still_pairs
-from maneuver_automaton.audit.passages import Body, Bounds, Pairs, bounds_of, places_of
+from maneuver_automaton.audit.passages import Body, Bounds, Pairs, bounds_of, places_of, time_of
 from maneuver_automaton.audit.surroundings import Surroundings
 
 CONTACT = 1e-9  # [m] what is closer touches: places are rounded
@@ -93,9 +93,11 @@ def _sharpened(
     floor = least.distance
     for number in range(ROUNDS):
         ask()
-        best = int(np.argmin(known.measured))
-        if known.measured[best] < least.measured:
-            least = Least(floor, float(known.measured[best]), float(known.time[best]))
+        measured = known.measured
+        best = int(np.argmin(measured))
+        if measured[best] < least.measured:
+            time = time_of(body, pairs, known, best)
+            least = Least(floor, float(measured[best]), time)
         sharp = least.measured - max(SHARP[0], SHARP[1] * least.measured)
         undecided = (known.least <= enough) & (enough < least.measured)
         open_ = ((known.least < sharp) | undecided) & (least.measured > CONTACT)
@@ -111,15 +113,17 @@ def _sharpened(
 
 def _cut(body: Body, pairs: Pairs, open_: NDArray[np.bool_]) -> Pairs:
     """Some stretches in `PARTS` each."""
-    rows = np.repeat(np.flatnonzero(open_), PARTS)
-    part = np.tile(np.arange(PARTS), rows.size // PARTS)
-    kept, number = np.unique(pairs.span[open_], return_inverse=True)
-    whole = pairs.places.spans.of(kept)
+    cut = np.flatnonzero(open_)
+    rows, part = np.repeat(cut, PARTS), np.tile(np.arange(PARTS), cut.size)
+    kept = np.zeros(pairs.places.lasts.size, dtype=np.bool_)
+    kept[pairs.span[cut]] = True
+    number = (np.cumsum(kept) - 1)[pairs.span[rows]]
+    whole = pairs.places.spans.of(np.flatnonzero(kept))
     shares = np.arange(PARTS + 1) / PARTS
     ends = whole.begin[:, None] + (whole.end - whole.begin)[:, None] * shares
     ends[:, -1] = whole.end
     spans = Spans(np.repeat(whole.element, PARTS), ends[:, :-1].ravel(), ends[:, 1:].ravel())
-    span = np.repeat(number, PARTS) * PARTS + part
+    span = number * PARTS + part
     places = places_of(body, spans)
     if pairs.frames is None:
         return Pairs(places, span, pairs.edge[rows], None)

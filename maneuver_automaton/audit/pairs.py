@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from maneuver_automaton.audit.passages import (
     Pairs,
     Places,
     bounds_of,
-    off_chords,
     places_of,
 )
 from maneuver_automaton.audit.surroundings import Surroundings
@@ -33,15 +32,17 @@ NEAREST = 64  # pairs with moving obstacles that are looked at first
 def spans_within(body: Body, first: float, last: float) -> Spans:
     """Stretches that turn little, and are about as long as the body, between two times [s]."""
     frames, times = body.frames, body.frames.times
-    lengths = np.diff(times)
-    steps = max(frames.length / LONGEST, _size(body), 1e-9)
+    lengths = times[1:] - times[:-1]
+    steps = max(frames.length / LONGEST, body.outline.size, 1e-9)
     count = np.ceil(np.maximum(frames.turn / CHORD, frames.speed / steps) * lengths)
     count = np.maximum(count, 1.0).astype(np.int64)
     element = np.repeat(np.arange(lengths.size), count)
     number = np.arange(element.size) - (np.cumsum(count) - count)[element]
+    begin, end = number / count[element], (number + 1) / count[element]
+    if first <= 0.0 and last >= times[-1]:
+        return Spans(element, begin, end)
     low, high = (np.clip((at - times[:-1]) / lengths, 0.0, 1.0) for at in (first, last))
-    begin = np.maximum(number / count[element], low[element])
-    end = np.minimum((number + 1) / count[element], high[element])
+    begin, end = np.maximum(begin, low[element]), np.minimum(end, high[element])
     kept = begin < end
     if not kept.any():  # an instant
         here = np.clip(np.searchsorted(times, first, "right") - 1, 0, lengths.size - 1)
@@ -56,18 +57,17 @@ def overlapped(body: Body, around: Surroundings, places: Places) -> int:
     In space those that block every altitude; the others are looked for wherever they are near.
     """
     corners, place, turn = places.corners[0, 0], places.place[0, 0], places.turn[0, 0]
-    seen = _Seen(corners, place, turn)
-    radius = float(body.outline.radius.max())
-    x, y = corners.real, corners.imag
-    box = np.array([[x.min(), y.min(), x.max(), y.max()]])
-    box += radius * np.array([-1.0, -1.0, 1.0, 1.0])
-    firsts = corners[body.outline.firsts]
-    still = np.concatenate([around.near(box)[1], around.right_of(firsts)])
+    here = _Here(corners, place + turn * body.outline.firsts, place, turn)
+    x, y, radius = corners.real, corners.imag, body.outline.radius
+    inside = [(x.min() - radius, y.min() - radius, x.max() + radius, y.max() + radius)]
+    # What holds a point has an edge to its right.
+    right = [(at.real, at.imag, max(around.right, at.real), at.imag) for at in here.firsts.tolist()]
+    still = around.near(np.array(inside + right))[1]
     if body.in_space:
         still = still[~np.isfinite(around.heights[still]).all(axis=1)]
     if still.size:
         still = np.unique(still)
-        edge = _overlapped_edge(body, seen, around.outline.of(still))
+        edge = _overlapped_edge(body, here, around.outline.of(still))
         if edge >= 0:
             return int(still[edge])
     if not around.motions:
@@ -75,37 +75,39 @@ def overlapped(body: Body, around: Surroundings, places: Places) -> int:
     now = body.clock + body.frames.times_at(places.spans.element[:1], places.spans.begin[:1])
     frames = frames_at(around, now)[:, 0]
     away = np.abs(corners - points_of(frames)[:, None]).min(axis=1)
-    for number in np.flatnonzero(away <= around.reaches + 2.0 * _size(body)).tolist():
+    for number in np.flatnonzero(away <= around.reaches + 2.0 * body.outline.size).tolist():
         first = around.firsts[number]
         if body.in_space and np.isfinite(around.heights[around.moving[first]]).all():
             continue
-        there, turned = points_of(frames[number]), directions(frames[number, 2])
-        from_there = turned.conj()
-        moved = _Seen(
-            (corners - there) * from_there, (place - there) * from_there, turn * from_there
-        )
-        edge = _overlapped_edge(body, moved, around.groups[number])
+        seen = here.seen_from(points_of(frames[number]), directions(frames[number, 2]))
+        edge = _overlapped_edge(body, seen, around.groups[number])
         if edge >= 0:
             return int(around.moving[first + edge])
     return -1
 
 
-class _Seen(NamedTuple):
+class _Here(NamedTuple):
     """A body at a time, as an outline sees it in its frame."""
 
     corners: Points  # (n,)
-    place: Points  # of its frame
-    turn: Points  # direction of its frame
+    firsts: Points  # (s,) a corner of each solid
+    place: Any  # of its frame
+    turn: Any  # direction of its frame
+
+    def seen_from(self, place: Any, turn: Any) -> _Here:
+        """The same, from a frame at a place, that is turned."""
+        back = turn.conj()
+        corners, firsts, own = ((one - place) * back for one in self[:3])
+        return _Here(corners, firsts, own, self.turn * back)
 
 
-def _overlapped_edge(body: Body, seen: _Seen, one: Outline) -> int:
+def _overlapped_edge(body: Body, here: _Here, one: Outline) -> int:
     """An edge of an outline that a body overlaps, or -1."""
-    own, back = body.outline, seen.turn.conj()
-    held = one.holds(seen.corners[own.firsts]).any(axis=1)[one.solid]
-    a, b = ((points_of(ends) - seen.place) * back for ends in (one.begins, one.ends))
+    own, back = body.outline.edges, here.turn.conj()
+    held = one.holds(here.firsts).any(axis=1)[one.solid]
+    a, b = (one.begins - here.place) * back, (one.ends - here.place) * back
     held |= own.holds(a).any(axis=0)
-    sides = points_of(own.begins), points_of(own.ends)
-    held |= crossed(a[:, None], b[:, None], *sides).any(axis=1)
+    held |= crossed(a[:, None], b[:, None], own.begins, own.ends).any(axis=1)
     return int(np.argmax(held)) if held.any() else -1
 
 
@@ -126,13 +128,12 @@ def still_pairs(body: Body, around: Surroundings, places: Places) -> tuple[Pairs
     Edges are looked for within a distance of where the body passes, and further away until one is
     measured that is no further than that.
     """
-    x, y = places.corners.real, places.corners.imag
-    pad = float(body.outline.radius.max()) + off_chords(body, places) + SPARE
-    low = np.stack([x.min(axis=(0, 2)) - pad, y.min(axis=(0, 2)) - pad], axis=1)
-    high = np.stack([x.max(axis=(0, 2)) + pad, y.max(axis=(0, 2)) + pad], axis=1)
-    within = FIRST_WITHIN * _size(body) + SPARE
+    corners = places.corners.view(np.float64).reshape(*places.corners.shape, 2)
+    pad = (body.outline.radius + SPARE + _off_chords(body, places))[:, None]
+    low, high = corners.min(axis=(0, 2)) - pad, corners.max(axis=(0, 2)) + pad
+    within = FIRST_WITHIN * body.outline.size + SPARE
     while True:
-        span, edge = around.near(np.hstack([low - within, high + within]))
+        span, edge = around.near(np.concatenate([low - within, high + within], axis=1))
         if not edge.size:
             within *= FURTHER
             continue
@@ -144,6 +145,11 @@ def still_pairs(body: Body, around: Surroundings, places: Places) -> tuple[Pairs
         within = nearest
 
 
+def _off_chords(body: Body, places: Places) -> Array:
+    """How far [m] points of the body leave their chords at most over stretches: (s,)."""
+    return places.off + places.off_by_reach * body.outline.most_reach
+
+
 def moving_pairs(body: Body, around: Surroundings, places: Places) -> Iterator[tuple[float, Pairs]]:
     """The stretches, each with all moving edges: a few that are near, then ever more.
 
@@ -153,12 +159,12 @@ def moving_pairs(body: Body, around: Surroundings, places: Places) -> Iterator[t
         return
     spans, clock = _cut_where_motions_change(body, around, places.spans)
     places = places_of(body, spans)
-    reach = _size(body)
     every = frames_at(around, clock.ravel()).reshape(len(around.motions), 2, -1, 3)
-    middles = places.place + places.turn * _middle(body)
+    middles = places.place + places.turn * body.outline.middle
     away = middles - points_of(every)
     apart = np.sqrt(point_apart(np.zeros(1), away[:, 0], away[:, 1]))
-    bound = apart - reach - around.reaches[:, None] - off_chords(body, places)
+    reach = body.outline.size + around.reaches[:, None]
+    bound = apart - reach - _off_chords(body, places)
     bound = np.maximum(bound, 0.0)
     order = np.argsort(bound, axis=None, kind="stable")
     for chosen in np.split(order, NEAREST * 16 ** np.arange(8)):
@@ -206,15 +212,3 @@ def frames_at(around: Surroundings, times: Array) -> Array:
             for motion in around.motions
         ]
     )
-
-
-def _middle(body: Body) -> complex:
-    """The middle of the body's outline, in its frame [m]."""
-    corners = body.outline.begins
-    return complex(*(0.5 * (corners.min(axis=0) + corners.max(axis=0))))
-
-
-def _size(body: Body) -> float:
-    """Radius [m] of a disc around that middle that holds the body."""
-    away = np.abs(points_of(body.outline.begins) - _middle(body)) + body.outline.radius
-    return float(away.max())

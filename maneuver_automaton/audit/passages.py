@@ -26,7 +26,7 @@ from maneuver_automaton.audit.apart import (
     squared,
 )
 from maneuver_automaton.audit.frames import Frames, Spans
-from maneuver_automaton.audit.outlines import Outline
+from maneuver_automaton.audit.outlines import BodyOutline
 from maneuver_automaton.audit.surroundings import Surroundings
 
 ROUNDING = 1e-14  # relative to the coordinates: what a distance may be off
@@ -36,9 +36,10 @@ ROUNDING = 1e-14  # relative to the coordinates: what a distance may be off
 class Body:
     """What keeps clear: its outline in a frame that moves among edges, counted from the origin."""
 
-    outline: Outline
+    outline: BodyOutline
     frames: Frames
-    offset: Array  # (2,) [m] from the origin of the edges to that of the frames
+    offset: complex  # x + i y [m] from the origin of the edges to that of the frames
+    doubt: float = 0.0  # [m, rad] how far a pose may be off at most
     height: tuple[float, float] = (0.0, 0.0)  # [m] about its altitude
     base: float = 0.0  # [m] altitude of the frames' zero
     clock: float = 0.0  # [s] on the edges' clock, when the frames start
@@ -46,7 +47,7 @@ class Body:
     @property
     def in_space(self) -> bool:
         """Whether it has an altitude."""
-        return self.frames.series.shape[2] > 3
+        return bool(self.frames.series.shape[2] > 3)
 
 
 class Places(NamedTuple):
@@ -75,37 +76,42 @@ class Bounds(NamedTuple):
     """What is known of pairs."""
 
     least: Array  # (m,) [m] the clearance is never less
-    measured: Array  # (m,) [m] at the begin or the end
-    time: Array  # (m,) [s] since the start, when that was
+    at_begin: Array  # (m,) [m] measured
+    at_end: Array  # (m,) [m] measured
+
+    @property
+    def measured(self) -> Array:
+        """The lesser of the two measured (m,) [m]."""
+        return np.minimum(self.at_begin, self.at_end)
 
 
 def places_of(body: Body, spans: Spans) -> Places:
     """Where a body is at the ends of stretches of time, counted as the edges are."""
     frames, element = body.frames, spans.element
     both = np.concatenate([element, element])
-    poses = frames.at(both, np.concatenate([spans.begin, spans.end]))
-    poses[:, :2] += body.offset
-    poses = poses.reshape(2, element.size, -1)
+    poses = frames.at(both, np.concatenate([spans.begin, spans.end])).reshape(2, element.size, -1)
     place, turn = points_of(poses), directions(poses[..., 2])
+    place += body.offset
     begins = frames.times[:-1]
     lasts = (spans.end - spans.begin) * (frames.times[1:] - begins)[element]
-    eighth, rate = 0.125 * lasts * lasts, frames.turn[element]
+    eighth = 0.125 * lasts * lasts
     return Places(
         spans=spans,
         place=place,
         turn=turn,
         altitude=poses[..., 3] + body.base if body.in_space else None,
-        corners=place[..., None] + turn[..., None] * points_of(body.outline.begins),
+        corners=place[..., None] + turn[..., None] * body.outline.edges.begins,
         lasts=lasts,
-        off=eighth * (frames.pull[element] + rate * frames.speed[element]),
-        off_by_reach=eighth * (frames.swerve[element] + rate * rate),
+        off=eighth * frames.bend[element],
+        off_by_reach=eighth * frames.swerve[element],
     )
 
 
-def off_chords(body: Body, places: Places) -> Array:
-    """How far [m] points of the body leave their chords at most over stretches: (s,)."""
-    reach = np.sqrt(squared(points_of(body.outline.begins)).max())
-    return np.asarray(places.off + places.off_by_reach * reach)
+def time_of(body: Body, pairs: Pairs, known: Bounds, row: int) -> float:
+    """When [s] since the start the clearance of a pair was measured."""
+    spans = pairs.places.spans.of(pairs.span[row : row + 1])
+    share = spans.begin if known.at_begin[row] <= known.at_end[row] else spans.end
+    return float(body.frames.times_at(spans.element, share)[0])
 
 
 def bounds_of(body: Body, around: Surroundings, pairs: Pairs, *, overlaps: bool = False) -> Bounds:
@@ -114,14 +120,13 @@ def bounds_of(body: Body, around: Surroundings, pairs: Pairs, *, overlaps: bool 
     Outlines that cross are looked for where a chord crosses an edge, where edges may be flown over,
     or everywhere if `overlaps`.
     """
-    edges, outline, places, span = around.outline, body.outline, pairs.places, pairs.span
-    a, b = points_of(edges.begins[pairs.edge])[:, None], points_of(edges.ends[pairs.edge])[:, None]
-    own = points_of(outline.begins), points_of(outline.ends)
-    n = own[0].size
+    edges, own, places, span = around.outline, body.outline.edges, pairs.places, pairs.span
+    a, b = edges.begins[pairs.edge][:, None], edges.ends[pairs.edge][:, None]
+    n = own.begins.size
     place, turn = places.place[:, span, None], places.turn[:, span, None]
     # Columns: corners of the body as its obstacle sees them, then an end of the edge as the body
     # sees it, against each side of the body.
-    paths, sides = (np.empty((2, span.size, 2 * n), dtype=np.complex128) for _ in "ab")
+    paths, sides = np.empty((2, 2, span.size, 2 * n), dtype=np.complex128)
     if pairs.frames is None:
         paths[..., :n], world = places.corners[:, span], a
     else:
@@ -131,18 +136,11 @@ def bounds_of(body: Body, around: Surroundings, pairs: Pairs, *, overlaps: bool 
         world = there + turned * a
     paths[..., n:] = (world - place) * turn.conj()
     sides[0, :, :n], sides[1, :, :n] = a, b
-    sides[0, :, n:], sides[1, :, n:] = own
-    radius = outline.radius
-    if radius.any() or edges.radius.any():
-        radius = np.concatenate([radius, radius]) + edges.radius[pairs.edge][:, None]
-    else:
-        radius = np.zeros(1)
-    near = _near(paths, sides, radius, _off(body, pairs, paths, np.abs(own[0]), np.abs(a)))
-    touched = near[0] <= 0.0
+    sides[0, :, n:], sides[1, :, n:] = own.begins, own.ends
+    near = _near(paths, sides, _off(body, pairs, paths, np.abs(a)), _radius(body, around, pairs))
+    doubtful = (near[0] <= 0.0) | overlaps
     coordinates = max(np.abs(one.view(np.float64)).max() for one in (place, a))
-    lever = 1.0 + np.abs(own[0]).max()
-    near[1] -= body.frames.doubt * lever + ROUNDING * coordinates
-    doubtful = touched | overlaps
+    near[1] -= body.doubt * (1.0 + body.outline.most_reach) + ROUNDING * coordinates
     if body.in_space:
         doubtful |= np.isfinite(around.heights[pairs.edge]).all(axis=1)
     if doubtful.any():
@@ -151,20 +149,24 @@ def bounds_of(body: Body, around: Surroundings, pairs: Pairs, *, overlaps: bool 
         ends = np.broadcast_to((end - place) * turn.conj(), place.shape)
         for k in (0, 1):
             at = paths[k, rows, :n], paths[k, rows, n], ends[k, rows, 0]
-            hit = _overlap(body, around, pairs.edge[rows], *at)
-            near[2 + k, rows[hit]] = 0.0
-            near[1, rows[hit]] = 0.0
+            hit = rows[_overlap(body, around, pairs.edge[rows], *at)]
+            near[2 + k, hit] = near[1, hit] = 0.0
     apart = np.maximum(near[1:], 0.0)
     if places.altitude is not None:
         heights = around.heights[pairs.edge]
         apart = np.hypot(apart, _apart_in_height(body, pairs, heights, places.altitude))
-    sooner = apart[1] <= apart[2]
-    share = np.where(sooner, places.spans.begin[span], places.spans.end[span])
-    time = body.frames.times_at(places.spans.element[span], share)
-    return Bounds(apart[0], np.where(sooner, apart[1], apart[2]), time)
+    return Bounds(*apart)
 
 
-def _near(paths: Points, sides: Points, radius: Array, off: Array) -> Array:
+def _radius(body: Body, around: Surroundings, pairs: Pairs) -> Array | None:
+    """Radii of what comes near (m, 2 n) [m]; None if all have corners."""
+    own = body.outline.edges.radius
+    if not (around.rounds or body.outline.radius):
+        return None
+    return np.asarray(np.concatenate([own, own]) + around.outline.radius[pairs.edge][:, None])
+
+
+def _near(paths: Points, sides: Points, off: Array, radius: Array | None) -> Array:
     """Distances (4, m) of paths (2, m, n) to edges (2, m, n), from the first point to the second.
 
     Those of the chords, those on the way at least, at the begin, at the end.
@@ -181,39 +183,38 @@ def _near(paths: Points, sides: Points, radius: Array, off: Array) -> Array:
     apart = np.empty((4, *least.shape))
     np.sqrt(least, out=apart[0])
     np.sqrt(at, out=apart[2:])
-    apart -= radius
+    if radius is not None:
+        apart -= radius
     np.subtract(apart[0], off, out=apart[1])
     return np.asarray(apart.min(axis=-1))
 
 
-def _off(body: Body, pairs: Pairs, paths: Points, reach: Array, end_reach: Array) -> Array:
+def _off(body: Body, pairs: Pairs, paths: Points, end_reach: Array) -> Array:
     """How far [m] paths (2, m, 2 n) leave their chords at most: (m, 2 n).
 
-    Corners of the body are at distances `reach` (n,) from its frame, edges at `end_reach` (m, 1)
-    from theirs, which run evenly.
+    Edges are at distances `end_reach` (m, 1) from their frames, which run evenly.
     """
-    element, n = pairs.places.spans.element[pairs.span], reach.size
-    lasts = pairs.places.lasts[pairs.span, None]
+    places, span, reach = pairs.places, pairs.span, body.outline.reach
+    element, lasts, n = places.spans.element[span], places.lasts[span, None], reach.size
     speed = body.frames.speed[element, None]
-    drift = spin = np.zeros(1)
+    drift = spin = edge_speed = np.zeros(1)
     if pairs.frames is not None:
         change = pairs.frames[:, 1] - pairs.frames[:, 0]
         lasting = np.where(lasts > 0.0, lasts, np.inf)  # rounding alone moves it in no time
         drift = np.hypot(change[:, 0], change[:, 1])[:, None] / lasting
         spin = np.abs(change[:, 2])[:, None] / lasting
-    edge_speed = drift + spin * end_reach
-    half_way = 0.5 * np.abs(paths[:, :, n : n + 1]).sum(axis=0)
-    away = half_way + 0.5 * (speed + edge_speed) * lasts
-    every = np.empty((lasts.size, 2 * n))
-    every[:, :n], every[:, n:] = reach, away
-    off = pairs.places.off[pairs.span, None] + pairs.places.off_by_reach[pairs.span, None] * every
-    if pairs.frames is None:
-        return np.asarray(off)
-    eighth, turn = 0.125 * lasts * lasts, body.frames.turn[element, None]
-    off[:, n:] += eighth * (spin * spin * end_reach + 2.0 * turn * edge_speed)
-    approach = speed + turn * reach + drift
-    far = 0.5 * (np.abs(paths[0, :, :n]) + np.abs(paths[1, :, :n]) + approach * lasts)
-    off[:, :n] += eighth * spin * (2.0 * approach + spin * far)
+        edge_speed = drift + spin * end_reach
+    seen = np.abs(paths[:, :, n : n + 1])
+    away = np.empty((span.size, 2 * n))
+    away[:, :n] = reach
+    away[:, n:] = 0.5 * (seen[0] + seen[1] + (speed + edge_speed) * lasts)
+    off = places.off[span, None] + places.off_by_reach[span, None] * away
+    if pairs.frames is not None:
+        eighth, turn = 0.125 * lasts * lasts, body.frames.turn[element, None]
+        off[:, n:] += eighth * (spin * spin * end_reach + 2.0 * turn * edge_speed)
+        approach, seen = speed + turn * reach + drift, np.abs(paths[..., :n])
+        far = 0.5 * (seen[0] + seen[1] + approach * lasts)
+        off[:, :n] += eighth * spin * (2.0 * approach + spin * far)
     return np.asarray(off)
 
 
@@ -221,7 +222,7 @@ def _apart_in_height(body: Body, pairs: Pairs, heights: Array, altitude: Array) 
     """Vertical clearances (3, m): at least on the way, at the begin, at the end."""
     places, span = pairs.places, pairs.span
     rise = body.frames.rise[places.spans.element]
-    off = (0.125 * places.lasts**2 * rise + body.frames.doubt)[span]
+    off = (0.125 * places.lasts**2 * rise + body.doubt)[span]
     ends = altitude[:, span]
     low = np.stack([ends.min(axis=0) - off, *ends]) + body.height[0]
     high = np.stack([ends.max(axis=0) + off, *ends]) + body.height[1]
@@ -241,14 +242,13 @@ def _overlap(
 
     The body's `corners` (m, n) are seen from the obstacle, the ends of the edge from the body.
     """
-    outline = body.outline
-    side = points_of(outline.begins), points_of(outline.ends)
-    over = crossed(begin[:, None], end[:, None], *side).any(axis=1)
-    over |= outline.holds(begin).any(axis=0)
+    own = body.outline.edges
+    over = crossed(begin[:, None], end[:, None], own.begins, own.ends).any(axis=1)
+    over |= own.holds(begin).any(axis=0)
     solids = around.outline.solid[edge]
     for solid in np.unique(solids):
-        ring, rows = around.outline.solid == solid, np.flatnonzero(solids == solid)
-        one = around.outline.of(ring)
-        for first in outline.firsts:
+        one = around.outline.of(around.outline.solid == solid)
+        rows = np.flatnonzero(solids == solid)
+        for first in own.firsts:
             over[rows] |= one.holds(corners[rows, first])[0]
     return np.asarray(over)

@@ -42,7 +42,7 @@ def _nearest_point(body: Body, around: Surroundings, pairs: Pairs, row: int) -> 
     """The point of the edge of a pair that is nearest to the body."""
     assert pairs.frames is not None
     edge, frame, places = pairs.edge[row], pairs.frames[row, 0], pairs.places
-    a, b = points_of(around.outline.begins[edge]), points_of(around.outline.ends[edge])
+    a, b = around.outline.begins[edge], around.outline.ends[edge]
     there, turned = points_of(frame), directions(frame[2])
     along = b - a
     seen = (places.corners[0, 0] - there) * turned.conj()
@@ -50,7 +50,7 @@ def _nearest_point(body: Body, around: Surroundings, pairs: Pairs, row: int) -> 
     shares = np.concatenate([[0.0, 1.0], np.clip(shares, 0.0, 1.0)])
     world = there + turned * (a + shares * along)
     from_body = (world - places.place[0, 0]) * places.turn[0, 0].conj()
-    sides = points_of(body.outline.begins), points_of(body.outline.ends)
-    apart = np.sqrt(point_apart(from_body[:, None], *sides)) - body.outline.radius
+    own = body.outline.edges
+    apart = np.sqrt(point_apart(from_body[:, None], own.begins, own.ends)) - own.radius
     best = world[int(np.argmin(apart.min(axis=1)))]
     return complex(np.round(best, 3)) + 0.0
