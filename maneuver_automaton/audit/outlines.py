@@ -29,6 +29,10 @@ class Outline(NamedTuple):
         solid = np.unique(self.solid[kept], return_inverse=True)[1]
         return Outline(self.begins[kept], self.ends[kept], self.radius[kept], solid)
 
+    def at(self, rows: IntArray) -> Outline:
+        """Some of its edges, in any order, each with the number of its solid."""
+        return Outline(self.begins[rows], self.ends[rows], self.radius[rows], self.solid[rows])
+
     @property
     def firsts(self) -> IntArray:
         """Numbers of the first edges of the solids."""

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.audit.apart import Points, crossed, directions, point_apart, points_of
@@ -58,20 +59,9 @@ def overlapped(body: Body, around: Surroundings, places: Places) -> int:
     """
     corners, place, turn = places.corners[0, 0], places.place[0, 0], places.turn[0, 0]
     here = _Here(corners, place + turn * body.outline.firsts, place, turn)
-    x, y, radius = corners.real, corners.imag, body.outline.radius
-    inside = [(x.min() - radius, y.min() - radius, x.max() + radius, y.max() + radius)]
-    # What holds a point has an edge to its right.
-    right = [(at.real, at.imag, max(around.right, at.real), at.imag) for at in here.firsts.tolist()]
-    still = around.near(np.array(inside + right))[1]
-    if body.in_space:
-        still = still[~np.isfinite(around.heights[still]).all(axis=1)]
-    if still.size:
-        still = np.unique(still)
-        edge = _overlapped_edge(body, here, around.outline.of(still))
-        if edge >= 0:
-            return int(still[edge])
-    if not around.motions:
-        return -1
+    edge = _overlapped_still(body, around, here)
+    if edge >= 0 or not around.motions:
+        return edge
     now = body.clock + body.frames.times_at(places.spans.element[:1], places.spans.begin[:1])
     frames = frames_at(around, now)[:, 0]
     away = np.abs(corners - points_of(frames)[:, None]).min(axis=1)
@@ -80,9 +70,9 @@ def overlapped(body: Body, around: Surroundings, places: Places) -> int:
         if body.in_space and np.isfinite(around.heights[around.moving[first]]).all():
             continue
         seen = here.seen_from(points_of(frames[number]), directions(frames[number, 2]))
-        edge = _overlapped_edge(body, seen, around.groups[number])
-        if edge >= 0:
-            return int(around.moving[first + edge])
+        held = _held(body, seen, around.groups[number])
+        if held.any():
+            return int(around.moving[first + np.argmax(held)])
     return -1
 
 
@@ -101,14 +91,40 @@ class _Here(NamedTuple):
         return _Here(corners, firsts, own, self.turn * back)
 
 
-def _overlapped_edge(body: Body, here: _Here, one: Outline) -> int:
-    """An edge of an outline that a body overlaps, or -1."""
+def _overlapped_still(body: Body, around: Surroundings, here: _Here) -> int:
+    """A still edge whose obstacle the body overlaps, or -1."""
+    x, y, radius = here.corners.real, here.corners.imag, body.outline.radius
+    boxes = [(x.min() - radius, y.min() - radius, x.max() + radius, y.max() + radius)]
+    # What holds a point has an edge to its right.
+    firsts = here.firsts.tolist()
+    boxes += [(at.real, at.imag, max(around.right, at.real), at.imag) for at in firsts]
+    which, still = around.near(np.array(boxes))
+    if body.in_space:
+        tall = ~np.isfinite(around.heights[still]).all(axis=1)
+        which, still = which[tall], still[tall]
+    near, edges = still[which == 0], around.outline
+    over = near.size > 0 and bool(_crosses(body, here, edges.at(near)).any())
+    for number, point in enumerate(here.firsts[:, None]):
+        right = edges.at(still[which == 1 + number])
+        turns = right.turns_about(point)[:, 0]
+        over = over or bool(np.bincount(right.solid, weights=turns).any())
+    if not over:
+        return -1
+    every = np.unique(still)
+    return int(every[np.argmax(_held(body, here, edges.of(every)))])
+
+
+def _held(body: Body, here: _Here, one: Outline) -> NDArray[np.bool_]:
+    """Which edges (n,) of whole solids cross those of a body, or are of one that holds it."""
+    return np.asarray(one.holds(here.firsts).any(axis=1)[one.solid] | _crosses(body, here, one))
+
+
+def _crosses(body: Body, here: _Here, one: Outline) -> NDArray[np.bool_]:
+    """Which edges (n,) cross those of a body, or begin inside it."""
     own, back = body.outline.edges, here.turn.conj()
-    held = one.holds(here.firsts).any(axis=1)[one.solid]
     a, b = (one.begins - here.place) * back, (one.ends - here.place) * back
-    held |= own.holds(a).any(axis=0)
-    held |= crossed(a[:, None], b[:, None], own.begins, own.ends).any(axis=1)
-    return int(np.argmax(held)) if held.any() else -1
+    crosses = crossed(a[:, None], b[:, None], own.begins, own.ends).any(axis=1)
+    return np.asarray(crosses | own.holds(a).any(axis=0))
 
 
 def instant(body: Body, around: Surroundings, time: float) -> Pairs:
@@ -128,21 +144,63 @@ def still_pairs(body: Body, around: Surroundings, places: Places) -> tuple[Pairs
     Edges are looked for within a distance of where the body passes, and further away until one is
     measured that is no further than that.
     """
-    corners = places.corners.view(np.float64).reshape(*places.corners.shape, 2)
     pad = (body.outline.radius + SPARE + _off_chords(body, places))[:, None]
-    low, high = corners.min(axis=(0, 2)) - pad, corners.max(axis=(0, 2)) + pad
+    boxes, own_boxes = _Boxes.around(places.corners), _Boxes.around(_from_begins(places))
     within = FIRST_WITHIN * body.outline.size + SPARE
     while True:
-        span, edge = around.near(np.concatenate([low - within, high + within], axis=1))
-        if not edge.size:
+        span, edge = around.near(np.concatenate(boxes.grown(pad + within), axis=1))
+        kept = _meets(around, places, own_boxes.grown(pad + within), span, edge)
+        if not kept.any():
             within *= FURTHER
             continue
-        pairs = Pairs(places, span, edge, None)
+        pairs = Pairs(places, span[kept], edge[kept], None)
         known = bounds_of(body, around, pairs)
         nearest = float(known.measured.min())
         if nearest <= within:
             return pairs, known
         within = nearest
+
+
+class _Boxes(NamedTuple):
+    """Corners (s, 2) of boxes along the axes [m]."""
+
+    low: Array
+    high: Array
+
+    @classmethod
+    def around(cls, points: Points) -> _Boxes:
+        """Boxes around points (2, s, n)."""
+        places = points.view(np.float64).reshape(*points.shape, 2)
+        return cls(places.min(axis=(0, 2)), places.max(axis=(0, 2)))
+
+    def grown(self, by: Array) -> _Boxes:
+        """The boxes, larger by a length (s, 1) [m] on every side."""
+        return _Boxes(self.low - by, self.high + by)
+
+
+def _from_begins(places: Places) -> Points:
+    """Corners (2, s, n) of a body over stretches, seen from its frame as they begin."""
+    return (places.corners - places.place[0, :, None]) * places.turn[0, :, None].conj()
+
+
+def _meets(
+    around: Surroundings, places: Places, boxes: _Boxes, span: IntArray, edge: IntArray
+) -> NDArray[np.bool_]:
+    """Whether the boxes around edges meet those of stretches, both along the body's axes.
+
+    Edges with a height stay: the tree holds boxes of theirs, inside which they may be flown over.
+    """
+    place, back = places.place[0, span], places.turn[0, span].conj()
+    a = (around.outline.begins[edge] - place) * back
+    b = (around.outline.ends[edge] - place) * back
+    low, high, radius = boxes.low[span], boxes.high[span], around.outline.radius[edge]
+    kept = np.maximum(a.real, b.real) + radius >= low[:, 0]
+    kept &= np.minimum(a.real, b.real) - radius <= high[:, 0]
+    kept &= np.maximum(a.imag, b.imag) + radius >= low[:, 1]
+    kept &= np.minimum(a.imag, b.imag) - radius <= high[:, 1]
+    if places.altitude is not None:
+        kept |= np.isfinite(around.heights[edge]).all(axis=1)
+    return np.asarray(kept)
 
 
 def _off_chords(body: Body, places: Places) -> Array:

@@ -274,7 +274,7 @@ def halves(parts: Windows) -> Windows:
 
 
 def along(starts: Array, twists: Array, times: Array) -> Array:
-    """Poses (..., n, 3) of coasts from `starts` under `twists` (n, 3) after `times` (..., n) [s]."""
+    """Poses (..., n, 3) of coasts from `starts` (n, 3) after `times` (..., n) [s]."""
     return (SE2(starts) @ SE2.exp(times[..., None] * twists)).pose
 
 
