@@ -33,8 +33,8 @@ from maneuver_automaton.collision.swept import (
     GrownBody,
     Twist,
     along,
-    box_around,
     chunks,
+    course_boxes,
     course_hulls,
     cut_where_it_pivots,
     fastest,
@@ -46,6 +46,7 @@ from maneuver_automaton.collision.swept import (
 )
 from maneuver_automaton.groups import SE2
 
+CLOSE = 4  # steps of a course at most, around which closer solids than rectangles are laid
 _ONE_AT_A_TIME = threading.Lock()  # objects are shared, and moved before they are asked
 
 
@@ -95,7 +96,6 @@ class FclChecker:
     proven: float = field(default=1e-3, kw_only=True)  # [m]
     _body: GrownBody = field(init=False, repr=False)
     _bare: GrownBody = field(init=False, repr=False)
-    _covers: tuple[GrownBody, ...] = field(init=False, repr=False)  # from few corners to all
     _ground: _Ground = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -110,9 +110,6 @@ class FclChecker:
         object.__setattr__(self, "origin", (x, y))
         object.__setattr__(self, "_body", grown_body(self.footprint, self.margin, excess))
         object.__setattr__(self, "_bare", grown_body(self.footprint, 0.0, excess))
-        around = box_around(self._body)
-        few = sum(map(len, self._body.pieces)) <= len(around.pieces[0])
-        object.__setattr__(self, "_covers", (self._body,) if few else (around, self._body))
         object.__setattr__(self, "_ground", _ground_of(self.obstacles, (x, y), excess))
 
     def pose_hit(self, pose: ArrayLike, *, time: float = 0.0) -> int | None:
@@ -200,44 +197,48 @@ class FclChecker:
         """Which obstacle the body touches along a course; None if the path is free.
 
         The course is sampled at `poses` (n, 3), seen from `start`, and `times` (n,) [s] since its
-        begin, and runs with a constant twist from sample to sample. One solid serves several
-        samples; where it touches, halves of it are tried, down to single ones. `ask` is called
-        before each, and may raise to give it up.
+        begin, and runs with a constant twist from sample to sample. `ask` is called again and
+        again, and may raise to give it up.
 
         Raises
         ------
         ValueError
             If a number is not finite.
         """
-        frame = SE2(self._seen("start", start))
-        seen = (frame @ SE2(as_array("poses", poses, last=3))).pose
-        clock = as_array("times", times) + start_time
-        spans = np.diff(clock)
-        steps = (SE2(seen[:-1]).inverse() @ SE2(seen[1:])).log()
-        twists = steps / np.maximum(spans, 1e-300)[:, None]
-        if self._may_come_near(seen, steps):
-            todo = chunks(steps)[::-1]
-            while todo:
-                ask()
-                first, last = todo.pop()
-                if last - first == 1:
-                    one = slice(first, last)
-                    hit = self._first_static_hit(seen[one], steps[one], np.ones(1), ask)
-                    if hit is not None:
-                        return hit[1]
-                    continue
-                # The rectangle around the body first: its few corners make a hull quickly, and
-                # mostly do.
-                if all(
-                    self._sweep_hits(body, seen[first : last + 1], steps[first:last])
-                    for body in self._covers
-                ):
-                    middle = (first + last) // 2
-                    todo += [(middle, last), (first, middle)]
-        if not self._ground.moving:
-            return None
-        hit = self._first_moving_hit(seen[:-1], twists, spans, clock[:-1], ask)
+        course = Course(start, poses, times, start_time)
+        hit = self.courses_hit([course], ask=ask)
         return None if hit is None else hit[1]
+
+    def courses_hit(
+        self, courses: Sequence[Course], *, ask: Callable[[], None] = lambda: None
+    ) -> tuple[int, int] | None:
+        """The first of several courses along which the body touches, and which obstacle.
+
+        One rectangle holds the body over many samples; where it touches, halves of it are tried,
+        then closer solids, down to single steps.
+        """
+        if not courses:
+            return None
+        counts = [len(np.atleast_2d(one.poses)) for one in courses]
+        number = np.repeat(np.arange(len(courses)), counts)
+        starts = self._seen("start", np.array([one.start for one in courses]))
+        every = as_array("poses", np.concatenate([one.poses for one in courses]), last=3)
+        clock = np.concatenate([as_array("times", one.times) + one.start_time for one in courses])
+        seen = (SE2(starts[number]) @ SE2(every)).pose
+        rows = np.flatnonzero(number[1:] == number[:-1])
+        of, spans = number[rows], clock[rows + 1] - clock[rows]
+        poses = np.stack([seen[rows], seen[rows + 1]])
+        steps = (SE2(poses[0]).inverse() @ SE2(poses[1])).log()
+        row = self._first_step_hit(poses, steps, of, ask)
+        hit = None if row is None else (int(of[row[0]]), row[1])
+        if not self._ground.moving:
+            return hit
+        sooner = slice(None if hit is None else int(np.searchsorted(of, hit[0])))
+        twists = steps[sooner] / np.maximum(spans[sooner], 1e-300)[:, None]
+        row = self._first_moving_hit(
+            poses[0, sooner], twists, spans[sooner], clock[rows[sooner]], ask
+        )
+        return hit if row is None else (int(of[row[0]]), row[1])
 
     def clearance(self, poses: ArrayLike, *, times: ArrayLike | None = None) -> float:
         """Least distance [m] to any obstacle at poses (n, 3) and times (n,) [s], 0 if none given.
@@ -265,17 +266,46 @@ class FclChecker:
         near[..., :2] -= self.origin
         return near
 
-    def _may_come_near(self, poses: Array, steps: Array) -> bool:
-        """Whether the rectangles around a course and around the static obstacles meet."""
-        far = float(np.hypot(*self._body.middle)) + self._body.reach
-        swings = np.linalg.norm(steps[:, :2], axis=1) + far * np.abs(steps[:, 2])
-        pad = far + float(swings.max(initial=0.0))
-        low, high = poses[:, :2].min(axis=0) - pad, poses[:, :2].max(axis=0) + pad
-        return bool((low <= self._ground.high).all() and (high >= self._ground.low).all())
+    def _first_step_hit(
+        self, poses: Array, steps: Array, courses: IntArray, ask: Callable[[], None]
+    ) -> tuple[int, int] | None:
+        """The first of some steps of courses that touches a static obstacle, and which."""
+        if self._ground.static is None or not len(steps):
+            return None
+        begins = np.append(True, courses[1:] != courses[:-1])
+        first, last = chunks(steps, begins)
+        close: list[tuple[int, int]] = []
+        while first.size:
+            ask()
+            rings = course_boxes(self._body, poses, steps, first, last)
+            boxes = [_object(_box_skin(ring)) for ring in rings]
+            hits = _touching(boxes, np.zeros((first.size, 3)), self._ground.static)
+            rows = np.fromiter(hits, dtype=np.int64, count=len(hits))
+            first, last = first[rows], last[rows]
+            short = last - first <= CLOSE
+            close += zip(first[short].tolist(), last[short].tolist(), strict=True)
+            ends = np.stack([first, (first + last) // 2, last], axis=1)[~short]
+            first, last = ends[:, :2].ravel(), ends[:, 1:].ravel()
+        close.sort(reverse=True)
+        while close:
+            ask()
+            begin, end = close.pop()
+            if end - begin == 1:
+                one = slice(begin, end)
+                hit = self._first_static_hit(poses[0, one], steps[one], np.ones(1), ask)
+                if hit is not None:
+                    return begin, hit[1]
+            elif self._sweep_hits(poses[:, begin:end], steps[begin:end]):
+                middle = (begin + end) // 2
+                close += [(middle, end), (begin, middle)]
+        return None
 
-    def _sweep_hits(self, body: GrownBody, poses: Array, steps: Array) -> bool:
-        """Whether one solid around a body along a course touches a static obstacle."""
-        skin = body_skin(course_hulls(body, poses, steps))
+    def _sweep_hits(self, poses: Array, steps: Array) -> bool:
+        """Whether one solid around the body along a few steps touches a static obstacle."""
+        x, y, turn = steps.sum(axis=0).tolist()
+        pieces = cut_where_it_pivots(self._body, (x, y, turn))
+        whole = np.concatenate([poses[0], poses[1, -1:]])
+        skin = body_skin(course_hulls(pieces, whole, steps))
         return bool(_touching([_object(skin)], np.zeros((1, 3)), self._ground.static))
 
     def _first_static_hit(
@@ -370,6 +400,15 @@ class FclChecker:
         return None
 
 
+class Course(NamedTuple):
+    """What is driven from a start: poses seen from there, with a constant twist between two."""
+
+    start: ArrayLike  # (3,)
+    poses: ArrayLike  # (n, 3)
+    times: ArrayLike  # (n,) [s] since its begin
+    start_time: float  # [s] of the world's clock
+
+
 class _Moving(NamedTuple):
     """A moving obstacle."""
 
@@ -382,8 +421,6 @@ class _Ground(NamedTuple):
     """Obstacles as FCL sees them."""
 
     static: Any  # one object for all static obstacles, None without
-    low: Array  # (2,) corners of the rectangle around it
-    high: Array
     owners: IntArray  # which obstacle each of its triangles belongs to
     moving: tuple[_Moving, ...]
 
@@ -395,6 +432,7 @@ class _Sliced(NamedTuple):
     excess: float  # [m]
 
 
+_BOX = body_skin([np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])]).triangles
 _AT_REST = MovingBody.of(Motion([0.0], [[0.0, 0.0, 0.0]]), 0.0)
 
 
@@ -424,17 +462,9 @@ def _ground_of(
             regions.append(region)
             owners.append(index)
     if not regions:
-        nowhere = np.full(2, np.inf)
-        return _Ground(None, nowhere, -nowhere, np.zeros(0, dtype=np.int64), tuple(moving))
+        return _Ground(None, np.zeros(0, dtype=np.int64), tuple(moving))
     skin, which = obstacle_skin(regions)
-    corners = skin.vertices[:, :2]
-    return _Ground(
-        _object(skin),
-        corners.min(axis=0),
-        corners.max(axis=0),
-        np.array(owners)[which],
-        tuple(moving),
-    )
+    return _Ground(_object(skin), np.array(owners)[which], tuple(moving))
 
 
 @functools.lru_cache(maxsize=32)
@@ -448,6 +478,14 @@ def _sliced(body: GrownBody, twist: Twist, level: int) -> _Sliced:
     duration, pieces = math.ldexp(1.0, -level), cut_where_it_pivots(body, twist)
     hulls = slice_hulls(pieces, twist, duration)
     return _Sliced(_object(body_skin(hulls)), slice_excess(pieces, twist, duration))
+
+
+def _box_skin(ring: Array) -> Skin:
+    """Walls and lid over a rectangle (4, 2), without a search for what they are made of."""
+    vertices = np.zeros((8, 3))
+    vertices[:4, :2] = vertices[4:, :2] = ring
+    vertices[4:, 2] = 1.0
+    return Skin(vertices, _BOX)
 
 
 def _is_sooner(coast: int, hit: tuple[int, int] | None) -> bool:

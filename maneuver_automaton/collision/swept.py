@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.shapes import Shape
@@ -75,21 +76,6 @@ def grown_body(footprint: tuple[Shape, ...], margin: float, excess: float) -> Gr
     return GrownBody(body_pieces(footprint, margin=margin, excess=excess))
 
 
-def box_around(body: GrownBody) -> GrownBody:
-    """The rectangle, along the axes of its frame, that holds a body.
-
-    Examples
-    --------
-    >>> triangle = GrownBody((np.array([[0.0, 0.0], [2.0, 0.0], [1.0, 1.0]]),))
-    >>> box_around(triangle).pieces[0].tolist()
-    [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]]
-    """
-    corners = np.concatenate(body.pieces)
-    (left, low), (right, high) = corners.min(axis=0), corners.max(axis=0)
-    return GrownBody((np.array([[left, low], [right, low], [right, high], [left, high]]),))
-
-
-@functools.lru_cache(maxsize=256)
 def cut_where_it_pivots(body: GrownBody, twist: Twist) -> GrownBody:
     """The same body in pieces none of whose long sides turns about a point beside its middle.
 
@@ -201,24 +187,72 @@ def course_hulls(body: GrownBody, poses: Array, steps: Array) -> list[Array]:
     return hulls
 
 
-def chunks(steps: Array) -> list[tuple[int, int]]:
-    """Runs [first, last) of steps (n, 3) that turn by at most `MOST_TURN` together, in order.
+def course_boxes(
+    body: GrownBody, poses: Array, steps: Array, firsts: IntArray, lasts: IntArray
+) -> Array:
+    """Rectangles (m, 4, 2) that hold every point of the body along parts of a course.
+
+    Step k goes from ``poses[0, k]`` to ``poses[1, k]``, (2, n, 3), with a constant twist, which
+    makes the step of `steps` (n, 3) in the frame of the first. Part i is of the steps from
+    ``firsts[i]`` to before ``lasts[i]``; its rectangle lies along the body in the middle of it.
 
     Examples
     --------
-    >>> chunks(np.array([[1.0, 0.0, 0.1], [1.0, 0.0, 0.1], [1.0, 0.0, 0.1]]))
-    [(0, 2), (2, 3)]
+    >>> square = GrownBody((np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),))
+    >>> poses = np.array([[[0.0, 0, 0], [1.0, 0, 0]], [[1.0, 0, 0], [2.0, 0, 0]]])
+    >>> steps = np.array([[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    >>> course_boxes(square, poses, steps, np.array([0]), np.array([2])).round(3).tolist()
+    [[[-1.0, -1.0], [3.0, -1.0], [3.0, 1.0], [-1.0, 1.0]]]
     """
-    runs: list[tuple[int, int]] = []
-    first, turned = 0, 0.0
-    for k, turn in enumerate(np.abs(steps[:, 2]).tolist()):
-        if k > first and (turned + turn > MOST_TURN or k - first >= MOST_STEPS):
-            runs.append((first, k))
-            first, turned = k, 0.0
+    corners = np.concatenate(body.pieces)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    count = lasts - firsts
+    starts = np.cumsum(count) - count
+    part = np.repeat(np.arange(count.size), count)
+    rows = np.arange(part.size) - starts[part] + firsts[part]
+    frames = SE2(poses[0, (firsts + lasts) // 2])
+    inverse, here = SE2(frames.inverse().pose[part]), poses[:, rows]
+    seen = inverse.act(SE2(here).act(middle))
+    turned = here[..., 2] - frames.pose[part, 2]
+    cosine, sine = np.abs(np.cos(turned)), np.abs(np.sin(turned))
+    # An arc lies in the triangle of its ends and the point where the tangents there meet.
+    turn = np.abs(steps[rows, 2])
+    swing = np.hypot(steps[rows, 0], steps[rows, 1]) + np.hypot(*corners.T).max() * turn
+    off = np.where(turn < 1.0, 0.5 * swing * np.tan(0.5 * np.minimum(turn, 1.0)), swing)
+    reach = np.stack(
+        [cosine * half[0] + sine * half[1], sine * half[0] + cosine * half[1]], axis=-1
+    )
+    reach += off[:, None]
+    low = np.minimum.reduceat((seen - reach).min(axis=0), starts)
+    high = np.maximum.reduceat((seen + reach).max(axis=0), starts)
+    x, y = np.stack([low[:, 0], high[:, 0]]), np.stack([low[:, 1], high[:, 1]])
+    rings = np.stack([x[[0, 1, 1, 0]], y[[0, 0, 1, 1]]], axis=-1)
+    return np.swapaxes(frames.act(rings), 0, 1)
+
+
+def chunks(steps: Array, begins: NDArray[np.bool_]) -> tuple[IntArray, IntArray]:
+    """Where runs of steps (n, 3) of courses begin and end; each turns by at most `MOST_TURN`.
+
+    A course begins with each of the steps that `begins` (n,) marks. A single step may turn more.
+
+    Examples
+    --------
+    >>> steps = np.array([[1.0, 0.0, 0.1], [1.0, 0.0, 0.1], [1.0, 0.0, 0.1]])
+    >>> first, last = chunks(steps, np.array([True, False, False]))
+    >>> first.tolist(), last.tolist()
+    ([0, 2], [2, 3])
+    """
+    firsts: list[int] = []
+    turned = 0.0
+    turns = np.abs(steps[:, 2]).tolist()
+    for k, (turn, begin) in enumerate(zip(turns, begins.tolist(), strict=True)):
+        if begin or turned + turn > MOST_TURN or k - firsts[-1] >= MOST_STEPS:
+            firsts.append(k)
+            turned = 0.0
         turned += turn
-    if len(steps):
-        runs.append((first, len(steps)))
-    return runs
+    first = np.array(firsts, dtype=np.int64)
+    return first, np.append(first[1:], len(steps))
 
 
 def slice_excess(body: GrownBody, twist: Twist, duration: float) -> float:

@@ -17,7 +17,7 @@ from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.collision import Box
 from maneuver_automaton.collision.checker import origin_near
-from maneuver_automaton.collision.fcl_checker import FclChecker
+from maneuver_automaton.collision.fcl_checker import Course, FclChecker
 from maneuver_automaton.collision.heights import Layer, layers_of
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Unicycle
@@ -196,43 +196,40 @@ def _what_hits(
         ask=lambda: _ask(budget),
     )
     number = len(plan.primitives) if hit is None else int(coasts.number[hit[0]])
-    for k, primitive in enumerate(plan.primitives[:number]):
-        if isinstance(primitive, Trim):
-            continue
-        if primitive.course is None:
-            return f"maneuver {primitive.name!r} has no course, so it cannot be checked"
-        obstacle = _course_hit(checker, plan, k, primitive.course, layer, problem, budget)
-        if obstacle is not None:
-            return f"obstacle {layer.numbers[obstacle]} is hit in maneuver {k}, {primitive.name!r}"
+    numbers, courses, missing = _courses_within_reach(plan, layer, problem, before=number)
+    sooner = checker.courses_hit(courses, ask=lambda: _ask(budget))
+    if sooner is not None:
+        number, obstacle = numbers[sooner[0]], sooner[1]
+        name = plan.primitives[number].name
+        return f"obstacle {layer.numbers[obstacle]} is hit in maneuver {number}, {name!r}"
+    if missing:
+        return f"maneuver {missing!r} has no course, so it cannot be checked"
     if hit is None:
         return ""
     name = plan.primitives[number].name
     return f"obstacle {layer.numbers[hit[1]]} is hit in trim {number}, {name!r}"
 
 
-def _course_hit(
-    checker: FclChecker,
-    plan: Plan,
-    number: int,
-    course: Trajectory,
-    layer: Layer,
-    problem: Problem,
-    budget: Budget,
-) -> int | None:
-    """Which obstacle of a layer is hit along the course of a primitive, by its number."""
-    start, begin = plan.switching_poses[number], float(plan.switching_times[number])
-    for rows in _rows_within_reach(course, start, layer, problem):
-        time = course.time[rows]
-        obstacle = checker.course_hit(
-            start[:3],
-            course.pose[rows, :3],
-            time - time[0],
-            start_time=begin + float(time[0]),
-            ask=lambda: _ask(budget),
-        )
-        if obstacle is not None:
-            return obstacle
-    return None
+def _courses_within_reach(
+    plan: Plan, layer: Layer, problem: Problem, *, before: int
+) -> tuple[list[int], list[Course], str]:
+    """Of the maneuvers before a primitive, what may come near a layer: numbers and courses.
+
+    Up to the first maneuver without a course, and the name of that.
+    """
+    numbers: list[int] = []
+    courses: list[Course] = []
+    for k, primitive in enumerate(plan.primitives[:before]):
+        if isinstance(primitive, Trim):
+            continue
+        course = primitive.course
+        if course is None:
+            return numbers, courses, primitive.name
+        start, begin = plan.switching_poses[k], float(plan.switching_times[k])
+        for rows in _rows_within_reach(course, start, layer, problem):
+            numbers.append(k)
+            courses.append(Course(start[:3], course.pose[rows, :3], course.time[rows], begin))
+    return numbers, courses, ""
 
 
 class _Coasts(NamedTuple):
