@@ -27,7 +27,8 @@ LONGEST = 64.0  # of which the path of a small body has so many
 SPARE = 1e-6  # [m] that nothing is left out for rounding
 FIRST_WITHIN = 0.1  # of the body's size: how far around it edges are looked for first
 FURTHER = 4.0  # times as far, if there is none
-NEAREST = 64  # pairs with moving obstacles that are looked at first
+NEAREST = 64  # pairs that are looked at first
+MANY = 256  # pairs at least, of which those that are far are left out first
 
 
 def spans_within(body: Body, first: float, last: float) -> Spans:
@@ -57,7 +58,7 @@ def overlapped(body: Body, around: Surroundings, places: Places) -> int:
 
     In space those that block every altitude; the others are looked for wherever they are near.
     """
-    corners, place, turn = places.corners[0, 0], places.place[0, 0], places.turn[0, 0]
+    corners, place, turn = places.corners[0, :, 0], places.place[0, 0], places.turn[0, 0]
     here = _Here(corners, place + turn * body.outline.firsts, place, turn)
     edge = _overlapped_still(body, around, here)
     if edge >= 0 or not around.motions:
@@ -154,11 +155,29 @@ def still_pairs(body: Body, around: Surroundings, places: Places) -> tuple[Pairs
             within *= FURTHER
             continue
         pairs = Pairs(places, span[kept], edge[kept], None)
+        if pairs.edge.size > MANY:
+            pairs = _nearest_pairs(body, around, pairs)
         known = bounds_of(body, around, pairs)
         nearest = float(known.measured.min())
         if nearest <= within:
             return pairs, known
         within = nearest
+
+
+def _nearest_pairs(body: Body, around: Surroundings, pairs: Pairs) -> Pairs:
+    """Those of many pairs that may be the nearest of all, by discs around the body's way."""
+    places, span, edge = pairs.places, pairs.span, pairs.edge
+    first, last = (places.place + places.turn * body.outline.middle)[:, span]
+    a, b = around.outline.begins[edge], around.outline.ends[edge]
+    apart = np.sqrt(point_apart(0.5 * (first + last), a, b)) - around.outline.radius[edge]
+    off = 0.5 * np.abs(last - first) + _off_chords(body, places)[span]
+    least = apart - body.outline.size - off - SPARE
+    some = np.argpartition(least, NEAREST)[:NEAREST]
+    nearest = float(bounds_of(body, around, pairs.of(some)).measured.min())
+    kept = least <= nearest
+    if body.in_space:  # what may be flown over may be near where its edges are far
+        kept |= np.isfinite(around.heights[edge]).all(axis=1)
+    return pairs.of(kept)
 
 
 class _Boxes(NamedTuple):
@@ -169,9 +188,10 @@ class _Boxes(NamedTuple):
 
     @classmethod
     def around(cls, points: Points) -> _Boxes:
-        """Boxes around points (2, s, n)."""
-        places = points.view(np.float64).reshape(*points.shape, 2)
-        return cls(places.min(axis=(0, 2)), places.max(axis=(0, 2)))
+        """Boxes around points (2, n, s)."""
+        x, y = (one.reshape(-1, points.shape[2]) for one in (points.real, points.imag))
+        low, high = (x.min(axis=0), y.min(axis=0)), (x.max(axis=0), y.max(axis=0))
+        return cls(np.stack(low, axis=1), np.stack(high, axis=1))
 
     def grown(self, by: Array) -> _Boxes:
         """The boxes, larger by a length (s, 1) [m] on every side."""
@@ -179,8 +199,8 @@ class _Boxes(NamedTuple):
 
 
 def _from_begins(places: Places) -> Points:
-    """Corners (2, s, n) of a body over stretches, seen from its frame as they begin."""
-    return (places.corners - places.place[0, :, None]) * places.turn[0, :, None].conj()
+    """Corners (2, n, s) of a body over stretches, seen from its frame as they begin."""
+    return np.asarray((places.corners - places.place[0]) * places.turn[0].conj())
 
 
 def _meets(

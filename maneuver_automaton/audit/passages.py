@@ -11,7 +11,7 @@ of the chord less that is never too large.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,7 @@ from maneuver_automaton.audit.frames import Frames, Spans
 from maneuver_automaton.audit.outlines import BodyOutline
 from maneuver_automaton.audit.surroundings import Surroundings
 
+AT_ONCE = 512  # pairs: with more, arrays no longer stay where they are quickly read
 ROUNDING = 1e-14  # relative to the coordinates: what a distance may be off
 
 
@@ -57,7 +58,7 @@ class Places(NamedTuple):
     place: Points  # (2, s) of its frame
     turn: Points  # (2, s) direction of its frame
     altitude: Array | None  # (2, s) [m]; None in the plane
-    corners: Points  # (2, s, n)
+    corners: Points  # (2, n, s)
     lasts: Array  # (s,) [s]
     off: Array  # (s,) [m] how far its frame's origin leaves its chord at most
     off_by_reach: Array  # (s,) what is added for each metre that a point is from there
@@ -70,6 +71,11 @@ class Pairs(NamedTuple):
     span: IntArray  # (m,) numbers of stretches
     edge: IntArray  # (m,)
     frames: Array | None  # (m, 2, 3) of moving obstacles
+
+    def of(self, rows: Any) -> Pairs:
+        """Some of them, by number, slice or truth."""
+        frames = None if self.frames is None else self.frames[rows]
+        return Pairs(self.places, self.span[rows], self.edge[rows], frames)
 
 
 class Bounds(NamedTuple):
@@ -100,7 +106,7 @@ def places_of(body: Body, spans: Spans) -> Places:
         place=place,
         turn=turn,
         altitude=poses[..., 3] + body.base if body.in_space else None,
-        corners=place[..., None] + turn[..., None] * body.outline.edges.begins,
+        corners=place[:, None] + turn[:, None] * body.outline.edges.begins[:, None],
         lasts=lasts,
         off=eighth * frames.bend[element],
         off_by_reach=eighth * frames.swerve[element],
@@ -120,23 +126,27 @@ def bounds_of(body: Body, around: Surroundings, pairs: Pairs, *, overlaps: bool 
     Outlines that cross are looked for where a chord crosses an edge, where edges may be flown over,
     or everywhere if `overlaps`.
     """
+    if pairs.edge.size > AT_ONCE:
+        blocks = [slice(k, k + AT_ONCE) for k in range(0, pairs.edge.size, AT_ONCE)]
+        parts = [bounds_of(body, around, pairs.of(one), overlaps=overlaps) for one in blocks]
+        return Bounds(*(np.concatenate(column) for column in zip(*parts, strict=True)))
     edges, own, places, span = around.outline, body.outline.edges, pairs.places, pairs.span
-    a, b = edges.begins[pairs.edge][:, None], edges.ends[pairs.edge][:, None]
+    a, b = edges.begins[pairs.edge], edges.ends[pairs.edge]
     n = own.begins.size
-    place, turn = places.place[:, span, None], places.turn[:, span, None]
-    # Columns: corners of the body as its obstacle sees them, then an end of the edge as the body
-    # sees it, against each side of the body.
-    paths, sides = np.empty((2, 2, span.size, 2 * n), dtype=np.complex128)
+    place, turn = places.place.take(span, axis=1), places.turn.take(span, axis=1)
+    # Rows: corners of the body as its obstacle sees them, then an end of the edge as the body sees
+    # it, against each side of the body.
+    paths, sides = np.empty((2, 2, 2 * n, span.size), dtype=np.complex128)
     if pairs.frames is None:
-        paths[..., :n], world = places.corners[:, span], a
+        paths[:, :n], world = places.corners.take(span, axis=2), a
     else:
-        frames = np.swapaxes(pairs.frames, 0, 1)[:, :, None]
+        frames = np.swapaxes(pairs.frames, 0, 1)
         there, turned = points_of(frames), directions(frames[..., 2])
-        paths[..., :n] = (places.corners[:, span] - there) * turned.conj()
+        paths[:, :n] = (places.corners[..., span] - there[:, None]) * turned[:, None].conj()
         world = there + turned * a
-    paths[..., n:] = (world - place) * turn.conj()
-    sides[0, :, :n], sides[1, :, :n] = a, b
-    sides[0, :, n:], sides[1, :, n:] = own.begins, own.ends
+    paths[:, n:] = ((world - place) * turn.conj())[:, None]
+    sides[0, :n], sides[1, :n] = a, b
+    sides[0, n:], sides[1, n:] = own.begins[:, None], own.ends[:, None]
     near = _near(paths, sides, _off(body, pairs, paths, np.abs(a)), _radius(body, around, pairs))
     doubtful = (near[0] <= 0.0) | overlaps
     coordinates = max(np.abs(one.view(np.float64)).max() for one in (place, a))
@@ -148,7 +158,7 @@ def bounds_of(body: Body, around: Surroundings, pairs: Pairs, *, overlaps: bool 
         end = b if pairs.frames is None else there + turned * b
         ends = np.broadcast_to((end - place) * turn.conj(), place.shape)
         for k in (0, 1):
-            at = paths[k, rows, :n], paths[k, rows, n], ends[k, rows, 0]
+            at = paths[k, :n, rows], paths[k, n, rows], ends[k, rows]  # (rows, n) first
             hit = rows[_overlap(body, around, pairs.edge[rows], *at)]
             near[2 + k, hit] = near[1, hit] = 0.0
     apart = np.maximum(near[1:], 0.0)
@@ -159,15 +169,15 @@ def bounds_of(body: Body, around: Surroundings, pairs: Pairs, *, overlaps: bool 
 
 
 def _radius(body: Body, around: Surroundings, pairs: Pairs) -> Array | None:
-    """Radii of what comes near (m, 2 n) [m]; None if all have corners."""
+    """Radii of what comes near (2 n, m) [m]; None if all have corners."""
     own = body.outline.edges.radius
     if not (around.rounds or body.outline.radius):
         return None
-    return np.asarray(np.concatenate([own, own]) + around.outline.radius[pairs.edge][:, None])
+    return np.asarray(np.concatenate([own, own])[:, None] + around.outline.radius[pairs.edge])
 
 
 def _near(paths: Points, sides: Points, off: Array, radius: Array | None) -> Array:
-    """Distances (4, m) of paths (2, m, n) to edges (2, m, n), from the first point to the second.
+    """Distances (4, m) of paths (2, n, m) to edges (2, n, m), from the first point to the second.
 
     Those of the chords, those on the way at least, at the begin, at the end.
     """
@@ -186,35 +196,35 @@ def _near(paths: Points, sides: Points, off: Array, radius: Array | None) -> Arr
     if radius is not None:
         apart -= radius
     np.subtract(apart[0], off, out=apart[1])
-    return np.asarray(apart.min(axis=-1))
+    return np.asarray(apart.min(axis=1))
 
 
 def _off(body: Body, pairs: Pairs, paths: Points, end_reach: Array) -> Array:
-    """How far [m] paths (2, m, 2 n) leave their chords at most: (m, 2 n).
+    """How far [m] paths (2, 2 n, m) leave their chords at most: (2 n, m).
 
-    Edges are at distances `end_reach` (m, 1) from their frames, which run evenly.
+    Edges are at distances `end_reach` (m,) from their frames, which run evenly.
     """
-    places, span, reach = pairs.places, pairs.span, body.outline.reach
-    element, lasts, n = places.spans.element[span], places.lasts[span, None], reach.size
-    speed = body.frames.speed[element, None]
+    places, span, reach = pairs.places, pairs.span, body.outline.reach[:, None]
+    element, lasts, n = places.spans.element[span], places.lasts[span], reach.size
+    speed = body.frames.speed[element]
     drift = spin = edge_speed = np.zeros(1)
     if pairs.frames is not None:
         change = pairs.frames[:, 1] - pairs.frames[:, 0]
         lasting = np.where(lasts > 0.0, lasts, np.inf)  # rounding alone moves it in no time
-        drift = np.hypot(change[:, 0], change[:, 1])[:, None] / lasting
-        spin = np.abs(change[:, 2])[:, None] / lasting
+        drift = np.hypot(change[:, 0], change[:, 1]) / lasting
+        spin = np.abs(change[:, 2]) / lasting
         edge_speed = drift + spin * end_reach
-    seen = np.abs(paths[:, :, n : n + 1])
-    away = np.empty((span.size, 2 * n))
-    away[:, :n] = reach
-    away[:, n:] = 0.5 * (seen[0] + seen[1] + (speed + edge_speed) * lasts)
-    off = places.off[span, None] + places.off_by_reach[span, None] * away
+    seen = np.abs(paths[:, n])
+    away = np.empty((2 * n, span.size))
+    away[:n] = reach
+    away[n:] = 0.5 * (seen[0] + seen[1] + (speed + edge_speed) * lasts)
+    off = places.off[span] + places.off_by_reach[span] * away
     if pairs.frames is not None:
-        eighth, turn = 0.125 * lasts * lasts, body.frames.turn[element, None]
-        off[:, n:] += eighth * (spin * spin * end_reach + 2.0 * turn * edge_speed)
-        approach, seen = speed + turn * reach + drift, np.abs(paths[..., :n])
+        eighth, turn = 0.125 * lasts * lasts, body.frames.turn[element]
+        off[n:] += eighth * (spin * spin * end_reach + 2.0 * turn * edge_speed)
+        approach, seen = speed + turn * reach + drift, np.abs(paths[:, :n])
         far = 0.5 * (seen[0] + seen[1] + approach * lasts)
-        off[:, :n] += eighth * spin * (2.0 * approach + spin * far)
+        off[:n] += eighth * spin * (2.0 * approach + spin * far)
     return np.asarray(off)
 
 

@@ -45,7 +45,7 @@ def _nearest_point(body: Body, around: Surroundings, pairs: Pairs, row: int) -> 
     a, b = around.outline.begins[edge], around.outline.ends[edge]
     there, turned = points_of(frame), directions(frame[2])
     along = b - a
-    seen = (places.corners[0, 0] - there) * turned.conj()
+    seen = (places.corners[0, :, 0] - there) * turned.conj()
     shares = ((seen - a) * along.conj()).real / max(float(np.abs(along)) ** 2, 1e-300)
     shares = np.concatenate([[0.0, 1.0], np.clip(shares, 0.0, 1.0)])
     world = there + turned * (a + shares * along)
