@@ -366,7 +366,7 @@ class FclChecker:
     ) -> tuple[int, int] | None:
         """The first of some coasts, begun at times on a clock, that meets a moving obstacle."""
         body = self._body
-        x, y = body.middle
+        (x, y), (half_x, half_y) = body.middle.tolist(), body.half.tolist()
         halves = 0.5 * durations
         centers = (SE2(starts) @ SE2.exp(halves[:, None] * twists)).act(body.middle)
         speeds = np.hypot(twists[:, 0] - twists[:, 2] * y, twists[:, 1] + twists[:, 2] * x)
@@ -384,9 +384,8 @@ class FclChecker:
         for k in np.flatnonzero(np.any(near, axis=0)).tolist():
             ask()
             (v_x, v_y, turn), (at_x, at_y, heading) = twists[k].tolist(), starts[k].tolist()
-            coasting = CoastingBody(
-                (at_x, at_y, heading), (v_x, v_y, turn), complex(x, y), body.reach
-            )
+            start, twist = (at_x, at_y, heading), (v_x, v_y, turn)
+            coasting = CoastingBody(start, twist, complex(x, y), body.reach, (half_x, half_y))
             for number in np.flatnonzero([row[k] for row in near]).tolist():
                 one = self._ground.moving[number]
                 if meet(
@@ -449,12 +448,14 @@ def _ground_of(
         region = obstacle_region(obstacle, excess=excess)
         if isinstance(obstacle, Obstacle) and obstacle.motion is not None:
             points = region.cover.reshape(-1, 2)
-            middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+            low, high = points.min(axis=0), points.max(axis=0)
+            middle, (half_x, half_y) = 0.5 * (low + high), (0.5 * (high - low)).tolist()
             path = MovingBody.of(
                 obstacle.motion,
                 float(np.hypot(*points.T).max()),
                 middle=complex(*middle),
                 radius=float(np.hypot(*(points - middle).T).max()),
+                half=(half_x, half_y),
             )
             skin, _ = obstacle_skin([region])
             moving.append(_Moving(_object(skin), path, index))

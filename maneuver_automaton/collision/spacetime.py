@@ -37,6 +37,7 @@ class CoastingBody(NamedTuple):
     twist: Twist
     middle: complex  # x + i y of the middle of a disc around the body, in its frame [m]
     reach: float  # [m] radius of that disc
+    half: tuple[float, float] | None = None  # [m] half the sides of a rectangle about the middle
 
     @property
     def velocity(self) -> complex:
@@ -71,21 +72,28 @@ class MovingBody(NamedTuple):
     turn_rate: float  # [rad/s] the frame never turns faster
     middle: complex  # x + i y of the middle of a disc around the body, in its frame [m]
     radius: float  # [m] of that disc
+    half: tuple[float, float] | None = None  # [m] half the sides of a rectangle about the middle
 
     @classmethod
     def of(
-        cls, motion: Motion, reach: float, *, middle: complex = 0j, radius: float | None = None
+        cls,
+        motion: Motion,
+        reach: float,
+        *,
+        middle: complex = 0j,
+        radius: float | None = None,
+        half: tuple[float, float] | None = None,
     ) -> MovingBody:
         """Body that follows a motion and has no point further than `reach` [m] from its frame.
 
         A disc around a `middle` in that frame, of a `radius` [m], is often much smaller: the frame
-        of an obstacle may lie anywhere.
+        of an obstacle may lie anywhere. A rectangle with `half` sides [m] about it may be, too.
         """
         rates = np.diff(motion.pose, axis=0) / np.diff(motion.time)[:, None]
         speed = float(np.hypot(rates[:, 0], rates[:, 1]).max(initial=0.0))
         turn_rate = float(np.abs(rates[:, 2]).max(initial=0))
         size = reach if radius is None else radius
-        return cls(motion.time, motion.pose, reach, speed, turn_rate, middle, size)
+        return cls(motion.time, motion.pose, reach, speed, turn_rate, middle, size, half)
 
     @property
     def fastest_middle(self) -> float:
@@ -146,6 +154,56 @@ def may_meet(
     return np.asarray(apart <= halves * (speeds + other.fastest_middle))
 
 
+class Apart(NamedTuple):
+    """Along a direction no point of one body comes closer to one of another than a distance."""
+
+    distance: float  # [m]
+    direction: complex  # unit vector from the one to the other
+    turning: tuple[bool, bool]  # whether the distance depends on how either is turned
+
+
+def apart_at_least(body: CoastingBody, other: MovingBody, here: Place, there: Place) -> list[Apart]:
+    """How far two bodies at two poses are apart at least, by discs and rectangles around them.
+
+    Nothing of those that overlap.
+
+    Examples
+    --------
+    >>> car = CoastingBody((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0j, 2.5, (2.4, 0.9))
+    >>> other = MovingBody.of(Motion([0.0], [[0.0, 2.0, 0.0]]), 2.5, half=(2.4, 0.9))
+    >>> bounds = apart_at_least(car, other, (0.0, 0.0, 0.0), (0.0, 2.0, 0.0))
+    >>> max((round(one.distance, 9), one.direction) for one in bounds[:1])
+    (0.2, 1j)
+    """
+    way = other.center(there) - body.center(here)
+    own, its = body.half or (body.reach, body.reach), other.half or (other.radius, other.radius)
+    angle = there[2] - here[2]
+    cosine, sine = abs(math.cos(angle)), abs(math.sin(angle))
+    found = []
+    away = abs(way)
+    if away > body.reach + other.radius:
+        found.append(Apart(away - body.reach - other.radius, way / away, (False, False)))
+    for heading, half, seen, radius, turning in (
+        (here[2], own, its, other.radius, (True, False)),
+        (there[2], its, own, body.reach, (False, True)),
+    ):
+        axis = cmath.rect(1.0, heading)
+        along = way * axis.conjugate()
+        x, y = abs(along.real) - half[0], abs(along.imag) - half[1]
+        signs = complex(math.copysign(1.0, along.real), math.copysign(1.0, along.imag))
+        box = (
+            x - cosine * seen[0] - sine * seen[1],
+            y - sine * seen[0] - cosine * seen[1],
+        )
+        for (d_x, d_y), less, turns in (((x, y), radius, turning), (box, 0.0, (True, True))):
+            gap = complex(max(d_x, 0.0), max(d_y, 0.0))
+            size = abs(gap)
+            if size > less:
+                to = complex(signs.real * gap.real, signs.imag * gap.imag) / size
+                found.append(Apart(size - less, axis * to, turns))
+    return found
+
+
 def meet(
     body: CoastingBody,
     other: MovingBody,
@@ -157,7 +215,8 @@ def meet(
     """Whether two bodies come within `contact` > 0 [m] of each other until `duration` [s].
 
     True only if they do; False only if they never touch. `distance` is that of the bodies at a
-    pose of the body and one of the other, and is asked for where discs around them are close.
+    pose of the body and one of the other, and is asked for where the discs and rectangles around
+    them are close.
 
     Source: conservative advancement, Mirtich (1996), *Impulse-based Dynamic Simulation of Rigid
     Body Systems*, Sec. 2.3, here with the least time in which ``a t + b t^2 / 2`` is the distance.
@@ -176,23 +235,48 @@ def meet(
     turning = abs(body.twist[2]) * body.reach
     bend = abs(body.velocity) * abs(body.twist[2])
     fastest = abs(body.velocity) + other.speed + turning + other.turn_rate * other.reach
-    near = 0.5 * (body.reach + other.radius)
     time = 0.0
     while True:
         here, (there, velocity, turn_rate, until) = body.at(time), other.stretch(time)
-        clearance = abs(body.center(here) - other.center(there)) - body.reach - other.radius
-        if clearance <= near:
+        own_velocity = _direction(here) * body.velocity
+        known = [one for one in apart_at_least(body, other, here, there) if one.distance > contact]
+        if known:
+            # The middle of the other runs on a circle about its frame.
+            arm = 1j * turn_rate * _direction(there) * other.middle
+            closing, both_bend = own_velocity - velocity - arm, bend + abs(turn_rate * arm)
+            spinning = turning, abs(turn_rate) * other.radius
+            lasts = max(_lasts(one, closing, spinning, both_bend) for one in known)
+            clearance = max(one.distance for one in known)
+        else:
             clearance = distance(here, there)
             if clearance <= contact:
                 return True
-        closing = abs(_direction(here) * body.velocity - velocity)
-        closing += turning + abs(turn_rate) * other.reach
-        speed = closing + math.sqrt(closing * closing + 2.0 * bend * clearance)
-        same_rates = min(time + 2.0 * clearance / speed, until) if speed > 0.0 else until
+            speed = abs(own_velocity - velocity) + turning + abs(turn_rate) * other.reach
+            lasts = _time_to_cover(clearance, speed, bend)
+        same_rates = min(time + lasts, until)
         after = max(same_rates, time + clearance / fastest) if fastest > 0.0 else math.inf
         if after > duration or time >= duration:
             return False
         time = after
+
+
+def _lasts(one: Apart, closing: complex, spinning: tuple[float, float], bend: float) -> float:
+    """How long [s] two bodies stay apart at least, that close in with a velocity of their middles.
+
+    Along a direction that stays where it is their points close in with no more than the velocity
+    along it, what that changes, and what they turn about their middles.
+    """
+    speed = (closing * one.direction.conjugate()).real
+    speed += sum(rate for turns, rate in zip(one.turning, spinning, strict=True) if turns)
+    return _time_to_cover(one.distance, speed, bend)
+
+
+def _time_to_cover(distance: float, speed: float, acceleration: float) -> float:
+    """The least time [s] in which ``speed t + acceleration t^2 / 2`` is a distance > 0 [m]."""
+    root = math.sqrt(speed * speed + 2.0 * acceleration * distance)
+    if speed > 0.0:
+        return 2.0 * distance / (speed + root)
+    return (root - speed) / acceleration if acceleration > 0.0 else math.inf
 
 
 def _direction(pose: Place) -> complex:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -41,16 +41,21 @@ class GrownBody:
 
         def __init__(self, pieces: tuple[Array, ...]) -> None: ...
 
-    @property
-    def middle(self) -> Array:
-        """Center (2,) of the box around the pieces [m]."""
-        corners = np.concatenate(self.pieces)
-        return np.asarray(0.5 * (corners.min(axis=0) + corners.max(axis=0)))
+    middle: Array = field(init=False)  # (2,) of the box around the pieces [m]
+    half: Array = field(init=False)  # (2,) half the sides of that box [m]
+    reach: float = field(init=False)  # [m] no point is further from the middle
 
-    @property
-    def reach(self) -> float:
-        """No point is further from the middle [m]."""
-        return float(np.hypot(*(np.concatenate(self.pieces) - self.middle).T).max())
+    if TYPE_CHECKING:
+
+        def __init__(self, pieces: tuple[Array, ...]) -> None: ...
+
+    def __post_init__(self) -> None:
+        corners = np.concatenate(self.pieces)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        middle = 0.5 * (low + high)
+        object.__setattr__(self, "middle", middle)
+        object.__setattr__(self, "half", 0.5 * (high - low))
+        object.__setattr__(self, "reach", float(np.hypot(*(corners - middle).T).max()))
 
 
 class Windows(NamedTuple):
@@ -204,9 +209,7 @@ def course_boxes(
     >>> course_boxes(square, poses, steps, np.array([0]), np.array([2])).round(3).tolist()
     [[[-1.0, -1.0], [3.0, -1.0], [3.0, 1.0], [-1.0, 1.0]]]
     """
-    corners = np.concatenate(body.pieces)
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    middle, half = body.middle, body.half
     count = lasts - firsts
     starts = np.cumsum(count) - count
     part = np.repeat(np.arange(count.size), count)
@@ -218,7 +221,7 @@ def course_boxes(
     cosine, sine = np.abs(np.cos(turned)), np.abs(np.sin(turned))
     # An arc lies in the triangle of its ends and the point where the tangents there meet.
     turn = np.abs(steps[rows, 2])
-    swing = np.hypot(steps[rows, 0], steps[rows, 1]) + np.hypot(*corners.T).max() * turn
+    swing = np.hypot(steps[rows, 0], steps[rows, 1]) + (np.hypot(*middle) + body.reach) * turn
     off = np.where(turn < 1.0, 0.5 * swing * np.tan(0.5 * np.minimum(turn, 1.0)), swing)
     reach = np.stack(
         [cosine * half[0] + sine * half[1], sine * half[0] + cosine * half[1]], axis=-1

@@ -6,11 +6,18 @@ import math
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
 from maneuver_automaton.collision import Motion
-from maneuver_automaton.collision.spacetime import CoastingBody, MovingBody, may_meet, meet
+from maneuver_automaton.collision.spacetime import (
+    CoastingBody,
+    MovingBody,
+    apart_at_least,
+    may_meet,
+    meet,
+)
 from maneuver_automaton.groups import SE2
 
 speeds = st.floats(-3.0, 3.0) | st.just(0.0)
@@ -153,3 +160,69 @@ def test_a_disc_beside_its_frame_is_met_where_a_frame_of_its_own_would_be(start,
         assert min(apart) > 1.6
     elif not possible(rover, other, duration):
         raise AssertionError("what meets may meet")
+
+
+boxes = st.tuples(st.floats(0.1, 3.0), st.floats(0.1, 3.0))
+poses = st.tuples(places, places, st.floats(-7, 7))
+
+
+@given(here=poses, there=poses, own=boxes, its=boxes, aside=st.tuples(places, places))
+def test_what_is_around_bodies_is_never_further_apart(here, there, own, its, aside):
+    """Rectangles: the bound is never more than their distance, and little less than it."""
+    middle = complex(*aside)
+    body = CoastingBody(here, (0.0, 0.0, 0.0), middle, math.hypot(*own), own)
+    other = MovingBody.of(Motion([0.0], [there]), 9.0, radius=math.hypot(*its), half=its)
+
+    def rectangle(pose, half, center):
+        corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
+        corners = corners + np.array([center.real, center.imag])
+        return shapely.Polygon(SE2(pose).act(corners))
+
+    one, two = rectangle(here, own, middle), rectangle(there, its, 0j)
+    found = apart_at_least(body, other, here, there)
+    for bound in found:
+        assert 0.0 < bound.distance <= one.distance(two) + 1e-9
+        ahead = [
+            shapely.get_coordinates(shape) @ [bound.direction.real, bound.direction.imag]
+            for shape in (one, two)
+        ]
+        assert bound.distance <= ahead[1].min() - ahead[0].max() + 1e-9
+    if one.distance(two) > 1e-9:
+        assert max(bound.distance for bound in found) >= 0.25 * one.distance(two)
+
+
+@given(
+    start=poses,
+    twist=st.tuples(speeds, speeds, speeds),
+    knots=st.lists(poses, min_size=1, max_size=4),
+    own=boxes,
+    its=boxes,
+    aside=st.tuples(places, places),
+    duration=st.floats(0.0, 4.0),
+)
+def test_rectangles_meet_when_they_touch(start, twist, knots, own, its, aside, duration):
+    """Two rectangles, one of them beside its frame, at many times."""
+    middle, motion = complex(*aside), Motion(0.8 * np.arange(len(knots)), knots)
+    body = CoastingBody(start, twist, 0j, math.hypot(*own), own)
+    other = MovingBody.of(
+        motion, abs(middle) + math.hypot(*its), middle=middle, radius=math.hypot(*its), half=its
+    )
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    rings = corners * own, corners * its + np.array(aside)
+
+    def apart(here, there):
+        one, two = (
+            shapely.Polygon(SE2(pose).act(ring))
+            for pose, ring in zip((here, there), rings, strict=True)
+        )
+        return one.distance(two)
+
+    times = np.linspace(0.0, duration, 60)
+    least = min(apart(body.at(time), other.stretch(time).pose) for time in times.tolist())
+    found = meet(body, other, duration=duration, distance=apart, contact=1e-2)
+    rate = math.hypot(*twist[:2]) + abs(twist[2]) * math.hypot(*own)
+    rate += other.speed + other.turn_rate * other.reach
+    if found:
+        assert least <= 1e-2 + rate * duration / 59 / 2 + 1e-9
+    else:
+        assert least > 0.0
