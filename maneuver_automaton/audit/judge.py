@@ -198,7 +198,8 @@ def _body(
     return Body(
         outline=body_outline(shapes),
         frames=frames,
-        offset=goal.pose[:2] - origin_of(goal.pose),
+        offset=complex(*(goal.pose[:2] - origin_of(goal.pose))),
+        doubt=frames.doubt(),
         height=height,
         base=float(goal.pose[3:].sum()),
         clock=plan.start_time,

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from maneuver_automaton.collision import Box, Disc
 from maneuver_automaton.collision.swept import (
     MOST_TURN,
+    cut_where_it_pivots,
     fastest,
     grown_body,
     halves,
@@ -31,7 +32,8 @@ twists = st.tuples(speeds, speeds, speeds)
 @pytest.mark.parametrize("name", ["car", "angle", "truck", "point"])
 def test_every_point_at_every_time_is_inside(name, twist, part):
     body = grown_body(FOOTPRINTS[name], 0.0, 1e-3)
-    duration = part * windows(twist, 2.0).length
+    duration = part * _windows(twist, 2.0).lengths[0]
+    body = cut_where_it_pivots(body, twist)
     poses = SE2.exp(np.multiply.outer(np.linspace(0.0, duration, 9), twist))
     for corners, hull in zip(body.pieces, slice_hulls(body, twist, duration), strict=True):
         seen = SE2(poses.pose[:, None]).act(corners).reshape(-1, 2)
@@ -79,29 +81,82 @@ def test_the_excess_falls_with_the_length():
     assert excesses[0] < 0.5
 
 
+def _windows(twist, duration):
+    return windows(np.array([twist[2]]), np.array([duration]))
+
+
 @given(twist=twists, duration=st.floats(1e-9, 1e3))
 def test_windows_cover_the_time_and_no_more(twist, duration):
-    parts = windows(twist, min(duration, 2.0 * np.pi / max(abs(twist[2]), 1e-9)))
     duration = min(duration, 2.0 * np.pi / max(abs(twist[2]), 1e-9))
-    assert abs(twist[2]) * parts.length <= MOST_TURN
+    parts = _windows(twist, duration)
+    length = parts.lengths[0]
+    assert (parts.lengths == length).all()
+    assert abs(twist[2]) * length <= MOST_TURN
     assert parts.begins[0] == 0.0
-    assert parts.begins[-1] + parts.length == pytest.approx(duration, rel=1e-15)
-    assert (parts.begins + parts.length <= duration * (1 + 1e-15)).all()
-    assert (np.diff(parts.begins) <= parts.length).all()
+    assert parts.begins[-1] + length == pytest.approx(duration, rel=1e-15)
+    assert (parts.begins + length <= duration * (1 + 1e-15)).all()
+    assert (np.diff(parts.begins) <= length).all()
     assert (np.diff(parts.begins) >= 0.0).all()
 
 
+@given(rates=st.lists(st.tuples(speeds, st.floats(0.0, 10.0)), max_size=5))
+def test_windows_of_several_are_those_of_each(rates):
+    turns, durations = np.array(rates).reshape(-1, 2).T
+    parts = windows(turns, durations)
+    for k, (turn, duration) in enumerate(rates):
+        alone, own = _windows((0.0, 0.0, turn), duration), parts.of(parts.coast == k)
+        assert own.begins.tolist() == alone.begins.tolist()
+        assert own.level.tolist() == alone.level.tolist()
+    assert (np.diff(parts.coast) >= 0).all()
+
+
 def test_halves_cover_the_same():
-    parts = windows((1.0, 0.0, 0.5), 3.3)
+    parts = _windows((1.0, 0.0, 0.5), 3.3)
     half = halves(parts)
-    assert half.length == 0.5 * parts.length
+    assert half.lengths[::2].tolist() == (0.5 * parts.lengths).tolist()
+    assert half.coast[::2].tolist() == half.coast[1::2].tolist() == parts.coast.tolist()
     assert half.begins[::2].tolist() == parts.begins.tolist()
-    assert (half.begins[1::2] - parts.begins).tolist() == [half.length] * len(parts.begins)
+    assert (half.begins[1::2] - parts.begins == half.lengths[::2]).all()
+
+
+def test_no_time_at_all_takes_no_slice():
+    assert windows(np.array([0.0, 1.0]), np.zeros(2)).coast.size == 0
+
+
+@given(twist=twists)
+@pytest.mark.parametrize("name", ["car", "angle", "truck", "point", "disc"])
+def test_a_cut_body_is_the_same_body(name, twist):
+    body = grown_body(FOOTPRINTS[name], 0.1, 1e-3)
+    whole, parts = (
+        shapely.union_all([shapely.Polygon(corners) for corners in one.pieces])
+        for one in (body, cut_where_it_pivots(body, twist))
+    )
+    assert whole.buffer(1e-9).covers(parts)
+    assert parts.buffer(1e-9).covers(whole)
+
+
+@pytest.mark.parametrize("twist", [(1.0, 0.0, 0.25), (0.0, 0.0, 1.0), (0.3, 0.8, -1.0)])
+def test_a_cut_body_stands_out_by_the_square_of_the_turn(twist):
+    body = grown_body((CAR,), 0.0, 1e-3)
+
+    def excess(pieces, turn):
+        duration = turn / abs(twist[2])
+        poses = SE2.exp(np.multiply.outer(np.linspace(0.0, duration, 400), twist)).pose
+        passed = shapely.union_all(
+            [shapely.polygons(SE2(poses[:, None]).act(corners)) for corners in body.pieces]
+        )
+        hulls = slice_hulls(pieces, twist, duration)
+        points = [shapely.get_coordinates(shapely.segmentize(_ring(one), 0.02)) for one in hulls]
+        return shapely.distance(shapely.points(np.concatenate(points)), passed).max()
+
+    pieces = cut_where_it_pivots(body, twist)
+    assert excess(pieces, 0.125) < 0.35 * excess(pieces, 0.25)
+    assert excess(pieces, 0.25) < 0.4 * excess(body, 0.25)
 
 
 def test_sizes_by_hand():
     body = grown_body((Box([4.0, 2.0], center=[1.0, 0.0]),), 0.0, 1e-3)
     assert body.middle.tolist() == [1.0, 0.0]
     assert body.reach == pytest.approx(np.sqrt(5.0))
-    assert fastest(body, (1.0, 0.0, 0.0)) == 1.0
-    assert fastest(body, (0.0, 0.0, 2.0)) == pytest.approx(2.0 * np.sqrt(10.0))
+    speeds = fastest(body, np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 2.0]]))
+    assert speeds.tolist() == pytest.approx([1.0, 2.0 * np.sqrt(10.0)])
