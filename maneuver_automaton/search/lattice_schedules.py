@@ -31,8 +31,8 @@ AT_WILL = Schedule(
         (
             300,
             (
-                Resolution(truncated=True, guided=True),
-                Resolution(scale=0.5, durations=0.5, truncated=True, guided=True),
+                Resolution(truncated=True, guided=True, coarse=True),
+                Resolution(scale=0.5, durations=0.5, truncated=True, guided=True, coarse=True),
             ),
         ),
         (1500, (Resolution(scale=0.24, durations=0.25, truncated=True, guided=True),)),

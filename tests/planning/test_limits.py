@@ -56,7 +56,12 @@ def test_a_plan_that_was_found_in_time_is_checked_and_returned() -> None:
 
 
 def test_a_plan_is_not_returned_late_for_its_checks() -> None:
-    assert looks_after(TASKS["among obstacles"], 400, 0, 1.5)[1] is PlanStatus.OUT_OF_BUDGET
+    assert looks_after(TASKS["among obstacles"], 20, 0, 1.5)[1] is PlanStatus.OUT_OF_BUDGET
+
+
+def test_a_first_plan_is_checked_before_it_is_improved() -> None:
+    """Whatever holds the process up later, there is something to return."""
+    assert looks_after(TASKS["among obstacles"], 400, 0, 1.5)[1] is PlanStatus.FOUND
 
 
 def test_what_checks_is_imported_before_the_clock_starts(monkeypatch: pytest.MonkeyPatch) -> None:
