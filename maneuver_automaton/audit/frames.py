@@ -8,7 +8,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.audit.legendre import INTEGRAL, SERIES, SLOPE, SLOPES, TO_NODES, values_at
+from maneuver_automaton.audit.legendre import (
+    INTEGRAL,
+    SERIES,
+    SLOPE,
+    SLOPES,
+    TO_END,
+    TO_NODES,
+    values_at,
+)
 
 
 class Spans(NamedTuple):
@@ -62,7 +70,7 @@ def frames_along(start: Array, twists: Array, lengths: Array) -> Frames:
     The heading is the integral of the turn rate, the place that of the velocity seen with it.
     """
     h = lengths[:, None]
-    heading = start[2] + _before(h[:, 0] * (twists[..., 2] @ INTEGRAL.sum(axis=0)))[:-1, None]
+    heading = start[2] + _before(h[:, 0] * (twists[..., 2] @ TO_END))[:-1, None]
     heading = heading + h * (twists[..., 2] @ TO_NODES.T)
     cosine, sine = np.cos(heading), np.sin(heading)
     rates = twists.copy()

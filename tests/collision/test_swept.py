@@ -12,7 +12,11 @@ from hypothesis import strategies as st
 
 from maneuver_automaton.collision import Box, Disc
 from maneuver_automaton.collision.swept import (
+    MOST_STEPS,
     MOST_TURN,
+    chunks,
+    course_boxes,
+    course_hulls,
     cut_where_it_pivots,
     fastest,
     grown_body,
@@ -160,3 +164,62 @@ def test_sizes_by_hand():
     assert body.reach == pytest.approx(np.sqrt(5.0))
     speeds = fastest(body, np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 2.0]]))
     assert speeds.tolist() == pytest.approx([1.0, 2.0 * np.sqrt(10.0)])
+
+
+courses = st.lists(
+    st.tuples(st.floats(-0.5, 0.5), st.floats(-0.2, 0.2), st.floats(-0.3, 0.3) | st.floats(-3, 3)),
+    min_size=1,
+    max_size=12,
+)
+
+
+def poses_along(steps):
+    poses = [np.array([1.0, -2.0, 0.5])]
+    for step in steps:
+        poses.append((SE2(poses[-1]) @ SE2.exp(step)).pose)
+    return np.array(poses)
+
+
+@given(steps=courses, data=st.data())
+@pytest.mark.parametrize("name", ["car", "angle", "disc", "point"])
+def test_a_body_on_a_course_stays_in_its_rectangles(name, steps, data):
+    body = grown_body(FOOTPRINTS[name], 0.1, 1e-3)
+    steps, n = np.array(steps), len(steps)
+    poses = poses_along(steps)
+    first = np.array(data.draw(st.lists(st.integers(0, n - 1), min_size=1, max_size=4)))
+    last = np.array([data.draw(st.integers(k + 1, n)) for k in first.tolist()])
+    rings = course_boxes(body, np.stack([poses[:-1], poses[1:]]), steps, first, last)
+    for begin, end, ring in zip(first, last, rings, strict=True):
+        box = shapely.Polygon(ring).buffer(1e-9)
+        for k in range(begin, end):
+            inside = SE2(poses[k]) @ SE2.exp(np.linspace(0.0, 1.0, 9)[:, None] * steps[k])
+            for corners in body.pieces:
+                seen = SE2(inside.pose[:, None]).act(corners).reshape(-1, 2)
+                assert shapely.covers(box, shapely.points(seen)).all()
+
+
+def test_rectangles_fall_to_the_body():
+    """Of a straight step they are exact, of a short turn they stand out by its half turn."""
+    body = grown_body((CAR,), 0.0, 1e-3)
+    steps = np.array([[0.5, 0.0, 0.0], [0.0, 0.0, 0.02]])
+    poses = poses_along(steps)
+    ends = np.stack([poses[:-1], poses[1:]])
+    straight, turned = course_boxes(body, ends, steps, np.array([0, 1]), np.array([1, 2]))
+    (hull,) = course_hulls(body, poses[:2], steps[:1])
+    assert shapely.Polygon(straight).symmetric_difference(shapely.Polygon(hull)).area < 1e-9
+    assert shapely.Polygon(turned).area < shapely.Polygon(body.pieces[0]).area + 0.6
+
+
+@given(steps=courses, begins=st.lists(st.booleans(), min_size=12, max_size=12))
+def test_chunks_are_runs_of_one_course_that_turn_little(steps, begins):
+    steps, marks = np.array(steps * 5), np.array((begins * 5)[: 5 * len(steps)])
+    marks[0] = True
+    first, last = chunks(steps, marks)
+    assert first[0] == 0
+    assert last[-1] == len(steps)
+    assert first[1:].tolist() == last[:-1].tolist()
+    assert np.isin(np.flatnonzero(marks), first).all()
+    for k, end in zip(first, last, strict=True):
+        turned = np.abs(steps[k:end, 2]).sum()
+        assert turned <= MOST_TURN + 1e-12 or end - k == 1
+        assert end - k <= MOST_STEPS
