@@ -165,7 +165,8 @@ def search_lattice(found: Incumbents, steps: Steps) -> LatticeWords:
     share = BEFORE_POLISHING if steps.polishes and not alone else 1.0
     lattice = LatticeWords(query, table, found, steps, alone, found.for_first.stage(share))
     lattice.first = _first(lattice)
-    lattice.bound = lattice_bound(query) if steps.at_will else None
+    # The path in the plane, where a way leads far round, takes longer than a first plan.
+    lattice.bound = lattice_bound(query) if steps.at_will and problem.search.improve else None
     return lattice
 
 

@@ -87,7 +87,11 @@ def compare(planner: Planner, starts: np.ndarray, goals: np.ndarray) -> None:
 def draw(planner: Planner, starts: np.ndarray, goals: np.ndarray, rows: list, path: Path) -> None:
     """Where goals are reached, and how long the way is over the straight line."""
     (cells,) = planner.obstacles
-    low, extent = cells.origin[:2], np.array(cells.extent)
+    rows_free, columns_free = np.nonzero(~cells.blocked)
+    first = np.array([columns_free.min(), rows_free.min()]) - 2
+    last = np.array([columns_free.max(), rows_free.max()]) + 3
+    low = cells.origin[:2] + first * cells.resolution
+    extent = (last - first) * cells.resolution
     size = extent[0] / COLUMNS
     shape = (int(np.ceil(extent[1] / size)), COLUMNS)
     at = np.floor((goals[:, :2] - low) / size).astype(int)
@@ -116,8 +120,10 @@ def draw(planner: Planner, starts: np.ndarray, goals: np.ndarray, rows: list, pa
             shown, origin="lower", extent=area, cmap="viridis", aspect="equal", **limits
         )
         blocked = np.ma.masked_where(~cells.blocked, cells.blocked)
-        ends = (low[0], low[0] + extent[0], low[1], low[1] + extent[1])
-        axes.imshow(blocked, origin="lower", extent=ends, cmap="gray", aspect="equal")
+        far_x, far_y = cells.origin[:2] + cells.extent
+        whole = (cells.origin[0], far_x, cells.origin[1], far_y)
+        axes.imshow(blocked, origin="lower", extent=whole, cmap="gray_r", aspect="equal", vmin=0)
+        axes.set(xlim=area[:2], ylim=area[2:])
         figure.colorbar(image, ax=axes, label=label, shrink=0.8)
         axes.set(title=title, xlabel="x [m]", ylabel="y [m]")
     figure.savefig(path, dpi=150)
@@ -125,7 +131,7 @@ def draw(planner: Planner, starts: np.ndarray, goals: np.ndarray, rows: list, pa
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--map", default="tb3_sandbox")
+    parser.add_argument("--map", default="depot")
     parser.add_argument("--queries", type=int, default=10_000)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("out/reachable"))

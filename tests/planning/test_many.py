@@ -155,5 +155,6 @@ def test_the_first_plan_is_returned_where_none_is_improved():
     for start, goal in zip(STARTS[:3], GOALS[:3], strict=True):
         first, best = quick.plan(start, goal), better.plan(start, goal)
         assert first.audit.passed
+        assert first.lower_bound <= best.lower_bound
         assert len(first.improvements) == 1
         assert best.cost <= first.cost
