@@ -21,6 +21,7 @@ from maneuver_automaton.groups import SE2
 
 SAME = 1e-9  # relative: twists per cost that differ by less are one
 SAMPLES = 1000  # goals at which the factor of short words is looked at first
+SIX = 6  # trims of Reeds and Shepp
 FEWEST_TRIMS = 3  # of words: a pose has three coordinates
 MOST_CANDIDATES = 2000
 
@@ -145,17 +146,19 @@ def design_library(
             f"design: the candidate {name!r} moves and costs nothing, so that no factor bounds "
             "what replaces it; add a price of time, or leave it out"
         )
-    choices = list(best_choices(twists, rates, most=most))
+    choices = list(best_choices(twists, rates, most=max(most, SIX)))
     points = twists / rates[:, None]
     disc = None
     if max_trims is not None:
-        disc = _disc(points, choices, radius, tasks, least)
         choices = [one for one in choices if _circle(points, one) is not None]
+        disc = _disc(points, choices, radius, tasks, least)
+    choices = [one for one in choices if len(one.chosen) <= most]
     finite = _better(choices)
     if not finite:
         raise ValueError(
-            f"design: no library of at most {most} trims follows all {len(trims)} candidates, "
-            "need more trims"
+            f"design: no library of at most {most} trims follows all {len(trims)} candidates"
+            + (" by short words, which take straights and full lock" if disc is not None else "")
+            + ", need more trims"
         )
     good = [one for one in finite if one.factor <= within * (1.0 + SAME)]
     best = min(good, key=lambda one: len(one.chosen)) if good else finite[-1]
@@ -205,14 +208,14 @@ def _disc(
     least: float | None,
 ) -> _Disc:
     """Goals that short words are to reach; refuses what has no optimum in closed form."""
-    circles = [circle for circle in (_circle(points, one) for one in choices) if circle]
-    if not circles:
+    circle = _circle(points, choices[0]) if choices else None
+    if circle is None:
         raise ValueError(
             "design: max_trims: the optimum of these candidates has no closed form, which it has "
             "where straights and full lock are the cheapest twists, as at the cost of length; "
             "leave max_trims out, then words may have any length"
         )
-    turning_radius, reverse = circles[0]
+    turning_radius, reverse = circle
     posed = _task_goals(tasks)
     if radius is None:
         if not len(posed):
