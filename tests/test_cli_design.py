@@ -64,6 +64,11 @@ def test_a_factor_that_is_not_kept_is_said(capsys):
     assert design(FILE, "--most", "4", "--within", "2") == 0
 
 
+def test_the_page_shows_the_example():
+    page = EXAMPLE.with_name("library.md").read_text(encoding="utf-8")
+    assert f"```text\n{EXAMPLE.read_text(encoding='utf-8')}```" in page
+
+
 @pytest.mark.slow
 def test_the_example_of_the_help(capsys):
     assert run(["automaton", "design", str(EXAMPLE), "-o", "city_car.json"]) == 0
