@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from maneuver_automaton.automaton.library import load_library
+from maneuver_automaton.automaton.library import load_library, save_library
+from maneuver_automaton.automaton.stock import load_stock_library
 from maneuver_automaton.cli import run
 from maneuver_automaton.scenario import load_scenario
 
@@ -107,6 +108,20 @@ def test_bad_files_are_refused_in_one_line(change, message, capsys):
     assert said.startswith("d.yaml:")
     assert message in said
     assert not Path("d.json").exists()
+
+
+def test_a_library_with_maneuvers_is_thinned(capsys):
+    save_library(load_stock_library("second_order_car"), "car.json")
+    assert run(["automaton", "design", "car.json", "--most", "150", "-o", "small.json"]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("small.json: 150 of 438 maneuvers, hash ")
+    assert "no choice of as many has less than " in said
+    assert len(load_library("small.json").maneuvers) == 150
+    assert run(["automaton", "design", "car.json", "--most", "20", "-o", "few.json"]) == 2
+    assert "car.json: disperse: 20 maneuvers cannot lead" in capsys.readouterr().err
+    for options in ([], ["--most", "150", "--within", "1.1"]):
+        assert run(["automaton", "design", "car.json", *options]) == 2
+        assert "--most says how many are kept, and nothing else" in capsys.readouterr().err
 
 
 def test_a_file_that_is_not_there(capsys):

@@ -331,7 +331,9 @@ def automaton_build(
 @automaton_app.command("design", epilog=ending("automaton design"))
 @exits
 def automaton_design(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Build file with the key design.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="Build file with design, or library.")
+    ],
     out: Out = Path("out"),
     quiet: Quiet = False,
     within: Annotated[
@@ -339,7 +341,7 @@ def automaton_design(
         typer.Option("--within", min=1.0, metavar="T", help="Factor that words may be dearer."),
     ] = None,
     most: Annotated[
-        int | None, typer.Option("--most", min=1, metavar="N", help="Trims of the library.")
+        int | None, typer.Option("--most", min=1, metavar="N", help="Trims (or maneuvers) of it.")
     ] = None,
     max_trims: Annotated[
         int | None, typer.Option("--max-trims", min=3, metavar="N", help="Trims of a word.")
@@ -351,7 +353,7 @@ def automaton_design(
     """Write the smallest library whose words lose no more than a factor, which is proven.
 
     It is DIR/library.json, or DIR itself if it ends in .json. The options hold instead of what the
-    file says.
+    file says. Of a library with maneuvers, the --most are kept whose ends are spread best.
     """
     from maneuver_automaton.cli import design_command
 

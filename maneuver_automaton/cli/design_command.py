@@ -9,24 +9,28 @@ from typing import TYPE_CHECKING
 from maneuver_automaton._arrays import vector_text
 from maneuver_automaton.automaton.library import automaton_hash, save_library
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
-from maneuver_automaton.cli.inputs import make_folder, not_written, target
+from maneuver_automaton.cli.inputs import automaton_of, make_folder, not_written, target
 from maneuver_automaton.cli.tables import console, table
+from maneuver_automaton.errors import InvalidScenario
 
 if TYPE_CHECKING:
+    from maneuver_automaton.automaton import Automaton
     from maneuver_automaton.design import DesignedLibrary, WordsProof
 
 
 def design(file: Path, out: Path, *, instead: Mapping[str, float], quiet: bool) -> int:
-    """Write the smallest library that a design file asks for, and say what is proven of it."""
+    """Write the smallest library that a design file asks for, and say what is proven of it.
+
+    Of a library with maneuvers, those are kept whose ends spread best.
+    """
+    path = target(out, "library.json")
+    if file.suffix == ".json":
+        return _disperse(file, path, instead=instead, quiet=quiet)
     from maneuver_automaton.scenario.design_file import design_of_file
 
-    path = target(out, "library.json")
     make_folder(path.parent)
     designed = design_of_file(file, instead=instead)
-    try:
-        save_library(designed.automaton, path)
-    except OSError as error:
-        raise not_written(path, error) from error
+    _save(designed.automaton, path)
     if not quiet:
         _print(path, designed)
     if not designed.holds:
@@ -35,6 +39,40 @@ def design(file: Path, out: Path, *, instead: Mapping[str, float], quiet: bool) 
             f"{designed.factor:.4g}: {_remedy(designed)}"
         )
     return FOUND if designed.holds else NO_PLAN
+
+
+def _disperse(file: Path, path: Path, *, instead: Mapping[str, float], quiet: bool) -> int:
+    """The library of a library file, with fewer maneuvers."""
+    from maneuver_automaton.design import disperse_library
+
+    others = [key for key in instead if key != "most"]
+    if others or "most" not in instead:
+        raise InvalidScenario(
+            f"{file}: of a library with maneuvers --most says how many are kept, and nothing else; "
+            "a factor is proven for the trims of a build file with the key design"
+        )
+    library = automaton_of(file)
+    make_folder(path.parent)
+    try:
+        done = disperse_library(library, most=int(instead["most"]))
+    except ValueError as error:
+        raise InvalidScenario(f"{file}: {error}") from error
+    _save(done.automaton, path)
+    if not quiet:
+        console().print(
+            f"{path}: {len(done.automaton.maneuvers)} of {done.maneuvers} maneuvers, hash "
+            f"{automaton_hash(done.automaton)}\n  dispersion {done.dispersion:.4g} m, at "
+            f"{done.farthest}; no choice of as many has less than {done.at_least:.4g} m",
+            soft_wrap=True,
+        )
+    return FOUND
+
+
+def _save(automaton: Automaton, path: Path) -> None:
+    try:
+        save_library(automaton, path)
+    except OSError as error:
+        raise not_written(path, error) from error
 
 
 def _print(path: Path, designed: DesignedLibrary) -> None:

@@ -39,7 +39,7 @@ EXAMPLES = {
     ),
     "automaton design": (
         "maneuver-automaton automaton design docs/howto/city_car.yaml --out city_car.json",
-        "maneuver-automaton automaton design docs/howto/city_car.yaml --max-trims 5 --out out",
+        "maneuver-automaton automaton design second_order_car.json --most 150 --out small.json",
     ),
     "automaton show": ("maneuver-automaton automaton show scenarios/parking.yaml --coverage",),
     "automaton draw": ("maneuver-automaton automaton draw scenarios/parking.yaml --out trims.pdf",),

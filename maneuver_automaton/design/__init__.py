@@ -1,5 +1,7 @@
 """Libraries made to measure: the fewest trims that lose no more than a factor, with its proof."""
 
+from maneuver_automaton.design.dispersing import DispersedLibrary as DispersedLibrary
+from maneuver_automaton.design.dispersing import disperse_library as disperse_library
 from maneuver_automaton.design.library_design import DesignedLibrary as DesignedLibrary
 from maneuver_automaton.design.library_design import design_library as design_library
 from maneuver_automaton.design.mixing import mixing_costs as mixing_costs

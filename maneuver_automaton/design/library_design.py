@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -239,7 +239,7 @@ def _short_words(disc: _Disc, max_trims: int, *, tolerance: float, most_boxes: i
 
     Source: Dubins (1957), *On curves of minimal length*: without reverse, three trims are enough.
     """
-    return proven_factor(
+    proof = proven_factor(
         turning_radius=disc.turning_radius,
         radius=disc.radius,
         max_trims=max_trims if disc.reverse else max(max_trims, MOST_TRIMS),
@@ -248,6 +248,7 @@ def _short_words(disc: _Disc, max_trims: int, *, tolerance: float, most_boxes: i
         tolerance=tolerance,
         most_boxes=most_boxes,
     )
+    return replace(proof, max_trims=max_trims)
 
 
 def _circle(points: Array, choice: Choice) -> tuple[float, bool] | None:
