@@ -184,7 +184,7 @@ def _better(choices: list[Choice]) -> list[Choice]:
     """Of the choices that follow all candidates those better than every smaller one, by size."""
     kept: list[Choice] = []
     for one in sorted(choices, key=lambda one: (len(one.chosen), one.factor)):
-        if one.factor < (kept[-1].factor if kept else math.inf):
+        if one.factor < (kept[-1].factor * (1.0 - SAME) if kept else math.inf):
             kept.append(one)
     return kept
 

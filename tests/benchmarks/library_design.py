@@ -3,7 +3,8 @@
 ``python tests/benchmarks/library_design.py [--goals N] [--pairs N] [--time-limit S]``: for each
 lattice the poses within six turning radii at which its words end, and what the shortest path there
 takes with the tightest radius of the lattice; N of them at random. Six trims of that radius are
-designed for these goals. Then N pairs of lattice poses on each of two Nav2 maps, planned with both.
+designed for these goals. Then designs for other costs, and what plans of theirs cost beside plans
+of all candidates. Then N pairs of lattice poses on each of two Nav2 maps, planned with both.
 Cost is length throughout; primitives that turn in place are left out.
 """
 
@@ -22,6 +23,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import maneuver_automaton as ma
 from maneuver_automaton.analysis import ReachSettings, reached
+from maneuver_automaton.analysis.coverage import poses_in_ball
 from maneuver_automaton.design import reeds_shepp_length, word_lengths
 from maneuver_automaton.formats.lattice import (
     Lattice,
@@ -33,6 +35,7 @@ from maneuver_automaton.formats.libraries import read_primitives
 from tests.benchmarks import cases
 from tests.benchmarks.tables import show
 
+LATERAL = 2.0  # [m/s^2]
 LENGTH = ma.Cost(length=1.0)
 LATTICES = (
     ("Nav2 ackermann, with reverse", "nav2-lattice/ackermann_5cm_r0.5m.json", True),
@@ -190,6 +193,59 @@ def on_maps(lattice: Primitives, n: int, time_limit: float) -> None:
     )
 
 
+def other_costs(n: int, time_limit: float) -> None:
+    """Designs for costs without a closed form: plans of few switches beside those of all trims."""
+    speeds = np.linspace(-1.0, 1.0, 21)
+    unicycles = ma.Automaton.of_grid(ma.Unicycle(), [speeds, speeds])
+    car = ma.Car(wheelbase=2.8, max_steering=0.6)
+    grid = ma.Automaton.of_grid(car, [10.0 * speeds, np.linspace(-0.6, 0.6, 25)])
+    sideways = np.abs(grid.body_velocities[:, 0] * grid.body_velocities[:, 2])
+    kept = tuple(trim for trim, a in zip(grid.trims, sideways, strict=True) if a <= LATERAL)
+    situations = (
+        ("unicycle, effort + time", unicycles, ma.Cost(effort=1.0, time=1.0), 3.0),
+        ("car, effort + 0.2 time", light_car(), ma.Cost(effort=1.0, time=0.2), 15.0),
+        (
+            f"car, time, at most {LATERAL:g} m/s^2 aside",
+            ma.Automaton(car, kept),
+            ma.Cost(time=1.0),
+            40.0,
+        ),
+    )
+    rows = []
+    for name, candidates, cost, reach in situations:
+        began = time.process_time()
+        design = ma.design_library(candidates, cost=cost)
+        seconds = time.process_time() - began
+        goals = poses_in_ball(reach, n, seed=0)
+        ratios = []
+        for goal in goals:
+            problems = [
+                ma.Problem(automaton, [0, 0, 0], goal, cost=cost)
+                for automaton in (design.automaton, candidates)
+            ]
+            few, every = (ma.plan(one, time_limit=time_limit).cost for one in problems)
+            ratios.append(few / every)
+        rows.append(
+            [
+                name,
+                design.candidates,
+                len(design.automaton),
+                design.factor,
+                float(np.median(ratios)),
+                float(np.max(ratios)),
+                seconds,
+            ]
+        )
+    header = ["vehicle, cost", "candidates", "trims", "factor", "plans: median", "largest"]
+    show([*header, "design [s]"], rows)
+    print(f"plans to {n} goals, {time_limit:g} s each, of the design over those of all candidates")
+
+
+def light_car() -> ma.Automaton:
+    car = ma.Car(wheelbase=2.8, max_steering=0.6, max_speed=1.0)
+    return ma.Automaton.of_grid(car, [np.linspace(-1.0, 1.0, 21), np.linspace(-0.6, 0.6, 25)])
+
+
 def snapped(
     lattice: Primitives, start: np.ndarray, goal: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, str, str]:
@@ -216,6 +272,8 @@ def main() -> None:
         primitives(name, cases.DATA / path, reverse=reverse) for name, path, reverse in LATTICES
     ]
     on_goals(lattices, options.goals)
+    print()
+    other_costs(options.pairs, options.time_limit)
     if cases.present("nav2-maps") and options.pairs:
         print()
         on_maps(lattices[0], options.pairs, options.time_limit)
