@@ -57,6 +57,15 @@ def test_what_is_proven_of_short_words_is_said(capsys):
     )
 
 
+def test_the_factor_is_drawn(capsys):
+    options = ("--max-trims", "4", "--radius", "2", "--plot")
+    assert design(FILE, *options) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "d.png"
+    assert Path("d.png").read_bytes().startswith(b"\x89PNG")
+    assert design(FILE, "--plot") == 0
+    assert "not drawn: the factor of words of any length" in capsys.readouterr().err
+
+
 def test_a_factor_that_is_not_kept_is_said(capsys):
     assert design(FILE, "--most", "4") == 1
     said = capsys.readouterr()

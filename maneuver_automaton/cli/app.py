@@ -336,6 +336,9 @@ def automaton_design(
     ],
     out: Out = Path("out"),
     quiet: Quiet = False,
+    plot: Annotated[
+        bool, typer.Option("--plot", help="Draw the factor over the goals, with --max-trims.")
+    ] = False,
     within: Annotated[
         float | None,
         typer.Option("--within", min=1.0, metavar="T", help="Factor that words may be dearer."),
@@ -359,7 +362,7 @@ def automaton_design(
 
     given = {"within": within, "most": most, "max_trims": max_trims, "radius_m": radius}
     instead = {key: value for key, value in given.items() if value is not None}
-    return design_command.design(file, out, instead=instead, quiet=quiet)
+    return design_command.design(file, out, instead=instead, quiet=quiet, plot=plot)
 
 
 @automaton_app.command("show", epilog=ending("automaton show"))

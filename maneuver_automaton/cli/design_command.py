@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from maneuver_automaton.design import DesignedLibrary, WordsProof
 
 
-def design(file: Path, out: Path, *, instead: Mapping[str, float], quiet: bool) -> int:
+def design(
+    file: Path, out: Path, *, instead: Mapping[str, float], quiet: bool, plot: bool = False
+) -> int:
     """Write the smallest library that a design file asks for, and say what is proven of it.
 
     Of a library with maneuvers, those are kept whose ends spread best.
@@ -33,6 +35,8 @@ def design(file: Path, out: Path, *, instead: Mapping[str, float], quiet: bool) 
     _save(designed.automaton, path)
     if not quiet:
         _print(path, designed)
+    if plot:
+        _draw(designed, path.with_suffix(".png"), quiet=quiet)
     if not designed.holds:
         complain(
             f"{file}: asked for a factor within {designed.within:g}, proven is "
@@ -73,6 +77,23 @@ def _save(automaton: Automaton, path: Path) -> None:
         save_library(automaton, path)
     except OSError as error:
         raise not_written(path, error) from error
+
+
+def _draw(designed: DesignedLibrary, path: Path, *, quiet: bool) -> None:
+    """The factor over the goals; without short words it is the same everywhere, and not drawn."""
+    if designed.words is None:
+        complain(f"{path}: not drawn: the factor of words of any length is one for all goals")
+        return
+    from maneuver_automaton import plotting
+    from maneuver_automaton.cli.pictures import skip_documentation
+
+    skip_documentation()
+    try:
+        plotting.save_factor_figure(designed.words, path)
+    except OSError as error:
+        raise not_written(path, error) from error
+    if not quiet:
+        console().print(str(path), soft_wrap=True)
 
 
 def _print(path: Path, designed: DesignedLibrary) -> None:
