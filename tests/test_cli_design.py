@@ -82,7 +82,7 @@ def test_the_page_shows_the_example():
 @pytest.mark.slow
 def test_the_example_of_the_help(capsys):
     assert run(["automaton", "design", str(EXAMPLE), "-o", "city_car.json"]) == 0
-    assert "words of at most 4 trims: factor 1.04085 proven" in capsys.readouterr().out
+    assert "words of at most 4 trims: factor 1.04674 proven" in capsys.readouterr().out
     assert len(load_library("city_car.json")) == 6
 
 
