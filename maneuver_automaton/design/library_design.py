@@ -73,7 +73,8 @@ def design_library(
     - Words of any length (`max_trims` is None): whatever the candidates do, the library does by
       mixing its trims, ``twist_j = sum share_i twist_i``, at ``sum share_i rate_i`` per second. So
       the greatest ``sum share_i rate_i / rate_j`` bounds the factor for *every* start and goal, and
-      short goals along candidate j attain it. A mixture is followed in the limit of many switches.
+      short goals along candidate j attain it. A mixture is followed in the limit of many switches,
+      and ends as near to the goal as one likes.
     - Words of at most `max_trims` trims: the optimum must be known in closed form. It is where the
       cheapest twists are straight and full lock, as for length, or for time at one speed: then C is
       the length of the shortest path of Reeds and Shepp, or of Dubins without reverse. The factor

@@ -132,12 +132,27 @@ class _Met:
     goal: Array
 
 
+def factors_at(goals: Array, *, turning_radius: float, max_trims: int, least: float) -> Array:
+    """Length (n,) of short words to goals (n, 3) over that of shortest paths, NaN below `least`.
+
+    Examples
+    --------
+    >>> goals = np.array([[3.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.1, 0.0, 0.0]])
+    >>> factors_at(goals, turning_radius=1.0, max_trims=3, least=0.5).round(3).tolist()
+    [1.0, 1.383, nan]
+    """
+    scaled = goals / np.array([turning_radius, turning_radius, 1.0])
+    short, long = _least(families(scaled, scaled), max_trims)
+    shortest = np.minimum(short, long)
+    counts = shortest >= least / turning_radius
+    return np.where(counts, short / np.where(counts, shortest, 1.0), np.nan)
+
+
 def _worst(goals: Array, met: _Met, max_trims: int, least: float, reach: float) -> _Met:
     """What was met, or what is worse among goals (n, 3)."""
-    short, long = _least(families(goals, goals), max_trims)
-    shortest = np.minimum(short, long)
-    counts = (shortest >= least) & (np.hypot(goals[:, 0], goals[:, 1]) <= reach)
-    ratios = np.where(counts, short / np.where(counts, shortest, 1.0), 1.0)
+    ratios = factors_at(goals, turning_radius=1.0, max_trims=max_trims, least=least)
+    counts = np.isfinite(ratios) & (np.hypot(goals[:, 0], goals[:, 1]) <= reach)
+    ratios = np.where(counts, ratios, 1.0)
     k = int(ratios.argmax()) if len(ratios) else -1
     if k < 0 or not ratios[k] > met.ratio:
         return met

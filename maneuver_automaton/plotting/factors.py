@@ -11,14 +11,15 @@ from matplotlib.collections import QuadMesh
 from matplotlib.patches import Circle
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.design import WordsProof, reeds_shepp_length, word_lengths
+from maneuver_automaton.design import WordsProof
+from maneuver_automaton.design.proof import factors_at
 from maneuver_automaton.plotting.colors import GREY, INK
 from maneuver_automaton.plotting.ends import draw_goal, draw_headings
 from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
 from maneuver_automaton.plotting.style import tidy
 
 SHADES = "viridis_r"
-PLACES, HEADINGS = 101, 36
+PLACES, HEADINGS = 51, 37  # from the start to the edge of the disc, and around
 ARROW = 0.08  # of the radius
 
 
@@ -48,8 +49,9 @@ def draw_factor(ax: Axes, proof: WordsProof) -> QuadMesh:
     >>> round(float(draw_factor(Figure().add_subplot(), words).get_array().max()), 6)
     1.0
     """
-    across = np.linspace(-proof.radius, proof.radius, PLACES)
-    factors = np.ma.masked_invalid(_worst_factors(proof, across))
+    half = np.linspace(0.0, proof.radius, PLACES)
+    across = np.concatenate([-half[:0:-1], half])
+    factors = np.ma.masked_invalid(_worst_factors(proof, half))
     most = max(proof.sampled, 1.0 + 1e-3)
     places = ax.pcolormesh(
         across,
@@ -94,19 +96,25 @@ def save_factor_figure(proof: WordsProof, path: str | Path) -> None:
     write_figure(figure, path)
 
 
-def _worst_factors(proof: WordsProof, across: Array) -> Array:
-    """Greatest ratio (n, n) over all headings at each place; NaN where no goal counts."""
-    x, y = np.meshgrid(across, across)
-    worst = np.full(x.shape, np.nan)
+def _worst_factors(proof: WordsProof, half: Array) -> Array:
+    """Greatest factor (2 n - 1, 2 n - 1) over all headings at each place; NaN where none counts.
+
+    A quarter of the places is looked at: `half` (n,) are its sides, from zero on. Mirrored, or
+    driven in the other gear, paths are as long.
+    """
+    x, y = np.meshgrid(half, half)
     inside = np.hypot(x, y) <= proof.radius
-    places = np.stack([x[inside], y[inside]], axis=-1)
-    most = np.full(len(places), np.nan)
-    for heading in np.linspace(-math.pi, math.pi, HEADINGS, endpoint=False):
-        goals = np.column_stack([places, np.full(len(places), heading)])
-        shortest = reeds_shepp_length(goals, radius=proof.turning_radius)
-        counts = shortest >= proof.least
-        words = word_lengths(goals, radius=proof.turning_radius, max_trims=proof.max_trims)
-        ratios = np.where(counts, words / np.where(counts, shortest, 1.0), np.nan)
-        most = np.fmax(most, ratios)
-    worst[inside] = most
-    return worst
+    most = np.full(int(inside.sum()), np.nan)
+    for heading in np.linspace(-math.pi, math.pi, HEADINGS):
+        goals = np.column_stack([x[inside], y[inside], np.full(len(most), heading)])
+        factors = factors_at(
+            goals,
+            turning_radius=proof.turning_radius,
+            max_trims=proof.max_trims,
+            least=proof.least,
+        )
+        most = np.fmax(most, factors)
+    quarter = np.full(x.shape, np.nan)
+    quarter[inside] = most
+    upper = np.concatenate([quarter[:, :0:-1], quarter], axis=1)
+    return np.concatenate([upper[:0:-1], upper])
