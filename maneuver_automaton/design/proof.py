@@ -16,6 +16,7 @@ from maneuver_automaton.design.reeds_shepp import MOST_TRIMS, Family, families
 
 AT_ONCE = 50_000  # boxes that are looked at in one go
 FIRST = 0.5  # size of the first boxes, in turning radii and radians
+HALVES = 8  # of a box
 SEED = 0  # of the goals that are sampled
 
 
@@ -87,7 +88,7 @@ def proven_factor(
     tolerance : float
         By which the proven factor may exceed the sampled one.
     most_boxes : int
-        After so many boxes what is proven is handed over.
+        With no more boxes than that, but for the first ones, what is proven is handed over.
     """
     scale = np.array([turning_radius, turning_radius, 1.0])
     reach, shortest = radius / turning_radius, least / turning_radius
@@ -96,7 +97,7 @@ def proven_factor(
     proven, looked = 1.0, 0
     finished = max_trims >= MOST_TRIMS
     corners, size = _first_boxes(reach)
-    while not finished and len(corners) and looked < most_boxes:
+    while not finished:
         open_corners, open_ratios = [], []
         for low in np.array_split(corners, 1 + len(corners) // AT_ONCE):
             ratios = _box_ratios(low, size, max_trims, shortest)
@@ -108,8 +109,9 @@ def proven_factor(
             open_ratios.append(ratios[is_open])
         corners, ratios = np.concatenate(open_corners), np.concatenate(open_ratios)
         finished = not len(corners)
-        if looked >= most_boxes:
+        if looked + HALVES * len(corners) > most_boxes:  # what is open counts as it was bounded
             proven = max(proven, float(ratios.max(initial=1.0)))
+            break
         corners, size = _halved(corners, size, reach)
     return WordsProof(
         max_trims=max_trims,
