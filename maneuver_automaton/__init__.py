@@ -30,6 +30,10 @@ if TYPE_CHECKING:
     from maneuver_automaton.collision import Polygon as Polygon
     from maneuver_automaton.collision import Zone as Zone
     from maneuver_automaton.costs import Cost as Cost
+    from maneuver_automaton.design import DesignedLibrary as DesignedLibrary
+    from maneuver_automaton.design import DispersedLibrary as DispersedLibrary
+    from maneuver_automaton.design import design_library as design_library
+    from maneuver_automaton.design import disperse_library as disperse_library
     from maneuver_automaton.exports import ros_messages as ros_messages
     from maneuver_automaton.exports import save_commonroad_solution as save_commonroad_solution
     from maneuver_automaton.exports import save_csv as save_csv
@@ -91,7 +95,9 @@ _HOMES = {
     "Car": "models",
     "CarWithTrailer": "models",
     "Cost": "costs",
+    "DesignedLibrary": "design",
     "Disc": "collision",
+    "DispersedLibrary": "design",
     "Disturbance": "receding_horizon",
     "Goal": "problem",
     "Helicopter": "models",
@@ -127,6 +133,8 @@ _HOMES = {
     "Verdict": "planning.verdict",
     "Zone": "collision",
     "build_library": "automaton.building",
+    "design_library": "design",
+    "disperse_library": "design",
     "drive_road": "roads",
     "load_library": "automaton.library",
     "load_map": "formats.maps",

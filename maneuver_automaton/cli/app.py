@@ -328,6 +328,43 @@ def automaton_build(
     return automaton_command.build(file, out, settings=settings)
 
 
+@automaton_app.command("design", epilog=ending("automaton design"))
+@exits
+def automaton_design(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="Build file with design, or library.")
+    ],
+    out: Out = Path("out"),
+    quiet: Quiet = False,
+    plot: Annotated[
+        bool, typer.Option("--plot", help="Draw the factor over the goals, with --max-trims.")
+    ] = False,
+    within: Annotated[
+        float | None,
+        typer.Option("--within", min=1.0, metavar="T", help="Factor that words may be dearer."),
+    ] = None,
+    most: Annotated[
+        int | None, typer.Option("--most", min=1, metavar="N", help="Trims (or maneuvers) of it.")
+    ] = None,
+    max_trims: Annotated[
+        int | None, typer.Option("--max-trims", min=3, metavar="N", help="Trims of a word.")
+    ] = None,
+    radius: Annotated[
+        float | None, typer.Option("--radius", metavar="R", help="Of the disc of goals [m].")
+    ] = None,
+) -> int:
+    """Write the smallest library whose words lose no more than a factor, which is proven.
+
+    It is DIR/library.json, or DIR itself if it ends in .json. The options hold instead of what the
+    file says. Of a library with maneuvers, the --most are kept whose ends are spread best.
+    """
+    from maneuver_automaton.cli import design_command
+
+    given = {"within": within, "most": most, "max_trims": max_trims, "radius_m": radius}
+    instead = {key: value for key, value in given.items() if value is not None}
+    return design_command.design(file, out, instead=instead, quiet=quiet, plot=plot)
+
+
 @automaton_app.command("show", epilog=ending("automaton show"))
 @exits
 def automaton_show(

@@ -11,6 +11,7 @@ CODES = {
     "check": f"0 all holds, 1 something does not, {BAD}",
     "automaton build": f"0 all maneuvers were found, 1 some not, {BAD}, "
     "130 interrupted (called again, it goes on)",
+    "automaton design": f"0 the factor is proven, 1 a greater one is, {BAD}",
     "plain": f"0 done, {BAD}",
 }
 EXAMPLES = {
@@ -35,6 +36,10 @@ EXAMPLES = {
     "automaton build": (
         "maneuver-automaton automaton build scenarios/grid_1681.yaml --out grid.json",
         "maneuver-automaton automaton build hovercraft.yaml --out hovercraft.json --jobs 2",
+    ),
+    "automaton design": (
+        "maneuver-automaton automaton design docs/howto/city_car.yaml --out city_car.json",
+        "maneuver-automaton automaton design second_order_car.json --most 150 --out small.json",
     ),
     "automaton show": ("maneuver-automaton automaton show scenarios/parking.yaml --coverage",),
     "automaton draw": ("maneuver-automaton automaton draw scenarios/parking.yaml --out trims.pdf",),

@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from maneuver_automaton.plotting.effort import (
         save_uniform_effort_figure as save_uniform_effort_figure,
     )
+    from maneuver_automaton.plotting.factors import draw_factor as draw_factor
+    from maneuver_automaton.plotting.factors import save_factor_figure as save_factor_figure
     from maneuver_automaton.plotting.feasible import draw_feasible_slice as draw_feasible_slice
     from maneuver_automaton.plotting.feasible import save_feasible_figure as save_feasible_figure
     from maneuver_automaton.plotting.footprint import footprint_polygons as footprint_polygons
@@ -94,6 +96,8 @@ _HOMES = {
     "draw_node_efforts": "effort",
     "save_retiming_figure": "effort",
     "save_uniform_effort_figure": "effort",
+    "draw_factor": "factors",
+    "save_factor_figure": "factors",
     "draw_feasible_slice": "feasible",
     "save_feasible_figure": "feasible",
     "footprint_polygons": "footprint",

@@ -44,6 +44,7 @@ from maneuver_automaton.scenario.checks import (
     Text,
     need,
 )
+from maneuver_automaton.scenario.design_part import DesignPart
 from maneuver_automaton.scenario.places import at
 from maneuver_automaton.scenario.reading import checked
 from maneuver_automaton.scenario.vehicle_parts import VehiclePart
@@ -121,6 +122,7 @@ class LibraryFile(Part):
     maneuvers: ManeuversPart = Field(
         default_factory=lambda: ManeuversPart(), description="how trims are joined"
     )
+    design: DesignPart | None = Field(None, description="how trims are chosen by automaton design")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -134,6 +136,7 @@ class BuildFile:
     trims: tuple[Trim, ...]
     missing: tuple[MissingTrim, ...]
     maneuvers: ManeuversPart
+    design: DesignPart | None = None
 
     __repr__ = brief
 
@@ -217,6 +220,7 @@ def build_file_of_text(text: str, *, name: str) -> BuildFile:
         trims=found.trims,
         missing=found.missing,
         maneuvers=file.maneuvers,
+        design=file.design,
     )
     _check_maneuvers(document, asked)
     return asked

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,17 +11,16 @@ from typing import Any, NamedTuple
 from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import AnyObstacle, Shape
-from maneuver_automaton.costs import Cost
 from maneuver_automaton.formats.statement import MapFile
 from maneuver_automaton.formats.yaml_source import Document, Where, parse
 from maneuver_automaton.models import Model
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.scenario.automata import automaton_of
 from maneuver_automaton.scenario.places import at
+from maneuver_automaton.scenario.prices import cost_of
 from maneuver_automaton.scenario.reading import values_of
 from maneuver_automaton.scenario.schema import (
     AutomatonPart,
-    CostPart,
     GoalPart,
     HorizonPart,
     RecedingHorizonPart,
@@ -179,7 +177,7 @@ def _problem(
     for k, zone in enumerate(file.zones):
         for n, name in enumerate(zone.trims or ()):
             _check_trim(document, ("zones", k, "trims", n), name, automaton)
-    cost, horizon = _cost(document, file.cost, automaton), _horizon(document, file.horizon)
+    cost, horizon = cost_of(document, file.cost, automaton), _horizon(document, file.horizon)
     with at(document, ()):
         return Problem(
             automaton,
@@ -220,30 +218,6 @@ def _goal(part: GoalPart) -> Goal:
         tolerance_m=part.tolerance_m,
         tolerance_rad=part.tolerance_rad,
     )
-
-
-def _cost(document: Document, part: CostPart, automaton: Automaton) -> Cost:
-    matrix = part.effort_matrix
-    where: Where = ("cost",) if matrix is None else ("cost", "effort_matrix")
-    if matrix is not None and len({len(row) for row in matrix} | {len(matrix)}) > 1:
-        rows = ", ".join(str(len(row)) for row in matrix)
-        raise document.error(
-            where, f"got {len(matrix)} rows of {rows} numbers, need a square matrix"
-        )
-    order = math.inf if part.norm_order == "inf" else float(part.norm_order)
-    with at(document, where):
-        cost = Cost(
-            effort=part.effort,
-            norm=part.norm,
-            time=part.time,
-            effort_matrix=matrix,  # type: ignore[arg-type]
-            norm_order=order,
-            length=part.length,
-            switch=part.switch,
-            direction_change=part.direction_change,
-        )
-        cost.rates(automaton.controls[:1], automaton.body_velocities[:1])
-    return cost
 
 
 def _search(part: SearchPart) -> SearchSettings:

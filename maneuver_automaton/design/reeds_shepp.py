@@ -1,0 +1,334 @@
+"""Reeds-Shepp lengths over whole boxes of goals: below every path, and above the shortest.
+
+A path of the classical kinds is fixed by two polar coordinates of the goal, so its parts are
+monotone functions of a radius and an angle, and intervals of them are nearly as tight as can be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from maneuver_automaton._arrays import Array, as_array
+
+QUARTER, HALF, FULL = 0.5 * np.pi, np.pi, 2.0 * np.pi  # turns
+SLACK = 1e-12  # [rad] by which intervals are widened, for rounding
+FORWARD, BACKWARD, EITHER = 1, -1, 0  # the sign that an angle has on a shortest path
+MOST_TRIMS = 5  # of a shortest path
+
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Interval:
+    """Numbers between `low` and `high`, elementwise; operations enclose all results."""
+
+    low: Array
+    high: Array
+
+    def __add__(self, other: Interval | float) -> Interval:
+        if isinstance(other, Interval):
+            return Interval(self.low + other.low, self.high + other.high)
+        return Interval(self.low + other, self.high + other)
+
+    def __neg__(self) -> Interval:
+        return Interval(-self.high, -self.low)
+
+    def __sub__(self, other: Interval | float) -> Interval:
+        return self + (-other)
+
+    @property
+    def ends(self) -> tuple[Array, Array]:
+        """Both ends."""
+        return self.low, self.high
+
+    def times(self, other: Interval) -> Interval:
+        """Products."""
+        products = np.stack([a * b for a in self.ends for b in other.ends])
+        return Interval(products.min(axis=0), products.max(axis=0))
+
+    def over(self, other: Interval) -> Interval:
+        """Quotients; everything where the divisor may be zero."""
+        apart = (other.low > 0.0) | (other.high < 0.0)
+        divisor = [np.where(apart, end, 1.0) for end in other.ends]
+        value = self.times(Interval(1.0 / divisor[1], 1.0 / divisor[0]))
+        return Interval(np.where(apart, value.low, -np.inf), np.where(apart, value.high, np.inf))
+
+    def size(self) -> Interval:
+        """Absolute values."""
+        least = np.maximum(0.0, np.maximum(self.low, -self.high))
+        return Interval(least, np.maximum(np.abs(self.low), np.abs(self.high)))
+
+    def cos(self) -> Interval:
+        """Cosines."""
+        first, last = np.cos(self.low), np.cos(self.high)
+        low = np.where(_holds(self, HALF), -1.0, np.minimum(first, last))
+        return Interval(low, np.where(_holds(self, 0.0), 1.0, np.maximum(first, last)))
+
+    def sin(self) -> Interval:
+        """Sines."""
+        return (self - QUARTER).cos()
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Family:
+    """Paths of one kind to the goals of boxes, on circles of radius 1.
+
+    `angles` are turns that depend on the goal, each with the sign that it has on a shortest path;
+    driven in the other gear it is as long, so for an upper bound the sign does not matter.
+    """
+
+    trims: int
+    angles: tuple[tuple[Interval, int], ...]
+    turn: Interval  # of which the angles are the sum or the difference, so not both smaller
+    length: Interval  # of all else, at least zero
+    somewhere: BoolArray  # whether shortest paths of the kind may exist for some goal of the box
+    everywhere: BoolArray  # whether paths of the kind exist for all
+
+    def lower(self) -> Array:
+        """No shortest path of this kind to any goal of the box is shorter; inf if there is none."""
+        angles = np.sum([_least(angle, sign) for angle, sign in self.angles], axis=0)
+        turned = np.maximum(angles, _least(self.turn, EITHER))
+        return np.where(self.somewhere, self.length.low + turned, np.inf)
+
+    def upper(self) -> Array:
+        """To every goal of the box a path of this kind is no longer; inf if not to every one."""
+        angles = np.sum([_greatest(angle) for angle, _ in self.angles], axis=0)
+        return np.where(self.everywhere, self.length.high + angles, np.inf)
+
+
+def reeds_shepp_length(goals: ArrayLike, *, radius: float = 1.0) -> Array:
+    """Length (...,) of the shortest path to poses (..., 3) of a car that also reverses [m].
+
+    Source: Reeds, Shepp (1990), *Optimal paths for a car that goes both forwards and backwards*.
+
+    Examples
+    --------
+    >>> reeds_shepp_length([[3.0, 0.0, 0.0], [0.0, 0.0, np.pi]]).round(6).tolist()
+    [3.0, 3.141593]
+    """
+    poses = as_array("goals", goals, last=3)
+    shape, flat = poses.shape[:-1], poses.reshape(-1, 3)
+    scaled = flat / np.array([radius, radius, 1.0])
+    least = np.min([family.lower() for family in families(scaled, scaled)], axis=0)
+    return np.asarray(radius * np.maximum(least, 0.0)).reshape(shape)
+
+
+def families(low: Array, high: Array) -> Iterator[Family]:
+    """All 48 kinds of path to the goals of boxes from `low` (n, 3) to `high` (n, 3), radius 1.
+
+    Source: Reeds, Shepp (1990), Sec. 8: eight forms, each also in reverse, mirrored, and, where it
+    is not its own image, driven from the end to the start.
+    """
+    x, y, heading = (Interval(low[:, k], high[:, k]) for k in range(3))
+    cos, sin = heading.cos(), heading.sin()
+    from_end = (x.times(cos) + y.times(sin), x.times(sin) - y.times(cos), heading)
+    for reverse in (False, True):
+        for mirrored in (False, True):
+            yield from _same(*_image(x, y, heading, reverse, mirrored))
+            yield from _opposite(*_image(x, y, heading, reverse, mirrored))
+            yield from _with_image(*_image(*from_end, reverse, mirrored))
+            yield from _two_turns(*_image(x, y, heading, reverse, mirrored))
+            yield from _two_turns(*_image(*from_end, reverse, mirrored))
+
+
+def _image(
+    x: Interval, y: Interval, heading: Interval, reverse: bool, mirrored: bool
+) -> tuple[Interval, Interval, Interval]:
+    """The goal of the path that is driven in the other gear, mirrored, or both."""
+    turned = -heading if reverse != mirrored else heading
+    return -x if reverse else x, -y if mirrored else y, turned
+
+
+def _same(x: Interval, y: Interval, heading: Interval) -> Iterator[Family]:
+    """Paths whose first and last circle are turned alike."""
+    far, at = _polar(x - heading.sin(), y - 1.0 + heading.cos())
+    yield Family(  # L S L (8.1)
+        trims=3,
+        angles=((at, FORWARD), (heading - at, FORWARD)),
+        turn=heading,
+        length=far,
+        somewhere=far.high >= 0.0,
+        everywhere=far.high >= 0.0,
+    )
+    # Where both circles nearly coincide the straight has any angle: of the two directions to drive
+    # it, one leaves turns of half a turn together at most, or of the heading if that is more.
+    turned = heading.size()
+    yield Family(
+        trims=3,
+        angles=((turned, EITHER),),
+        turn=heading,
+        length=far + Interval(*(np.maximum(HALF - end, 0.0) for end in turned.ends[::-1])),
+        somewhere=np.zeros(far.low.shape, dtype=np.bool_),
+        everywhere=turned.high <= HALF + SLACK,
+    )
+    yield from _with_image(x, y, heading)
+    last = (y - 1.0 + heading.cos()).over(heading.sin())
+    first = x - heading.sin() - last.times(heading.cos())
+    yield Family(  # S L S
+        trims=3,
+        angles=((heading, EITHER),),
+        turn=heading,
+        length=first.size() + last.size(),
+        somewhere=np.zeros(far.low.shape, dtype=np.bool_),
+        everywhere=np.isfinite(last.high),
+    )
+
+
+def _with_image(x: Interval, y: Interval, heading: Interval) -> Iterator[Family]:
+    """Paths that are not their own image from the end."""
+    sin, cos = heading.sin(), heading.cos()
+    far, at = _polar(x - sin, y - 1.0 + cos)
+    half = Interval(*(np.arcsin(np.minimum(end / 4.0, 1.0)) for end in far.ends))
+    yield Family(  # L R L (8.3, 8.4)
+        trims=3,
+        angles=((at - half + HALF, FORWARD), (heading - at - half - HALF, EITHER)),
+        turn=heading - half - half,
+        length=half + half,
+        somewhere=far.low <= 4.0,
+        everywhere=far.high <= 4.0,
+    )
+    yield Family(  # the same by the other middle circle: never shortest, but of three trims
+        trims=3,
+        angles=((at + half, EITHER), (heading - at + half, EITHER)),
+        turn=heading + half + half,
+        length=half + half,
+        somewhere=np.zeros(far.low.shape, dtype=np.bool_),
+        everywhere=far.high <= 4.0,
+    )
+    straight = _tangent(far)
+    bend = Interval(np.arctan2(straight.high, -2.0), np.arctan2(straight.low, -2.0))
+    first = at + bend
+    yield Family(  # L R(pi/2) S L (8.9)
+        trims=4,
+        angles=((first, FORWARD), (heading - QUARTER - first, BACKWARD)),
+        turn=heading - QUARTER,
+        length=(straight - 2.0).size() + QUARTER,
+        somewhere=straight.high >= 2.0,
+        everywhere=far.low >= 2.0,
+    )
+    far, at = _polar(x + sin, y - 1.0 - cos)
+    first = at + QUARTER
+    yield Family(  # L R(pi/2) S R (8.10)
+        trims=4,
+        angles=((first, FORWARD), (first + QUARTER - heading, BACKWARD)),
+        turn=heading - QUARTER,
+        length=(far - 2.0).size() + QUARTER,
+        somewhere=far.high >= 2.0,
+        everywhere=far.high >= 0.0,
+    )
+
+
+def _two_turns(x: Interval, y: Interval, heading: Interval) -> Iterator[Family]:
+    """Paths of two turns and a straight, L R S: never shortest, but among those of three parts."""
+    sin, cos = heading.sin(), heading.cos()
+    along = x.times(cos) + y.times(sin) - sin
+    aside = y.times(cos) - x.times(sin) - 1.0 - cos
+    wide = aside.size()
+    half = Interval(*(np.sqrt(np.maximum(4.0 - end**2, 0.0)) for end in wide.ends[::-1]))
+    for last, ahead in ((along - half, half), (along + half, -half)):
+        _, bend = _polar(ahead, aside)
+        yield Family(
+            trims=3,
+            angles=((heading + bend + QUARTER, EITHER), (bend + QUARTER, EITHER)),
+            turn=heading,
+            length=last.size(),
+            somewhere=np.zeros(wide.low.shape, dtype=np.bool_),
+            everywhere=wide.high <= 2.0,
+        )
+
+
+def _opposite(x: Interval, y: Interval, heading: Interval) -> Iterator[Family]:
+    """Paths whose first and last circle are turned against each other: their own images."""
+    far, at = _polar(x + heading.sin(), y - 1.0 - heading.cos())
+    straight = _tangent(far)
+    first = at + Interval(np.arctan2(2.0, straight.high), np.arctan2(2.0, straight.low))
+    yield Family(  # L S R (8.2)
+        trims=3,
+        angles=((first, FORWARD), (first - heading, FORWARD)),
+        turn=heading,
+        length=straight,
+        somewhere=far.high >= 2.0,
+        everywhere=far.low >= 2.0,
+    )
+    first = at + Interval(np.arctan2(straight.high, -2.0), np.arctan2(straight.low, -2.0))
+    yield Family(  # L R(pi/2) S L(pi/2) R (8.11)
+        trims=5,
+        angles=((first, FORWARD), (first - heading, FORWARD)),
+        turn=heading,
+        length=(straight - 4.0).size() + HALF,
+        somewhere=straight.high >= 4.0,
+        everywhere=far.low >= 2.0,
+    )
+    middle = Interval(*(np.arccos(np.minimum((2.0 + end) / 4.0, 1.0)) for end in far.ends[::-1]))
+    first = at + middle - 1.5 * np.pi
+    yield Family(  # L R(u) L(u) R, the middle two in one gear (8.7)
+        trims=4,
+        angles=((first, FORWARD), (first - middle - middle - heading, BACKWARD)),
+        turn=heading + middle + middle,
+        length=middle + middle,
+        somewhere=far.low <= 2.0,
+        everywhere=far.high <= 2.0,
+    )
+    middle = Interval(*(np.arccos(np.clip(1.25 - end**2 / 16.0, -1.0, 1.0)) for end in far.ends))
+    first = at - HALF - _lag(middle)
+    yield Family(  # L R(u) L(u) R, the middle two in either gear (8.8); for u beyond pi/2 too
+        trims=4,
+        angles=((first, FORWARD), (first - heading, FORWARD)),
+        turn=heading,
+        length=middle + middle,
+        somewhere=(far.high >= 2.0) & (far.low <= np.sqrt(20.0)),
+        everywhere=(far.low >= 2.0) & (far.high <= 6.0),
+    )
+
+
+def _lag(middle: Interval) -> Interval:
+    """Angle of ``sin u + i (2 - cos u)``, which is least, pi / 3, at u = pi / 3."""
+    ends = [np.arctan2(2.0 - np.cos(u), np.sin(u)) for u in middle.ends]
+    least = np.where((middle.low <= HALF / 3) & (middle.high >= HALF / 3), HALF / 3, np.inf)
+    return Interval(np.minimum(least, np.minimum(*ends)), np.maximum(*ends))
+
+
+def _tangent(far: Interval) -> Interval:
+    """Length of the inner tangent of two circles of radius 1, their centres apart by `far`."""
+    return Interval(*(np.sqrt(np.maximum(end**2 - 4.0, 0.0)) for end in far.ends))
+
+
+def _polar(x: Interval, y: Interval) -> tuple[Interval, Interval]:
+    """Radius and angle of the points of rectangles; all angles where one holds the origin."""
+    across, along_y = x.size(), y.size()
+    far = Interval(np.hypot(across.low, along_y.low), np.hypot(across.high, along_y.high))
+    middle = np.arctan2(0.5 * (y.low + y.high), 0.5 * (x.low + x.high))
+    along, aside = np.cos(middle), np.sin(middle)
+    corners = np.stack(
+        [np.arctan2(v * along - u * aside, u * along + v * aside) for u in x.ends for v in y.ends]
+    )
+    around = far.low <= 0.0
+    low = np.where(around, -HALF, middle + corners.min(axis=0))
+    return far, Interval(low, np.where(around, HALF, middle + corners.max(axis=0)))
+
+
+def _holds(angle: Interval, value: float) -> BoolArray:
+    """Whether an interval holds `value`, modulo a full turn."""
+    return np.asarray(
+        np.floor((angle.high - value + SLACK) / FULL) >= np.ceil((angle.low - value - SLACK) / FULL)
+    )
+
+
+def _least(angle: Interval, sign: int) -> Array:
+    """Least size of an angle of that sign, modulo a full turn and within half a turn."""
+    if sign == EITHER:
+        return np.minimum(_least(angle, FORWARD), _least(angle, BACKWARD))
+    low = (angle if sign == FORWARD else -angle).low - SLACK
+    past = low - FULL * np.floor(low / FULL)
+    size = np.where(past <= HALF + 2.0 * SLACK, past, np.inf)
+    return np.where(_holds(angle, 0.0), 0.0, size)
+
+
+def _greatest(angle: Interval) -> Array:
+    """Greatest size of an angle, driven in the gear in which it is shorter."""
+    sizes = [np.abs(np.remainder(end + HALF, FULL) - HALF) for end in angle.ends]
+    return np.where(_holds(angle, HALF), HALF, np.maximum(*sizes))
