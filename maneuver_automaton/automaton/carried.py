@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,8 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton.plan import Plan
 from maneuver_automaton.groups import LieGroup, group_of
 from maneuver_automaton.models import Model
-from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.primitives import Maneuver
+from maneuver_automaton.primitives.trajectory import Trajectory
 
 
 def carried(plan: Plan, model: Model, part: str) -> Plan:
@@ -34,6 +35,7 @@ def carried(plan: Plan, model: Model, part: str) -> Plan:
     --------
     >>> from maneuver_automaton.models import UserModel
     >>> from maneuver_automaton.groups import SE2
+    >>> from maneuver_automaton.primitives import Trim
     >>> class Cart:
     ...     part_names = ("cart",)
     ...     def part_poses(self, z):  # one metre behind, whatever z is
@@ -52,16 +54,17 @@ def carried(plan: Plan, model: Model, part: str) -> Plan:
         """Where the part is, seen from the vehicle."""
         return group(np.asarray(model.part_poses(states)[..., which, :], dtype=np.float64))
 
-    def trim_of(trim: Trim) -> Trim:
-        seen = frame(trim.reduced_state).inverse().adjoint() @ trim.body_velocity
-        return replace(trim, body_velocity=seen)
-
+    states = np.array([trim.reduced_state for trim in plan.trims])
+    adjoints = frame(states).inverse().adjoint()
     start = group(plan.start) @ frame(_first_state(plan))
     return replace(
         plan,
         start=start.pose,
-        trims=tuple(trim_of(trim) for trim in plan.trims),
-        maneuvers=tuple(None if m is None else _maneuver(m, frame) for m in plan.maneuvers),
+        trims=tuple(
+            replace(trim, body_velocity=adjoint @ trim.body_velocity)
+            for trim, adjoint in zip(plan.trims, adjoints, strict=True)
+        ),
+        maneuvers=_maneuvers(plan.maneuvers, frame),
     )
 
 
@@ -74,13 +77,31 @@ def _first_state(plan: Plan) -> Array:
     return plan.trims[0].reduced_state
 
 
-def _maneuver(maneuver: Maneuver, frame: Callable[[Array], LieGroup]) -> Maneuver:
-    """The maneuver of the part, its displacement seen from where the part begins."""
-    course = maneuver.course
-    if course is None:
-        raise ValueError(f"maneuver {maneuver.name!r}: has no course, so nothing can be carried")
-    frames = frame(course.reduced_state)
+def _maneuvers(
+    maneuvers: Sequence[Maneuver | None], frame: Callable[[Array], LieGroup]
+) -> tuple[Maneuver | None, ...]:
+    """The maneuvers of the part, their displacements seen from where the part begins."""
+    courses: list[Trajectory] = []
+    for one in maneuvers:
+        if one is not None and one.course is None:
+            raise ValueError(f"maneuver {one.name!r}: has no course, so nothing can be carried")
+        courses += [one.course] if one is not None and one.course is not None else []
+    if not courses:
+        return tuple(maneuvers)
+    counts = [len(course.time) for course in courses]
+    firsts = np.cumsum(counts) - counts
+    frames = frame(np.concatenate([course.reduced_state for course in courses]))
     group = type(frames)
-    pose = (group(frames.pose[0]).inverse() @ group(course.pose) @ frames).pose.copy()
-    pose[0] = 0.0
-    return replace(maneuver, displacement=pose[-1], course=replace(course, pose=pose))
+    begins = group(frames.pose[np.repeat(firsts, counts)]).inverse()
+    poses = (begins @ group(np.concatenate([one.pose for one in courses])) @ frames).pose.copy()
+    poses[firsts] = 0.0
+    seen = iter(zip(courses, np.split(poses, firsts[1:]), strict=True))
+    moved: list[Maneuver | None] = []
+    for one in maneuvers:
+        if one is None:
+            moved.append(None)
+        else:
+            course, pose = next(seen)
+            there = replace(course, pose=pose)
+            moved.append(replace(one, displacement=pose[-1], course=there))
+    return tuple(moved)

@@ -1,8 +1,11 @@
 """Moving obstacles: advance in time by no more than the distance allows.
 
-From the exact distance at one time, the time at which two bodies can touch at the earliest; from
-there again, until they are closer than what counts as contact or the motion is over. Nothing is
-missed between, whatever turns, and two bodies reported to meet are no further apart than that.
+From a distance at one time, the time at which two bodies can touch at the earliest; from there
+again, until they are closer than what counts as contact or the motion is over. Nothing is missed
+between, whatever turns, and two bodies reported to meet are no further apart than that. The
+distance is that of discs and rectangles around them, with the direction that parts them: what
+passes by along an obstacle closes in with no speed, and takes one step. Where these overlap it is
+the exact one, which takes ten times as long.
 
 Solids in (x, y, c t) are the other sound way. Where all move straight they are exact, and a query
 takes 5 us. But the solid of what turns stands out by ``reach * turn / 2``, of the obstacle too,

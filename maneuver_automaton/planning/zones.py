@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from itertools import groupby
+import numpy as np
 
-from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.collision import Obstacle, Zone
-from maneuver_automaton.collision.fcl_checker import FclChecker
+from maneuver_automaton.collision.fcl_checker import Course, FclChecker
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.problem import Problem
@@ -28,34 +27,50 @@ def what_zone_forbids(problem: Problem, plan: Plan, origin: tuple[float, float])
     for zone in problem.zones:
         for moving, shapes in bodies:
             checker = FclChecker(shapes, (Obstacle(zone.shape),), origin=origin)
-            for k, (own, seen) in enumerate(zip(plan.primitives, moving.primitives, strict=True)):
-                start, duration = moving.switching_poses[k], float(plan.primitive_durations[k])
-                if isinstance(own, Trim):
-                    if not piece_is_admitted(zone, own):
-                        assert isinstance(seen, Trim)
-                        hit = checker.motion_hit(start[:3], seen.body_velocity[:3], duration)
-                        if hit is not None:
-                            return f"{zone.words} does not admit trim {k}, {own.name!r}"
-                else:
-                    assert isinstance(seen, Maneuver)
-                    if _course_enters(zone, checker, own, seen, start, model):
-                        return f"{zone.words} does not admit maneuver {k}, {own.name!r}"
+            number = _first_forbidden(zone, checker, plan, moving, model)
+            if number is not None:
+                own = plan.primitives[number]
+                kind = "trim" if isinstance(own, Trim) else "maneuver"
+                return f"{zone.words} does not admit {kind} {number}, {own.name!r}"
     return ""
 
 
-def _course_enters(
-    zone: Zone, checker: FclChecker, maneuver: Maneuver, seen: Maneuver, start: Array, model: Model
-) -> bool:
-    """Whether a maneuver, `seen` at one part, touches a zone where it is not admitted."""
-    course = seen.course
-    if course is None:
-        return True
+def _first_forbidden(
+    zone: Zone, checker: FclChecker, plan: Plan, moving: Plan, model: Model
+) -> int | None:
+    """The first primitive that touches a zone with one body where it is not admitted."""
+    trims = [
+        k
+        for k, own in enumerate(plan.primitives)
+        if isinstance(own, Trim) and not piece_is_admitted(zone, own)
+    ]
+    twists = [moving.primitives[k].body_velocity[:3] for k in trims]  # type: ignore[union-attr]
+    hit = checker.motions_hit(
+        moving.switching_poses[trims, :3],
+        np.array(twists).reshape(-1, 3),
+        plan.primitive_durations[trims],
+    )
+    first = None if hit is None else trims[hit[0]]
+    numbers: list[int] = []
+    courses: list[Course] = []
+    unknown = None  # the first maneuver of which nobody knows where it leads
+    for k, (own, seen) in enumerate(zip(plan.primitives, moving.primitives, strict=True)):
+        if isinstance(own, Trim) or isinstance(seen, Trim) or (first is not None and k > first):
+            continue
+        if seen.course is None:
+            unknown = k
+            break
+        start = moving.switching_poses[k, :3]
+        for rows in _forbidden_rows(zone, own, model):
+            numbers.append(k)
+            courses.append(Course(start, seen.course.pose[rows, :3], seen.course.time[rows], 0.0))
+    entered = checker.courses_hit(courses)
+    found = [first, unknown, None if entered is None else numbers[entered[0]]]
+    return min((one for one in found if one is not None), default=None)
+
+
+def _forbidden_rows(zone: Zone, maneuver: Maneuver, model: Model) -> list[slice]:
+    """Runs of samples of a maneuver's course along which a zone does not admit it."""
     forbidden = ~admitted_stretches(zone, maneuver, model)
-    for is_forbidden, group in groupby(range(forbidden.size), key=lambda k: bool(forbidden[k])):
-        stretch = list(group)
-        if is_forbidden:
-            rows = slice(stretch[0], stretch[-1] + 2)
-            hit = checker.course_hit(start[:3], course.pose[rows, :3], course.time[rows])
-            if hit is not None:
-                return True
-    return False
+    runs = np.flatnonzero(np.diff(np.concatenate([[False], forbidden, [False]]).astype(np.int8)))
+    return [slice(first, last + 1) for first, last in runs.reshape(-1, 2).tolist()]
