@@ -15,7 +15,7 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton._display import Player, picture, player_frame, player_page
 from maneuver_automaton.errors import MissingExtra
 from maneuver_automaton.groups import LieGroup, group_of
-from maneuver_automaton.groups.chain import chained
+from maneuver_automaton.groups.chain import chained, coasted, coasted_once
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 
@@ -200,6 +200,8 @@ class Plan:
         """Poses (m + 1, dof) at the switching times."""
         if not self.primitives:
             return self.start[None].copy()
+        if not any(self.maneuvers):
+            return coasted(self.start, self._twists, self.primitive_durations)
         steps = group_of(self.start.size).exp(self.primitive_durations[:, None] * self._twists).pose
         steps = steps.copy()
         for k, primitive in enumerate(self.primitives):
@@ -225,6 +227,10 @@ class Plan:
         if not self.primitives:
             return np.broadcast_to(self.start, (*times.shape, self.start.size)).copy()
         index = self._index_at(times)
+        if not (times.ndim or any(self.maneuvers)):
+            passed = max(float(times - self.switching_times[index]), 0.0)
+            passed = min(passed, float(self.primitive_durations[index]))
+            return coasted_once(self.switching_poses[index], self._twists[index], passed)
         begin = group_of(self.start.size)(self.switching_poses[index])
         since = np.clip(times - self.switching_times[index], 0.0, self.primitive_durations[index])
         steps = np.array(begin.exp(since[..., None] * self._twists[index]).pose)
