@@ -76,7 +76,7 @@ class Plan:
             raise ValueError(
                 f"plan: got {self.durations.shape} durations for {len(self.trims)} trims"
             )
-        if (self.durations < 0.0).any():
+        if min(self.durations.tolist(), default=0.0) < 0.0:
             raise ValueError(f"plan: durations must not be negative, got {self.durations.min()} s")
         if self.maneuvers and len(self.maneuvers) != len(self.trims) - 1:
             raise ValueError(
