@@ -172,23 +172,20 @@ def fold(
 ) -> float:
     """Move `edge` along its branch as far towards `beyond` as the branch goes; its value there."""
     q = free[0]
-    steering = (problem.twists, problem.goal, problem.tolerance, candidates.counter)
     trial = np.empty(edge.size)
     assign(trial, edge)
+    evaluate(problem, candidates, word, n, triple, free, trial, branch, scratch, values)
+    value = values[0]
     good = edge[q]
     for _ in range(30):
         trial[q] = 0.5 * (good + beyond)
-        solve_triple(steering, word, n, triple, trial, scratch[0])
-        if math.isnan(scratch[0][branch, 0]):
-            beyond = trial[q]
-        else:
+        if evaluate(problem, candidates, word, n, triple, free, trial, branch, scratch, values):
             good = trial[q]
-    trial[q] = good
-    if evaluate(problem, candidates, word, n, triple, free, trial, branch, scratch, values):
-        assign(edge, trial)
-    else:  # singular where the branch ends
-        evaluate(problem, candidates, word, n, triple, free, edge, branch, scratch, values)
-    return values[0]
+            assign(edge, trial)
+            value = values[0]
+        else:
+            beyond = trial[q]
+    return value
 
 
 @inner_kernel
