@@ -168,9 +168,11 @@ class WordScan:
         """Scan and polish, shorter words first; False if a limit ended it."""
         modes = list(self.modes())
         tail = 1 if self.setup.free_heading else 0
-        if max_words is None and self._takes_a_moment(modes, budget):
-            self._run_at_once(modes, tail)
-            return True
+        if max_words is None:
+            at_once = [mode for mode in modes if self._takes_a_moment(mode, budget)]
+            if at_once:
+                self._run_at_once(at_once, tail)
+            modes = [mode for mode in modes if mode not in at_once]
         for n in range(1, self.most + 1):
             for mode in modes:
                 if n > mode.most_moving or mode.at_least > tied(float(self.found.best[-1])):
@@ -183,21 +185,19 @@ class WordScan:
                     self._gridded = True
         return True
 
-    def _takes_a_moment(self, modes: Sequence[Mode], budget: Budget) -> bool:
+    def _takes_a_moment(self, mode: Mode, budget: Budget) -> bool:
         """Whether a whole scan is so short that nobody asks the clock meanwhile."""
         tail = 1 if self.setup.free_heading else 0
         if self.most + tail > MOST_AT_ONCE:
             return False
-        seconds = 0.0
-        for mode in modes:
-            if not mode.at_least > tied(float(self.found.best[-1])):
-                each = SECONDS_PER_WORD if mode.kernel_problem[0].targets.size else SECONDS_IF_FREE
-                for n in range(1, min(self.most, mode.most_moving) + 1):
-                    seconds += len(self.setup.trims) ** n * each[n + tail]
+        each = SECONDS_PER_WORD if mode.kernel_problem[0].targets.size else SECONDS_IF_FREE
+        most = min(self.most, mode.most_moving)
+        numbers = range(1, most + 1)
+        seconds = math.fsum(len(self.setup.trims) ** n * each[n + tail] for n in numbers)
         return seconds <= MOMENT and seconds <= AT_ONCE * budget.left
 
     def _run_at_once(self, modes: Sequence[Mode], tail: int) -> None:
-        """The whole scan in one call: calls take longer than the scan of a few words."""
+        """The whole scan of some modes in one call: calls take longer than a scan of few words."""
         from maneuver_automaton.search import _kernels_all_words
 
         both = (*modes, modes[0])[:2]  # in place of a second way to meet the time
