@@ -77,8 +77,8 @@ def seen_from(start: Array, pose: Array) -> Array:
 
     Examples
     --------
-    >>> seen_from(np.array([1.0, 2.0, np.pi / 2]), np.array([1.0, 5.0, np.pi])).round(3).tolist()
-    [3.0, -0.0, 1.571]
+    >>> seen_from(np.array([1.0, 2.0, np.pi / 2]), np.array([0.0, 5.0, np.pi])).round(3).tolist()
+    [3.0, 1.0, 1.571]
     """
     here, there = start.tolist(), pose.tolist()
     x, y = there[0] - here[0], there[1] - here[1]
