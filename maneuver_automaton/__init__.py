@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.planning import Planner as Planner
     from maneuver_automaton.planning import PlanResult as PlanResult
     from maneuver_automaton.planning import PlanStatus as PlanStatus
+    from maneuver_automaton.planning import plan_many as plan_many
     from maneuver_automaton.planning import plans as plans
     from maneuver_automaton.planning.lower_bound import lower_bound as lower_bound
     from maneuver_automaton.planning.plan import plan as plan
@@ -135,6 +136,7 @@ _HOMES = {
     "lower_bound": "planning.lower_bound",
     "plan": "planning",
     "plan_road": "roads",
+    "plan_many": "planning",
     "plans": "planning",
     "ros_messages": "exports",
     "save_commonroad_solution": "exports",

@@ -19,6 +19,7 @@ class _State:
     """What came; no dataclass, since a signal may come before that module is imported."""
 
     signal: int | None = None
+    listening: bool = False
     patient: int = 0  # blocks that end by themselves once `stopped`
     compiling: int = 0  # functions that the compiler is at work on: it asks nobody
     tells: tuple[Callable[[], None], ...] = ()  # what to call when the first signal comes
@@ -30,6 +31,11 @@ _STATE = _State()
 def stopped() -> bool:
     """Whether a signal has asked to come to an end."""
     return _STATE.signal is not None
+
+
+def is_main_program() -> bool:
+    """Whether this process is the command line's own, rather than somebody else's program."""
+    return _STATE.listening
 
 
 def clock() -> float:
@@ -94,9 +100,11 @@ def listening() -> Iterator[None]:
         if before[one] is not signal.SIG_IGN:  # as of a process in the background
             signal.signal(one, _take)
     sys.unraisablehook = lambda lost: None if lost.exc_type is KeyboardInterrupt else hook(lost)
+    _STATE.listening = True
     try:
         yield
     finally:
+        _STATE.listening = False
         sys.unraisablehook = hook
         for one, handler in before.items():
             signal.signal(one, handler)

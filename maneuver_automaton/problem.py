@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -146,6 +147,7 @@ class SearchSettings:
     headings: int | None = None  # of the lattice, 72 if None
     weight: float | None = None  # of the cost to go in the first pass, 2 if None
     show_nodes: bool = False  # hand over what the first plan's search expanded
+    improve: bool = True  # a plan that was found; otherwise the first that passes is returned
 
     def __post_init__(self) -> None:
         if self.method not in SEARCH_METHODS:
@@ -513,7 +515,7 @@ class Problem:
             zones=tuple(zone.moved(by) for zone in self.zones),
         )
 
-    @property
+    @functools.cached_property
     def moves(self) -> bool:
         """Whether an obstacle moves."""
         return any(moves(obstacle) for obstacle in self.obstacles)

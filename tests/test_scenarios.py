@@ -18,6 +18,7 @@ FOLDER = Path(__file__).parent.parent / "scenarios"
 FILES = sorted(FOLDER.glob("*.yaml"))
 FEW, MANY = 3000, 40_000  # expansions: they end a search after the same work everywhere
 NEED_MORE = {
+    "effort_among_obstacles": 6000,
     "helicopter_city": 36_000,
     "narrow_corridor": MANY,
     "omnidirectional": MANY,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from maneuver_automaton.audit.frames import Spans
 from maneuver_automaton.audit.pairs import moving_pairs, overlapped, still_pairs
-from maneuver_automaton.audit.passages import Body, Pairs, bounds_of
+from maneuver_automaton.audit.passages import Body, Bounds, Pairs, bounds_of, places_of, time_of
 from maneuver_automaton.audit.surroundings import Surroundings
 
 CONTACT = 1e-9  # [m] what is closer touches: places are rounded
@@ -65,15 +65,18 @@ def least_clearance(
     """
     if not around.owners.size or not spans.element.size:
         return NEVER
-    least = NEVER
-    if body.frames.series.shape[2] == 3 and overlapped(body, around, spans) >= 0:
+    places, least = places_of(body, spans), NEVER
+    if overlapped(body, around, places) >= 0:
         start = float(body.frames.times_at(spans.element[:1], spans.begin[:1])[0])
         return Least(0.0, 0.0, start)
-    for batch in (still_pairs, moving_pairs):
-        for nearest, pairs in batch(body, around, spans):
-            if not nearest < least.measured:
-                break
-            least = _sharpened(body, around, pairs, least, enough, ask)
+    if around.still.size:
+        pairs, known = still_pairs(body, around, places)
+        least = _sharpened(body, around, pairs, known, least, enough, ask)
+    for nearest, pairs in moving_pairs(body, around, places):
+        if not nearest < least.measured:
+            break
+        known = bounds_of(body, around, pairs)
+        least = _sharpened(body, around, pairs, known, least, enough, ask)
     return least._replace(distance=max(least.distance, 0.0))
 
 
@@ -81,6 +84,7 @@ def _sharpened(
     body: Body,
     around: Surroundings,
     pairs: Pairs,
+    known: Bounds,
     least: Least,
     enough: float,
     ask: Callable[[], None],
@@ -89,10 +93,11 @@ def _sharpened(
     floor = least.distance
     for number in range(ROUNDS):
         ask()
-        known = bounds_of(body, around, pairs)
-        best = int(np.argmin(known.measured))
-        if known.measured[best] < least.measured:
-            least = Least(floor, float(known.measured[best]), float(known.time[best]))
+        measured = known.measured
+        best = int(np.argmin(measured))
+        if measured[best] < least.measured:
+            time = time_of(body, pairs, known, best)
+            least = Least(floor, float(measured[best]), time)
         sharp = least.measured - max(SHARP[0], SHARP[1] * least.measured)
         undecided = (known.least <= enough) & (enough < least.measured)
         open_ = ((known.least < sharp) | undecided) & (least.measured > CONTACT)
@@ -101,24 +106,28 @@ def _sharpened(
         floor = min(floor, float(known.least[~open_].min(initial=math.inf)))
         if not open_.any():
             break
-        pairs = _cut(pairs, open_)
+        pairs = _cut(body, pairs, open_)
+        known = bounds_of(body, around, pairs)
     return least._replace(distance=floor)
 
 
-def _cut(pairs: Pairs, open_: NDArray[np.bool_]) -> Pairs:
+def _cut(body: Body, pairs: Pairs, open_: NDArray[np.bool_]) -> Pairs:
     """Some stretches in `PARTS` each."""
-    rows = np.repeat(np.flatnonzero(open_), PARTS)
-    part = np.tile(np.arange(PARTS), rows.size // PARTS)
-    kept, number = np.unique(pairs.span[open_], return_inverse=True)
-    whole = pairs.spans.of(kept)
+    cut = np.flatnonzero(open_)
+    rows, part = np.repeat(cut, PARTS), np.tile(np.arange(PARTS), cut.size)
+    kept = np.zeros(pairs.places.lasts.size, dtype=np.bool_)
+    kept[pairs.span[cut]] = True
+    number = (np.cumsum(kept) - 1)[pairs.span[rows]]
+    whole = pairs.places.spans.of(np.flatnonzero(kept))
     shares = np.arange(PARTS + 1) / PARTS
     ends = whole.begin[:, None] + (whole.end - whole.begin)[:, None] * shares
     ends[:, -1] = whole.end
     spans = Spans(np.repeat(whole.element, PARTS), ends[:, :-1].ravel(), ends[:, 1:].ravel())
-    span = np.repeat(number, PARTS) * PARTS + part
+    span = number * PARTS + part
+    places = places_of(body, spans)
     if pairs.frames is None:
-        return Pairs(spans, span, pairs.edge[rows], None)
+        return Pairs(places, span, pairs.edge[rows], None)
     first, last = pairs.frames[rows, 0], pairs.frames[rows, 1]
     between = np.stack([part, part + 1], axis=1)[..., None] / PARTS
     frames = first[:, None] + between * (last - first)[:, None]
-    return Pairs(spans, span, pairs.edge[rows], frames)
+    return Pairs(places, span, pairs.edge[rows], frames)

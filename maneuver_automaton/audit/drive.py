@@ -121,11 +121,13 @@ def driven(plan: Plan, model: Model) -> Drive:
 
 def _cut(stated: Stated, turns: Array, parts: IntArray, alone: NDArray[np.bool_]) -> _Elements:
     """Runs of one control within a primitive that turn by no more than `TURN`, or equal parts."""
-    breaks = (np.diff(stated.controls, axis=0) != 0.0).any(axis=1)
-    breaks |= (np.diff(stated.pieces) != 0) | alone[1:] | alone[:-1]
-    breaks |= np.diff(np.floor((np.cumsum(turns) - turns) / TURN)) != 0.0
-    run = np.concatenate([[0], np.cumsum(breaks)])
-    begins = np.concatenate([[0], 1 + np.flatnonzero(breaks)])
+    controls, pieces = stated.controls, stated.pieces
+    turned = np.floor((np.cumsum(turns) - turns) / TURN)
+    breaks = np.ones(pieces.size, dtype=np.bool_)
+    breaks[1:] = (pieces[1:] != pieces[:-1]) | alone[1:] | alone[:-1] | (turned[1:] != turned[:-1])
+    breaks[1:] |= (controls[1:] != controls[:-1]).any(axis=1)
+    run = np.cumsum(breaks) - 1
+    begins = np.flatnonzero(breaks)
     count = parts[begins]
     of = np.repeat(np.arange(begins.size), count)
     number = np.arange(of.size) - (np.cumsum(count) - count)[of]
@@ -156,23 +158,28 @@ def _compared(
     """The drive, and the greatest difference to what the plan states of it."""
     reduced, frames = found.reduced, found.frames
     # What a reduced state is off moves the vehicle for as long as it is driven.
-    unknown = (1.0 + float(frames.times[-1])) * (reduced.error + reduced.jumps / reduced.error.size)
-    frames = replace(frames, error=frames.error + unknown)
+    has_states = bool(reduced.series.shape[2])
+    if has_states:
+        doubt = reduced.error + reduced.jumps / reduced.error.size
+        frames = replace(frames, error=frames.error + (1.0 + float(frames.times[-1])) * doubt)
     ends = np.cumsum(stated.lengths)
     at = np.searchsorted(elements.first, np.arange(ends.size), side="right") - 1
-    share = np.clip((ends - frames.times[at]) / elements.lengths[at], 0.0, 1.0)
+    share = np.maximum((ends - frames.times[at]) / elements.lengths[at], 0.0)
     inner = np.flatnonzero(share < 1.0)
     poses, states = frames.series.sum(axis=1)[at], reduced.series.sum(axis=1)[at]
-    poses[inner] = frames.at(at[inner], share[inner])
-    states[inner] = values_at(reduced.series[at[inner]], share[inner])
-    twists = np.nan_to_num(found.twists - stated.twists[elements.first][:, None])
-    differences = (
-        poses - stated.ends,
-        states - stated.end_states,
-        states[:-1] - stated.states[1:],  # what begins states it anew
-        twists * elements.lengths[:, None, None],
-    )
-    off = max(float(np.abs(one).max(initial=0.0)) for one in differences)
+    if inner.size:
+        poses[inner] = frames.at(at[inner], share[inner])
+    if inner.size and has_states:
+        states[inner] = values_at(reduced.series[at[inner]], share[inner])
+    off_poses = np.abs(poses - stated.ends)
+    off_twists = np.abs(found.twists - stated.twists[elements.first][:, None])
+    off_twists *= elements.lengths[:, None, None]
+    # Of the twists of maneuvers nothing is stated: those are not numbers, and do not count.
+    off = np.maximum(off_poses.max(), np.fmax.reduce(off_twists, axis=None, initial=0.0))
+    if has_states:
+        off = np.maximum(off, np.abs(states - stated.end_states).max())
+        begun_anew = np.abs(states[:-1] - stated.states[1:]).max(initial=0.0)
+        off = np.maximum(off, begun_anew)
     return Drive(
         plan=plan,
         model=model,
@@ -180,8 +187,8 @@ def _compared(
         twists=found.twists,
         states=reduced.nodes,
         end=poses[-1],
-        off=off + reduced.jumps,
-        turned=float(np.abs(differences[0][:, 2]).max(initial=0.0)),
+        off=float(off) + reduced.jumps,
+        turned=float(off_poses[:, 2].max()),
         ends=ends,
         pieces=stated.pieces,
         controls=stated.controls,

@@ -8,7 +8,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.audit.legendre import INTEGRAL, SERIES, SLOPE, SLOPES, TO_NODES, values_at
+from maneuver_automaton.audit.legendre import (
+    INTEGRAL,
+    SERIES,
+    SLOPE,
+    SLOPES,
+    TO_END,
+    TO_NODES,
+    values_at,
+)
 
 
 class Spans(NamedTuple):
@@ -36,8 +44,8 @@ class Frames:
     nodes: Array  # (e, N, dof) poses at the nodes
     speed: Array  # (e,) [m/s] of the origin at most
     turn: Array  # (e,) [rad/s]
-    pull: Array  # (e,) [m/s^2] how fast the velocity seen from the body changes
-    swerve: Array  # (e,) [rad/s^2] how fast the turn rate changes
+    bend: Array  # (e,) [m/s^2] how fast the velocity changes
+    swerve: Array  # (e,) [1/s^2] what is added for each metre from the origin
     rise: Array  # (e,) [m/s^2] how fast the climb rate changes
     error: Array  # (e,) [m, rad] of one element, as far as its last terms show
     length: float  # [m] of the path at most
@@ -51,7 +59,6 @@ class Frames:
         begins = self.times[elements]
         return np.asarray(begins + shares * (self.times[elements + 1] - begins))
 
-    @property
     def doubt(self) -> float:
         """How far [m, rad] a pose may be off at most: errors add up, and headings have levers."""
         return float(self.error.sum()) * (1.0 + self.length)
@@ -63,7 +70,7 @@ def frames_along(start: Array, twists: Array, lengths: Array) -> Frames:
     The heading is the integral of the turn rate, the place that of the velocity seen with it.
     """
     h = lengths[:, None]
-    heading = start[2] + _before(h[:, 0] * (twists[..., 2] @ INTEGRAL.sum(axis=0)))[:-1, None]
+    heading = start[2] + _before(h[:, 0] * (twists[..., 2] @ TO_END))[:-1, None]
     heading = heading + h * (twists[..., 2] @ TO_NODES.T)
     cosine, sine = np.cos(heading), np.sin(heading)
     rates = twists.copy()
@@ -95,15 +102,15 @@ def _bounded(lengths: Array, series: Array, nodes: Array, twists: Array, error: 
     terms = np.abs(SERIES @ twists)  # (e, N, dof)
     most = terms.sum(axis=1)
     change = SLOPES @ terms / lengths[:, None]
-    speed = np.hypot(most[:, 0], most[:, 1])
+    speed, turn = np.hypot(most[:, 0], most[:, 1]), most[:, 2]
     return Frames(
         times=_before(lengths),
         series=series,
         nodes=nodes,
         speed=speed,
-        turn=most[:, 2],
-        pull=np.hypot(change[:, 0], change[:, 1]),
-        swerve=change[:, 2],
+        turn=turn,
+        bend=np.hypot(change[:, 0], change[:, 1]) + turn * speed,
+        swerve=change[:, 2] + turn * turn,
         rise=change[:, 3:].sum(axis=1),
         error=error,
         length=float(speed @ lengths),

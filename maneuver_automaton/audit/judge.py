@@ -198,7 +198,8 @@ def _body(
     return Body(
         outline=body_outline(shapes),
         frames=frames,
-        offset=goal.pose[:2] - origin_of(goal.pose),
+        offset=complex(*(goal.pose[:2] - origin_of(goal.pose))),
+        doubt=frames.doubt(),
         height=height,
         base=float(goal.pose[3:].sum()),
         clock=plan.start_time,
@@ -247,8 +248,10 @@ def _beyond_limits(drive: Drive) -> list[str]:
         (model.reduced_names, model.reduced_limits, drive.sampled_states),
         (model.control_names, model.control_limits, drive.controls),
     ):
-        for name, (low, high), column in zip(names, limits.tolist(), values.T, strict=True):
-            excess = max(float(column.max()) - high, low - float(column.min()))
+        most, least = values.max(axis=0).tolist(), values.min(axis=0).tolist()
+        rows = zip(names, limits.tolist(), most, least, strict=True)
+        for name, (low, high), greatest, smallest in rows:
+            excess = max(greatest - high, low - smallest)
             size = max([1.0, *(abs(limit) for limit in (low, high) if math.isfinite(limit))])
             if excess > LIMIT_TOLERANCE * size:
                 reasons.append(f"{name} is {excess:.3g} beyond its limits [{low:.6g}, {high:.6g}]")

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.audit.apart import Points, points_of
 from maneuver_automaton.audit.stated import placed
 from maneuver_automaton.collision.shapes import Box, Disc, OccupancyMap, Shape
 
@@ -17,8 +19,8 @@ from maneuver_automaton.collision.shapes import Box, Disc, OccupancyMap, Shape
 class Outline(NamedTuple):
     """Edges of rings; a disc is an edge without length that has a radius."""
 
-    begins: Array  # (n, 2) [m], which are all corners
-    ends: Array  # (n, 2) [m]
+    begins: Points  # (n,) [m], which are all corners
+    ends: Points  # (n,) [m]
     radius: Array  # (n,) [m]
     solid: IntArray  # (n,) which solid each edge bounds, in order; holes bound theirs too
 
@@ -27,27 +29,51 @@ class Outline(NamedTuple):
         solid = np.unique(self.solid[kept], return_inverse=True)[1]
         return Outline(self.begins[kept], self.ends[kept], self.radius[kept], solid)
 
-    def holds(self, points: Array) -> Any:
-        """Whether points (m, 2) are in each solid (s, m): the rings run around them.
+    def at(self, rows: IntArray) -> Outline:
+        """Some of its edges, in any order, each with the number of its solid."""
+        return Outline(self.begins[rows], self.ends[rows], self.radius[rows], self.solid[rows])
+
+    @property
+    def firsts(self) -> IntArray:
+        """Numbers of the first edges of the solids."""
+        return np.flatnonzero(np.diff(self.solid, prepend=-1))
+
+    def turns_about(self, points: Points) -> IntArray:
+        """By how many turns each edge takes part in running around points (m,): (n, m)."""
+        a, b = self.begins[:, None], self.ends[:, None]
+        rises = (b.imag > points.imag).astype(np.int64) - (a.imag > points.imag)
+        to = points - a
+        turns = rises * (((b - a).conj() * to).imag * rises > 0.0)
+        if self.radius.any():
+            round_ = self.radius[:, None]
+            turns += (round_ > 0.0) & (np.abs(to) <= round_)
+        return turns
+
+    def holds(self, points: Points) -> Any:
+        """Whether points (m,) are in each solid (s, m): the rings run around them.
 
         Examples
         --------
         >>> square = outline_of((Box([2.0, 2.0]), Disc(1.0, [5.0, 0.0])))
-        >>> square.holds(np.array([[0.5, 0.5], [4.5, 0.0]])).tolist()
+        >>> square.holds(np.array([0.5 + 0.0j, 4.5 + 0.0j])).tolist()
         [[True, False], [False, True]]
         """
-        a, b, p = self.begins[:, None], self.ends[:, None], points[None]
-        rises = (b[..., 1] > p[..., 1]).astype(np.int64) - (a[..., 1] > p[..., 1])
-        to, along = p - a, b - a
-        side = along[..., 0] * to[..., 1] - along[..., 1] * to[..., 0]
-        turns = rises * (side * rises > 0.0)
-        round_ = self.radius[:, None]
-        if round_.any():
-            turns += (round_ > 0.0) & (np.hypot(to[..., 0], to[..., 1]) <= round_)
-        if not len(turns):
-            return np.zeros((0, len(points)), dtype=np.bool_)
-        firsts = np.flatnonzero(np.diff(self.solid, prepend=-1))
-        return np.add.reduceat(turns, firsts, axis=0) != 0
+        if not self.radius.size:
+            return np.zeros((0, points.size), dtype=np.bool_)
+        return np.asarray(np.add.reduceat(self.turns_about(points), self.firsts, axis=0) != 0)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class BodyOutline:
+    """The outline of a body, and how far it reaches."""
+
+    edges: Outline
+    firsts: Points  # (s,) a corner of each solid
+    reach: Array  # (n,) [m] from the frame to each corner
+    most_reach: float  # [m]
+    radius: float  # [m] the greatest
+    middle: complex  # of the box around the corners
+    size: float  # [m] radius of a disc around the middle that holds the body
 
 
 def outline_of(shapes: Sequence[Shape], origin: tuple[float, float] = (0.0, 0.0)) -> Outline:
@@ -59,21 +85,40 @@ def outline_of(shapes: Sequence[Shape], origin: tuple[float, float] = (0.0, 0.0)
         If a polygon has no area.
     """
     if not shapes:
-        point = np.zeros((1, 2))
+        point = np.zeros(1, dtype=np.complex128)
         return Outline(point, point, np.zeros(1), np.zeros(1, dtype=np.int64))
     return joined([_outline(shape, np.array(origin)) for shape in shapes])
 
 
 @functools.lru_cache(maxsize=32)
-def body_outline(shapes: tuple[Shape, ...]) -> Outline:
-    """As `outline_of`; those of the last bodies are kept."""
-    return outline_of(shapes)
+def body_outline(shapes: tuple[Shape, ...]) -> BodyOutline:
+    """The outline of a body; those of the last bodies are kept.
+
+    Examples
+    --------
+    >>> car = body_outline((Box([4.0, 2.0], center=[1.0, 0.0]),))
+    >>> car.middle, round(car.size, 3), round(car.most_reach, 3)
+    ((1+0j), 2.236, 3.162)
+    """
+    edges = outline_of(shapes)
+    corners, reach = edges.begins, np.abs(edges.begins)
+    x, y = corners.real, corners.imag
+    middle = complex(0.5 * (x.min() + x.max()), 0.5 * (y.min() + y.max()))
+    return BodyOutline(
+        edges=edges,
+        firsts=corners[edges.firsts],
+        reach=reach,
+        most_reach=float(reach.max()),
+        radius=float(edges.radius.max()),
+        middle=middle,
+        size=float((np.abs(corners - middle) + edges.radius).max()),
+    )
 
 
 def joined(outlines: Sequence[Outline]) -> Outline:
     """Several outlines as one."""
     if not outlines:
-        nothing = np.zeros((0, 2))
+        nothing = np.zeros(0, dtype=np.complex128)
         return Outline(nothing, nothing, np.zeros(0), np.zeros(0, dtype=np.int64))
     counts = [0, *np.cumsum([int(one.solid.max(initial=-1)) + 1 for one in outlines])[:-1].tolist()]
     return Outline(
@@ -99,7 +144,8 @@ def map_outline(one: OccupancyMap, origin: tuple[float, float]) -> Outline:
     seen = np.concatenate([one.resolution * ends, np.zeros((2, len(low), 1))], axis=-1)
     corners = placed(one.origin - [*origin, 0.0], seen)
     n = len(low)
-    return Outline(corners[0, :, :2], corners[1, :, :2], np.zeros(n), np.zeros(n, dtype=np.int64))
+    begins, ends = points_of(corners)
+    return Outline(begins, ends, np.zeros(n), np.zeros(n, dtype=np.int64))
 
 
 def _borders(changes: Array) -> tuple[Array, Array, Array, Array]:
@@ -117,7 +163,7 @@ def _borders(changes: Array) -> tuple[Array, Array, Array, Array]:
 
 def _outline(shape: Shape, origin: Array) -> Outline:
     if isinstance(shape, Disc):
-        center = shape.center[None] - origin
+        center = points_of(shape.center[None] - origin)
         return Outline(center, center, np.array([shape.radius]), np.zeros(1, dtype=np.int64))
     if isinstance(shape, Box):
         corners = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]) * shape.size
@@ -128,8 +174,8 @@ def _outline(shape: Shape, origin: Array) -> Outline:
 
 
 def _rings(rings: Sequence[Array]) -> Outline:
-    begins = np.concatenate(rings)
-    ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
+    begins = points_of(np.concatenate(rings))
+    ends = points_of(np.concatenate([np.roll(ring, -1, axis=0) for ring in rings]))
     n = len(begins)
     return Outline(begins, ends, np.zeros(n), np.zeros(n, dtype=np.int64))
 
@@ -168,5 +214,5 @@ def _faces(ring: Array) -> Any:
     lines = shapely.get_parts(shapely.node(shapely.LineString(np.vstack([ring, ring[:1]]))))
     faces = shapely.get_parts(shapely.polygonize(lines))
     inner = [[face.representative_point().x, face.representative_point().y] for face in faces]
-    around = _rings([ring]).holds(np.array(inner).reshape(-1, 2))[0]
+    around = _rings([ring]).holds(points_of(np.array(inner).reshape(-1, 2)))[0]
     return shapely.union_all(faces[around])

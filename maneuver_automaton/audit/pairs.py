@@ -3,46 +3,48 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.audit.apart import crossed, point_apart
+from maneuver_automaton.audit.apart import Points, crossed, directions, point_apart, points_of
 from maneuver_automaton.audit.frames import Spans
 from maneuver_automaton.audit.outlines import Outline
 from maneuver_automaton.audit.passages import (
     Body,
+    Bounds,
     Pairs,
+    Places,
     bounds_of,
-    corners_of,
-    off_chords,
-    placed_at,
-    poses_of,
-    seen_from,
+    places_of,
 )
 from maneuver_automaton.audit.surroundings import Surroundings
-from maneuver_automaton.collision.shapes import Motion
 
 CHORD = 0.25  # [rad] of the first stretches
 LONGEST = 64.0  # of which the path of a small body has so many
-_ZERO: Array = np.zeros(1)
 SPARE = 1e-6  # [m] that nothing is left out for rounding
-GUESSES = 16  # places where an edge is looked for that is near
-NEAREST = 64  # pairs with moving obstacles that are looked at first
+FIRST_WITHIN = 0.1  # of the body's size: how far around it edges are looked for first
+FURTHER = 4.0  # times as far, if there is none
+NEAREST = 64  # pairs that are looked at first
+MANY = 256  # pairs at least, of which those that are far are left out first
 
 
 def spans_within(body: Body, first: float, last: float) -> Spans:
     """Stretches that turn little, and are about as long as the body, between two times [s]."""
     frames, times = body.frames, body.frames.times
-    lengths = np.diff(times)
-    steps = max(frames.length / LONGEST, _size(body), 1e-9)
+    lengths = times[1:] - times[:-1]
+    steps = max(frames.length / LONGEST, body.outline.size, 1e-9)
     count = np.ceil(np.maximum(frames.turn / CHORD, frames.speed / steps) * lengths)
     count = np.maximum(count, 1.0).astype(np.int64)
     element = np.repeat(np.arange(lengths.size), count)
     number = np.arange(element.size) - (np.cumsum(count) - count)[element]
+    begin, end = number / count[element], (number + 1) / count[element]
+    if first <= 0.0 and last >= times[-1]:
+        return Spans(element, begin, end)
     low, high = (np.clip((at - times[:-1]) / lengths, 0.0, 1.0) for at in (first, last))
-    begin = np.maximum(number / count[element], low[element])
-    end = np.minimum((number + 1) / count[element], high[element])
+    begin, end = np.maximum(begin, low[element]), np.minimum(end, high[element])
     kept = begin < end
     if not kept.any():  # an instant
         here = np.clip(np.searchsorted(times, first, "right") - 1, 0, lengths.size - 1)
@@ -51,127 +53,212 @@ def spans_within(body: Body, first: float, last: float) -> Spans:
     return Spans(element[kept], begin[kept], end[kept])
 
 
-def overlapped(body: Body, around: Surroundings, spans: Spans) -> int:
-    """An edge of an obstacle that the body overlaps as the first stretch begins; -1 for none."""
-    first = spans.of(slice(1))
-    pose = poses_of(body, first)[0]
-    now = body.clock + body.frames.times_at(first.element, first.begin)
-    x, y = corners_of(body, pose)
-    radius = float(body.outline.radius.max())
-    low, high = np.array([x.min(), y.min()]) - radius, np.array([x.max(), y.max()]) + radius
-    firsts = np.unique(body.outline.solid, return_index=True)[1]
-    still = around.about(low, high, np.stack([x[0, firsts], y[0, firsts]], axis=1))
-    edge = _overlapped_edge(body, pose, around.outline.of(still), np.zeros((1, 3)))
-    if edge >= 0:
-        return int(still[edge])
-    for number, one in enumerate(around.groups):
-        frame = motion_at(around.motions[number], now)
-        away = np.hypot(x - frame[0, 0], y - frame[0, 1]).min()
-        if away <= around.reaches[number] + 2.0 * _size(body):
-            edge = _overlapped_edge(body, pose, one, frame)
-            if edge >= 0:
-                return int(around.moving[around.firsts[number] + edge])
+def overlapped(body: Body, around: Surroundings, places: Places) -> int:
+    """An edge of an obstacle that the body overlaps as the first stretch begins; -1 for none.
+
+    In space those that block every altitude; the others are looked for wherever they are near.
+    """
+    corners, place, turn = places.corners[0, :, 0], places.place[0, 0], places.turn[0, 0]
+    here = _Here(corners, place + turn * body.outline.firsts, place, turn)
+    edge = _overlapped_still(body, around, here)
+    if edge >= 0 or not around.motions:
+        return edge
+    now = body.clock + body.frames.times_at(places.spans.element[:1], places.spans.begin[:1])
+    frames = frames_at(around, now)[:, 0]
+    away = np.abs(corners - points_of(frames)[:, None]).min(axis=1)
+    for number in np.flatnonzero(away <= around.reaches + 2.0 * body.outline.size).tolist():
+        first = around.firsts[number]
+        if body.in_space and np.isfinite(around.heights[around.moving[first]]).all():
+            continue
+        seen = here.seen_from(points_of(frames[number]), directions(frames[number, 2]))
+        held = _held(body, seen, around.groups[number])
+        if held.any():
+            return int(around.moving[first + np.argmax(held)])
     return -1
 
 
-def _overlapped_edge(body: Body, pose: Array, one: Outline, frame: Array) -> int:
-    """An edge of an outline in a frame (1, 3) that the body at a pose (1, dof) overlaps, or -1."""
-    own = body.outline
-    x, y = seen_from(frame, corners_of(body, pose))
-    firsts = np.unique(own.solid, return_index=True)[1]
-    held = one.holds(np.stack([x[0, firsts], y[0, firsts]], axis=1)).any(axis=1)[one.solid]
-    a, b = (seen_from(pose, placed_at(frame, (*ends.T,))) for ends in (one.begins, one.ends))
-    held |= own.holds(np.stack([a[0][0], a[1][0]], axis=1)).any(axis=0)
-    side = ((*own.begins.T,), (*own.ends.T,))
-    held |= crossed((a[0].T, a[1].T), (b[0].T, b[1].T), *side).any(axis=1)
-    return int(np.argmax(held)) if held.any() else -1
+class _Here(NamedTuple):
+    """A body at a time, as an outline sees it in its frame."""
+
+    corners: Points  # (n,)
+    firsts: Points  # (s,) a corner of each solid
+    place: Any  # of its frame
+    turn: Any  # direction of its frame
+
+    def seen_from(self, place: Any, turn: Any) -> _Here:
+        """The same, from a frame at a place, that is turned."""
+        back = turn.conj()
+        corners, firsts, own = ((one - place) * back for one in self[:3])
+        return _Here(corners, firsts, own, self.turn * back)
+
+
+def _overlapped_still(body: Body, around: Surroundings, here: _Here) -> int:
+    """A still edge whose obstacle the body overlaps, or -1."""
+    x, y, radius = here.corners.real, here.corners.imag, body.outline.radius
+    boxes = [(x.min() - radius, y.min() - radius, x.max() + radius, y.max() + radius)]
+    # What holds a point has an edge to its right.
+    firsts = here.firsts.tolist()
+    boxes += [(at.real, at.imag, max(around.right, at.real), at.imag) for at in firsts]
+    which, still = around.near(np.array(boxes))
+    if body.in_space:
+        tall = ~np.isfinite(around.heights[still]).all(axis=1)
+        which, still = which[tall], still[tall]
+    near, edges = still[which == 0], around.outline
+    over = near.size > 0 and bool(_crosses(body, here, edges.at(near)).any())
+    for number, point in enumerate(here.firsts[:, None]):
+        right = edges.at(still[which == 1 + number])
+        turns = right.turns_about(point)[:, 0]
+        over = over or bool(np.bincount(right.solid, weights=turns).any())
+    if not over:
+        return -1
+    every = np.unique(still)
+    return int(every[np.argmax(_held(body, here, edges.of(every)))])
+
+
+def _held(body: Body, here: _Here, one: Outline) -> NDArray[np.bool_]:
+    """Which edges (n,) of whole solids cross those of a body, or are of one that holds it."""
+    return np.asarray(one.holds(here.firsts).any(axis=1)[one.solid] | _crosses(body, here, one))
+
+
+def _crosses(body: Body, here: _Here, one: Outline) -> NDArray[np.bool_]:
+    """Which edges (n,) cross those of a body, or begin inside it."""
+    own, back = body.outline.edges, here.turn.conj()
+    a, b = (one.begins - here.place) * back, (one.ends - here.place) * back
+    crosses = crossed(a[:, None], b[:, None], own.begins, own.ends).any(axis=1)
+    return np.asarray(crosses | own.holds(a).any(axis=0))
 
 
 def instant(body: Body, around: Surroundings, time: float) -> Pairs:
     """All edges at a time [s] since the start."""
     edge = np.concatenate([around.still, around.moving])
-    spans = spans_within(body, time, time)
+    places = places_of(body, spans_within(body, time, time))
     frames = np.zeros((edge.size, 2, 3))
-    for number, motion in enumerate(around.motions):
-        frames[around.motion_of_edge[edge] == number] = motion_at(
-            motion, np.array([body.clock + time])
-        )
-    return Pairs(spans, np.zeros_like(edge), edge, frames)
+    if around.motions:
+        now = frames_at(around, np.array([body.clock + time]))
+        frames[around.still.size :] = now[around.motion_of_edge[around.moving]]
+    return Pairs(places, np.zeros_like(edge), edge, frames)
 
 
-def still_pairs(body: Body, around: Surroundings, spans: Spans) -> Iterator[tuple[float, Pairs]]:
-    """The stretches, each with the still edges that may be the nearest of all; they may be at 0."""
-    if not around.still.size:
-        return
-    poses = poses_of(body, spans)
-    x, y = corners_of(body, poses.reshape(-1, poses.shape[2]))
-    x, y = x.reshape(2, spans.element.size, -1), y.reshape(2, spans.element.size, -1)
-    middles = _middles(body, poses)
-    some = np.unique(np.linspace(0, spans.element.size - 1, GUESSES).astype(np.int64))
-    guess = Pairs(spans, some, around.nearest(middles[0, some]), None)
-    nearest = float(bounds_of(body, around, guess).measured.min()) + SPARE
-    off = off_chords(body, spans)
-    reach = nearest + float(body.outline.radius.max()) + off
-    boxes = np.stack(
-        [
-            x.min(axis=(0, 2)) - reach,
-            y.min(axis=(0, 2)) - reach,
-            x.max(axis=(0, 2)) + reach,
-            y.max(axis=(0, 2)) + reach,
-        ],
-        axis=1,
-    )
-    which, edge = around.near(boxes)
-    first, last = ((middles[k, which, 0], middles[k, which, 1]) for k in (0, 1))
-    a, b = (tuple(ends[edge].T) for ends in (around.outline.begins, around.outline.ends))
-    apart = point_apart(first, a, b)
-    for one in (point_apart(last, a, b), point_apart(a, first, last), point_apart(b, first, last)):
-        apart = np.minimum(apart, one)
-    far = nearest + _size(body) + off[which] + around.outline.radius[edge]
-    chord = np.hypot(last[0] - first[0], last[1] - first[1])
-    # The middle may be off by what its chord is, and where both cross no end need be near.
-    kept = np.sqrt(apart) <= np.maximum(far, 0.5 * chord)
-    kept |= np.isfinite(around.heights[edge]).all(axis=1)  # they may be flown over
-    yield 0.0, Pairs(spans, which[kept], edge[kept], None)
+def still_pairs(body: Body, around: Surroundings, places: Places) -> tuple[Pairs, Bounds]:
+    """The stretches, each with the still edges that may be the nearest of all, and their bounds.
+
+    Edges are looked for within a distance of where the body passes, and further away until one is
+    measured that is no further than that.
+    """
+    pad = (body.outline.radius + SPARE + _off_chords(body, places))[:, None]
+    boxes, own_boxes = _Boxes.around(places.corners), _Boxes.around(_from_begins(places))
+    within = FIRST_WITHIN * body.outline.size + SPARE
+    while True:
+        span, edge = around.near(np.concatenate(boxes.grown(pad + within), axis=1))
+        kept = _meets(around, places, own_boxes.grown(pad + within), span, edge)
+        if not kept.any():
+            within *= FURTHER
+            continue
+        pairs = Pairs(places, span[kept], edge[kept], None)
+        if pairs.edge.size > MANY:
+            pairs = _nearest_pairs(body, around, pairs)
+        known = bounds_of(body, around, pairs)
+        nearest = float(known.measured.min())
+        if nearest <= within:
+            return pairs, known
+        within = nearest
 
 
-def moving_pairs(body: Body, around: Surroundings, spans: Spans) -> Iterator[tuple[float, Pairs]]:
+def _nearest_pairs(body: Body, around: Surroundings, pairs: Pairs) -> Pairs:
+    """Those of many pairs that may be the nearest of all, by discs around the body's way."""
+    places, span, edge = pairs.places, pairs.span, pairs.edge
+    first, last = (places.place + places.turn * body.outline.middle)[:, span]
+    a, b = around.outline.begins[edge], around.outline.ends[edge]
+    apart = np.sqrt(point_apart(0.5 * (first + last), a, b)) - around.outline.radius[edge]
+    off = 0.5 * np.abs(last - first) + _off_chords(body, places)[span]
+    least = apart - body.outline.size - off - SPARE
+    some = np.argpartition(least, NEAREST)[:NEAREST]
+    nearest = float(bounds_of(body, around, pairs.of(some)).measured.min())
+    kept = least <= nearest
+    if body.in_space:  # what may be flown over may be near where its edges are far
+        kept |= np.isfinite(around.heights[edge]).all(axis=1)
+    return pairs.of(kept)
+
+
+class _Boxes(NamedTuple):
+    """Corners (s, 2) of boxes along the axes [m]."""
+
+    low: Array
+    high: Array
+
+    @classmethod
+    def around(cls, points: Points) -> _Boxes:
+        """Boxes around points (2, n, s)."""
+        x, y = (one.reshape(-1, points.shape[2]) for one in (points.real, points.imag))
+        low, high = (x.min(axis=0), y.min(axis=0)), (x.max(axis=0), y.max(axis=0))
+        return cls(np.stack(low, axis=1), np.stack(high, axis=1))
+
+    def grown(self, by: Array) -> _Boxes:
+        """The boxes, larger by a length (s, 1) [m] on every side."""
+        return _Boxes(self.low - by, self.high + by)
+
+
+def _from_begins(places: Places) -> Points:
+    """Corners (2, n, s) of a body over stretches, seen from its frame as they begin."""
+    return np.asarray((places.corners - places.place[0]) * places.turn[0].conj())
+
+
+def _meets(
+    around: Surroundings, places: Places, boxes: _Boxes, span: IntArray, edge: IntArray
+) -> NDArray[np.bool_]:
+    """Whether the boxes around edges meet those of stretches, both along the body's axes.
+
+    Edges with a height stay: the tree holds boxes of theirs, inside which they may be flown over.
+    """
+    place, back = places.place[0, span], places.turn[0, span].conj()
+    a = (around.outline.begins[edge] - place) * back
+    b = (around.outline.ends[edge] - place) * back
+    low, high, radius = boxes.low[span], boxes.high[span], around.outline.radius[edge]
+    kept = np.maximum(a.real, b.real) + radius >= low[:, 0]
+    kept &= np.minimum(a.real, b.real) - radius <= high[:, 0]
+    kept &= np.maximum(a.imag, b.imag) + radius >= low[:, 1]
+    kept &= np.minimum(a.imag, b.imag) - radius <= high[:, 1]
+    if places.altitude is not None:
+        kept |= np.isfinite(around.heights[edge]).all(axis=1)
+    return np.asarray(kept)
+
+
+def _off_chords(body: Body, places: Places) -> Array:
+    """How far [m] points of the body leave their chords at most over stretches: (s,)."""
+    return places.off + places.off_by_reach * body.outline.most_reach
+
+
+def moving_pairs(body: Body, around: Surroundings, places: Places) -> Iterator[tuple[float, Pairs]]:
     """The stretches, each with all moving edges: a few that are near, then ever more.
 
     With each a distance [m] that neither they nor what follows comes closer than.
     """
     if not around.motions:
         return
-    spans, clock = _cut_where_motions_change(body, around, spans)
-    poses = poses_of(body, spans)
-    reach = _size(body)
-    both = np.concatenate([clock[0], clock[1]])
-    at = np.stack([motion_at(motion, both) for motion in around.motions])
-    every = at.reshape(len(around.motions), 2, -1, 3)
-    away = _middles(body, poses) - every[..., :2]
-    apart = np.sqrt(
-        point_apart(
-            (_ZERO, _ZERO),
-            (away[:, 0, :, 0], away[:, 0, :, 1]),
-            (away[:, 1, :, 0], away[:, 1, :, 1]),
-        )
-    )
-    bound = np.maximum(apart - reach - around.reaches[:, None] - off_chords(body, spans), 0.0)
+    spans, clock = _cut_where_motions_change(body, around, places.spans)
+    places = places_of(body, spans)
+    every = frames_at(around, clock.ravel()).reshape(len(around.motions), 2, -1, 3)
+    middles = places.place + places.turn * body.outline.middle
+    away = middles - points_of(every)
+    apart = np.sqrt(point_apart(np.zeros(1), away[:, 0], away[:, 1]))
+    reach = body.outline.size + around.reaches[:, None]
+    bound = apart - reach - _off_chords(body, places)
+    bound = np.maximum(bound, 0.0)
     order = np.argsort(bound, axis=None, kind="stable")
     for chosen in np.split(order, NEAREST * 16 ** np.arange(8)):
         if chosen.size:
-            yield float(bound.flat[chosen[0]]), _expanded(around, spans, every, chosen)
+            yield float(bound.flat[chosen[0]]), _expanded(around, places, every, chosen)
 
 
-def _expanded(around: Surroundings, spans: Spans, frames: Array, chosen: IntArray) -> Pairs:
+def _expanded(around: Surroundings, places: Places, frames: Array, chosen: IntArray) -> Pairs:
     """Pairs of all edges of some pairs (k,) of motions and stretches, numbered in that order."""
-    number, span = np.divmod(chosen, spans.element.size)
+    number, span = np.divmod(chosen, places.lasts.size)
     firsts = around.firsts
     count = np.diff(firsts)[number]
     rows = np.repeat(np.arange(chosen.size), count)
     place = np.arange(rows.size) - (np.cumsum(count) - count)[rows] + firsts[number][rows]
     number, span = number[rows], span[rows]
-    return Pairs(spans, span, around.moving[place], frames[number, :, span])
+    return Pairs(places, span, around.moving[place], frames[number, :, span])
 
 
 def _cut_where_motions_change(
@@ -195,27 +282,11 @@ def _cut_where_motions_change(
     return Spans(element, *shares), body.clock + np.stack([times[:-1], times[1:]])
 
 
-def motion_at(motion: Motion, times: Array) -> Array:
-    """Poses (m, 3) of a motion: linear between its times, still before and after."""
-    columns = [np.interp(times, motion.time, column) for column in motion.pose.T]
-    return np.stack(columns, axis=1)
-
-
-def _middle(body: Body) -> Array:
-    """The middle (2,) of the body's outline, in its frame [m]."""
-    corners = body.outline.begins
-    return np.asarray(0.5 * (corners.min(axis=0) + corners.max(axis=0)))
-
-
-def _size(body: Body) -> float:
-    """Radius [m] of a disc around that middle that holds the body."""
-    away = np.hypot(*(body.outline.begins - _middle(body)).T) + body.outline.radius
-    return float(away.max())
-
-
-def _middles(body: Body, poses: Array) -> Array:
-    """Places (..., 2) of that middle, the body's frame at poses (..., dof)."""
-    x, y = _middle(body)
-    cosine, sine = np.cos(poses[..., 2]), np.sin(poses[..., 2])
-    turned = np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
-    return np.asarray(poses[..., :2] + turned)
+def frames_at(around: Surroundings, times: Array) -> Array:
+    """Poses (motions, m, 3) of what moves: linear between its times, still before and after."""
+    return np.stack(
+        [
+            np.stack([np.interp(times, motion.time, column) for column in motion.pose.T], axis=1)
+            for motion in around.motions
+        ]
+    )

@@ -10,19 +10,26 @@ of the chord less that is never too large.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.audit.apart import Points, crossed, point_apart
+from maneuver_automaton.audit.apart import (
+    Points,
+    crossed,
+    directions,
+    point_apart,
+    points_of,
+    squared,
+)
 from maneuver_automaton.audit.frames import Frames, Spans
-from maneuver_automaton.audit.outlines import Outline
+from maneuver_automaton.audit.outlines import BodyOutline
 from maneuver_automaton.audit.surroundings import Surroundings
 
+AT_ONCE = 512  # pairs: with more, arrays no longer stay where they are quickly read
 ROUNDING = 1e-14  # relative to the coordinates: what a distance may be off
 
 
@@ -30,205 +37,206 @@ ROUNDING = 1e-14  # relative to the coordinates: what a distance may be off
 class Body:
     """What keeps clear: its outline in a frame that moves among edges, counted from the origin."""
 
-    outline: Outline
+    outline: BodyOutline
     frames: Frames
-    offset: Array  # (2,) [m] from the origin of the edges to that of the frames
+    offset: complex  # x + i y [m] from the origin of the edges to that of the frames
+    doubt: float = 0.0  # [m, rad] how far a pose may be off at most
     height: tuple[float, float] = (0.0, 0.0)  # [m] about its altitude
     base: float = 0.0  # [m] altitude of the frames' zero
     clock: float = 0.0  # [s] on the edges' clock, when the frames start
+
+    @property
+    def in_space(self) -> bool:
+        """Whether it has an altitude."""
+        return bool(self.frames.series.shape[2] > 3)
+
+
+class Places(NamedTuple):
+    """Where a body is at the begin and the end of stretches of time, and how it leaves chords."""
+
+    spans: Spans  # (s,)
+    place: Points  # (2, s) of its frame
+    turn: Points  # (2, s) direction of its frame
+    altitude: Array | None  # (2, s) [m]; None in the plane
+    corners: Points  # (2, n, s)
+    lasts: Array  # (s,) [s]
+    off: Array  # (s,) [m] how far its frame's origin leaves its chord at most
+    off_by_reach: Array  # (s,) what is added for each metre that a point is from there
 
 
 class Pairs(NamedTuple):
     """Stretches of time, each with an edge of an obstacle, and where its frame is at their ends."""
 
-    spans: Spans
+    places: Places
     span: IntArray  # (m,) numbers of stretches
     edge: IntArray  # (m,)
     frames: Array | None  # (m, 2, 3) of moving obstacles
+
+    def of(self, rows: Any) -> Pairs:
+        """Some of them, by number, slice or truth."""
+        frames = None if self.frames is None else self.frames[rows]
+        return Pairs(self.places, self.span[rows], self.edge[rows], frames)
 
 
 class Bounds(NamedTuple):
     """What is known of pairs."""
 
     least: Array  # (m,) [m] the clearance is never less
-    measured: Array  # (m,) [m] at the begin or the end
-    time: Array  # (m,) [s] since the start, when that was
+    at_begin: Array  # (m,) [m] measured
+    at_end: Array  # (m,) [m] measured
+
+    @property
+    def measured(self) -> Array:
+        """The lesser of the two measured (m,) [m]."""
+        return np.minimum(self.at_begin, self.at_end)
 
 
-class _Rates(NamedTuple):
-    """What frames do at most over stretches of time, (m,) each."""
-
-    time: Array  # [s] how long
-    speed: Array  # of the body's frame [m/s]
-    turn: Array  # [rad/s]
-    pull: Array  # [m/s^2]
-    swerve: Array  # [rad/s^2]
-    drift: Array  # [m/s] of the obstacle's frame
-    spin: Array  # [rad/s]
-
-
-def poses_of(body: Body, spans: Spans) -> Array:
-    """Poses (2, m, dof) of a body's frame at begin and end of stretches, where the edges are."""
-    count = spans.element.size
-    both = np.concatenate([spans.element, spans.element])
-    poses = body.frames.at(both, np.concatenate([spans.begin, spans.end]))
-    poses[:, :2] += body.offset
-    return poses.reshape(2, count, -1)
-
-
-def corners_of(body: Body, poses: Array) -> Points:
-    """Corners (..., n) of the body's outline, its frame at poses (..., dof)."""
-    cosine, sine = np.cos(poses[..., 2, None]), np.sin(poses[..., 2, None])
-    x, y = body.outline.begins.T
-    return (
-        poses[..., 0, None] + cosine * x - sine * y,
-        poses[..., 1, None] + sine * x + cosine * y,
+def places_of(body: Body, spans: Spans) -> Places:
+    """Where a body is at the ends of stretches of time, counted as the edges are."""
+    frames, element = body.frames, spans.element
+    both = np.concatenate([element, element])
+    poses = frames.at(both, np.concatenate([spans.begin, spans.end])).reshape(2, element.size, -1)
+    place, turn = points_of(poses), directions(poses[..., 2])
+    place += body.offset
+    begins = frames.times[:-1]
+    lasts = (spans.end - spans.begin) * (frames.times[1:] - begins)[element]
+    eighth = 0.125 * lasts * lasts
+    return Places(
+        spans=spans,
+        place=place,
+        turn=turn,
+        altitude=poses[..., 3] + body.base if body.in_space else None,
+        corners=place[:, None] + turn[:, None] * body.outline.edges.begins[:, None],
+        lasts=lasts,
+        off=eighth * frames.bend[element],
+        off_by_reach=eighth * frames.swerve[element],
     )
 
 
-def seen_from(frames: Array, points: Points) -> Points:
-    """Points (m, n) in the world, from frames (m, 3 or more)."""
-    cosine, sine = np.cos(frames[:, 2, None]), np.sin(frames[:, 2, None])
-    x, y = points[0] - frames[:, 0, None], points[1] - frames[:, 1, None]
-    return cosine * x + sine * y, cosine * y - sine * x
-
-
-def rates_of(body: Body, pairs: Pairs) -> _Rates:
-    """What a body does at most over stretches, and the frame of an obstacle, which runs evenly."""
-    of, element = body.frames, pairs.spans.element[pairs.span]
-    time = (pairs.spans.end - pairs.spans.begin)[pairs.span] * np.diff(of.times)[element]
-    drift = spin = np.zeros(time.size)
-    if pairs.frames is not None:
-        change = pairs.frames[:, 1] - pairs.frames[:, 0]
-        lasting = np.where(time > 0.0, time, np.inf)  # rounding alone moves it in no time
-        drift, spin = np.hypot(change[:, 0], change[:, 1]) / lasting, np.abs(change[:, 2]) / lasting
-    rows = (of.speed[element], of.turn[element], of.pull[element], of.swerve[element])
-    return _Rates(*(one[:, None] for one in (time, *rows, drift, spin)))
-
-
-def off_chords(body: Body, spans: Spans) -> Array:
-    """How far [m] points of the body leave their chords at most over stretches: (m,)."""
-    reach = np.hypot(*body.outline.begins.T).max()
-    every = np.arange(spans.element.size)
-    rates = rates_of(body, Pairs(spans, every, every, None))
-    return _off_by_body(rates, reach, ())[:, 0]
+def time_of(body: Body, pairs: Pairs, known: Bounds, row: int) -> float:
+    """When [s] since the start the clearance of a pair was measured."""
+    spans = pairs.places.spans.of(pairs.span[row : row + 1])
+    share = spans.begin if known.at_begin[row] <= known.at_end[row] else spans.end
+    return float(body.frames.times_at(spans.element, share)[0])
 
 
 def bounds_of(body: Body, around: Surroundings, pairs: Pairs, *, overlaps: bool = False) -> Bounds:
     """What is known of the clearance of a body to edges over stretches of time.
 
-    Outlines that cross are looked for where a bound lets them, or everywhere if `overlaps`.
+    Outlines that cross are looked for where a chord crosses an edge, where edges may be flown over,
+    or everywhere if `overlaps`.
     """
-    edges, outline = around.outline, body.outline
-    poses, rates = poses_of(body, pairs.spans), rates_of(body, pairs)
-    inside = corners_of(body, poses)  # (2, spans, n) each: at begin and end
-    poses = poses[:, pairs.span]
-    a, b = _columns(edges.begins[pairs.edge]), _columns(edges.ends[pairs.edge])
-    ours, begins, ends = [], [], []  # at begin and end
-    for k, pose in enumerate(poses):
-        corners, edge = (inside[0][k, pairs.span], inside[1][k, pairs.span]), (a, b)
-        if pairs.frames is not None:
-            frame = pairs.frames[:, k]
-            corners, edge = seen_from(frame, corners), (placed_at(frame, a), placed_at(frame, b))
-        ours.append(corners)
-        begins.append(seen_from(pose, edge[0]))
-        ends.append(seen_from(pose, edge[1]))
-    side = (tuple(outline.begins.T), tuple(outline.ends.T))
-    radius = outline.radius + edges.radius[pairs.edge][:, None]
-    near = np.minimum(
-        _near(ours, (a, b), radius, _off_by_body(rates, np.hypot(*side[0]), ours)),
-        _near(begins, side, radius, _off_by_edge(rates, np.hypot(*a), begins)),
-    )
-    coordinates = max(float(np.abs(poses[..., :2]).max()), float(np.abs(a).max()))
-    lever = 1.0 + float(np.hypot(*side[0]).max())
-    near[0] -= body.frames.doubt * lever + ROUNDING * coordinates
-    above = _apart_in_height(body, around, pairs, poses, rates)
-    doubtful = overlaps | (near[0] <= 0.0) | np.isfinite(around.heights[pairs.edge]).all(axis=1)
+    if pairs.edge.size > AT_ONCE:
+        blocks = [slice(k, k + AT_ONCE) for k in range(0, pairs.edge.size, AT_ONCE)]
+        parts = [bounds_of(body, around, pairs.of(one), overlaps=overlaps) for one in blocks]
+        return Bounds(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    edges, own, places, span = around.outline, body.outline.edges, pairs.places, pairs.span
+    a, b = edges.begins[pairs.edge], edges.ends[pairs.edge]
+    n = own.begins.size
+    place, turn = places.place.take(span, axis=1), places.turn.take(span, axis=1)
+    # Rows: corners of the body as its obstacle sees them, then an end of the edge as the body sees
+    # it, against each side of the body.
+    paths, sides = np.empty((2, 2, 2 * n, span.size), dtype=np.complex128)
+    if pairs.frames is None:
+        paths[:, :n], world = places.corners.take(span, axis=2), a
+    else:
+        frames = np.swapaxes(pairs.frames, 0, 1)
+        there, turned = points_of(frames), directions(frames[..., 2])
+        paths[:, :n] = (places.corners[..., span] - there[:, None]) * turned[:, None].conj()
+        world = there + turned * a
+    paths[:, n:] = ((world - place) * turn.conj())[:, None]
+    sides[0, :n], sides[1, :n] = a, b
+    sides[0, n:], sides[1, n:] = own.begins[:, None], own.ends[:, None]
+    near = _near(paths, sides, _off(body, pairs, paths, np.abs(a)), _radius(body, around, pairs))
+    doubtful = (near[0] <= 0.0) | overlaps
+    coordinates = max(np.abs(one.view(np.float64)).max() for one in (place, a))
+    near[1] -= body.doubt * (1.0 + body.outline.most_reach) + ROUNDING * coordinates
+    if body.in_space:
+        doubtful |= np.isfinite(around.heights[pairs.edge]).all(axis=1)
     if doubtful.any():
         rows = np.flatnonzero(doubtful)
+        end = b if pairs.frames is None else there + turned * b
+        ends = np.broadcast_to((end - place) * turn.conj(), place.shape)
         for k in (0, 1):
-            at = [(x[rows], y[rows]) for x, y in (ours[k], begins[k], ends[k])]
-            hit = _overlap(body, around, pairs.edge[rows], *at)
-            near[1 + k, rows[hit]] = 0.0
-            near[0, rows[hit]] = 0.0
-    apart = np.hypot(np.maximum(near, 0.0), above)
-    sooner = apart[1] <= apart[2]
-    spans = pairs.spans.of(pairs.span)
-    share = np.where(sooner, spans.begin, spans.end)
-    time = body.frames.times_at(spans.element, share)
-    return Bounds(apart[0], np.where(sooner, apart[1], apart[2]), time)
+            at = paths[k, :n, rows], paths[k, n, rows], ends[k, rows]  # (rows, n) first
+            hit = rows[_overlap(body, around, pairs.edge[rows], *at)]
+            near[2 + k, hit] = near[1, hit] = 0.0
+    apart = np.maximum(near[1:], 0.0)
+    if places.altitude is not None:
+        heights = around.heights[pairs.edge]
+        apart = np.hypot(apart, _apart_in_height(body, pairs, heights, places.altitude))
+    return Bounds(*apart)
 
 
-def _columns(points: Array) -> Points:
-    """Points (m, 2) as columns (m, 1), so that rows of others broadcast."""
-    return points[:, 0, None], points[:, 1, None]
+def _radius(body: Body, around: Surroundings, pairs: Pairs) -> Array | None:
+    """Radii of what comes near (2 n, m) [m]; None if all have corners."""
+    own = body.outline.edges.radius
+    if not (around.rounds or body.outline.radius):
+        return None
+    return np.asarray(np.concatenate([own, own])[:, None] + around.outline.radius[pairs.edge])
 
 
-def placed_at(frames: Array, points: Points) -> Points:
-    """Points (m, n) or (n,) seen from frames (m, 3 or more), in the world."""
-    cosine, sine = np.cos(frames[:, 2, None]), np.sin(frames[:, 2, None])
-    x, y = points
-    return frames[:, 0, None] + cosine * x - sine * y, frames[:, 1, None] + sine * x + cosine * y
+def _near(paths: Points, sides: Points, off: Array, radius: Array | None) -> Array:
+    """Distances (4, m) of paths (2, n, m) to edges (2, n, m), from the first point to the second.
 
-
-def _near(path: Sequence[Points], edge: tuple[Points, Points], radius: Array, off: Array) -> Array:
-    """Distances (3, m): at least on the way, at the begin, at the end of paths to edges."""
-    first, last = path
-    at = [point_apart(first, *edge), point_apart(last, *edge)]
-    least = np.minimum(point_apart(edge[0], first, last), point_apart(edge[1], first, last))
-    least = np.minimum(np.minimum(*at), least)
+    Those of the chords, those on the way at least, at the begin, at the end.
+    """
+    at = point_apart(paths, sides[0], sides[1])
+    on = point_apart(sides, paths[0], paths[1])
+    ends = np.minimum(at[0], at[1])
+    least = np.minimum(ends, np.minimum(on[0], on[1]))
     # Where they cross, an end of the path is within half of its length from the edge.
-    length = (last[0] - first[0]) ** 2 + (last[1] - first[1]) ** 2
-    rows = np.flatnonzero((np.minimum(*at) <= 0.25 * length).any(axis=1))
-    if rows.size:
-        some = [(_rows(x, rows), _rows(y, rows)) for x, y in (first, last, *edge)]
-        least[rows] = np.where(crossed(*some), 0.0, least[rows])
-    near = np.sqrt([least, *at]) - radius
-    near[0] -= off
-    return np.asarray(near.min(axis=-1))
+    some = np.flatnonzero(ends <= 0.25 * squared(paths[1] - paths[0]))
+    if some.size:
+        flat = paths.reshape(2, -1)[:, some], sides.reshape(2, -1)[:, some]
+        least.flat[some[crossed(*flat[0], *flat[1])]] = 0.0
+    apart = np.empty((4, *least.shape))
+    np.sqrt(least, out=apart[0])
+    np.sqrt(at, out=apart[2:])
+    if radius is not None:
+        apart -= radius
+    np.subtract(apart[0], off, out=apart[1])
+    return np.asarray(apart.min(axis=1))
 
 
-def _rows(values: Array, rows: IntArray) -> Array:
-    """Some rows of values (m, n); values (n,) are the same for all."""
-    return values[rows] if values.ndim > 1 else values
+def _off(body: Body, pairs: Pairs, paths: Points, end_reach: Array) -> Array:
+    """How far [m] paths (2, 2 n, m) leave their chords at most: (2 n, m).
+
+    Edges are at distances `end_reach` (m,) from their frames, which run evenly.
+    """
+    places, span, reach = pairs.places, pairs.span, body.outline.reach[:, None]
+    element, lasts, n = places.spans.element[span], places.lasts[span], reach.size
+    speed = body.frames.speed[element]
+    drift = spin = edge_speed = np.zeros(1)
+    if pairs.frames is not None:
+        change = pairs.frames[:, 1] - pairs.frames[:, 0]
+        lasting = np.where(lasts > 0.0, lasts, np.inf)  # rounding alone moves it in no time
+        drift = np.hypot(change[:, 0], change[:, 1]) / lasting
+        spin = np.abs(change[:, 2]) / lasting
+        edge_speed = drift + spin * end_reach
+    seen = np.abs(paths[:, n])
+    away = np.empty((2 * n, span.size))
+    away[:n] = reach
+    away[n:] = 0.5 * (seen[0] + seen[1] + (speed + edge_speed) * lasts)
+    off = places.off[span] + places.off_by_reach[span] * away
+    if pairs.frames is not None:
+        eighth, turn = 0.125 * lasts * lasts, body.frames.turn[element]
+        off[n:] += eighth * (spin * spin * end_reach + 2.0 * turn * edge_speed)
+        approach, seen = speed + turn * reach + drift, np.abs(paths[:, :n])
+        far = 0.5 * (seen[0] + seen[1] + approach * lasts)
+        off[:n] += eighth * spin * (2.0 * approach + spin * far)
+    return np.asarray(off)
 
 
-def _off_by_body(rates: _Rates, reach: Array, seen: Sequence[Points]) -> Array:
-    """How far [m] the path of a corner of the body, seen from the obstacle, leaves its chord."""
-    speed = rates.speed + rates.turn * reach
-    pull = rates.pull + rates.swerve * reach + rates.turn * speed
-    if rates.spin.any():
-        approach = speed + rates.drift
-        pull = pull + rates.spin * (2.0 * approach + rates.spin * _away(seen, approach, rates))
-    return np.asarray(0.125 * rates.time**2 * pull)
-
-
-def _off_by_edge(rates: _Rates, reach: Array, seen: Sequence[Points]) -> Array:
-    """How far [m] the path of a corner of the obstacle, seen from the body, leaves its chord."""
-    speed = rates.drift + rates.spin * reach
-    away = _away(seen, rates.speed + speed, rates)
-    pull = rates.spin**2 * reach + rates.pull + rates.swerve * away
-    pull = pull + rates.turn * (2.0 * speed + rates.speed + rates.turn * away)
-    return np.asarray(0.125 * rates.time**2 * pull)
-
-
-def _away(seen: Sequence[Points], approach: Array, rates: _Rates) -> Array:
-    """How far [m] a point is from the frame that sees it at most, on its way."""
-    return np.asarray(0.5 * (np.hypot(*seen[0]) + np.hypot(*seen[1]) + approach * rates.time))
-
-
-def _apart_in_height(
-    body: Body, around: Surroundings, pairs: Pairs, poses: Array, rates: _Rates
-) -> Array:
-    """Vertical clearances (3, m): at least on the way, at the begin, at the end; 0 in the plane."""
-    if poses.shape[2] == 3:
-        return np.zeros((3, 1))
-    altitude = poses[..., 3] + body.base
-    off = 0.125 * rates.time[:, 0] ** 2 * body.frames.rise[pairs.spans.element[pairs.span]]
-    off = off + body.frames.doubt
-    low = np.stack([altitude.min(axis=0) - off, *altitude]) + body.height[0]
-    high = np.stack([altitude.max(axis=0) + off, *altitude]) + body.height[1]
-    bottom, top = around.heights[pairs.edge].T
+def _apart_in_height(body: Body, pairs: Pairs, heights: Array, altitude: Array) -> Array:
+    """Vertical clearances (3, m): at least on the way, at the begin, at the end."""
+    places, span = pairs.places, pairs.span
+    rise = body.frames.rise[places.spans.element]
+    off = (0.125 * places.lasts**2 * rise + body.doubt)[span]
+    ends = altitude[:, span]
+    low = np.stack([ends.min(axis=0) - off, *ends]) + body.height[0]
+    high = np.stack([ends.max(axis=0) + off, *ends]) + body.height[1]
+    bottom, top = heights.T
     return np.asarray(np.maximum(np.maximum(low - top, bottom - high), 0.0))
 
 
@@ -244,16 +252,13 @@ def _overlap(
 
     The body's `corners` (m, n) are seen from the obstacle, the ends of the edge from the body.
     """
-    outline = body.outline
-    side = (tuple(outline.begins.T), tuple(outline.ends.T))
-    over = crossed(begin, end, *side).any(axis=1)
-    over |= outline.holds(np.column_stack([begin[0], begin[1]])).any(axis=0)
-    firsts = np.unique(outline.solid, return_index=True)[1]
+    own = body.outline.edges
+    over = crossed(begin[:, None], end[:, None], own.begins, own.ends).any(axis=1)
+    over |= own.holds(begin).any(axis=0)
     solids = around.outline.solid[edge]
     for solid in np.unique(solids):
-        ring, rows = around.outline.solid == solid, np.flatnonzero(solids == solid)
-        one = around.outline.of(ring)
-        for first in firsts:
-            points = np.stack([corners[0][rows, first], corners[1][rows, first]], axis=1)
-            over[rows] |= one.holds(points)[0]
+        one = around.outline.of(around.outline.solid == solid)
+        rows = np.flatnonzero(solids == solid)
+        for first in own.firsts:
+            over[rows] |= one.holds(corners[rows, first])[0]
     return np.asarray(over)

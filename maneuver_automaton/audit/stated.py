@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton import Plan, Primitive
 from maneuver_automaton.primitives import Maneuver, Trim
 
 NOTHING = 1e-12  # [s] shorter pieces lead nowhere
@@ -33,31 +35,40 @@ def stated_by(plan: Plan) -> Stated:
     ValueError
         If a maneuver has no course.
     """
-    poses = plan.switching_poses
+    poses, lengths = plan.switching_poses, plan.primitive_durations
     rows: list[Stated] = []
-    for k, (piece, duration) in enumerate(
-        zip(plan.primitives, plan.primitive_durations.tolist(), strict=True)
-    ):
-        if duration > NOTHING:
-            one = _trim(piece, duration, poses[k + 1]) if isinstance(piece, Trim) else None
-            rows.append(one or _maneuver(piece, poses[k]))  # type: ignore[arg-type]
+    lasting = np.flatnonzero(lengths > NOTHING)
+    for _, run in groupby(lasting.tolist(), key=lambda k: _run_of(plan.primitives[k], k)):
+        numbers = np.array(list(run))
+        pieces = [plan.primitives[k] for k in numbers]
+        trims = [one for one in pieces if isinstance(one, Trim)]
+        if trims:
+            rows.append(_trims(trims, numbers, lengths[numbers], poses[numbers + 1]))
+        rows += [
+            _maneuver(one, k, poses[k])
+            for one, k in zip(pieces, numbers.tolist(), strict=True)
+            if isinstance(one, Maneuver)
+        ]
     if not rows:
         return _nothing(plan)
-    numbers = np.flatnonzero(plan.primitive_durations > NOTHING)
-    pieces = np.repeat(numbers, [row.lengths.size for row in rows])
-    whole = Stated(*(np.concatenate(column) for column in zip(*rows, strict=True)))
-    return whole._replace(pieces=pieces)
+    if len(rows) == 1:
+        return rows[0]
+    return Stated(*(np.concatenate(column) for column in zip(*rows, strict=True)))
 
 
-def _trim(trim: Trim, duration: float, end: Array) -> Stated:
-    states = trim.reduced_state[None]
-    twist = trim.body_velocity[None]
-    return Stated(
-        np.array([duration]), trim.control[None], states, states, end[None], twist, _UNKNOWN
-    )
+def _run_of(piece: Primitive, number: int) -> int:
+    """What trims share that follow each other; every maneuver stands alone."""
+    return -1 if isinstance(piece, Trim) else number
 
 
-def _maneuver(maneuver: Maneuver, begin: Array) -> Stated:
+def _trims(trims: Sequence[Trim], numbers: IntArray, lengths: Array, ends: Array) -> Stated:
+    states = np.array([trim.reduced_state for trim in trims])
+    controls = np.array([trim.control for trim in trims])
+    twists = np.array([trim.body_velocity for trim in trims])
+    return Stated(lengths, controls, states, states, ends, twists, numbers)
+
+
+def _maneuver(maneuver: Maneuver, number: int, begin: Array) -> Stated:
     course = maneuver.course
     if course is None:
         raise ValueError(f"maneuver {maneuver.name!r}: has no course, so it cannot be audited")
@@ -71,7 +82,7 @@ def _maneuver(maneuver: Maneuver, begin: Array) -> Stated:
         course.reduced_state[1:][lasting],
         poses[lasting],
         np.full_like(poses[lasting], np.nan),
-        _UNKNOWN,
+        np.full(int(lasting.sum()), number),
     )
 
 
@@ -80,10 +91,8 @@ def _nothing(plan: Plan) -> Stated:
     states = np.zeros((0, 0 if trim is None else trim.reduced_state.size))
     controls = np.zeros((0, 0 if trim is None else trim.control.size))
     poses = np.zeros((0, plan.start.size))
-    return Stated(np.zeros(0), controls, states, states, poses, poses, _UNKNOWN)
-
-
-_UNKNOWN: IntArray = np.zeros(0, dtype=np.int64)
+    none = np.zeros(0, dtype=np.int64)
+    return Stated(np.zeros(0), controls, states, states, poses, poses, none)
 
 
 def placed(frames: Array, seen: Array) -> Array:

@@ -25,7 +25,7 @@ class Surroundings:
     --------
     >>> from maneuver_automaton.collision import Box, Obstacle
     >>> crate = Obstacle(Box([1.0, 1.0], center=[3.0, 0.0]))
-    >>> surroundings_of((crate,), (1.0, 0.0)).outline.begins[:, 0].tolist()
+    >>> surroundings_of((crate,), (1.0, 0.0)).outline.begins.real.tolist()
     [1.5, 2.5, 2.5, 1.5]
     """
 
@@ -40,6 +40,8 @@ class Surroundings:
     groups: tuple[Outline, ...]  # (motions,) the edges of each motion
     reaches: Array  # (motions,) [m] how far they are from their frames at most
     tree: Any  # STRtree of these
+    right: float  # [m] no edge is further to the right
+    rounds: bool  # whether any edge has a radius
 
     def near(self, boxes: Array) -> tuple[IntArray, IntArray]:
         """Which boxes (m, 4) [low x, low y, high x, high y] may meet which still edges.
@@ -50,21 +52,6 @@ class Surroundings:
 
         which, edges = self.tree.query(shapely.box(*boxes.T))
         return which, self.still[edges]
-
-    def about(self, low: Array, high: Array, points: Array) -> IntArray:
-        """Still edges in a box, and to the right of points (m, 2), which tell what holds these."""
-        right = np.column_stack([points, np.full(len(points), math.inf), points[:, 1]])
-        right[:, 2] = max(float(self.outline.begins[:, 0].max(initial=0.0)), float(high[0])) + 1.0
-        edges: IntArray = np.unique(self.near(np.vstack([[*low, *high], right]))[1])
-        return edges
-
-    def nearest(self, points: Array) -> IntArray:
-        """A still edge (m,) that is near each of points (m, 2)."""
-        import shapely
-
-        _, edges = self.tree.query_nearest(shapely.points(points), all_matches=False)
-        near: IntArray = self.still[edges]
-        return near
 
 
 def origin_of(place: ArrayLike) -> tuple[float, float]:
@@ -132,21 +119,24 @@ def surroundings_around(
         groups=groups,
         reaches=np.array([_reach(group) for group in groups]),
         tree=shapely.STRtree(_geometries(whole, still, heights_of)),
+        rounds=bool(whole.radius.any()),
+        right=float((whole.begins.real + whole.radius).max(initial=0.0)),
     )
 
 
 def _reach(outline: Outline) -> float:
     """How far [m] an outline is from the frame that it is seen from at most."""
-    return float((np.hypot(*outline.begins.T) + outline.radius).max())
+    return float((np.abs(outline.begins) + outline.radius).max())
 
 
 def _geometries(outline: Outline, still: IntArray, heights: Array) -> Any:
     """What the tree holds: edges, boxes around discs, and around solids that have a height."""
     import shapely
 
-    begins, ends, radius = outline.begins[still], outline.ends[still], outline.radius[still, None]
-    edges = shapely.linestrings(np.stack([begins, ends], axis=1))
-    low, high = np.minimum(begins, ends) - radius, np.maximum(begins, ends) + radius
+    both = np.stack([outline.begins[still], outline.ends[still]], axis=1)
+    ends, radius = both.view(np.float64).reshape(-1, 2, 2), outline.radius[still, None]
+    edges = shapely.linestrings(ends)
+    low, high = ends.min(axis=1) - radius, ends.max(axis=1) + radius
     solids = int(outline.solid.max(initial=-1)) + 1
     least, most = np.full((solids, 2), math.inf), np.full((solids, 2), -math.inf)
     np.minimum.at(least, outline.solid[still], low)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -47,7 +47,7 @@ def seen_from(plan: Plan, goal: Goal) -> Plan:
     start = np.array(plan.start)
     places = [0, 1, *range(3, start.size)]
     start[places] -= goal.pose[places]
-    return replace(plan, start=start, start_time=0.0)
+    return plan.begun_at(start, start_time=0.0)
 
 
 def distance_to(end: Array, goal: Goal) -> TerminalError:

@@ -180,6 +180,24 @@ class Plan:
                 pieces.append((maneuver, maneuver.duration))
         return pieces
 
+    def begun_at(self, start: ArrayLike, *, start_time: float) -> Plan:
+        """The same motions from another pose (dof,) and time [s].
+
+        What is known of the motions alone is kept.
+
+        Examples
+        --------
+        >>> trim = Trim(name="ahead", body_velocity=[1.0, 0.0, 0.0], control=[1.0, 0.0])
+        >>> plan = Plan([0.0, 0.0, 0.0], (trim,), durations=[2.0])
+        >>> plan.begun_at([0.0, 5.0, np.pi], start_time=1.0).end.round(9).tolist()
+        [-2.0, 5.0, 3.141592654]
+        """
+        other = replace(self, start=np.asarray(start, dtype=np.float64), start_time=start_time)
+        for name in ("_pieces", "_steps", "_twists", "primitives", "primitive_durations"):
+            if name in vars(self) and other.start.size == self.start.size:
+                vars(other)[name] = vars(self)[name]
+        return other
+
     @property
     def word(self) -> tuple[str, ...]:
         """Names of the primitives, in order."""
@@ -200,14 +218,19 @@ class Plan:
         """Poses (m + 1, dof) at the switching times."""
         if not self.primitives:
             return self.start[None].copy()
-        if not any(self.maneuvers):
+        if not (any(self.maneuvers) or "_steps" in vars(self)):
             return coasted(self.start, self._twists, self.primitive_durations)
+        return chained(self.start, self._steps)
+
+    @cached_property
+    def _steps(self) -> Array:
+        """Motion (m, dof) of every primitive, seen from where it begins."""
         steps = group_of(self.start.size).exp(self.primitive_durations[:, None] * self._twists).pose
         steps = steps.copy()
         for k, primitive in enumerate(self.primitives):
             if isinstance(primitive, Maneuver):
                 steps[k] = primitive.displacement
-        return chained(self.start, steps)
+        return steps
 
     @cached_property
     def _twists(self) -> Array:

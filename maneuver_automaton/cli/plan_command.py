@@ -17,6 +17,7 @@ from maneuver_automaton.cli.folder_runs import Row, check_address, run_folder
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, scenario_of
 from maneuver_automaton.cli.looks import LookOptions
+from maneuver_automaton.cli.pictures import Draughtsman, draughtsman, skip_documentation
 from maneuver_automaton.cli.progress import has_terminal, waiting
 from maneuver_automaton.errors import InvalidScenario
 
@@ -62,12 +63,32 @@ def plan_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> int
         elif stopped():
             complain(f"{path}: interrupted: the best plan so far is in {out / 'plan.json'}")
         return NO_PLAN if found.plan is None else FOUND
+    with draughtsman(wanted=settings.plot) as beside:
+        return _plan_alone(path, out, settings, parts, beside)
+
+
+def _plan_alone(
+    path: Path, out: Path, settings: Settings, parts: Parts, beside: Draughtsman | None
+) -> int:
     scenario = scenario_of(path, parts)
     limit = settings.time_limit or scenario.time_limit_s
     said = f"planning, at most {limit:g} s"
     shown = None if settings.quiet or not has_terminal() else SoFar.of_gap(settings.gap)
     with waiting(said, quiet=settings.quiet, more=lambda: shown.text if shown else ""):
         result = _plan(scenario, out, settings, shown)
+    pictures = (result, scenario.name, out, settings)
+    drawn = beside is not None and not stopped() and beside.begin(_draw, *pictures)
+    if not drawn:
+        _drawn_here(*pictures)
+    try:
+        return _told(path, scenario.name, result, out, settings)
+    finally:
+        if drawn and beside is not None and not beside.is_done():
+            _drawn_here(*pictures)
+
+
+def _told(path: Path, name: str, result: PlanResult, out: Path, settings: Settings) -> int:
+    """Print the plan, or why there is none, and return the exit code."""
     if result.plan is None:
         complain(f"{path}: {result.status.value}: {result.reason}")
         return NO_PLAN
@@ -76,7 +97,7 @@ def plan_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> int
     if not settings.quiet:
         from maneuver_automaton.cli.tables import print_result
 
-        print_result(scenario.name, result, folder=str(out))
+        print_result(name, result, folder=str(out))
     return FOUND
 
 
@@ -140,7 +161,7 @@ class SoFar:
 def _plan(
     scenario: Scenario, out: Path, settings: Settings, shown: SoFar | None = None
 ) -> PlanResult:
-    """Plan and write the files."""
+    """Plan and write plan.json."""
     from maneuver_automaton import planning
 
     make_folder(out)
@@ -166,24 +187,34 @@ def _plan(
         result = replace(result, reason="interrupted before there was a plan")
     result = replace(result, timing_s={**scenario.timing_s, **result.timing_s})
     try:
-        _write(result, scenario.name, out, settings)
+        _write(result, scenario.name, out)
     except OSError as error:
         raise not_written(Path(error.filename or out), error) from error
     return result
 
 
-def _write(result: PlanResult, name: str, out: Path, settings: Settings) -> None:
+def _write(result: PlanResult, name: str, out: Path) -> None:
     from maneuver_automaton.formats.plan_json import save_plan
 
     save_plan(result, out / "plan.json", name=name, interrupted=stopped())
     for picture in PICTURES:
         (out / picture).unlink(missing_ok=True)  # of an earlier plan
+
+
+def _drawn_here(result: PlanResult, name: str, out: Path, settings: Settings) -> None:
+    """Draw in this process."""
     if stopped() or not (settings.plot or settings.animate or settings.html):
         return
-    from maneuver_automaton import plotting
-    from maneuver_automaton.cli.pictures import skip_documentation
-
     skip_documentation()
+    try:
+        _draw(result, name, out, settings)
+    except OSError as error:
+        raise not_written(Path(error.filename or out), error) from error
+
+
+def _draw(result: PlanResult, name: str, out: Path, settings: Settings) -> None:
+    """Write the pictures of a plan."""
+    from maneuver_automaton import plotting
 
     if settings.plot:
         look = settings.look.look(name)
@@ -214,7 +245,9 @@ def _row(problem: tuple[Path, Parts], *, out: Path, settings: Settings, folder: 
         with contextlib.chdir(folder):
             if road_command.is_road(path):
                 return _road_row(path, parts, out, settings)
-            result = _plan(scenario_of(path, parts), out, settings)
+            scenario = scenario_of(path, parts)
+            result = _plan(scenario, out, settings)
+            _drawn_here(result, scenario.name, out, settings)
     except Exception as error:  # noqa: BLE001, one bad file must not stop the others
         return Row(name=path.name, code=BAD_INPUT, status="bad input", reason=explained(error))
     found = result.plan is not None

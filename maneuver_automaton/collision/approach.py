@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from maneuver_automaton.groups import SE2
 
 
 def least_over_poses(
-    distance: Callable[[Array, Array], float],
+    distance: Callable[[Sequence[float], Sequence[float]], float],
     poses: Array,
     others: Array,
     *,
@@ -25,7 +25,7 @@ def least_over_poses(
     last distance less that is no smaller than the least, none is measured.
     """
     bound = -math.inf
-    for here, there, closer in zip(poses, others, moved, strict=True):
+    for here, there, closer in zip(poses.tolist(), others.tolist(), moved.tolist(), strict=True):
         bound -= closer
         if bound < least:
             bound = distance(here, there)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import math
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -27,16 +27,16 @@ from maneuver_automaton.collision.solids import (
     obstacle_region,
     obstacle_skin,
 )
-from maneuver_automaton.collision.spacetime import CoastingBody, MovingBody, may_meet, meet
+from maneuver_automaton.collision.spacetime import CoastingBody, MovingBody, Place, may_meet, meet
 from maneuver_automaton.collision.swept import (
     STANDING,
     GrownBody,
     Twist,
-    Windows,
     along,
-    box_around,
     chunks,
+    course_boxes,
     course_hulls,
+    cut_where_it_pivots,
     fastest,
     grown_body,
     halves,
@@ -46,6 +46,7 @@ from maneuver_automaton.collision.swept import (
 )
 from maneuver_automaton.groups import SE2
 
+CLOSE = 4  # steps of a course at most, around which closer solids than rectangles are laid
 _ONE_AT_A_TIME = threading.Lock()  # objects are shared, and moved before they are asked
 
 
@@ -95,7 +96,6 @@ class FclChecker:
     proven: float = field(default=1e-3, kw_only=True)  # [m]
     _body: GrownBody = field(init=False, repr=False)
     _bare: GrownBody = field(init=False, repr=False)
-    _covers: tuple[GrownBody, ...] = field(init=False, repr=False)  # from few corners to all
     _ground: _Ground = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -110,20 +110,18 @@ class FclChecker:
         object.__setattr__(self, "origin", (x, y))
         object.__setattr__(self, "_body", grown_body(self.footprint, self.margin, excess))
         object.__setattr__(self, "_bare", grown_body(self.footprint, 0.0, excess))
-        around = box_around(self._body)
-        few = sum(map(len, self._body.pieces)) <= len(around.pieces[0])
-        object.__setattr__(self, "_covers", (self._body,) if few else (around, self._body))
         object.__setattr__(self, "_ground", _ground_of(self.obstacles, (x, y), excess))
 
     def pose_hit(self, pose: ArrayLike, *, time: float = 0.0) -> int | None:
         """Which obstacle the body touches at a pose (3,) and a time [s]; None if it is free."""
         here = self._seen("pose", pose)
-        hit = self._static_hit(here[None])
-        if hit is not None:
-            return hit
+        if self._ground.static is not None:
+            hit = self._first_pose_hit(here[None], np.zeros(1, dtype=np.int64))
+            if hit is not None:
+                return hit[1]
         for one in self._ground.moving:
-            there = one.path.at(time)
-            if _touching(_standing(self._body), here[None], one.object, there=there):
+            there = one.path.stretch(time).pose
+            if _touching([_standing(self._body)], here[None], one.object, there=there):
                 return one.owner
         return None
 
@@ -145,15 +143,47 @@ class FclChecker:
         ValueError
             If a number is not finite, or the duration negative.
         """
-        here = self._seen("start", start)
-        v_x, v_y, turn_rate = as_array("body_velocity", body_velocity, last=3).tolist()
+        here = as_array("start", start, last=3)[None]
+        twist = as_array("body_velocity", body_velocity, last=3)[None]
         if not (math.isfinite(duration) and duration >= 0.0):
             raise ValueError(f"duration must be a number of at least 0, got {duration} s")
-        twist = (v_x, v_y, turn_rate)
-        hit = self._static_hit_along(here, twist, duration)
-        if hit is not None or not self._ground.moving:
+        hit = self.motions_hit(here, twist, [duration], start_times=start_time)
+        return None if hit is None else hit[1]
+
+    def motions_hit(
+        self,
+        starts: ArrayLike,
+        body_velocities: ArrayLike,
+        durations: ArrayLike,
+        *,
+        start_times: ArrayLike = 0.0,
+        ask: Callable[[], None] = lambda: None,
+    ) -> tuple[int, int] | None:
+        """The first of several motions that touches, and which obstacle; None if all are free.
+
+        Each coasts as in `motion_hit`: from one of `starts` (n, 3), for one of `durations` (n,),
+        from one of `start_times` (n,) on [s]. `ask` is called again and again, and may raise to
+        give it up.
+
+        Raises
+        ------
+        ValueError
+            If a number is not finite, or a duration negative.
+        """
+        here = self._seen("starts", starts)
+        twists = as_array("body_velocities", body_velocities, last=3)
+        lasting = as_array("durations", durations)
+        if lasting.size and not lasting.min() >= 0.0:
+            raise ValueError(f"durations: got {lasting.min()} s, need at least 0")
+        hit = self._first_static_hit(here, twists, lasting, ask)
+        if not self._ground.moving:
             return hit
-        return self._moving_hit_along(here, twist, duration, start_time)
+        before = slice(len(here) if hit is None else hit[0])  # where it may touch sooner
+        clock = np.broadcast_to(as_array("start_times", start_times), lasting.shape)
+        sooner = self._first_moving_hit(
+            here[before], twists[before], lasting[before], clock[before], ask
+        )
+        return hit if sooner is None else sooner
 
     def course_hit(
         self,
@@ -167,49 +197,48 @@ class FclChecker:
         """Which obstacle the body touches along a course; None if the path is free.
 
         The course is sampled at `poses` (n, 3), seen from `start`, and `times` (n,) [s] since its
-        begin, and runs with a constant twist from sample to sample. One solid serves several
-        samples; where it touches, halves of it are tried, down to single ones. `ask` is called
-        before each, and may raise to give it up.
+        begin, and runs with a constant twist from sample to sample. `ask` is called again and
+        again, and may raise to give it up.
 
         Raises
         ------
         ValueError
             If a number is not finite.
         """
-        frame = SE2(self._seen("start", start))
-        seen = (frame @ SE2(as_array("poses", poses, last=3))).pose
-        clock = as_array("times", times) + start_time
-        spans = np.diff(clock)
-        steps = (SE2(seen[:-1]).inverse() @ SE2(seen[1:])).log()
-        twists = steps / np.maximum(spans, 1e-300)[:, None]
-        if self._may_come_near(seen, steps):
-            todo = chunks(steps)[::-1]
-            while todo:
-                ask()
-                first, last = todo.pop()
-                if last - first == 1:
-                    twist = (*steps[first].tolist(),)
-                    hit = self._static_hit_along(seen[first], (twist[0], twist[1], twist[2]), 1.0)
-                    if hit is not None:
-                        return hit
-                    continue
-                # The rectangle around the body first: its few corners make a hull quickly, and
-                # mostly do.
-                if all(
-                    self._sweep_hits(body, seen[first : last + 1], steps[first:last])
-                    for body in self._covers
-                ):
-                    middle = (first + last) // 2
-                    todo += [(middle, last), (first, middle)]
-        if self._ground.moving:
-            for k in self._near_moving(seen, steps, clock).tolist():
-                ask()
-                v_x, v_y, turn_rate = twists[k].tolist()
-                span, time = float(spans[k]), float(clock[k])
-                hit = self._moving_hit_along(seen[k], (v_x, v_y, turn_rate), span, time)
-                if hit is not None:
-                    return hit
-        return None
+        course = Course(start, poses, times, start_time)
+        hit = self.courses_hit([course], ask=ask)
+        return None if hit is None else hit[1]
+
+    def courses_hit(
+        self, courses: Sequence[Course], *, ask: Callable[[], None] = lambda: None
+    ) -> tuple[int, int] | None:
+        """The first of several courses along which the body touches, and which obstacle.
+
+        One rectangle holds the body over many samples; where it touches, halves of it are tried,
+        then closer solids, down to single steps.
+        """
+        if not courses:
+            return None
+        counts = [len(np.atleast_2d(one.poses)) for one in courses]
+        number = np.repeat(np.arange(len(courses)), counts)
+        starts = self._seen("start", np.array([one.start for one in courses]))
+        every = as_array("poses", np.concatenate([one.poses for one in courses]), last=3)
+        clock = np.concatenate([as_array("times", one.times) + one.start_time for one in courses])
+        seen = (SE2(starts[number]) @ SE2(every)).pose
+        rows = np.flatnonzero(number[1:] == number[:-1])
+        of, spans = number[rows], clock[rows + 1] - clock[rows]
+        poses = np.stack([seen[rows], seen[rows + 1]])
+        steps = (SE2(poses[0]).inverse() @ SE2(poses[1])).log()
+        row = self._first_step_hit(poses, steps, of, ask)
+        hit = None if row is None else (int(of[row[0]]), row[1])
+        if not self._ground.moving:
+            return hit
+        sooner = slice(None if hit is None else int(np.searchsorted(of, hit[0])))
+        twists = steps[sooner] / np.maximum(spans[sooner], 1e-300)[:, None]
+        row = self._first_moving_hit(
+            poses[0, sooner], twists, spans[sooner], clock[rows[sooner]], ask
+        )
+        return hit if row is None else (int(of[row[0]]), row[1])
 
     def clearance(self, poses: ArrayLike, *, times: ArrayLike | None = None) -> float:
         """Least distance [m] to any obstacle at poses (n, 3) and times (n,) [s], 0 if none given.
@@ -237,74 +266,146 @@ class FclChecker:
         near[..., :2] -= self.origin
         return near
 
-    def _may_come_near(self, poses: Array, steps: Array) -> bool:
-        """Whether the rectangles around a course and around the static obstacles meet."""
-        far = float(np.hypot(*self._body.middle)) + self._body.reach
-        swings = np.linalg.norm(steps[:, :2], axis=1) + far * np.abs(steps[:, 2])
-        pad = far + float(swings.max(initial=0.0))
-        low, high = poses[:, :2].min(axis=0) - pad, poses[:, :2].max(axis=0) + pad
-        return bool((low <= self._ground.high).all() and (high >= self._ground.low).all())
-
-    def _sweep_hits(self, body: GrownBody, poses: Array, steps: Array) -> bool:
-        """Whether one solid around a body along a course touches a static obstacle."""
-        skin = body_skin(course_hulls(body, poses, steps))
-        return bool(_touching(_object(skin), np.zeros((1, 3)), self._ground.static, most=1))
-
-    def _static_hit(self, poses: Array) -> int | None:
-        """A static obstacle that is touched at one of the poses (n, 3)."""
-        if self._ground.static is None:
+    def _first_step_hit(
+        self, poses: Array, steps: Array, courses: IntArray, ask: Callable[[], None]
+    ) -> tuple[int, int] | None:
+        """The first of some steps of courses that touches a static obstacle, and which."""
+        if self._ground.static is None or not len(steps):
             return None
-        hits = _touching(_standing(self._body), poses, self._ground.static, most=1)
-        return self._ground.owner_of(hits)
-
-    def _static_hit_along(self, start: Array, twist: Twist, duration: float) -> int | None:
-        """A static obstacle that is touched along a coast."""
-        if self._ground.static is None:
-            return None
-        if fastest(self._body, twist) * duration <= STANDING:
-            return self._static_hit(start[None])
-        once = 2.0 * math.pi / abs(twist[2]) if twist[2] else math.inf  # then it is where it began
-        parts = windows(twist, min(duration, once))
-        while True:
-            solid = _sliced(self._body, twist, parts.level)
-            hits = _touching(solid.object, along(start, twist, parts.begins), self._ground.static)
-            if not hits or solid.excess <= 0.5 * self.proven:
-                return self._ground.owner_of(hits)
-            parts = Windows(parts.level, parts.begins[list(hits)])
-            middles = along(start, twist, parts.begins + 0.5 * parts.length)
-            hit = self._static_hit(middles)
-            if hit is not None:
-                return hit
-            parts = halves(parts)
-
-    def _near_moving(self, seen: Array, steps: Array, clock: Array) -> IntArray:
-        """Numbers of the steps between samples on which a moving obstacle may be met."""
-        body, spans = self._body, np.diff(clock)
-        x, y = body.middle
-        middles = (SE2(seen[:-1]) @ SE2.exp(0.5 * steps)).act(body.middle)
-        covered = 0.5 * np.hypot(steps[:, 0] - steps[:, 2] * y, steps[:, 1] + steps[:, 2] * x)
-        near = np.zeros(len(steps), dtype=np.bool_)
-        for one in self._ground.moving:
-            apart = np.hypot(*(middles - one.path.centers(clock[:-1] + 0.5 * spans)).T)
-            most = covered + 0.5 * spans * one.path.fastest_middle
-            near |= apart <= most + body.reach + one.path.radius
-        return np.flatnonzero(near)
-
-    def _moving_hit_along(
-        self, start: Array, twist: Twist, duration: float, time: float
-    ) -> int | None:
-        """A moving obstacle that is touched along a coast."""
-        body = self._body
-        coasting = CoastingBody(start, twist, complex(*body.middle), body.reach)
-        center = coasting.center(coasting.at(0.5 * duration))
-        for one in self._ground.moving:
-            path = one.path.from_time(time)
-            distance = functools.partial(_distance, _standing(body), one.object)
-            if may_meet(coasting, path, duration=duration, center=center) and meet(
-                coasting, path, duration=duration, distance=distance, contact=0.5 * self.proven
-            ):
-                return one.owner
+        begins = np.append(True, courses[1:] != courses[:-1])
+        first, last = chunks(steps, begins)
+        close: list[tuple[int, int]] = []
+        while first.size:
+            ask()
+            rings = course_boxes(self._body, poses, steps, first, last)
+            boxes = [_object(_box_skin(ring)) for ring in rings]
+            hits = _touching(boxes, np.zeros((first.size, 3)), self._ground.static)
+            rows = np.fromiter(hits, dtype=np.int64, count=len(hits))
+            first, last = first[rows], last[rows]
+            short = last - first <= CLOSE
+            close += zip(first[short].tolist(), last[short].tolist(), strict=True)
+            ends = np.stack([first, (first + last) // 2, last], axis=1)[~short]
+            first, last = ends[:, :2].ravel(), ends[:, 1:].ravel()
+        close.sort(reverse=True)
+        while close:
+            ask()
+            begin, end = close.pop()
+            if end - begin == 1:
+                one = slice(begin, end)
+                hit = self._first_static_hit(poses[0, one], steps[one], np.ones(1), ask)
+                if hit is not None:
+                    return begin, hit[1]
+            elif self._sweep_hits(poses[:, begin:end], steps[begin:end]):
+                middle = (begin + end) // 2
+                close += [(middle, end), (begin, middle)]
         return None
+
+    def _sweep_hits(self, poses: Array, steps: Array) -> bool:
+        """Whether one solid around the body along a few steps touches a static obstacle."""
+        x, y, turn = steps.sum(axis=0).tolist()
+        pieces = cut_where_it_pivots(self._body, (x, y, turn))
+        whole = np.concatenate([poses[0], poses[1, -1:]])
+        skin = body_skin(course_hulls(pieces, whole, steps))
+        return bool(_touching([_object(skin)], np.zeros((1, 3)), self._ground.static))
+
+    def _first_static_hit(
+        self, starts: Array, twists: Array, durations: Array, ask: Callable[[], None]
+    ) -> tuple[int, int] | None:
+        """The first of some coasts that touches a static obstacle, and which."""
+        if self._ground.static is None:
+            return None
+        moving = fastest(self._body, twists) * durations > STANDING
+        first = self._first_pose_hit(starts, np.flatnonzero(~moving))
+        turning = np.abs(twists[:, 2])
+        with np.errstate(divide="ignore", over="ignore"):
+            once = 2.0 * math.pi / turning  # then it is where it began
+        parts = windows(turning, np.where(moving, np.minimum(durations, once), 0.0))
+        if first is not None:
+            parts = parts.of(parts.coast < first[0])
+        kinds: list[Twist] = [(x, y, turn) for x, y, turn in twists.tolist()]
+        while parts.coast.size:
+            ask()
+            of = parts.coast
+            solids = [
+                _sliced(self._body, kinds[k], level)
+                for k, level in zip(of.tolist(), parts.level.tolist(), strict=True)
+            ]
+            begins, middles = along(
+                starts[of], twists[of], np.stack([parts.begins, parts.begins + 0.5 * parts.lengths])
+            )
+            objects = [solid.object for solid in solids]
+            hits = _touching(objects, begins, self._ground.static)
+            if not hits:
+                break
+            for row, triangle in hits.items():  # in order: the first is the first coast's
+                if solids[row].excess <= 0.5 * self.proven and _is_sooner(of[row], first):
+                    first = int(of[row]), int(self._ground.owners[triangle])
+            rows = np.array([row for row in hits if _is_sooner(of[row], first)], dtype=np.int64)
+            hit = self._first_pose_hit(middles, rows)
+            if hit is not None:
+                first = int(of[hit[0]]), hit[1]
+                rows = rows[of[rows] < first[0]]
+            parts = halves(parts.of(rows))
+        return first
+
+    def _first_pose_hit(self, poses: Array, rows: IntArray) -> tuple[int, int] | None:
+        """The first of some rows of poses (n, 3) that touches a static obstacle, and which."""
+        body = [_standing(self._body)] * rows.size
+        hits = _touching(body, poses[rows], self._ground.static, most=1)
+        return next(
+            ((int(rows[row]), int(self._ground.owners[at])) for row, at in hits.items()), None
+        )
+
+    def _first_moving_hit(
+        self,
+        starts: Array,
+        twists: Array,
+        durations: Array,
+        clock: Array,
+        ask: Callable[[], None],
+    ) -> tuple[int, int] | None:
+        """The first of some coasts, begun at times on a clock, that meets a moving obstacle."""
+        body = self._body
+        (x, y), (half_x, half_y) = body.middle.tolist(), body.half.tolist()
+        halves = 0.5 * durations
+        centers = (SE2(starts) @ SE2.exp(halves[:, None] * twists)).act(body.middle)
+        speeds = np.hypot(twists[:, 0] - twists[:, 2] * y, twists[:, 1] + twists[:, 2] * x)
+        near = [
+            may_meet(
+                one.path,
+                centers,
+                times=clock + halves,
+                halves=halves,
+                speeds=speeds,
+                reach=body.reach,
+            )
+            for one in self._ground.moving
+        ]
+        for k in np.flatnonzero(np.any(near, axis=0)).tolist():
+            ask()
+            (v_x, v_y, turn), (at_x, at_y, heading) = twists[k].tolist(), starts[k].tolist()
+            start, twist = (at_x, at_y, heading), (v_x, v_y, turn)
+            coasting = CoastingBody(start, twist, complex(x, y), body.reach, (half_x, half_y))
+            for number in np.flatnonzero([row[k] for row in near]).tolist():
+                one = self._ground.moving[number]
+                if meet(
+                    coasting,
+                    one.path.from_time(float(clock[k])),
+                    duration=float(durations[k]),
+                    distance=functools.partial(_distance, _standing(body), one.object),
+                    contact=0.5 * self.proven,
+                ):
+                    return k, one.owner
+        return None
+
+
+class Course(NamedTuple):
+    """What is driven from a start: poses seen from there, with a constant twist between two."""
+
+    start: ArrayLike  # (3,)
+    poses: ArrayLike  # (n, 3)
+    times: ArrayLike  # (n,) [s] since its begin
+    start_time: float  # [s] of the world's clock
 
 
 class _Moving(NamedTuple):
@@ -319,14 +420,8 @@ class _Ground(NamedTuple):
     """Obstacles as FCL sees them."""
 
     static: Any  # one object for all static obstacles, None without
-    low: Array  # (2,) corners of the rectangle around it
-    high: Array
     owners: IntArray  # which obstacle each of its triangles belongs to
     moving: tuple[_Moving, ...]
-
-    def owner_of(self, hits: dict[int, int]) -> int | None:
-        """Which obstacle the first of the triangles hit belongs to."""
-        return int(self.owners[next(iter(hits.values()))]) if hits else None
 
 
 class _Sliced(NamedTuple):
@@ -336,6 +431,7 @@ class _Sliced(NamedTuple):
     excess: float  # [m]
 
 
+_BOX = body_skin([np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])]).triangles
 _AT_REST = MovingBody.of(Motion([0.0], [[0.0, 0.0, 0.0]]), 0.0)
 
 
@@ -352,12 +448,14 @@ def _ground_of(
         region = obstacle_region(obstacle, excess=excess)
         if isinstance(obstacle, Obstacle) and obstacle.motion is not None:
             points = region.cover.reshape(-1, 2)
-            middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+            low, high = points.min(axis=0), points.max(axis=0)
+            middle, (half_x, half_y) = 0.5 * (low + high), (0.5 * (high - low)).tolist()
             path = MovingBody.of(
                 obstacle.motion,
                 float(np.hypot(*points.T).max()),
                 middle=complex(*middle),
                 radius=float(np.hypot(*(points - middle).T).max()),
+                half=(half_x, half_y),
             )
             skin, _ = obstacle_skin([region])
             moving.append(_Moving(_object(skin), path, index))
@@ -365,17 +463,9 @@ def _ground_of(
             regions.append(region)
             owners.append(index)
     if not regions:
-        nowhere = np.full(2, np.inf)
-        return _Ground(None, nowhere, -nowhere, np.zeros(0, dtype=np.int64), tuple(moving))
+        return _Ground(None, np.zeros(0, dtype=np.int64), tuple(moving))
     skin, which = obstacle_skin(regions)
-    corners = skin.vertices[:, :2]
-    return _Ground(
-        _object(skin),
-        corners.min(axis=0),
-        corners.max(axis=0),
-        np.array(owners)[which],
-        tuple(moving),
-    )
+    return _Ground(_object(skin), np.array(owners)[which], tuple(moving))
 
 
 @functools.lru_cache(maxsize=32)
@@ -386,9 +476,22 @@ def _standing(body: GrownBody) -> Any:
 
 @functools.lru_cache(maxsize=1024)
 def _sliced(body: GrownBody, twist: Twist, level: int) -> _Sliced:
-    duration = math.ldexp(1.0, -level)
-    hulls = slice_hulls(body, twist, duration)
-    return _Sliced(_object(body_skin(hulls)), slice_excess(body, twist, duration))
+    duration, pieces = math.ldexp(1.0, -level), cut_where_it_pivots(body, twist)
+    hulls = slice_hulls(pieces, twist, duration)
+    return _Sliced(_object(body_skin(hulls)), slice_excess(pieces, twist, duration))
+
+
+def _box_skin(ring: Array) -> Skin:
+    """Walls and lid over a rectangle (4, 2), without a search for what they are made of."""
+    vertices = np.zeros((8, 3))
+    vertices[:4, :2] = vertices[4:, :2] = ring
+    vertices[4:, 2] = 1.0
+    return Skin(vertices, _BOX)
+
+
+def _is_sooner(coast: int, hit: tuple[int, int] | None) -> bool:
+    """Whether a coast comes before the one that is hit."""
+    return hit is None or coast < hit[0]
 
 
 def _object(skin: Skin) -> Any:
@@ -412,37 +515,46 @@ def _turns(poses: Array) -> Array:
     return turns
 
 
-def _place(one: Any, pose: Array) -> None:
-    """Put an object at a pose (3,)."""
-    one.setRotation(_turns(pose[None])[0])
-    one.setTranslation(np.array([pose[0], pose[1], 0.0]))
+def _place(one: Any, pose: Sequence[float]) -> None:
+    """Put an object at a pose."""
+    x, y, heading = pose
+    cosine, sine = math.cos(heading), math.sin(heading)
+    one.setRotation(np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]]))
+    one.setTranslation(np.array([x, y, 0.0]))
 
 
 def _touching(
-    one: Any, poses: Array, other: Any, *, there: Array | None = None, most: int | None = None
+    ones: Sequence[Any],
+    poses: Array,
+    other: Any,
+    *,
+    there: Place | None = None,
+    most: int | None = None,
 ) -> dict[int, int]:
-    """At which of the poses (n, 3) an object touches another, and which of its triangles."""
+    """Which of some objects (n) at poses (n, 3) touch another, and which of its triangles."""
     import fcl
 
+    collide, result_of = fcl.collide, fcl.CollisionResult
     request = fcl.CollisionRequest(num_max_contacts=1, enable_contact=False)
-    places = np.column_stack([poses[:, :2], np.zeros(len(poses))])
+    places = np.zeros((len(poses), 3))
+    places[:, :2] = poses[:, :2]
     hits: dict[int, int] = {}
     with _ONE_AT_A_TIME:
         if there is not None:
             _place(other, there)
-        for k, (turn, place) in enumerate(zip(_turns(poses), places, strict=True)):
+        for k, (one, turn, place) in enumerate(zip(ones, _turns(poses), places, strict=True)):
             one.setRotation(turn)
             one.setTranslation(place)
-            result = fcl.CollisionResult()
-            if fcl.collide(one, other, request, result):
+            result = result_of()
+            if collide(one, other, request, result):
                 hits[k] = result.contacts[0].b2
                 if len(hits) == most:
                     break
     return hits
 
 
-def _distance(one: Any, other: Any, here: Array, there: Array) -> float:
-    """Distance [m] of two objects at two poses (3,), zero on contact."""
+def _distance(one: Any, other: Any, here: Sequence[float], there: Sequence[float]) -> float:
+    """Distance [m] of two objects at two poses, zero on contact."""
     import fcl
 
     with _ONE_AT_A_TIME:

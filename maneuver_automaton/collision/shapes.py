@@ -447,6 +447,8 @@ def as_obstacles(value: Any) -> tuple[AnyObstacle, ...]:
     """
     if isinstance(value, Obstacle | OccupancyMap):
         return (value,)
+    if type(value) is tuple and all(isinstance(one, Obstacle | OccupancyMap) for one in value):
+        return value
     if _holds_parts(value):
         return tuple(one for part in value for one in as_obstacles(part))
     shapes = as_shapes("obstacles", value, or_else="Obstacle, OccupancyMap, ")

@@ -13,26 +13,31 @@ build, here 10 ms. And with time as third axis no heights are left that tell a s
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision.shapes import Motion
 from maneuver_automaton.collision.swept import Twist
 from maneuver_automaton.groups import SE2
 
+Place: TypeAlias = tuple[float, float, float]
+"""A pose on plain numbers: x [m], y [m], heading [rad]."""
+
 
 class CoastingBody(NamedTuple):
     """A body whose frame coasts from a pose."""
 
-    start: Array  # (3,)
+    start: Place
     twist: Twist
     middle: complex  # x + i y of the middle of a disc around the body, in its frame [m]
     reach: float  # [m] radius of that disc
+    half: tuple[float, float] | None = None  # [m] half the sides of a rectangle about the middle
 
     @property
     def velocity(self) -> complex:
@@ -40,12 +45,20 @@ class CoastingBody(NamedTuple):
         v_x, v_y, turn_rate = self.twist
         return complex(v_x, v_y) + 1j * turn_rate * self.middle
 
-    def at(self, time: float) -> Array:
-        """Pose (3,) after `time` [s]."""
-        return (SE2(self.start) @ SE2.exp(time * np.array(self.twist))).pose
+    def at(self, time: float) -> Place:
+        """Pose after `time` [s].
 
-    def center(self, pose: Array) -> complex:
-        """Where the middle is at a pose (3,)."""
+        Source: Solà, Deray, Atchuthan (2018), Eqs. (156), (158), in half-angle form.
+        """
+        v_x, v_y, turn_rate = self.twist
+        x, y, heading = self.start
+        half = 0.5 * turn_rate * time
+        chord = complex(v_x, v_y) * time * (math.sin(half) / half if half else 1.0)
+        place = complex(x, y) + chord * cmath.rect(1.0, heading + half)
+        return place.real, place.imag, heading + turn_rate * time
+
+    def center(self, pose: Place) -> complex:
+        """Where the middle is at a pose."""
         return complex(pose[0], pose[1]) + _direction(pose) * self.middle
 
 
@@ -59,29 +72,36 @@ class MovingBody(NamedTuple):
     turn_rate: float  # [rad/s] the frame never turns faster
     middle: complex  # x + i y of the middle of a disc around the body, in its frame [m]
     radius: float  # [m] of that disc
+    half: tuple[float, float] | None = None  # [m] half the sides of a rectangle about the middle
 
     @classmethod
     def of(
-        cls, motion: Motion, reach: float, *, middle: complex = 0j, radius: float | None = None
+        cls,
+        motion: Motion,
+        reach: float,
+        *,
+        middle: complex = 0j,
+        radius: float | None = None,
+        half: tuple[float, float] | None = None,
     ) -> MovingBody:
         """Body that follows a motion and has no point further than `reach` [m] from its frame.
 
         A disc around a `middle` in that frame, of a `radius` [m], is often much smaller: the frame
-        of an obstacle may lie anywhere.
+        of an obstacle may lie anywhere. A rectangle with `half` sides [m] about it may be, too.
         """
         rates = np.diff(motion.pose, axis=0) / np.diff(motion.time)[:, None]
         speed = float(np.hypot(rates[:, 0], rates[:, 1]).max(initial=0.0))
         turn_rate = float(np.abs(rates[:, 2]).max(initial=0))
         size = reach if radius is None else radius
-        return cls(motion.time, motion.pose, reach, speed, turn_rate, middle, size)
+        return cls(motion.time, motion.pose, reach, speed, turn_rate, middle, size, half)
 
     @property
     def fastest_middle(self) -> float:
         """Greatest speed of the middle of the disc [m/s]."""
         return self.speed + self.turn_rate * abs(self.middle)
 
-    def center(self, pose: Array) -> complex:
-        """Where the middle is at a pose (3,)."""
+    def center(self, pose: Place) -> complex:
+        """Where the middle is at a pose."""
         return complex(pose[0], pose[1]) + _direction(pose) * self.middle
 
     def centers(self, times: Array) -> Array:
@@ -97,23 +117,91 @@ class MovingBody(NamedTuple):
         times = np.asarray(time, dtype=np.float64)
         return np.stack([np.interp(times, self.knots, self.poses[:, k]) for k in range(3)], axis=-1)
 
-    def rates(self, time: float) -> tuple[complex, float, float]:
-        """Velocity [m/s], turn rate [rad/s] from `time` [s] on, and until when they last [s]."""
-        k = int(np.searchsorted(self.knots, time, side="right"))
-        if k == self.knots.size:
-            return 0j, 0.0, math.inf
-        if k == 0:
-            return 0j, 0.0, float(self.knots[0])
-        lasts = float(self.knots[k] - self.knots[k - 1])
-        x, y, turn = ((self.poses[k] - self.poses[k - 1]) / lasts).tolist()
-        return complex(x, y), turn, float(self.knots[k])
+    def stretch(self, time: float) -> Stretch:
+        """Where the frame is at a `time` [s], and how it goes on from there."""
+        knots = self.knots
+        k = int(knots.searchsorted(time, side="right"))
+        x, y, heading = self.poses[max(k - 1, 0)].tolist()
+        if k in (0, knots.size):
+            until = math.inf if k else float(knots[0])
+            return Stretch((x, y, heading), 0j, 0.0, until)
+        begin, end = knots[k - 1 : k + 1].tolist()
+        v_x, v_y, turn = ((self.poses[k] - self.poses[k - 1]) / (end - begin)).tolist()
+        since = time - begin
+        pose = x + since * v_x, y + since * v_y, heading + since * turn
+        return Stretch(pose, complex(v_x, v_y), turn, end)
 
 
-def may_meet(body: CoastingBody, other: MovingBody, *, duration: float, center: complex) -> bool:
-    """False where both are too far and too slow; `center` is the body's after half the time."""
-    there = other.center(other.at(0.5 * duration))
-    covered = 0.5 * duration * (abs(body.velocity) + other.fastest_middle)
-    return abs(center - there) <= covered + body.reach + other.radius
+class Stretch(NamedTuple):
+    """A pose at a time, and the rates from then on."""
+
+    pose: Place
+    velocity: complex  # [m/s]
+    turn_rate: float  # [rad/s]
+    until: float  # [s] how long the rates last
+
+
+def may_meet(
+    other: MovingBody, centers: Array, *, times: Array, halves: Array, speeds: Array, reach: float
+) -> NDArray[np.bool_]:
+    """False (n,) where bodies are too far and too slow to meet another.
+
+    Each lasts from `halves` (n,) [s] before one of `times` (n,) to as long after it; then its
+    middle is at one of `centers` (n, 2), and never faster than one of `speeds` (n,) [m/s]. No point
+    of it is further than `reach` [m] from its middle.
+    """
+    apart = np.hypot(*(centers - other.centers(times)).T) - reach - other.radius
+    return np.asarray(apart <= halves * (speeds + other.fastest_middle))
+
+
+class Apart(NamedTuple):
+    """Along a direction no point of one body comes closer to one of another than a distance."""
+
+    distance: float  # [m]
+    direction: complex  # unit vector from the one to the other
+    turning: tuple[bool, bool]  # whether the distance depends on how either is turned
+
+
+def apart_at_least(body: CoastingBody, other: MovingBody, here: Place, there: Place) -> list[Apart]:
+    """How far two bodies at two poses are apart at least, by discs and rectangles around them.
+
+    Nothing of those that overlap.
+
+    Examples
+    --------
+    >>> car = CoastingBody((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0j, 2.5, (2.4, 0.9))
+    >>> other = MovingBody.of(Motion([0.0], [[0.0, 2.0, 0.0]]), 2.5, half=(2.4, 0.9))
+    >>> bounds = apart_at_least(car, other, (0.0, 0.0, 0.0), (0.0, 2.0, 0.0))
+    >>> max((round(one.distance, 9), one.direction) for one in bounds[:1])
+    (0.2, 1j)
+    """
+    way = other.center(there) - body.center(here)
+    own, its = body.half or (body.reach, body.reach), other.half or (other.radius, other.radius)
+    angle = there[2] - here[2]
+    cosine, sine = abs(math.cos(angle)), abs(math.sin(angle))
+    found = []
+    away = abs(way)
+    if away > body.reach + other.radius:
+        found.append(Apart(away - body.reach - other.radius, way / away, (False, False)))
+    for heading, half, seen, radius, turning in (
+        (here[2], own, its, other.radius, (True, False)),
+        (there[2], its, own, body.reach, (False, True)),
+    ):
+        axis = cmath.rect(1.0, heading)
+        along = way * axis.conjugate()
+        x, y = abs(along.real) - half[0], abs(along.imag) - half[1]
+        signs = complex(math.copysign(1.0, along.real), math.copysign(1.0, along.imag))
+        box = (
+            x - cosine * seen[0] - sine * seen[1],
+            y - sine * seen[0] - cosine * seen[1],
+        )
+        for (d_x, d_y), less, turns in (((x, y), radius, turning), (box, 0.0, (True, True))):
+            gap = complex(max(d_x, 0.0), max(d_y, 0.0))
+            size = abs(gap)
+            if size > less:
+                to = complex(signs.real * gap.real, signs.imag * gap.imag) / size
+                found.append(Apart(size - less, axis * to, turns))
+    return found
 
 
 def meet(
@@ -121,23 +209,24 @@ def meet(
     other: MovingBody,
     *,
     duration: float,
-    distance: Callable[[Array, Array], float],
+    distance: Callable[[Place, Place], float],
     contact: float,
 ) -> bool:
     """Whether two bodies come within `contact` > 0 [m] of each other until `duration` [s].
 
     True only if they do; False only if they never touch. `distance` is that of the bodies at a
-    pose of the body and one of the other, and is asked for where discs around them are close.
+    pose of the body and one of the other, and is asked for where the discs and rectangles around
+    them are close.
 
     Source: conservative advancement, Mirtich (1996), *Impulse-based Dynamic Simulation of Rigid
     Body Systems*, Sec. 2.3, here with the least time in which ``a t + b t^2 / 2`` is the distance.
 
     Examples
     --------
-    >>> still = CoastingBody(np.zeros(3), (0.0, 0.0, 0.0), 0j, 0.5)
+    >>> still = CoastingBody((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0j, 0.5)
     >>> crossing = MovingBody.of(Motion([0.0, 4.0], [[-4.0, 0, 0], [4.0, 0, 0]]), 0.5)
     >>> def distance(one, other):
-    ...     return max(0.0, math.hypot(*(one - other)[:2]) - 1.0)
+    ...     return max(0.0, math.dist(one[:2], other[:2]) - 1.0)
     >>> meet(still, crossing, duration=1.0, distance=distance, contact=1e-3)
     False
     >>> meet(still, crossing, duration=2.0, distance=distance, contact=1e-3)
@@ -146,25 +235,49 @@ def meet(
     turning = abs(body.twist[2]) * body.reach
     bend = abs(body.velocity) * abs(body.twist[2])
     fastest = abs(body.velocity) + other.speed + turning + other.turn_rate * other.reach
-    near = 0.5 * (body.reach + other.radius)
     time = 0.0
     while True:
-        here, there = body.at(time), other.at(time)
-        clearance = abs(body.center(here) - other.center(there)) - body.reach - other.radius
-        if clearance <= near:
+        here, (there, velocity, turn_rate, until) = body.at(time), other.stretch(time)
+        own_velocity = _direction(here) * body.velocity
+        known = [one for one in apart_at_least(body, other, here, there) if one.distance > contact]
+        if known:
+            # The middle of the other runs on a circle about its frame.
+            arm = 1j * turn_rate * _direction(there) * other.middle
+            closing, both_bend = own_velocity - velocity - arm, bend + abs(turn_rate * arm)
+            spinning = turning, abs(turn_rate) * other.radius
+            lasts = max(_lasts(one, closing, spinning, both_bend) for one in known)
+            clearance = max(one.distance for one in known)
+        else:
             clearance = distance(here, there)
             if clearance <= contact:
                 return True
-        velocity, turn_rate, until = other.rates(time)
-        closing = abs(_direction(here) * body.velocity - velocity)
-        closing += turning + abs(turn_rate) * other.reach
-        speed = closing + math.sqrt(closing * closing + 2.0 * bend * clearance)
-        same_rates = min(time + 2.0 * clearance / speed, until) if speed > 0.0 else until
+            speed = abs(own_velocity - velocity) + turning + abs(turn_rate) * other.reach
+            lasts = _time_to_cover(clearance, speed, bend)
+        same_rates = min(time + lasts, until)
         after = max(same_rates, time + clearance / fastest) if fastest > 0.0 else math.inf
         if after > duration or time >= duration:
             return False
         time = after
 
 
-def _direction(pose: Array) -> complex:
-    return complex(math.cos(pose[2]), math.sin(pose[2]))
+def _lasts(one: Apart, closing: complex, spinning: tuple[float, float], bend: float) -> float:
+    """How long [s] two bodies stay apart at least, that close in with a velocity of their middles.
+
+    Along a direction that stays where it is their points close in with no more than the velocity
+    along it, what that changes, and what they turn about their middles.
+    """
+    speed = (closing * one.direction.conjugate()).real
+    speed += sum(rate for turns, rate in zip(one.turning, spinning, strict=True) if turns)
+    return _time_to_cover(one.distance, speed, bend)
+
+
+def _time_to_cover(distance: float, speed: float, acceleration: float) -> float:
+    """The least time [s] in which ``speed t + acceleration t^2 / 2`` is a distance > 0 [m]."""
+    root = math.sqrt(speed * speed + 2.0 * acceleration * distance)
+    if speed > 0.0:
+        return 2.0 * distance / (speed + root)
+    return (root - speed) / acceleration if acceleration > 0.0 else math.inf
+
+
+def _direction(pose: Place) -> complex:
+    return cmath.rect(1.0, pose[2])

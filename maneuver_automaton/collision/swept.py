@@ -2,18 +2,23 @@
 
 A coast is cut into slices that last a power of two seconds. One hull for each twist and each such
 time serves every slice of every plan. Half a slice is again a slice, of less excess.
+
+The hull of a side that turns about a point beside its middle fills the angle between where it was
+and where it will be: the excess falls with the turn, not with its square. So the body is cut there
+first (`cut_where_it_pivots`), and a slice of a quarter of a radian stands out by centimetres.
 """
 
 from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.shapes import Shape
 from maneuver_automaton.collision.solids import body_pieces, convex_hull
 from maneuver_automaton.groups import SE2
@@ -22,6 +27,8 @@ Twist = tuple[float, float, float]  # [m/s, m/s, rad/s]
 MOST_TURN = 0.25  # [rad] of one slice
 MOST_STEPS = 32  # of a course in one hull
 STANDING = 1e-12  # [m] a body that moves no point further is taken to stand
+FAR = 1e9  # [m] what turns about a point further away is taken to go straight
+ROUND = 0.1  # of a piece's extent: sides of less than this on either side of a pivot stay whole
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,28 +41,38 @@ class GrownBody:
 
         def __init__(self, pieces: tuple[Array, ...]) -> None: ...
 
-    @property
-    def middle(self) -> Array:
-        """Center (2,) of the box around the pieces [m]."""
-        corners = np.concatenate(self.pieces)
-        return np.asarray(0.5 * (corners.min(axis=0) + corners.max(axis=0)))
+    middle: Array = field(init=False)  # (2,) of the box around the pieces [m]
+    half: Array = field(init=False)  # (2,) half the sides of that box [m]
+    reach: float = field(init=False)  # [m] no point is further from the middle
 
-    @property
-    def reach(self) -> float:
-        """No point is further from the middle [m]."""
-        return float(np.hypot(*(np.concatenate(self.pieces) - self.middle).T).max())
+    if TYPE_CHECKING:
+
+        def __init__(self, pieces: tuple[Array, ...]) -> None: ...
+
+    def __post_init__(self) -> None:
+        corners = np.concatenate(self.pieces)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        middle = 0.5 * (low + high)
+        object.__setattr__(self, "middle", middle)
+        object.__setattr__(self, "half", 0.5 * (high - low))
+        object.__setattr__(self, "reach", float(np.hypot(*(corners - middle).T).max()))
 
 
 class Windows(NamedTuple):
-    """Slices of one level that cover a coast; the last may overlap the one before."""
+    """Slices that cover coasts, in order; the last of each may overlap the one before."""
 
-    level: int  # each lasts 2^-level s
+    coast: IntArray  # (n,) number of the coast
+    level: IntArray  # (n,) each lasts 2^-level s
     begins: Array  # (n,) [s]
 
     @property
-    def length(self) -> float:
-        """How long each lasts [s]."""
-        return math.ldexp(1.0, -self.level)
+    def lengths(self) -> Array:
+        """How long each lasts (n,) [s]."""
+        return np.ldexp(1.0, -self.level)
+
+    def of(self, rows: Any) -> Windows:
+        """Some of them, by number or truth."""
+        return Windows(self.coast[rows], self.level[rows], self.begins[rows])
 
 
 @functools.lru_cache(maxsize=16)
@@ -64,18 +81,56 @@ def grown_body(footprint: tuple[Shape, ...], margin: float, excess: float) -> Gr
     return GrownBody(body_pieces(footprint, margin=margin, excess=excess))
 
 
-def box_around(body: GrownBody) -> GrownBody:
-    """The rectangle, along the axes of its frame, that holds a body.
+def cut_where_it_pivots(body: GrownBody, twist: Twist) -> GrownBody:
+    """The same body in pieces none of whose long sides turns about a point beside its middle.
+
+    All that a turning body does at an instant is to turn about one point, which stays where it is
+    in the body's frame. A side is cut, and the whole piece with it, where it is nearest to that
+    point: it moves outwards on one side of there, and inwards on the other.
 
     Examples
     --------
-    >>> triangle = GrownBody((np.array([[0.0, 0.0], [2.0, 0.0], [1.0, 1.0]]),))
-    >>> box_around(triangle).pieces[0].tolist()
-    [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]]
+    >>> body = GrownBody((np.array([[-1.0, -1.0], [3.0, -1.0], [3.0, 1.0], [-1.0, 1.0]]),))
+    >>> sorted(part[:, 0].tolist() for part in cut_where_it_pivots(body, (2.0, 0.0, 0.5)).pieces)
+    [[-1.0, 0.0, 0.0, -1.0], [0.0, 3.0, 3.0, 0.0]]
+    >>> cut_where_it_pivots(body, (2.0, 0.0, 0.0)) is body
+    True
     """
-    corners = np.concatenate(body.pieces)
-    (left, low), (right, high) = corners.min(axis=0), corners.max(axis=0)
-    return GrownBody((np.array([[left, low], [right, low], [right, high], [left, high]]),))
+    v_x, v_y, turn_rate = twist
+    if turn_rate == 0.0 or math.hypot(v_x, v_y) > FAR * abs(turn_rate):
+        return body
+    pivot = np.array([-v_y / turn_rate, v_x / turn_rate])
+    whole, todo = [], list(body.pieces)
+    while todo:
+        corners = todo.pop()
+        sides = np.roll(corners, -1, axis=0) - corners
+        lengths = np.maximum(np.hypot(*sides.T), 1e-300)
+        feet = ((pivot - corners) * sides).sum(axis=1) / lengths  # [m] from where each begins
+        shorter = np.minimum(feet, lengths - feet)
+        k = int(np.argmax(shorter))
+        extent = float((corners.max(axis=0) - corners.min(axis=0)).max())
+        if shorter[k] > ROUND * extent:
+            along = sides[k] / lengths[k]
+            parts = _halves_of(corners, (corners - corners[k]) @ along - feet[k])
+            todo += parts
+        else:
+            whole.append(corners)
+    return GrownBody(tuple(whole))
+
+
+def _halves_of(corners: Array, aside: Array) -> list[Array]:
+    """A convex polygon (n, 2) cut by a line that its corners are `aside` (n,) [m] of."""
+    after, aside_after = np.roll(corners, -1, axis=0), np.roll(aside, -1)
+    halves: list[list[Array]] = [[], []]
+    for k, here in enumerate(aside.tolist()):
+        for side, sign in enumerate((-1.0, 1.0)):
+            if sign * here >= 0.0:
+                halves[side].append(corners[k])
+        if here * aside_after[k] < 0.0:
+            cut = corners[k] + here / (here - aside_after[k]) * (after[k] - corners[k])
+            halves[0].append(cut)
+            halves[1].append(cut)
+    return [np.array(one) for one in halves]
 
 
 def slice_hulls(body: GrownBody, twist: Twist, duration: float) -> list[Array]:
@@ -137,24 +192,70 @@ def course_hulls(body: GrownBody, poses: Array, steps: Array) -> list[Array]:
     return hulls
 
 
-def chunks(steps: Array) -> list[tuple[int, int]]:
-    """Runs [first, last) of steps (n, 3) that turn by at most `MOST_TURN` together, in order.
+def course_boxes(
+    body: GrownBody, poses: Array, steps: Array, firsts: IntArray, lasts: IntArray
+) -> Array:
+    """Rectangles (m, 4, 2) that hold every point of the body along parts of a course.
+
+    Step k goes from ``poses[0, k]`` to ``poses[1, k]``, (2, n, 3), with a constant twist, which
+    makes the step of `steps` (n, 3) in the frame of the first. Part i is of the steps from
+    ``firsts[i]`` to before ``lasts[i]``; its rectangle lies along the body in the middle of it.
 
     Examples
     --------
-    >>> chunks(np.array([[1.0, 0.0, 0.1], [1.0, 0.0, 0.1], [1.0, 0.0, 0.1]]))
-    [(0, 2), (2, 3)]
+    >>> square = GrownBody((np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),))
+    >>> poses = np.array([[[0.0, 0, 0], [1.0, 0, 0]], [[1.0, 0, 0], [2.0, 0, 0]]])
+    >>> steps = np.array([[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    >>> course_boxes(square, poses, steps, np.array([0]), np.array([2])).round(3).tolist()
+    [[[-1.0, -1.0], [3.0, -1.0], [3.0, 1.0], [-1.0, 1.0]]]
     """
-    runs: list[tuple[int, int]] = []
-    first, turned = 0, 0.0
-    for k, turn in enumerate(np.abs(steps[:, 2]).tolist()):
-        if k > first and (turned + turn > MOST_TURN or k - first >= MOST_STEPS):
-            runs.append((first, k))
-            first, turned = k, 0.0
+    middle, half = body.middle, body.half
+    count = lasts - firsts
+    starts = np.cumsum(count) - count
+    part = np.repeat(np.arange(count.size), count)
+    rows = np.arange(part.size) - starts[part] + firsts[part]
+    frames = SE2(poses[0, (firsts + lasts) // 2])
+    inverse, here = SE2(frames.inverse().pose[part]), poses[:, rows]
+    seen = inverse.act(SE2(here).act(middle))
+    turned = here[..., 2] - frames.pose[part, 2]
+    cosine, sine = np.abs(np.cos(turned)), np.abs(np.sin(turned))
+    # An arc lies in the triangle of its ends and the point where the tangents there meet.
+    turn = np.abs(steps[rows, 2])
+    swing = np.hypot(steps[rows, 0], steps[rows, 1]) + (np.hypot(*middle) + body.reach) * turn
+    off = np.where(turn < 1.0, 0.5 * swing * np.tan(0.5 * np.minimum(turn, 1.0)), swing)
+    reach = np.stack(
+        [cosine * half[0] + sine * half[1], sine * half[0] + cosine * half[1]], axis=-1
+    )
+    reach += off[:, None]
+    low = np.minimum.reduceat((seen - reach).min(axis=0), starts)
+    high = np.maximum.reduceat((seen + reach).max(axis=0), starts)
+    x, y = np.stack([low[:, 0], high[:, 0]]), np.stack([low[:, 1], high[:, 1]])
+    rings = np.stack([x[[0, 1, 1, 0]], y[[0, 0, 1, 1]]], axis=-1)
+    return np.swapaxes(frames.act(rings), 0, 1)
+
+
+def chunks(steps: Array, begins: NDArray[np.bool_]) -> tuple[IntArray, IntArray]:
+    """Where runs of steps (n, 3) of courses begin and end; each turns by at most `MOST_TURN`.
+
+    A course begins with each of the steps that `begins` (n,) marks. A single step may turn more.
+
+    Examples
+    --------
+    >>> steps = np.array([[1.0, 0.0, 0.1], [1.0, 0.0, 0.1], [1.0, 0.0, 0.1]])
+    >>> first, last = chunks(steps, np.array([True, False, False]))
+    >>> first.tolist(), last.tolist()
+    ([0, 2], [2, 3])
+    """
+    firsts: list[int] = []
+    turned = 0.0
+    turns = np.abs(steps[:, 2]).tolist()
+    for k, (turn, begin) in enumerate(zip(turns, begins.tolist(), strict=True)):
+        if begin or turned + turn > MOST_TURN or k - firsts[-1] >= MOST_STEPS:
+            firsts.append(k)
+            turned = 0.0
         turned += turn
-    if len(steps):
-        runs.append((first, len(steps)))
-    return runs
+    first = np.array(firsts, dtype=np.int64)
+    return first, np.append(first[1:], len(steps))
 
 
 def slice_excess(body: GrownBody, twist: Twist, duration: float) -> float:
@@ -179,37 +280,50 @@ def slice_excess(body: GrownBody, twist: Twist, duration: float) -> float:
     return excess
 
 
-def windows(twist: Twist, duration: float) -> Windows:
-    """The fewest slices that cover a coast of `duration` > 0 [s]; none lasts longer.
+def windows(turn_rates: Array, durations: Array) -> Windows:
+    """The fewest slices that cover coasts (n,) of `durations` [s], none longer than its coast.
 
     Examples
     --------
-    >>> windows((1.0, 0.0, 0.0), 5.0)
-    Windows(level=-2, begins=array([0., 1.]))
-    >>> windows((1.0, 0.0, 1.0), 0.7)
-    Windows(level=2, begins=array([0.  , 0.25, 0.45]))
+    >>> parts = windows(np.array([0.0, 1.0, 0.0]), np.array([5.0, 0.7, 0.0]))
+    >>> parts.coast.tolist(), parts.begins.round(9).tolist()
+    ([0, 0, 1, 1, 1], [0.0, 1.0, 0.0, 0.25, 0.45])
+    >>> parts.lengths.tolist()
+    [4.0, 4.0, 0.25, 0.25, 0.25]
     """
-    level = -math.floor(math.log2(duration))
-    while math.ldexp(max(1.0 / duration, abs(twist[2]) / MOST_TURN), -level) > 1.0:
-        level += 1
-    length = math.ldexp(1.0, -level)
-    count = math.ceil(duration / length)
-    return Windows(level, np.minimum(length * np.arange(count), duration - length))
+    turning = np.abs(turn_rates)
+    with np.errstate(divide="ignore", over="ignore"):
+        most = np.minimum(durations, MOST_TURN / turning)
+    level = 1 - np.frexp(most)[1].astype(np.int64)
+    lengths = np.ldexp(1.0, -level)
+    count = np.ceil(durations / lengths).astype(np.int64)
+    coast = np.repeat(np.arange(count.size), count)
+    number = np.arange(coast.size) - (np.cumsum(count) - count)[coast]
+    begins = np.minimum(number * lengths[coast], (durations - lengths)[coast])
+    return Windows(coast, level[coast], begins)
 
 
 def halves(parts: Windows) -> Windows:
     """Slices half as long that cover the time of `parts`."""
-    begins = parts.begins[:, None] + [0.0, 0.5 * parts.length]
-    return Windows(parts.level + 1, begins.reshape(-1))
+    second = np.stack([np.zeros(parts.begins.size), 0.5 * parts.lengths], axis=1)
+    begins = (parts.begins[:, None] + second).reshape(-1)
+    return Windows(np.repeat(parts.coast, 2), np.repeat(parts.level + 1, 2), begins)
 
 
-def along(start: Array, twist: Twist, times: Array) -> Array:
-    """Poses (n, 3) of a coast after `times` (n,) [s]."""
-    return (SE2(start) @ SE2.exp(np.multiply.outer(times, twist))).pose
+def along(starts: Array, twists: Array, times: Array) -> Array:
+    """Poses (..., n, 3) of coasts from `starts` (n, 3) after `times` (..., n) [s]."""
+    return (SE2(starts) @ SE2.exp(times[..., None] * twists)).pose
 
 
-def fastest(body: GrownBody, twist: Twist) -> float:
-    """Speed [m/s] no point of the body exceeds."""
-    corners = np.concatenate(body.pieces)
-    v_x, v_y, turn_rate = twist
-    return float(np.hypot(v_x - turn_rate * corners[:, 1], v_y + turn_rate * corners[:, 0]).max())
+def fastest(body: GrownBody, twists: Array) -> Array:
+    """Speeds (n,) [m/s] that no point of the body exceeds under twists (n, 3).
+
+    Examples
+    --------
+    >>> square = GrownBody((np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),))
+    >>> fastest(square, np.array([[3.0, 0.0, 0.0], [0.0, 0.0, 2.0]])).round(3).tolist()
+    [3.0, 2.828]
+    """
+    x, y = np.concatenate(body.pieces).T
+    v_x, v_y, turn_rate = twists.T[:, :, None]
+    return np.asarray(np.hypot(v_x - turn_rate * y, v_y + turn_rate * x).max(axis=1))

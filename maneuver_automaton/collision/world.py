@@ -99,10 +99,11 @@ class World:
 
     def into(self, pose: Array) -> Array:
         """A pose (..., 3) seen from the world's frame: places first, so that no digit is lost."""
-        near = np.array(pose, dtype=np.float64)
-        near[..., :2] -= self.frame[:2]
-        turned = (SE2(np.array([0.0, 0.0, -self.frame[2]])) @ SE2(near)).pose.copy()
-        turned[..., 2] = wrapped(turned[..., 2])
+        turned = np.array(pose, dtype=np.float64)
+        x, y = turned[..., 0] - self.frame[0], turned[..., 1] - self.frame[1]
+        c, s = np.cos(-self.frame[2]), np.sin(-self.frame[2])
+        turned[..., 0], turned[..., 1] = c * x - s * y, s * x + c * y
+        turned[..., 2] = wrapped(turned[..., 2] - self.frame[2])
         seen = np.round(turned, DIGITS)
         half = seen[..., 2] <= -np.round(np.pi, DIGITS)  # half a turn to either side is one pose
         seen[..., 2] = np.where(half, -seen[..., 2], seen[..., 2])
@@ -166,6 +167,12 @@ def own_frame(obstacles: tuple[AnyObstacle, ...], otherwise: Array) -> tuple[flo
 
     The pose `otherwise` (3,) where there is none.
     """
+    return _frame_at_first(obstacles) or tuple(otherwise[:3].tolist())
+
+
+@functools.lru_cache(maxsize=64)
+def _frame_at_first(obstacles: tuple[AnyObstacle, ...]) -> tuple[float, ...]:
+    """The pose of `own_frame`; empty where there is none."""
     for obstacle in obstacles:
         if isinstance(obstacle, OccupancyMap):
             return tuple(obstacle.origin.tolist())
@@ -179,7 +186,7 @@ def own_frame(obstacles: tuple[AnyObstacle, ...], otherwise: Array) -> tuple[flo
         longest = int(np.argmax(np.round(length / length.max(), 6))) if length.max() > 0.0 else -1
         if longest >= 0:
             return (*ring[0].tolist(), math.atan2(edge[longest, 1], edge[longest, 0]))
-    return tuple(otherwise[:3].tolist())
+    return ()
 
 
 def _seen_map(one: OccupancyMap, frame: Array) -> OccupancyMap:

@@ -67,7 +67,8 @@ class SE2:
         >>> SE2.exp([np.pi, 0.0, np.pi]).pose.round(3).tolist()
         [0.0, 2.0, 3.142]
         """
-        v_x, v_y, turn = np.moveaxis(as_array("twist", twist, last=3), -1, 0)
+        rates = as_array("twist", twist, last=3)
+        v_x, v_y, turn = rates[..., 0], rates[..., 1], rates[..., 2]
         ahead, aside = np.sinc(turn / np.pi), np.sin(turn / 2) * np.sinc(turn / (2 * np.pi))
         return cls(np.stack([ahead * v_x - aside * v_y, aside * v_x + ahead * v_y, turn], axis=-1))
 

@@ -10,20 +10,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.audit import Audit, audit_plan, origin_of
-from maneuver_automaton.automaton import Automaton, Plan, Primitive
+from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.collision import Box
 from maneuver_automaton.collision.checker import origin_near
-from maneuver_automaton.collision.fcl_checker import FclChecker
+from maneuver_automaton.collision.fcl_checker import Course, FclChecker
 from maneuver_automaton.collision.heights import Layer, layers_of
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning.workspace import Workspace, workspace_of
 from maneuver_automaton.planning.zones import what_zone_forbids
-from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.primitives import Trim
+from maneuver_automaton.primitives.trajectory import Trajectory
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.conditions import broken_condition
 from maneuver_automaton.search.inside import stays_inside
@@ -184,68 +185,101 @@ def _what_hits(
         height = plan.start[3:].sum(keepdims=True)
         if layer.clearance(height, problem.body_height)[0] > problem.margin:
             return ""
-        hit = checker.pose_hit(plan.start[:3], time=plan.start_time)
-        return "" if hit is None else f"obstacle {layer.numbers[hit]} is hit at the start"
-    for k, primitive in enumerate(plan.primitives):
-        _ask(budget)
+        here = checker.pose_hit(plan.start[:3], time=plan.start_time)
+        return "" if here is None else f"obstacle {layer.numbers[here]} is hit at the start"
+    coasts = _coasts_within_reach(plan, layer, problem)
+    hit = checker.motions_hit(
+        coasts.start,
+        coasts.twist,
+        coasts.duration,
+        start_times=coasts.time,
+        ask=lambda: _ask(budget),
+    )
+    number = len(plan.primitives) if hit is None else int(coasts.number[hit[0]])
+    numbers, courses, missing = _courses_within_reach(plan, layer, problem, before=number)
+    sooner = checker.courses_hit(courses, ask=lambda: _ask(budget))
+    if sooner is not None:
+        number, obstacle = numbers[sooner[0]], sooner[1]
+        name = plan.primitives[number].name
+        return f"obstacle {layer.numbers[obstacle]} is hit in maneuver {number}, {name!r}"
+    if missing:
+        return f"maneuver {missing!r} has no course, so it cannot be checked"
+    if hit is None:
+        return ""
+    name = plan.primitives[number].name
+    return f"obstacle {layer.numbers[hit[1]]} is hit in trim {number}, {name!r}"
+
+
+def _courses_within_reach(
+    plan: Plan, layer: Layer, problem: Problem, *, before: int
+) -> tuple[list[int], list[Course], str]:
+    """Of the maneuvers before a primitive, what may come near a layer: numbers and courses.
+
+    Up to the first maneuver without a course, and the name of that.
+    """
+    numbers: list[int] = []
+    courses: list[Course] = []
+    for k, primitive in enumerate(plan.primitives[:before]):
+        if isinstance(primitive, Trim):
+            continue
+        course = primitive.course
+        if course is None:
+            return numbers, courses, primitive.name
         start, begin = plan.switching_poses[k], float(plan.switching_times[k])
-        if isinstance(primitive, Maneuver) and primitive.course is None:
-            return f"maneuver {primitive.name!r} has no course, so it cannot be checked"
-        for piece in _within_reach(primitive, start, plan.primitive_durations[k], layer, problem):
-            time = begin + float(piece.time[0])
-            if isinstance(primitive, Trim):
-                first, last = piece.time.tolist()
-                pose = primitive.coast(group_of(start.size)(start), first).pose
-                hit = checker.motion_hit(
-                    pose[:3], primitive.body_velocity[:3], last - first, start_time=time
-                )
-            else:
-                since = piece.time - piece.time[0]
-                hit = checker.course_hit(
-                    start[:3], piece.pose, since, start_time=time, ask=lambda: _ask(budget)
-                )
-            if hit is not None:
-                kind = "trim" if isinstance(primitive, Trim) else "maneuver"
-                return f"obstacle {layer.numbers[hit]} is hit in {kind} {k}, {primitive.name!r}"
-    return ""
+        for rows in _rows_within_reach(course, start, layer, problem):
+            numbers.append(k)
+            courses.append(Course(start[:3], course.pose[rows, :3], course.time[rows], begin))
+    return numbers, courses, ""
 
 
-class _Stretch(NamedTuple):
-    """A part of a primitive; of a trim the times of its ends."""
+class _Coasts(NamedTuple):
+    """Trims of a plan, or parts of them, from first to last."""
 
-    time: Array  # (n,) [s] since the primitive's begin
-    pose: Array  # (n, 3) seen from there
+    number: IntArray  # (m,) of the primitive
+    start: Array  # (m, 3)
+    twist: Array  # (m, 3)
+    duration: Array  # (m,) [s]
+    time: Array  # (m,) [s] when each begins
 
 
-def _within_reach(
-    primitive: Primitive, start: Array, duration: float, layer: Layer, problem: Problem
-) -> list[_Stretch]:
-    """The parts of a primitive in which its altitude is within the margin of a layer."""
-    if isinstance(primitive, Trim):
-        ends = np.array([0.0, duration])
-        poses = np.zeros((2, 3))
-        climb = float(primitive.body_velocity[3:].sum())
-        if math.isinf(layer.high) or start.size == 3:
-            return [_Stretch(ends, poses)]
-        low = layer.low - problem.body_height[1] - problem.margin - start[3]
-        high = layer.high - problem.body_height[0] + problem.margin - start[3]
-        if climb == 0.0:
-            return [_Stretch(ends, poses)] if low <= 0.0 <= high else []
-        first, last = sorted((low / climb, high / climb))
-        inside = np.clip([first, last], 0.0, duration)
-        return [_Stretch(inside, poses)] if last >= 0.0 and first <= duration else []
-    assert primitive.course is not None
-    time, pose = primitive.course.time, primitive.course.pose
+def _coasts_within_reach(plan: Plan, layer: Layer, problem: Problem) -> _Coasts:
+    """The parts of trims in which the altitude is within the margin of a layer."""
+    trims = [(k, one) for k, one in enumerate(plan.primitives) if isinstance(one, Trim)]
+    number = np.array([k for k, _ in trims], dtype=np.int64)
+    velocity = np.array([one.body_velocity for _, one in trims]).reshape(-1, plan.start.size)
+    start, lasting = plan.switching_poses[number], plan.primitive_durations[number]
+    first, last = np.zeros(number.size), lasting
+    if not (math.isinf(layer.high) or plan.start.size == 3):
+        low = layer.low - problem.body_height[1] - problem.margin - start[:, 3]
+        high = layer.high - problem.body_height[0] + problem.margin - start[:, 3]
+        climb = velocity[:, 3]
+        with np.errstate(
+            divide="ignore", invalid="ignore"
+        ):  # what does not climb stays where it is
+            meets = np.sort([low / climb, high / climb], axis=0)
+        level, within = climb == 0.0, (low <= 0.0) & (high >= 0.0)
+        first = np.where(level, 0.0, np.clip(meets[0], 0.0, lasting))
+        last = np.where(level, lasting, np.clip(meets[1], 0.0, lasting))
+        kept = np.where(level, within, (meets[1] >= 0.0) & (meets[0] <= lasting))
+        number, velocity, start = number[kept], velocity[kept], start[kept]
+        first, last = first[kept], last[kept]
+        group = group_of(plan.start.size)
+        start = (group(start) @ group.exp(first[:, None] * velocity)).pose
+    time = plan.switching_times[number] + first
+    return _Coasts(number, start[:, :3], velocity[:, :3], last - first, time)
+
+
+def _rows_within_reach(
+    course: Trajectory, start: Array, layer: Layer, problem: Problem
+) -> list[slice]:
+    """Runs of samples of a course, begun at a pose, whose altitude is within reach of a layer."""
     if math.isinf(layer.high) or start.size == 3:
-        return [_Stretch(time, pose[:, :3])]
-    step = float(np.abs(np.diff(pose[:, 3])).max(initial=0.0))  # so that no run is a sample
-    near = layer.clearance(start[3] + pose[:, 3], problem.body_height) <= problem.margin + step
+        return [slice(None)]
+    altitude = course.pose[:, 3]
+    step = float(np.abs(np.diff(altitude)).max(initial=0.0))  # so that no run is a sample
+    near = layer.clearance(start[3] + altitude, problem.body_height) <= problem.margin + step
     runs = np.flatnonzero(np.diff(np.concatenate([[False], near, [False]]).astype(np.int8)))
-    return [
-        _Stretch(time[first:last], pose[first:last, :3])
-        for first, last in runs.reshape(-1, 2).tolist()
-        if last - first > 1
-    ]
+    return [slice(first, last) for first, last in runs.reshape(-1, 2).tolist() if last - first > 1]
 
 
 def _end_states(problem: Problem, goal: Goal) -> tuple[Array, Array] | None:

@@ -48,13 +48,16 @@ def plan_in_steps(
         load_checks(problem, found.workspace)
     if steps.along_paths and not budget.is_over:
         _offer(found, paths.plans())
-    if steps.words and not budget.is_over:
+    if steps.words and not (budget.is_over or found.is_enough):
         _offer(found, _free_words(found, steps), proven=not problem.obstacles)
-    if steps.lattice and not budget.is_over:
+    if steps.lattice and not (budget.is_over or found.is_enough):
         lattice = search_lattice(found, steps)
         searched = budget.elapsed if lattice.knows_all else None
-        found.offer_in_turn(improved(lattice))
-    if steps.polishes and not found.for_better.is_over:
+        if not problem.search.improve:
+            found.offer_in_turn(lattice.candidates)
+        if not found.is_enough:
+            found.offer_in_turn(improved(lattice))
+    if steps.polishes and not (found.for_better.is_over or found.is_enough):
         known = found.cost
         polish_found(found, paths.guesses)
         if lattice and lattice.words and found.cost == known and not budget.is_over:
@@ -77,7 +80,7 @@ def _offer(found: Incumbents, plans: Iterable[tuple[Plan, int]], *, proven: bool
         if not found.may_check:
             return
         found.offer(plan, goal_index, proven=proven)
-        if found.budget.is_over:
+        if found.budget.is_over or found.is_enough:
             return
 
 

@@ -98,6 +98,11 @@ class Incumbents:
         return not self.plans or self.budget.left_to_check >= self.longest_check
 
     @property
+    def is_enough(self) -> bool:
+        """Whether no better plan is asked for than those there are."""
+        return not self.problem.search.improve and len(self.plans) > self.alternatives
+
+    @property
     def why_refused(self) -> str:
         """Why the first plan was refused; empty if none was."""
         return next(iter(self.reasons.values()), "")
@@ -138,19 +143,22 @@ class Incumbents:
         return False
 
     def offer_in_turn(self, candidates: Iterable[Candidate]) -> None:
-        """Check candidates, in the order given, until there are as many plans as are asked for.
+        """Check candidates, the cheapest first, until as many plans as are asked for are no dearer.
 
         Once the time is over they are checked only until there is a plan at all: at least one of
         them, and a few more if they take no more than a moment.
         """
         late = 0
         for one in candidates:
-            if len(self.plans) > self.alternatives or not self.may_check:
+            known = [
+                other.plan for other in self.plans if other.cost <= one.cost + _slack(one.cost)
+            ]
+            if len(known) > self.alternatives or not self.may_check:
                 return
             if late and (self.plans or self._is_late(late)):
                 return
             plan = one.plan()
-            if is_new(plan, (other.plan for other in self.plans), self.likeness):
+            if is_new(plan, known, self.likeness):
                 self.offer(plan, one.goal_index, proven=one.proven)
             late += self.budget.is_over
 
@@ -261,3 +269,8 @@ class Incumbents:
     def _timing(self, searched: float) -> dict[str, float]:
         refined = max(self.budget.elapsed - searched - self.checking, 0.0)
         return {"search": searched, "refine": refined, "audit": self.checking}
+
+
+def _slack(cost: float) -> float:
+    """By how much a plan may be dearer than its word was found to be."""
+    return CHEAPER * abs(cost)

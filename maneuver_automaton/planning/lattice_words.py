@@ -85,21 +85,27 @@ class LatticeWords:
         """
         return self.query.library.at_will
 
+    @property
+    def candidates(self) -> list[Candidate]:
+        """Words that are to be checked, the cheapest first."""
+        return [_candidate(self.query, word) for word in self.words[::-1] if self.knows_all]
+
     def gained(self, word: Word) -> None:
         """A better word was found."""
         self.words.append(word)
         if self.knows_all:
             self.found.note(word.cost + self.query.padding)
-            if self.found.shows is not None and self.found.may_check:
+            # The first is checked at once: whatever comes between, there is something to return.
+            wanted = self.found.shows is not None or not self.found.plans
+            if wanted and self.found.may_check:
                 goal_index = self.query.goal_index[word.goal]
                 self.found.offer(plan_of_word(self.query, word), goal_index)
             return
         if not self.found.may_check:
             return
         self.found.offer(plan_of_word(self.query, word), self.query.goal_index[word.goal])
-        if (
-            not self.steps.polishes and not self.found.budget.is_over
-        ):  # which finds better times, and takes what time there is
+        # Polishing finds better times, and takes what time there is.
+        if not (self.steps.polishes or self.found.budget.is_over or self.found.is_enough):
             self.offer_best_times()
 
     def offer_best_times(self) -> None:
@@ -159,7 +165,8 @@ def search_lattice(found: Incumbents, steps: Steps) -> LatticeWords:
     share = BEFORE_POLISHING if steps.polishes and not alone else 1.0
     lattice = LatticeWords(query, table, found, steps, alone, found.for_first.stage(share))
     lattice.first = _first(lattice)
-    lattice.bound = lattice_bound(query) if steps.at_will else None
+    # The path in the plane, where a way leads far round, takes longer than a first plan.
+    lattice.bound = lattice_bound(query) if steps.at_will and problem.search.improve else None
     return lattice
 
 

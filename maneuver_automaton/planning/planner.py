@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,6 +23,7 @@ from maneuver_automaton.collision import (
     as_obstacles,
 )
 from maneuver_automaton.costs import Cost, StageCost
+from maneuver_automaton.planning.many import plan_many_on
 from maneuver_automaton.planning.plan import plan_in, prepare
 from maneuver_automaton.planning.result import PlanResult
 from maneuver_automaton.planning.workspace import Workspace
@@ -146,6 +148,45 @@ class Planner:
             alternatives=alternatives,
             gap=gap,
             watch=watch,
+        )
+
+    def plan_many(
+        self,
+        starts: ArrayLike,
+        goals: ArrayLike | Sequence[Goal],
+        *,
+        time_limit: float = 5.0,
+        jobs: int = 1,
+        scheduler: str | None = None,
+        take: Callable[[PlanResult], Any] | None = None,
+        journal: str | Path | None = None,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> Iterator[Any]:
+        """Plan from many `starts` (n, dof) to as many `goals`; one of either serves all.
+
+        The answers come in the order of the queries, as soon as they are known, each that of
+        `plan` to the last bit where the clock decides nothing: with ``search.max_expansions``, or
+        with ``search.improve`` off. Each process keeps the map ready for all of its queries.
+        The arguments are those of `maneuver_automaton.plan_many`.
+
+        Examples
+        --------
+        >>> from maneuver_automaton import Unicycle
+        >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (0, 1)})
+        >>> answers = Planner(robot).plan_many([0, 0, 0], [[1, 0, 0], [2, 0, 0]])
+        >>> [round(result.cost, 6) for result in answers]
+        [1.0, 2.0]
+        """
+        return plan_many_on(
+            self,
+            starts,
+            goals,
+            time_limit=time_limit,
+            jobs=jobs,
+            scheduler=scheduler,
+            take=take,
+            journal=journal,
+            progress=progress,
         )
 
     def with_obstacles(

@@ -254,6 +254,7 @@ def _search(part: SearchPart) -> SearchSettings:
         headings=part.headings,
         weight=part.weight,
         show_nodes=part.show_nodes,
+        improve=part.improve,
     )
 
 

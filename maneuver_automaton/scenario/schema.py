@@ -304,6 +304,9 @@ class SearchPart(Part):
         | None
     ) = Field(None, description="lattice: weight of the cost to go")
     show_nodes: bool = Field(False, description="lattice: draw what the first plan's search tried")
+    improve: bool = Field(
+        True, description="look for better plans once there is one; false: return the first"
+    )
 
 
 class PushPart(Part):

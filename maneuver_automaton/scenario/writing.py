@@ -185,6 +185,7 @@ def _search(search: SearchSettings, time_limit_s: float) -> dict[str, Any]:
             headings=search.headings,
             weight=search.weight,
             show_nodes=search.show_nodes or None,
+            improve=None if search.improve else False,
         ),
     }
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._cache_files import keep_within, read_checked, used_now, write_checked
+from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton._kernel_folders import user_cache_folder
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_table
@@ -91,6 +92,7 @@ def cost_to_go_table(
     return prepared.once(_kept, *_made_from(library, size), folder)
 
 
+@kept_by_first
 def _made_from(library: LatticeLibrary, reach: float) -> tuple[bytes, bytes, bytes, float, bool]:
     """The key of a table: twists, rates and edge durations of the trims that move, and its size."""
     arrays = library.arrays.library

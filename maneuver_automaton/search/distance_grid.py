@@ -15,6 +15,8 @@ from maneuver_automaton.search.prepared import RECENT, Prepared
 
 MOST_CELLS = 1_000_000
 OCTILE = 1.0823922002923938  # 1 / cos(pi / 8): most of a path along cells over a straight one
+COARSER = 3  # field cells along a side of a coarse cell
+COARSEST = 1.05  # half diagonals of a coarse cell over the body's inscribed radius, at most
 DETOUR = 4.0  # [sides of the grid] that are preferred to a path through a wall thinner than a cell
 
 
@@ -44,9 +46,18 @@ class DistanceGrid(NamedTuple):
 
 
 def distance_grid(
-    world: World, box: Array, seeds: Array, aim: Array, *, prepared: Prepared = RECENT
+    world: World,
+    box: Array,
+    seeds: Array,
+    aim: Array,
+    *,
+    coarse: bool = False,
+    prepared: Prepared = RECENT,
 ) -> DistanceGrid:
     """Distances from `seeds` (n, 2 or more) inside `box` (4,), grown towards `aim` (2 or more,).
+
+    Coarse cells, where the body is large enough for them, show fewer passages to be closed, and
+    take a ninth of the time.
 
     Source of the inflation: a pose in a cell is at most half its diagonal from the centre, and a
     disc of the body's inscribed radius around it must be free. A wall between the middles of two
@@ -59,6 +70,8 @@ def distance_grid(
         return _none()
     width = float(np.maximum(high - low, field.cell).prod())
     stride = stride_of(width, field.cell)
+    if coarse and COARSER * field.cell * math.sqrt(0.5) <= COARSEST * world.body.inscribed:
+        stride = max(stride, COARSER)
     cell = stride * field.cell
     origin = np.array([field.origin_x, field.origin_y]) - (stride // 2) * field.cell
     first = np.floor((low - origin) / cell).astype(int)

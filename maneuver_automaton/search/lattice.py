@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import functools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.distance_grid import DistanceGrid, distance_grid
-from maneuver_automaton.search.lattice_pass import Pass, both_ends, pass_of
+from maneuver_automaton.search.lattice_pass import Pass, pass_of
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_schedules import Schedule, schedule_of
 from maneuver_automaton.search.lattice_task import Resolution
@@ -54,32 +53,33 @@ def first_plan(
         Its expansions are those of all searches together.
     table : CostTable
     grids : tuple of DistanceGrid, optional
-        Distances to the goals and to the start, if they are known.
+        Distances to the goals and to the start along fine cells, if they are known.
     """
     schedule = schedule_of(query.library)
-    grids = distance_grids(query) if grids is None else grids
+    guides = _Guides(query, table, grids)
     room = 2**62 if budget.expansions is None else budget.expansions
     (_, coarse), *stages = schedule.stages
     if query.settings.weight is not None:
         coarse = tuple(replace(one, weight=query.settings.weight) for one in coarse)
-    passes = _begun(query, schedule, coarse, grids, table)
-    if budget.left < min(one.first_takes for one in passes):
-        budget = budget.part(0.0)  # nothing is begun that would be late
+    turns = _turns(guides, schedule, coarse)
     word, proof, total, left_out = None, "", 0, False
     while word is None:
-        for one in passes:
+        for one in turns:
             if not one.may_expand or total >= room or budget.is_over:
                 continue
-            before = one.expansions
-            word = one.run(min(one.chunk, room - total), math.inf, budget=budget)
-            total += one.expansions - before
+            search = one.begun or one.begin()
+            search.is_late = budget.left < search.first_takes  # nothing is begun that would be late
+            before = search.expansions
+            word = search.run(min(one.chunk, room - total), math.inf, budget=budget)
+            total += search.expansions - before
             one.chunk = min(2 * one.chunk, schedule.most_chunk)
             if word is not None:
-                word = forward_word(word) if one.resolution.backwards else word
+                word = forward_word(word) if search.resolution.backwards else word
                 break
-        alive = any(one.alive for one in passes)
-        proof = "" if alive or word is not None else _enclosed(query, grids)
-        late = alive and not any(one.may_expand for one in passes)
+        alive = any(one.alive for one in turns)
+        closed = not alive or any(one.is_closed for one in turns)
+        proof = _enclosed(query, guides.fine) if word is None and closed else ""
+        late = alive and not any(one.may_expand for one in turns)
         if word is not None or total >= room or budget.is_over or proof or late:
             break
         if stages and (not alive or total >= stages[0][0]):
@@ -87,46 +87,113 @@ def first_plan(
             if any(one.backwards for one in resolutions) and budget.left < to_reverse(query):
                 left_out = True
                 continue
-            passes += _begun(query, schedule, resolutions, grids, table)
+            turns += _turns(guides, schedule, resolutions)
         elif not alive:
             break
-    ahead = [one for one in passes if not one.resolution.backwards]
+    passes = [one.begun for one in turns if one.begun is not None]
+    ahead = [one.nearest for one in passes if not one.resolution.backwards]
     return FirstPlan(
         word=word,
         expansions=total,
         queries=sum(one.queries for one in passes),
         exhausted=word is None and not alive and not left_out,
         enclosed=proof,
-        nearest=min(one.nearest for one in ahead) if word is None else math.inf,
+        nearest=min(ahead, default=math.inf) if word is None else math.inf,
         nodes=_expanded(query, passes) if query.settings.show_nodes else None,
     )
 
 
-def _begun(
-    query: LatticeQuery,
-    schedule: Schedule,
-    resolutions: tuple[Resolution, ...],
-    grids: Grids,
-    table: CostTable,
-) -> list[Pass]:
-    """Searches at some resolutions; one of the library in reverse only where that can be asked."""
-    passes: list[Pass] = []
+@dataclass(slots=True, eq=False)
+class _Guides:
+    """Estimates that lead the searches for one query, each made when it is asked for."""
+
+    query: LatticeQuery
+    table: CostTable
+    fine_grids: Grids | None
+    coarse_grids: dict[float, DistanceGrid] = field(default_factory=dict)
+
+    @property
+    def fine(self) -> Grids:
+        """Distances to the goals and to the start along fine cells."""
+        if self.fine_grids is None:
+            self.fine_grids = distance_grids(self.query)
+        return self.fine_grids
+
+    def grid(self, resolution: Resolution, sign: float) -> DistanceGrid:
+        """Distances to where a search leads."""
+        if not resolution.coarse:
+            return self.fine[0 if sign > 0.0 else 1]
+        if sign not in self.coarse_grids:
+            self.coarse_grids[sign] = _grid(self.query, sign, coarse=True)
+        return self.coarse_grids[sign]
+
+
+@dataclass(slots=True, eq=False)
+class _Turn:
+    """A search that begins when it is its turn."""
+
+    guides: _Guides
+    query: LatticeQuery  # that of the guides, or its reverse
+    resolution: Resolution
+    sign: float
+    chunk: int
+    begun: Pass | None = None
+
+    @property
+    def alive(self) -> bool:
+        """Whether there is something left to expand."""
+        return self.begun is None or self.begun.alive
+
+    @property
+    def may_expand(self) -> bool:
+        """The same, and there is time to do so."""
+        return self.begun is None or self.begun.may_expand
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether the plane alone, in fine cells, leads from none of its roots to an aim."""
+        if self.begun is None or self.resolution.coarse:
+            return False
+        return not self.begun.arrays.state[layout.N_NODES]
+
+    def begin(self) -> Pass:
+        """The search with its roots."""
+        back = self.resolution.backwards
+        self.begun = pass_of(
+            self.query,
+            self.resolution,
+            grid=self.guides.grid(self.resolution, -1.0 if back else self.sign),
+            sign=self.sign,
+            table=self.guides.table if self.resolution.guided and not back else NO_TABLE,
+        )
+        return self.begun
+
+
+def _turns(guides: _Guides, schedule: Schedule, resolutions: tuple[Resolution, ...]) -> list[_Turn]:
+    """Searches at some resolutions, in turn from every end; among moving obstacles from the start.
+
+    One of the library in reverse only where that can be asked.
+    """
+    turns: list[_Turn] = []
+    query, chunk = guides.query, schedule.first_chunk
+    ends = [sign for sign in schedule.ends if sign > 0.0 or not query.moves]
     for one in resolutions:
-        if one.backwards:
-            back = reversed_query(query)
-            passes += [] if back is None else [pass_of(back, one, grid=grids[1])]
-        else:
-            guide = table if one.guided else NO_TABLE
-            passes += both_ends(query, one, grids=grids, table=guide, ends=schedule.ends)
-    for begun in passes:
-        begun.chunk = schedule.first_chunk
-    return passes
+        if not one.backwards:
+            turns += [_Turn(guides, query, one, sign, chunk) for sign in ends]
+        elif (back := reversed_query(query)) is not None:
+            turns.append(_Turn(guides, back, one, 1.0, chunk))
+    return turns
 
 
 def distance_grids(query: LatticeQuery) -> Grids:
     """Distances to the goals and to the start."""
-    grid = functools.partial(distance_grid, query.plane, query.box, prepared=query.prepared)
-    return grid(query.goals, query.start), grid(query.start[None], query.goals[0])
+    return _grid(query, 1.0, coarse=False), _grid(query, -1.0, coarse=False)
+
+
+def _grid(query: LatticeQuery, sign: float, *, coarse: bool) -> DistanceGrid:
+    """Distances to where searches along time lead, or those against it."""
+    seeds, aim = (query.goals, query.start) if sign > 0.0 else (query.start[None], query.goals[0])
+    return distance_grid(query.plane, query.box, seeds, aim, coarse=coarse, prepared=query.prepared)
 
 
 def _enclosed(query: LatticeQuery, grids: Grids) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -66,7 +67,8 @@ class LatticeArrays(NamedTuple):
     most_children: int
 
 
-class LatticeLibrary(NamedTuple):
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LatticeLibrary:
     """The arrays, and the values that the wrapper needs beside them."""
 
     arrays: LatticeArrays

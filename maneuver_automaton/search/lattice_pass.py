@@ -166,30 +166,6 @@ def _with_coasts(query: LatticeQuery, resolution: Resolution, sign: float) -> La
     return library._replace(edge_durations=durations, moves=moves_of(twists, sign * durations))
 
 
-def both_ends(
-    query: LatticeQuery,
-    resolution: Resolution,
-    *,
-    grids: tuple[DistanceGrid, DistanceGrid],
-    table: CostTable = NO_TABLE,
-    arrays: SearchArrays | None = None,
-    ends: tuple[float, ...] = (1.0, -1.0),
-) -> list[Pass]:
-    """Searches from the start and, without moving obstacles, from the goals."""
-    return [
-        pass_of(
-            query,
-            resolution,
-            grid=grids[0 if sign > 0 else 1],
-            sign=sign,
-            table=table,
-            arrays=arrays,
-        )
-        for sign in ends
-        if sign > 0.0 or not query.moves
-    ]
-
-
 def _word(one: Pass) -> Word:
     """The word that a search has found, from start to goal, in the automaton's numbers."""
     arrays, library, query = one.arrays, one.library, one.query

@@ -25,7 +25,7 @@ from maneuver_automaton.search.lattice_worlds import Worlds, worlds_around
 from maneuver_automaton.search.prepared import RECENT, Prepared
 from maneuver_automaton.search.scene import Scene, scene_of
 from maneuver_automaton.words.library import NO_TRIM
-from maneuver_automaton.words.word import Word, with_price, word_of_steps
+from maneuver_automaton.words.word import Word, word_of_steps
 
 MARGIN = 0.005  # proven clearance of every pose looked at, in half widths of the body
 LEAST_MARGIN = 1e-7  # [m]
@@ -139,7 +139,7 @@ class LatticeQuery:
 
     def word_of(self, steps: Iterable[tuple[int, int, float]], goal: int) -> Word:
         """A word of steps in the automaton's numbers, with its cost."""
-        return with_price(self.library.priced, word_of_steps(steps, goal=goal))
+        return word_of_steps(steps, goal=goal, library=self.library.priced)
 
 
 def lattice_query(
@@ -239,7 +239,9 @@ def _end_clearances(
         if offsets.any():
             there = (SE2(there) @ SE2(offsets)).pose
         for band, world in zip(worlds.bands, worlds.between, strict=True):
-            aside = clearances(replace(world, body=body_of(part.shapes)), there, times=times)
+            body = body_of(part.shapes)
+            around = world if world.body is body else replace(world, body=body)
+            aside = clearances(around, there, times=times)
             found.append(np.maximum(aside, band.clearance(altitudes, problem.body_height)))
     least: Array = np.min(found, axis=0)
     return least - problem.margin

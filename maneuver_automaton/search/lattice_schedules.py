@@ -27,12 +27,12 @@ class Schedule(NamedTuple):
 
 AT_WILL = Schedule(
     (
-        (0, (Resolution(),)),
+        (0, (Resolution(coarse=True),)),
         (
             300,
             (
-                Resolution(truncated=True, guided=True),
-                Resolution(scale=0.5, durations=0.5, truncated=True, guided=True),
+                Resolution(truncated=True, guided=True, coarse=True),
+                Resolution(scale=0.5, durations=0.5, truncated=True, guided=True, coarse=True),
             ),
         ),
         (1500, (Resolution(scale=0.24, durations=0.25, truncated=True, guided=True),)),

@@ -43,6 +43,7 @@ class Resolution:
     fine: float = 0.4  # cells of such edges, in cells of this resolution
     margin: float = 1.0  # of the proven clearance
     guided: bool = False  # by the table of the cost to go
+    coarse: bool = False  # led by distances along coarse cells
     stop: bool = True  # at the first connection
     layered: bool = False  # whether cells know the gear and the trim that prices ask for
     most: int = 2**62  # expansions

@@ -52,11 +52,13 @@ class Word:
         return float(self.durations.sum()) + self.maneuver_time
 
 
-def word_of_steps(steps: Iterable[tuple[int, int, float]], *, goal: int) -> Word:
+def word_of_steps(
+    steps: Iterable[tuple[int, int, float]], *, goal: int, library: Library | None = None
+) -> Word:
     """A word from its steps: the transition that leads to a trim, the trim, and its time [s].
 
-    A trim that goes on is one trim; one that lasts no time stands only beside a maneuver, or at an
-    end. The transition of the first step is none.
+    With a library it has its price. A trim that goes on is one trim; one that lasts no time stands
+    only beside a maneuver, or at an end. The transition of the first step is none.
 
     Examples
     --------
@@ -74,26 +76,41 @@ def word_of_steps(steps: Iterable[tuple[int, int, float]], *, goal: int) -> Word
         trims.append(trim)
         durations.append(time)
     _drop_idle_switches(trims, durations, transitions)
+    numbers = np.array(trims, dtype=np.int64)
+    times = np.array(durations, dtype=np.float64)
+    held = np.array(transitions, dtype=np.int64)
+    cost, lasting = _price(library, numbers, times, held) if library else (math.nan, 0.0)
     return Word(
-        trims=np.array(trims, dtype=np.int64),
-        durations=np.array(durations, dtype=np.float64),
-        transitions=np.array(transitions, dtype=np.int64),
+        trims=numbers,
+        durations=times,
+        transitions=held,
         goal=goal,
+        cost=cost,
+        maneuver_time=lasting,
     )
 
 
 def with_price(library: Library, word: Word) -> Word:
     """The word with its cost at the prices of a library, and the time of its maneuvers."""
-    arrays, numbers = library.arrays, library.number_of[word.trims]
-    held = word.transitions[word.transitions != SWITCH]
-    lasting = sum(library.automaton.maneuvers[k].duration for k in held)
-    cost = float(arrays.rates[numbers] @ word.durations)
-    cost += float(library.maneuver_costs[held].sum())
-    cost += arrays.switch * (len(word.transitions) - len(held))
+    cost, lasting = _price(library, word.trims, word.durations, word.transitions)
+    return replace(word, cost=cost, maneuver_time=lasting)
+
+
+def _price(
+    library: Library, trims: IntArray, durations: Array, transitions: IntArray
+) -> tuple[float, float]:
+    """Cost of a word at the prices of a library, and the time of its maneuvers [s]."""
+    arrays, numbers = library.arrays, library.number_of[trims]
+    cost, lasting, switches = float(arrays.rates[numbers] @ durations), 0.0, len(transitions)
+    held = transitions[transitions != SWITCH]
+    if held.size:
+        lasting = float(sum(library.automaton.maneuvers[k].duration for k in held))
+        cost += float(library.maneuver_costs[held].sum())
+        switches -= held.size
+    cost += arrays.switch * switches
     gears = arrays.gears[numbers]
     gears = gears[gears != 0]
-    cost += arrays.direction_change * int(np.count_nonzero(gears[1:] != gears[:-1]))
-    return replace(word, cost=cost, maneuver_time=float(lasting))
+    return cost + arrays.direction_change * int(np.count_nonzero(gears[1:] != gears[:-1])), lasting
 
 
 def plan_of(

@@ -45,6 +45,13 @@ def scene(seed: int, trims: int, polygons: int, *, moving: int = 0) -> tuple[Pla
     rng = np.random.default_rng([7, seed, trims, polygons])
     word = [CAR.trims[k] for k in rng.integers(len(CAR.trims), size=trims)]
     plan = Plan(np.zeros(3), word, durations=rng.uniform(0.3, 3.0, trims))
+    return plan, beside(plan, polygons, rng, moving=moving)
+
+
+def beside(
+    plan: Plan, polygons: int, rng: np.random.Generator, *, moving: int = 0
+) -> list[Obstacle]:
+    """Polygons beside where a plan leads the body, and others that pass far from it."""
     poses = plan.sample(max_step_m=0.1, max_step_rad=0.02).pose
     corners = np.vstack([BODY.corners, BODY.corners[:1]])
     cosine, sine = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
@@ -63,7 +70,7 @@ def scene(seed: int, trims: int, polygons: int, *, moving: int = 0) -> tuple[Pla
         aside = rng.uniform(high + 3.0, high + 9.0)
         motion = Motion([0.0, plan.duration], [[*aside, 0.0], [aside[0] + 5.0, aside[1], 0.0]])
         obstacles.append(Obstacle(BODY, motion=motion))
-    return plan, obstacles
+    return obstacles
 
 
 def timed(plan: Plan, obstacles: list[Obstacle], repeats: int) -> float:

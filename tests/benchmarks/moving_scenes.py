@@ -21,7 +21,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import maneuver_automaton as ma
-from maneuver_automaton._compile import kernel
+from maneuver_automaton._compile import inner_kernel, kernel
 from maneuver_automaton.collision import Disc, Obstacle
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon import ClosedLoop
@@ -158,7 +158,7 @@ def _survives(moving, low, cell, columns, rows, begin, goal, robot, tick, spin_t
     return True
 
 
-@kernel
+@inner_kernel
 def _mark_clear(clear, moving, low, cell, kept, time):
     """Mark the cells further than `kept` from all moving obstacles at a time."""
     columns, rows = clear.shape
@@ -177,7 +177,7 @@ def _mark_clear(clear, moving, low, cell, kept, time):
                     clear[i, j] = False
 
 
-@kernel
+@inner_kernel
 def _step_free(moving, low, cell, robot, i, j, p, q, at):
     """Whether a step from (i, j) to (p, q) is clear at its quarters; the ends are known."""
     for quarter in range(3):
@@ -190,7 +190,7 @@ def _step_free(moving, low, cell, robot, i, j, p, q, at):
     return True
 
 
-@kernel
+@inner_kernel
 def _pose_at(moving, m, time, at):
     """Pose of moving obstacle `m` at a time, linear between its knots, still before and after."""
     last = moving.knots[m] - 1
@@ -206,7 +206,7 @@ def _pose_at(moving, m, time, at):
         at[axis] = moving.pose[m, k, axis] + share * (after - moving.pose[m, k, axis])
 
 
-@kernel
+@inner_kernel
 def _distance(moving, m, at, x, y):
     """Distance from a point to moving obstacle `m` at a pose, 0 inside a box."""
     dx, dy = x - at[0], y - at[1]

@@ -23,7 +23,7 @@ import shapely
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from maneuver_automaton._compile import kernel
+from maneuver_automaton._compile import inner_kernel, kernel
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import Obstacle, OccupancyMap, Polygon, Shape
 from maneuver_automaton.problem import Problem
@@ -318,7 +318,7 @@ def is_free(x, y, yaw, world):
     return True
 
 
-@kernel
+@inner_kernel
 def _apart(moved, n, radius, world, shape):
     """Whether an axis separates a convex part (n corners of `moved`) from a convex shape."""
     m, kept = int(world[shape]), radius + world[shape + 1]
@@ -347,7 +347,7 @@ def _apart(moved, n, radius, world, shape):
     return _axis_clearance(moved, n, corners, m, ax, ay) > kept
 
 
-@kernel
+@inner_kernel
 def _axis_clearance(moved, n, corners, m, ax, ay):
     """Clearance between two sets of corners seen along an axis, negative where they overlap."""
     length = math.hypot(ax, ay)

@@ -17,6 +17,7 @@ def functions_of(problem, *, incumbent=math.inf, work=2_000_000):
     return [proof.function for proof in found if proof.function is not None]
 
 
+@pytest.mark.slow
 def test_a_function_bounds_the_plans_from_other_starts():
     problem = among((), goal=(6.0, 3.0, 0.9))
     function = functions_of(problem)[0]

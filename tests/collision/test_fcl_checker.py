@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap, Polygon
 from maneuver_automaton.collision.checker import CollisionChecker
-from maneuver_automaton.collision.fcl_checker import FclChecker
+from maneuver_automaton.collision.fcl_checker import Course, FclChecker
 from maneuver_automaton.groups import SE2
 from tests.collision.scenes import (
     ANGLE,
@@ -461,3 +461,81 @@ def test_a_course_may_be_given_up_between_its_parts():
             checker.course_hit(
                 [0, 0, 0], poses, np.linspace(0.0, 2.0, 41), start_time=6.0, ask=late
             )
+
+
+def first_of(hits):
+    """The first that is hit, and which obstacle."""
+    return next(((k, hit) for k, hit in enumerate(hits) if hit is not None), None)
+
+
+@pytest.mark.parametrize("seed", quick_are(range(6), range(40)))
+def test_several_motions_are_hit_where_one_of_them_is(seed):
+    """Of no length, standing still, spins and long ways among them."""
+    rng = np.random.default_rng([300, seed])
+    footprint = list(FOOTPRINTS.values())[seed % len(FOOTPRINTS)]
+    obstacles = random_scene(rng, moving=2 * (seed % 2))
+    checker = FclChecker(footprint, obstacles)
+    n = rng.integers(0, 8)
+    starts = np.array([random_pose(rng) for _ in range(n)]).reshape(-1, 3)
+    free = np.array([checker.pose_hit(pose) is None for pose in starts], dtype=bool)
+    starts = starts[free]
+    kinds = np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 1.5), *TWISTS])
+    twists = kinds[rng.integers(len(kinds), size=len(starts))]
+    durations = rng.choice([0.0, 1e-14, 0.3, 2.0], size=len(starts))
+    clock = rng.uniform(-2.0, 5.0, len(starts))
+    one_by_one = [
+        checker.motion_hit(start, twist, duration, start_time=time)
+        for start, twist, duration, time in zip(starts, twists, durations, clock, strict=True)
+    ]
+    found = checker.motions_hit(starts, twists, durations, start_times=clock)
+    assert (found is None) == (first_of(one_by_one) is None)
+    if found is not None:
+        assert found[0] == first_of(one_by_one)[0]
+
+
+def random_course(rng, n, step):
+    """A course of n samples that begins anywhere, its turns those of a vehicle that steers."""
+    poses = [np.zeros(3)]
+    for turn in np.cumsum(rng.uniform(-0.02, 0.02, n - 1)):
+        poses.append((SE2(poses[-1]) @ SE2.exp([step, 0.0, turn])).pose)
+    return np.array(poses)
+
+
+@pytest.mark.parametrize("seed", quick_are(range(6), range(40)))
+def test_several_courses_are_hit_where_one_of_them_is(seed):
+    rng = np.random.default_rng([400, seed])
+    footprint = list(FOOTPRINTS.values())[seed % len(FOOTPRINTS)]
+    obstacles = random_scene(rng, moving=2 * (seed % 2))
+    checker = FclChecker(footprint, obstacles)
+    courses = []
+    for n in rng.choice([1, 2, 5, 40, 90], size=rng.integers(0, 6)):
+        start, time = random_pose(rng), rng.uniform(-2.0, 5.0)
+        if checker.pose_hit(start, time=time) is None:
+            courses.append(Course(start, random_course(rng, n, 0.05), 0.1 * np.arange(n), time))
+    one_by_one = [
+        checker.course_hit(one.start, one.poses, one.times, start_time=one.start_time)
+        for one in courses
+    ]
+    found = checker.courses_hit(courses)
+    assert (found is None) == (first_of(one_by_one) is None)
+    if found is not None:
+        assert found[0] == first_of(one_by_one)[0]
+
+
+@pytest.mark.parametrize("seed", quick_are(range(4), range(20)))
+def test_a_course_of_one_coast_is_that_coast(seed):
+    """Cut into samples of any length, also where they turn by radians."""
+    rng = np.random.default_rng([500, seed])
+    obstacles, answers = random_scene(rng), set()
+    checker = FclChecker((CAR,), obstacles)
+    for _ in range(12):
+        start, twist = random_pose(rng), np.array(TWISTS[rng.integers(len(TWISTS))])
+        times = np.append(0.0, np.sort(rng.uniform(0.0, 2.0, rng.choice([1, 4, 60]))))
+        poses = SE2.exp(times[:, None] * twist).pose
+        hit = checker.motion_hit(start, twist, times[-1])
+        found = checker.course_hit(start, poses, times)
+        if (hit is None) != (found is None):  # then it is a matter of what counts as proven
+            least, slack = judge((CAR,), obstacles, start, twist, times[-1], 300)
+            assert least <= PROVEN + slack
+        answers.add(found is None)
+    assert answers

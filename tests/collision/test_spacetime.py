@@ -6,11 +6,19 @@ import math
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
 from maneuver_automaton.collision import Motion
-from maneuver_automaton.collision.spacetime import CoastingBody, MovingBody, may_meet, meet
+from maneuver_automaton.collision.spacetime import (
+    CoastingBody,
+    MovingBody,
+    apart_at_least,
+    may_meet,
+    meet,
+)
+from maneuver_automaton.groups import SE2
 
 speeds = st.floats(-3.0, 3.0) | st.just(0.0)
 places = st.floats(-5.0, 5.0)
@@ -28,6 +36,31 @@ def clearance(here, there):
     return np.maximum(np.hypot(apart[..., 0], apart[..., 1]) - 0.6, 0.0)
 
 
+def possible(rover, other, duration):
+    """Whether a rover may meet another within a time."""
+    (near,) = may_meet(
+        other,
+        np.array([rover.center(rover.at(0.5 * duration))]).view(np.float64).reshape(1, 2),
+        times=np.array([0.5 * duration]),
+        halves=np.array([0.5 * duration]),
+        speeds=np.array([abs(rover.velocity)]),
+        reach=rover.reach,
+    )
+    return bool(near)
+
+
+@given(
+    start=st.tuples(places, places, st.floats(-7, 7)),
+    twist=st.tuples(speeds, speeds, speeds),
+    time=st.floats(0.0, 9.0),
+)
+def test_a_coast_is_that_of_the_group(start, twist, time):
+    body = CoastingBody(start, twist, 0j, 1.0)
+    assert body.at(time) == pytest.approx(
+        (SE2(start) @ SE2.exp(time * np.array(twist))).pose, abs=1e-12
+    )
+
+
 @given(
     start=st.tuples(places, places, st.floats(-7, 7)),
     twist=st.tuples(speeds, speeds, speeds),
@@ -37,7 +70,7 @@ def clearance(here, there):
 )
 def test_against_dense_times(start, twist, knots, begin, duration):
     motion = Motion(begin + np.arange(len(knots)) * 0.8, knots)
-    rover, other = CoastingBody(np.array(start), twist, 0j, 0.3), MovingBody.of(motion, 1.3)
+    rover, other = CoastingBody(start, twist, 0j, 0.3), MovingBody.of(motion, 1.3)
     times = np.linspace(0.0, duration, 400)
     clearances = clearance(np.array([rover.at(time) for time in times]), other.at(times))
     found = meet(
@@ -46,18 +79,19 @@ def test_against_dense_times(start, twist, knots, begin, duration):
     rate = math.hypot(*twist[:2]) + other.speed + other.turn_rate * 1.3
     if found:
         assert clearances.min() <= 1e-3 + rate * duration / 399 / 2 + 1e-12
-        center = rover.center(rover.at(0.5 * duration))
-        assert may_meet(rover, other, duration=duration, center=center)
+        assert possible(rover, other, duration)
     else:
         assert clearances.min() > 0.0
 
 
-def test_rates_by_hand():
+def test_stretches_by_hand():
     body = MovingBody.of(Motion([1.0, 3.0, 4.0], [[0, 0, 0], [4, 2, 1], [4, 2, 7]]), 1.0)
-    assert body.rates(0.0) == (0j, 0.0, 1.0)
-    assert body.rates(1.0) == (2 + 1j, 0.5, 3.0)
-    assert body.rates(3.5) == (0j, 6.0, 4.0)
-    assert body.rates(4.0) == (0j, 0.0, math.inf)
+    assert body.stretch(0.0) == ((0, 0, 0), 0j, 0.0, 1.0)
+    assert body.stretch(1.0) == ((0, 0, 0), 2 + 1j, 0.5, 3.0)
+    assert body.stretch(3.5) == ((4, 2, 4), 0j, 6.0, 4.0)
+    assert body.stretch(4.0) == ((4, 2, 7), 0j, 0.0, math.inf)
+    for time in (0.0, 1.0, 2.2, 3.0, 3.9, 4.0, 9.0):
+        assert body.stretch(time).pose == pytest.approx(body.at(time), abs=1e-15)
     assert body.speed == pytest.approx(math.sqrt(5.0))
     assert body.turn_rate == 6.0
     assert body.from_time(1.0).at(1.0).tolist() == [2.0, 1.0, 0.5]
@@ -71,7 +105,7 @@ def test_a_convoy_takes_few_steps():
         asked.append(1)
         return abs(here[0] - there[0]) - 1.0
 
-    rover = CoastingBody(np.zeros(3), (10.0, 0.0, 0.0), 0j, 0.5)
+    rover = CoastingBody((0.0, 0.0, 0.0), (10.0, 0.0, 0.0), 0j, 0.5)
     times = np.arange(100.0)
     road = Motion(times, np.column_stack([1.01 + 10.0 * times, 0 * times, 0 * times]))
     ahead = MovingBody.of(road, 0.5)
@@ -86,18 +120,17 @@ def test_what_never_moves_is_asked_once():
         asked.append(1)
         return 0.5
 
-    still = CoastingBody(np.zeros(3), (0.0, 0.0, 0.0), 0j, 1.0)
+    still = CoastingBody((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0j, 1.0)
     parked = MovingBody.of(Motion([0.0], [[2.0, 0.0, 0.0]]), 1.0)
     assert not meet(still, parked, duration=1e9, distance=distance, contact=1e-3)
     assert len(asked) == 1
 
 
 def test_far_and_slow_cannot_meet():
-    rover = CoastingBody(np.zeros(3), (1.0, 0.0, 0.0), 0j, 1.0)
+    rover = CoastingBody((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0j, 1.0)
     parked = MovingBody.of(Motion([0.0], [[20.0, 0.0, 0.0]]), 1.0)
-    for duration, possible in ((10.0, False), (19.0, True)):
-        center = rover.center(rover.at(0.5 * duration))
-        assert may_meet(rover, parked, duration=duration, center=center) is possible
+    for duration, close in ((10.0, False), (19.0, True)):
+        assert possible(rover, parked, duration) is close
 
 
 @given(
@@ -109,7 +142,7 @@ def test_a_disc_beside_its_frame_is_met_where_a_frame_of_its_own_would_be(start,
     """The same body, seen from a frame 5 m beside it: its disc is small, its reach is not."""
     times = np.arange(len(knots)) * 0.8
     far = Motion(times, knots)
-    rover = CoastingBody(np.array(start), (1.0, 0.0, 0.3), 0j, 0.3)
+    rover = CoastingBody(start, (1.0, 0.0, 0.3), 0j, 0.3)
     other = MovingBody.of(far, 6.3, middle=5.0 + 0j, radius=1.3)
     dense = np.linspace(0.0, duration, 200)
     centers = other.centers(dense)
@@ -125,5 +158,71 @@ def test_a_disc_beside_its_frame_is_met_where_a_frame_of_its_own_would_be(start,
     )
     if not found:
         assert min(apart) > 1.6
-    elif not may_meet(rover, other, duration=duration, center=rover.center(rover.at(duration / 2))):
+    elif not possible(rover, other, duration):
         raise AssertionError("what meets may meet")
+
+
+boxes = st.tuples(st.floats(0.1, 3.0), st.floats(0.1, 3.0))
+poses = st.tuples(places, places, st.floats(-7, 7))
+
+
+@given(here=poses, there=poses, own=boxes, its=boxes, aside=st.tuples(places, places))
+def test_what_is_around_bodies_is_never_further_apart(here, there, own, its, aside):
+    """Rectangles: the bound is never more than their distance, and little less than it."""
+    middle = complex(*aside)
+    body = CoastingBody(here, (0.0, 0.0, 0.0), middle, math.hypot(*own), own)
+    other = MovingBody.of(Motion([0.0], [there]), 9.0, radius=math.hypot(*its), half=its)
+
+    def rectangle(pose, half, center):
+        corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
+        corners = corners + np.array([center.real, center.imag])
+        return shapely.Polygon(SE2(pose).act(corners))
+
+    one, two = rectangle(here, own, middle), rectangle(there, its, 0j)
+    found = apart_at_least(body, other, here, there)
+    for bound in found:
+        assert 0.0 < bound.distance <= one.distance(two) + 1e-9
+        ahead = [
+            shapely.get_coordinates(shape) @ [bound.direction.real, bound.direction.imag]
+            for shape in (one, two)
+        ]
+        assert bound.distance <= ahead[1].min() - ahead[0].max() + 1e-9
+    if one.distance(two) > 1e-9:
+        assert max(bound.distance for bound in found) >= 0.25 * one.distance(two)
+
+
+@given(
+    start=poses,
+    twist=st.tuples(speeds, speeds, speeds),
+    knots=st.lists(poses, min_size=1, max_size=4),
+    own=boxes,
+    its=boxes,
+    aside=st.tuples(places, places),
+    duration=st.floats(0.0, 4.0),
+)
+def test_rectangles_meet_when_they_touch(start, twist, knots, own, its, aside, duration):
+    """Two rectangles, one of them beside its frame, at many times."""
+    middle, motion = complex(*aside), Motion(0.8 * np.arange(len(knots)), knots)
+    body = CoastingBody(start, twist, 0j, math.hypot(*own), own)
+    other = MovingBody.of(
+        motion, abs(middle) + math.hypot(*its), middle=middle, radius=math.hypot(*its), half=its
+    )
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    rings = corners * own, corners * its + np.array(aside)
+
+    def apart(here, there):
+        one, two = (
+            shapely.Polygon(SE2(pose).act(ring))
+            for pose, ring in zip((here, there), rings, strict=True)
+        )
+        return one.distance(two)
+
+    times = np.linspace(0.0, duration, 60)
+    least = min(apart(body.at(time), other.stretch(time).pose) for time in times.tolist())
+    found = meet(body, other, duration=duration, distance=apart, contact=1e-2)
+    rate = math.hypot(*twist[:2]) + abs(twist[2]) * math.hypot(*own)
+    rate += other.speed + other.turn_rate * other.reach
+    if found:
+        assert least <= 1e-2 + rate * duration / 59 / 2 + 1e-9
+    else:
+        assert least > 0.0

@@ -65,7 +65,10 @@ def test_what_is_kept_is_a_plan_of_its_scene(name):
     plan = Plan(problem.start, trims, durations=one["durations"], start_time=problem.start_time)
     assert problem.cost_of(plan) == pytest.approx(one["cost"], rel=1e-9, abs=1e-12)
     scale = max(1.0, float(np.abs(problem.start[:2]).max()))
-    assert max(problem.goals[one["goal"]].off(plan.end)) < EXACT * scale
+    goal = problem.goals[one["goal"]]
+    off_m, off_rad = goal.off(plan.end)
+    assert off_m - goal.tolerance_m < EXACT * scale
+    assert off_rad - goal.tolerance_rad < EXACT * scale
 
 
 def test_what_may_be_dearer_says_why():

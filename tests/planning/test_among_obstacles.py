@@ -100,7 +100,9 @@ KINDS = {
     "dubins": replace(BASE, automaton=scenes.dubins(0.8), footprint=(Disc(0.25),)),
     "prices": replace(BASE, cost=Cost(time=1.0, switch=0.2, direction_change=0.7)),
     "effort": replace(ROBOTS, cost=Cost(effort=1.0, norm=0.5)),
-    "few trims": replace(BASE, horizon=Horizon(max_trims=5)),
+    "few trims": replace(
+        BASE, horizon=Horizon(max_trims=5), search=SearchSettings(max_expansions=1200)
+    ),
     "long trims": replace(BASE, horizon=Horizon(min_coast=0.25)),
     "little time": replace(ROBOTS, horizon=Horizon(max_time=13.0), cost=Cost(effort=1.0)),
     "fixed time": replace(ROBOTS, horizon=Horizon(time=25.0), cost=Cost(effort=1.0)),

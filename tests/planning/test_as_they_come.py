@@ -25,7 +25,7 @@ def counted(problem, n=3000):
     "name", quick_are(["cluttered_room", "parking"], ["cluttered_room", "parking", "trailer"])
 )
 def test_each_is_better_and_audited_and_the_last_is_the_answer(name):
-    problem = counted(load_scenario(f"scenarios/{name}.yaml").problem, 500)
+    problem = counted(load_scenario(f"scenarios/{name}.yaml").problem, 1000)
     *before, last = plans(problem, time_limit=60.0)
     assert last.cost == plan(problem, time_limit=60.0).cost
     for result in (*before, last):

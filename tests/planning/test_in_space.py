@@ -171,6 +171,7 @@ def test_walls_prove_that_there_is_no_way():
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_blocked_goal_in_space_is_named():
     on_it = replace(BASE, obstacles=(Obstacle(Box([1.0, 1.0], [9.0, 1.0]), height=(0.5, 2.0)),))
     assert plan(on_it, time_limit=LIMIT).status is PlanStatus.GOAL_BLOCKED

@@ -17,7 +17,7 @@ from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.planning.lattice_words import late_at_first
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.refinement.incumbent_words import incumbent_words
-from maneuver_automaton.search import lattice_pass, lattice_schedules
+from maneuver_automaton.search import lattice, lattice_schedules
 from maneuver_automaton.search.lattice_pass import pass_of
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_schedules import LINKED
@@ -149,7 +149,7 @@ def test_settings_of_the_lattice_are_read(monkeypatch):
     assert task_of(query, Resolution(scale=0.5)).cell == 0.155
     weights = []
     monkeypatch.setattr(
-        lattice_pass, "pass_of", lambda *a, **k: weights.append(a[1].weight) or pass_of(*a, **k)
+        lattice, "pass_of", lambda *a, **k: weights.append(a[1].weight) or pass_of(*a, **k)
     )
     stages = ((0, (Resolution(),)), (0, (Resolution(scale=0.5),)))
     monkeypatch.setattr(lattice_schedules, "LINKED", LINKED._replace(stages=stages, first_chunk=4))

@@ -49,6 +49,7 @@ def test_parts_heights_and_trims_reach_the_problem():
     assert again.start_trim == name
 
 
+@pytest.mark.slow
 def test_planners_used_in_turn_keep_what_they_prepared(monkeypatch):
     """Each has its own map and body: none makes anything twice, however many there are."""
     made = []

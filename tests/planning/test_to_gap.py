@@ -15,6 +15,7 @@ from tests import scenes
 SLOT = replace(scenes.parallel_slot(6.5), cost=ma.Cost(length=1.0))
 
 
+@pytest.mark.slow
 def test_a_search_ends_once_its_gap_is_proven():
     watch = Watch(gap=0.0)
     result = ma.plan(SLOT, time_limit=60.0, gap=0.1, watch=watch)

@@ -70,6 +70,7 @@ def test_a_car_parks_exactly_and_from_rest_to_rest():
     assert result.audit.passed
 
 
+@pytest.mark.slow
 def test_costs_fall_and_the_first_plan_stops_and_steers():
     result = plan(parking(), time_limit=3.0)
     costs = [cost for _, cost in result.improvements]

@@ -31,6 +31,7 @@ from tests.plotting.loops import (
     straight_loop,
     unfinished_loop,
 )
+from tests.quickly import quick_are
 from tests.search.cases import compiled_only
 
 CAR = {"rectangle_m": [0.5, 0.3]}
@@ -40,7 +41,7 @@ def axes():
     return Figure().add_subplot()
 
 
-@pytest.mark.parametrize("name", LOOPS)
+@pytest.mark.parametrize("name", quick_are(["parking", "empty", "straight"], LOOPS))
 def test_a_page_of_every_kind_of_loop(name, tmp_path):
     save_closed_loop_figure(LOOPS[name](), tmp_path / "loop.png", footprint=CAR)
     assert_picture(tmp_path / "loop.png")

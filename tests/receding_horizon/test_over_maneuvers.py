@@ -220,6 +220,7 @@ def test_a_plan_that_ends_within_the_tolerance_is_kept(noise):
         assert [step.deed for step in loop.steps[1:]] == [Deed.KEPT] * (len(loop.steps) - 1)
 
 
+@pytest.mark.slow
 def test_at_first_a_planner_has_all_the_time_where_there_are_zones(monkeypatch):
     """It looks at words itself: looked at before, they would take half of its time."""
     monkeypatch.setattr(over_maneuvers, "search_insertion", lambda *_, **__: 1 / 0)

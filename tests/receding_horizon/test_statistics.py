@@ -34,6 +34,7 @@ def in_numbers(outcome: Outcome) -> tuple[object, ...]:
     )
 
 
+@pytest.mark.slow
 def test_two_jobs_come_to_the_same_as_one():
     settings = {"step": 1.0, "steps": 4, "disturbance": NOISE, "seeds": range(3)}
     starts = [[0.0, 1.0, 0.0], [0.5, 0.5, 1.0]]

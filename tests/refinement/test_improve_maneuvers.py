@@ -53,6 +53,7 @@ def assert_sound(word):
         assert (maneuvers[held].source, maneuvers[held].target) == ends
 
 
+@pytest.mark.slow
 def test_every_gain_is_a_sound_word_and_cheaper():
     """Without a new search, shortcuts and via-points alone."""
     first = first_word()

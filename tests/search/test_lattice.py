@@ -26,7 +26,7 @@ from maneuver_automaton.search.lattice_memory import (
     search_arrays,
     with_room,
 )
-from maneuver_automaton.search.lattice_pass import both_ends, pass_of, with_cost
+from maneuver_automaton.search.lattice_pass import pass_of, with_cost
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_schedules import AT_WILL
 from maneuver_automaton.search.lattice_task import Resolution, task_of
@@ -81,7 +81,8 @@ def grown(problem, *, sign=1.0, one=None, n=EXPANSIONS):
     """A pass that does not stop at a connection, its nodes and links."""
     query = query_of(problem)
     resolution = Resolution(stop=False) if one is None else one
-    (one,) = both_ends(query, resolution, grids=distance_grids(query), ends=(sign,))
+    grid = distance_grids(query)[0 if sign > 0.0 else 1]
+    one = pass_of(query, resolution, grid=grid, sign=sign)
     one.run(n, math.inf)
     used = int(one.arrays.state[layout.N_NODES])
     return one, one.arrays.nodes[:used], one.arrays.links[:used]
@@ -243,7 +244,7 @@ def test_the_same_at_every_call_and_from_used_memory():
     memory = search_arrays(query.library.arrays.library)
     said = []
     for arrays in (None, memory, memory):
-        (one,) = both_ends(query, resolution, grids=grids, arrays=arrays, ends=(1.0,))
+        one = pass_of(query, resolution, grid=grids[0], arrays=arrays)
         word = one.run(EXPANSIONS, math.inf)
         said.append((one.expansions, None if word is None else word.durations.tobytes()))
     assert said[0] == said[1] == said[2]
@@ -253,7 +254,7 @@ def test_in_chunks_it_is_the_same_as_at_once():
     nodes = []
     for chunks in ([EXPANSIONS], [1, 7, EXPANSIONS - 8]):
         query = query_of(PROBLEMS["car"])
-        (one,) = both_ends(query, Resolution(stop=False), grids=distance_grids(query), ends=(1.0,))
+        one = pass_of(query, Resolution(stop=False), grid=distance_grids(query)[0])
         for n in chunks:
             one.run(n, math.inf)
         nodes.append(one.arrays.nodes[: int(one.arrays.state[layout.N_NODES])])
