@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+FEW = 16  # numbers that are looked at faster one by one
 
 
 def as_array(name: str, value: ArrayLike, *, last: int | Sequence[int] | None = None) -> Array:
@@ -48,10 +50,16 @@ def as_array(name: str, value: ArrayLike, *, last: int | Sequence[int] | None = 
         if array.ndim == 0 or array.shape[-1] not in admitted:
             need = " or ".join(str(n) for n in admitted)
             raise ValueError(f"{name}: got shape {array.shape}, need {need} components last")
-    if not np.isfinite(array).all():
+    if not _is_finite(array):
         bad = array[~np.isfinite(array)].flat[0]
         raise ValueError(f"{name}: got {bad}, need finite numbers")
     return array
+
+
+def _is_finite(array: Array) -> bool:
+    if array.size <= FEW:
+        return all(map(math.isfinite, array.ravel().tolist()))
+    return bool(np.isfinite(array).all())
 
 
 def freeze(instance: Any, name: str, *, last: int | Sequence[int] | None = None) -> None:

@@ -31,10 +31,12 @@ def check_size(name: str, values: ArrayLike) -> None:
         ...
     ValueError: disc: radius: got 1e+12 m, need at most 1e+10 m in size
     """
-    numbers = np.atleast_1d(np.asarray(values, dtype=np.float64))
-    far = numbers[np.abs(numbers) > FARTHEST]
-    if far.size:
-        raise ValueError(f"{name}: got {far.flat[0]:g} m, need at most {FARTHEST:g} m in size")
+    numbers = np.asarray(values, dtype=np.float64)
+    if numbers.size and not np.abs(numbers).max() <= FARTHEST:
+        far = np.atleast_1d(numbers)
+        far = far[np.abs(far) > FARTHEST]
+        if far.size:
+            raise ValueError(f"{name}: got {far.flat[0]:g} m, need at most {FARTHEST:g} m in size")
 
 
 def check_heading(name: str, pose: ArrayLike) -> None:

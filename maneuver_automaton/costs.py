@@ -91,12 +91,23 @@ class Cost:
         Rest counts as a trim; a direction change is a change of sign of the forward speed
         between trims that drive.
         """
-        if not (self.switch or self.direction_change) or len(body_velocities) < 2:
+        if not prices_switches(self) or len(body_velocities) < 2:
             return 0.0
         signs = np.sign(body_velocities[:, 0])
         driving = signs[signs != 0.0]
         changes = int(np.count_nonzero(driving[1:] != driving[:-1]))
         return self.switch * (len(body_velocities) - 1) + self.direction_change * changes
+
+
+def prices_switches(cost: StageCost) -> bool:
+    """Whether a switch of trims costs something by itself, or may: a user's own cost may.
+
+    Examples
+    --------
+    >>> prices_switches(Cost(time=1.0)), prices_switches(Cost(time=1.0, switch=0.1))
+    (False, True)
+    """
+    return not isinstance(cost, Cost) or cost.switch > 0.0 or cost.direction_change > 0.0
 
 
 WEIGHTS = ("effort", "norm", "time", "length", "switch", "direction_change")

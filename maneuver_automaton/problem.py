@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -26,7 +26,7 @@ from maneuver_automaton.collision import (
     as_footprint,
     as_obstacles,
 )
-from maneuver_automaton.costs import Cost, StageCost
+from maneuver_automaton.costs import Cost, StageCost, prices_switches
 from maneuver_automaton.groups import SE2, LieGroup, SE2xR, Translations
 from maneuver_automaton.models import Model, OnLattice, OnlyTranslated
 from maneuver_automaton.primitives import Maneuver, Trim
@@ -85,10 +85,8 @@ class Goal:
         >>> Goal(pose=[1.0, 0.0, 0.0]).off(np.array([1.0, 2.0, 2 * np.pi]))
         (2.0, 0.0)
         """
-        places = [0, 1, *range(3, self.pose.size)]
-        distance = float(np.linalg.norm(pose[places] - self.pose[places]))
-        turn = math.remainder(float(pose[2] - self.pose[2]), 2.0 * math.pi)
-        return distance, 0.0 if self.free_heading else abs(turn)
+        distance, turn = apart(self.pose, pose)
+        return distance, 0.0 if self.free_heading else turn
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -274,11 +272,7 @@ class Problem:
         object.__setattr__(self, "goals", _as_goals(self.goals))
         if self.automaton.translated is not None:
             self._give_headings(self.automaton.translated)
-        freeze(self, "start", last=dof)
-        if self.start.ndim != 1:
-            raise ValueError(f"start: pose has shape {self.start.shape}, need one pose")
-        check_size("start: pose", self.start[[0, 1, *range(3, dof)]])
-        check_heading("start: pose", self.start)
+        self._check_start()
         check_size("margin", self.margin)
         for goal in self.goals:
             if goal.pose.size != dof:
@@ -299,8 +293,6 @@ class Problem:
                     f"horizon: time is {self.horizon.time:g} s, in which the {turns:.3g} whole "
                     f"turns of a trim would all be tried, need at most {MOST_TURNS}"
                 )
-        if not math.isfinite(self.start_time):
-            raise ValueError(f"start: time must be finite, got {self.start_time} s")
         object.__setattr__(self, "obstacles", as_obstacles(self.obstacles))
         object.__setattr__(self, "footprint", as_footprint(self.footprint))
         object.__setattr__(self, "parts", _as_parts(self.automaton.model, self.parts))
@@ -317,6 +309,16 @@ class Problem:
             raise ValueError(f"margin must be a number of at least 0, got {self.margin} m")
         if not self.automaton.is_kinematic:
             self._check_ends()
+
+    def _check_start(self) -> None:
+        dof = self.automaton.model.group.dof
+        freeze(self, "start", last=dof)
+        if self.start.ndim != 1:
+            raise ValueError(f"start: pose has shape {self.start.shape}, need one pose")
+        check_size("start: pose", self.start[[0, 1, *range(3, dof)]])
+        check_heading("start: pose", self.start)
+        if not math.isfinite(self.start_time):
+            raise ValueError(f"start: time must be finite, got {self.start_time} s")
 
     def _give_headings(self, model: OnlyTranslated) -> None:
         """Start and goals of a vehicle that translations alone move get headings of its trims.
@@ -403,9 +405,9 @@ class Problem:
         if not plan.trims:
             return np.zeros(0)
         known = _known_rates(self.automaton, self.cost)
-        rates = [known[trim.name][1] for trim in plan.trims if _is_known(trim, known)]
-        if len(rates) == len(plan.trims):
-            return np.array(rates)
+        entries = [known.get(trim.name, _UNKNOWN) for trim in plan.trims]
+        if all(entry[0] is trim for entry, trim in zip(entries, plan.trims, strict=True)):
+            return np.array([entry[1] for entry in entries])
         controls = np.array([trim.control for trim in plan.trims])
         return self.cost.rates(controls, np.array([trim.body_velocity for trim in plan.trims]))
 
@@ -419,6 +421,8 @@ class Problem:
             return 0.0
         coasting = float(self.rates_of(plan) @ plan.durations)
         if not any(plan.maneuvers):
+            if not prices_switches(self.cost):
+                return coasting
             velocities = np.array([trim.body_velocity for trim in plan.trims])
             return coasting + self.cost.switching(velocities)
         maneuvers = sum(self.maneuver_cost(one) for one in plan.maneuvers if one)
@@ -460,6 +464,37 @@ class Problem:
         signs = np.sign(rows[:, 0])
         return np.asarray(rows[np.append(True, signs[1:] != signs[:-1])])
 
+    def starting_at(self, start: Array, *, time: float, horizon: Horizon | None = None) -> Problem:
+        """The same problem from another start (dof,) at another time [s].
+
+        What stays the same is not checked again: that takes longer than a search of few words.
+
+        Raises
+        ------
+        ValueError
+            If the start is no pose of the vehicle, or the time is not finite.
+
+        Examples
+        --------
+        >>> from maneuver_automaton.models import Unicycle
+        >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "spin": (0.0, 1.0)})
+        >>> later = Problem(robot, [0, 0, 0], [1, 1, 0]).starting_at(np.ones(3), time=0.5)
+        >>> later.start.tolist(), later.start_time, later.goals[0].pose.tolist()
+        ([1.0, 1.0, 1.0], 0.5, [1.0, 1.0, 0.0])
+        """
+        horizon = self.horizon if horizon is None else horizon
+        longer = (horizon.time or 0.0) > (self.horizon.time or 0.0)
+        if longer or self.automaton.translated is not None:  # more turns, or a heading of a trim's
+            return replace(self, start=start, start_time=time, horizon=horizon)
+        moved: Problem = object.__new__(Problem)
+        for name in _FIELDS:
+            object.__setattr__(moved, name, getattr(self, name))
+        object.__setattr__(moved, "start", start)
+        object.__setattr__(moved, "start_time", time)
+        object.__setattr__(moved, "horizon", horizon)
+        moved._check_start()
+        return moved
+
     def moved(self, by: LieGroup) -> Problem:
         """The problem moved by the group element `by`, all around it too; bounds must be open.
 
@@ -486,9 +521,28 @@ class Problem:
         return any(moves(obstacle) for obstacle in self.obstacles)
 
 
+_FIELDS = tuple(one.name for one in fields(Problem))
+
+
+def apart(one: Array, other: Array) -> tuple[float, float]:
+    """How far two poses (dof,) are from each other: distance [m], and turn [rad] up to pi.
+
+    Examples
+    --------
+    >>> apart(np.zeros(3), np.array([3.0, 4.0, 2 * np.pi]))
+    (5.0, 0.0)
+    """
+    places = slice(2) if one.size == 3 else [0, 1, *range(3, one.size)]
+    way = other[places] - one[places]
+    return math.sqrt(way.dot(way)), abs(math.remainder(float(other[2] - one[2]), 2.0 * math.pi))
+
+
 def moves(obstacle: AnyObstacle) -> bool:
     """Whether an obstacle moves."""
     return isinstance(obstacle, Obstacle) and obstacle.motion is not None
+
+
+_UNKNOWN: tuple[Trim | None, float] = (None, math.nan)
 
 
 @kept_by_first
@@ -498,11 +552,6 @@ def _known_rates(automaton: Automaton, cost: StageCost) -> dict[str, tuple[Trim,
     return {
         trim.name: (trim, rate) for trim, rate in zip(automaton.trims, rates.tolist(), strict=True)
     }
-
-
-def _is_known(trim: Trim, known: dict[str, tuple[Trim, float]]) -> bool:
-    entry = known.get(trim.name)
-    return entry is not None and entry[0] is trim
 
 
 def _as_parts(

@@ -15,7 +15,7 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton._display import Player, picture, player_frame, player_page
 from maneuver_automaton.errors import MissingExtra
 from maneuver_automaton.groups import LieGroup, group_of
-from maneuver_automaton.groups.chain import chained
+from maneuver_automaton.groups.chain import chained, coasted, coasted_once
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 
@@ -76,7 +76,7 @@ class Plan:
             raise ValueError(
                 f"plan: got {self.durations.shape} durations for {len(self.trims)} trims"
             )
-        if (self.durations < 0.0).any():
+        if min(self.durations.tolist(), default=0.0) < 0.0:
             raise ValueError(f"plan: durations must not be negative, got {self.durations.min()} s")
         if self.maneuvers and len(self.maneuvers) != len(self.trims) - 1:
             raise ValueError(
@@ -218,6 +218,8 @@ class Plan:
         """Poses (m + 1, dof) at the switching times."""
         if not self.primitives:
             return self.start[None].copy()
+        if not (any(self.maneuvers) or "_steps" in vars(self)):
+            return coasted(self.start, self._twists, self.primitive_durations)
         return chained(self.start, self._steps)
 
     @cached_property
@@ -248,6 +250,10 @@ class Plan:
         if not self.primitives:
             return np.broadcast_to(self.start, (*times.shape, self.start.size)).copy()
         index = self._index_at(times)
+        if not (times.ndim or any(self.maneuvers)):
+            passed = max(float(times - self.switching_times[index]), 0.0)
+            passed = min(passed, float(self.primitive_durations[index]))
+            return coasted_once(self.switching_poses[index], self._twists[index], passed)
         begin = group_of(self.start.size)(self.switching_poses[index])
         since = np.clip(times - self.switching_times[index], 0.0, self.primitive_durations[index])
         steps = np.array(begin.exp(since[..., None] * self._twists[index]).pose)

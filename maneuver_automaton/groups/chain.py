@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from maneuver_automaton._arrays import Array
@@ -26,3 +28,76 @@ def chained(start: Array, steps: Array) -> Array:
     poses[1:, :2] = _turned(poses[:-1, 2], steps[:, :2])
     np.cumsum(poses[:, :2], axis=0, out=poses[:, :2])
     return poses
+
+
+def coasted(start: Array, twists: Array, durations: Array) -> Array:
+    """Poses (n + 1, dof) from `start` (dof,) on, after each of n trims; the heading is the third.
+
+    To the last bit ``chained(start, exp(durations * twists))``: on plain numbers, which for a word
+    of a few trims takes a tenth of the time that arrays take.
+
+    Parameters
+    ----------
+    start : (dof,) array
+        [m, m, rad(, m)].
+    twists : (n, dof) array
+        [m/s, m/s, rad/s(, m/s)].
+    durations : (n,) array
+        [s].
+
+    Examples
+    --------
+    >>> quarter = np.array([[np.pi / 2, 0.0, np.pi / 2]])
+    >>> coasted(np.zeros(3), quarter, np.array([1.0]))[-1].round(3).tolist()
+    [1.0, 1.0, 1.571]
+    """
+    pose: list[float] = start.tolist()
+    poses = [pose]
+    for twist, duration in zip(twists.tolist(), durations.tolist(), strict=True):
+        pose = _after(pose, twist, duration)
+        poses.append(pose)
+    return np.array(poses)
+
+
+def coasted_once(start: Array, twist: Array, duration: float) -> Array:
+    """Pose (dof,) after one trim from `start` (dof,): the last one of `coasted`.
+
+    Examples
+    --------
+    >>> coasted_once(np.zeros(3), np.array([2.0, 0.0, 0.0]), 1.5).tolist()
+    [3.0, 0.0, 0.0]
+    """
+    return np.array(_after(start.tolist(), twist.tolist(), duration))
+
+
+def seen_from(start: Array, pose: Array) -> Array:
+    """A pose (dof,) seen from another: places are subtracted first, so that no digit is lost.
+
+    To the last bit ``start.inverse() @ pose`` of poses that are moved to where `start` is 0.
+
+    Examples
+    --------
+    >>> seen_from(np.array([1.0, 2.0, np.pi / 2]), np.array([0.0, 5.0, np.pi])).round(3).tolist()
+    [3.0, 1.0, 1.571]
+    """
+    here, there = start.tolist(), pose.tolist()
+    x, y = there[0] - here[0], there[1] - here[1]
+    c, s = math.cos(-here[2]), math.sin(-here[2])
+    planar = [c * x - s * y, s * x + c * y, there[2] - here[2]]
+    return np.array(planar if len(here) == 3 else [*planar, there[3] - here[3]])
+
+
+def _after(pose: list[float], twist: list[float], duration: float) -> list[float]:
+    """Pose after a trim; the formula of `SE2.exp`, in the same order of operations."""
+    v_x, v_y, turn = (duration * rate for rate in twist[:3])
+    ahead, aside = _sinc(turn / math.pi), math.sin(turn / 2) * _sinc(turn / (2 * math.pi))
+    x, y = ahead * v_x - aside * v_y, aside * v_x + ahead * v_y
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    planar = [pose[0] + (c * x - s * y), pose[1] + (s * x + c * y), pose[2] + turn]
+    return planar if len(pose) == 3 else [*planar, pose[3] + duration * twist[3]]
+
+
+def _sinc(share: float) -> float:
+    """What `np.sinc` comes to."""
+    angle = math.pi * share
+    return math.sin(angle) / angle if angle else 1.0

@@ -68,7 +68,7 @@ class Trim:
     @property
     def is_rest(self) -> bool:
         """Whether the trim stands still: zero twist."""
-        return not self.body_velocity.any()
+        return not any(self.body_velocity.tolist())
 
     def coast(self, start: Pose, duration: ArrayLike) -> Pose:
         """Poses after coasting from `start` for `duration` (...,) [s]."""

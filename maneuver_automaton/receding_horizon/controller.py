@@ -209,7 +209,7 @@ class RecedingHorizon:
         if last is not None:
             last = self._cut(last, passed)
         at = self.problem.start_time if last is None else last.time + passed
-        here = replace(self.problem, start=pose, start_time=at, horizon=self._horizon(at))
+        here = self.problem.starting_at(pose, time=at, horizon=self._horizon(at))
         now, search = started(
             self.settings, here, last, passed=passed, budget=budget, changed=changed
         )
@@ -250,9 +250,11 @@ class RecedingHorizon:
 
     def _logged(self, chosen: Chosen, search: StepSearch, now: Situation) -> Step:
         here, last, delta = now.here, now.last, self.settings.step
-        most = min(chosen.plan.duration / delta, MOST_AHEAD)
-        instants = here.start_time + delta * np.arange(1, 2 + most)
-        plan = with_samples_at(chosen.plan, instants, here.automaton.model)
+        plan = chosen.plan
+        if plan.maneuvers:
+            most = min(plan.duration / delta, MOST_AHEAD)
+            instants = here.start_time + delta * np.arange(1, 2 + most)
+            plan = with_samples_at(plan, instants, here.automaton.model)
         deed = _deed(chosen, now)
         bound = self._bound(chosen, search, now)
         value = chosen.value if deed.leads or search.knows_all else bound
@@ -277,6 +279,7 @@ class RecedingHorizon:
             arrived=chosen.arrived,
             deed=deed,
             free_until=chosen.free_until,
+            is_sole=now.is_sole,
         )
         self._count(step, now)
         broken = (*now.violations, *self._broken(step, now))

@@ -6,16 +6,21 @@ import math
 from collections.abc import Iterator
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.cutting import NOTHING
 from maneuver_automaton.budget import Budget
+from maneuver_automaton.costs import prices_switches
+from maneuver_automaton.problem import Goal
 from maneuver_automaton.receding_horizon.candidates import Candidate, allowed, bounded
 from maneuver_automaton.receding_horizon.log import Deed, Guarantee, Origin
 from maneuver_automaton.receding_horizon.mitigation import Mitigation
 from maneuver_automaton.receding_horizon.reanchoring import quickest, rejoining
 from maneuver_automaton.receding_horizon.shifting import rested
 from maneuver_automaton.receding_horizon.situation import Situation
+from maneuver_automaton.search.alternatives import tied
 from maneuver_automaton.search.choose import search_goal
-from maneuver_automaton.search.limits import closed_bound
+from maneuver_automaton.search.limits import closed_bound, sole_bound
 from maneuver_automaton.search.result import SearchStatus, plan_of
+from maneuver_automaton.words.word import is_word_of
 
 SECOND_OPINION = 0.02  # [s] for short words beside insertion
 PACES = 5  # dearer plans, which may be cheaper at another pace
@@ -50,6 +55,8 @@ class InFreeSpace:
                 now.exhaustive = False
                 self._over_budget()
                 break
+            if known is not None and self._is_sole(known, goal):
+                continue
             results = search_goal(
                 here,
                 goal,
@@ -58,6 +65,7 @@ class InFreeSpace:
                 known=None if self.settings.retimed else known,
                 ties=True,
                 second_opinion=SECOND_OPINION,
+                not_first=None if known is None else self._driven(known),
             )
             proven = any(one.exhaustive for one in results)
             decisive = not (self.settings.retimed or bounded(here))
@@ -66,10 +74,44 @@ class InFreeSpace:
                 self._over_budget()
             for result in results:
                 for solution in result.solutions:
+                    if known is not None and is_word_of(here.automaton, known, solution):
+                        continue  # the plan that is kept was found again
                     plan = plan_of(here, solution)
                     if self.is_safe(plan):
                         found.append(now.candidate(plan, index, Origin.SEARCHED))
         return found
+
+    def _is_sole(self, known: Plan, goal: Goal) -> bool:
+        """Whether a plan is proven to be the cheapest, and the only one that is so cheap."""
+        searched = self.settings.retimed or bounded(self.here)
+        return not searched and self.here.cost_of(known) <= tied(sole_bound(self.here, goal))
+
+    def _driven(self, known: Plan) -> int | None:
+        """The trim that was driven since the last step, where that tells which words may win.
+
+        Bellman's principle of optimality: where the last step has searched every word of up to S
+        trims, no word W of fewer than S trims from here costs less than `known`, the rest of its
+        plan; nor does one of S trims that begins with the trim driven since, for as long as one
+        trim was driven alone. For with the part that was driven in front, W would have been a word
+        of at most S trims from there, to the same goal, and cheaper than the plan found. Its cost
+        is the sum, since switches cost nothing, and no time is fixed or limited. Where no other
+        plan cost as much there, none does here.
+
+        Source: Bellman (1957), *Dynamic Programming*, Sec. III.3.
+        """
+        now, here, last = self.now, self.here, self.now.last
+        horizon = here.horizon
+        limited = horizon.time is not None or horizon.max_time is not None
+        if last is None or limited or prices_switches(here.cost) or horizon.max_trims is None:
+            return None
+        if not now.rounding or now.changed or not (last.exhaustive and last.is_sole):
+            return None
+        left = last.value - last.applied_cost
+        if self.settings.retimed or bounded(here) or here.cost_of(known) > tied(left):
+            return None
+        if not last.plan.trims or last.plan.durations[0] < last.applied - NOTHING:
+            return None
+        return here.automaton.index_of(last.plan.trims[0].name)
 
     def _over_budget(self) -> None:
         if all(one.guarantee is not Guarantee.BUDGET for one in self.now.violations):

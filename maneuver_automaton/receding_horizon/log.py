@@ -98,6 +98,7 @@ class Step:
     measured: Array | None = None  # (dof,) pose that was measured, if it is used a step later
     deed: Deed = Deed.PLANNED
     free_until: float | None = None  # [s] no contact is predicted until then; None: nothing there
+    is_sole: bool = False  # no other plan was found that costs as much
     clearance_m: float | None = None  # least one while it was driven, by the audit
 
     __repr__ = brief

@@ -124,8 +124,8 @@ def costliest_first(plan: Plan, rates: Array) -> Plan:
     """
     if len(plan.trims) < 2:
         return plan
-    twists = np.array([trim.body_velocity for trim in plan.trims])
-    moves = [bool(twist.any()) for twist in twists]
+    twists = [trim.body_velocity.tolist() for trim in plan.trims]
+    moves = [any(twist) for twist in twists]
     moving = [k for k, move in enumerate(moves) if move]
     order: list[int] = []
     block: list[int] = []
@@ -142,7 +142,7 @@ def costliest_first(plan: Plan, rates: Array) -> Plan:
     return Plan(plan.start, word, durations=times, start_time=plan.start_time)
 
 
-def commute(one: Array, other: Array) -> bool:
+def commute(one: Sequence[float] | Array, other: Sequence[float] | Array) -> bool:
     """Whether two twists commute: their Lie bracket is zero.
 
     Examples
@@ -152,6 +152,6 @@ def commute(one: Array, other: Array) -> bool:
     >>> commute(np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
     False
     """
-    bracket = one[2] * other[:2] - other[2] * one[:2]
-    scale = float(np.abs(one).max() * np.abs(other).max())
-    return bool(np.abs(bracket).max() <= 1e-12 * scale)
+    bracket = max(abs(one[2] * other[k] - other[2] * one[k]) for k in range(2))
+    scale = max(map(abs, one)) * max(map(abs, other))
+    return bool(bracket <= 1e-12 * scale)

@@ -14,7 +14,7 @@ from maneuver_automaton.automaton.cutting import NOTHING, committed, head_of, jo
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.needs import has_inertia
 from maneuver_automaton.primitives import Trim
-from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.problem import Problem, apart
 from maneuver_automaton.receding_horizon.candidates import Candidate, candidate, within
 from maneuver_automaton.receding_horizon.log import Deed, Guarantee, Origin, Step, Violation
 from maneuver_automaton.receding_horizon.reanchoring import (
@@ -26,6 +26,8 @@ from maneuver_automaton.receding_horizon.reanchoring import (
 from maneuver_automaton.receding_horizon.settings import EXACT, Settings
 from maneuver_automaton.receding_horizon.shifting import moves_on, rest_of, rested
 from maneuver_automaton.search.alternatives import TIE
+
+ROUNDING = 1e-13  # relative, of a pose that was computed from a plan
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -78,13 +80,16 @@ class Situation:
         self.changed = changed
         self.violations: list[Violation] = []
         self.exhaustive = False
+        self.is_sole = False  # whether no other plan was found that costs as much as the best
         self.off_plan: float | None = None
+        self.rounding = False  # whether no more than rounding parts the vehicle from its plan
         self.rest: Plan | None = None
         self.bound = 0.0  # no plan costs less, as is known before a search
         self.busy = 0.0  # [s] that are committed: until the maneuver under way ends
         if last is not None:
-            off = distance(here.start, Goal(pose=last.plan.pose_at(last.time + passed)))
+            off = max(apart(last.plan.pose_at(last.time + passed), here.start))
             self.off_plan = 0.0 if off <= EXACT * self.size else off
+            self.rounding = off <= ROUNDING * self.size
             self.rest = rest_of(last.plan, passed, start=here.start, pad=settings.pad_of(here))
             self.busy = committed(last.plan, passed)
 
@@ -287,6 +292,7 @@ class Situation:
             self.exhaustive = self.exhaustive and least == kept.cost
             return kept
         tied = [one for one in everything if one.cost <= least + TIE * (1.0 + abs(least))]
+        self.is_sole = len(tied) == 1
         return min(tied, key=lambda one: one.preference)
 
     def candidate(self, plan: Plan, index: int, origin: Origin) -> Candidate:

@@ -212,6 +212,14 @@ def is_neighbour(problem: WordProblem, twists: Array, rows: Array, n: int, times
 def polish_candidates(
     problem: WordProblem, links: Links, candidates: Candidates, found: Found, max_trims: int
 ) -> None:
+    """`polish_all`, for Python to call."""
+    polish_all(problem, links, candidates, found, max_trims)
+
+
+@inner_kernel
+def polish_all(
+    problem: WordProblem, links: Links, candidates: Candidates, found: Found, max_trims: int
+) -> None:
     """Polish all candidates in order, and empty their buffer."""
     linked, width = links.cost.shape[0] > 1, candidates.words.shape[1]
     seen = room_for(problem, width) if linked else problem

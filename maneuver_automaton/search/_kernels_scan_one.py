@@ -13,7 +13,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel
-from maneuver_automaton.search._kernels_problem import condition
+from maneuver_automaton.search._kernels_cell_costs import (
+    closed_form,
+    has_bounds,
+    least_costs,
+    mark_cheap_cells,
+)
+from maneuver_automaton.search._kernels_cell_turns import TINY
+from maneuver_automaton.search._kernels_problem import condition, word_extra
 from maneuver_automaton.search._kernels_scan_costs import (
     affordable,
     coasting_cost,
@@ -31,6 +38,7 @@ from maneuver_automaton.words._kernels_times import assign
 
 if TYPE_CHECKING:
     from maneuver_automaton._arrays import Array, IntArray
+    from maneuver_automaton.search._kernels_cell_costs import ClosedForm
     from maneuver_automaton.search._kernels_problem import Candidates, WordProblem
 
 
@@ -51,6 +59,22 @@ def scan_one(
     if not reach > 0.0:
         return
     nodes = max(8, math.ceil(problem.nodes * reach / problem.reaches[word[q]]))
+    # cells between nodes in which a branch may be cheap enough: the others have no solution that
+    # counts, and most words have none of these
+    live = np.ones((2, nodes), dtype=np.bool_)
+    known = closed_form(problem, word, triple, q)
+    cheap = np.inf  # what its trims may cost
+    if m == 0 and upper_bound < np.inf and has_bounds(problem, word, triple, q):
+        cheap = upper_bound + TINY * (1.0 + abs(upper_bound))
+        cheap -= problem.pad_cost + word_extra(problem, word, n)
+        if not mark_cheap_cells(known, reach, cheap, live):
+            return
+    needed = np.zeros((2, nodes + 1), dtype=np.bool_)  # a cell's nodes, and one on either side
+    for branch in range(2):
+        for j in range(nodes):
+            if live[branch, j]:
+                for k in range(max(j - 1, 0), min(j + 2, nodes) + 1):
+                    needed[branch, k] = True
     scratch = scratch_for(problem, word, n, 1)
     values = np.zeros(2)
     both = np.empty((2, 3))
@@ -62,9 +86,13 @@ def scan_one(
     steering = (problem.twists, problem.goal, problem.tolerance, candidates.counter)
     most = nearly_cheap(problem, word, n, upper_bound)
     for j in range(nodes + 1):
+        if not (needed[0, j] or needed[1, j]):
+            continue
         times[q] = reach * j / nodes
         solve_triple(steering, word, n, triple, times, both)
         for branch in range(2):
+            if not needed[branch, j]:
+                continue
             costs[branch, j] = coasting_cost(problem, word, triple, q, times[q], both[branch])
             copy_branches(scratch[0], both)
             if take_branch(problem, word, n, triple, free, branch, scratch, times, values):
@@ -82,6 +110,8 @@ def scan_one(
     stack = (np.zeros((24, n)), np.zeros((24, n)), np.zeros((24, 4)))
     for branch in range(2):
         for j in range(nodes):
+            if not live[branch, j]:
+                continue
             if not may_be_cheap(costs[branch, j], costs[branch, j + 1], most):
                 continue
             if not (there[branch, j] or there[branch, j + 1]):
@@ -113,7 +143,10 @@ def scan_one(
                     problem, candidates, word, n, triple, free, low[0], reach * j / nodes,
                     branch, scratch, values,
                 )  # fmt: skip
-            bisect(problem, candidates, word, n, triple, free, branch, scratch, values, stack)
+            bisect(
+                problem, candidates, word, n, triple, free, branch, scratch, values, stack,
+                known, cheap,
+            )  # fmt: skip
 
 
 @bare_inner_kernel
@@ -167,8 +200,13 @@ def bisect(
     scratch: tuple[Array, Array, Array, Array],
     values: Array,
     stack: tuple[Array, Array, Array],
+    known: ClosedForm,
+    cheap: float,
 ) -> None:
-    """Halve the interval on the stack where its bend leaves room for a root; propose the roots."""
+    """Halve the interval on the stack where its bend leaves room for a root; propose the roots.
+
+    Intervals in which the trims of the word cost more than `cheap` are dropped.
+    """
     lows, highs, numbers = stack
     q = free[0]
     m = problem.targets.size
@@ -182,6 +220,8 @@ def bisect(
             numbers[top, 0], numbers[top, 1], numbers[top, 2], numbers[top, 3],
         )  # fmt: skip
         top -= 1
+        if cheap < np.inf and least_costs(known, low[q], high[q])[branch] > cheap:
+            continue
         for i in range(n):
             middle[i] = 0.5 * (low[i] + high[i])
         if m == 0:

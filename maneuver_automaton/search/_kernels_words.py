@@ -264,8 +264,8 @@ def promising(
 # scan of words with transitions takes twice the time.
 
 
-@kernel
-def scan_words(
+@inner_kernel
+def propose_words(
     problem: WordProblem,
     links: Links,
     candidates: Candidates,
@@ -314,7 +314,7 @@ def scan_words(
 
 
 @kernel
-def scan_flat_words(
+def scan_words(
     problem: WordProblem,
     links: Links,
     candidates: Candidates,
@@ -323,7 +323,21 @@ def scan_flat_words(
     last: int,
     upper_bound: float,
 ) -> int:
-    """`scan_words` for words that cannot span the plane."""
+    """`propose_words`, for Python to call."""
+    return propose_words(problem, links, candidates, n, first, last, upper_bound)
+
+
+@inner_kernel
+def propose_flat_words(
+    problem: WordProblem,
+    links: Links,
+    candidates: Candidates,
+    n: int,
+    first: int,
+    last: int,
+    upper_bound: float,
+) -> int:
+    """`propose_words` for words that cannot span the plane."""
     linked = links.cost.shape[0] > 1
     seen = room_for(problem, n) if linked else problem
     word = np.zeros(n, dtype=np.int64)
@@ -349,6 +363,20 @@ def scan_flat_words(
 
 
 @kernel
+def scan_flat_words(
+    problem: WordProblem,
+    links: Links,
+    candidates: Candidates,
+    n: int,
+    first: int,
+    last: int,
+    upper_bound: float,
+) -> int:
+    """`propose_flat_words`, for Python to call."""
+    return propose_flat_words(problem, links, candidates, n, first, last, upper_bound)
+
+
+@kernel
 def scan_long_words(
     problem: WordProblem,
     links: Links,
@@ -358,7 +386,7 @@ def scan_long_words(
     last: int,
     upper_bound: float,
 ) -> int:
-    """`scan_words` for words that span and have two times free."""
+    """`propose_words` for words that span and have two times free."""
     linked = links.cost.shape[0] > 1
     seen = room_for(problem, n) if linked else problem
     word = np.zeros(n, dtype=np.int64)

@@ -52,6 +52,7 @@ def search_goal(
     known: Plan | None = None,
     ties: bool = False,
     second_opinion: float = AFFORDABLE,
+    not_first: int | None = None,
 ) -> list[SearchResult]:
     """The method asked for; `auto`: exhaustive where affordable, otherwise insertion, or both.
 
@@ -71,6 +72,8 @@ def search_goal(
         Whether exhaustive search lists all that cost as much as the last solution asked for.
     second_opinion : float
         [s] that exhaustive search of short words may be expected to take beside insertion.
+    not_first : int, optional
+        As in `search_words`.
 
     Returns
     -------
@@ -90,6 +93,7 @@ def search_goal(
                 budget=budget,
                 upper_bound=upper_bound,
                 ties=ties,
+                not_first=not_first,
             )
         ]
     results = [

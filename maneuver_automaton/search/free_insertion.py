@@ -15,7 +15,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.costs import Cost
+from maneuver_automaton.costs import Cost, prices_switches
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search.alternatives import in_order
 from maneuver_automaton.search.exact_end import corrected, with_fewer_digits
@@ -43,6 +43,7 @@ SECONDS_A_ROUND = 3e-6  # for every trim of the library, measured
 GROWN = 2  # seeds that may grow beyond the limit before they are shortened
 SHORTENED = 3  # words that are tried with fewer trims where switches cost
 CHATTER = 5  # trims of a word in which two may chatter
+CLOSING = 1e-6  # relative, by which a cost changes where a word is closed at the exact goal
 LATE = 1e-9  # [s] by which rounding may exceed a time
 
 
@@ -144,7 +145,7 @@ def _improved(work: _Work) -> SearchResult:
     binding = not words or min(words, key=_cost).certificate < -ACCURACY * library.scale
     if most < LONGEST and binding and not library.free_heading and not task.budget.is_over:
         words += _from_longer(work, begun, counts)
-    if _prices_switches(problem) and not task.budget.is_over:
+    if prices_switches(problem.cost) and not task.budget.is_over:
         words += _with_fewer_switches(library, words, task.budget)
     if (
         task.alternatives > 0 and not task.budget.is_over
@@ -164,15 +165,22 @@ def _fitting(work: _Work, rounds: int) -> int:
 
 
 def _closed(work: _Work, words: Sequence[TimedWord]) -> list[Word]:
-    """The solutions of words; once the time is over, that of the cheapest word that has one."""
-    over = work.task.budget.is_over
+    """The solutions of words; where only the cheapest is asked for, no dearer ones.
+
+    Once the time is over, that of the cheapest word that has one.
+    """
+    budget = work.task.budget
+    in_turn = work.task.alternatives == 0 and not prices_switches(work.problem.cost)
     solutions: list[Word] = []
-    for word in sorted(words, key=_cost) if over else words:
-        if solutions and work.task.budget.is_over:
+    enough = math.inf
+    for word in sorted(words, key=_cost) if in_turn or budget.is_over else words:
+        if word.cost > enough or (solutions and budget.is_over):
             break
         if len(word.trims) - work.library.tail <= work.most:
             most = work.problem.horizon.max_trims or LONGEST
             solutions += [one for one in _solutions(work, word) if one.trims.size <= most]
+            if solutions and in_turn:  # closing changes a cost by less
+                enough = min(enough, word.cost + CLOSING * (1.0 + abs(word.cost)))
     return solutions
 
 
@@ -203,12 +211,6 @@ def _from_longer(
             again = _with_insertions(library, short, most, _fitting(work, ROUNDS), counts)
             if math.isfinite(again.cost) and len(again.trims) <= most:
                 yield again
-
-
-def _prices_switches(problem: Problem) -> bool:
-    """Whether a switch of trims costs something by itself."""
-    cost = problem.cost
-    return not isinstance(cost, Cost) or cost.switch > 0.0 or cost.direction_change > 0.0
 
 
 def _with_fewer_switches(

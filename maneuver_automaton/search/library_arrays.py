@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.setup import SearchSetup
+from maneuver_automaton.words.library import MovingTrims
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -42,40 +45,56 @@ class LibraryArrays:
 def library_arrays(problem: Problem, setup: SearchSetup) -> LibraryArrays:
     """Arrays of every trim that can be inserted."""
     limit = problem.horizon.time
-    trims, twists, rates = setup.trims, setup.twists, setup.rates
-    rest = None
-    if limit is not None and setup.rest is not None:
-        rest = len(trims)
-        trims = np.append(trims, setup.rest)
+    rest = setup.rest if limit is not None else None
+    kept = _columns(setup.library, len(problem.automaton), rest, setup.free_heading)
+    rows, targets = [], []
+    if setup.climbs:
+        rows.append(kept.twists[:, 3])
+        targets.append(float(setup.goal[3]))
+    if limit is not None:
+        rows.append(kept.weights)
+        targets.append(limit)
+    return LibraryArrays(
+        trims=kept.trims,
+        number_of=kept.number_of,
+        twists=kept.twists,
+        rates=kept.rates,
+        rows=np.array(rows).reshape(len(rows), len(kept.rates)),
+        targets=np.array(targets, dtype=np.float64),
+        goal=np.array(setup.goal),
+        rest=None if rest is None else len(setup.library.trims),
+        free_heading=setup.free_heading,
+        climbs=setup.climbs,
+        n_priced=len(kept.trims) - int(setup.free_heading),
+        fixed_cost=setup.rest_rate * limit if rest is not None and limit is not None else 0.0,
+    )
+
+
+class _Columns(NamedTuple):
+    """What the arrays of a library have for every start and goal."""
+
+    trims: IntArray
+    number_of: IntArray
+    twists: Array
+    rates: Array
+    weights: Array  # (M,) 0 for the free turn, otherwise 1
+
+
+@kept_by_first
+def _columns(library: MovingTrims, n_trims: int, rest: int | None, free_heading: bool) -> _Columns:
+    """The moving trims of an automaton of `n_trims`; the `rest` that pads a time; a free turn."""
+    trims, twists, rates = library.trims, library.twists, library.rates
+    if rest is not None:
+        trims = np.append(trims, rest)
         twists = np.vstack([twists, np.zeros(4)])
-        rates = np.append(rates - setup.rest_rate, 0.0)
+        rates = np.append(rates - library.rest_rate, 0.0)
     weights = np.ones(len(trims))
-    n_priced = len(trims)
-    number_of = np.full(len(problem.automaton), -1, dtype=np.int64)
+    number_of = np.full(n_trims, -1, dtype=np.int64)
     number_of[trims] = np.arange(len(trims))
-    if setup.free_heading:
+    if free_heading:
         trims = np.append(trims, -1)
         twists = np.vstack([twists, [0.0, 0.0, 1.0, 0.0]])
         rates = np.append(rates, 0.0)
         weights = np.append(weights, 0.0)
-    rows, targets = [], []
-    if setup.climbs:
-        rows.append(twists[:, 3])
-        targets.append(float(setup.goal[3]))
-    if limit is not None:
-        rows.append(weights)
-        targets.append(limit)
-    return LibraryArrays(
-        trims=trims,
-        number_of=number_of,
-        twists=np.array(twists, order="C"),  # kernels are compiled for arrays that can be written
-        rates=np.array(rates),
-        rows=np.array(rows).reshape(len(rows), len(rates)),
-        targets=np.array(targets, dtype=np.float64),
-        goal=np.array(setup.goal),
-        rest=rest,
-        free_heading=setup.free_heading,
-        climbs=setup.climbs,
-        n_priced=n_priced,
-        fixed_cost=setup.rest_rate * limit if rest is not None and limit is not None else 0.0,
-    )
+    # kernels are compiled for arrays that can be written
+    return _Columns(trims, number_of, np.array(twists, order="C"), np.array(rates), weights)

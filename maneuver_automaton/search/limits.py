@@ -10,13 +10,14 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.costs import StageCost
+from maneuver_automaton.costs import StageCost, prices_switches
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.setup import SearchSetup, search_setup
 from maneuver_automaton.words.library import moving_trims
 
 MISSED = 1e-6  # [m, rad] for a goal a metre away: what is nearer may be met
+CLEARLY = 1e-3  # share by which a price is higher that nobody takes for the same
 HARDLY_TURNING = 1e-6  # turn rate, as a share of a twist, that is too small to measure a path by
 
 
@@ -142,6 +143,36 @@ def closed_bounds(problem: Problem, goal: Goal) -> dict[str, float]:
     return {what: padded + bound for what, bound in bounds.items()}
 
 
+def sole_bound(problem: Problem, goal: Goal) -> float:
+    """Cost of the only cheapest plan to a goal, if there is one that costs no more; else 0 or less.
+
+    The distance at the best price per metre, or the turn at the best price per radian, where one
+    trim alone has that price. A plan that costs no more drives straight to the goal, or turns on
+    the spot, and uses no other trim; so none is cheaper, and no other as cheap.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.automaton import Automaton
+    >>> from maneuver_automaton.models import Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (2, 0), "slow": (1, 0), "spin": (0, 1)})
+    >>> problem = Problem(robot, [-3, 0, 0], [0, 0, 0])
+    >>> sole_bound(problem, problem.goals[0])
+    1.5
+    """
+    limit, library = problem.horizon.time, moving_trims(problem.automaton, problem.cost)
+    pads = limit is not None and library.rest is not None
+    exact = goal.tolerance_m == goal.tolerance_rad == 0.0
+    prices = _prices(problem.automaton, problem.cost, pads) if exact else None
+    if prices is None or (limit is not None and not pads) or prices_switches(problem.cost):
+        return 0.0
+    distance, turn = goal.off(problem.start)
+    bound = max(
+        distance * prices.per_metre if prices.one_per_metre else 0.0,
+        turn * prices.per_radian if prices.one_per_radian else 0.0,
+    )
+    return bound + (library.rest_rate * limit if limit is not None else 0.0)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Prices:
     """Best prices of a library; what rest costs is taken off where it pads."""
@@ -150,6 +181,8 @@ class _Prices:
     per_radian: float
     per_second: float
     per_square: float  # per (m/s)^2 + (rad/s)^2 and second
+    one_per_metre: bool  # whether one trim alone has the best price
+    one_per_radian: bool
 
 
 @kept_by_first
@@ -161,14 +194,22 @@ def _prices(automaton: Automaton, cost: StageCost, pads: bool) -> _Prices | None
         return None
     squares = library.speeds**2 + library.turn_rates**2
     with np.errstate(divide="ignore", invalid="ignore"):
+        metre = np.where(library.speeds > 0.0, rates / library.speeds, np.inf)
+        radian = np.where(library.turn_rates > 0.0, rates / library.turn_rates, np.inf)
         return _Prices(
-            per_metre=float(np.min(np.where(library.speeds > 0.0, rates / library.speeds, np.inf))),
-            per_radian=float(
-                np.min(np.where(library.turn_rates > 0.0, rates / library.turn_rates, np.inf))
-            ),
+            per_metre=float(metre.min()),
+            per_radian=float(radian.min()),
             per_second=float(rates.min()),
             per_square=float(np.min(rates / squares)),
+            one_per_metre=_is_alone(metre),
+            one_per_radian=_is_alone(radian),
         )
+
+
+def _is_alone(prices: Array) -> bool:
+    """Whether one price is the best by far."""
+    least = float(prices.min())
+    return math.isfinite(least) and np.count_nonzero(prices <= least * (1.0 + CLEARLY)) == 1
 
 
 def rest_rate(problem: Problem) -> float | None:

@@ -11,10 +11,11 @@ import numpy as np
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Unicycle
-from maneuver_automaton.problem import Goal, Horizon, Problem
+from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.free_insertion import compile_calming
 from maneuver_automaton.search.insertion import search_insertion
+from maneuver_automaton.search.word_scan import MOST_AT_ONCE
 from maneuver_automaton.search.words import search_words
 from maneuver_automaton.words import solve_switching_times
 from maneuver_automaton.words.word import Word
@@ -23,11 +24,17 @@ if TYPE_CHECKING:
     from maneuver_automaton.search.lattice_query import LatticeQuery
 
 
+MANY = 10**9
+
+
 @functools.cache
 def load_word_kernels(max_trims: int) -> None:
     """Have the kernels of exhaustive search ready, for words of up to `max_trims` trims."""
     problem = replace(_smallest_problem(), horizon=Horizon(max_trims=max_trims))
-    found = search_words(problem, problem.goals[0])
+    at_once = replace(problem, horizon=Horizon(max_trims=min(max_trims, MOST_AT_ONCE)))
+    search_words(at_once, at_once.goals[0])
+    counted = SearchSettings(max_expansions=MANY)  # which is never done at once
+    found = search_words(replace(problem, search=counted), problem.goals[0])
     for solution in found.solutions[:1]:  # none where a signal ended the search
         certificate(problem, problem.goals[0], solution)
 

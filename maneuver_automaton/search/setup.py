@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.groups import group_of
+from maneuver_automaton.groups.chain import seen_from
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.words.library import FULL_TURN, MovingTrims, moving_trims
 from maneuver_automaton.words.transitions import Transitions, identities
@@ -64,16 +64,6 @@ def search_setup(problem: Problem, goal: Goal) -> SearchSetup:
 def goal_from_start(problem: Problem, goal: Goal) -> Array:
     """The goal (4,) seen from the problem's start, at an altitude of zero in the plane."""
     relative = np.zeros(4)
-    relative[: problem.start.size] = _seen_from(problem.start, goal.pose)
+    relative[: problem.start.size] = seen_from(problem.start, goal.pose)
     relative.setflags(write=False)
     return relative
-
-
-def _seen_from(start: Array, goal: Array) -> Array:
-    """The goal relative to the start: places are subtracted first, so that no digit is lost."""
-    group = group_of(start.size)
-    places = [0, 1, *range(3, start.size)]
-    here, there = np.array(start), np.array(goal)
-    there[places] -= here[places]
-    here[places] = 0.0
-    return (group(here).inverse() @ group(there)).pose

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,13 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.budget import Budget, EvenPace
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.alternatives import tied
+from maneuver_automaton.search.alternatives import TIE, tied
 from maneuver_automaton.search.setup import SearchSetup
 from maneuver_automaton.search.timed_word import TimedWord
-from maneuver_automaton.words.library import FULL_TURN
+from maneuver_automaton.words.library import FULL_TURN, MovingTrims
 from maneuver_automaton.words.word import Word
 
 MOST_TRIMS = 5  # moving trims of one word; each beyond three is scanned on a grid
@@ -29,6 +30,11 @@ NODES = 64  # per scanned time, bisected where the function bends
 NODES_2D = 32  # per scanned time where there are two
 TOLERANCE = 1e-12  # relative, for tangent circles and parallel lines
 CAPACITY = 4096
+SECONDS_IF_FREE = (0.0, 1e-6, 1e-6, 1e-6, 5e-5)  # by trims, for words of no linear condition
+PORTIONS_AT_ONCE = np.array([128, 8])  # words of three trims, and of four, before solutions count
+MOST_AT_ONCE = 4  # trims, the free turn among them, of words that are scanned in one call
+MOMENT = 0.02  # [s] that nobody minds to wait for
+AT_ONCE = 0.1  # share of the time left that a scan may take without a look at the clock
 SECONDS_PER_WORD = (1e-6, 1e-6, 1e-6, 5e-6, 1e-3, 2e-2)  # by trims, where little time is left
 
 BoolArray = NDArray[np.bool_]
@@ -46,8 +52,13 @@ def scanned(
     spare: bool = False,
     slack: float = math.inf,
     most_words: int | None,
+    not_first: int | None = None,
 ) -> tuple[WordScan, bool]:
-    """A scan of all words of up to `most` trims, and whether no limit ended it."""
+    """A scan of all words of up to `most` trims, and whether no limit ended it.
+
+    Where `not_first` is a trim of the automaton, fewer words need to be scanned: those of `most`
+    trims that do not begin with it.
+    """
     capacity = CAPACITY
     while True:
         scan = WordScan(
@@ -60,6 +71,7 @@ def scanned(
             spare=spare,
             slack=slack,
             upper_bound=upper_bound,
+            not_first=not_first,
         )
         finished = scan.run(budget, most_words)
         if scan.n_found <= capacity:
@@ -93,6 +105,7 @@ class WordScan:
         spare: bool = False,
         slack: float = math.inf,
         upper_bound: float = math.inf,
+        not_first: int | None = None,
     ) -> None:
         from maneuver_automaton.search import _kernels_polish, _kernels_problem, _kernels_words
 
@@ -105,6 +118,7 @@ class WordScan:
         self.spare = spare
         self.slack = slack
         self.tables = _tables(setup)
+        self.not_first = None if not_first is None else _row_of(setup, not_first)
         self._gridded = False
         width = MOST_TRIMS + 1
         # a user's own price of switches is added afterwards: what is cheap now may be dear then
@@ -114,18 +128,18 @@ class WordScan:
         self.pruned = alternatives is not None or upper_bound < math.inf
         asked = capacity if alternatives is None else alternatives + 1
         self.candidates = _kernels_problem.Candidates(
-            words=np.zeros((CAPACITY, width), dtype=np.int64),
-            times=np.zeros((CAPACITY, width)),
-            sizes=np.zeros(CAPACITY, dtype=np.int64),
-            isolated=np.zeros(CAPACITY, dtype=np.int64),
+            words=np.empty((CAPACITY, width), dtype=np.int64),
+            times=np.empty((CAPACITY, width)),
+            sizes=np.empty(CAPACITY, dtype=np.int64),
+            isolated=np.empty(CAPACITY, dtype=np.int64),
             counter=np.zeros(3, dtype=np.int64),
             turns=np.zeros((3, width), dtype=np.int64),
             work=np.zeros(width),
         )
         self.found = _kernels_problem.Found(
-            words=np.zeros((capacity + 1, width), dtype=np.int64),
-            times=np.zeros((capacity + 1, width)),
-            costs=np.zeros(capacity),
+            words=np.empty((capacity + 1, width), dtype=np.int64),
+            times=np.empty((capacity + 1, width)),
+            costs=np.empty(capacity),
             counter=np.zeros(1, dtype=np.int64),
             best=np.full(asked, upper_bound),
         )
@@ -154,6 +168,11 @@ class WordScan:
         """Scan and polish, shorter words first; False if a limit ended it."""
         modes = list(self.modes())
         tail = 1 if self.setup.free_heading else 0
+        if max_words is None:
+            at_once = [mode for mode in modes if self._takes_a_moment(mode, budget)]
+            if at_once:
+                self._run_at_once(at_once, tail)
+            modes = [mode for mode in modes if mode not in at_once]
         for n in range(1, self.most + 1):
             for mode in modes:
                 if n > mode.most_moving or mode.at_least > tied(float(self.found.best[-1])):
@@ -165,6 +184,37 @@ class WordScan:
                 if n + tail > 4 and self.n_steering > calls:
                     self._gridded = True
         return True
+
+    def _takes_a_moment(self, mode: Mode, budget: Budget) -> bool:
+        """Whether a whole scan is so short that nobody asks the clock meanwhile."""
+        tail = 1 if self.setup.free_heading else 0
+        if self.most + tail > MOST_AT_ONCE:
+            return False
+        each = SECONDS_PER_WORD if mode.kernel_problem[0].targets.size else SECONDS_IF_FREE
+        most = min(self.most, mode.most_moving)
+        numbers = range(1, most + 1)
+        seconds = math.fsum(len(self.setup.trims) ** n * each[n + tail] for n in numbers)
+        return seconds <= MOMENT and seconds <= AT_ONCE * budget.left
+
+    def _run_at_once(self, modes: Sequence[Mode], tail: int) -> None:
+        """The whole scan of some modes in one call: calls take longer than a scan of few words."""
+        from maneuver_automaton.search import _kernels_all_words
+
+        both = (*modes, modes[0])[:2]  # in place of a second way to meet the time
+        limits = [min(mode.most_moving, self.most) for mode in modes]
+        _kernels_all_words.scan_all_words(
+            *both[0].kernel_problem,
+            *both[1].kernel_problem,
+            np.array([*limits, 0][:2]),
+            np.array([mode.at_least for mode in both]),
+            self.candidates,
+            self.found,
+            tail,
+            PORTIONS_AT_ONCE,
+            self.most,
+            TIE,
+            -1 if self.not_first is None else self.not_first,
+        )
 
     def _scan_all(
         self,
@@ -210,7 +260,10 @@ class WordScan:
             yield self.kernels.scan_long_words, 2
 
     def modes(self) -> Iterator[Mode]:
-        """A fixed time padded by rest; free; a fixed or longest time met exactly."""
+        """A fixed time padded by rest; free; a fixed or longest time met exactly.
+
+        The last one not where the cheapest trim for so long is too dear.
+        """
         horizon, setup = self.problem.horizon, self.setup
         exact = horizon.time if horizon.time is not None else horizon.max_time
         if horizon.time is None:
@@ -221,6 +274,8 @@ class WordScan:
         if exact is not None:
             most = min(2, self.most) if self.spare else self.most
             at_least = exact * float(setup.rates.min()) if len(setup.rates) else math.inf
+            if at_least > tied(float(self.found.best[-1])):
+                return
             yield Mode(self._kernel_problem(exact, pad=False, fixed=True), most, at_least)
 
     def _kernel_problem(self, limit: float | None, *, pad: bool, fixed: bool) -> tuple[Any, Any]:
@@ -228,7 +283,7 @@ class WordScan:
         from maneuver_automaton.search._kernels_problem import Links, WordProblem
 
         setup, cost, tables = self.setup, self.problem.cost, self.tables
-        rates, weights = tables.rates, tables.weights
+        weights = tables.weights
         known = setup.transitions
         rows, targets, gains = [], [], []
         if setup.climbs:
@@ -240,8 +295,8 @@ class WordScan:
             targets.append(limit)
             gains.append(known.time)
         prices = known.cost
+        rates, per_unit = _rates_above(tables, setup.rest_rate if pad else 0.0)
         if pad:
-            rates = rates - setup.rest_rate * weights
             prices = prices - setup.rest_rate * known.time
         linked = len(prices) > 1
         distance = math.hypot(*setup.goal[:2])
@@ -253,16 +308,11 @@ class WordScan:
             size=np.zeros(1, dtype=np.int64),
             twists=tables.twists,
             rates=rates,
-            prices=np.divide(
-                rates[:, None],
-                tables.paces,
-                out=np.full(tables.paces.shape, np.inf),
-                where=tables.paces > 0.0,
-            ),
+            prices=per_unit,
             rows=np.array(rows).reshape(len(rows), len(rates)),
             targets=np.array(targets, dtype=np.float64),
             periods=tables.periods,
-            reaches=np.minimum(tables.reaches, bounded),
+            reaches=np.minimum(tables.reaches(setup), bounded),
             parallel=tables.parallel,
             weights=weights,
             goal=np.array(setup.goal),
@@ -323,7 +373,7 @@ class WordScan:
         return Word(trims=word, durations=times, cost=cost)
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Tables:
     """Tables of every trim for kernels, the turn of a free heading last."""
 
@@ -333,7 +383,22 @@ class _Tables:
     weights: Array  # (M,) 0 for the free turn, otherwise 1
     paces: Array  # (M, 2) metres and radians per second
     parallel: BoolArray  # (M, M)
-    reaches: Array  # (M,) [s]
+    fastest: Array  # (M,) [m/s] on the way to a goal, in the plane or upwards
+    largest: float  # [m] radius of a turn
+
+    def reaches(self, setup: SearchSetup) -> Array:
+        """Longest time of interest per trim: a full turn, or a path well beyond the goal."""
+        place = math.hypot(float(setup.goal[0]), float(setup.goal[1]))
+        length = max(2.0 * (place + 4.0 * self.largest) + abs(float(setup.goal[3])), 1e-3)
+        moves = self.fastest > 0.0
+        straight = np.divide(length, self.fastest, out=np.zeros(moves.size), where=moves)
+        return np.where(self.twists[:, 2] != 0.0, self.periods, straight)
+
+
+def _row_of(setup: SearchSetup, trim: int) -> int | None:
+    """Row of a trim of the automaton among those of a search; None if it is not among them."""
+    rows = np.flatnonzero(setup.trims == trim)
+    return int(rows[0]) if rows.size else None
 
 
 def load_tables(setup: SearchSetup) -> None:
@@ -341,20 +406,39 @@ def load_tables(setup: SearchSetup) -> None:
     _tables(setup)
 
 
-def _priced(rates: Array, paces: Array) -> Array:
-    """Cost (M, 2) per metre and per radian, inf where a trim makes none."""
-    none = np.full(paces.shape, np.inf)
-    return np.asarray(np.divide(rates[:, None], paces, out=none, where=paces > 0.0))
+@kept_by_first
+def _rates_above(tables: _Tables, rest: float) -> tuple[Array, Array]:
+    """Cost per second (M,) less that of a rest; and (M, 2) per metre and per radian, inf for none.
+
+    The free turn has no cost to take it off from.
+    """
+    rates = tables.rates - rest * tables.weights if rest else tables.rates
+    none = np.full(tables.paces.shape, np.inf)
+    return rates, np.divide(rates[:, None], tables.paces, out=none, where=tables.paces > 0.0)
 
 
 def _tables(setup: SearchSetup) -> _Tables:
-    twists, rates, periods = np.array(setup.twists), np.array(setup.rates), np.array(setup.periods)
+    """The tables of a search, which those for the whole of a library share."""
+    if setup.trims is setup.library.trims and setup.rates is setup.library.rates:
+        return _tables_of_all(setup.library, setup.free_heading)
+    return _tables_of(setup.twists, setup.rates, setup.periods, setup.free_heading)
+
+
+@kept_by_first
+def _tables_of_all(library: MovingTrims, free_heading: bool) -> _Tables:
+    return _tables_of(library.twists, library.rates, library.periods, free_heading)
+
+
+def _tables_of(twists: Array, rates: Array, periods: Array, free_heading: bool) -> _Tables:
+    twists, rates, periods = np.array(twists), np.array(rates), np.array(periods)
     weights = np.ones(len(rates))
-    if setup.free_heading:
+    if free_heading:
         twists = np.vstack([twists, [0.0, 0.0, 1.0, 0.0]])
         rates = np.append(rates, 0.0)
         periods = np.append(periods, FULL_TURN)
         weights = np.append(weights, 0.0)
+    turning = twists[:, 2] != 0.0
+    speeds = np.sqrt(twists[:, 0] ** 2 + twists[:, 1] ** 2)
     return _Tables(
         twists=twists,
         rates=rates,
@@ -362,21 +446,9 @@ def _tables(setup: SearchSetup) -> _Tables:
         weights=weights,
         paces=np.stack([np.hypot(twists[:, 0], twists[:, 1]), np.abs(twists[:, 2])], axis=1),
         parallel=_parallel(twists),
-        reaches=_reaches(setup, twists, periods),
+        fastest=np.maximum(speeds, np.abs(twists[:, 3])),
+        largest=float((speeds[turning] / np.abs(twists[turning, 2])).max(initial=0.0)),
     )
-
-
-def _reaches(setup: SearchSetup, twists: Array, periods: Array) -> Array:
-    """Longest time of interest per trim: a full turn, or a path well beyond the goal."""
-    turning = twists[:, 2] != 0.0
-    speeds = np.sqrt(twists[:, 0] ** 2 + twists[:, 1] ** 2)
-    radii = speeds[turning] / np.abs(twists[turning, 2])
-    place = math.hypot(float(setup.goal[0]), float(setup.goal[1]))
-    length = 2.0 * (place + 4.0 * radii.max(initial=0.0)) + abs(setup.goal[3])
-    pace = np.maximum(speeds, np.abs(twists[:, 3]))
-    with np.errstate(divide="ignore"):
-        straight = np.where(pace > 0.0, max(length, 1e-3) / pace, 0.0)
-    return np.where(turning, periods, straight)
 
 
 def _parallel(twists: Array) -> BoolArray:

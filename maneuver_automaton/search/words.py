@@ -28,6 +28,7 @@ def search_words(
     nodes: int = NODES,
     upper_bound: float = math.inf,
     ties: bool = False,
+    not_first: int | None = None,
 ) -> SearchResult:
     """Search every word of at most ``max_trims`` trims for its locally optimal coasting times.
 
@@ -51,6 +52,10 @@ def search_words(
         Cost of a plan that is known: what is dearer may be left out, and so there may be none.
     ties : bool
         Whether to list, beside the solutions asked for, all that cost as much as the last of them.
+    not_first : int, optional
+        A trim of the automaton. No word of fewer than ``max_trims`` trims, and none that begins
+        with this trim, is cheaper than `upper_bound`, or as cheap and another plan, as the caller
+        has proven: they need not be searched.
 
     Returns
     -------
@@ -93,6 +98,7 @@ def search_words(
         nodes=nodes,
         budget=budget,
         most_words=problem.search.max_expansions,
+        not_first=not_first,
     )
     solutions = tuple(in_order(_handed_over(job, budget)))
     if alternatives is not None and len(solutions) > alternatives + 1:

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.groups import group_of
-from maneuver_automaton.groups.chain import chained
+from maneuver_automaton.groups.chain import coasted
 from maneuver_automaton.words.conjugation import conjugated, goal_before
 
 STEPS = 8
@@ -38,7 +37,7 @@ class EndConditions:
         twists, places = self.twists, np.array(self.start)
         plane = [0, 1, *range(3, places.size)]  # places, not the heading
         places[plane] -= self.goal[plane]  # seen from the goal's place no digit is lost
-        poses = chained(places, group_of(places.size).exp(times[:, None] * twists).pose)
+        poses = coasted(places, twists, times)
         after, end = poses[1:], poses[-1]
         c, s = np.cos(after[:, 2]), np.sin(after[:, 2])
         arm = end[:2] - after[:, :2]

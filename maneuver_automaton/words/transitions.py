@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton
 
 SWITCH = -1  # the maneuver of a switch at will: the identity
@@ -95,6 +96,7 @@ def transitions_of(automaton: Automaton, prices: Array) -> Transitions:
     )
 
 
+@kept_by_first
 def identities(automaton: Automaton) -> Transitions:
     """The transitions of a vehicle that switches at will between all trims of an automaton.
 

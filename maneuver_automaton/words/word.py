@@ -15,6 +15,8 @@ from maneuver_automaton.words.closing import closed_at
 from maneuver_automaton.words.library import Library
 from maneuver_automaton.words.transitions import SWITCH
 
+SAME_TIME = 1e-9  # [s] coasting times that differ by less are the same
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Word:
@@ -171,6 +173,24 @@ def word_of_plan(automaton: Automaton, plan: Plan) -> Word | None:
         transitions=np.array(transitions, dtype=np.int64),
         maneuver_time=sum(one.duration for one in plan.maneuvers if one),
     )
+
+
+def is_word_of(automaton: Automaton, plan: Plan, word: Word) -> bool:
+    """Whether a word of trims that switch at will is that of a plan, with the same times.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
+    >>> plan = Plan([0, 0, 0], robot.trims, durations=[2.0, 0.5])
+    >>> is_word_of(robot, plan, Word(trims=[0, 1], durations=[2.0, 0.5]))
+    True
+    """
+    if word.trims.size != len(plan.trims) or plan.maneuvers:
+        return False
+    pairs = zip(plan.trims, word.trims.tolist(), strict=True)
+    same = all(trim is automaton.trims[k] for trim, k in pairs)
+    return same and bool(np.abs(plan.durations - word.durations).max(initial=0.0) <= SAME_TIME)
 
 
 def displacements_of(automaton: Automaton, transitions: Sequence[int] | IntArray) -> Array:

@@ -50,7 +50,7 @@ def feasible_starts(problem: Problem, n: int) -> np.ndarray:
     while len(found) < n:
         pose = np.array([*rng.uniform(-2.0, 2.0, 2), rng.uniform(-np.pi, np.pi)])
         here = replace(hurry, start=pose)
-        for result in search_goal(here, here.goals[0], alternatives=0, time_limit=5.0):
+        for result in search_goal(here, here.goals[0], alternatives=0):
             if result.solutions and result.solutions[0].duration <= T:
                 found.append(pose)
                 break

@@ -11,9 +11,20 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning import plan
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
 from maneuver_automaton.receding_horizon import Guarantee, Origin, RecedingHorizon, within
+from maneuver_automaton.receding_horizon.in_free_space import InFreeSpace
 from maneuver_automaton.receding_horizon.reanchoring import distance, missed
+from maneuver_automaton.search import choose
+from maneuver_automaton.search.limits import sole_bound
 from tests.receding_horizon.loops import AHEAD, EFFORT, NEAR, SPIN_TOO, parking_loop, straight
-from tests.search.cases import REEDS_SHEPP, TABLE_2, helicopter, robot, without_rest
+from tests.search.cases import (
+    REEDS_SHEPP,
+    REVERSED_SPIN,
+    TABLE_2,
+    compiled_only,
+    helicopter,
+    robot,
+    without_rest,
+)
 
 FREE = Horizon(max_trims=4)
 PAIR = {"rest": (0.0, 0.0), "slow": (0.5, 0.0), "fast": (1.0, 0.0)}
@@ -452,3 +463,60 @@ class TestLowerBound:
         _, step = controller(problem, retimed=True).step(problem.start)
         assert step.value == pytest.approx(1.0)  # 2 m in 4 s, the least effort there is
         assert step.lower_bound == pytest.approx(1.0)
+
+
+class TestWordsLeftOut:
+    """What a step need not search: it decides as one that searches every word."""
+
+    @staticmethod
+    def drives(problem, starts):
+        for start in starts:
+            loop = controller(replace(problem, start=start))
+            pose, steps = start, []
+            while len(steps) < 12 and not (steps and steps[-1].arrived):
+                _, step = loop.step(pose)
+                steps.append(step)
+                pose = step.predicted
+            yield steps
+
+    @staticmethod
+    def searching_all(monkeypatch):
+        monkeypatch.setattr(InFreeSpace, "_is_sole", lambda *_: False)
+        monkeypatch.setattr(InFreeSpace, "_driven", lambda *_: None)
+
+    @compiled_only
+    @pytest.mark.parametrize("controls", [TABLE_2, REVERSED_SPIN, REEDS_SHEPP])
+    @pytest.mark.parametrize("horizon", [FREE, Horizon(time=8.0, max_trims=4)])
+    def test_the_loop_is_the_same(self, controls, horizon, monkeypatch):
+        time_too = Cost(effort=1.0, time=1.0)
+        problem = parking_loop({"rest": (0.0, 0.0)} | controls, cost=time_too, horizon=horizon)
+        rng = np.random.default_rng(3)
+        starts = [[*rng.uniform(-2.0, 2.0, 2), rng.uniform(-3.0, 3.0)] for _ in range(8)]
+        fast = list(self.drives(problem, starts))
+        self.searching_all(monkeypatch)
+        for some, every in zip(fast, self.drives(problem, starts), strict=True):
+            assert [step.plan.word for step in some] == [step.plan.word for step in every]
+            assert [step.value for step in some] == pytest.approx(
+                [step.value for step in every], rel=1e-12
+            )
+            assert [step.exhaustive for step in some] == [step.exhaustive for step in every]
+
+    def test_a_plan_straight_to_the_goal_is_not_searched_for_again(self, monkeypatch):
+        loop = controller(straight(3.0, controls=SPIN_TOO, horizon=FREE, cost=Cost(time=1.0)))
+        _, step = loop.step([-3.0, 0.0, 0.0])
+        monkeypatch.setattr(choose, "search_words", None)
+        _, step = loop.step(step.predicted)
+        assert (step.plan.word, step.value, step.exhaustive) == (("ahead",), 2.0, True)
+
+    def test_an_equally_cheap_plan_is_searched_for(self):
+        pair = {"slow": (0.5, 0.0), "fast": (1.0, 0.0), "spin": (0.0, 1.0)}
+        by_length = straight(3.0, controls=pair, cost=Cost(length=1.0), horizon=Horizon())
+        assert sole_bound(by_length, by_length.goals[0]) == 0.0
+
+    def test_off_its_plan_every_word_is_searched(self):
+        loop = controller(parking_loop(cost=Cost(effort=1.0, time=1.0), horizon=FREE))
+        _, step = loop.step([0.0, 1.0, 0.0])
+        _, step = loop.step(step.predicted + np.array([1e-4, 0.0, 0.0]))
+        assert step.exhaustive
+        fresh = controller(parking_loop(start=step.pose, cost=loop.problem.cost, horizon=FREE))
+        assert step.value == pytest.approx(fresh.step(step.pose)[1].value, rel=1e-9)
