@@ -88,11 +88,9 @@ def test_the_mirror_image_costs_the_same():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cost", [MIXED, QUADRATIC])
-@pytest.mark.parametrize(
-    "pose",
-    [pytest.param(PARKING, marks=pytest.mark.slow), (0.5, -0.4, 1.0), (0.0, 0.05, 0.0)],
-)
+@pytest.mark.parametrize("pose", [PARKING, (0.5, -0.4, 1.0), (0.0, 0.05, 0.0)])
 def test_depth_first_finds_the_best_of_all(pose, cost):
     problem = problem_of(even(3), cost, intervals=3)
     found = exhausted(problem, pose, first=[0, 0, 0])

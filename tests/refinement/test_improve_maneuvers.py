@@ -105,6 +105,7 @@ def test_the_last_point_is_the_end_of_every_word():
         assert work.point_times(here, word, 0.0)[-1] == total
 
 
+@pytest.mark.slow
 def test_a_word_that_rests_on_the_way_is_cut_short():
     """What lasts no time does not hinder: a rest of 5 s in the middle is left out."""
     here, first = query(), first_word()
