@@ -312,9 +312,8 @@ def _digest(asked: _Asked) -> str:
 def _kept_in(path: Path, identity: str) -> list[Any]:
     """What a journal has kept of these queries; a line that was cut off counts for nothing."""
     head = json.dumps({"queries": identity})
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
+    text = path.read_text(encoding="utf-8") if path.exists() else ""
+    if "\n" not in text and head.startswith(text):  # not there, or cut off within its first line
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(head + "\n", encoding="utf-8")
         return []
@@ -329,7 +328,12 @@ def _kept_in(path: Path, identity: str) -> list[Any]:
 
 
 def _keep(path: Path, found: list[Any]) -> None:
-    lines = "".join(json.dumps(one) + "\n" for one in found)
+    try:
+        lines = "".join(json.dumps(one) + "\n" for one in found)
+    except TypeError as error:
+        raise ValueError(
+            f"journal: {error}; need numbers, texts, lists and dicts of what is taken"
+        ) from error
     with path.open("a", encoding="utf-8") as file:
         file.write(lines)
         file.flush()

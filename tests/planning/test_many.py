@@ -116,6 +116,14 @@ def test_an_interrupted_run_goes_on(tmp_path):
     assert len(done) == 2
     assert list(by.plan_many(STARTS, GOALS, take=counted, journal=journal)) == rest
     assert len(done) == 2
+    journal.write_text(journal.read_text()[:7])  # cut off within its first line
+    assert list(by.plan_many(STARTS, GOALS, take=cost_of, journal=journal)) == rest
+    with pytest.raises(ValueError, match="is not JSON serializable; need numbers, texts"):
+        list(
+            by.plan_many(
+                STARTS, GOALS, take=lambda result: result.status, journal=tmp_path / "no.jsonl"
+            )
+        )
     with pytest.raises(ValueError, match="is the journal of other queries"):
         list(by.plan_many(STARTS, GOALS + 0.1, take=cost_of, journal=journal))
 
