@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, IntArray, wrapped
+from maneuver_automaton._arrays import FEW, Array, IntArray, wrapped
 from maneuver_automaton.collision import _kernels_field
 from maneuver_automaton.collision.body import Body, body_of
 from maneuver_automaton.collision.convex import (
@@ -39,6 +39,8 @@ from maneuver_automaton.groups import SE2
 MOST_FIELD_CELLS = 60_000
 MOST_MAP_CELLS = 250_000  # of the field over an occupancy map, where a cell costs less
 MOST_BUCKETS = 100_000
+SHARE = 10.0**DIGITS  # of a metre or radian that a coordinate is rounded to
+HALF_TURN = float(np.round(np.pi, DIGITS))
 
 
 class Field(NamedTuple):
@@ -99,15 +101,42 @@ class World:
 
     def into(self, pose: Array) -> Array:
         """A pose (..., 3) seen from the world's frame: places first, so that no digit is lost."""
-        turned = np.array(pose, dtype=np.float64)
-        x, y = turned[..., 0] - self.frame[0], turned[..., 1] - self.frame[1]
+        poses = np.asarray(pose, dtype=np.float64)
+        if poses.size <= FEW:
+            rows = poses.reshape(-1, 3).tolist()
+            return np.array([self._one_into(*row) for row in rows]).reshape(poses.shape)
+        x, y = poses[..., 0] - self.frame[0], poses[..., 1] - self.frame[1]
         c, s = np.cos(-self.frame[2]), np.sin(-self.frame[2])
-        turned[..., 0], turned[..., 1] = c * x - s * y, s * x + c * y
-        turned[..., 2] = wrapped(turned[..., 2] - self.frame[2])
-        seen = np.round(turned, DIGITS)
-        half = seen[..., 2] <= -np.round(np.pi, DIGITS)  # half a turn to either side is one pose
+        turned = np.stack(
+            [c * x - s * y, s * x + c * y, wrapped(poses[..., 2] - self.frame[2])], -1
+        )
+        seen: Array = np.round(turned, DIGITS)
+        half = seen[..., 2] <= -HALF_TURN  # half a turn to either side is one pose
         seen[..., 2] = np.where(half, -seen[..., 2], seen[..., 2])
         return seen
+
+    def _one_into(self, x: float, y: float, heading: float) -> tuple[float, float, float]:
+        """The same for one pose, in numbers: some arrays take longer than a first plan may."""
+        to_x, to_y, turn = self.frame.tolist()
+        c, s = float(np.cos(-turn)), float(np.sin(-turn))
+        x, y = x - to_x, y - to_y
+        seen = rounded((heading - turn + np.pi) % (2.0 * np.pi) - np.pi)
+        return (
+            rounded(c * x - s * y),
+            rounded(s * x + c * y),
+            -seen if seen <= -HALF_TURN else seen,
+        )
+
+
+def rounded(value: float) -> float:
+    """A number as `numpy.round` rounds it to `DIGITS` decimals.
+
+    Examples
+    --------
+    >>> rounded(1.00000000051), rounded(-0.2e-9)
+    (1.000000001, -0.0)
+    """
+    return math.copysign(round(value * SHARE) / SHARE, value)
 
 
 @functools.lru_cache(maxsize=64)
