@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import FEW, Array, IntArray, wrapped
 from maneuver_automaton.collision import _kernels_field
@@ -78,6 +79,8 @@ class MovingObstacles(NamedTuple):
     middle: Array  # (M, 2) of a disc around it, in its frame
     reach: Array  # (M,) radius of that disc
     present: Array  # (M, 2) [s] it is there from and until; held at its first and last knot beyond
+    rate: Array  # (K, 3) after each knot: of the pose, or the twist in the frame of what coasts
+    arcs: NDArray[np.bool_]  # (M,) whether it coasts on arcs from knot to knot
 
 
 class WorldArrays(NamedTuple):
@@ -151,7 +154,7 @@ def world_of(
     """The world of obstacles around a footprint, seen from the pose `frame`.
 
     A distance `keep` [m] to everything can be asked for later, up to the one given here. Moving
-    obstacles are there at all times, or from and until the times `present` [s], one pair each.
+    obstacles are there as long as they say, or from and until times `present` [s], one pair each.
 
     Examples
     --------
@@ -173,8 +176,8 @@ def world_of(
         if isinstance(one, OccupancyMap):
             pieces += [(ring, 0.0) for ring in _cells(one, pose)]
     solids = solids_of(pieces)
-    always = ((-math.inf, math.inf),) * len(moving)
-    moving_arrays = _moving_obstacles(moving, pose, present or always)
+    there = present or tuple(one.presence for one in moving)
+    moving_arrays = _moving_obstacles(moving, pose, there)
     box = _box(solids.plates[:, :4], moving_arrays)
     arrays = WorldArrays(
         solids=solids,
@@ -187,7 +190,7 @@ def world_of(
         body=body,
         arrays=arrays,
         box=box,
-        last_event=float(moving_arrays.time.max()) if moving_arrays.time.size else -math.inf,
+        last_event=_last_event(moving_arrays),
     )
 
 
@@ -298,7 +301,7 @@ def _moving_obstacles(
 ) -> MovingObstacles:
     pieces: list[tuple[Array, float]] = []
     first_piece, first_knot = [0], [0]
-    times, poses, speeds, middles, reaches = [], [], [], [], []
+    times, poses, rates, arcs, speeds, middles, reaches = [], [], [], [], [], [], []
     for obstacle in moving:
         assert obstacle.motion is not None
         own = convex_pieces(obstacle.shape)
@@ -310,10 +313,12 @@ def _moving_obstacles(
         motion = _seen_motion(obstacle.motion, frame)
         times.append(motion.time)
         poses.append(motion.pose)
+        rates.append(np.vstack([motion.rates, np.zeros(3)]))
+        arcs.append(motion.twist is not None)
         first_knot.append(first_knot[-1] + motion.time.size)
         middles.append(middle)
         reaches.append(max(float(np.hypot(*(ring - middle).T).max()) + r for ring, r in own))
-        speeds.append(_speed(motion, own))
+        speeds.append(motion.fastest(max(float(np.hypot(*ring.T).max()) + r for ring, r in own)))
     return MovingObstacles(
         solids=solids_of(pieces),
         first_piece=np.array(first_piece, dtype=np.int64),
@@ -324,20 +329,18 @@ def _moving_obstacles(
         middle=np.array(middles, dtype=np.float64).reshape(-1, 2),
         reach=np.array(reaches, dtype=np.float64),
         present=np.array(present, dtype=np.float64).reshape(-1, 2),
+        rate=np.concatenate([np.zeros((0, 3)), *rates]),
+        arcs=np.array(arcs, dtype=np.bool_),
     )
+
+
+def _last_event(moving: MovingObstacles) -> float:
+    """When the last obstacle stops, or comes, or goes [s]."""
+    times = np.concatenate([moving.time, moving.present.ravel()])
+    return float(times[np.isfinite(times)].max(initial=-math.inf))
 
 
 def _seen_motion(motion: Motion, frame: Array) -> Motion:
     there = motion.moved(SE2(np.array([-frame[0], -frame[1], 0.0])))
     turned = there.moved(SE2(np.array([0.0, 0.0, -frame[2]])))
-    return Motion(turned.time, np.round(turned.pose, DIGITS))
-
-
-def _speed(motion: Motion, pieces: list[tuple[Array, float]]) -> float:
-    """No point of the obstacle is ever faster."""
-    if motion.time.size < 2:
-        return 0.0
-    # Linear between knots, the heading too: the rates of a stretch hold all along it.
-    step = np.diff(motion.pose, axis=0) / np.diff(motion.time)[:, None]
-    far = max(float(np.hypot(*ring.T).max()) + r for ring, r in pieces)
-    return float((np.hypot(step[:, 0], step[:, 1]) + far * np.abs(step[:, 2])).max())
+    return Motion(turned.time, np.round(turned.pose, DIGITS), turned.twist)

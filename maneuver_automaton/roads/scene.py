@@ -146,7 +146,7 @@ def _near_shape(shape: Shape, digits: int | None) -> Shape:
 def _near_obstacle(one: Obstacle, digits: int | None) -> Obstacle:
     if one.motion is None:
         return replace(one, shape=_near_shape(one.shape, digits))
-    return replace(one, motion=Motion(one.motion.time, _near(one.motion.pose, digits)))
+    return replace(one, motion=replace(one.motion, pose=_near(one.motion.pose, digits)))
 
 
 def presence_of(one: Obstacle) -> tuple[float, float]:
