@@ -377,6 +377,24 @@ class Motion:
         late = times >= self.time[-1]
         return np.where(late[..., None], self.pose[-1], found)
 
+    def times_for_lines(self, turn: float) -> Array:
+        """Times (m,) between which lines stand for it: on arcs it turns no more than `turn` [rad].
+
+        Examples
+        --------
+        >>> Motion([0, 1], [[0, 0, 0], [0, 2, np.pi]], [[np.pi, 0, np.pi]]).times_for_lines(2.0)
+        array([0. , 0.5, 1. ])
+        """
+        if self.twist is None:
+            return self.time
+        lasting = np.diff(self.time)
+        counts = np.maximum(np.ceil(self.turn_rates * lasting / turn), 1.0).astype(np.int64)
+        begins = [
+            first + step * np.arange(n) / n
+            for first, step, n in zip(self.time[:-1], lasting, counts.tolist(), strict=True)
+        ]
+        return np.append(np.concatenate([np.zeros(0), *begins]), self.time[-1])
+
     def moved(self, by: LieGroup) -> Motion:
         """The motion moved by a planar pose."""
         return Motion(self.time, (_planar(by) @ SE2(self.pose)).pose, self.twist)

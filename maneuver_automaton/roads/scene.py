@@ -10,7 +10,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton._brief import brief
-from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Polygon, Shape
+from maneuver_automaton.collision import Box, Disc, Obstacle, Polygon, Shape
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads.goal_region import GoalRegion
 from maneuver_automaton.roads.lanelets import Lanelet
