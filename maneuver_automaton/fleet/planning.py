@@ -23,7 +23,7 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.shapes import Obstacle
 from maneuver_automaton.fleet.conflicts import Course, components, meetings
 from maneuver_automaton.fleet.problem import FleetProblem
-from maneuver_automaton.fleet.result import FleetResult, FleetStatus
+from maneuver_automaton.fleet.result import FleetResult
 from maneuver_automaton.fleet.vehicle import LONG, QUICK, Found, Vehicle
 from maneuver_automaton.fleet.verdict import verified
 from maneuver_automaton.planning.workspace import Workspace
@@ -142,14 +142,12 @@ class _FleetSearch:
         """The way of each by itself."""
         for one in self.vehicles:
             one.plan_alone(self.budget.part(ALONE_SHARE / max(len(self.vehicles), 1)))
-            known = one.alone
-            if known is None or known.plan is None:
-                said = known.reason if known is not None else "no time was left"
-                self.reasons[one.number] = f"it has no way even alone: {said}"
+            if one.alone is None:
+                self.reasons[one.number] = f"it has no way even alone: {one.why_none}"
 
     def _plan_together(self, able: Sequence[int], orders: int) -> None:
         """Plans that keep apart: those alone where nobody meets, the others one after another."""
-        alone = {k: found for k in able if (found := self.vehicles[k].alone_found()) is not None}
+        alone = {k: found for k in able if (found := self.vehicles[k].alone) is not None}
         courses = {k: one.course for k, one in alone.items()}
         for one in self.vehicles:
             if one.number not in alone:
@@ -169,11 +167,11 @@ class _FleetSearch:
         rng = np.random.default_rng(self.seed)
         for n_th in range(orders):
             order = self._order_of(rest, n_th, rng)
-            found = self._one_after_another(order, dict(self.held))
-            better = best is None or self._rank(found) < self._rank(best)
+            planned = self._one_after_another(order, dict(self.held))
+            better = best is None or self._rank(planned) < self._rank(best)
             if better:
-                best, self.order = found, order
-            if len(found) == len(able) or self.budget.is_over:
+                best, self.order = planned, order
+            if len(planned) == len(able) or self.budget.is_over:
                 break
         assert best is not None
         self.held = best
@@ -185,8 +183,7 @@ class _FleetSearch:
         """The more important first, then the shortest way first; later orders are shuffled."""
 
         def key(k: int) -> tuple[float, float]:
-            known = self.vehicles[k].alone
-            cost = known.cost if known is not None and known.cost is not None else math.inf
+            cost = self._alone_cost(k)
             blur = 1.0 if n_th == 0 else float(rng.uniform(0.3, 1.7))
             return -self.fleet.priority[k], blur * cost
 
@@ -204,7 +201,7 @@ class _FleetSearch:
         return math.fsum(one.cost for one in held.values())
 
     def _one_after_another(self, order: Sequence[int], held: Held) -> Held:
-        """Plans in an order, past those that are held; who fails is planned before those it hits."""
+        """Plans in an order, past those that are held; who fails goes before those it hits."""
         waiting, evicted = list(order), 0
         failed: set[int] = set()
         while waiting and not self.budget.is_over:
@@ -259,6 +256,10 @@ class _FleetSearch:
     def _improve(self, able: Sequence[int], max_rounds: int | None) -> None:
         """Plan groups anew, those with the most to gain first, as long as there is time."""
         rng = np.random.default_rng([self.seed, 1])
+        for k in able if max_rounds is None else []:
+            if self.budget.is_over:
+                return
+            self.vehicles[k].look_for_better_ways(self.budget)
         idle, most_idle = 0, 40 + 8 * len(able)
         while not self.budget.is_over and (max_rounds is None or self.rounds < max_rounds):
             group = self._group(rng)
@@ -296,7 +297,7 @@ class _FleetSearch:
         weights = np.array([excess[k] for k in losing])
         first = int(rng.choice(losing, p=weights / weights.sum()))
         size = int(rng.integers(1, LARGEST_GROUP + 1))
-        alone = self.vehicles[first].alone_found()
+        alone = self.vehicles[first].alone
         courses: dict[int, Course] = {k: one.course for k, one in self.held.items()}
         if alone is not None:
             courses[first] = alone.course
@@ -310,7 +311,7 @@ class _FleetSearch:
 
     def _alone_cost(self, k: int) -> float:
         known = self.vehicles[k].alone
-        return known.cost if known is not None and known.cost is not None else math.inf
+        return known.cost if known is not None else math.inf
 
     def _tell(self) -> None:
         value = self._value(self.held)
@@ -320,7 +321,7 @@ class _FleetSearch:
 
     def _who_is_in_the_way(self, k: int) -> str:
         """Why a vehicle has no plan, and whom its way alone would meet."""
-        alone = self.vehicles[k].alone_found()
+        alone = self.vehicles[k].alone
         if alone is None:
             return "it has no way even alone"
         courses: dict[int, Course] = {
@@ -335,7 +336,7 @@ class _FleetSearch:
     def _result(self) -> FleetResult:
         """The answer: the plans checked, each alone and each pair."""
         result = verified(self.fleet, self.vehicles, self.held, self.reasons)
-        lower = [one.alone.lower_bound or 0.0 for one in self.vehicles if one.alone is not None]
+        lower = [one.bound.value for one in self.vehicles if one.bound is not None]
         bound = math.fsum(lower) if self.objective == "sum" else 0.0
         counts = {
             "expansions": sum(one.expansions for one in self.vehicles),

@@ -11,10 +11,11 @@ from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.shapes import Disc, Motion, Obstacle
 from maneuver_automaton.fleet.conflicts import Course
-from maneuver_automaton.planning.blocked import goals_left
+from maneuver_automaton.planning.blocked import blocked_ends, goals_left
+from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.needs import has_inertia
 from maneuver_automaton.planning.plan import plan_in
-from maneuver_automaton.planning.result import PlanResult
+from maneuver_automaton.planning.result import LowerBound, PlanResult
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.improve import Patience, improve
@@ -22,13 +23,13 @@ from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.waiting import with_waits
 from maneuver_automaton.search.word_plan import plan_of_word
-from maneuver_automaton.words.word import Word, word_of_plan
+from maneuver_automaton.words.word import Word
 
 WAYS = 6  # alone, that are tried with rests
 QUICK = 1500  # expansions in space and time at first ...
 LONG = 20_000  # ... and where nothing else helps
 AT_ONCE = Patience(attempts=0, passes=0)
-ALONE = Patience(attempts=400, passes=2)
+WITH_TIME = Patience(attempts=400, passes=2)
 NEARLY = 1.05  # times the way alone: what costs more is searched for in space and time as well
 LEAST_S, INERTIA_S = 0.01, 2.0  # [s] that a whole query gets at least, and with inertia at most
 POINT = (Disc(1e-6),)  # the body of a vehicle that is a point, as others see it
@@ -59,7 +60,9 @@ class Vehicle:
     leaves: bool
     grown: float  # [m] by which others see it larger
     workspace: Workspace
-    alone: PlanResult | None = None
+    alone: Found | None = None  # its plan by itself
+    bound: LowerBound | None = None  # no plan of it costs less
+    why_none: str = ""  # why it has no plan by itself
     ways: list[Word] = field(default_factory=list)  # alone, the cheapest first
     standing: Course = field(init=False)  # at its start, for ever
     expansions: int = 0
@@ -95,31 +98,55 @@ class Vehicle:
 
     def plan_alone(self, budget: Budget) -> None:
         """Find its way past what stands still, by itself, and a few others beside it."""
-        problem = self.problem
-        known = plan_in(
-            self.workspace, problem, time_limit=max(budget.left, LEAST_S), alternatives=0
-        )
-        self.alone = known
-        self._count(known.counts.get("expansions", 0))
-        if known.plan is None or not self.at_will:
-            return
-        query = self._query(problem)
-        words = self._improved(query, budget) if problem.obstacles else []
-        own = word_of_plan(query.automaton, known.plan)
-        words += [replace(own, cost=known.cost or 0.0)] if own is not None else []
-        words = sorted(words, key=lambda word: word.cost)
-        distinct = {tuple(word.trims.tolist()): word for word in reversed(words)}
-        self.ways = list(distinct.values())[::-1][:WAYS]
+        blocked = blocked_ends(self.problem)
+        if blocked is not None:
+            self.why_none = blocked.reason
+        elif self.at_will:
+            self._plan_words(budget)
+        else:
+            result = plan_in(
+                self.workspace, self.problem, time_limit=max(budget.left, LEAST_S), alternatives=0
+            )
+            self._count(result.counts.get("expansions", 0))
+            self.alone, self.why_none = self._found(result), result.reason
+            self.bound = result.bound
 
-    def _improved(self, query: LatticeQuery, budget: Budget) -> list[Word]:
-        """A way found by the lattice, improved, and those beside it."""
+    def _plan_words(self, budget: Budget) -> None:
+        """The same for one whose plans are words of the lattice."""
+        query = self._query(self.problem)
         first = first_plan(query, budget=replace(budget, expansions=LONG))
         self._count(first.expansions)
         if first.word is None:
-            return []
-        better = improve(query, first.word, budget=replace(budget, expansions=LONG), patience=ALONE)
+            self.why_none = first.enclosed or "no way was found"
+            return
+        self._keep_ways(query, first.word, budget, AT_ONCE)
+        self.bound = lattice_bound(query)
+
+    def look_for_better_ways(self, budget: Budget) -> None:
+        """Better ways past what stands still, and others beside them."""
+        if self.ways and self.problem.obstacles:
+            self._keep_ways(self._query(self.problem), self.ways[0], budget, WITH_TIME)
+
+    def _keep_ways(
+        self, query: LatticeQuery, word: Word, budget: Budget, patience: Patience
+    ) -> None:
+        better = improve(query, word, budget=budget, patience=patience)
         self._count(better.expansions)
-        return [better.word, first.word, *better.others]
+        words = [better.word, word, *better.others, *self.ways]
+        words = sorted(words, key=lambda one: one.cost)
+        distinct = {tuple(one.trims.tolist()): one for one in reversed(words)}
+        self.ways = list(distinct.values())[::-1][:WAYS]
+        self.alone = self._word_found(query, self.ways[0])
+
+    def _word_found(self, query: LatticeQuery, word: Word) -> Found:
+        plan = plan_of_word(query, word)
+        goal_index = query.goal_index[word.goal]
+        return Found(plan, word.cost + query.padding, goal_index, self.course_of(plan))
+
+    def _found(self, result: PlanResult) -> Found | None:
+        if result.plan is None or result.cost is None:
+            return None
+        return Found(result.plan, result.cost, result.goal_index or 0, self.course_of(result.plan))
 
     def past(
         self,
@@ -131,8 +158,7 @@ class Vehicle:
     ) -> Found | None:
         """The cheapest way found past what the others do; None if there is none below a cost."""
         if not others:
-            found = self.alone_found()
-            return found if found is not None and found.cost < known else None
+            return self.alone if self.alone is not None and self.alone.cost < known else None
         problem = replace(
             self.problem,
             obstacles=(*self.problem.obstacles, *others),
@@ -158,26 +184,15 @@ class Vehicle:
         best = improve(query, best, budget=budget, patience=AT_ONCE).word
         if not best.cost < known:
             return None
-        plan = plan_of_word(query, best)
-        goal_index = query.goal_index[best.goal]
-        return Found(plan, best.cost + query.padding, goal_index, self.course_of(plan))
-
-    def alone_found(self) -> Found | None:
-        """Its way alone, as it was found."""
-        known = self.alone
-        if known is None or known.plan is None or known.cost is None:
-            return None
-        return Found(known.plan, known.cost, known.goal_index or 0, self.course_of(known.plan))
+        return self._word_found(query, best)
 
     def _past_with_inertia(self, problem: Problem, budget: Budget, known: float) -> Found | None:
         workspace = Workspace(problem.obstacles, self.workspace.prepared)
         share = max(min(budget.left, INERTIA_S), LEAST_S)
         result = plan_in(workspace, problem, time_limit=share, alternatives=0)
         self._count(result.counts.get("expansions", 0))
-        if result.plan is None or result.cost is None or not result.cost < known:
-            return None
-        goal_index = result.goal_index or 0
-        return Found(result.plan, result.cost, goal_index, self.course_of(result.plan))
+        found = self._found(result)
+        return found if found is not None and found.cost < known else None
 
     def _query(self, problem: Problem) -> LatticeQuery:
         return lattice_query(problem, goals_left(problem), prepared=self.workspace.prepared)

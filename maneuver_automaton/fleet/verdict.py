@@ -71,19 +71,18 @@ def verified(
 
 def _checked(one: Vehicle, found: Found | None, settings: SearchSettings) -> tuple[PlanResult, str]:
     """The answer for one vehicle, and why its plan was refused."""
-    known, problem = one.alone, replace(one.problem, search=settings)
+    problem = replace(one.problem, search=settings)
     if found is None:
-        reason = "it has no plan" if known is None else known.reason or "it has no plan"
-        status = PlanStatus.NO_PLAN if known is None or known.plan is not None else known.status
-        return PlanResult(problem=problem, status=status, reason=reason), ""
+        reason = one.why_none or "it has no plan past the others"
+        return PlanResult(problem=problem, status=PlanStatus.NO_PLAN, reason=reason), ""
     goal = problem.goals[found.goal_index]
     checked = check_plan(problem, found.plan, goal, one.workspace)
     if checked.broken is not None or checked.audit is None:
         said = f"its plan was refused: {checked.reason}"
         return PlanResult(problem=problem, status=PlanStatus.NO_PLAN, reason=said), said
     cost = problem.cost_of(found.plan)
-    lower = min(cost, (known.lower_bound or 0.0) if known is not None else 0.0)
-    bound = known.bound if known is not None else None
+    bound = one.bound
+    lower = min(cost, bound.value if bound is not None else 0.0)
     return (
         PlanResult(
             problem=problem,
@@ -138,5 +137,7 @@ def plan_of_motion(motion: Motion, until: float) -> Plan:
     last = float(motion.time[-1])
     twists = [*motion.rates, np.zeros(3)]
     durations = [*np.diff(motion.time), max(until - last, 0.0)]
-    trims = tuple(Trim(name="", body_velocity=twist, control=twist) for twist in twists)
+    trims = tuple(
+        Trim(name=str(k), body_velocity=twist, control=twist) for k, twist in enumerate(twists)
+    )
     return Plan(motion.pose[0], trims, durations=durations, start_time=float(motion.time[0]))
