@@ -26,7 +26,9 @@ from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import FleetResult
 from maneuver_automaton.fleet.vehicle import LONG, QUICK, Found, Vehicle
 from maneuver_automaton.fleet.verdict import verified
+from maneuver_automaton.planning.plan import prepare
 from maneuver_automaton.planning.workspace import Workspace
+from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.search.prepared import Prepared
 
 Objective = Literal["sum", "last"]
@@ -36,7 +38,6 @@ MOST_EVICTED = 8  # times that plans are given up for one vehicle
 ALONE_SHARE = 0.5  # of the time, for all ways alone
 LARGEST_GROUP = 4  # vehicles that are planned anew together
 WORTH = 1e-6  # share of the objective that another plan has to save
-LATER_S = (0.0, 2.0, 4.0, 8.0)  # [s]
 
 
 def plan_fleet(
@@ -96,10 +97,17 @@ def plan_fleet(
         raise ValueError(f"objective must be 'sum' or 'last', got {objective!r}")
     if orders < 1:
         raise ValueError(f"orders must be at least 1, got {orders}")
+    vehicles = vehicles_of(fleet)
+    for problem, workspace in {
+        (id(one.problem.automaton), id(one.workspace)): (one.problem, one.workspace)
+        for one in vehicles
+    }.values():
+        prepare(problem, workspace)
+    load_lattice()
     with patient():
-        return _FleetSearch(fleet, objective, Budget.from_now(time_limit), seed, on_better).run(
-            orders, max_rounds
-        )
+        return _FleetSearch(
+            fleet, vehicles, objective, Budget.from_now(time_limit), seed, on_better
+        ).run(orders, max_rounds)
 
 
 @dataclass(slots=True, eq=False)
@@ -107,20 +115,17 @@ class _FleetSearch:
     """One search for the plans of a fleet."""
 
     fleet: FleetProblem
+    vehicles: list[Vehicle]
     objective: Objective
     budget: Budget
     seed: int
     on_better: Callable[[float, float], None] | None
-    vehicles: list[Vehicle] = field(init=False)
     held: Held = field(default_factory=dict)
     reasons: dict[int, str] = field(default_factory=dict)
     order: list[int] = field(default_factory=list)
     improvements: list[tuple[float, float]] = field(default_factory=list)
     queries: int = 0
     rounds: int = 0
-
-    def __post_init__(self) -> None:
-        self.vehicles = vehicles_of(self.fleet)
 
     def run(self, orders: int, max_rounds: int | None) -> FleetResult:
         """The whole search, and the checks of what it found."""
@@ -256,16 +261,18 @@ class _FleetSearch:
     def _improve(self, able: Sequence[int], max_rounds: int | None) -> None:
         """Plan groups anew, those with the most to gain first, as long as there is time."""
         rng = np.random.default_rng([self.seed, 1])
-        for k in able if max_rounds is None else []:
-            if self.budget.is_over:
-                return
-            self.vehicles[k].look_for_better_ways(self.budget)
+        unseen = sorted(able, key=lambda k: -self._excess(k))
         idle, most_idle = 0, 40 + 8 * len(able)
         while not self.budget.is_over and (max_rounds is None or self.rounds < max_rounds):
+            self.rounds += 1
+            if unseen and self.rounds % 2:
+                self.vehicles[unseen.pop(0)].look_for_better_ways(self.budget)
+                continue
             group = self._group(rng)
+            if not group and unseen:
+                continue
             if not group or idle > most_idle:
                 return
-            self.rounds += 1
             others = {k: one for k, one in self.held.items() if k not in group}
             before = self._value(self.held)
             now = self._anew(group, others)
@@ -290,7 +297,7 @@ class _FleetSearch:
 
     def _group(self, rng: np.random.Generator) -> list[int]:
         """Vehicles to be planned anew: one that loses by others, and some that are in its way."""
-        excess = {k: one.cost - self._alone_cost(k) for k, one in self.held.items()}
+        excess = {k: self._excess(k) for k in self.held}
         losing = [k for k, lost in excess.items() if lost > WORTH * self.held[k].cost]
         if not losing:
             return []
@@ -312,6 +319,10 @@ class _FleetSearch:
     def _alone_cost(self, k: int) -> float:
         known = self.vehicles[k].alone
         return known.cost if known is not None else math.inf
+
+    def _excess(self, k: int) -> float:
+        """What a vehicle's plan costs more than its way alone."""
+        return self.held[k].cost - self._alone_cost(k) if k in self.held else 0.0
 
     def _tell(self) -> None:
         value = self._value(self.held)
