@@ -50,6 +50,22 @@ class Course:
         """When it has come to rest for good, or is gone [s]."""
         return min(self.until, max(float(one.time[-1]) for one in self.motions))
 
+    def after(self, time: float) -> Course:
+        """What is left of it from a time on [s]."""
+        if all(time <= float(one.time[0]) for one in self.motions):
+            return self
+        return replace(self, motions=tuple(_left(one, time) for one in self.motions))
+
+
+def _left(motion: Motion, time: float) -> Motion:
+    """A motion from a time on [s]."""
+    if time <= float(motion.time[0]):
+        return motion
+    first = int(np.searchsorted(motion.time, time, side="right"))
+    times = np.concatenate([[time], motion.time[first:]])
+    poses = np.concatenate([motion.at(time)[None], motion.pose[first:]])
+    return Motion(times, poses, motion.rates[first - 1 :])
+
 
 def larger(shape: Shape, by: float) -> Shape:
     """A shape that holds all within a length [m] of another, with square corners.
@@ -99,14 +115,16 @@ def meetings(
         owners += [number] * len(bodies)
         obstacles += list(bodies)
     world = world_of(tuple(obstacles), (), frame)
-    quiet = max(one.quiet_after for one in courses.values()) + AFTER
+    # Who begins later stands at its start until then: all are looked at from the first begin on.
+    began = min(float(way.time[0]) for one in courses.values() for way in one.motions)
+    span = (began - AFTER, max(one.quiet_after for one in courses.values()) + AFTER)
     owner = np.array(owners)
     found: dict[tuple[int, int], float] = {}
     wanted = set(numbers if among is None else among)
     for number in numbers:
         if number not in wanted:
             continue
-        times = first_meetings(world.arrays.moving, courses[number], frame, quiet, keep)
+        times = first_meetings(world.arrays.moving, courses[number], frame, span, keep)
         for other in numbers:
             if other == number or (other in wanted and other < number):
                 continue
@@ -122,30 +140,32 @@ def first_meetings(
     moving: MovingObstacles,
     course: Course,
     frame: tuple[float, float, float],
-    quiet: float,
+    span: tuple[float, float],
     keep: float,
 ) -> Array:
-    """When a vehicle first comes within a distance [m] of each of what moves (M,) [s]."""
+    """When a vehicle first comes within a distance [m] of each of what moves (M,) in a span [s]."""
     least = np.full(moving.speed.size, math.inf)
     for shapes, motion in zip(course.shapes, course.motions, strict=True):
         body, out = body_of(shapes), np.empty(moving.speed.size)
-        rows = _coasts(motion, body, frame, min(quiet, course.until))
+        rows = _coasts(motion, body, frame, (span[0], min(span[1], course.until)))
         kernels.first_meetings(moving, body, rows, keep, PROOF, out)
         np.minimum(least, out, out=least)
     return least
 
 
-def _coasts(motion: Motion, body: Body, frame: tuple[float, float, float], until: float) -> Array:
-    """Rows of `first_meetings`: the coasts of a motion, then it stands until a time."""
+def _coasts(
+    motion: Motion, body: Body, frame: tuple[float, float, float], span: tuple[float, float]
+) -> Array:
+    """Rows of `first_meetings`: it stands from a time on, coasts, then stands until a time [s]."""
     poses, times = motion.pose - np.array(frame), motion.time
-    begins = times[0] - AFTER
-    lasting = np.concatenate([[AFTER], np.diff(times), [max(until - times[-1], 0.0)]])
+    before, after = max(times[0] - span[0], 0.0), max(span[1] - times[-1], 0.0)
+    lasting = np.concatenate([[before], np.diff(times), [after]])
     rows = np.zeros((len(times) + 1, 9))
     rows[:, :3] = poses[np.maximum(np.arange(len(times) + 1) - 1, 0)]
     rows[1:-1, 3:6] = motion.rates  # it coasts, or never moves
     rows[:, 6] = fastest_points(body, rows[:, 3:6])
     rows[:, 7] = lasting
-    rows[:, 8] = np.concatenate([[begins], times])
+    rows[:, 8] = np.concatenate([[span[0]], times])
     return rows
 
 

@@ -1,0 +1,118 @@
+"""Who drives what, as each vehicle knows it, where messages may be lost.
+
+A vehicle may drive another plan once all others have acknowledged it; until then the others keep
+clear of both, the one it drives and the one it asked for. Whatever message is lost, what a vehicle
+drives is among what each of the others expects of it. A message a step and pair says which plan is
+held, and so ends all doubt.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+from maneuver_automaton.fleet.vehicle import Found
+
+Kind = Literal["holds", "asks", "agrees", "drives", "withdraws"]
+
+
+class Message(NamedTuple):
+    """One message: what a vehicle says to another one in a step."""
+
+    step: int
+    sender: str
+    receiver: str
+    kind: Kind
+
+
+Lost = Callable[[Message], bool]
+
+
+@dataclass(slots=True, eq=False)
+class Agreement:
+    """What every vehicle expects of every other one: the plans that it may drive."""
+
+    names: Sequence[str]
+    lost: Lost | None = None
+    expected: dict[int, dict[int, list[Found]]] = field(default_factory=dict)
+    step: int = 0
+    sent: int = 0
+
+    def start(self, held: Mapping[int, Found]) -> None:
+        """All know the plans that are driven at first."""
+        self.expected = {j: {k: [one] for k, one in held.items() if k != j} for j in held}
+
+    def begin(self, step: int, held: Mapping[int, Found]) -> None:
+        """A step begins: everybody says which plan it holds."""
+        self.step = step
+        for k in [*self.expected]:
+            if k not in held:
+                self.leave(k)
+        for sender in held:
+            self._tell(sender, held[sender], "holds")
+
+    def enter(self, k: int, found: Found, held: Mapping[int, Found]) -> bool:
+        """Let a vehicle in that holds a plan, if all others say that they know of it."""
+        others = [j for j in self.expected if j != k]
+        known = [j for j in others if self._say(k, j, "asks")]
+        for j in known:
+            self.expected[j][k] = [found]
+        if not all(self._say(j, k, "agrees") for j in known) or len(known) < len(others):
+            return False
+        self.expected[k] = {j: [held[j]] for j in others}
+        return True
+
+    def leave(self, k: int) -> None:
+        """A vehicle is gone."""
+        self.expected.pop(k, None)
+        for others in self.expected.values():
+            others.pop(k, None)
+
+    def agree(
+        self, k: int, found: Found, holds: Found, refuses: Callable[[int, Found], bool]
+    ) -> bool:
+        """Whether all others agree that a vehicle drives another plan than the one it holds."""
+        agreed = True
+        others = [j for j in self.expected if j != k]
+        for j in others:
+            if not self._say(k, j, "asks"):
+                agreed = False
+                continue
+            self.expected[j].setdefault(k, [holds]).append(found)
+            agreed = not refuses(j, found) and self._say(j, k, "agrees") and agreed
+        if agreed:
+            self._tell(k, found, "drives")
+        else:
+            self._tell(k, holds, "withdraws")
+        return agreed
+
+    def announce(self, k: int, found: Found) -> None:
+        """A vehicle drives another plan, whether the others agree or not."""
+        self._tell(k, found, "drives")
+
+    def others_of(self, k: int) -> dict[int, list[Found]]:
+        """The plans that a vehicle expects of each of the others."""
+        return self.expected[k]
+
+    def unknown(self, held: Mapping[int, Found]) -> list[tuple[int, int]]:
+        """Pairs of which the first does not expect of the second what that drives."""
+        return [
+            (j, k)
+            for j, others in self.expected.items()
+            for k, found in held.items()
+            if k != j and not any(one is found for one in others.get(k, ()))
+        ]
+
+    def _tell(self, sender: int, found: Found, kind: Kind) -> None:
+        """A vehicle says to all others which plan it drives."""
+        for receiver in self.expected:
+            if receiver != sender and self._say(sender, receiver, kind):
+                self.expected[receiver][sender] = [found]
+
+    def _say(self, sender: int, receiver: int, kind: Kind) -> bool:
+        """Whether a message arrives."""
+        self.sent += 1
+        if self.lost is None:
+            return True
+        return not self.lost(Message(self.step, self.names[sender], self.names[receiver], kind))

@@ -1,0 +1,156 @@
+"""Guarantees of a fleet's loop, asserted in every step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from maneuver_automaton.fleet.agreement import Agreement
+from maneuver_automaton.fleet.conflicts import Course, meetings
+from maneuver_automaton.fleet.held import (
+    CONTACT,
+    LATER,
+    arrival,
+    least_apart,
+    left_to_pay,
+    why_not_free,
+)
+from maneuver_automaton.fleet.log import FleetGuarantee, FleetStep, FleetViolation, Swap
+from maneuver_automaton.fleet.vehicle import Found, Vehicle
+
+ACCURACY = 1e-7  # relative, of values: a maneuver that is cut costs as much to within this
+FAR = 1.0  # [m] beyond the margin: what keeps more is not measured
+FINE = 0.02  # [m] to which the distance proven is known
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Before:
+    """What was held when a step began, at its time."""
+
+    values: dict[int, float]  # cost of what is left
+    arrivals: dict[int, float]  # [s]
+    promised: dict[int, float]  # values that the last step said, at its own time
+
+    @classmethod
+    def of(
+        cls,
+        vehicles: Sequence[Vehicle],
+        held: Mapping[int, Found],
+        time: float,
+        last: FleetStep | None,
+    ) -> Before:
+        """At a step's begin."""
+        known = {} if last is None else last.values
+        return cls(
+            values={k: left_to_pay(vehicles[k], one, time) for k, one in held.items()},
+            arrivals={k: arrival(one) for k, one in held.items()},
+            promised={k: known.get(vehicles[k].name, math.inf) for k in held},
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class After:
+    """What is held when it ends."""
+
+    time: float
+    held: Mapping[int, Found]
+    courses: Mapping[int, Course]  # what is left of them
+    off: Mapping[int, float]  # [m] beside the plans
+    disturbed: set[int]  # who has another plan not by an exchange of its own
+    in_group: set[int]  # who has another one by an exchange of several at once
+    swaps: Sequence[Swap]
+    tube_m: float
+    keep: float  # [m]
+
+
+def broken(
+    vehicles: Sequence[Vehicle], agreement: Agreement, before: Before, after: After
+) -> Iterator[FleetViolation]:
+    """The guarantees that a step broke."""
+    names = [one.name for one in vehicles]
+    yield from _too_near(names, after)
+    for k in after.held:
+        if after.off[k] > after.tube_m:
+            reason = f"it is {after.off[k]:.3g} m beside its plan, need at most {after.tube_m:g} m"
+            yield FleetViolation(FleetGuarantee.HELD, (names[k],), reason)
+        if said := why_not_free(vehicles[k], after.courses[k]):
+            yield FleetViolation(FleetGuarantee.STILL, (names[k],), said)
+    yield from _dearer(vehicles, before, after)
+    yield from _out_of_order(after.swaps)
+    for j, k in agreement.unknown(after.held):
+        reason = f"{names[j]} does not know what it drives"
+        yield FleetViolation(FleetGuarantee.KNOWN, (names[k],), reason)
+
+
+def _too_near(names: Sequence[str], after: After) -> Iterator[FleetViolation]:
+    """Pairs that the kernel cannot prove apart, and the audit's bounds neither."""
+    for row in meetings(after.courses, keep=after.keep):
+        least = least_apart(after.courses, row.one, row.other)
+        if least <= max(after.keep - CONTACT, CONTACT):
+            pair = (names[row.one], names[row.other])
+            reason = f"at {row.time:.6g} s they come within {least:.6g} m, need {after.keep:g} m"
+            yield FleetViolation(FleetGuarantee.APART, pair, reason)
+
+
+def _dearer(vehicles: Sequence[Vehicle], before: Before, after: After) -> Iterator[FleetViolation]:
+    """Whose value rose, or who arrives later, and whether the sum did."""
+    sums = [0.0, 0.0, 0.0]
+    for k, found in after.held.items():
+        if k in after.disturbed:
+            continue
+        was, promised = before.values[k], before.promised[k]
+        now = left_to_pay(vehicles[k], found, after.time)
+        if was < math.inf:
+            sums[0] += now
+            sums[1] += was
+            sums[2] += abs(was)
+        allowed = was + ACCURACY * (1.0 + abs(was)) if k not in after.in_group else math.inf
+        if now > allowed or was > promised + ACCURACY * (1.0 + abs(was)):
+            reason = f"the value is {now:.9g}, was {was:.9g} and {promised:.9g} a step before"
+            yield FleetViolation(FleetGuarantee.DECREASE, (vehicles[k].name,), reason)
+        later = arrival(found) - before.arrivals[k] if arrival(found) < math.inf else 0.0
+        if later > LATER * (1.0 + abs(before.arrivals[k])) and k not in after.in_group:
+            reason = f"it arrives {later:.3g} s later than its last plan said"
+            yield FleetViolation(FleetGuarantee.ARRIVAL, (vehicles[k].name,), reason)
+    if sums[0] > sums[1] + ACCURACY * (1.0 + sums[2]):
+        everybody = tuple(vehicles[k].name for k in after.held)
+        reason = f"the sum is {sums[0]:.9g}, was {sums[1]:.9g}"
+        yield FleetViolation(FleetGuarantee.DECREASE, everybody, reason)
+
+
+def _out_of_order(swaps: Sequence[Swap]) -> Iterator[FleetViolation]:
+    """Swaps that were not proven past the plans that those before them had left held."""
+    versions: dict[str, int] = {}
+    for swap in swaps:
+        known = dict(swap.past)
+        stale = [name for name, version in versions.items() if known.get(name, version) != version]
+        if stale:
+            reason = f"swap {swap.order} was not proven past the plan that {stale[0]} held"
+            yield FleetViolation(FleetGuarantee.ORDER, swap.names, reason)
+        versions.update(known)
+        versions.update(swap.holds)
+
+
+def gap_between(courses: Mapping[int, Course], *, keep: float) -> float:
+    """A distance [m] that any two vehicles are proven to keep from now on, to within 2 cm.
+
+    At most a metre more than the distance to keep; 0 if not even that is proven.
+    """
+    if len(courses) < 2:
+        return math.inf
+    if meetings(courses, keep=keep):
+        return 0.0
+    low, high, more = keep, keep + FAR, 2.0 * FINE
+    while low + more < high:
+        if meetings(courses, keep=low + more):
+            high = low + more
+            break
+        low, more = low + more, 2.0 * more
+    while high - low > FINE and high < keep + FAR:
+        middle = 0.5 * (low + high)
+        if meetings(courses, keep=middle):
+            high = middle
+        else:
+            low = middle
+    return low

@@ -1,0 +1,289 @@
+"""What is left of a plan that a vehicle holds, and how it may go on from there."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import networkx as nx
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.audit import closest_to
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.cutting import (
+    NOTHING,
+    committed,
+    head_of,
+    joined,
+    tail_of,
+    with_samples_at,
+)
+from maneuver_automaton.budget import Budget
+from maneuver_automaton.collision.advancement import free_times
+from maneuver_automaton.collision.body import body_of
+from maneuver_automaton.collision.shapes import Obstacle
+from maneuver_automaton.collision.world import own_frame, world_of
+from maneuver_automaton.fleet.conflicts import Course
+from maneuver_automaton.fleet.vehicle import Found, Vehicle
+from maneuver_automaton.fleet.verdict import plan_of_motion
+from maneuver_automaton.models import Omnidirectional
+from maneuver_automaton.planning.tracking import PROVEN, PROVEN_SHARE
+from maneuver_automaton.primitives import Trim
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.receding_horizon.candidates import allowed, within
+from maneuver_automaton.receding_horizon.reanchoring import reanchored
+from maneuver_automaton.receding_horizon.shifting import followed_by, moves_on
+
+CONTACT = 1e-9  # [m] what is closer touches
+LATER = 1e-9  # [s], relative too: what arrives by so much later is as soon
+
+
+def resting(vehicle: Vehicle, pose: Array, time: float) -> Found:
+    """A vehicle's plan if it has none: it stays where it is, and does not arrive."""
+    rest = next((one for one in vehicle.problem.automaton.trims if one.is_rest), None)
+    trims, lasting = ((), []) if rest is None else ((rest,), [0.0])
+    plan = Plan(pose, trims, durations=lasting, start_time=time)
+    return Found(plan, math.inf, 0, vehicle.course_of(plan))
+
+
+def leads(found: Found) -> bool:
+    """Whether a plan arrives."""
+    return found.cost < math.inf
+
+
+def arrival(found: Found) -> float:
+    """When a plan arrives [s]; inf if it does not."""
+    return found.arrival if leads(found) else math.inf
+
+
+def rest_of_plan(vehicle: Vehicle, found: Found, time: float) -> Plan:
+    """What is left of a plan from a time on [s]."""
+    plan = found.plan
+    if time <= plan.start_time or not plan.trims:
+        return replace(plan, start_time=max(time, plan.start_time))
+    cut = with_samples_at(plan, [time], vehicle.problem.automaton.model)
+    return tail_of(cut, time - plan.start_time)
+
+
+def left_to_pay(vehicle: Vehicle, found: Found, time: float) -> float:
+    """Cost of what is left of a plan; inf if it does not arrive."""
+    if not leads(found) or time <= found.plan.start_time:
+        return found.cost
+    if time >= found.arrival - NOTHING:
+        return 0.0
+    return vehicle.problem.cost_of(rest_of_plan(vehicle, found, time))
+
+
+def is_over(found: Found, time: float) -> bool:
+    """Whether nothing of a plan is left but to stay."""
+    return time >= found.arrival - NOTHING
+
+
+def off_plan(vehicle: Vehicle, found: Found, time: float, pose: Array) -> float:
+    """How far any point of the body is from where its plan has it [m]: an upper bound."""
+    planned = found.plan.pose_at(time)
+    places = [0, 1, *range(3, pose.size)]
+    distance = float(np.linalg.norm(pose[places] - planned[places]))
+    turn = abs(math.remainder(float(pose[2] - planned[2]), 2.0 * math.pi))
+    reach = 0.0
+    for shapes, motion in zip(found.course.shapes, found.course.motions, strict=True):
+        beside = float(np.hypot(*(motion.at(time)[:2] - planned[:2])))
+        reach = max(reach, beside + body_of(shapes).reach)
+    return distance + 2.0 * reach * math.sin(min(turn, math.pi) / 2.0)
+
+
+def onward(
+    vehicle: Vehicle, found: Found, time: float, after: float = 0.0
+) -> tuple[Plan | None, Problem]:
+    """What is committed from a time on, `after` seconds at least, and the problem from its end.
+
+    With inertia, the maneuver under way is driven to its end.
+    """
+    if vehicle.at_will and after <= 0.0:
+        here = found.plan.pose_at(time)
+        begin = max(time, vehicle.problem.start_time)
+        return None, vehicle.problem.starting_at(here, time=begin)
+    rest = rest_of_plan(vehicle, found, time)
+    busy = max(after, committed(rest, after) + after) if rest.trims else after
+    if not rest.trims or not moves_on(rest):
+        still = _standing(rest, after)
+        return still, vehicle.problem.starting_at(rest.end, time=rest.start_time + after)
+    if rest.duration < busy:
+        head = followed_by(rest, _standing(replace(rest, start=rest.end), busy - rest.duration))
+    else:
+        head = head_of(
+            with_samples_at(rest, [rest.start_time + busy], vehicle.problem.automaton.model),
+            busy,
+        )
+    trim = rest.trims[0] if busy <= NOTHING else head.trims[-1]
+    problem = vehicle.problem.starting_at(
+        head.end if busy > NOTHING else rest.start,
+        time=rest.start_time + busy,
+        trim=None if vehicle.at_will else trim.name,
+    )
+    return (head if busy > NOTHING else None), problem
+
+
+def _standing(rest: Plan, lasting: float) -> Plan:
+    """To stand for a time [s] in the rest that a plan ends in."""
+    trim = rest.trims[-1] if rest.trims and rest.trims[-1].is_rest else None
+    if trim is None:
+        size = rest.start.size
+        still = np.zeros(size)
+        trim = Trim(name="rest", body_velocity=still, control=np.zeros(2))
+    return Plan(rest.start, (trim,), durations=[lasting], start_time=rest.start_time)
+
+
+def proposal(
+    vehicle: Vehicle,
+    found: Found,
+    *,
+    time: float,
+    after: float,
+    others: list[Obstacle],
+    budget: Budget,
+    known: float,
+    most: int,
+) -> tuple[Found | None, Found | None]:
+    """Another plan past the others that costs less than `known`, and the way alone, if that does.
+
+    Both from a time on, with what is committed.
+    """
+    head, problem = onward(vehicle, found, time, after)
+    there = Vehicle(
+        vehicle.number, vehicle.name, problem, vehicle.leaves, vehicle.grown, vehicle.workspace
+    )
+    there.plan_alone(budget)
+    spent = 0.0 if head is None else vehicle.problem.cost_of(head)
+    if there.alone is None or not there.alone.cost + spent < known:
+        return None, None
+    other = there.past(others, budget, most=most, known=known - spent)
+    alone = _after(vehicle, head, there.alone)
+    return None if other is None else _after(vehicle, head, other), alone
+
+
+def _after(vehicle: Vehicle, head: Plan | None, found: Found) -> Found:
+    """What is committed, then a plan from its end."""
+    if head is None:
+        return found
+    plan = head
+    if found.plan.trims:
+        follows = followed_by if vehicle.at_will else joined
+        plan = follows(head, found.plan)
+    cost = vehicle.problem.cost_of(plan)
+    return Found(plan, cost, found.goal_index, vehicle.course_of(plan))
+
+
+def rejoined(vehicle: Vehicle, found: Found, time: float, pose: Array) -> Iterator[Found]:
+    """A plan made to start where the vehicle was measured, in several ways; it arrives.
+
+    The same word with other times, three trims to one of its next joints, or as it is, if it then
+    ends within the goal's tolerance.
+    """
+    if not leads(found):
+        yield resting(vehicle, pose, time)
+        return
+    rest = rest_of_plan(vehicle, found, time)
+    goal = vehicle.problem.goals[found.goal_index]
+    here = vehicle.problem.starting_at(pose, time=rest.start_time)
+    plans = reanchored(here, rest, goal, pad=None, under_way=committed(rest, 0.0) > 0.0)
+    moved = replace(rest, start=pose)
+    if within(moved.end, goal):
+        yield Found(
+            moved, vehicle.problem.cost_of(moved), found.goal_index, vehicle.course_of(moved)
+        )
+    if not moves_on(rest):
+        return
+    for plan in plans:
+        if allowed(here, plan):
+            cost = vehicle.problem.cost_of(plan)
+            yield Found(plan, cost, found.goal_index, vehicle.course_of(plan))
+
+
+def stopping(vehicle: Vehicle, found: Found, time: float, pose: Array) -> Found:
+    """The plan that comes to rest soonest; what is held where the library cannot stop it."""
+    if vehicle.at_will or not moves_on(rest_of_plan(vehicle, found, time)):
+        return resting(vehicle, pose, time)
+    head, problem = onward(vehicle, found, time)
+    plan = head
+    if not problem.first_trim.is_rest:
+        brake = _brake(problem)
+        if brake is None:
+            return replace(found, cost=math.inf)
+        plan = brake if head is None else joined(head, brake)
+    if plan is None:
+        return resting(vehicle, pose, time)
+    plan = replace(plan, start=pose)
+    return Found(plan, math.inf, 0, vehicle.course_of(plan))
+
+
+def _brake(problem: Problem) -> Plan | None:
+    """The maneuvers that lead soonest from a problem's first trim to one that rests."""
+    automaton = problem.automaton
+    begin = problem.first_trim.name
+    graph: nx.DiGraph[str] = nx.DiGraph()
+    graph.add_node(begin)
+    for one in automaton.maneuvers:
+        known = graph.get_edge_data(one.source, one.target)
+        if known is None or one.duration < known["maneuver"].duration:
+            graph.add_edge(one.source, one.target, weight=one.duration, maneuver=one)
+    times = nx.single_source_dijkstra_path_length(graph, begin)
+    rests = [one.name for one in automaton.trims if one.is_rest and one.name in times]
+    if not rests:
+        return None
+    path = nx.dijkstra_path(graph, begin, min(rests, key=lambda name: times[name]))
+    return Plan(
+        problem.start,
+        tuple(automaton[name] for name in path),
+        durations=[0.0] * len(path),
+        maneuvers=tuple(graph[a][b]["maneuver"] for a, b in itertools.pairwise(path)),
+        start_time=problem.start_time,
+    )
+
+
+def why_not_free(vehicle: Vehicle, course: Course) -> str:
+    """Why a course is not free of what is not of the fleet; empty if it is.
+
+    By the kernels, and where they cannot prove it by the audit's bounds.
+    """
+    problem = vehicle.problem
+    if not problem.obstacles:
+        return ""
+    frame = own_frame(problem.obstacles, problem.goals[0].pose)
+    for shapes, motion in zip(course.shapes, course.motions, strict=True):
+        world = world_of(problem.obstacles, shapes, frame, keep=problem.margin)
+        until = min(course.until, max(problem.quiet_after, float(motion.time[-1])) + 1.0)
+        lasting = np.diff(motion.time, append=max(until, float(motion.time[-1])))
+        still = np.zeros((1, 3))
+        margin = PROVEN if problem.margin <= 0.0 else min(PROVEN, PROVEN_SHARE * problem.margin)
+        free = free_times(
+            world,
+            world.into(motion.pose),
+            twists=np.concatenate([motion.rates, still]),
+            durations=lasting,
+            margin=margin,
+            keep=problem.margin,
+            times=motion.time,
+        )
+        if (free >= lasting).all():
+            continue
+        plan = plan_of_motion(motion, until)
+        least = closest_to(plan, Omnidirectional(), problem.obstacles, footprint=shapes)
+        if least.distance <= max(problem.margin - CONTACT, CONTACT):
+            return f"at {least.time:.6g} s it comes within {least.distance:.3g} m of an obstacle"
+    return ""
+
+
+def least_apart(courses: Mapping[int, Course], one: int, other: int) -> float:
+    """Least distance of two vehicles along their courses [m], by the audit's bounds."""
+    first, second = courses[one], courses[other]
+    quiet = max(first.quiet_after, second.quiet_after)
+    least = math.inf
+    for shapes, motion in zip(first.shapes, first.motions, strict=True):
+        plan = plan_of_motion(motion, min(quiet, first.until))
+        found = closest_to(plan, Omnidirectional(), second.bodies, footprint=shapes)
+        least = min(least, found.distance)
+    return least

@@ -1,0 +1,214 @@
+"""The closed loop of a fleet: everybody holds a plan, and may exchange it for a better one.
+
+*Feasible*: every plan held is free of what is not of the fleet, and any two bodies keep the margin
+for ever, rest included. If all drive the begin of their plans, the rests are feasible. A vehicle
+may exchange its plan for another one that is proven past the plans the others hold now: pairs
+without it are unchanged, so the plans are feasible again, whatever is exchanged in whatever order.
+A vehicle that finds nothing better, or not in time, holds on. So nobody ever has to agree with
+anybody on more than the order of swaps, and no plan is ever lost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton.budget import Budget
+from maneuver_automaton.fleet.agreement import Agreement, Lost
+from maneuver_automaton.fleet.horizon_step import FleetStepUnderWay, LoopSettings, LoopState
+from maneuver_automaton.fleet.log import FleetStep
+from maneuver_automaton.fleet.planning import vehicles_of
+from maneuver_automaton.fleet.problem import FleetProblem
+from maneuver_automaton.fleet.result import FleetResult
+from maneuver_automaton.fleet.vehicle import Found, Vehicle
+from maneuver_automaton.planning.plan import prepare
+from maneuver_automaton.refinement.ready import load_lattice
+
+
+class FleetHorizon:
+    """Model predictive control of a fleet: every vehicle holds a plan, and exchanges it for better.
+
+    In every step the vehicles look for better plans, one after another, past the plans that all
+    others hold at that moment. One is driven only if it is proven apart from all of these for ever
+    and free of what is not of the fleet, costs less, and arrives no later. Whoever finds nothing
+    holds on. Guarantees are asserted in every step; its log has each that is broken, and why.
+
+    Off its plan by no more than its tube, a vehicle rejoins it if that is proven, and otherwise
+    drives on beside it. Beyond, its plan is void: it is planned anew at once.
+
+    Source: Scheffe et al. (2024), *Distributed MPC with prioritization*, for the idea that plans
+    are exchanged one after another; here past the plans held, not past predictions of this step.
+
+    Parameters
+    ----------
+    fleet : FleetProblem
+    step : float
+        delta [s]: the loop closes every so often.
+    first : FleetResult, optional
+        Plans from `plan_fleet` to begin with; who has none rests at its start.
+    margin : float
+        Another plan must cost less by more than this.
+    tube_m : float, optional
+        How far any point of a body may be from where its plan has it [m]; half of the fleet's
+        margin if omitted, and never more.
+    time_limit : float
+        [s] per step, for all searches.
+    swaps_per_step : int, optional
+        Vehicles that look for a better plan in a step; all if omitted, as long as there is time.
+    group_size : int
+        Up to so many exchange their plans at once where the sum falls: some of them may then arrive
+        later. Not where messages may be lost, over which several cannot agree to change at once.
+    delay_steps : int
+        An answer comes so many steps late; meanwhile the plan that is held is driven.
+    lost : callable, optional
+        Whether a message is lost; none is if omitted.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Disc, Problem, Unicycle
+    >>> robot = Automaton.of_controls(
+    ...     Unicycle(), {"rest": (0, 0), "on": (1, 0), "left": (0, 1), "right": (0, -1)}
+    ... )
+    >>> there = Problem(robot, [0, 0, 0], [4, 0, 0], footprint=Disc(0.3))
+    >>> across = Problem(robot, [2, -2, 0], [2, 2, 0], footprint=Disc(0.3))
+    >>> fleet = FleetProblem([there, across], names=["a", "b"])
+    >>> loop = FleetHorizon(fleet, step=0.5)
+    >>> log = loop.step({"a": [0, 0, 0], "b": [2, -2, 0]})
+    >>> [swap.names for swap in log.swaps], log.control_of("a").tolist(), log.violations
+    ([('a',), ('b',)], [1.0, 0.0], ())
+    """
+
+    def __init__(
+        self,
+        fleet: FleetProblem,
+        *,
+        step: float,
+        first: FleetResult | None = None,
+        margin: float = 0.0,
+        tube_m: float | None = None,
+        time_limit: float = 1.0,
+        swaps_per_step: int | None = None,
+        group_size: int = 1,
+        delay_steps: int = 0,
+        lost: Lost | None = None,
+    ) -> None:
+        for name, value in (("step", step), ("time_limit", time_limit)):
+            if not value > 0.0:
+                raise ValueError(f"fleet horizon: {name} must be positive, got {value} s")
+        if not margin >= 0.0:
+            raise ValueError(f"fleet horizon: margin must be at least 0, got {margin}")
+        if tube_m is not None and not 0.0 <= tube_m <= 0.5 * fleet.margin:
+            raise ValueError(
+                f"fleet horizon: tube_m is {tube_m:g} m, need at most half of the margin of the "
+                f"fleet, {fleet.margin:g} m: two bodies may both be off their plans"
+            )
+        for name, count in (("group_size", group_size), ("swaps_per_step", swaps_per_step)):
+            if count is not None and count < 1:
+                raise ValueError(f"fleet horizon: {name} must be at least 1, got {count}")
+        if delay_steps < 0:
+            raise ValueError(f"fleet horizon: delay_steps must be at least 0, got {delay_steps}")
+        vehicles = vehicles_of(fleet)
+        self.fleet = fleet
+        self.state = LoopState(
+            fleet,
+            LoopSettings(
+                step=step,
+                margin=margin,
+                tube_m=0.5 * fleet.margin if tube_m is None else tube_m,
+                time_limit=time_limit,
+                swaps_per_step=swaps_per_step,
+                group_size=group_size if lost is None else 1,
+                delay_steps=delay_steps,
+            ),
+            vehicles,
+            Agreement(fleet.names, lost),
+            _plans_of(first, vehicles),
+        )
+        self._numbers = {name: k for k, name in enumerate(fleet.names)}
+        for one in vehicles:
+            prepare(one.problem, one.workspace)
+        load_lattice()
+
+    def step(
+        self,
+        states: Mapping[str, ArrayLike],
+        *,
+        time: float | None = None,
+        broken_down: Collection[str] = (),
+    ) -> FleetStep:
+        """The plans that all hold from now on, and how they came about.
+
+        Parameters
+        ----------
+        states : mapping of str to (dof,) array_like
+            Measured poses [m, m, rad(, m)] of those that are there. Who is new joins as soon as
+            there is room; who is left out is gone.
+        time : float, optional
+            [s] on the clock of all; a step after the last one if omitted.
+        broken_down : collection of str
+            Who cannot but stop.
+
+        Returns
+        -------
+        FleetStep
+
+        Raises
+        ------
+        ValueError
+            If a name is none of the fleet's, a state is no pose, or time goes backwards.
+        """
+        state, poses = self.state, self._poses_of(states)
+        at = min(one.problem.start_time for one in state.vehicles)
+        if state.last is not None:
+            at = state.last.time + state.settings.step
+        at = at if time is None else time
+        if state.last is not None and not at >= state.last.time:
+            raise ValueError(
+                f"fleet horizon: time is {at:g} s, before the last step, {state.last.time:g} s"
+            )
+        stopped = {self._number_of(name) for name in broken_down}
+        budget = Budget.from_now(state.settings.time_limit)
+        state.last = FleetStepUnderWay(state, at, poses, budget).run(stopped)
+        return state.last
+
+    def _number_of(self, name: str) -> int:
+        if name not in self._numbers:
+            names = ", ".join(self._numbers)
+            raise ValueError(f"fleet horizon: no vehicle is named {name!r}, there are {names}")
+        return self._numbers[name]
+
+    def _poses_of(self, states: Mapping[str, ArrayLike]) -> dict[int, Array]:
+        """Measured poses by number, in its order."""
+        poses = {}
+        for name, measured in states.items():
+            k = self._number_of(name)
+            dof = self.state.vehicles[k].problem.automaton.model.group.dof
+            pose = np.array(as_array(f"state of {name!r}", measured, last=dof))
+            if pose.shape != (dof,):
+                raise ValueError(f"state of {name!r}: got shape {pose.shape}, need ({dof},)")
+            poses[k] = pose
+        return dict(sorted(poses.items()))
+
+
+def _plans_of(first: FleetResult | None, vehicles: Sequence[Vehicle]) -> dict[int, Found]:
+    """The plans of an answer, by number."""
+    if first is None:
+        return {}
+    known = {}
+    for one in vehicles:
+        result = first.results.get(one.name)
+        if result is None or result.plan is None:
+            continue
+        cost = one.problem.cost_of(result.plan)
+        known[one.number] = Found(
+            result.plan, cost, result.goal_index or 0, one.course_of(result.plan)
+        )
+    return known

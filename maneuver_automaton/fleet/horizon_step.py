@@ -1,0 +1,480 @@
+"""One step of a fleet's loop: shift all plans, rejoin, plan anew what is void, exchange, check."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.budget import Budget
+from maneuver_automaton.collision.shapes import Obstacle
+from maneuver_automaton.fleet.agreement import Agreement
+from maneuver_automaton.fleet.conflicts import Course, meetings
+from maneuver_automaton.fleet.guarantees import After, Before, broken, gap_between
+from maneuver_automaton.fleet.held import (
+    LATER,
+    arrival,
+    is_over,
+    leads,
+    left_to_pay,
+    off_plan,
+    proposal,
+    rejoined,
+    rest_of_plan,
+    resting,
+    stopping,
+    why_not_free,
+)
+from maneuver_automaton.fleet.log import FleetGuarantee, FleetStep, FleetViolation, Swap
+from maneuver_automaton.fleet.problem import FleetProblem
+from maneuver_automaton.fleet.vehicle import LONG, QUICK, Found, Vehicle
+from maneuver_automaton.receding_horizon.candidates import within
+from maneuver_automaton.receding_horizon.settings import EXACT
+
+WORTH = 1e-6  # share of its cost that another plan saves at least
+EASED = (1.0, 0.5, 0.0)  # shares of the margin, where a void plan has none that keeps all of it
+LEAST = 1e-3  # [m] kept even then
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class LoopSettings:
+    """How a fleet's loop is closed."""
+
+    step: float  # delta [s]
+    margin: float  # that another plan costs less
+    tube_m: float
+    time_limit: float  # [s] per step
+    swaps_per_step: int | None
+    group_size: int
+    delay_steps: int
+
+
+@dataclass(slots=True, eq=False)
+class LoopState:
+    """What a fleet's loop knows from step to step; vehicles by number."""
+
+    fleet: FleetProblem
+    settings: LoopSettings
+    vehicles: list[Vehicle]
+    agreement: Agreement
+    first: dict[int, Found]  # plans for those that enter
+    held: dict[int, Found] = field(default_factory=dict)
+    arrived: set[int] = field(default_factory=set)
+    broken: set[int] = field(default_factory=set)
+    versions: dict[int, int] = field(default_factory=dict)  # how often a plan was exchanged
+    settled: dict[int, Found] = field(default_factory=dict)  # held, and no way alone is cheaper
+    in_vain: dict[int, list[Found]] = field(default_factory=dict)  # past which nothing was found
+    due: dict[int, tuple[int, Found, Found]] = field(default_factory=dict)  # when, what, for what
+    last: FleetStep | None = None
+
+
+class FleetStepUnderWay:
+    """One step under way; it changes the state of its loop."""
+
+    def __init__(
+        self, state: LoopState, time: float, poses: dict[int, Array], budget: Budget
+    ) -> None:
+        self.state = state
+        self.held = state.held
+        self.vehicles = state.vehicles
+        self.keep = state.fleet.margin
+        self.time = time
+        self.poses = poses
+        self.budget = budget
+        self.number = 0 if state.last is None else state.last.number + 1
+        self.swaps: list[Swap] = []
+        self.asked: list[int] = []
+        self.void: list[int] = []
+        self.refused: list[int] = []
+        self.violations: list[FleetViolation] = []
+        self.off: dict[int, float] = {}
+        self.disturbed: set[int] = set()  # who has another plan not by an exchange of its own
+        self.in_group: set[int] = set()
+        self._left: dict[int, tuple[Found, Course]] = {}  # what is left of courses, by identity
+
+    def run(self, broken_down: set[int]) -> FleetStep:
+        """The step from begin to end."""
+        state = self.state
+        for k in [k for k in self.held if k not in self.poses]:
+            del self.held[k]
+        self._let_in()
+        before = Before.of(self.vehicles, self.held, self.time, state.last)
+        state.agreement.begin(self.number, self.held)
+        self._rejoin()
+        self._stop(broken_down & set(self.held))
+        self._plan_anew()
+        self._note_arrivals()
+        self._exchange_what_is_due()
+        self._exchange()
+        return self._logged(before)
+
+    # -- what is proven
+
+    def _course(self, found: Found) -> Course:
+        """What is left of a plan's course."""
+        known = self._left.get(id(found))
+        if known is None:
+            known = self._left[id(found)] = (found, found.course.after(self.time))
+        return known[1]
+
+    def _first_meeting(self, found: Found, others: Collection[Found], keep: float) -> float:
+        """When a plan first comes within a distance [m] of one of others [s]; inf if never."""
+        if not others:
+            return math.inf
+        courses = {n: self._course(one) for n, one in enumerate((found, *others))}
+        return min((row.time for row in meetings(courses, keep=keep, among=[0])), default=math.inf)
+
+    def _is_proven(self, k: int, found: Found, others: Collection[Found]) -> bool:
+        """Whether a plan keeps apart from others, and is free of what is not of the fleet."""
+        if self._first_meeting(found, others, self.keep) < math.inf:
+            return False
+        return not why_not_free(self.vehicles[k], self._course(found))
+
+    def _expected_by(self, k: int, but: Collection[int] = ()) -> list[Found]:
+        """All plans that others may drive, as a vehicle knows it."""
+        known = self.state.agreement.others_of(k)
+        return [one for j, some in known.items() if j not in but for one in some]
+
+    def _flag(self, guarantee: FleetGuarantee, numbers: Sequence[int], reason: str) -> None:
+        names = tuple(self.vehicles[k].name for k in numbers)
+        self.violations.append(FleetViolation(guarantee, names, reason))
+
+    # -- who is there
+
+    def _let_in(self) -> None:
+        """Those that are new, if they keep apart from all: with their first plan, or at rest."""
+        agreement, at_first = self.state.agreement, self.state.last is None
+        for k in [k for k in self.poses if k not in self.held]:
+            vehicle, pose = self.vehicles[k], self.poses[k]
+            choices = [resting(vehicle, pose, self.time)]
+            first = self.state.first.pop(k, None)
+            if first is not None and off_plan(vehicle, first, self.time, pose) <= EXACT:
+                choices.insert(0, first)
+            others = {id(one): one for one in self.held.values()}
+            for known in agreement.expected.values():
+                others.update({id(one): one for some in known.values() for one in some})
+            for found in choices:
+                proven = self._is_proven(k, found, list(others.values()))
+                if proven and (at_first or agreement.enter(k, found, self.held)):
+                    self.held[k] = found
+                    self.state.versions[k] = 0
+                    self.disturbed.add(k)
+                    break
+            else:
+                self.refused.append(k)
+        if at_first:
+            agreement.start(self.held)
+            for k in self.refused:
+                self._flag(FleetGuarantee.HELD, [k], "it cannot stay where it begins")
+
+    def _note_arrivals(self) -> None:
+        """Whose plan is over: at the goal, or it has none that arrives."""
+        for k, found in self.held.items():
+            if k in self.state.arrived or not leads(found) or not is_over(found, self.time):
+                continue
+            if within(self.poses[k], self.vehicles[k].problem.goals[found.goal_index]):
+                self.state.arrived.add(k)
+            else:  # it stays where its plan ends, and looks for another one
+                self._hold(k, replace(found, cost=math.inf))
+
+    def _hold(self, k: int, found: Found) -> None:
+        """Another plan is held, whatever the others say to it."""
+        self.held[k] = found
+        self.state.versions[k] += 1
+        self.disturbed.add(k)
+        self.state.agreement.announce(k, found)
+
+    # -- off the plan
+
+    def _rejoin(self) -> None:
+        """Those off their plans by no more than their tubes rejoin them; the others' are void."""
+        for k, found in self.held.items():
+            vehicle, pose = self.vehicles[k], self.poses[k]
+            off = off_plan(vehicle, found, self.time, pose)
+            size = 1.0 + float(abs(pose).max())
+            self.off[k] = off = 0.0 if off <= EXACT * size else off
+            if k in self.state.broken or off == 0.0:
+                continue
+            if off > self.state.settings.tube_m:
+                self.void.append(k)
+            elif k not in self.state.arrived:
+                self._rejoin_within(k, found)
+
+    def _rejoin_within(self, k: int, found: Found) -> None:
+        others = self._expected_by(k)
+        for again in rejoined(self.vehicles[k], found, self.time, self.poses[k]):
+            if self._is_proven(k, again, others):
+                if self._agreed(k, again):
+                    self.held[k] = again
+                    self.state.versions[k] += 1
+                    self.disturbed.add(k)
+                    self.off[k] = 0.0
+                return
+
+    def _agreed(self, k: int, found: Found) -> bool:
+        """Whether all others agree to a plan."""
+        return self.state.agreement.agree(k, found, self.held[k], self._refuses)
+
+    def _refuses(self, j: int, found: Found) -> bool:
+        """Whether a vehicle refuses another's plan: it would meet it."""
+        return self._first_meeting(found, [self.held[j]], self.keep) < math.inf
+
+    def _stop(self, broken_down: set[int]) -> None:
+        """Who breaks down stops as soon as it can; plans that would hit it are void."""
+        new = broken_down - self.state.broken
+        for k in sorted(new):
+            self._hold(k, stopping(self.vehicles[k], self.held[k], self.time, self.poses[k]))
+            self.off[k] = 0.0
+        self.state.broken |= new
+        self.void = [k for k in self.void if k not in self.state.broken]
+        stopped = [self.held[k] for k in new]
+        for k, found in self.held.items():
+            if k in self.state.broken or k in self.void or not stopped:
+                continue
+            if self._first_meeting(found, stopped, self.keep) < math.inf:
+                self.void.append(k)
+
+    def _plan_anew(self) -> None:
+        """Plans for those whose plans are void, the most urgent first; the next in its order."""
+        waiting = list(self.void)
+        if len(waiting) > 1:
+            others = {
+                k: [one for j, one in self.held.items() if j != k and j not in waiting]
+                for k in waiting
+            }
+            waiting.sort(key=lambda k: self._first_meeting(self.held[k], others[k], self.keep))
+        while waiting:
+            k = waiting.pop(0)
+            found = self._anew(k, waiting)
+            self._hold(k, found)
+            self.off[k] = off_plan(self.vehicles[k], found, self.time, self.poses[k])
+            self.state.arrived.discard(k)
+
+    def _anew(self, k: int, waiting: Sequence[int]) -> Found:
+        """A plan for a vehicle whose plan is void."""
+        vehicle, pose, held = self.vehicles[k], self.poses[k], self.held[k]
+        all_others = [one for j, one in self.held.items() if j != k]
+        firm = [one for j, one in self.held.items() if j != k and j not in waiting]
+        stop = stopping(vehicle, held, self.time, pose)
+        again = list(rejoined(vehicle, held, self.time, pose))
+        for one in again:
+            if self._is_proven(k, one, all_others):
+                return one
+        for others in (all_others, firm) if waiting else (all_others,):
+            found = self._search(k, self._from_here(k), others, math.inf, most=LONG)[0]
+            if found is not None and self._is_proven(k, found, others):
+                return found
+        for share in EASED:
+            keep = max(share * self.keep, LEAST)
+            for one in (stop, *again):
+                free = self._first_meeting(one, firm, keep) == math.inf
+                if free and not why_not_free(vehicle, self._course(one)):
+                    if share < 1.0:
+                        reason = f"no plan was found that keeps more than {keep:.3g} m"
+                        self._flag(FleetGuarantee.APART, [k], reason)
+                    return one
+        choices = [(self._first_meeting(one, firm, LEAST), n) for n, one in enumerate((stop, held))]
+        when, n = max(choices)
+        reason = f"it meets another vehicle at {when:.6g} s, or what stands still"
+        self._flag(FleetGuarantee.SAFETY, [k], f"unavoidable: {reason}")
+        return (stop, held)[n]
+
+    def _from_here(self, k: int) -> Found:
+        """What a vehicle holds, if it begins where it was measured."""
+        vehicle, found = self.vehicles[k], self.held[k]
+        rest = rest_of_plan(vehicle, found, self.time)
+        return replace(found, plan=replace(rest, start=self.poses[k]))
+
+    # -- exchanges
+
+    def _search(
+        self, k: int, base: Found, others: Collection[Found], known: float, *, most: int = QUICK
+    ) -> tuple[Found | None, Found | None]:
+        """Another plan past the others, and the way alone; None for what does not cost less."""
+        settings = self.state.settings
+        seen: list[Obstacle] = [body for one in others for body in self._course(one).obstacles]
+        return proposal(
+            self.vehicles[k],
+            base,
+            time=self.time,
+            after=0.0 if k in self.void else settings.delay_steps * settings.step,
+            others=seen,
+            budget=self.budget,
+            known=known,
+            most=most,
+        )
+
+    def _left_to_pay(self, k: int) -> float:
+        return left_to_pay(self.vehicles[k], self.held[k], self.time)
+
+    def _better_than(self, cost: float) -> float:
+        """What another plan must cost less than."""
+        if cost == math.inf:
+            return cost
+        return cost - max(self.state.settings.margin, WORTH * (1.0 + abs(cost)))
+
+    def _exchange(self) -> None:
+        """Who may gain looks for a better plan, one after another, in an order that rotates."""
+        settings, state = self.state.settings, self.state
+        able = [
+            k
+            for k in self.held
+            if k not in state.broken and k not in state.arrived and k not in self.void
+        ]
+        turn = self.number % max(len(able), 1)
+        for k in [*able[turn:], *able[:turn]]:
+            most = settings.swaps_per_step
+            if self.budget.is_over or (most is not None and len(self.asked) >= most):
+                return
+            if state.settled.get(k) is self.held[k] or k in state.due:
+                continue
+            around = [self.held[k], *self._expected_by(k)]
+            if _same(state.in_vain.get(k, []), around):
+                continue
+            before = len(self.swaps)
+            self._look_for_better(k)
+            # Later no more is to be had from the same plans: what is left of them is less.
+            if len(self.swaps) == before and not self.budget.is_over:
+                state.in_vain[k] = around
+
+    def _look_for_better(self, k: int) -> None:
+        """A vehicle looks for a plan that costs less and arrives no later; else a group does."""
+        settings, base = self.state.settings, self.held[k]
+        self.asked.append(k)
+        known = self._better_than(self._left_to_pay(k))
+        found, alone = self._search(k, base, self._expected_by(k), known)
+        if alone is None:
+            if leads(base) and not self.budget.is_over:
+                self.state.settled[k] = base
+            return
+        if found is not None and found.arrival <= arrival(base) * (1.0 + LATER) + LATER:
+            if settings.delay_steps:
+                self.state.due[k] = (self.number + settings.delay_steps, found, base)
+            else:
+                self._swap({k: found})
+        elif settings.group_size > 1 and not settings.delay_steps:
+            self._look_in_group(k, alone)
+
+    def _exchange_what_is_due(self) -> None:
+        """Answers that come now: exchanged if the plan is still held, and they are proven now."""
+        for k, (when, found, base) in [*self.state.due.items()]:
+            gone = self.held.get(k) is not base
+            if gone or self.number >= when:
+                del self.state.due[k]
+            if gone or self.number < when or self.off[k] > 0.0:
+                continue
+            if found.plan.start_time < self.time:
+                cost = left_to_pay(self.vehicles[k], found, self.time)
+            else:
+                cost = found.cost
+            if cost < self._better_than(self._left_to_pay(k)):
+                self._swap({k: found})
+
+    def _look_in_group(self, k: int, alone: Found) -> None:
+        """A vehicle and those in its way look for plans whose sum is less."""
+        state = self.state
+        courses = {j: self._course(one) for j, one in self.held.items() if j != k}
+        met = meetings({**courses, k: self._course(alone)}, keep=self.keep, among=[k])
+        near = [row.one if row.other == k else row.other for row in met]
+        movable = [j for j in near if j not in state.broken and j not in state.arrived]
+        group = [k, *movable[: state.settings.group_size - 1]]
+        if len(group) < 2 or any(j in state.due for j in group):
+            return
+        if self.number % 2:
+            group.reverse()
+        others = self._expected_by(k, but=group)
+        found: dict[int, Found] = {}
+        for n, j in enumerate(group):
+            to_come = [self.held[i] for i in group[n + 1 :]]
+            here = [*others, *found.values()]
+            still = [resting(self.vehicles[i], self.poses[i], self.time) for i in group[n + 1 :]]
+            one = None
+            for more in (still, []) if to_come else ([],):
+                one = one or self._search(j, self.held[j], [*here, *more], math.inf)[0]
+            if one is None:
+                return
+            found[j] = one
+        self._swap(found)
+
+    def _swap(self, found: dict[int, Found]) -> None:
+        """Exchange plans if these are proven past all that is held now, each other too, and pay."""
+        before = math.fsum(self._left_to_pay(k) for k in found)
+        after = math.fsum(left_to_pay(self.vehicles[k], one, self.time) for k, one in found.items())
+        if not after < self._better_than(before):
+            return
+        for n, (k, one) in enumerate(found.items()):
+            others = [*self._expected_by(k, but=found), *list(found.values())[:n]]
+            if not self._is_proven(k, one, others):
+                return
+        versions = self.state.versions
+        past = tuple(
+            (self.vehicles[j].name, versions[j]) for j in sorted(self.held) if j not in found
+        )
+        if len(found) == 1:
+            ((k, one),) = found.items()
+            if not self._agreed(k, one):
+                return
+            self.held[k] = one
+        else:
+            for k, one in found.items():
+                self.held[k] = one
+                self.state.agreement.announce(k, one)
+            self.in_group |= set(found)
+        for k in found:
+            versions[k] += 1
+        names = tuple(self.vehicles[k].name for k in found)
+        self.swaps.append(
+            Swap(
+                names=names,
+                before=before,
+                after=after,
+                past=past,
+                holds=tuple((self.vehicles[k].name, versions[k]) for k in found),
+                order=len(self.swaps),
+            )
+        )
+
+    # -- the log
+
+    def _logged(self, before: Before) -> FleetStep:
+        """All of the step, and the guarantees that it broke."""
+        state = self.state
+        courses = {k: self._course(one) for k, one in self.held.items()}
+        after = After(
+            time=self.time,
+            held=self.held,
+            courses=courses,
+            off=self.off,
+            disturbed=self.disturbed,
+            in_group=self.in_group,
+            swaps=self.swaps,
+            tube_m=state.settings.tube_m,
+            keep=self.keep,
+        )
+        self.violations += broken(self.vehicles, state.agreement, before, after)
+        names = [one.name for one in self.vehicles]
+        plans = {names[k]: one.plan for k, one in self.held.items()}
+        return FleetStep(
+            number=self.number,
+            time=self.time,
+            poses={names[k]: self.poses[k] for k in self.held},
+            plans=plans,
+            driven={names[k]: self._from_here(k).plan for k in self.held},
+            values={names[k]: self._left_to_pay(k) for k in self.held},
+            arrivals={names[k]: arrival(one) for k, one in self.held.items()},
+            off_plan={names[k]: self.off[k] for k in self.held},
+            arrived=tuple(names[k] for k in sorted(state.arrived & set(self.held))),
+            swaps=tuple(self.swaps),
+            asked=tuple(names[k] for k in self.asked),
+            void=tuple(names[k] for k in self.void),
+            refused=tuple(names[k] for k in self.refused),
+            gap_m=gap_between(courses, keep=self.keep),
+            violations=tuple(self.violations),
+            solve_s=self.budget.elapsed,
+        )
+
+
+def _same(one: Sequence[Found], other: Sequence[Found]) -> bool:
+    """Whether these are the same plans."""
+    return len(one) == len(other) and all(a is b for a, b in zip(one, other, strict=True))

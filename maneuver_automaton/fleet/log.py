@@ -1,0 +1,151 @@
+"""The log of a fleet's closed loop, step by step, as values."""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton._brief import brief
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.cutting import NOTHING
+from maneuver_automaton.fleet.problem import FleetProblem
+from maneuver_automaton.fleet.result import Closest
+
+
+class FleetGuarantee(enum.Enum):
+    """Guarantees of every step of a fleet's loop."""
+
+    APART = "apart"  # what is left of any two plans held keeps the margin for ever, rest included
+    HELD = "held"  # everybody holds a plan that begins where the vehicle is, to within its tube
+    DECREASE = "value decrease"  # the sum falls by what was driven, and by the gain of the swaps
+    ARRIVAL = "arrival"  # nobody arrives later than its last plan said
+    STILL = "still is free"  # what is left of each plan is free of what is not of the fleet
+    ORDER = "commit order"  # each swap is proven past the plans that are held when it is made
+    KNOWN = "known"  # what a vehicle drives is one of the plans that the others expect of it
+    SAFETY = "safety"  # who cannot keep apart, and cannot stop in time
+    NO_COLLISION = "no collision"  # of any two bodies along what was driven, measured
+
+
+class FleetViolation(NamedTuple):
+    """A guarantee that a step broke, by which vehicles, and why."""
+
+    guarantee: FleetGuarantee
+    names: tuple[str, ...]
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.guarantee.value}: {', '.join(self.names)}: {self.reason}"
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Swap:
+    """Plans exchanged for others: of one vehicle, or of several at once."""
+
+    names: tuple[str, ...]
+    before: float  # sum of the costs of what was left of their plans; inf if one did not arrive
+    after: float
+    past: tuple[tuple[str, int], ...]  # that it was proven past: whose plan, and which
+    holds: tuple[tuple[str, int], ...]  # the plans that are held from then on
+    order: int  # 0 for the first of the step
+
+    __repr__ = brief
+
+    @property
+    def gain(self) -> float:
+        """What is saved; inf if somebody arrives who did not."""
+        return self.before - self.after
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class FleetStep:
+    """One step: where the vehicles are, and the plans they hold from then on, by name."""
+
+    number: int  # 0 for the first
+    time: float  # [s]
+    poses: dict[str, Array]  # as they were measured
+    plans: dict[str, Plan]  # held; each began at its own time, and ends in a rest
+    driven: dict[str, Plan]  # from the measured pose on, at `time`
+    values: dict[str, float]  # cost of what is left; inf if the plan does not arrive
+    arrivals: dict[str, float]  # [s] on the clock of all; inf if the plan does not arrive
+    off_plan: dict[str, float]  # [m] any point of the body from where the plan has it
+    arrived: tuple[str, ...]
+    swaps: tuple[Swap, ...]
+    asked: tuple[str, ...]  # who looked for another plan, in this order
+    void: tuple[str, ...]  # whose plans were void, and planned anew
+    refused: tuple[str, ...]  # who has not been let in yet
+    gap_m: float  # any two bodies keep it over the rest of the plans; the audit's lower bound
+    violations: tuple[FleetViolation, ...]
+    solve_s: float
+    distance_m: float = math.inf  # least of any two bodies along what was driven, measured
+
+    __repr__ = brief
+
+    @property
+    def value(self) -> float:
+        """Cost of what is left of all plans."""
+        return math.fsum(self.values.values())
+
+    def control_of(self, name: str) -> Array | None:
+        """The control of a vehicle from now on; None if it has nothing to do."""
+        plan = self.driven[name]
+        if not plan.primitives or plan.duration <= NOTHING:
+            return None
+        return plan.control_at(plan.start_time)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class FleetLog:
+    """A fleet's closed loop from its begin to where it ended."""
+
+    problem: FleetProblem
+    step: float  # [s]
+    steps: tuple[FleetStep, ...]
+    driven: dict[str, tuple[Plan, ...]]  # piece after piece, from where the vehicle was
+    arrived_s: dict[str, float]  # when each arrived, on the clock of all [s]
+    broken_down: tuple[str, ...]
+    closest: Closest | None  # of all that was driven; None if nobody came near anybody
+    status: str  # reached | steps_spent
+    reason: str = ""
+    cost: float = 0.0  # of all that was driven
+    counts: dict[str, int] = field(default_factory=dict)
+
+    __repr__ = brief
+
+    @property
+    def reached(self) -> bool:
+        """Whether everybody who can has arrived."""
+        return self.status == "reached"
+
+    @property
+    def distance_m(self) -> float:
+        """Least distance of any two bodies along what was driven [m]; inf if none came near."""
+        return math.inf if self.closest is None else self.closest.distance_m
+
+    @property
+    def sum_s(self) -> float:
+        """Sum of the times until those that arrived did [s]."""
+        begins = dict(zip(self.problem.names, self.problem.problems, strict=True))
+        return math.fsum(when - begins[name].start_time for name, when in self.arrived_s.items())
+
+    @property
+    def last_s(self) -> float:
+        """When the last one arrived, on the clock of all [s]."""
+        return max(self.arrived_s.values(), default=0.0)
+
+    @property
+    def violations(self) -> Iterator[tuple[int, FleetViolation]]:
+        """Number of the step and the guarantee it broke, in order."""
+        for step in self.steps:
+            for violation in step.violations:
+                yield step.number, violation
+
+    @property
+    def swaps(self) -> Iterator[tuple[int, Swap]]:
+        """Number of the step and the swap, in order."""
+        for step in self.steps:
+            for swap in step.swaps:
+                yield step.number, swap

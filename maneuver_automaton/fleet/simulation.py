@@ -1,0 +1,311 @@
+"""A fleet's closed loop in simulation: noise, pushes, breakdowns, joining, leaving, lost words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton._interrupts import patient, stopped
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.cutting import NOTHING, head_of, with_samples_at
+from maneuver_automaton.fleet.agreement import Lost
+from maneuver_automaton.fleet.horizon import FleetHorizon
+from maneuver_automaton.fleet.log import FleetGuarantee, FleetLog, FleetStep, FleetViolation
+from maneuver_automaton.fleet.planning import plan_fleet
+from maneuver_automaton.fleet.problem import FleetProblem
+from maneuver_automaton.fleet.result import Closest, FleetResult
+from maneuver_automaton.fleet.vehicle import Vehicle
+from maneuver_automaton.fleet.verdict import measured
+from maneuver_automaton.groups import group_of
+from maneuver_automaton.receding_horizon.disturbance import (
+    Disturbance,
+    Draw,
+    as_driven,
+    checked,
+    draws,
+)
+from maneuver_automaton.receding_horizon.shifting import moves_on
+
+TOUCHES = 1e-9  # [m] what is closer touches
+NEVER: Mapping[str, float] = MappingProxyType({})
+
+
+def simulate_fleet(
+    fleet: FleetProblem,
+    *,
+    step: float,
+    steps: int = 200,
+    disturbance: Disturbance | Mapping[str, Disturbance] | None = None,
+    seed: int = 0,
+    first: FleetResult | None = None,
+    first_time_limit: float = 5.0,
+    margin: float = 0.0,
+    tube_m: float | None = None,
+    time_limit: float = 1.0,
+    swaps_per_step: int | None = None,
+    group_size: int = 1,
+    delay_steps: int = 0,
+    lost: Lost | None = None,
+    joins_s: Mapping[str, float] = NEVER,
+    breaks_s: Mapping[str, float] = NEVER,
+    progress: Callable[[FleetStep], None] | None = None,
+) -> FleetLog:
+    """Close the loop of a fleet until all that can have arrived, or `steps` steps are spent.
+
+    Parameters
+    ----------
+    fleet : FleetProblem
+    step : float
+        delta [s].
+    steps : int
+        At most so many.
+    disturbance : Disturbance, or a mapping of str to Disturbance, optional
+        Of all vehicles, or of each that is named; every one has numbers of its own. Only who drives
+        is disturbed, but anybody may be pushed. Its delay is no matter: see `delay_steps`.
+    seed : int
+        Of the disturbances and the first plans.
+    first : FleetResult, optional
+        Plans to begin with; those of `plan_fleet` if omitted, within `first_time_limit` [s].
+    margin, tube_m, time_limit, swaps_per_step, group_size, delay_steps, lost
+        As in `FleetHorizon`.
+    joins_s : mapping of str to float
+        When vehicles appear at their starts [s]; each joins as soon as there is room.
+    breaks_s : mapping of str to float
+        When vehicles break down [s]: they stop as soon as they can, and stay there.
+    progress : callable, optional
+        Called with every step.
+
+    Returns
+    -------
+    FleetLog
+        Its distances are measured along what was driven, disturbances included.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range, or a name is none of the fleet's.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Disc, Problem, Unicycle
+    >>> robot = Automaton.of_controls(
+    ...     Unicycle(), {"rest": (0, 0), "on": (1, 0), "left": (0, 1), "right": (0, -1)}
+    ... )
+    >>> there = Problem(robot, [0, 0, 0], [4, 0, 0], footprint=Disc(0.3))
+    >>> across = Problem(robot, [2, -2, 0], [2, 2, 0], footprint=Disc(0.3))
+    >>> fleet = FleetProblem([there, across], names=["a", "b"], margin=0.1)
+    >>> log = simulate_fleet(fleet, step=0.5, first_time_limit=1.0)
+    >>> log.reached, sorted(log.arrived_s), log.distance_m > 0.1, [*log.violations]
+    (True, ['a', 'b'], True, [])
+    """
+    if steps < 1:
+        raise ValueError(f"steps must be at least 1, got {steps}")
+    for what, times in (("joins_s", joins_s), ("breaks_s", breaks_s)):
+        for name in times:
+            if name not in fleet.names:
+                raise ValueError(f"{what}: no vehicle is named {name!r}")
+    if first is None:
+        first = _first_plans(fleet, set(joins_s), first_time_limit, seed)
+    loop = FleetHorizon(
+        fleet,
+        step=step,
+        first=first,
+        margin=margin,
+        tube_m=tube_m,
+        time_limit=time_limit,
+        swaps_per_step=swaps_per_step,
+        group_size=group_size,
+        delay_steps=delay_steps,
+        lost=lost,
+    )
+    drives = [_Drive(one, upset) for one, upset in _upsets(loop.state.vehicles, disturbance, seed)]
+    world = _World(loop, drives, step, dict(joins_s), dict(breaks_s))
+    with patient():
+        for number in range(steps):
+            if stopped() or world.is_over:
+                break
+            now = world.advance(number)
+            if progress is not None:
+                progress(now)
+    return world.log()
+
+
+def _first_plans(
+    fleet: FleetProblem, later: set[str], time_limit: float, seed: int
+) -> FleetResult | None:
+    """Plans of those that are there from the begin on."""
+    there = [k for k, name in enumerate(fleet.names) if name not in later]
+    if not there:
+        return None
+    present = FleetProblem(
+        [fleet.problems[k] for k in there],
+        names=[fleet.names[k] for k in there],
+        margin=fleet.margin,
+        leaves=[fleet.leaves[k] for k in there],
+        priority=[fleet.priority[k] for k in there],
+    )
+    return plan_fleet(present, time_limit=time_limit, seed=seed)
+
+
+def _upsets(
+    vehicles: list[Vehicle], disturbance: Disturbance | Mapping[str, Disturbance] | None, seed: int
+) -> Iterator[tuple[Vehicle, Disturbance]]:
+    """Every vehicle with its disturbance, whose numbers are its own."""
+    calm = Disturbance()
+    seeds = np.random.SeedSequence(seed).generate_state(len(vehicles)).tolist()
+    for one, own in zip(vehicles, seeds, strict=True):
+        if isinstance(disturbance, Mapping):
+            upset = disturbance.get(one.name, calm)
+        else:
+            upset = calm if disturbance is None else disturbance
+        dof = one.problem.start.size
+        if upset.twist_scale is not None and not one.at_will:
+            raise ValueError(
+                "fleet: disturbance: twist_scale is for vehicles without inertia: "
+                "a maneuver is driven as its model says"
+            )
+        yield one, checked(replace(upset, seed=int(own) + upset.seed), dof)
+
+
+@dataclass(slots=True, eq=False)
+class _Drive:
+    """A vehicle along the loop."""
+
+    vehicle: Vehicle
+    upset: Disturbance
+    pose: Array = field(init=False)
+    random: Iterator[Draw] = field(init=False)
+    pieces: list[Plan] = field(default_factory=list)
+    cost: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.pose = np.array(self.vehicle.problem.start)
+        self.random = draws(self.upset, self.pose.size)
+
+    def drive(self, plan: Plan, time: float, step: float, number: int, noise: Array) -> Plan:
+        """Drive a plan for a step from where the vehicle is; what was driven."""
+        model = self.vehicle.problem.automaton.model
+        until = time + step - plan.start_time
+        if until <= NOTHING or not plan.trims:
+            piece = Plan(self.pose, (), durations=[], start_time=time)
+        else:
+            cut = with_samples_at(plan, [time + step], model)
+            piece = replace(head_of(cut, until), start=self.pose)
+            self.cost += self.vehicle.problem.cost_of(piece)
+        piece = as_driven(piece, self.upset)
+        self.pieces.append(piece)
+        self.pose = np.array(piece.end)
+        if moves_on(piece):
+            self.pose = self.pose + noise
+        if number in self.upset.pushes:
+            group = group_of(self.pose.size)
+            push = np.array(self.upset.pushes[number], dtype=np.float64)
+            self.pose = np.array((group(self.pose) @ group(push)).pose)
+        return piece
+
+
+@dataclass(slots=True, eq=False)
+class _World:
+    """All vehicles, the loop that drives them, and what happens to them."""
+
+    loop: FleetHorizon
+    drives: list[_Drive]
+    step: float
+    joins_s: dict[str, float]
+    breaks_s: dict[str, float]
+    steps: list[FleetStep] = field(default_factory=list)
+    arrived_s: dict[str, float] = field(default_factory=dict)
+    gone: set[str] = field(default_factory=set)
+    broken: set[str] = field(default_factory=set)
+    closest: Closest | None = None
+
+    @property
+    def time(self) -> float:
+        """The time of the next step [s]."""
+        if self.steps:
+            return self.steps[-1].time + self.step
+        return min(one.vehicle.problem.start_time for one in self.drives)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether all that can have arrived."""
+        names = {one.vehicle.name for one in self.drives}
+        return not names - set(self.arrived_s) - self.broken
+
+    def advance(self, number: int) -> FleetStep:
+        """One step: measure, decide, drive."""
+        time, states, noises = self.time, dict[str, Array](), dict[str, Array]()
+        for one in self.drives:
+            draw, name = next(one.random), one.vehicle.name
+            noises[name] = draw.noise
+            if name not in self.gone and self.joins_s.get(name, -math.inf) <= time:
+                states[name] = one.pose + draw.measurement
+        due = {name for name, at in self.breaks_s.items() if at <= time and name in states}
+        now = self.loop.step(states, time=time, broken_down=due - set(self.arrived_s))
+        self.broken |= due & set(now.plans) - set(now.arrived)
+        driven = {}
+        for k, one in enumerate(self.drives):
+            name = one.vehicle.name
+            if name not in now.plans:
+                continue
+            if name in now.arrived and name not in self.arrived_s:
+                plan = now.plans[name]
+                self.arrived_s[name] = min(time, plan.start_time + plan.duration)
+            if name in now.arrived and one.vehicle.leaves:
+                self.gone.add(name)
+                continue
+            # a void plan may undo an arrival
+            if name not in now.arrived:
+                self.arrived_s.pop(name, None)
+            driven[k] = one.drive(now.driven[name], time, self.step, number, noises[name])
+        self.steps.append(self._judged(now, driven))
+        return self.steps[-1]
+
+    def _judged(self, now: FleetStep, driven: Mapping[int, Plan]) -> FleetStep:
+        """The step with the collisions that were measured along what it drove."""
+        names = [one.vehicle.name for one in self.drives]
+        courses = {
+            k: replace(self.drives[k].vehicle.course_of(piece), until=math.inf)
+            for k, piece in driven.items()
+        }
+        rows = measured(courses, names, keep=self.loop.fleet.margin)
+        hits = []
+        for row in rows:
+            if self.closest is None or row.distance_m < self.closest.distance_m:
+                self.closest = row
+            if row.distance_m <= TOUCHES:
+                reason = f"they touch at {row.time_s:.6g} s"
+                hits.append(FleetViolation(FleetGuarantee.NO_COLLISION, row.pair, reason))
+        least = min((row.distance_m for row in rows), default=math.inf)
+        return replace(now, distance_m=least, violations=(*now.violations, *hits))
+
+    def log(self) -> FleetLog:
+        """The log of all steps."""
+        names = {one.vehicle.name for one in self.drives}
+        left = names - set(self.arrived_s) - self.broken
+        status, reason = "reached", ""
+        if left:
+            status = "steps_spent"
+            reason = f"{', '.join(sorted(left))} did not arrive in {len(self.steps)} steps"
+        return FleetLog(
+            problem=self.loop.fleet,
+            step=self.step,
+            steps=tuple(self.steps),
+            driven={one.vehicle.name: tuple(one.pieces) for one in self.drives},
+            arrived_s=dict(self.arrived_s),
+            broken_down=tuple(sorted(self.broken)),
+            closest=self.closest,
+            status=status,
+            reason=reason,
+            cost=math.fsum(one.cost for one in self.drives),
+            counts={
+                "swaps": sum(len(one.swaps) for one in self.steps),
+                "asked": sum(len(one.asked) for one in self.steps),
+                "messages": self.loop.state.agreement.sent,
+            },
+        )
