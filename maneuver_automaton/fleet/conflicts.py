@@ -97,18 +97,25 @@ class Meeting(NamedTuple):
 
 
 def meetings(
-    courses: Mapping[int, Course], *, keep: float, among: Sequence[int] | None = None
+    courses: Mapping[int, Course],
+    *,
+    keep: float,
+    among: Sequence[int] | None = None,
+    frame: tuple[float, float, float] | None = None,
 ) -> list[Meeting]:
     """Pairs of vehicles that come closer than a distance [m], the first that does so first.
 
     Whatever is not among the pairs keeps the distance at all times, also after all have arrived.
-    Only pairs with one of the vehicles `among`, if these are given.
+    Only pairs with one of the vehicles `among`, if these are given. Places are counted from a pose
+    `frame` nearby, that of the first vehicle if omitted: with the same one all that is prepared for
+    a course is prepared once.
     """
     numbers = sorted(courses)
     if len(numbers) < 2:
         return []
-    first = courses[numbers[0]].motions[0].pose[0]
-    frame = (float(first[0]), float(first[1]), 0.0)
+    if frame is None:
+        first = courses[numbers[0]].motions[0].pose[0]
+        frame = (float(first[0]), float(first[1]), 0.0)
     owners, obstacles = [], []
     for number in numbers:
         bodies = courses[number].bodies

@@ -19,6 +19,8 @@ from maneuver_automaton.fleet.held import (
 from maneuver_automaton.fleet.log import FleetGuarantee, FleetStep, FleetViolation, Swap
 from maneuver_automaton.fleet.vehicle import Found, Vehicle
 
+Frame = tuple[float, float, float]
+
 ACCURACY = 1e-7  # relative, of values: a maneuver that is cut costs as much to within this
 FAR = 1.0  # [m] beyond the margin: what keeps more is not measured
 FINE = 0.02  # [m] to which the distance proven is known
@@ -62,6 +64,7 @@ class After:
     swaps: Sequence[Swap]
     tube_m: float
     keep: float  # [m]
+    frame: Frame
 
 
 def broken(
@@ -85,7 +88,7 @@ def broken(
 
 def _too_near(names: Sequence[str], after: After) -> Iterator[FleetViolation]:
     """Pairs that the kernel cannot prove apart, and the audit's bounds neither."""
-    for row in meetings(after.courses, keep=after.keep):
+    for row in meetings(after.courses, keep=after.keep, frame=after.frame):
         least = least_apart(after.courses, row.one, row.other)
         if least <= max(after.keep - CONTACT, CONTACT):
             pair = (names[row.one], names[row.other])
@@ -132,24 +135,24 @@ def _out_of_order(swaps: Sequence[Swap]) -> Iterator[FleetViolation]:
         versions.update(swap.holds)
 
 
-def gap_between(courses: Mapping[int, Course], *, keep: float) -> float:
+def gap_between(courses: Mapping[int, Course], *, keep: float, frame: Frame) -> float:
     """A distance [m] that any two vehicles are proven to keep from now on, to within 2 cm.
 
     At most a metre more than the distance to keep; 0 if not even that is proven.
     """
     if len(courses) < 2:
         return math.inf
-    if meetings(courses, keep=keep):
+    if meetings(courses, keep=keep, frame=frame):
         return 0.0
     low, high, more = keep, keep + FAR, 2.0 * FINE
     while low + more < high:
-        if meetings(courses, keep=low + more):
+        if meetings(courses, keep=low + more, frame=frame):
             high = low + more
             break
         low, more = low + more, 2.0 * more
     while high - low > FINE and high < keep + FAR:
         middle = 0.5 * (low + high)
-        if meetings(courses, keep=middle):
+        if meetings(courses, keep=middle, frame=frame):
             high = middle
         else:
             low = middle

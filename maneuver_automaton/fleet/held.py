@@ -97,34 +97,46 @@ def off_plan(vehicle: Vehicle, found: Found, time: float, pose: Array) -> float:
 
 def onward(
     vehicle: Vehicle, found: Found, time: float, after: float = 0.0
-) -> tuple[Plan | None, Problem]:
+) -> tuple[Plan | None, Problem | None]:
     """What is committed from a time on, `after` seconds at least, and the problem from its end.
 
-    With inertia, the maneuver under way is driven to its end.
+    With inertia, the maneuver under way is driven to its end, and on to the next trim that the
+    library has; there is no problem where none comes.
     """
-    if vehicle.at_will and after <= 0.0:
-        here = found.plan.pose_at(time)
-        begin = max(time, vehicle.problem.start_time)
-        return None, vehicle.problem.starting_at(here, time=begin)
-    rest = rest_of_plan(vehicle, found, time)
-    busy = max(after, committed(rest, after) + after) if rest.trims else after
-    if not rest.trims or not moves_on(rest):
-        still = _standing(rest, after)
-        return still, vehicle.problem.starting_at(rest.end, time=rest.start_time + after)
-    if rest.duration < busy:
-        head = followed_by(rest, _standing(replace(rest, start=rest.end), busy - rest.duration))
+    rest, own = rest_of_plan(vehicle, found, time), vehicle.problem
+    if not moves_on(rest):
+        head = _standing(rest, after) if after > NOTHING else None
+        return head, own.starting_at(rest.end, time=rest.start_time + after)
+    if vehicle.at_will:
+        busy, name = after, None
     else:
-        head = head_of(
-            with_samples_at(rest, [rest.start_time + busy], vehicle.problem.automaton.model),
-            busy,
-        )
-    trim = rest.trims[0] if busy <= NOTHING else head.trims[-1]
-    problem = vehicle.problem.starting_at(
-        head.end if busy > NOTHING else rest.start,
-        time=rest.start_time + busy,
-        trim=None if vehicle.at_will else trim.name,
-    )
-    return (head if busy > NOTHING else None), problem
+        known = _next_in_library(vehicle, rest, max(after, after + committed(rest, after)))
+        if known is None:
+            return None, None
+        busy, name = known
+    if busy <= NOTHING:
+        return None, own.starting_at(rest.start, time=rest.start_time, trim=name)
+    head = rest
+    if busy < rest.duration - NOTHING:
+        cut = with_samples_at(rest, [rest.start_time + busy], own.automaton.model)
+        head = head_of(cut, busy)
+    elif busy > rest.duration + NOTHING:
+        ended = replace(rest, start=rest.end)
+        head = followed_by(rest, _standing(ended, busy - rest.duration))
+    return head, own.starting_at(head.end, time=rest.start_time + busy, trim=name)
+
+
+def _next_in_library(vehicle: Vehicle, rest: Plan, busy: float) -> tuple[float, str] | None:
+    """When, `busy` seconds on at least, a plan is next in a trim of the library, and in which."""
+    names, begin = vehicle.problem.automaton.trim_names, 0.0
+    between = (*(rest.maneuvers or (None,) * (len(rest.trims) - 1)), None)
+    for trim, lasting, maneuver in zip(rest.trims, rest.durations, between, strict=True):
+        end = begin + float(lasting)
+        if end >= busy - NOTHING and trim.name in names:
+            return max(begin, busy), trim.name
+        begin = end + (0.0 if maneuver is None else maneuver.duration)
+    last = rest.trims[-1]
+    return (max(busy, rest.duration), last.name) if last.name in names else None
 
 
 def _standing(rest: Plan, lasting: float) -> Plan:
@@ -153,6 +165,8 @@ def proposal(
     Both from a time on, with what is committed.
     """
     head, problem = onward(vehicle, found, time, after)
+    if problem is None:
+        return None, None
     there = Vehicle(
         vehicle.number, vehicle.name, problem, vehicle.leaves, vehicle.grown, vehicle.workspace
     )
@@ -208,6 +222,8 @@ def stopping(vehicle: Vehicle, found: Found, time: float, pose: Array) -> Found:
     if vehicle.at_will or not moves_on(rest_of_plan(vehicle, found, time)):
         return resting(vehicle, pose, time)
     head, problem = onward(vehicle, found, time)
+    if problem is None:  # it is driven to its end
+        return replace(found, cost=math.inf)
     plan = head
     if not problem.first_trim.is_rest:
         brake = _brake(problem)

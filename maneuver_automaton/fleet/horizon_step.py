@@ -79,6 +79,8 @@ class FleetStepUnderWay:
         self.held = state.held
         self.vehicles = state.vehicles
         self.keep = state.fleet.margin
+        start = state.vehicles[0].problem.start
+        self.frame = (float(start[0]), float(start[1]), 0.0)
         self.time = time
         self.poses = poses
         self.budget = budget
@@ -123,7 +125,8 @@ class FleetStepUnderWay:
         if not others:
             return math.inf
         courses = {n: self._course(one) for n, one in enumerate((found, *others))}
-        return min((row.time for row in meetings(courses, keep=keep, among=[0])), default=math.inf)
+        met = meetings(courses, keep=keep, among=[0], frame=self.frame)
+        return min((row.time for row in met), default=math.inf)
 
     def _is_proven(self, k: int, found: Found, others: Collection[Found]) -> bool:
         """Whether a plan keeps apart from others, and is free of what is not of the fleet."""
@@ -149,7 +152,7 @@ class FleetStepUnderWay:
             vehicle, pose = self.vehicles[k], self.poses[k]
             choices = [resting(vehicle, pose, self.time)]
             first = self.state.first.pop(k, None)
-            if first is not None and off_plan(vehicle, first, self.time, pose) <= EXACT:
+            if first is not None and self._off(k, first) == 0.0:
                 choices.insert(0, first)
             others = {id(one): one for one in self.held.values()}
             for known in agreement.expected.values():
@@ -175,25 +178,32 @@ class FleetStepUnderWay:
                 continue
             if within(self.poses[k], self.vehicles[k].problem.goals[found.goal_index]):
                 self.state.arrived.add(k)
-            else:  # it stays where its plan ends, and looks for another one
-                self._hold(k, replace(found, cost=math.inf))
+                continue
+            # It stays where it is, or where its plan ends, and looks for another one.
+            stay = resting(self.vehicles[k], self.poses[k], self.time)
+            proven = self._is_proven(k, stay, self._expected_by(k))
+            self._hold(k, stay if proven else replace(found, cost=math.inf))
 
     def _hold(self, k: int, found: Found) -> None:
         """Another plan is held, whatever the others say to it."""
         self.held[k] = found
         self.state.versions[k] += 1
         self.disturbed.add(k)
+        self.off[k] = self._off(k, found)
         self.state.agreement.announce(k, found)
 
     # -- off the plan
 
+    def _off(self, k: int, found: Found) -> float:
+        """How far a vehicle is beside a plan [m]; 0 if by no more than rounding."""
+        pose = self.poses[k]
+        off = off_plan(self.vehicles[k], found, self.time, pose)
+        return 0.0 if off <= EXACT * (1.0 + float(abs(pose).max())) else off
+
     def _rejoin(self) -> None:
         """Those off their plans by no more than their tubes rejoin them; the others' are void."""
         for k, found in self.held.items():
-            vehicle, pose = self.vehicles[k], self.poses[k]
-            off = off_plan(vehicle, found, self.time, pose)
-            size = 1.0 + float(abs(pose).max())
-            self.off[k] = off = 0.0 if off <= EXACT * size else off
+            self.off[k] = off = self._off(k, found)
             if k in self.state.broken or off == 0.0:
                 continue
             if off > self.state.settings.tube_m:
@@ -210,6 +220,9 @@ class FleetStepUnderWay:
                     self.state.versions[k] += 1
                     self.disturbed.add(k)
                     self.off[k] = 0.0
+                    if k in self.state.due:
+                        when, other, _ = self.state.due[k]
+                        self.state.due[k] = (when, other, again)
                 return
 
     def _agreed(self, k: int, found: Found) -> bool:
@@ -225,7 +238,6 @@ class FleetStepUnderWay:
         new = broken_down - self.state.broken
         for k in sorted(new):
             self._hold(k, stopping(self.vehicles[k], self.held[k], self.time, self.poses[k]))
-            self.off[k] = 0.0
         self.state.broken |= new
         self.void = [k for k in self.void if k not in self.state.broken]
         stopped = [self.held[k] for k in new]
@@ -248,7 +260,6 @@ class FleetStepUnderWay:
             k = waiting.pop(0)
             found = self._anew(k, waiting)
             self._hold(k, found)
-            self.off[k] = off_plan(self.vehicles[k], found, self.time, self.poses[k])
             self.state.arrived.discard(k)
 
     def _anew(self, k: int, waiting: Sequence[int]) -> Found:
@@ -293,6 +304,8 @@ class FleetStepUnderWay:
     ) -> tuple[Found | None, Found | None]:
         """Another plan past the others, and the way alone; None for what does not cost less."""
         settings = self.state.settings
+        if is_over(base, self.time):
+            base = self._from_here(k)  # it stands, so it may begin where it was measured
         seen: list[Obstacle] = [body for one in others for body in self._course(one).obstacles]
         return proposal(
             self.vehicles[k],
@@ -362,20 +375,21 @@ class FleetStepUnderWay:
             gone = self.held.get(k) is not base
             if gone or self.number >= when:
                 del self.state.due[k]
-            if gone or self.number < when or self.off[k] > 0.0:
+            if gone or self.number < when:
                 continue
-            if found.plan.start_time < self.time:
-                cost = left_to_pay(self.vehicles[k], found, self.time)
-            else:
-                cost = found.cost
-            if cost < self._better_than(self._left_to_pay(k)):
-                self._swap({k: found})
+            on_it = self._off(k, found) == 0.0
+            again = rejoined(self.vehicles[k], found, self.time, self.poses[k])
+            for one in [found] if on_it else again:
+                if self._swap({k: one}):
+                    break
 
     def _look_in_group(self, k: int, alone: Found) -> None:
         """A vehicle and those in its way look for plans whose sum is less."""
         state = self.state
         courses = {j: self._course(one) for j, one in self.held.items() if j != k}
-        met = meetings({**courses, k: self._course(alone)}, keep=self.keep, among=[k])
+        met = meetings(
+            {**courses, k: self._course(alone)}, keep=self.keep, among=[k], frame=self.frame
+        )
         near = [row.one if row.other == k else row.other for row in met]
         movable = [j for j in near if j not in state.broken and j not in state.arrived]
         group = [k, *movable[: state.settings.group_size - 1]]
@@ -397,16 +411,16 @@ class FleetStepUnderWay:
             found[j] = one
         self._swap(found)
 
-    def _swap(self, found: dict[int, Found]) -> None:
-        """Exchange plans if these are proven past all that is held now, each other too, and pay."""
+    def _swap(self, found: dict[int, Found]) -> bool:
+        """Exchange plans if these pay and are proven past all that is held now, and each other."""
         before = math.fsum(self._left_to_pay(k) for k in found)
         after = math.fsum(left_to_pay(self.vehicles[k], one, self.time) for k, one in found.items())
         if not after < self._better_than(before):
-            return
+            return False
         for n, (k, one) in enumerate(found.items()):
             others = [*self._expected_by(k, but=found), *list(found.values())[:n]]
             if not self._is_proven(k, one, others):
-                return
+                return False
         versions = self.state.versions
         past = tuple(
             (self.vehicles[j].name, versions[j]) for j in sorted(self.held) if j not in found
@@ -414,15 +428,16 @@ class FleetStepUnderWay:
         if len(found) == 1:
             ((k, one),) = found.items()
             if not self._agreed(k, one):
-                return
+                return False
             self.held[k] = one
         else:
             for k, one in found.items():
                 self.held[k] = one
                 self.state.agreement.announce(k, one)
             self.in_group |= set(found)
-        for k in found:
+        for k, one in found.items():
             versions[k] += 1
+            self.off[k] = self._off(k, one)
         names = tuple(self.vehicles[k].name for k in found)
         self.swaps.append(
             Swap(
@@ -434,6 +449,7 @@ class FleetStepUnderWay:
                 order=len(self.swaps),
             )
         )
+        return True
 
     # -- the log
 
@@ -451,6 +467,7 @@ class FleetStepUnderWay:
             swaps=self.swaps,
             tube_m=state.settings.tube_m,
             keep=self.keep,
+            frame=self.frame,
         )
         self.violations += broken(self.vehicles, state.agreement, before, after)
         names = [one.name for one in self.vehicles]
@@ -469,7 +486,7 @@ class FleetStepUnderWay:
             asked=tuple(names[k] for k in self.asked),
             void=tuple(names[k] for k in self.void),
             refused=tuple(names[k] for k in self.refused),
-            gap_m=gap_between(courses, keep=self.keep),
+            gap_m=gap_between(courses, keep=self.keep, frame=self.frame),
             violations=tuple(self.violations),
             solve_s=self.budget.elapsed,
         )
