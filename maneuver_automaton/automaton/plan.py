@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import accumulate
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -93,6 +94,37 @@ class Plan:
                 )
 
     @classmethod
+    def of_parts(
+        cls,
+        start: Array,
+        trims: tuple[Trim, ...],
+        durations: Sequence[float],
+        *,
+        start_time: float,
+    ) -> Plan:
+        """A plan of trims alone, from parts of another plan, which was checked when it was made.
+
+        Checks would take most of the time of cutting a plan.
+
+        Examples
+        --------
+        >>> ahead = Trim(name="ahead", body_velocity=[1.0, 0.0, 0.0], control=[1.0, 0.0])
+        >>> plan = Plan([0.0, 0.0, 0.0], (ahead,), durations=[2.0])
+        >>> Plan.of_parts(plan.start, plan.trims, [0.5], start_time=1.0).end.tolist()
+        [0.5, 0.0, 0.0]
+        """
+        lasting = np.array(durations, dtype=np.float64)
+        lasting.setflags(write=False)
+        if start.flags.writeable:
+            start = start.copy()
+            start.setflags(write=False)
+        plan: Plan = object.__new__(cls)
+        vars(plan).update(
+            start=start, trims=trims, durations=lasting, maneuvers=(), start_time=start_time
+        )
+        return plan
+
+    @classmethod
     def of_primitives(
         cls,
         start: ArrayLike,
@@ -159,11 +191,15 @@ class Plan:
     @cached_property
     def primitives(self) -> tuple[Primitive, ...]:
         """Trims and maneuvers in order; beside maneuvers without the trims that last no time."""
+        if not self.maneuvers:
+            return self.trims
         return tuple(primitive for primitive, _ in self._pieces)
 
     @cached_property
     def primitive_durations(self) -> Array:
         """Duration (m,) of each primitive [s]."""
+        if not self.maneuvers:
+            return self.durations
         return np.array([duration for _, duration in self._pieces], dtype=np.float64)
 
     @cached_property
@@ -211,7 +247,8 @@ class Plan:
     @cached_property
     def switching_times(self) -> Array:
         """Times (m + 1,) at which primitives begin and the plan ends [s]."""
-        return self.start_time + np.concatenate([[0.0], np.cumsum(self.primitive_durations)])
+        ends = list(accumulate(self.primitive_durations.tolist(), initial=0.0))
+        return self.start_time + np.array(ends)
 
     @cached_property
     def switching_poses(self) -> Array:

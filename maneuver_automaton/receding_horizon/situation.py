@@ -98,10 +98,10 @@ class Situation:
         gap = self.settings.gap
         return gap is not None and kept is not None and kept.cost - self.bound <= gap * kept.cost
 
-    @property
+    @cached_property
     def size(self) -> float:
         """The size [m or rad] that errors of rounding grow with."""
-        return 1.0 + float(np.abs(self.here.start).max())
+        return 1.0 + max(map(abs, self.here.start.tolist()))
 
     @cached_property
     def head(self) -> Plan | None:
