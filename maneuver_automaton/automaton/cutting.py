@@ -56,9 +56,9 @@ def head_of(plan: Plan, until: float) -> Plan:
     ([0.25, 0.0, 0.0], [2.0, 0.0, 0.0])
     """
     if not plan.maneuvers:
-        lasting = first_times(plan.durations.tolist(), until)
-        trims = plan.trims[: len(lasting)]
-        return Plan.of_parts(plan.start, trims, lasting, start_time=plan.start_time)
+        heads = first_times(plan.durations.tolist(), until)
+        trims = plan.trims[: len(heads)]
+        return Plan.of_parts(plan.start, trims, heads, start_time=plan.start_time)
     word, times, between, left = [plan.trims[0]], [0.0], list[Maneuver | None](), until
     for k, (trim, duration) in enumerate(zip(plan.trims, plan.durations.tolist(), strict=True)):
         if k and left <= NOTHING:

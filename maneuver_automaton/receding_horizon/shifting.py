@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan, Primitive
 from maneuver_automaton.automaton.cutting import NOTHING, joined, tail_of

@@ -6,8 +6,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numpy as np
-
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING, committed, head_of, joined
@@ -101,7 +99,8 @@ class Situation:
     @cached_property
     def size(self) -> float:
         """The size [m or rad] that errors of rounding grow with."""
-        return 1.0 + max(map(abs, self.here.start.tolist()))
+        numbers: list[float] = self.here.start.tolist()
+        return 1.0 + max(map(abs, numbers))
 
     @cached_property
     def head(self) -> Plan | None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from maneuver_automaton.automaton import Plan
+from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.insertion import search_insertion
@@ -123,12 +124,17 @@ def search_goal(
     return results
 
 
+@kept_by_first
+def _n_moving(automaton: Automaton) -> int:
+    return int(automaton.body_velocities.any(axis=1).sum())
+
+
 def _affordable(problem: Problem, goal: Goal, most_seconds: float = AFFORDABLE) -> bool:
     """Whether every admitted word can be searched in a moment."""
     most = problem.horizon.max_trims
     if most is None or most > MOST_TRIMS - int(goal.free_heading):
         return False
-    moving = int(problem.automaton.body_velocities.any(axis=1).sum())
+    moving = _n_moving(problem.automaton)
     tail = int(goal.free_heading)
     seconds = sum(moving**n * SECONDS_PER_WORD[n + tail] for n in range(1, most + 1))
     return bool(seconds <= most_seconds)
