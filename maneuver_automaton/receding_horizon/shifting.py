@@ -151,9 +151,9 @@ def commute(one: Sequence[float] | Array, other: Sequence[float] | Array) -> boo
 
     Examples
     --------
-    >>> commute(np.array([1.0, 0.0, 0.0]), np.array([-2.0, 0.0, 0.0]))
+    >>> commute([1.0, 0.0, 0.0], [-2.0, 0.0, 0.0])
     True
-    >>> commute(np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+    >>> commute([1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
     False
     """
     bracket = max(
