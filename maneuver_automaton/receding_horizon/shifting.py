@@ -135,7 +135,7 @@ def costliest_first(plan: Plan, rates: Array) -> Plan:
     dear: list[float] = (-rates).tolist()
     for k in moving:
         if not all(commute(twists[j], twists[k]) for j in block):  # a climb commutes with both
-            order += sorted(block, key=dear.__getitem__)
+            order += block if len(block) == 1 else sorted(block, key=dear.__getitem__)
             block = []
         block.append(k)
     order += sorted(block, key=dear.__getitem__)

@@ -309,7 +309,7 @@ class WordScan:
             rows=same.rows,
             targets=np.array(targets, dtype=np.float64),
             periods=tables.periods,
-            reaches=np.minimum(tables.reaches(setup), bounded),
+            reaches=tables.reaches(setup, most=bounded),
             parallel=tables.parallel,
             weights=tables.weights,
             goal=np.array(setup.goal),
@@ -355,8 +355,8 @@ class WordScan:
         if time_s is not None and self.setup.rest is not None:
             left = time_s - float(times.sum())
             if left > 1e-9:
-                word = np.append(word, self.setup.rest)
-                times = np.append(times, left)
+                word = np.array([*word.tolist(), self.setup.rest], dtype=np.int64)
+                times = np.array([*times.tolist(), left])
         if self.own_prices:
             cost += self.problem.cost.switching(self.problem.automaton.body_velocities[word])
         return Word(trims=word, durations=times, cost=cost)
@@ -379,13 +379,16 @@ class _Tables:
     fastest: Array  # [m/s] of these on the way to a goal, in the plane or upwards
     largest: float  # [m] radius of a turn
 
-    def reaches(self, setup: SearchSetup) -> Array:
-        """Longest time of interest per trim: a full turn, or a path well beyond the goal."""
+    def reaches(self, setup: SearchSetup, *, most: float) -> Array:
+        """Longest time of interest per trim: a full turn, or a path well beyond the goal.
+
+        Not more than `most` [s].
+        """
         place = math.hypot(float(setup.goal[0]), float(setup.goal[1]))
         length = max(2.0 * (place + 4.0 * self.largest) + abs(float(setup.goal[3])), 1e-3)
         reaches = self.turns.copy()
         reaches[self.straights] = length / self.fastest
-        return reaches
+        return reaches if most == math.inf else np.minimum(reaches, most)
 
 
 def _row_of(setup: SearchSetup, trim: int) -> int | None:
