@@ -498,11 +498,9 @@ class Problem:
         if longer or self.automaton.translated is not None:  # more turns, or a heading of a trim's
             return replace(self, start=start, start_time=time, horizon=horizon)
         moved: Problem = object.__new__(Problem)
-        for name in _FIELDS:
-            object.__setattr__(moved, name, getattr(self, name))
-        object.__setattr__(moved, "start", start)
-        object.__setattr__(moved, "start_time", time)
-        object.__setattr__(moved, "horizon", horizon)
+        known = vars(self)
+        vars(moved).update({name: known[name] for name in _FIELDS})
+        vars(moved).update(start=start, start_time=time, horizon=horizon)
         moved._check_start()
         return moved
 

@@ -292,7 +292,7 @@ class Situation:
             return kept
         tied = [one for one in everything if one.cost <= least + TIE * (1.0 + abs(least))]
         self.is_sole = len(tied) == 1
-        return min(tied, key=lambda one: one.preference)
+        return tied[0] if self.is_sole else min(tied, key=lambda one: one.preference)
 
     def candidate(self, plan: Plan, index: int, origin: Origin) -> Candidate:
         """A plan from here, with the costs by which it is compared."""
