@@ -97,6 +97,7 @@ class Horizon:
     max_trims: int | None = None  # rest included; None: no limit
     min_coast: float = 0.0  # [s] of every trim but rest
     max_time: float | None = None  # [s] at most, with a free final time
+    stay: bool = False  # at the goal for ever, where nothing may pass later, with a free final time
 
     def __post_init__(self) -> None:
         for name in ("time", "max_time"):
@@ -105,6 +106,8 @@ class Horizon:
                 raise ValueError(f"horizon: {name} must be positive, got {value} s")
         if self.time is not None and self.max_time is not None:
             raise ValueError("horizon: max_time is for a free final time, but time is fixed")
+        if self.time is not None and self.stay:
+            raise ValueError("horizon: stay is for a free final time, but time is fixed")
         if self.max_trims is not None and self.max_trims < 1:
             raise ValueError(f"horizon: max_trims must be at least 1, got {self.max_trims}")
         if not (math.isfinite(self.min_coast) and self.min_coast >= 0.0):
@@ -262,8 +265,7 @@ class Problem:
 
     def __post_init__(self) -> None:
         dof = self.automaton.model.group.dof
-        if isinstance(self.start, _Element):
-            object.__setattr__(self, "start", self.start.pose)
+        object.__setattr__(self, "start", _pose_of(self.start))
         if type(self.cost).__hash__ is None:
             raise ValueError(
                 f"cost: {type(self.cost).__name__} has no hash; need a value that does not change, "
@@ -272,18 +274,8 @@ class Problem:
         object.__setattr__(self, "goals", _as_goals(self.goals))
         if self.automaton.translated is not None:
             self._give_headings(self.automaton.translated)
-        self._check_start()
+        self._check_ends()
         check_size("margin", self.margin)
-        for goal in self.goals:
-            if goal.pose.size != dof:
-                raise ValueError(
-                    f"goal: pose has {goal.pose.size} numbers, need {dof} "
-                    f"for the {self.automaton.model.name}"
-                )
-            if goal.trim is not None:
-                self.automaton.index_of(goal.trim)
-        if self.start_trim is not None:
-            self.automaton.index_of(self.start_trim)
         if self.horizon.time is not None and dof > 2:
             turns = (
                 self.horizon.time * np.abs(self.automaton.body_velocities[:, 2]).max() / math.tau
@@ -307,8 +299,6 @@ class Problem:
                 self.automaton.index_of(trim)
         if not (math.isfinite(self.margin) and self.margin >= 0.0):
             raise ValueError(f"margin must be a number of at least 0, got {self.margin} m")
-        if not self.automaton.is_kinematic:
-            self._check_ends()
 
     def _check_start(self) -> None:
         dof = self.automaton.model.group.dof
@@ -319,6 +309,23 @@ class Problem:
         check_heading("start: pose", self.start)
         if not math.isfinite(self.start_time):
             raise ValueError(f"start: time must be finite, got {self.start_time} s")
+
+    def _check_ends(self) -> None:
+        """Start and goals are poses of the vehicle, and their trims its own."""
+        self._check_start()
+        dof = self.start.size
+        for goal in self.goals:
+            if goal.pose.size != dof:
+                raise ValueError(
+                    f"goal: pose has {goal.pose.size} numbers, need {dof} "
+                    f"for the {self.automaton.model.name}"
+                )
+            if goal.trim is not None:
+                self.automaton.index_of(goal.trim)
+        if self.start_trim is not None:
+            self.automaton.index_of(self.start_trim)
+        if not self.automaton.is_kinematic:
+            self._check_rests()
 
     def _give_headings(self, model: OnlyTranslated) -> None:
         """Start and goals of a vehicle that translations alone move get headings of its trims.
@@ -343,7 +350,7 @@ class Problem:
         )
         object.__setattr__(self, "goals", goals)
 
-    def _check_ends(self) -> None:
+    def _check_rests(self) -> None:
         """A vehicle with inertia begins and ends in a trim."""
         named = [("start", self.start_trim), *(("goal", goal.trim) for goal in self.goals)]
         for what, trim in named:
@@ -475,15 +482,26 @@ class Problem:
         signs = np.sign(rows[:, 0])
         return np.asarray(rows[np.append(True, signs[1:] != signs[:-1])])
 
-    def starting_at(self, start: Array, *, time: float, horizon: Horizon | None = None) -> Problem:
-        """The same problem from another start (dof,) at another time [s].
+    def starting_at(
+        self,
+        start: ArrayLike | _Element,
+        *,
+        time: float,
+        goals: ArrayLike | _Element | Goal | Sequence[Goal] | None = None,
+        trim: str | None = None,
+        horizon: Horizon | None = None,
+    ) -> Problem:
+        """The same problem from another start (dof,) at another time [s], perhaps to other goals.
 
-        What stays the same is not checked again: that takes longer than a search of few words.
+        What stays the same is not checked again: that takes longer than a search of few words. The
+        trim at the start is that of the problem, unless one is named.
 
         Raises
         ------
         ValueError
-            If the start is no pose of the vehicle, or the time is not finite.
+            If the start or a goal is no pose of the vehicle, or the time is not finite.
+        UnknownTrim
+            If a trim is named that the automaton does not have.
 
         Examples
         --------
@@ -493,15 +511,23 @@ class Problem:
         >>> later.start.tolist(), later.start_time, later.goals[0].pose.tolist()
         ([1.0, 1.0, 1.0], 0.5, [1.0, 1.0, 0.0])
         """
-        horizon = self.horizon if horizon is None else horizon
-        longer = (horizon.time or 0.0) > (self.horizon.time or 0.0)
+        changed: dict[str, Any] = {"start": start, "start_time": time}
+        if goals is not None:
+            changed["goals"] = goals
+        if trim is not None:
+            changed["start_trim"] = trim
+        if horizon is not None:
+            changed["horizon"] = horizon
+        longer = horizon is not None and (horizon.time or 0.0) > (self.horizon.time or 0.0)
         if longer or self.automaton.translated is not None:  # more turns, or a heading of a trim's
-            return replace(self, start=start, start_time=time, horizon=horizon)
+            return replace(self, **changed)
         moved: Problem = object.__new__(Problem)
-        known = vars(self)
-        vars(moved).update({name: known[name] for name in _FIELDS})
-        vars(moved).update(start=start, start_time=time, horizon=horizon)
-        moved._check_start()
+        changed["start"] = _pose_of(start)
+        if goals is not None:
+            changed["goals"] = _as_goals(goals)
+        known = {name: self.__dict__[name] for name in _FIELDS}
+        moved.__dict__.update(known, moves=self.moves, **changed)
+        moved._check_ends()
         return moved
 
     def moved(self, by: LieGroup) -> Problem:
@@ -523,6 +549,15 @@ class Problem:
             obstacles=tuple(obstacle.moved(by) for obstacle in self.obstacles),
             zones=tuple(zone.moved(by) for zone in self.zones),
         )
+
+    @functools.cached_property
+    def quiet_after(self) -> float:
+        """When [s] the last moving obstacle has stopped, come or gone; -inf if nothing moves."""
+        times = [-math.inf]
+        for one in self.obstacles:
+            if isinstance(one, Obstacle) and one.motion is not None:
+                times += [float(one.motion.time[-1]), *filter(math.isfinite, one.presence)]
+        return max(times)
 
     @functools.cached_property
     def moves(self) -> bool:
@@ -573,11 +608,18 @@ def _as_parts(
     return {name: as_footprint(shapes) for name, shapes in parts.items()}
 
 
+def _pose_of(value: Any) -> Any:
+    """The pose of a group element; anything else as it is."""
+    known = isinstance(value, np.ndarray | list | tuple)  # to look for attributes takes longer
+    return value.pose if not known and isinstance(value, _Element) else value
+
+
 def _as_goals(value: Any) -> tuple[Goal, ...]:
     if isinstance(value, Goal):
         return (value,)
-    if isinstance(value, _Element):
-        return tuple(Goal(pose=pose) for pose in np.atleast_2d(value.pose))
+    if isinstance(value, tuple) and all(type(one) is Goal for one in value) and value:
+        return value
+    value = _pose_of(value)
     if isinstance(value, Sequence) and any(isinstance(v, Goal | _Element) for v in value):
         return tuple(goal for one in value for goal in _as_goals(one))
     poses = as_array("goal: pose", value)

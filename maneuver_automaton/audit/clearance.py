@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton.audit.frames import Spans
-from maneuver_automaton.audit.pairs import moving_pairs, overlapped, still_pairs
+from maneuver_automaton.audit.pairs import moving_pairs, on_arcs, overlapped, still_pairs
 from maneuver_automaton.audit.passages import Body, Bounds, Pairs, bounds_of, places_of, time_of
 from maneuver_automaton.audit.surroundings import Surroundings
 
@@ -106,12 +106,12 @@ def _sharpened(
         floor = min(floor, float(known.least[~open_].min(initial=math.inf)))
         if not open_.any():
             break
-        pairs = _cut(body, pairs, open_)
+        pairs = _cut(body, around, pairs, open_)
         known = bounds_of(body, around, pairs)
     return least._replace(distance=floor)
 
 
-def _cut(body: Body, pairs: Pairs, open_: NDArray[np.bool_]) -> Pairs:
+def _cut(body: Body, around: Surroundings, pairs: Pairs, open_: NDArray[np.bool_]) -> Pairs:
     """Some stretches in `PARTS` each."""
     cut = np.flatnonzero(open_)
     rows, part = np.repeat(cut, PARTS), np.tile(np.arange(PARTS), cut.size)
@@ -130,4 +130,5 @@ def _cut(body: Body, pairs: Pairs, open_: NDArray[np.bool_]) -> Pairs:
     first, last = pairs.frames[rows, 0], pairs.frames[rows, 1]
     between = np.stack([part, part + 1], axis=1)[..., None] / PARTS
     frames = first[:, None] + between * (last - first)[:, None]
+    on_arcs(frames, body, around, Pairs(places, span, pairs.edge[rows], None))
     return Pairs(places, span, pairs.edge[rows], frames)

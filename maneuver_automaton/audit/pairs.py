@@ -21,6 +21,7 @@ from maneuver_automaton.audit.passages import (
     places_of,
 )
 from maneuver_automaton.audit.surroundings import Surroundings
+from maneuver_automaton.collision.shapes import Motion
 
 CHORD = 0.25  # [rad] of the first stretches
 LONGEST = 64.0  # of which the path of a small body has so many
@@ -66,6 +67,7 @@ def overlapped(body: Body, around: Surroundings, places: Places) -> int:
     now = body.clock + body.frames.times_at(places.spans.element[:1], places.spans.begin[:1])
     frames = frames_at(around, now)[:, 0]
     away = np.abs(corners - points_of(frames)[:, None]).min(axis=1)
+    away[(now < around.present[:, 0]) | (now > around.present[:, 1])] = np.inf
     for number in np.flatnonzero(away <= around.reaches + 2.0 * body.outline.size).tolist():
         first = around.firsts[number]
         if body.in_space and np.isfinite(around.heights[around.moving[first]]).all():
@@ -129,13 +131,16 @@ def _crosses(body: Body, here: _Here, one: Outline) -> NDArray[np.bool_]:
 
 
 def instant(body: Body, around: Surroundings, time: float) -> Pairs:
-    """All edges at a time [s] since the start."""
-    edge = np.concatenate([around.still, around.moving])
+    """All edges that are there at a time [s] since the start."""
+    first, last = around.present.T - body.clock
+    there = ((first <= time) & (time <= last))[around.motion_of_edge[around.moving]]
+    moving = around.moving[there]
+    edge = np.concatenate([around.still, moving])
     places = places_of(body, spans_within(body, time, time))
     frames = np.zeros((edge.size, 2, 3))
     if around.motions:
         now = frames_at(around, np.array([body.clock + time]))
-        frames[around.still.size :] = now[around.motion_of_edge[around.moving]]
+        frames[around.still.size :] = now[around.motion_of_edge[moving]]
     return Pairs(places, np.zeros_like(edge), edge, frames)
 
 
@@ -243,8 +248,12 @@ def moving_pairs(body: Body, around: Surroundings, places: Places) -> Iterator[t
     apart = np.sqrt(point_apart(np.zeros(1), away[:, 0], away[:, 1]))
     reach = body.outline.size + around.reaches[:, None]
     bound = apart - reach - _off_chords(body, places)
+    bound -= 0.125 * places.lasts**2 * around.bends[:, None]
     bound = np.maximum(bound, 0.0)
+    middle = 0.5 * (clock[0] + clock[1])
+    bound[(middle < around.present[:, :1]) | (middle > around.present[:, 1:])] = np.inf
     order = np.argsort(bound, axis=None, kind="stable")
+    order = order[np.isfinite(bound.flat[order])]
     for chosen in np.split(order, NEAREST * 16 ** np.arange(8)):
         if chosen.size:
             yield float(bound.flat[chosen[0]]), _expanded(around, places, every, chosen)
@@ -267,7 +276,9 @@ def _cut_where_motions_change(
     """Stretches within which every obstacle runs evenly, and their ends (2, m) on the clock [s]."""
     begin = body.frames.times_at(spans.element, spans.begin)
     end = body.frames.times_at(spans.element, spans.end)
-    knots = np.unique(np.concatenate([motion.time for motion in around.motions])) - body.clock
+    comes_or_goes = around.present[np.isfinite(around.present)]
+    changes = [*(motion.time for motion in around.motions), comes_or_goes]
+    knots = np.unique(np.concatenate(changes)) - body.clock
     inside = knots[(knots > begin[0]) & (knots < end[-1])]
     times = np.unique(np.concatenate([begin, end, inside]))
     if times.size == 1:
@@ -283,10 +294,32 @@ def _cut_where_motions_change(
 
 
 def frames_at(around: Surroundings, times: Array) -> Array:
-    """Poses (motions, m, 3) of what moves: linear between its times, still before and after."""
-    return np.stack(
-        [
-            np.stack([np.interp(times, motion.time, column) for column in motion.pose.T], axis=1)
-            for motion in around.motions
-        ]
-    )
+    """Poses (motions, m, 3) of what moves: linear or on arcs between its times, else still."""
+    return np.stack([_frames_of(motion, times) for motion in around.motions])
+
+
+def on_arcs(frames: Array, body: Body, around: Surroundings, pairs: Pairs) -> None:
+    """Put frames (m, 2, 3) of pairs where they are, for motions that do not run evenly."""
+    motion, spans = around.motion_of_edge[pairs.edge], pairs.places.spans.of(pairs.span)
+    for number, one in enumerate(around.motions):
+        rows = np.flatnonzero(motion == number)
+        if one.twist is None or not rows.size:
+            continue
+        for k, share in enumerate((spans.begin, spans.end)):
+            now = body.clock + body.frames.times_at(spans.element[rows], share[rows])
+            frames[rows, k] = _frames_of(one, now)
+
+
+def _frames_of(motion: Motion, times: Array) -> Array:
+    """Poses (m, 3) of one frame at times (m,)."""
+    if motion.twist is None or motion.time.size == 1:
+        columns = [np.interp(times, motion.time, column) for column in motion.pose.T]
+        return np.stack(columns, axis=1)
+    inside = np.clip(times, motion.time[0], motion.time[-1])
+    k = np.minimum(np.searchsorted(motion.time, inside, side="right"), motion.time.size - 1) - 1
+    since, (ahead, aside, turn) = inside - motion.time[k], motion.twist[k].T
+    # A chord of an arc leads in the direction that the frame has half way.
+    half = 0.5 * turn * since
+    chord = since * np.sinc(half / np.pi) * directions(motion.pose[k, 2] + half)
+    place = points_of(motion.pose[k]) + (ahead + 1j * aside) * chord
+    return np.stack([place.real, place.imag, motion.pose[k, 2] + 2.0 * half], axis=1)

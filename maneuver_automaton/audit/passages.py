@@ -147,7 +147,8 @@ def bounds_of(body: Body, around: Surroundings, pairs: Pairs, *, overlaps: bool 
     paths[:, n:] = ((world - place) * turn.conj())[:, None]
     sides[0, :n], sides[1, :n] = a, b
     sides[0, n:], sides[1, n:] = own.begins[:, None], own.ends[:, None]
-    near = _near(paths, sides, _off(body, pairs, paths, np.abs(a)), _radius(body, around, pairs))
+    off = _off(body, around, pairs, paths, np.abs(a))
+    near = _near(paths, sides, off, _radius(body, around, pairs))
     doubtful = (near[0] <= 0.0) | overlaps
     coordinates = max(np.abs(one.view(np.float64)).max() for one in (place, a))
     near[1] -= body.doubt * (1.0 + body.outline.most_reach) + ROUNDING * coordinates
@@ -199,19 +200,24 @@ def _near(paths: Points, sides: Points, off: Array, radius: Array | None) -> Arr
     return np.asarray(apart.min(axis=1))
 
 
-def _off(body: Body, pairs: Pairs, paths: Points, end_reach: Array) -> Array:
+def _off(body: Body, around: Surroundings, pairs: Pairs, paths: Points, end_reach: Array) -> Array:
     """How far [m] paths (2, 2 n, m) leave their chords at most: (2 n, m).
 
-    Edges are at distances `end_reach` (m,) from their frames, which run evenly.
+    Edges are at distances `end_reach` (m,) from their frames, which run evenly, or on arcs that
+    bend no more than is known of their motions.
     """
     places, span, reach = pairs.places, pairs.span, body.outline.reach[:, None]
     element, lasts, n = places.spans.element[span], places.lasts[span], reach.size
     speed = body.frames.speed[element]
-    drift = spin = edge_speed = np.zeros(1)
+    drift = spin = edge_speed = bend = np.zeros(1)
     if pairs.frames is not None:
         change = pairs.frames[:, 1] - pairs.frames[:, 0]
         lasting = np.where(lasts > 0.0, lasts, np.inf)  # rounding alone moves it in no time
         drift = np.hypot(change[:, 0], change[:, 1]) / lasting
+        motion = around.motion_of_edge[pairs.edge]
+        moves = (motion >= 0) & (lasts > 0.0)
+        drift = np.maximum(drift, np.where(moves, np.append(around.speeds, 0.0)[motion], 0.0))
+        bend = np.where(moves, np.append(around.bends, 0.0)[motion], 0.0)
         spin = np.abs(change[:, 2]) / lasting
         edge_speed = drift + spin * end_reach
     seen = np.abs(paths[:, n])
@@ -221,10 +227,10 @@ def _off(body: Body, pairs: Pairs, paths: Points, end_reach: Array) -> Array:
     off = places.off[span] + places.off_by_reach[span] * away
     if pairs.frames is not None:
         eighth, turn = 0.125 * lasts * lasts, body.frames.turn[element]
-        off[n:] += eighth * (spin * spin * end_reach + 2.0 * turn * edge_speed)
+        off[n:] += eighth * (spin * spin * end_reach + 2.0 * turn * edge_speed + bend)
         approach, seen = speed + turn * reach + drift, np.abs(paths[:, :n])
         far = 0.5 * (seen[0] + seen[1] + approach * lasts)
-        off[:n] += eighth * spin * (2.0 * approach + spin * far)
+        off[:n] += eighth * (spin * (2.0 * approach + spin * far) + bend)
     return np.asarray(off)
 
 

@@ -34,6 +34,9 @@ class Surroundings:
     heights: Array  # (n, 2) [m] from where to where they stand
     motion_of_edge: IntArray  # (n,) which motion an edge has; -1 if it stands still
     motions: tuple[Motion, ...]
+    present: Array  # (motions, 2) [s] from when until when what moves is there
+    speeds: Array  # (motions,) [m/s] of the frame at most, where it coasts on arcs; else 0
+    bends: Array  # (motions,) [m/s^2] how fast its velocity changes then; else 0
     still: IntArray  # (k,) numbers of the edges that stand still
     moving: IntArray  # those of the others, motion by motion
     firsts: IntArray  # (motions + 1,) where those of each motion begin among them
@@ -88,14 +91,16 @@ def surroundings_around(
 
     outlines, heights, indices = [], [], []
     motions: list[Motion] = []
+    present: list[tuple[float, float]] = []
     for one in obstacles:
         if isinstance(one, OccupancyMap):
-            outline, height, motion = map_outline(one, origin), None, None
+            outline, height, motion, there = map_outline(one, origin), None, None, None
         else:
-            height, motion = one.height, one.motion
+            height, motion, there = one.height, one.motion, one.presence
             outline = outline_of((one.shape,), origin if motion is None else (0.0, 0.0))
-        if motion is not None:
-            motions.append(Motion(motion.time, motion.pose - [*origin, 0.0]))
+        if motion is not None and there is not None:
+            motions.append(Motion(motion.time, motion.pose - [*origin, 0.0], motion.twist))
+            present.append(there)
         outlines.append(outline)
         heights.append(height or (-math.inf, math.inf))
         indices.append(-1 if motion is None else len(motions) - 1)
@@ -113,6 +118,9 @@ def surroundings_around(
         heights=heights_of,
         motion_of_edge=index,
         motions=tuple(motions),
+        present=np.array(present, dtype=np.float64).reshape(-1, 2),
+        speeds=np.array([_fastest(one) for one in motions]),
+        bends=np.array([float(one.bends.max(initial=0.0)) for one in motions]),
         still=still,
         moving=moving,
         firsts=firsts,
@@ -122,6 +130,11 @@ def surroundings_around(
         rounds=bool(whole.radius.any()),
         right=float((whole.begins.real + whole.radius).max(initial=0.0)),
     )
+
+
+def _fastest(motion: Motion) -> float:
+    """How fast [m/s] the frame of what coasts on arcs is at most; 0 for one that runs evenly."""
+    return 0.0 if motion.twist is None else float(motion.speeds.max(initial=0.0))
 
 
 def _reach(outline: Outline) -> float:

@@ -16,7 +16,7 @@ from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton._brief import brief
 from maneuver_automaton._display import Player, picture, player_frame, player_page
 from maneuver_automaton.errors import MissingExtra
-from maneuver_automaton.groups import LieGroup, group_of
+from maneuver_automaton.groups import SE2, LieGroup, group_of
 from maneuver_automaton.groups.chain import chained, coasted, end_of_coasting
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
@@ -259,6 +259,48 @@ class Plan:
         if not (any(self.maneuvers) or "_steps" in vars(self)):
             return coasted(self.start, self._twists, self.primitive_durations)
         return chained(self.start, self._steps)
+
+    @property
+    def coasts(self) -> tuple[Array, Array, Array]:
+        """The plan in the plane as coasts: times (n,) [s], poses (n, 3), twists (n - 1, 3) between.
+
+        Trims are whole; a maneuver coasts from sample to sample of its course.
+
+        Raises
+        ------
+        ValueError
+            If a maneuver has no course.
+        """
+        times, poses = [self.start_time], [self.start[:3]]
+        twists: list[Array] = []
+        begins = self.switching_times
+        for k, primitive in enumerate(self.primitives):
+            lasting = float(self.primitive_durations[k])
+            if not begins[k + 1] > times[-1]:
+                continue
+            here, after = self.switching_poses[k], self.switching_poses[k + 1, :3]
+            if isinstance(primitive, Trim):
+                times.append(float(begins[k + 1]))
+                poses.append(after)
+                twists.append(primitive.body_velocity[:3])
+                continue
+            course = primitive.course
+            if course is None:
+                raise ValueError(f"maneuver {primitive.name!r}: has no course, so no motion")
+            samples = np.array((SE2(here[:3]) @ SE2(course.pose[:, :3])).pose)
+            samples[:, 2] = here[2] + course.pose[:, 2]
+            scale = lasting / float(course.time[-1])
+            since = scale * course.time
+            steps = (SE2(samples[:-1]).inverse() @ SE2(samples[1:])).pose.copy()
+            steps[:, 2] = np.diff(samples[:, 2])
+            for n in range(1, len(since)):
+                at = float(begins[k]) + float(since[n])
+                if not at > times[-1]:
+                    continue
+                twists.append(SE2(steps[n - 1]).log() / (at - times[-1]))
+                times.append(at)
+                poses.append(samples[n])
+        return np.array(times), np.array(poses), np.array(twists).reshape(-1, 3)
 
     @cached_property
     def _steps(self) -> Array:

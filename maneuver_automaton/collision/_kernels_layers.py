@@ -43,6 +43,8 @@ def layer_world(layers: LayerArrays, k: int) -> WorldArrays:
             moving.middle[m_0:m_1],
             moving.reach[m_0:m_1],
             moving.present[m_0:m_1],
+            moving.rate,
+            moving.arcs[m_0:m_1],
         ),
     )
 

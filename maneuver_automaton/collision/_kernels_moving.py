@@ -44,6 +44,11 @@ def obstacle_pose(moving: MovingObstacles, m: int, time: float) -> tuple[float, 
         k = k_1 - 1
         return moving.pose[k, 0], moving.pose[k, 1], moving.pose[k, 2]
     low = knot_before(moving, m, time)
+    if moving.arcs[m]:
+        r_x, r_y, r_turn = moving.rate[low, 0], moving.rate[low, 1], moving.rate[low, 2]
+        d_x, d_y, turn = coast(r_x, r_y, r_turn, time - moving.time[low])
+        x, y, heading = moving.pose[low, 0], moving.pose[low, 1], moving.pose[low, 2]
+        return compose(x, y, heading, d_x, d_y, turn)
     high = low + 1
     share = (time - moving.time[low]) / (moving.time[high] - moving.time[low])
     x = moving.pose[low, 0] + share * (moving.pose[high, 0] - moving.pose[low, 0])
@@ -70,7 +75,7 @@ def closing_of(
     It holds to the next knot, no longer than `most` [s]. `sign` is the direction of time.
     """
     k_0, last = moving.first_knot[m], moving.first_knot[m + 1] - 1
-    m_x, m_y, m_turn = 0.0, 0.0, 0.0
+    m_x, m_y, m_turn, m_bend = 0.0, 0.0, 0.0, 0.0
     # A knot that is reached just now belongs to what comes next, in either direction.
     now = time + sign * SOON
     if now <= moving.time[k_0]:
@@ -79,20 +84,27 @@ def closing_of(
         until = math.inf if sign > 0.0 else time - moving.time[last]
     else:
         k = knot_before(moving, m, now)
-        rate = sign / (moving.time[k + 1] - moving.time[k])
-        m_x = rate * (moving.pose[k + 1, 0] - moving.pose[k, 0])
-        m_y = rate * (moving.pose[k + 1, 1] - moving.pose[k, 1])
-        m_turn = rate * (moving.pose[k + 1, 2] - moving.pose[k, 2])
+        if moving.arcs[m]:
+            r_x, r_y, m_turn = moving.rate[k, 0], moving.rate[k, 1], sign * moving.rate[k, 2]
+            m_heading = moving.pose[k, 2] + moving.rate[k, 2] * (time - moving.time[k])
+            m_c, m_s = math.cos(m_heading), math.sin(m_heading)
+            m_x, m_y = sign * (m_c * r_x - m_s * r_y), sign * (m_s * r_x + m_c * r_y)
+            m_bend = abs(m_turn) * math.hypot(r_x, r_y)
+        else:
+            rate = sign / (moving.time[k + 1] - moving.time[k])
+            m_x = rate * (moving.pose[k + 1, 0] - moving.pose[k, 0])
+            m_y = rate * (moving.pose[k + 1, 1] - moving.pose[k, 1])
+            m_turn = rate * (moving.pose[k + 1, 2] - moving.pose[k, 2])
         until = moving.time[k + 1] - time if sign > 0.0 else time - moving.time[k]
     lasting = min(until + SOON, most)
     # Two points of the two come together no faster than their frames do, and both turns, and as far
-    # as the body's velocity turns until then. Of two that drive side by side one hardly moves, seen
-    # from the other.
+    # as the velocities of both turn until then. Of two that drive side by side one hardly moves,
+    # seen from the other.
     c, s = math.cos(heading), math.sin(heading)
     w_x, w_y = sign * (c * v_x - s * v_y), sign * (s * v_x + c * v_y)
     far = body.reach + abs(body.middle_x) + abs(body.middle_y)
     m_far = moving.reach[m] + abs(moving.middle[m, 0]) + abs(moving.middle[m, 1])
-    closing = math.hypot(w_x - m_x, w_y - m_y) + abs(m_turn) * m_far
+    closing = math.hypot(w_x - m_x, w_y - m_y) + abs(m_turn) * m_far + m_bend * lasting
     if turn_rate != 0.0:
         closing += abs(turn_rate) * (far + lasting * math.hypot(v_x, v_y))
     return closing, lasting
@@ -176,8 +188,12 @@ def free_of_moving(
         if end < 0.0 or begin > free:
             continue
         t, end = max(begin, 0.0), min(end, free)
-        # Seen from the obstacle, no point of the body is faster than both together.
-        fast = speed + moving.speed[m]
+        # Seen from the obstacle, no point of the body is faster than both together; the obstacle
+        # stands before its first knot and after its last.
+        first, last = moving.first_knot[m], moving.first_knot[m + 1] - 1
+        low, high = (clock + t, clock + end) if sign > 0.0 else (clock - end, clock - t)
+        stands = high <= moving.time[first] or low >= moving.time[last]
+        fast = speed if stands else speed + moving.speed[m]
         while True:
             p_x, p_y, p_heading = x, y, heading
             if t > 0.0:

@@ -120,6 +120,8 @@ class FclChecker:
             if hit is not None:
                 return hit[1]
         for one in self._ground.moving:
+            if not one.path.present[0] <= time <= one.path.present[1]:
+                continue
             there = one.path.stretch(time).pose
             if _touching([_standing(self._body)], here[None], one.object, there=there):
                 return one.owner
@@ -252,12 +254,16 @@ class FclChecker:
         if self._ground.static is not None:
             moving = (_Moving(self._ground.static, _AT_REST, -1), *moving)
         least = math.inf
-        moved = travel(seen, self._bare.middle, self._bare.reach)
         for one in moving:
-            others = one.path.at(clock)
+            first, last = one.path.present
+            there = np.flatnonzero((first <= clock) & (clock <= last))
+            if not there.size:
+                continue
+            others = one.path.motion.at(clock[there])
+            moved = travel(seen[there], self._bare.middle, self._bare.reach)
             both = moved + travel(others, np.zeros(2), one.path.reach)
             distance = functools.partial(_distance, _standing(self._bare), one.object)
-            least = least_over_poses(distance, seen, others, moved=both, least=least)
+            least = least_over_poses(distance, seen[there], others, moved=both, least=least)
         return least
 
     def _seen(self, name: str, poses: ArrayLike) -> Array:
@@ -390,8 +396,9 @@ class FclChecker:
                 one = self._ground.moving[number]
                 if meet(
                     coasting,
-                    one.path.from_time(float(clock[k])),
+                    one.path,
                     duration=float(durations[k]),
+                    clock=float(clock[k]),
                     distance=functools.partial(_distance, _standing(body), one.object),
                     contact=0.5 * self.proven,
                 ):
@@ -456,6 +463,7 @@ def _ground_of(
                 middle=complex(*middle),
                 radius=float(np.hypot(*(points - middle).T).max()),
                 half=(half_x, half_y),
+                present=obstacle.presence,
             )
             skin, _ = obstacle_skin([region])
             moving.append(_Moving(_object(skin), path, index))

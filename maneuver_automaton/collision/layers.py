@@ -207,6 +207,8 @@ def _all_moving(
         middle=np.concatenate([one.middle for one in moving]),
         reach=np.concatenate([one.reach for one in moving]),
         present=np.concatenate([one.present for one in moving]),
+        rate=np.concatenate([one.rate for one in moving]),
+        arcs=np.concatenate([one.arcs for one in moving]),
     )
 
 

@@ -22,7 +22,7 @@ from collections.abc import Callable
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision.shapes import Motion
@@ -53,12 +53,7 @@ class CoastingBody(NamedTuple):
 
         Source: Solà, Deray, Atchuthan (2018), Eqs. (156), (158), in half-angle form.
         """
-        v_x, v_y, turn_rate = self.twist
-        x, y, heading = self.start
-        half = 0.5 * turn_rate * time
-        chord = complex(v_x, v_y) * time * (math.sin(half) / half if half else 1.0)
-        place = complex(x, y) + chord * cmath.rect(1.0, heading + half)
-        return place.real, place.imag, heading + turn_rate * time
+        return _after(self.start, self.twist, time)
 
     def center(self, pose: Place) -> complex:
         """Where the middle is at a pose."""
@@ -66,10 +61,10 @@ class CoastingBody(NamedTuple):
 
 
 class MovingBody(NamedTuple):
-    """A body whose frame follows poses in time, linear between, still before and after."""
+    """A body whose frame follows a motion; it is there from a time until another."""
 
-    knots: Array  # (n,) [s]
-    poses: Array  # (n, 3)
+    motion: Motion
+    present: tuple[float, float]  # [s]
     reach: float  # [m] no point is further from the frame's origin
     speed: float  # [m/s] the frame's origin is never faster
     turn_rate: float  # [rad/s] the frame never turns faster
@@ -86,17 +81,17 @@ class MovingBody(NamedTuple):
         middle: complex = 0j,
         radius: float | None = None,
         half: tuple[float, float] | None = None,
+        present: tuple[float, float] = (-math.inf, math.inf),
     ) -> MovingBody:
         """Body that follows a motion and has no point further than `reach` [m] from its frame.
 
         A disc around a `middle` in that frame, of a `radius` [m], is often much smaller: the frame
         of an obstacle may lie anywhere. A rectangle with `half` sides [m] about it may be, too.
         """
-        rates = np.diff(motion.pose, axis=0) / np.diff(motion.time)[:, None]
-        speed = float(np.hypot(rates[:, 0], rates[:, 1]).max(initial=0.0))
-        turn_rate = float(np.abs(rates[:, 2]).max(initial=0))
+        speed = float(motion.speeds.max(initial=0.0))
+        turn_rate = float(motion.turn_rates.max(initial=0.0))
         size = reach if radius is None else radius
-        return cls(motion.time, motion.pose, reach, speed, turn_rate, middle, size, half)
+        return cls(motion, present, reach, speed, turn_rate, middle, size, half)
 
     @property
     def fastest_middle(self) -> float:
@@ -109,30 +104,26 @@ class MovingBody(NamedTuple):
 
     def centers(self, times: Array) -> Array:
         """Where the middle is (n, 2) at times (n,)."""
-        return SE2(self.at(times)).act(np.array([self.middle.real, self.middle.imag]))
-
-    def from_time(self, time: float) -> MovingBody:
-        """A copy whose clock is at zero at `time` [s]."""
-        return self._replace(knots=self.knots - time)
-
-    def at(self, time: ArrayLike) -> Array:
-        """Poses (..., 3) at `time` (...,) [s]."""
-        times = np.asarray(time, dtype=np.float64)
-        return np.stack([np.interp(times, self.knots, self.poses[:, k]) for k in range(3)], axis=-1)
+        return SE2(self.motion.at(times)).act(np.array([self.middle.real, self.middle.imag]))
 
     def stretch(self, time: float) -> Stretch:
         """Where the frame is at a `time` [s], and how it goes on from there."""
-        knots = self.knots
+        knots, poses, twists = self.motion.time, self.motion.pose, self.motion.twist
         k = int(knots.searchsorted(time, side="right"))
-        x, y, heading = self.poses[max(k - 1, 0)].tolist()
+        x, y, heading = poses[max(k - 1, 0)].tolist()
         if k in (0, knots.size):
             until = math.inf if k else float(knots[0])
-            return Stretch((x, y, heading), 0j, 0.0, until)
+            return Stretch((x, y, heading), 0j, 0.0, until, 0.0)
         begin, end = knots[k - 1 : k + 1].tolist()
-        v_x, v_y, turn = ((self.poses[k] - self.poses[k - 1]) / (end - begin)).tolist()
         since = time - begin
+        if twists is not None:
+            v_x, v_y, turn = twists[k - 1].tolist()
+            pose = _after((x, y, heading), (v_x, v_y, turn), since)
+            velocity = complex(v_x, v_y)
+            return Stretch(pose, _direction(pose) * velocity, turn, end, abs(velocity * turn))
+        v_x, v_y, turn = ((poses[k] - poses[k - 1]) / (end - begin)).tolist()
         pose = x + since * v_x, y + since * v_y, heading + since * turn
-        return Stretch(pose, complex(v_x, v_y), turn, end)
+        return Stretch(pose, complex(v_x, v_y), turn, end, 0.0)
 
 
 class Stretch(NamedTuple):
@@ -142,6 +133,7 @@ class Stretch(NamedTuple):
     velocity: complex  # [m/s]
     turn_rate: float  # [rad/s]
     until: float  # [s] how long the rates last
+    bend: float  # [m/s^2] how fast the velocity changes
 
 
 def may_meet(
@@ -212,14 +204,16 @@ def meet(
     other: MovingBody,
     *,
     duration: float,
+    clock: float = 0.0,
     distance: Callable[[Place, Place], float],
     contact: float,
 ) -> bool:
     """Whether two bodies come within `contact` > 0 [m] of each other until `duration` [s].
 
-    True only if they do; False only if they never touch. `distance` is that of the bodies at a
-    pose of the body and one of the other, and is asked for where the discs and rectangles around
-    them are close.
+    The body begins when the other's clock says `clock` [s]; while the other is not there they do
+    not meet. True only if they do; False only if they never touch. `distance` is that of the bodies
+    at a pose of the body and one of the other, and is asked for where the discs and rectangles
+    around them are close.
 
     Source: conservative advancement, Mirtich (1996), *Impulse-based Dynamic Simulation of Rigid
     Body Systems*, Sec. 2.3, here with the least time in which ``a t + b t^2 / 2`` is the distance.
@@ -238,15 +232,22 @@ def meet(
     turning = abs(body.twist[2]) * body.reach
     bend = abs(body.velocity) * abs(body.twist[2])
     fastest = abs(body.velocity) + other.speed + turning + other.turn_rate * other.reach
-    time = 0.0
+    time, duration = max(other.present[0] - clock, 0.0), min(duration, other.present[1] - clock)
+    if time > duration:
+        return False
     while True:
-        here, (there, velocity, turn_rate, until) = body.at(time), other.stretch(time)
+        here, (there, velocity, turn_rate, until, its_bend) = (
+            body.at(time),
+            other.stretch(clock + time),
+        )
+        until -= clock
         own_velocity = _direction(here) * body.velocity
         known = [one for one in apart_at_least(body, other, here, there) if one.distance > contact]
         if known:
             # The middle of the other runs on a circle about its frame.
             arm = 1j * turn_rate * _direction(there) * other.middle
-            closing, both_bend = own_velocity - velocity - arm, bend + abs(turn_rate * arm)
+            closing = own_velocity - velocity - arm
+            both_bend = bend + its_bend + abs(turn_rate * arm)
             spinning = turning, abs(turn_rate) * other.radius
             lasts = max(_lasts(one, closing, spinning, both_bend) for one in known)
             clearance = max(one.distance for one in known)
@@ -255,7 +256,7 @@ def meet(
             if clearance <= contact:
                 return True
             speed = abs(own_velocity - velocity) + turning + abs(turn_rate) * other.reach
-            lasts = _time_to_cover(clearance, speed, bend)
+            lasts = _time_to_cover(clearance, speed, bend + its_bend)
         same_rates = min(time + lasts, until)
         after = max(same_rates, time + clearance / fastest) if fastest > 0.0 else math.inf
         if after > duration or time >= duration:
@@ -280,6 +281,16 @@ def _time_to_cover(distance: float, speed: float, acceleration: float) -> float:
     if speed > 0.0:
         return 2.0 * distance / (speed + root)
     return (root - speed) / acceleration if acceleration > 0.0 else math.inf
+
+
+def _after(start: Place, twist: Twist, time: float) -> Place:
+    """Pose after a coast of `time` [s]."""
+    v_x, v_y, turn_rate = twist
+    x, y, heading = start
+    half = 0.5 * turn_rate * time
+    chord = complex(v_x, v_y) * time * (math.sin(half) / half if half else 1.0)
+    place = complex(x, y) + chord * cmath.rect(1.0, heading + half)
+    return place.real, place.imag, heading + turn_rate * time
 
 
 def _direction(pose: Place) -> complex:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.outline import outlines
@@ -60,6 +61,11 @@ class _Single(NamedTuple):
     part: Part
     motion: Motion
     owner: int
+    present: tuple[float, float] = (-math.inf, math.inf)  # [s]
+
+    def is_away(self, times: Array) -> NDArray[np.bool_]:
+        """Whether it is not there at times (n,) [s]."""
+        return np.asarray((times < self.present[0]) | (times > self.present[1]))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -103,7 +109,11 @@ class Surroundings:
         cores, centers = part.at(poses), SE2(poses).act(part.middle)
         frames = [single.motion.at(times) for single in self.singles]
         between = [
-            np.hypot(*(SE2(frame).act(single.part.middle) - centers).T)
+            np.where(
+                single.is_away(times),
+                math.inf,
+                np.hypot(*(SE2(frame).act(single.part.middle) - centers).T),
+            )
             for single, frame in zip(self.singles, frames, strict=True)
         ]
         reaches = np.array([part.reach + single.part.reach for single in self.singles])
@@ -111,7 +121,8 @@ class Surroundings:
         for single, frame, middles, reach in zip(
             self.singles, frames, between, reaches, strict=True
         ):
-            rows = np.flatnonzero(middles - reach <= np.minimum(limit, best.distance))
+            near = middles - reach <= np.minimum(limit, best.distance)
+            rows = np.flatnonzero(near & np.isfinite(middles))
             away = np.full(len(poses), math.inf)
             apart = shapely.distance(cores[rows], single.part.at(frame[rows]))
             away[rows] = np.maximum(apart - part.radius - single.part.radius, 0.0)
@@ -154,7 +165,8 @@ def surroundings_around(
                 cores.append(part.core)
                 owners.append(index)
             else:
-                singles.append(_Single(part, obstacle.motion or _AT_REST, index))
+                moves = obstacle.motion or _AT_REST
+                singles.append(_Single(part, moves, index, obstacle.presence))
     return Surroundings(
         tree=shapely.STRtree(cores),
         owners=np.array(owners, dtype=np.int64),
@@ -229,8 +241,4 @@ def runs_of(one: OccupancyMap) -> list[Any]:
 
 
 def _speed(single: _Single) -> float:
-    if single.motion.time.size < 2:
-        return 0.0
-    rates = np.diff(single.motion.pose, axis=0) / np.diff(single.motion.time)[:, None]
-    reach = float(np.hypot(*single.part.middle)) + single.part.reach
-    return float((np.hypot(rates[:, 0], rates[:, 1]) + reach * np.abs(rates[:, 2])).max())
+    return single.motion.fastest(float(np.hypot(*single.part.middle)) + single.part.reach)

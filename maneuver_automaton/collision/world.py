@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array, IntArray, wrapped
+from maneuver_automaton._arrays import FEW, Array, IntArray, wrapped
 from maneuver_automaton.collision import _kernels_field
 from maneuver_automaton.collision.body import Body, body_of
 from maneuver_automaton.collision.convex import (
@@ -39,6 +40,9 @@ from maneuver_automaton.groups import SE2
 MOST_FIELD_CELLS = 60_000
 MOST_MAP_CELLS = 250_000  # of the field over an occupancy map, where a cell costs less
 MOST_BUCKETS = 100_000
+ALONG = 0.5  # [rad] of an arc between the places that say where a moving obstacle goes
+SHARE = 10.0**DIGITS  # of a metre or radian that a coordinate is rounded to
+HALF_TURN = float(np.round(np.pi, DIGITS))
 
 
 class Field(NamedTuple):
@@ -76,6 +80,8 @@ class MovingObstacles(NamedTuple):
     middle: Array  # (M, 2) of a disc around it, in its frame
     reach: Array  # (M,) radius of that disc
     present: Array  # (M, 2) [s] it is there from and until; held at its first and last knot beyond
+    rate: Array  # (K, 3) after each knot: of the pose, or the twist in the frame of what coasts
+    arcs: NDArray[np.bool_]  # (M,) whether it coasts on arcs from knot to knot
 
 
 class WorldArrays(NamedTuple):
@@ -99,15 +105,42 @@ class World:
 
     def into(self, pose: Array) -> Array:
         """A pose (..., 3) seen from the world's frame: places first, so that no digit is lost."""
-        turned = np.array(pose, dtype=np.float64)
-        x, y = turned[..., 0] - self.frame[0], turned[..., 1] - self.frame[1]
+        poses = np.asarray(pose, dtype=np.float64)
+        if poses.size <= FEW:
+            rows = poses.reshape(-1, 3).tolist()
+            return np.array([self._one_into(*row) for row in rows]).reshape(poses.shape)
+        x, y = poses[..., 0] - self.frame[0], poses[..., 1] - self.frame[1]
         c, s = np.cos(-self.frame[2]), np.sin(-self.frame[2])
-        turned[..., 0], turned[..., 1] = c * x - s * y, s * x + c * y
-        turned[..., 2] = wrapped(turned[..., 2] - self.frame[2])
-        seen = np.round(turned, DIGITS)
-        half = seen[..., 2] <= -np.round(np.pi, DIGITS)  # half a turn to either side is one pose
+        turned = np.stack(
+            [c * x - s * y, s * x + c * y, wrapped(poses[..., 2] - self.frame[2])], -1
+        )
+        seen: Array = np.round(turned, DIGITS)
+        half = seen[..., 2] <= -HALF_TURN  # half a turn to either side is one pose
         seen[..., 2] = np.where(half, -seen[..., 2], seen[..., 2])
         return seen
+
+    def _one_into(self, x: float, y: float, heading: float) -> tuple[float, float, float]:
+        """The same for one pose, in numbers: some arrays take longer than a first plan may."""
+        to_x, to_y, turn = self.frame.tolist()
+        c, s = float(np.cos(-turn)), float(np.sin(-turn))
+        x, y = x - to_x, y - to_y
+        seen = rounded((heading - turn + np.pi) % (2.0 * np.pi) - np.pi)
+        return (
+            rounded(c * x - s * y),
+            rounded(s * x + c * y),
+            -seen if seen <= -HALF_TURN else seen,
+        )
+
+
+def rounded(value: float) -> float:
+    """A number as `numpy.round` rounds it to `DIGITS` decimals.
+
+    Examples
+    --------
+    >>> rounded(1.00000000051), rounded(-0.2e-9)
+    (1.000000001, -0.0)
+    """
+    return math.copysign(round(value * SHARE) / SHARE, value)
 
 
 @functools.lru_cache(maxsize=64)
@@ -122,7 +155,7 @@ def world_of(
     """The world of obstacles around a footprint, seen from the pose `frame`.
 
     A distance `keep` [m] to everything can be asked for later, up to the one given here. Moving
-    obstacles are there at all times, or from and until the times `present` [s], one pair each.
+    obstacles are there as long as they say, or from and until times `present` [s], one pair each.
 
     Examples
     --------
@@ -133,33 +166,40 @@ def world_of(
     body = body_of(footprint)
     pose = np.array(frame)
     pose.setflags(write=False)
-    still = [o for o in obstacles if isinstance(o, Obstacle) and o.motion is None]
     moving = [o for o in obstacles if isinstance(o, Obstacle) and o.motion is not None]
-    maps = [_seen_map(o, pose) for o in obstacles if isinstance(o, OccupancyMap)]
-    pieces = pieces_seen_from([o.shape for o in still], pose)
-    # Rectangles of maps come last: near contact they are solids as others, but the field takes maps
-    # by a transform of their cells.
-    listed = len(pieces)
-    for one in obstacles:
-        if isinstance(one, OccupancyMap):
-            pieces += [(ring, 0.0) for ring in _cells(one, pose)]
-    solids = solids_of(pieces)
-    always = ((-math.inf, math.inf),) * len(moving)
-    moving_arrays = _moving_obstacles(moving, pose, present or always)
-    box = _box(solids.plates[:, :4], moving_arrays)
-    arrays = WorldArrays(
-        solids=solids,
-        buckets=_buckets(solids.plates, body, keep),
-        field=_field(solids, listed, maps, body, keep),
-        moving=moving_arrays,
-    )
+    static = tuple(o for o in obstacles if isinstance(o, OccupancyMap) or o.motion is None)
+    solids, buckets, field = _static_arrays(static, footprint, frame, keep)
+    there = present or tuple(one.presence for one in moving)
+    followed = [_one_moving(obstacle, frame) for obstacle in moving]
+    moving_arrays = _moving_obstacles(followed, there)
     return World(
         frame=pose,
         body=body,
-        arrays=arrays,
-        box=box,
-        last_event=float(moving_arrays.time.max()) if moving_arrays.time.size else -math.inf,
+        arrays=WorldArrays(solids=solids, buckets=buckets, field=field, moving=moving_arrays),
+        box=_box(solids.plates[:, :4], followed),
+        last_event=_last_event(moving_arrays),
     )
+
+
+@functools.lru_cache(maxsize=64)
+def _static_arrays(
+    static: tuple[AnyObstacle, ...],
+    footprint: tuple[Shape, ...],
+    frame: tuple[float, ...],
+    keep: float,
+) -> tuple[Solids, Buckets, Field]:
+    """What stands still around a footprint: the same, whatever moves beside it."""
+    body, pose = body_of(footprint), np.array(frame)
+    maps = [_seen_map(o, pose) for o in static if isinstance(o, OccupancyMap)]
+    pieces = pieces_seen_from([o.shape for o in static if isinstance(o, Obstacle)], pose)
+    # Rectangles of maps come last: near contact they are solids as others, but the field takes maps
+    # by a transform of their cells.
+    listed = len(pieces)
+    for one in static:
+        if isinstance(one, OccupancyMap):
+            pieces += [(ring, 0.0) for ring in _cells(one, pose)]
+    solids = solids_of(pieces)
+    return solids, _buckets(solids.plates, body, keep), _field(solids, listed, maps, body, keep)
 
 
 def own_frame(obstacles: tuple[AnyObstacle, ...], otherwise: Array) -> tuple[float, ...]:
@@ -204,15 +244,10 @@ def _cells(one: OccupancyMap, frame: Array) -> Array:
     return seen_from(turned + shift, np.array([0.0, 0.0, frame[2]]))
 
 
-def _box(boxes: Array, moving: MovingObstacles) -> Array:
-    rows = [boxes] if len(boxes) else []
-    for k in range(len(moving.speed)):
-        knots = moving.pose[moving.first_knot[k] : moving.first_knot[k + 1]]
-        middles = np.asarray(SE2(knots).act(moving.middle[k]))
-        rows.append(np.hstack([middles - moving.reach[k], middles + moving.reach[k]]))
-    if not rows:
+def _box(boxes: Array, moving: list[_Moving]) -> Array:
+    every = np.concatenate([boxes, *(one.box[None] for one in moving)])
+    if not len(every):
         return np.array([math.inf, math.inf, -math.inf, -math.inf])
-    every = np.concatenate(rows)
     return np.concatenate([every[:, :2].min(axis=0), every[:, 2:].max(axis=0)])
 
 
@@ -264,51 +299,67 @@ def _buckets(plates: Array, body: Body, keep: float) -> Buckets:
     return Buckets(start, items, float(low[0]), float(low[1]), cell, columns, rows, reach)
 
 
+class _Moving(NamedTuple):
+    """One moving obstacle, seen from a world's frame."""
+
+    pieces: list[tuple[Array, float]]
+    motion: Motion
+    rate: Array  # (n, 3)
+    speed: float
+    middle: Array
+    reach: float
+    box: Array  # (4,) [low x, low y, high x, high y] of where it goes
+
+
 def _moving_obstacles(
-    moving: list[Obstacle], frame: Array, present: tuple[tuple[float, float], ...]
+    every: list[_Moving], present: tuple[tuple[float, float], ...]
 ) -> MovingObstacles:
-    pieces: list[tuple[Array, float]] = []
-    first_piece, first_knot = [0], [0]
-    times, poses, speeds, middles, reaches = [], [], [], [], []
-    for obstacle in moving:
-        assert obstacle.motion is not None
-        own = convex_pieces(obstacle.shape)
-        pieces += own
-        first_piece.append(len(pieces))
-        low = np.min([ring.min(axis=0) - r for ring, r in own], axis=0)
-        high = np.max([ring.max(axis=0) + r for ring, r in own], axis=0)
-        middle = 0.5 * (low + high)
-        motion = _seen_motion(obstacle.motion, frame)
-        times.append(motion.time)
-        poses.append(motion.pose)
-        first_knot.append(first_knot[-1] + motion.time.size)
-        middles.append(middle)
-        reaches.append(max(float(np.hypot(*(ring - middle).T).max()) + r for ring, r in own))
-        speeds.append(_speed(motion, own))
+    knots = [one.motion.time.size for one in every]
     return MovingObstacles(
-        solids=solids_of(pieces),
-        first_piece=np.array(first_piece, dtype=np.int64),
-        first_knot=np.array(first_knot, dtype=np.int64),
-        time=np.concatenate([np.zeros(0), *times]),
-        pose=np.concatenate([np.zeros((0, 3)), *poses]),
-        speed=np.array(speeds, dtype=np.float64),
-        middle=np.array(middles, dtype=np.float64).reshape(-1, 2),
-        reach=np.array(reaches, dtype=np.float64),
+        solids=solids_of([piece for one in every for piece in one.pieces]),
+        first_piece=np.cumsum([0, *(len(one.pieces) for one in every)], dtype=np.int64),
+        first_knot=np.cumsum([0, *knots], dtype=np.int64),
+        time=np.concatenate([np.zeros(0), *(one.motion.time for one in every)]),
+        pose=np.concatenate([np.zeros((0, 3)), *(one.motion.pose for one in every)]),
+        speed=np.array([one.speed for one in every], dtype=np.float64),
+        middle=np.array([one.middle for one in every], dtype=np.float64).reshape(-1, 2),
+        reach=np.array([one.reach for one in every], dtype=np.float64),
         present=np.array(present, dtype=np.float64).reshape(-1, 2),
+        rate=np.concatenate([np.zeros((0, 3)), *(one.rate for one in every)]),
+        arcs=np.array([one.motion.twist is not None for one in every], dtype=np.bool_),
     )
+
+
+@functools.lru_cache(maxsize=1024)
+def _one_moving(obstacle: Obstacle, frame: tuple[float, ...]) -> _Moving:
+    """A moving obstacle as a world sees it: the same for all bodies, and whatever is beside it."""
+    assert obstacle.motion is not None
+    own = convex_pieces(obstacle.shape)
+    low = np.min([ring.min(axis=0) - r for ring, r in own], axis=0)
+    high = np.max([ring.max(axis=0) + r for ring, r in own], axis=0)
+    middle = 0.5 * (low + high)
+    motion = _seen_motion(obstacle.motion, np.array(frame))
+    far = max(float(np.hypot(*ring.T).max()) + r for ring, r in own)
+    reach = max(float(np.hypot(*(ring - middle).T).max()) + r for ring, r in own)
+    way = np.asarray(SE2(motion.at(motion.times_for_lines(ALONG))).act(middle))
+    return _Moving(
+        pieces=own,
+        motion=motion,
+        rate=np.vstack([motion.rates, np.zeros(3)]),
+        speed=motion.fastest(far),
+        middle=middle,
+        reach=reach,
+        box=np.concatenate([way.min(axis=0) - reach, way.max(axis=0) + reach]),
+    )
+
+
+def _last_event(moving: MovingObstacles) -> float:
+    """When the last obstacle stops, or comes, or goes [s]."""
+    times = np.concatenate([moving.time, moving.present.ravel()])
+    return float(times[np.isfinite(times)].max(initial=-math.inf))
 
 
 def _seen_motion(motion: Motion, frame: Array) -> Motion:
     there = motion.moved(SE2(np.array([-frame[0], -frame[1], 0.0])))
     turned = there.moved(SE2(np.array([0.0, 0.0, -frame[2]])))
-    return Motion(turned.time, np.round(turned.pose, DIGITS))
-
-
-def _speed(motion: Motion, pieces: list[tuple[Array, float]]) -> float:
-    """No point of the obstacle is ever faster."""
-    if motion.time.size < 2:
-        return 0.0
-    # Linear between knots, the heading too: the rates of a stretch hold all along it.
-    step = np.diff(motion.pose, axis=0) / np.diff(motion.time)[:, None]
-    far = max(float(np.hypot(*ring.T).max()) + r for ring, r in pieces)
-    return float((np.hypot(step[:, 0], step[:, 1]) + far * np.abs(step[:, 2])).max())
+    return Motion(turned.time, np.round(turned.pose, DIGITS), turned.twist)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision import AnyObstacle, Disc
 from maneuver_automaton.collision.advancement import clearances
@@ -24,15 +26,19 @@ CLEARLY = 1e-6  # [m] a clearance beyond the margin that leaves no doubt
 def blocked_ends(problem: Problem) -> PlanResult | None:
     """The verdict, if the start or every goal is out of bounds or touches an obstacle."""
     reason = outside(problem.start, problem.bounds)
+    sure = _surely_free(problem)
     if reason:
         reason = f"the start is outside the bounds: {reason}"
-    elif problem.obstacles:
+    elif problem.obstacles and not sure[0]:
         said = where_touched(problem, problem.start, problem.start_time)
         said = said or _part_touched(problem, problem.start_trim, problem.start, problem.start_time)
         reason = f"at the start {said}" if said else ""
     if reason:
         return PlanResult(problem=problem, status=PlanStatus.START_BLOCKED, reason=reason)
-    reasons = [why_goal_blocked(problem, goal) for goal in problem.goals]
+    reasons = [
+        why_goal_blocked(problem, goal, free=free)
+        for goal, free in zip(problem.goals, sure[1:], strict=True)
+    ]
     if all(reasons):
         many = f"every goal is blocked; the first: {reasons[0]}"
         return PlanResult(
@@ -43,12 +49,29 @@ def blocked_ends(problem: Problem) -> PlanResult | None:
     return None
 
 
-def why_goal_blocked(problem: Problem, goal: Goal) -> str:
-    """Why no plan can end at a goal; empty if one may. Moving obstacles may be gone on arrival."""
+def _surely_free(problem: Problem) -> list[bool]:
+    """Whether the kernels prove the start and every goal (1 + n,) free, all in one call.
+
+    Not asked for where heights matter, where something moves, or for what a vehicle carries.
+    """
+    none = [False] * (1 + len(problem.goals))
+    if not problem.obstacles or problem.parts or problem.start.size > 3 or problem.moves:
+        return none
+    world = world_around(problem)
+    poses = np.array([problem.start, *(goal.pose for goal in problem.goals)])
+    aside = clearances(world, world.into(poses)).tolist()
+    return [one > problem.margin + CLEARLY for one in aside]
+
+
+def why_goal_blocked(problem: Problem, goal: Goal, *, free: bool = False) -> str:
+    """Why no plan can end at a goal; empty if one may, as where its pose is known to be `free`.
+
+    Moving obstacles may be gone on arrival.
+    """
     reason = outside(goal.pose, problem.bounds)
     if reason:
         return f"the goal is outside the bounds: {reason}"
-    if not problem.obstacles:
+    if free or not problem.obstacles:
         return ""
     if goal.free_heading and problem.footprint:  # only what touches at every heading counts
         inside = body_of(problem.footprint).inscribed

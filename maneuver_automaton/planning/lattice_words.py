@@ -29,7 +29,6 @@ from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
 from maneuver_automaton.refinement.restarts import restarts_of
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable, cost_to_go_table
 from maneuver_automaton.search.lattice import FirstPlan, first_plan
-from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.waiting import with_waits
 from maneuver_automaton.search.word_plan import plan_of_word
@@ -180,7 +179,7 @@ def _first(lattice: LatticeWords) -> FirstPlan | None:
     if query.problem.moves and lattice.knows_all:
         first = lattice.first_plan(query, limit, most=QUICK)
         if first.word is not None:
-            lattice.gained(with_cost(first.word, query))
+            lattice.gained(first.word)
             return first
         path = lattice.first_plan(_among_static(query), limit)
         timed = None if path.word is None else with_waits(query, path.word)
@@ -189,7 +188,7 @@ def _first(lattice: LatticeWords) -> FirstPlan | None:
             return first
     first = lattice.first_plan(query, limit)
     if first.word is not None:
-        lattice.gained(with_cost(first.word, query))
+        lattice.gained(first.word)
     return first
 
 
@@ -315,7 +314,7 @@ def _detours(lattice: LatticeWords, best: Word, most: int) -> Iterator[Candidate
             first = lattice.first_plan(closed, lattice.for_others)
             if first.word is None:
                 continue
-            word = with_cost(first.word, closed)
+            word = first.word
             for where in (closed, query):  # away from the stone, then without it
                 patience = SOME if where is closed else AT_ONCE
                 word = lattice.improve(where, word, lattice.for_others, patience=patience).word

@@ -62,6 +62,7 @@ class Planner:
     zones: tuple[Zone, ...] = field(default=(), kw_only=True)
     start_trim: str | None = field(default=None, kw_only=True)  # of queries that name none
     workspace: Workspace = field(init=False)  # what its queries share
+    _first: Problem = field(init=False)  # a query whose every value was checked
 
     __repr__ = brief
 
@@ -90,11 +91,15 @@ class Planner:
         object.__setattr__(self, "zones", tuple(self.zones))
         object.__setattr__(self, "workspace", Workspace(self.obstacles))
         automaton = self.automaton
-        # A vehicle without a rest has to be given a trim to end in; any will do here.
-        last = None if automaton.rest is not None else automaton.trim_names[0]
+        # With inertia, without a rest, it has to be given a trim to end in; any will do here.
+        at_will = automaton.is_kinematic and not automaton.model.reduced_names
+        named = not at_will and automaton.rest is None
+        last = automaton.trim_names[0] if named else None
         here = origin_of(automaton, automaton.trims[0])
         aim = Goal(pose=np.where(np.arange(here.size) == 2, here, 1.0), trim=last)
-        prepare(self.problem(here, aim, start_trim=self.start_trim or last), self.workspace)
+        first = self._problem(here, aim, start_trim=self.start_trim or last)
+        object.__setattr__(self, "_first", first)
+        prepare(first, self.workspace)
 
     def problem(
         self,
@@ -105,6 +110,19 @@ class Planner:
         start_trim: str | None = None,
     ) -> Problem:
         """The problem of one query; `start_trim` goes before the planner's own."""
+        trim = self.start_trim if start_trim is None else start_trim
+        if trim is None and self._first.start_trim is not None:
+            return self._problem(start, goals, start_time=start_time, start_trim=None)
+        return self._first.starting_at(start, time=start_time, goals=goals, trim=trim)
+
+    def _problem(
+        self,
+        start: ArrayLike,
+        goals: ArrayLike | Goal | Sequence[Goal],
+        *,
+        start_time: float = 0.0,
+        start_trim: str | None,
+    ) -> Problem:
         return Problem(
             self.automaton,
             start,
@@ -120,7 +138,7 @@ class Planner:
             margin=self.margin,
             zones=self.zones,
             start_time=start_time,
-            start_trim=self.start_trim if start_trim is None else start_trim,
+            start_trim=start_trim,
         )
 
     def plan(

@@ -190,7 +190,6 @@ class Improvement:
             self.expansions += one.expansions - done
             self.queries += one.queries - asked
             one.chunk = min(2 * one.chunk, MOST_CHUNK)
-            word = None if word is None else with_cost(word, self.query)
             if word is not None and word.cost < last and not self._over():
                 last = word.cost
                 yield from self._made_of(word, restart)

@@ -10,7 +10,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton._brief import brief
-from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Polygon, Shape
+from maneuver_automaton.collision import Box, Disc, Obstacle, Polygon, Shape
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads.goal_region import GoalRegion
 from maneuver_automaton.roads.lanelets import Lanelet
@@ -146,7 +146,7 @@ def _near_shape(shape: Shape, digits: int | None) -> Shape:
 def _near_obstacle(one: Obstacle, digits: int | None) -> Obstacle:
     if one.motion is None:
         return replace(one, shape=_near_shape(one.shape, digits))
-    return replace(one, motion=Motion(one.motion.time, _near(one.motion.pose, digits)))
+    return replace(one, motion=replace(one.motion, pose=_near(one.motion.pose, digits)))
 
 
 def presence_of(one: Obstacle) -> tuple[float, float]:

@@ -265,6 +265,8 @@ class Obstacle(Part):
         "unknown": ("map",),
         "height_m": ("polygon_m", "disc_m", "box_m"),
         "motion": ("polygon_m", "disc_m", "box_m"),
+        "twists": ("motion",),
+        "present_s": ("polygon_m", "disc_m", "box_m"),
     }
 
     polygon_m: Polygon | None = Field(None, description="corners [x, y]")
@@ -286,6 +288,14 @@ class Obstacle(Part):
         ]
         | None
     ) = Field(None, description="poses in time, linear between")
+    twists: (
+        Annotated[
+            tuple[Pose, ...],
+            Several("a list of [v_x, v_y, turn rate], one for every pose but the last", at_least=0),
+        ]
+        | None
+    ) = Field(None, description="velocities in its own frame after each pose: it moves on arcs")
+    present_s: Interval | None = Field(None, description="[from, to]: it is there then alone")
 
 
 class SearchPart(Part):

@@ -20,6 +20,7 @@ from maneuver_automaton.collision import (
     Shape,
     Zone,
 )
+from maneuver_automaton.collision.shapes import STANDS
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.nav2_map import load_nav2_map
 from maneuver_automaton.formats.polygons import simple_polygon
@@ -157,9 +158,13 @@ def stated_obstacle(obstacle: AnyObstacle, maps: Sequence[MapFile], folder: Path
     entry = _stated_shape(obstacle.shape)
     if obstacle.height is not None:
         entry["height_m"] = [float(z) for z in obstacle.height]
-    if obstacle.motion is not None:
+    if obstacle.motion is not None and obstacle.motion is not STANDS:
         motion = obstacle.motion
         entry["motion"] = np.column_stack([motion.time, motion.pose]).tolist()
+        if motion.twist is not None:
+            entry["twists"] = motion.twist.tolist()
+    if obstacle.present_s is not None:
+        entry["present_s"] = [float(time) for time in obstacle.present_s]
     return entry
 
 
@@ -178,14 +183,15 @@ def _obstacle(document: Document, part: schema.Obstacle, k: int) -> Obstacle:
     if part.motion is not None:
         rows = np.array(part.motion)
         try:
-            motion = Motion(rows[:, 0], rows[:, 1:])
+            motion = Motion(rows[:, 0], rows[:, 1:], part.twists)
         except ValueError as error:
-            where = ("obstacles", k, "motion")
+            where = ("obstacles", k, "motion" if part.twists is None else "twists")
             raise document.error(where, str(error).removeprefix("motion: ")) from error
     return Obstacle(
         _shape(document, part, ("obstacles", k)),
         height=part.height_m,
         motion=motion,
+        present_s=part.present_s,
         name=f"obstacle {k + 1}",
     )
 

@@ -13,11 +13,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from maneuver_automaton._compile import bare_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.search._kernels_distance import push
 from maneuver_automaton.search._kernels_estimate import cost_to_go
 from maneuver_automaton.search._kernels_expansion import connect_ends
 from maneuver_automaton.search._kernels_nodes import (
+    BEGUN,
     CLOSED,
     EXPANSIONS,
     FOUND,
@@ -50,36 +51,6 @@ if TYPE_CHECKING:
 
 
 @bare_kernel
-def begin(
-    search: SearchArrays,
-    task: Task,
-    lib: LatticeArrays,
-    scene: Scene,
-    grid: DistanceGrid,
-    table: CostTable,
-) -> None:
-    """Push the roots of a search; what was searched before is forgotten."""
-    state, found = search.state, search.found
-    generation = state[GENERATION] + 1  # which frees all rows of the hash table at once
-    for k in range(state.shape[0]):
-        state[k] = 0
-    state[GENERATION] = generation
-    found[0] = math.inf
-    for r in range(task.roots.shape[0]):
-        pose = (task.roots[r, 0], task.roots[r, 1], task.roots[r, 2], task.roots[r, 3])
-        x, y, heading, z = pose
-        trim = task.root_trims[r]
-        estimate = cost_to_go(task, grid, table, scene.layers.plane, pose, trim)
-        key = cell_key(task, x, y, heading, z, layer_of(task, lib, trim, 0, 0), 0.0, 0)
-        slot = slot_of(search.table, generation, key)
-        # A root that cannot reach an aim, or shares its cell with an earlier one, is left out.
-        if estimate == math.inf or node_in(search.table, generation, slot) >= 0:
-            continue
-        row = (x, y, heading, z, 0.0, 0.0, 0.0, 0.0, 0.0)
-        add_node(search, task.weight, slot, key, row, (-1, trim, 0, 0, r, ROOTED), estimate)
-
-
-@bare_kernel
 def expand(
     search: SearchArrays,
     task: Task,
@@ -90,12 +61,14 @@ def expand(
     n: int,
     upper_bound: float,
 ) -> int:
-    """Expand up to `n` nodes; stops at the first connection if the task says so.
+    """Expand up to `n` nodes, the roots first; stops at the first connection if the task says so.
 
     Children that cannot lead to less than `upper_bound` are left out. Returns whether it may go on:
     1, or 0 when nothing is left to expand.
     """
     nodes, links, state = search.nodes, search.links, search.state
+    if state[BEGUN] == 0:
+        _push_roots(search, task, lib, scene, grid, table)
     room = nodes.shape[0] - lib.most_children - 1  # so that one expansion always fits
     for _ in range(n):
         node = open_node(search, task, upper_bound)
@@ -125,3 +98,29 @@ def expand(
         if lib.edge_cost.shape[0] > 0:
             relax_maneuvers(search, task, lib, scene, grid, table, node, upper_bound)
     return 1
+
+
+@bare_inner_kernel
+def _push_roots(
+    search: SearchArrays,
+    task: Task,
+    lib: LatticeArrays,
+    scene: Scene,
+    grid: DistanceGrid,
+    table: CostTable,
+) -> None:
+    """Push the roots of a search."""
+    state, generation = search.state, search.state[GENERATION]
+    state[BEGUN] = 1
+    for r in range(task.roots.shape[0]):
+        pose = (task.roots[r, 0], task.roots[r, 1], task.roots[r, 2], task.roots[r, 3])
+        x, y, heading, z = pose
+        trim = task.root_trims[r]
+        estimate = cost_to_go(task, grid, table, scene.layers.plane, pose, trim)
+        key = cell_key(task, x, y, heading, z, layer_of(task, lib, trim, 0, 0), 0.0, 0)
+        slot = slot_of(search.table, generation, key)
+        # A root that cannot reach an aim, or shares its cell with an earlier one, is left out.
+        if estimate == math.inf or node_in(search.table, generation, slot) >= 0:
+            continue
+        row = (x, y, heading, z, 0.0, 0.0, 0.0, 0.0, 0.0)
+        add_node(search, task.weight, slot, key, row, (-1, trim, 0, 0, r, ROOTED), estimate)

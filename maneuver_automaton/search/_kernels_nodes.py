@@ -20,7 +20,7 @@ The open list is a binary heap in `heap_key` and `heap_node` (n,), ordered by th
 weighted cost to go. A node is pushed once, when it is made. A cheaper node of its cell closes it,
 and leaves it in the heap; it is passed over when it is popped.
 
-`state` (12,) are the numbers named below; `found` (5,) is the cost of the cheapest plan found, then
+`state` (13,) are the numbers named below; `found` (5,) is the cost of the cheapest plan found, then
 the durations of the three trims of its connection and of the climb. `scratch` holds the candidates
 of one connection.
 """
@@ -59,7 +59,8 @@ PARENT, TRIM, GEAR, COUNT, ROOT, EDGE, CLOSED = range(7)
     CLIMB,  # with this trim that climbs at its end, ...
     FREE,  # and whether the words are those of a free heading
     QUERIES,  # motions and connections that were tested
-) = range(12)
+    BEGUN,  # 1 once the roots are pushed
+) = range(13)
 
 
 @inlined_kernel

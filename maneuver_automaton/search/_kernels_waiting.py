@@ -1,7 +1,8 @@
 """When to wait along a given path so that moving obstacles pass: only times are searched.
 
-The path is cut into pieces; a state is a joint of them and a tick of the clock at which the vehicle
-may stand there.
+The path is cut into pieces. A state is a joint between two of them, and the time for which the
+vehicle may stand there from its arrival on: as long as that lasts, later arrivals lead nowhere that
+waiting does not (safe intervals, Phillips and Likhachev 2011).
 """
 
 from __future__ import annotations
@@ -9,80 +10,126 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from maneuver_automaton._compile import bare_kernel
-from maneuver_automaton.search._kernels_coast import coast_free, coasted, may_stay
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
+from maneuver_automaton.search._kernels_coast import coast_free, coast_proven, may_stay
+from maneuver_automaton.search._kernels_distance import pop, push
 
 if TYPE_CHECKING:
     from maneuver_automaton.search.lattice_arrays import LatticeArrays
     from maneuver_automaton.search.scene import Scene
     from maneuver_automaton.search.waiting import PathArrays
 
-UNREACHED = -1
-WAITED = -2  # the vehicle has stood since the tick before
+HALVINGS = 7  # of a tick, for the time at which the way is free again
+PATIENT = 16  # departures that are blocked before ticks become longer
+MOST_ASKED = 20_000  # departures tried in all
+JOINT, PARENT = range(2)  # columns of `path.links`
+ARRIVAL, UNTIL, DEPARTURE = range(3)  # columns of `path.times`; the last is that of the parent
 
 
 @bare_kernel
 def earliest_arrival(
     lib: LatticeArrays,
     scene: Scene,
-    clocks: tuple[float, float, float],
+    clocks: tuple[float, float, float, float],
     path: PathArrays,
     rest: int,
     tick: float,
-) -> tuple[int, int, float]:
-    """Joint and tick of the last departure, and when it arrives; the joint is -1 if none does.
+) -> int:
+    """The state that arrives first where the path ends; -1 if none does.
 
-    Fills `path.before` with how each state is reached. `path.trims`, `path.durations`
-    (n,) are the pieces, `path.poses` (n + 1, 3) their joints. `path.before` (n + 1, ticks, 2)
-    becomes the joint and tick from which a state is reached by driving, or WAITED, or UNREACHED.
-    `rest` is the trim that waits, -1 if none. `clocks` are the time of the world at the start, the
-    longest duration, and the time of the world until which the goal is kept.
+    Fills `path.links` (s, 2), the joint and parent of each state, and `path.times` (s, 3): when it
+    is reached, until when the vehicle may stand there, and when it left its parent's joint [s since
+    the start]. `rest` is the trim that waits, -1 if none. `clocks` are the time of the world at the
+    start, the longest duration, the time of the world until which the goal is kept, and the time
+    since the start after which nothing changes any more.
     """
-    # Forwards over ticks: a piece and a wait end at later ticks, so when a tick is looked at, all
-    # that leads to its states has been. A state is entered once; how does not matter, since what
-    # can be driven from it is the same.
-    clock_of_start, most_time, stay_until = clocks
-    n, ticks = path.trims.shape[0], path.before.shape[1]
-    for i in range(n + 1):
-        for j in range(ticks):
-            path.before[i, j, 0] = UNREACHED
-    path.before[0, 0, 0] = 0
-    path.before[0, 0, 1] = 0
-    best, best_joint, best_tick = math.inf, -1, -1
-    for j in range(ticks):
-        now = j * tick
-        if now >= best:
-            break  # what departs later arrives later
-        for i in range(n):
-            if path.before[i, j, 0] == UNREACHED:
+    clock, most_time, stay_until, quiet = clocks
+    n, asked = path.trims.shape[0], 0
+    used, queued, _ = _reach(lib, scene, path, rest, clock, quiet, 0, 0.0, -1, 0.0, 0, 0)
+    while queued > 0:
+        state = pop(path.keys, path.items, queued)
+        queued -= 1
+        joint, arrival = path.links[state, JOINT], path.times[state, ARRIVAL]
+        pose = _pose(path, joint)
+        if joint == n:
+            if may_stay(scene, lib, path.trims[n - 1], pose, clock + arrival, stay_until):
+                return state
+            continue
+        trim, t = path.trims[joint], path.durations[joint]
+        # Departures are tried a tick apart; where the way is blocked for long, ever further apart.
+        leave, last, step, blocked = arrival, path.times[state, UNTIL], 0.0, 0
+        while leave <= last and leave + t <= most_time and asked < MOST_ASKED:
+            asked += 1
+            if not coast_free(scene, lib, trim, pose, t, clock + leave):
+                if leave > quiet:
+                    break  # nothing moves any more
+                step = tick * (1 + blocked // PATIENT)
+                leave, blocked = leave + step, blocked + 1
                 continue
-            pose = (path.poses[i, 0], path.poses[i, 1], path.poses[i, 2], 0.0)
-            if (
-                rest >= 0
-                and j + 1 < ticks
-                and path.before[i, j + 1, 0] == UNREACHED
-                and coast_free(scene, lib, rest, pose, tick, clock_of_start + now)
-            ):
-                path.before[i, j + 1, 0] = WAITED
-            # Drive on without a wait as far as that is free, and note each joint where it may stand
-            # from the arrival until the next tick.
-            time = now
-            for k in range(i, n):
-                trim, t = path.trims[k], path.durations[k]
-                if not coast_free(scene, lib, trim, pose, t, clock_of_start + time):
-                    break
-                pose = coasted(lib, trim, pose, t)
-                time += t
-                clock = clock_of_start + time
-                if k + 1 == n:
-                    stays = may_stay(scene, lib, trim, pose, clock, stay_until)
-                    if stays and time < best and time <= most_time:
-                        best, best_joint, best_tick = time, i, j
-                    break
-                then = math.ceil(time / tick)
-                if rest < 0 or then >= ticks or path.before[k + 1, then, 0] != UNREACHED:
-                    continue
-                if coast_free(scene, lib, rest, pose, then * tick - time, clock):
-                    path.before[k + 1, then, 0] = i
-                    path.before[k + 1, then, 1] = j
-    return best_joint, best_tick, best
+            if step > 0.0:  # when exactly it is free again
+                low, high = leave - step, leave
+                for _ in range(HALVINGS):
+                    middle = 0.5 * (low + high)
+                    if coast_free(scene, lib, trim, pose, t, clock + middle):
+                        high = middle
+                    else:
+                        low = middle
+                leave = high
+            there = leave + t
+            used, queued, until = _reach(
+                lib, scene, path, rest, clock, quiet, joint + 1, there, state, leave, used, queued
+            )
+            if used < 0:
+                return -1  # no room for more
+            if leave > quiet:
+                break
+            # What arrives while it may stand there anyway is of no use.
+            leave, step, blocked = max(leave, until - t) + tick, tick, 0
+    return -1
+
+
+@bare_inner_kernel
+def _reach(
+    lib: LatticeArrays,
+    scene: Scene,
+    path: PathArrays,
+    rest: int,
+    clock: float,
+    quiet: float,
+    joint: int,
+    arrival: float,
+    parent: int,
+    left: float,
+    used: int,
+    queued: int,
+) -> tuple[int, int, float]:
+    """Note that a joint is reached, unless it was before, in the same stretch of time.
+
+    Returns the numbers of states and of those in the open list, and until when the vehicle may
+    stand there.
+    """
+    latest = path.latest[joint]
+    while latest >= 0:
+        if path.times[latest, ARRIVAL] <= arrival <= path.times[latest, UNTIL]:
+            return used, queued, path.times[latest, UNTIL]
+        latest = path.before[latest]
+    if used == path.links.shape[0]:
+        return -1, queued, arrival
+    pose = _pose(path, joint)
+    until = arrival
+    if rest >= 0:
+        lasting = max(quiet - arrival, 0.0) + 1.0
+        stands, _ = coast_proven(scene, lib, rest, pose, lasting, clock + arrival)
+        until = arrival + stands if stands < lasting else math.inf
+    path.links[used, JOINT], path.links[used, PARENT] = joint, parent
+    path.times[used, ARRIVAL], path.times[used, UNTIL] = arrival, until
+    path.times[used, DEPARTURE] = left
+    path.before[used], path.latest[joint] = path.latest[joint], used
+    push(path.keys, path.items, queued, arrival, used)
+    return used + 1, queued + 1, until
+
+
+@inlined_kernel
+def _pose(path: PathArrays, joint: int) -> tuple[float, float, float, float]:
+    """Pose (x, y, heading, z) at a joint."""
+    return path.poses[joint, 0], path.poses[joint, 1], path.poses[joint, 2], path.poses[joint, 3]

@@ -65,22 +65,24 @@ def distance_grid(
     whole diagonal.
     """
     field = world.arrays.field
-    low, high = box[:2], box[2:]
     if not field.distance.size:
         return _none()
-    width = float(np.maximum(high - low, field.cell).prod())
-    stride = stride_of(width, field.cell)
+    low_x, low_y, high_x, high_y = box.tolist()
+    area = max(high_x - low_x, field.cell) * max(high_y - low_y, field.cell)
+    stride = stride_of(area, field.cell)
     if coarse and COARSER * field.cell * math.sqrt(0.5) <= COARSEST * world.body.inscribed:
         stride = max(stride, COARSER)
     cell = stride * field.cell
-    origin = np.array([field.origin_x, field.origin_y]) - (stride // 2) * field.cell
-    first = np.floor((low - origin) / cell).astype(int)
-    last = np.floor((high - origin) / cell).astype(int)  # the far rim belongs to it too
-    columns, rows = (int(n) for n in np.maximum(last - first, 0) + 1)
-    start = origin + first * cell
+    origin_x = field.origin_x - (stride // 2) * field.cell
+    origin_y = field.origin_y - (stride // 2) * field.cell
+    first_i, first_j = math.floor((low_x - origin_x) / cell), math.floor((low_y - origin_y) / cell)
+    # The far rim belongs to it too.
+    last_i, last_j = math.floor((high_x - origin_x) / cell), math.floor((high_y - origin_y) / cell)
+    columns, rows = max(last_i - first_i, 0) + 1, max(last_j - first_j, 0) + 1
+    start_x, start_y = origin_x + first_i * cell, origin_y + first_j * cell
     n = columns * rows
-    half_diagonal = float(cell) * math.sqrt(0.5)
-    aim_i, aim_j = (int(k) for k in np.floor((aim[:2] - start) / cell))
+    half_diagonal = cell * math.sqrt(0.5)
+    aim_x, aim_y = aim[:2].tolist()
     grid = DistanceGrid(
         value=prepared.room(n, np.float64),
         rank=prepared.room(n, np.float64),
@@ -88,20 +90,20 @@ def distance_grid(
         keys=prepared.room(8 * n + 8, np.float64),
         items=prepared.room(8 * n + 8, np.int64),
         state=np.zeros(3, dtype=np.int64),
-        origin_x=float(start[0]),
-        origin_y=float(start[1]),
-        cell=float(cell),
+        origin_x=start_x,
+        origin_y=start_y,
+        cell=cell,
         columns=columns,
         rows=rows,
         stride=stride,
-        shift_x=int(first[0]) * stride,
-        shift_y=int(first[1]) * stride,
+        shift_x=first_i * stride,
+        shift_y=first_j * stride,
         inflation=world.body.inscribed - half_diagonal,
         wanted=world.body.inscribed,
         cut=half_diagonal if world.body.inscribed < 2.0 * half_diagonal else -math.inf,
-        detour=float(DETOUR * (columns + rows) * cell),
-        aim_i=aim_i,
-        aim_j=aim_j,
+        detour=DETOUR * (columns + rows) * cell,
+        aim_i=math.floor((aim_x - start_x) / cell),
+        aim_j=math.floor((aim_y - start_y) / cell),
     )
     _kernels_distance.seed(grid, np.ascontiguousarray(seeds[:, :2]))
     return grid

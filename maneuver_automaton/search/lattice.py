@@ -13,7 +13,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.distance_grid import DistanceGrid, distance_grid
-from maneuver_automaton.search.lattice_pass import Pass, pass_of
+from maneuver_automaton.search.lattice_pass import Pass, give_back, pass_of, with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_schedules import Schedule, schedule_of
 from maneuver_automaton.search.lattice_task import Resolution
@@ -74,7 +74,8 @@ def first_plan(
             total += search.expansions - before
             one.chunk = min(2 * one.chunk, schedule.most_chunk)
             if word is not None:
-                word = forward_word(word) if search.resolution.backwards else word
+                if search.resolution.backwards:
+                    word = with_cost(forward_word(word), query)
                 break
         alive = any(one.alive for one in turns)
         closed = not alive or any(one.is_closed for one in turns)
@@ -91,16 +92,19 @@ def first_plan(
         elif not alive:
             break
     passes = [one.begun for one in turns if one.begun is not None]
-    ahead = [one.nearest for one in passes if not one.resolution.backwards]
-    return FirstPlan(
+    ahead = [one.nearest for one in passes if word is None and not one.resolution.backwards]
+    found = FirstPlan(
         word=word,
         expansions=total,
         queries=sum(one.queries for one in passes),
         exhausted=word is None and not alive and not left_out,
         enclosed=proof,
-        nearest=min(ahead, default=math.inf) if word is None else math.inf,
+        nearest=min(ahead, default=math.inf),
         nodes=_expanded(query, passes) if query.settings.show_nodes else None,
     )
+    for search in passes:
+        give_back(search)
+    return found
 
 
 @dataclass(slots=True, eq=False)
@@ -154,7 +158,8 @@ class _Turn:
         """Whether the plane alone, in fine cells, leads from none of its roots to an aim."""
         if self.begun is None or self.resolution.coarse:
             return False
-        return not self.begun.arrays.state[layout.N_NODES]
+        state = self.begun.arrays.state
+        return bool(state[layout.BEGUN]) and not state[layout.N_NODES]
 
     def begin(self) -> Pass:
         """The search with its roots."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -92,6 +93,24 @@ class LatticeLibrary:
     interval: tuple[float, float]  # least expansions, for each goal, and most, between connections
     at_will: bool  # whether plans begin and end in any trim, and may end with a turn on the spot
     mirrored: bool  # whether the mirror image of every trim is a trim of the same cost
+
+    @functools.cached_property
+    def drives(self) -> bool:
+        """Whether a trim moves."""
+        numbered = self.arrays.library
+        return bool(numbered.twists[: numbered.n_trims].any())
+
+    @functools.cached_property
+    def climbs(self) -> bool:
+        """Whether a trim or a maneuver leads up or down."""
+        arrays = self.arrays
+        return bool(arrays.library.twists[:, 3].any() or arrays.edge_displacement[:, 3].any())
+
+    @functools.cached_property
+    def limits_coasts(self) -> bool:
+        """Whether a trim has a longest time."""
+        numbered = self.arrays.library
+        return bool(np.isfinite(numbered.longest[: numbered.n_trims]).any())
 
     def edges_of(self, maneuvers: IntArray) -> IntArray:
         """Edges of maneuvers of the automaton."""

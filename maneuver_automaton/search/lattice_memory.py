@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.search import _kernels_nodes as kernels
+from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.words.library import LibraryArrays, Scratch, scratch_of
 
 SMALLEST = 2048  # nodes
@@ -23,7 +25,7 @@ class SearchArrays(NamedTuple):
     table: IntArray  # (4 n, 2) key, generation and node
     heap_key: Array
     heap_node: IntArray
-    state: IntArray  # (12,)
+    state: IntArray  # (13,)
     found: Array  # (5,) cost, three durations and that of a climb
     scratch: Scratch
 
@@ -37,10 +39,24 @@ def search_arrays(library: LibraryArrays) -> SearchArrays:
         table=np.zeros((4 * n, 2), dtype=np.int64),
         heap_key=np.empty(n),
         heap_node=np.empty(n, dtype=np.int64),
-        state=np.zeros(12, dtype=np.int64),
+        state=np.zeros(13, dtype=np.int64),
         found=np.zeros(5),
         scratch=scratch_of(library),
     )
+
+
+def spare_searches(library: LatticeLibrary) -> list[SearchArrays]:
+    """A list that keeps arrays of searches with one library that nobody uses now."""
+    del library  # whoever asks keeps one list for each
+    return []
+
+
+def begin_anew(search: SearchArrays) -> None:
+    """Forget what was searched in these arrays; the next expansion begins with the roots."""
+    generation = search.state[kernels.GENERATION] + 1  # frees all rows of the hash table at once
+    search.state[:] = 0
+    search.state[kernels.GENERATION] = generation
+    search.found[0] = math.inf
 
 
 def room_takes(search: SearchArrays, nodes: int) -> float:

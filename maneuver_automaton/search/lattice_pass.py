@@ -16,8 +16,10 @@ from maneuver_automaton.search.distance_grid import DistanceGrid
 from maneuver_automaton.search.lattice_arrays import LatticeArrays, moves_of
 from maneuver_automaton.search.lattice_memory import (
     SearchArrays,
+    begin_anew,
     room_takes,
     search_arrays,
+    spare_searches,
     with_room,
 )
 from maneuver_automaton.search.lattice_query import LatticeQuery
@@ -33,6 +35,8 @@ AT_FIRST = 200_000  # words steered at the first expansion for which one is a po
 STEERED_S = 2.5e-8  # [s] that steering one word takes
 LONGER = 1.6  # times a least coasting time, for the longer of two coasts
 NO_EDGE = layout.COASTED
+MOST_SPARE = 4  # searches of one library whose arrays are kept
+LARGEST_SPARE = 1 << 15  # nodes of such a search, some 5 MB
 LEAST = 1e-5  # share of the cost that a better word has to save
 
 
@@ -139,11 +143,23 @@ def pass_of(
     scaled = _with_coasts(query, resolution, sign)
     task = task_of(query, resolution, sign=sign)
     scene = query.scene(query.margin * resolution.margin)
-    room = search_arrays(scaled.library) if arrays is None else arrays
-    room = with_room(room, len(task.roots) + 4)
-    kernels.begin(room, task, scaled, scene, grid, table)
+    if arrays is None:
+        spare = query.prepared.once(spare_searches, query.library)
+        try:
+            arrays = spare.pop()
+        except IndexError:  # asked for before, another thread might take the last one
+            arrays = search_arrays(scaled.library)
+    room = with_room(arrays, len(task.roots) + 4)
+    begin_anew(room)
     pace = Pace(UNLIMITED, steps=max(1, min(FIRST_CHUNK, AT_FIRST // _steered(scaled, task))))
     return Pass(query, resolution, task, scene, grid, table, room, scaled, pace)
+
+
+def give_back(one: Pass) -> None:
+    """Leave the arrays of a search that is over to the next one: fresh memory costs more."""
+    spare = one.query.prepared.once(spare_searches, one.query.library)
+    if len(spare) < MOST_SPARE and len(one.arrays.nodes) <= LARGEST_SPARE:
+        spare.append(one.arrays)
 
 
 def _steered(library: LatticeArrays, task: Task) -> int:
@@ -167,28 +183,28 @@ def _with_coasts(query: LatticeQuery, resolution: Resolution, sign: float) -> La
 
 
 def _word(one: Pass) -> Word:
-    """The word that a search has found, from start to goal, in the automaton's numbers."""
+    """The word that a search has found, from start to goal, at the prices of its library."""
     arrays, library, query = one.arrays, one.library, one.query
-    state = arrays.state
+    state, links = arrays.state.tolist(), arrays.links
     numbered = library.library
     words = numbered.free_words if state[layout.FREE] else numbered.words
-    row = [*words[state[layout.ROW]].tolist(), int(state[layout.CLIMB])]
+    row = [*words[state[layout.ROW]].tolist(), state[layout.CLIMB]]
     connection = [
         (NO_EDGE, trim, t)
         for trim, t in zip(row, arrays.found[1:5].tolist(), strict=True)
         if 0 <= trim < numbered.n_trims
     ]
     path: list[tuple[int, int, float]] = []
-    node = int(state[layout.NODE])
-    while arrays.links[node, layout.PARENT] >= 0:
-        link = arrays.links[node]
-        edge, t = int(link[layout.EDGE]), float(arrays.nodes[node, layout.COAST])
-        path.append((edge, int(link[layout.TRIM]), t))
-        node = int(link[layout.PARENT])
-    root = int(arrays.links[node, layout.ROOT])
-    goal = int(state[layout.GOAL])
+    node = state[layout.NODE]
+    link = links[node].tolist()
+    while link[layout.PARENT] >= 0:
+        coast = float(arrays.nodes[node, layout.COAST])
+        path.append((link[layout.EDGE], link[layout.TRIM], coast))
+        node = link[layout.PARENT]
+        link = links[node].tolist()
+    goal = state[layout.GOAL]
     if one.task.sign < 0.0:
-        goal = goal_of_root(query, root)
+        goal = goal_of_root(query, link[layout.ROOT])
         return query.word_of(_with_maneuvers(query, connection + path, NO_TRIM), goal)
     end = int(one.task.aim_trims[goal])
     return query.word_of(_with_maneuvers(query, path[::-1] + connection, end), goal)
@@ -222,7 +238,7 @@ def _with_maneuvers(
 
 def _edges_between(library: LatticeArrays, source: int, target: int) -> list[int]:
     """Edges of the transition between two trims; none within a class, or where there is no trim."""
-    if min(source, target) < 0:
+    if min(source, target) < 0 or not len(library.edge_cost):
         return []
     edges: list[int] = []
     at, goal = (int(library.library.class_of[trim]) for trim in (source, target))

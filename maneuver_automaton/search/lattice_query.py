@@ -130,6 +130,8 @@ class LatticeQuery:
     @property
     def stay_until(self) -> float:
         """Time of the world [s] until which a plan rests at its goal; -inf if it need not."""
+        if self.problem.horizon.stay:
+            return self.world.last_event
         fixed = self.problem.horizon.time
         return -math.inf if fixed is None else self.problem.start_time + fixed
 
@@ -163,23 +165,21 @@ def lattice_query(
         problem.goals[k].pose[None] if turns else poses_aimed_at(problem, problem.goals[k])
         for k in goals
     ]
-    index = np.repeat(goals, [len(row) for row in rows])
+    index = np.array([k for k, row in zip(goals, rows, strict=True) for _ in row])
     free = np.array([problem.goals[k].free_heading for k in index])
-    poses = np.concatenate(rows)
-    level = float(poses[0, 3]) if poses.shape[1] > 3 else 0.0
-    ends = _seen(worlds.whole, np.vstack([problem.start, poses]), level)
+    poses = np.concatenate([problem.start[None], *rows])
+    level = float(poses[1, 3]) if poses.shape[1] > 3 else 0.0
+    ends = _seen(worlds.whole, poses, level)
     trims = _end_trims(problem, library, index)
     clear = _end_clearances(problem, library, worlds, ends, trims, level)
-    kept = np.ones(len(ends), dtype=np.bool_)
     # The clearance at one heading says nothing of a goal at which the vehicle may turn.
     if not turns and (clear[1:] > 0.0).any():
-        kept[1:] = clear[1:] > 0.0
-    margin = _margin(library, worlds.whole, clear[kept])
-    box, window, bounded = window_of(
-        problem.bounds, worlds.outer, ends[kept], radius=library.radius
-    )
+        kept = np.append(0, 1 + np.flatnonzero(clear[1:] > 0.0))
+        clear, ends, trims, poses = clear[kept], ends[kept], trims[kept], poses[kept]
+        index, free = index[kept[1:] - 1], free[kept[1:] - 1]
+    margin = _margin(library, worlds.whole, clear)
+    box, window, bounded = window_of(problem.bounds, worlds.outer, ends, radius=library.radius)
     most = horizon.max_time if horizon.time is None else horizon.time
-    kept = kept[1:]
     return LatticeQuery(
         problem=problem,
         library=library,
@@ -188,11 +188,11 @@ def lattice_query(
         around=scene_of(problem, library, worlds, window, margin=margin, level=level),
         start=ends[0],
         start_trim=int(trims[0]),
-        goals=ends[1:][kept],
-        goal_trims=trims[1:][kept],
-        free_heading=free[kept] & turns,
-        goal_poses=poses[kept],
-        goal_index=tuple(index[kept].tolist()),
+        goals=ends[1:],
+        goal_trims=trims[1:],
+        free_heading=free & turns,
+        goal_poses=poses[1:],
+        goal_index=tuple(index.tolist()),
         box=box,
         bounded=bounded,
         most_time=math.inf if most is None else most * (1.0 + 1e-12),
@@ -204,7 +204,8 @@ def _seen(world: World, poses: Array, level: float) -> Array:
     """Poses (n, dof) as the query keeps them, (n, 4)."""
     seen = np.zeros((len(poses), 4))
     seen[:, :3] = world.into(poses[:, :3])
-    seen[:, 3 : poses.shape[1]] = np.round(poses[:, 3:] - level, DIGITS)
+    if poses.shape[1] > 3:
+        seen[:, 3] = np.round(poses[:, 3] - level, DIGITS)
     return seen
 
 
@@ -230,9 +231,8 @@ def _end_clearances(
 
     Among moving obstacles, at the start time, and after everything has come to rest.
     """
-    times = np.full(len(ends), max(problem.start_time, worlds.whole.last_event))
-    times[0] = problem.start_time
-    altitudes = ends[:, 3] + level
+    after = max(problem.start_time, worlds.whole.last_event)
+    times = np.array([problem.start_time] + [after] * (len(ends) - 1))
     found = []
     for part in library.parts:
         offsets, there = part.trim_poses[trims], ends[:, :3]
@@ -242,15 +242,19 @@ def _end_clearances(
             body = body_of(part.shapes)
             around = world if world.body is body else replace(world, body=body)
             aside = clearances(around, there, times=times)
-            found.append(np.maximum(aside, band.clearance(altitudes, problem.body_height)))
-    least: Array = np.min(found, axis=0)
+            if worlds.flat is None:
+                above = band.clearance(ends[:, 3] + level, problem.body_height)
+                aside = np.maximum(aside, above)
+            found.append(aside)
+    least: Array = found[0] if len(found) == 1 else np.min(found, axis=0)
     return least - problem.margin
 
 
 def _margin(library: LatticeLibrary, world: World, clear: Array) -> float:
     """Proven clearance: a share of the body, at most half of that at start and goals."""
     usual = MARGIN * (_half_width(library) or _typical(world))
-    return float(max(LEAST_MARGIN, min([usual, *(0.5 * clear[clear > 0.0]).tolist()])))
+    halves = [0.5 * one for one in clear.tolist() if one > 0.0]
+    return float(max(LEAST_MARGIN, min([usual, *halves])))
 
 
 def _half_width(library: LatticeLibrary) -> float:

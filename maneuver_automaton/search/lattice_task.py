@@ -102,15 +102,12 @@ class Task(NamedTuple):
 def task_of(query: LatticeQuery, resolution: Resolution, *, sign: float = 1.0) -> Task:
     """Limits and sizes of a search, as the kernels see them."""
     library, settings = query.library, query.settings
-    numbered = library.arrays.library
     frame = query.goals[0]
     cell = resolution.scale * (settings.cell or library.cell)
     headings = settings.headings or HEADINGS
     size = query.half_width or library.radius * 0.1
     sharp = INTERVAL * library.radius * library.per_metre
     tick = _tick(query, resolution)
-    moving = numbered.twists[: numbered.n_trims].any()
-    longest = _limits_coasts(query)
     by_gear, by_trim, by_count, layers = _layers(query, resolution)
     start, goals = _ends(query)
     aims, aim_trims, aim_free = goals if sign > 0.0 else start
@@ -140,7 +137,7 @@ def task_of(query: LatticeQuery, resolution: Resolution, *, sign: float = 1.0) -
         per_climb=float(library.per_climb),
         # The path to the goal says how long to wait, unless no trim moves: then nothing is solved
         # for, and the node that ends at the goal must not be missed.
-        per_interval=(float(sharp) or 1.0) if moving else math.inf,
+        per_interval=(float(sharp) or 1.0) if library.drives else math.inf,
         least_interval=query.interval[0],
         most_interval=query.interval[1],
         connection_factor=CONNECTION_FACTOR,
@@ -156,17 +153,11 @@ def task_of(query: LatticeQuery, resolution: Resolution, *, sign: float = 1.0) -
         stay_until=float(query.stay_until),
         most_trims=int(query.most_trims),
         least_coast=float(query.least_coast * (1.0 - ROUNDING)),
-        checks_words=bool(query.most_trims > 0 or query.least_coast > 0.0 or longest),
+        checks_words=bool(query.most_trims > 0 or query.least_coast > 0.0 or library.limits_coasts),
         by_gear=by_gear,
         by_trim=by_trim,
         by_count=by_count,
     )
-
-
-def _limits_coasts(query: LatticeQuery) -> bool:
-    """Whether a trim has a longest time."""
-    numbered = query.library.arrays.library
-    return bool(np.isfinite(numbered.longest[: numbered.n_trims]).any())
 
 
 def _layers(query: LatticeQuery, resolution: Resolution) -> tuple[bool, bool, bool, int]:
@@ -176,7 +167,7 @@ def _layers(query: LatticeQuery, resolution: Resolution) -> tuple[bool, bool, bo
     by_gear = bool(resolution.layered and numbered.direction_change > 0.0)
     by_trim = len(arrays.trims_of) > len(numbered.cost) and bool(
         query.least_coast > 0.0
-        or _limits_coasts(query)
+        or query.library.limits_coasts
         or (resolution.layered and numbered.switch > 0.0)
     )
     by_count = query.most_trims > 0
@@ -186,6 +177,8 @@ def _layers(query: LatticeQuery, resolution: Resolution) -> tuple[bool, bool, bo
 
 def goal_roots(query: LatticeQuery) -> tuple[Array, IntArray]:
     """Poses (R, 4) at the goals, a few headings where any will do, and their trims."""
+    if not query.free_heading.any():
+        return np.array(query.goals), np.array(query.goal_trims, dtype=np.int64)
     rows, trims = [], []
     for goal, free, trim in zip(query.goals, query.free_heading, query.goal_trims, strict=True):
         turns = np.arange(SAMPLED_HEADINGS if free else 1) * (2.0 * np.pi / SAMPLED_HEADINGS)
@@ -214,6 +207,8 @@ def _lag(library: LatticeLibrary, aim_trims: IntArray) -> Array:
     """Least surplus (m + 1,) of maneuvers from each trim, and from none, to an aim's trim."""
     numbered = library.arrays.library
     classes = numbered.class_of
+    if not library.lag.any():
+        return np.zeros(1 + numbered.n_trims)
     to_aims = library.lag[:, classes[aim_trims]].min(axis=1)
     return np.append(to_aims[classes[: numbered.n_trims]], to_aims[0])
 
@@ -246,11 +241,9 @@ def _radix(
 
     Where numbers are short, places far apart share them: that drops a node, never a proof.
     """
-    low, high = np.array(query.box[:2]), np.array(query.box[2:])
-    far = float((high - low).max())  # no pose of the window is farther from the frame along x or y
-    library = query.library.arrays
-    climbs = library.library.twists[:, 3].any() or library.edge_displacement[:, 3].any()
-    turns, levels = headings + 1, MOST_LEVELS if climbs else 1
+    low_x, low_y, high_x, high_y = query.box.tolist()
+    far = max(high_x - low_x, high_y - low_y)  # no pose of the window is farther from the frame
+    turns, levels = headings + 1, MOST_LEVELS if query.library.climbs else 1
     ticks = MOST_TICKS if tick > 0.0 else 1
     others = layers * 2 * ticks * levels * turns  # two: truncated edges have cells of their own
     sides = 2

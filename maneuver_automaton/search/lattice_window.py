@@ -24,8 +24,8 @@ def window_of(
     low = np.minimum(world.box[:2], poses[:, :2].min(axis=0)) - pad
     high = np.maximum(world.box[2:], poses[:, :2].max(axis=0)) + pad
     if bounds.x is None and bounds.y is None:
-        box = np.concatenate([low, high])
-        return box, np.concatenate([box, [0.0, 0.0, 1.0, 0.0, 0.0]]), False
+        window = np.array([*low.tolist(), *high.tolist(), 0.0, 0.0, 1.0, 0.0, 0.0])
+        return window[:4], window, False
     turn = float(world.frame[2])
     c, s = math.cos(turn), math.sin(turn)
     corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])

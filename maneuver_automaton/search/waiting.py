@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.groups import SE2
@@ -18,17 +16,22 @@ from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word
 
 MOST_PIECES = 60  # joints at which it may wait
-MOST_TICKS = 300  # of the clock, until nothing moves any more
-SHORTEST_TICK = 0.1  # [s]
+MOST_STATES = 4096  # of joints, each for a stretch of time
+TICK = 0.1  # [s] between departures that are tried
 
 
 class PathArrays(NamedTuple):
-    """Pieces of a path, as the kernel sees them."""
+    """Pieces of a path and the states along it, as the kernel sees them."""
 
     trims: IntArray  # (n,)
     durations: Array  # (n,)
-    poses: Array  # (n + 1, 3)
-    before: NDArray[np.int32]  # (n + 1, ticks, 2) joint and tick of the departure, or a mark
+    poses: Array  # (n + 1, 4)
+    links: IntArray  # (s, 2) joint and parent of each state
+    times: Array  # (s, 3) arrival, until when it may stand there, departure from the parent [s]
+    before: IntArray  # (s,) the state of the same joint that was found before, -1 for none
+    latest: IntArray  # (n + 1,) the state of each joint that was found last, -1 for none
+    keys: Array  # (s,) of the open list
+    items: IntArray  # (s,)
 
 
 def with_waits(query: LatticeQuery, word: Word) -> Word | None:
@@ -36,6 +39,9 @@ def with_waits(query: LatticeQuery, word: Word) -> Word | None:
 
     It arrives as early as rests at the joints of its pieces allow. Without a rest in the library
     the word is taken as it is, if it is free.
+
+    Source: Phillips, Likhachev (2011), *SIPP: Safe Interval Path Planning for Dynamic
+    Environments*, ICRA, here along one path.
     """
     library = query.library.arrays
     if not len(word.trims):
@@ -44,28 +50,28 @@ def with_waits(query: LatticeQuery, word: Word) -> Word | None:
     still = np.flatnonzero(~twists[: library.library.n_trims].any(axis=1))
     rest = int(still[0]) if still.size else -1
     trims, durations = _pieces(word, query)
-    until = query.world.last_event - query.problem.start_time
-    lasting = max(until, 0.0) + 1.0 if math.isfinite(until) else 1.0
-    tick = max(SHORTEST_TICK, lasting / MOST_TICKS)
-    ticks = math.ceil(lasting / tick) + 2
+    quiet = query.world.last_event - query.problem.start_time
     steps = SE2.exp(durations[:, None] * twists[trims, :3]).pose
+    poses = np.zeros((len(trims) + 1, 4))
+    poses[:, :3] = chained(query.start[:3], steps)
+    poses[:, 3] = query.start[3] + np.append(0.0, np.cumsum(durations * twists[trims, 3]))
     path = PathArrays(
         trims=trims,
         durations=durations,
-        poses=np.ascontiguousarray(chained(query.start[:3], steps)),
-        before=np.empty((len(trims) + 1, ticks, 2), dtype=np.int32),
+        poses=poses,
+        links=np.empty((MOST_STATES, 2), dtype=np.int64),
+        times=np.empty((MOST_STATES, 3)),
+        before=np.empty(MOST_STATES, dtype=np.int64),
+        latest=np.full(len(trims) + 1, -1, dtype=np.int64),
+        keys=np.empty(MOST_STATES),
+        items=np.empty(MOST_STATES, dtype=np.int64),
     )
-    joint, at, _ = kernels.earliest_arrival(
-        library,
-        query.scene(),
-        (float(query.start_time), float(query.most_time), float(query.stay_until)),
-        path,
-        rest,
-        tick,
-    )
-    if joint < 0:
+    clock, most, stay = float(query.start_time), float(query.most_time), float(query.stay_until)
+    clocks = clock, most, stay, max(quiet, 0.0)
+    state = kernels.earliest_arrival(library, query.scene(), clocks, path, rest, TICK)
+    if state < 0:
         return None
-    parts = _with_rests(path, joint, at, rest, tick)
+    parts = _with_rests(path, state, rest)
     driven = [(SWITCH, int(query.library.trims[trim]), t) for trim, t in parts]
     return with_cost(query.word_of(driven, word.goal), query)
 
@@ -78,21 +84,15 @@ def _pieces(word: Word, query: LatticeQuery) -> tuple[IntArray, Array]:
     return np.repeat(numbers, counts), np.repeat(word.durations / counts, counts)
 
 
-def _with_rests(
-    path: PathArrays, joint: int, at: int, rest: int, tick: float
-) -> list[tuple[int, float]]:
-    """Trims and durations of the path with its rests, read backwards from the last departure."""
-    end = len(path.trims)
+def _with_rests(path: PathArrays, state: int, rest: int) -> list[tuple[int, float]]:
+    """Trims and durations of the path with its rests, read backwards from its last state."""
     parts: list[tuple[int, float]] = []
-    while True:
-        pieces = list(zip(path.trims[joint:end], path.durations[joint:end], strict=True))
-        parts = [(int(trim), float(t)) for trim, t in pieces] + parts
-        waited = 0
-        while path.before[joint, at, 0] == kernels.WAITED:
-            waited, at = waited + 1, at - 1
-        if joint == 0 and at == 0:
-            return [(rest, waited * tick), *parts] if waited else parts
-        before, left = (int(k) for k in path.before[joint, at])
-        spent = left * tick + float(path.durations[before:joint].sum())
-        parts = [(rest, (at + waited) * tick - spent), *parts]
-        end, joint, at = joint, before, left
+    while (parent := int(path.links[state, kernels.PARENT])) >= 0:
+        joint = int(path.links[parent, kernels.JOINT])
+        parts.append((int(path.trims[joint]), float(path.durations[joint])))
+        left = float(path.times[state, kernels.DEPARTURE])
+        waited = left - float(path.times[parent, kernels.ARRIVAL])
+        if waited > 0.0:
+            parts.append((rest, waited))
+        state = parent
+    return parts[::-1]

@@ -72,7 +72,7 @@ def test_against_dense_times(start, twist, knots, begin, duration):
     motion = Motion(begin + np.arange(len(knots)) * 0.8, knots)
     rover, other = CoastingBody(start, twist, 0j, 0.3), MovingBody.of(motion, 1.3)
     times = np.linspace(0.0, duration, 400)
-    clearances = clearance(np.array([rover.at(time) for time in times]), other.at(times))
+    clearances = clearance(np.array([rover.at(time) for time in times]), motion.at(times))
     found = meet(
         rover, other, duration=duration, distance=lambda a, b: float(clearance(a, b)), contact=1e-3
     )
@@ -86,16 +86,15 @@ def test_against_dense_times(start, twist, knots, begin, duration):
 
 def test_stretches_by_hand():
     body = MovingBody.of(Motion([1.0, 3.0, 4.0], [[0, 0, 0], [4, 2, 1], [4, 2, 7]]), 1.0)
-    assert body.stretch(0.0) == ((0, 0, 0), 0j, 0.0, 1.0)
-    assert body.stretch(1.0) == ((0, 0, 0), 2 + 1j, 0.5, 3.0)
-    assert body.stretch(3.5) == ((4, 2, 4), 0j, 6.0, 4.0)
-    assert body.stretch(4.0) == ((4, 2, 7), 0j, 0.0, math.inf)
+    assert body.stretch(0.0) == ((0, 0, 0), 0j, 0.0, 1.0, 0.0)
+    assert body.stretch(1.0) == ((0, 0, 0), 2 + 1j, 0.5, 3.0, 0.0)
+    assert body.stretch(3.5) == ((4, 2, 4), 0j, 6.0, 4.0, 0.0)
+    assert body.stretch(4.0) == ((4, 2, 7), 0j, 0.0, math.inf, 0.0)
     for time in (0.0, 1.0, 2.2, 3.0, 3.9, 4.0, 9.0):
-        assert body.stretch(time).pose == pytest.approx(body.at(time), abs=1e-15)
+        assert body.stretch(time).pose == pytest.approx(body.motion.at(time), abs=1e-15)
     assert body.speed == pytest.approx(math.sqrt(5.0))
     assert body.turn_rate == 6.0
-    assert body.from_time(1.0).at(1.0).tolist() == [2.0, 1.0, 0.5]
-    assert body.at([-9.0, 9.0]).tolist() == [[0.0, 0.0, 0.0], [4.0, 2.0, 7.0]]
+    assert body.motion.at([-9.0, 9.0]).tolist() == [[0.0, 0.0, 0.0], [4.0, 2.0, 7.0]]
 
 
 def test_a_convoy_takes_few_steps():

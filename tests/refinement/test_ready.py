@@ -14,7 +14,6 @@ from tests.refinement.test_incumbent_words import query
 from tests.search.maneuver_searches import search_maneuvers
 
 KERNELS = (
-    lattice.begin,
     lattice.expand,
     attempts.attempt_all,
     points.begin_program,

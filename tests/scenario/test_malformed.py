@@ -495,6 +495,21 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
         obstacle("{disc_m: {center: [3, 0], radius: 1}, map: a.yaml}"),
         ":15: obstacles[0]: got disc_m and map, need exactly one of polygon_m, disc_m, box_m, map",
     ),
+    "obstacle twists beside the way": (
+        obstacle(
+            "{disc_m: {center: [0, 0], radius: 1}, motion: [[0, 0, 0, 0], [1, 2, 0, 0]], "
+            "twists: [[1, 0, 0]]}"
+        ),
+        ":15: obstacles[0].twists: twist 1 leads 1 m and 0 rad beside pose 2",
+    ),
+    "obstacle twists without a motion": (
+        obstacle("{disc_m: {center: [0, 0], radius: 1}, twists: [[1, 0, 0]]}"),
+        ":15: obstacles[0].twists: goes with motion only",
+    ),
+    "obstacle present backwards": (
+        obstacle("{disc_m: {center: [0, 0], radius: 1}, present_s: [2, 1]}"),
+        ":15: obstacles[0].present_s: got [2, 1], need an interval [low, high] with low < high",
+    ),
     "obstacle motion backwards": (
         obstacle("{polygon_m: [[1, 1], [2, 1], [2, 2]], motion: [[0, 0, 0, 0], [0, 1, 0, 0]]}"),
         ":15: obstacles[0].motion: got [[0, 0, 0, 0], [0, 1, 0, 0]], need poses "

@@ -272,3 +272,23 @@ def test_car_scenarios(name):
     assert scenario.problem.obstacles
     assert scenario.problem.footprint[0].corners.tolist()[0] == [-0.95, -0.95]
     assert_same(read(to_yaml(scenario)), scenario)
+
+
+COMES_AND_GOES = """\
+obstacles:
+  - {disc_m: {center: [3, 1], radius: 0.5}, present_s: [2, 3]}
+  - box_m: {center: [0, 0], size: [1, 0.5]}
+    motion: [[0, 0, 0, 0], [2, 2, 0, 0], [3, 2.8414709848078967, 0.4596976941318602, 1]]
+    twists: [[1, 0, 0], [1, 0, 1]]
+    present_s: [0, 9]
+"""
+
+
+def test_what_moves_on_arcs_and_comes_and_goes_is_written_and_read():
+    scenario = read(SCENARIO + COMES_AND_GOES)
+    door, tug = scenario.problem.obstacles
+    assert door.present_s == (2.0, 3.0)
+    assert tug.present_s == (0.0, 9.0)
+    there = [2.0 + math.sin(0.5), 1.0 - math.cos(0.5), 0.5]
+    assert tug.motion.at(2.5) == pytest.approx(there)
+    assert_same(read(to_yaml(scenario)), scenario)

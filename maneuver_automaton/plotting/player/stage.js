@@ -161,6 +161,7 @@ class Stage {
       one.pose.forEach((pose, n) => context[n ? "lineTo" : "moveTo"](pose[0], pose[1]));
       context.stroke();
       context.setLineDash([]);
+      if (one.present && (time < one.present[0] || time > one.present[1])) continue;
       if (one.leaves && (time < one.t[0] - 1e-9 || time > one.t[one.t.length - 1] + 1e-9)) continue;
       const path = new Path2D(), pose = posedAt(one, time);
       one.rings.forEach((ring) => trace(path, ring.map((place) => acted(pose, place))));

@@ -16,6 +16,8 @@ from maneuver_automaton.plotting.limits import bound_lines
 from maneuver_automaton.plotting.player.local import PLACE_DIGITS, POSE_DIGITS, Local, rounded
 from maneuver_automaton.problem import Bounds, Goal
 
+TURN = 0.05  # [rad] of what moves on an arc, between two of its poses
+
 
 def obstacle_entries(obstacles: Iterable[AnyObstacle], local: Local, *, leave: bool) -> list[Any]:
     """Static and moving obstacles; with `leave`, a moving one is there for its motion only."""
@@ -85,10 +87,13 @@ def _obstacle_entry(one: Obstacle, local: Local, *, leave: bool) -> dict[str, An
         entry["height"] = list(one.height)
     if one.motion is None:
         return entry | {"rings": [local.places(ring) for ring in rings]}
+    if one.present_s is not None:
+        entry["present"] = [one.present_s[0], one.present_s[1]]
+    times = one.motion.times_for_lines(TURN)
     return entry | {
         "rings": [rounded(ring, PLACE_DIGITS) for ring in rings],
-        "t": rounded(one.motion.time, POSE_DIGITS),
-        "pose": local.poses(one.motion.pose),
+        "t": rounded(times, POSE_DIGITS),
+        "pose": local.poses(one.motion.at(times)),
         "leaves": leave,
     }
 

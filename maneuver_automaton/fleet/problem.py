@@ -1,0 +1,112 @@
+"""Several vehicles that share a world: each has a problem of its own, and all keep apart."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from maneuver_automaton._brief import brief
+from maneuver_automaton._ceilings import check_size
+from maneuver_automaton.groups import LieGroup
+from maneuver_automaton.problem import Problem
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FleetProblem:
+    """Problems of several vehicles, of any kind mixed, whose bodies keep apart at all times.
+
+    Every vehicle stands at its start until it leaves, at its problem's `start_time` or later, and
+    stays at its goal once it is there, unless it `leaves`. Obstacles and bounds of a problem are
+    those of its vehicle alone; times are of one clock.
+
+    Parameters
+    ----------
+    problems : sequence of Problem
+        One for each vehicle, with a free final time.
+    names : sequence of str, optional
+        Names of the vehicles; their numbers, from 1, if omitted.
+    margin : float
+        Distance [m] that any two bodies keep.
+    leaves : sequence of bool, optional
+        Whether a vehicle is gone once it has arrived; none is if omitted.
+    priority : sequence of float, optional
+        Who is more important plans first: the greater the sooner; all alike if omitted.
+
+    Raises
+    ------
+    ValueError
+        If there is no vehicle, names are not distinct, or a number is out of its range.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Disc, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "on": (1, 0), "spin": (0, 1)})
+    >>> body = {"footprint": Disc(0.3)}
+    >>> there = Problem(robot, [0, 0, 0], [4, 0, 0], **body)
+    >>> back = Problem(robot, [4, 0, 3.14], [0, 0, 3.14], **body)
+    >>> FleetProblem([there, back], names=["a", "b"]).names
+    ('a', 'b')
+    """
+
+    problems: tuple[Problem, ...]
+    names: tuple[str, ...] = field(default=(), kw_only=True)
+    margin: float = field(default=0.0, kw_only=True)  # [m]
+    leaves: tuple[bool, ...] = field(default=(), kw_only=True)
+    priority: tuple[float, ...] = field(default=(), kw_only=True)
+
+    __repr__ = brief
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            problems: Sequence[Problem],
+            *,
+            names: Sequence[str] = (),
+            margin: float = 0.0,
+            leaves: Sequence[bool] = (),
+            priority: Sequence[float] = (),
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        n = len(self.problems)
+        if not n:
+            raise ValueError("fleet: there is no vehicle, need at least one")
+        numbered = tuple(str(k + 1) for k in range(n))
+        object.__setattr__(self, "problems", tuple(self.problems))
+        object.__setattr__(self, "names", tuple(self.names) or numbered)
+        object.__setattr__(self, "leaves", tuple(self.leaves) or (False,) * n)
+        object.__setattr__(self, "priority", tuple(map(float, self.priority)) or (0.0,) * n)
+        for name in ("names", "leaves", "priority"):
+            if len(getattr(self, name)) != n:
+                raise ValueError(
+                    f"fleet: got {len(getattr(self, name))} {name}, need one for each of "
+                    f"{n} vehicles"
+                )
+        twice = [name for name in self.names if self.names.count(name) > 1]
+        if twice:
+            raise ValueError(f"fleet: two vehicles have the name {twice[0]!r}, need distinct names")
+        check_size("fleet: margin", self.margin)
+        if not (math.isfinite(self.margin) and self.margin >= 0.0):
+            raise ValueError(f"fleet: margin must be a number of at least 0, got {self.margin} m")
+        for name, problem in zip(self.names, self.problems, strict=True):
+            if problem.horizon.time is not None:
+                raise ValueError(
+                    f"fleet: vehicle {name!r} has a fixed time, need a free final time"
+                )
+
+    def __len__(self) -> int:
+        """How many vehicles there are."""
+        return len(self.problems)
+
+    def moved(self, by: LieGroup) -> FleetProblem:
+        """The fleet moved by a group element, all around it too; bounds must be open.
+
+        Raises
+        ------
+        ValueError
+            If there are bounds, or a vehicle does not look the same after a rotation in `by`.
+        """
+        return replace(self, problems=tuple(one.moved(by) for one in self.problems))
