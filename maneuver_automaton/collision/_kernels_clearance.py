@@ -271,9 +271,7 @@ def corner_time(a: float, b: float, ahead: float, turn: float, limit: float) -> 
 
 
 @inlined_kernel
-def stays_above(
-    a: float, b: float, ahead: float, turn: float, limit: float, most: float
-) -> bool:
+def stays_above(a: float, b: float, ahead: float, turn: float, limit: float, most: float) -> bool:
     """Whether a corner on a circle, as in `corner_time`, surely does not meet `limit` by `most`.
 
     Its height after an angle is ``ahead + a cos(angle) - b sin(angle)``, the angle with the sign of
