@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.collision.world import WorldArrays
 
 WIDEST = 0.5 * math.pi  # [rad] of a turn whose tangents hold it closely
+SHORT = 1e-9  # [m] of an edge without a normal
 FREE, UNKNOWN = -1, -2  # in place of the solid that is not parted from a motion
 
 
@@ -107,8 +108,9 @@ def sweep(
                 before = k - 1 if k > 0 else m - 1
                 n_x, n_y = hull[k, 1] - hull[before, 1], hull[before, 0] - hull[k, 0]
                 length = math.sqrt(n_x * n_x + n_y * n_y)
-                if length > 0.0:
-                    n_x, n_y = n_x / length, n_y / length
+                # An edge that is all rounding has no normal: it parts the area from nothing.
+                n_x = n_x / length if length > SHORT else 0.0
+                n_y = n_y / length if length > SHORT else 0.0
                 # The offset holds all points, also where rounding has bent a normal.
                 offset = -math.inf
                 for j in range(n):
@@ -117,9 +119,15 @@ def sweep(
                 rows[used, 2], rows[used, 3], rows[used, 4] = n_x, n_y, offset
                 used += 1
             starts[motion * n_pieces + b + 1] = used
-        low_x, low_y = rows[begin:used, 0].min(), rows[begin:used, 1].min()
-        m_x = 0.5 * (low_x + rows[begin:used, 0].max())
-        m_y = 0.5 * (low_y + rows[begin:used, 1].max())
+        # The middle of the two corners that are farthest apart: of what is long, the disc around it
+        # is hardly larger than the least one.
+        m_x, m_y, widest = rows[begin, 0], rows[begin, 1], 0.0
+        for j in range(begin, used):
+            for k in range(begin, j):
+                e_x, e_y = rows[j, 0] - rows[k, 0], rows[j, 1] - rows[k, 1]
+                if e_x * e_x + e_y * e_y > widest:
+                    widest = e_x * e_x + e_y * e_y
+                    m_x, m_y = 0.5 * (rows[j, 0] + rows[k, 0]), 0.5 * (rows[j, 1] + rows[k, 1])
         reach = 0.0
         for b in range(n_pieces):
             for j in range(starts[motion * n_pieces + b], starts[motion * n_pieces + b + 1]):
