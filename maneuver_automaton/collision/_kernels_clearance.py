@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 NEAR = 0.1  # share of a body's reach below which solids are looked at one by one
 SHARP = 0.3  # share of that below which clearances to sharp corners are made exact
+NEGLIGIBLE = 1e-7  # [m] no rounding is as large
 ROUGH = 1e-6  # share of a radius by which a corner has to be higher to be passed over
 
 
@@ -98,16 +99,38 @@ def separation(
 
 @bare_inner_kernel
 def core_distance(
-    body: Body, b: int, x: float, y: float, c: float, s: float, solids: Solids, p: int
+    body: Body,
+    b: int,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    solids: Solids,
+    p: int,
+    n_x: float,
+    n_y: float,
 ) -> tuple[float, float, float]:
-    """Distance of two convex cores that do not overlap, and its direction towards the body."""
+    """Distance of two convex cores that do not overlap, and its direction towards the body.
+
+    The direction (n_x, n_y), towards the body, parts the two, or is none, (0, 0).
+    """
     b_0, b_1 = body.first[b], body.first[b + 1]
     p_0, p_1 = solids.first[p], solids.first[p + 1]
     best, axis_x, axis_y = math.inf, 0.0, 0.0
     # Two convex polygons that do not overlap are nearest at a corner of one of them: all corners of
     # the body against all edges of the solid, then the other way round. A single corner is an edge
-    # of length zero, so discs need no case of their own.
+    # of length zero, so discs need no case of their own. Along the direction that parts them a
+    # corner may be farther from all of the other one than the nearest so far: it is passed over.
+    top, low = -math.inf, math.inf  # of the solid, and of the body over the pose
+    m_x, m_y = c * n_x + s * n_y, c * n_y - s * n_x
+    for j in range(p_0, p_1):
+        top = max(top, n_x * (solids.edges[j, 0] - x) + n_y * (solids.edges[j, 1] - y))
     for j in range(b_0, b_1):
+        height = m_x * body.edges[j, 0] + m_y * body.edges[j, 1]
+        low = min(low, height)
+        away = max(height - top - NEGLIGIBLE, 0.0)
+        if away * away > best:
+            continue
         at_x = x + c * body.edges[j, 0] - s * body.edges[j, 1]
         at_y = y + s * body.edges[j, 0] + c * body.edges[j, 1]
         before = p_1 - 1
@@ -125,6 +148,9 @@ def core_distance(
             before = k
     for j in range(p_0, p_1):
         d_x, d_y = solids.edges[j, 0] - x, solids.edges[j, 1] - y
+        away = max(low - n_x * d_x - n_y * d_y - NEGLIGIBLE, 0.0)
+        if away * away > best:
+            continue
         at_x, at_y = c * d_x + s * d_y, c * d_y - s * d_x
         before = b_1 - 1
         for k in range(b_0, b_1):
@@ -180,7 +206,7 @@ def piece_clearance(
     # case, and needed: no normal parts the line from a point beyond its end.
     apart = not -math.inf < distance <= 0.0 or corners <= 3  # two points, or a point and a line
     if apart and distance - rounding <= min(exact, enough):
-        distance, axis_x, axis_y = core_distance(body, b, x, y, c, s, solids, p)
+        distance, axis_x, axis_y = core_distance(body, b, x, y, c, s, solids, p, axis_x, axis_y)
     return distance - rounding, axis_x, axis_y
 
 
