@@ -15,6 +15,7 @@ from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 if TYPE_CHECKING:
     from maneuver_automaton.collision.body import Body
     from maneuver_automaton.collision.convex import Solids
+    from maneuver_automaton.collision.swept_areas import SweptAreas
     from maneuver_automaton.collision.world import Buckets, Field, WorldArrays
 
 NEAR = 0.1  # share of a body's reach below which solids are looked at one by one
@@ -45,7 +46,7 @@ def point_to_segment(x: float, y: float, ax: float, ay: float, bx: float, by: fl
 
 @inlined_kernel
 def separation(
-    body: Body,
+    body: Body | SweptAreas,
     b: int,
     x: float,
     y: float,
