@@ -17,10 +17,10 @@ from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.lattice_arrays import (
     CELL,
     LatticeLibrary,
+    coasts_of,
     edge_durations_of,
     lattice_arrays,
     length_scale,
-    moves_of,
     tightest_turn,
 )
 from maneuver_automaton.search.lattice_edges import (
@@ -121,7 +121,7 @@ def library_of_trims(
     )
     return LatticeLibrary(
         arrays=made,
-        backwards=made._replace(moves=moves_of(twists, -durations)),
+        backwards=made._replace(**coasts_of(twists, -durations, made.body)._asdict()),
         priced=library,
         parts=parts,
         trims=library.trims,
