@@ -23,6 +23,7 @@ from maneuver_automaton.planning.no_way import before_proof
 from maneuver_automaton.planning.result import LowerBound
 from maneuver_automaton.planning.steps import BY_TIME, Steps
 from maneuver_automaton.problem import moves
+from maneuver_automaton.refinement.clear_insertion import paced, whole_of
 from maneuver_automaton.refinement.improve import Improved, Patience, improve
 from maneuver_automaton.refinement.incumbent_words import quick_word
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
@@ -225,9 +226,12 @@ def _needs_quick_word(query: LatticeQuery) -> bool:
 
 def improved(lattice: LatticeWords) -> list[Candidate]:
     """Plans to be checked, the cheapest first: what was found, and others if they are asked for."""
-    query, found = lattice.query, lattice.found
     if not lattice.words:
         return []
+    lattice.query, word = paced(lattice.query, lattice.words[-1])
+    if word is not lattice.words[-1]:
+        lattice.gained(word)
+    query, found = lattice.query, lattice.found
     if query.problem.moves and lattice.knows_all:
         _let_pass(lattice)
     better = lattice.improve(
@@ -237,6 +241,7 @@ def improved(lattice: LatticeWords) -> list[Candidate]:
         patience=Patience(),
         floor=lattice.bound.value - query.padding if lattice.bound else -math.inf,
         better=lattice.gained,
+        every_trim=whole_of(query),
         meanwhile=lambda: load_checks(query.problem, found.workspace),
     )
     if not lattice.knows_all:
