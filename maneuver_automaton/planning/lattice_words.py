@@ -23,7 +23,7 @@ from maneuver_automaton.planning.no_way import before_proof
 from maneuver_automaton.planning.result import LowerBound
 from maneuver_automaton.planning.steps import BY_TIME, Steps
 from maneuver_automaton.problem import moves
-from maneuver_automaton.refinement.clear_insertion import paced, whole_of
+from maneuver_automaton.refinement.clear_insertion import has_paces, paced, whole_of
 from maneuver_automaton.refinement.improve import Improved, Patience, improve
 from maneuver_automaton.refinement.incumbent_words import quick_word
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
@@ -228,9 +228,8 @@ def improved(lattice: LatticeWords) -> list[Candidate]:
     """Plans to be checked, the cheapest first: what was found, and others if they are asked for."""
     if not lattice.words:
         return []
-    lattice.query, word = paced(lattice.query, lattice.words[-1])
-    if word is not lattice.words[-1]:
-        lattice.gained(word)
+    if has_paces(lattice.query):
+        _at_pace(lattice)
     query, found = lattice.query, lattice.found
     if query.problem.moves and lattice.knows_all:
         _let_pass(lattice)
@@ -251,6 +250,15 @@ def improved(lattice: LatticeWords) -> list[Candidate]:
         candidates += _free_words(lattice)
         candidates += _detours(lattice, better.word, 2 * found.alternatives)
     return sorted(candidates, key=lambda one: one.cost)
+
+
+def _at_pace(lattice: LatticeWords) -> None:
+    """Take the trims of a large library that fill the time, once the first word is shortened."""
+    query, budget = lattice.query, lattice.for_others
+    lattice.improve(query, lattice.words[-1], budget, patience=AT_ONCE, better=lattice.gained)
+    lattice.query, word = paced(query, lattice.words[-1])
+    if word is not lattice.words[-1]:
+        lattice.gained(word)
 
 
 def _for_the_best(lattice: LatticeWords) -> Budget:

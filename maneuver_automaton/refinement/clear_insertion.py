@@ -140,6 +140,11 @@ def _dense(query: LatticeQuery) -> LatticeQuery:
     return with_trims(query, Chosen(tuple(words.tolist())))
 
 
+def has_paces(query: LatticeQuery) -> bool:
+    """Whether the paces of a large library have to be chosen, since time is limited."""
+    return math.isfinite(query.most_time) and stands_for_more(query.problem)
+
+
 def paced(query: LatticeQuery, word: Word) -> tuple[LatticeQuery, Word]:
     """The query with trims at the paces that suit a word, where its time is limited, and the word.
 
@@ -147,7 +152,7 @@ def paced(query: LatticeQuery, word: Word) -> tuple[LatticeQuery, Word]:
     at these paces, if that is cheaper.
     """
     problem, held = query.problem, query.library.trims
-    if not (math.isfinite(query.most_time) and stands_for_more(problem)):
+    if not has_paces(query):
         return query, word
     known = moving_trims(problem.automaton, problem.cost)
     moves = np.isin(word.trims, known.trims)
