@@ -66,7 +66,7 @@ def earliest_arrival(
                 step = tick * (1 + blocked // PATIENT)
                 leave, blocked = leave + step, blocked + 1
                 continue
-            if step > 0.0:  # when exactly it is free again
+            if blocked > 0:  # when exactly it is free again
                 low, high = leave - step, leave
                 for _ in range(HALVINGS):
                     middle = 0.5 * (low + high)
@@ -84,7 +84,7 @@ def earliest_arrival(
             if leave > quiet:
                 break
             # What arrives while it may stand there anyway is of no use.
-            leave, step, blocked = max(leave, until - t) + tick, tick, 0
+            leave, blocked = max(leave, until - t) + tick, 0
     return -1
 
 
