@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.search.scene import Scene
     from maneuver_automaton.search.waiting import PathArrays
 
-HALVINGS = 7  # of a tick, for the time at which the way is free again
+HALVINGS = 10  # of a tick, for the time at which the way is free again
 PATIENT = 16  # departures that are blocked before ticks become longer
 MOST_ASKED = 20_000  # departures tried in all
 JOINT, PARENT = range(2)  # columns of `path.links`
