@@ -97,6 +97,7 @@ class Horizon:
     max_trims: int | None = None  # rest included; None: no limit
     min_coast: float = 0.0  # [s] of every trim but rest
     max_time: float | None = None  # [s] at most, with a free final time
+    stay: bool = False  # at the goal for ever, where nothing may pass later, with a free final time
 
     def __post_init__(self) -> None:
         for name in ("time", "max_time"):
@@ -105,6 +106,8 @@ class Horizon:
                 raise ValueError(f"horizon: {name} must be positive, got {value} s")
         if self.time is not None and self.max_time is not None:
             raise ValueError("horizon: max_time is for a free final time, but time is fixed")
+        if self.time is not None and self.stay:
+            raise ValueError("horizon: stay is for a free final time, but time is fixed")
         if self.max_trims is not None and self.max_trims < 1:
             raise ValueError(f"horizon: max_trims must be at least 1, got {self.max_trims}")
         if not (math.isfinite(self.min_coast) and self.min_coast >= 0.0):
@@ -535,6 +538,15 @@ class Problem:
             obstacles=tuple(obstacle.moved(by) for obstacle in self.obstacles),
             zones=tuple(zone.moved(by) for zone in self.zones),
         )
+
+    @functools.cached_property
+    def quiet_after(self) -> float:
+        """When [s] the last moving obstacle has stopped, come or gone; -inf if nothing moves."""
+        times = [-math.inf]
+        for one in self.obstacles:
+            if isinstance(one, Obstacle) and one.motion is not None:
+                times += [float(one.motion.time[-1]), *filter(math.isfinite, one.presence)]
+        return max(times)
 
     @functools.cached_property
     def moves(self) -> bool:

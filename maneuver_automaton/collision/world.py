@@ -40,6 +40,7 @@ from maneuver_automaton.groups import SE2
 MOST_FIELD_CELLS = 60_000
 MOST_MAP_CELLS = 250_000  # of the field over an occupancy map, where a cell costs less
 MOST_BUCKETS = 100_000
+ALONG = 0.5  # [rad] of an arc between the places that say where a moving obstacle goes
 SHARE = 10.0**DIGITS  # of a metre or radian that a coordinate is rounded to
 HALF_TURN = float(np.round(np.pi, DIGITS))
 
@@ -165,33 +166,40 @@ def world_of(
     body = body_of(footprint)
     pose = np.array(frame)
     pose.setflags(write=False)
-    still = [o for o in obstacles if isinstance(o, Obstacle) and o.motion is None]
     moving = [o for o in obstacles if isinstance(o, Obstacle) and o.motion is not None]
-    maps = [_seen_map(o, pose) for o in obstacles if isinstance(o, OccupancyMap)]
-    pieces = pieces_seen_from([o.shape for o in still], pose)
-    # Rectangles of maps come last: near contact they are solids as others, but the field takes maps
-    # by a transform of their cells.
-    listed = len(pieces)
-    for one in obstacles:
-        if isinstance(one, OccupancyMap):
-            pieces += [(ring, 0.0) for ring in _cells(one, pose)]
-    solids = solids_of(pieces)
+    static = tuple(o for o in obstacles if isinstance(o, OccupancyMap) or o.motion is None)
+    solids, buckets, field = _static_arrays(static, footprint, frame, keep)
     there = present or tuple(one.presence for one in moving)
-    moving_arrays = _moving_obstacles(moving, pose, there)
-    box = _box(solids.plates[:, :4], moving_arrays)
-    arrays = WorldArrays(
-        solids=solids,
-        buckets=_buckets(solids.plates, body, keep),
-        field=_field(solids, listed, maps, body, keep),
-        moving=moving_arrays,
-    )
+    followed = [_one_moving(obstacle, frame) for obstacle in moving]
+    moving_arrays = _moving_obstacles(followed, there)
     return World(
         frame=pose,
         body=body,
-        arrays=arrays,
-        box=box,
+        arrays=WorldArrays(solids=solids, buckets=buckets, field=field, moving=moving_arrays),
+        box=_box(solids.plates[:, :4], followed),
         last_event=_last_event(moving_arrays),
     )
+
+
+@functools.lru_cache(maxsize=64)
+def _static_arrays(
+    static: tuple[AnyObstacle, ...],
+    footprint: tuple[Shape, ...],
+    frame: tuple[float, ...],
+    keep: float,
+) -> tuple[Solids, Buckets, Field]:
+    """What stands still around a footprint: the same, whatever moves beside it."""
+    body, pose = body_of(footprint), np.array(frame)
+    maps = [_seen_map(o, pose) for o in static if isinstance(o, OccupancyMap)]
+    pieces = pieces_seen_from([o.shape for o in static if isinstance(o, Obstacle)], pose)
+    # Rectangles of maps come last: near contact they are solids as others, but the field takes maps
+    # by a transform of their cells.
+    listed = len(pieces)
+    for one in static:
+        if isinstance(one, OccupancyMap):
+            pieces += [(ring, 0.0) for ring in _cells(one, pose)]
+    solids = solids_of(pieces)
+    return solids, _buckets(solids.plates, body, keep), _field(solids, listed, maps, body, keep)
 
 
 def own_frame(obstacles: tuple[AnyObstacle, ...], otherwise: Array) -> tuple[float, ...]:
@@ -236,15 +244,10 @@ def _cells(one: OccupancyMap, frame: Array) -> Array:
     return seen_from(turned + shift, np.array([0.0, 0.0, frame[2]]))
 
 
-def _box(boxes: Array, moving: MovingObstacles) -> Array:
-    rows = [boxes] if len(boxes) else []
-    for k in range(len(moving.speed)):
-        knots = moving.pose[moving.first_knot[k] : moving.first_knot[k + 1]]
-        middles = np.asarray(SE2(knots).act(moving.middle[k]))
-        rows.append(np.hstack([middles - moving.reach[k], middles + moving.reach[k]]))
-    if not rows:
+def _box(boxes: Array, moving: list[_Moving]) -> Array:
+    every = np.concatenate([boxes, *(one.box[None] for one in moving)])
+    if not len(every):
         return np.array([math.inf, math.inf, -math.inf, -math.inf])
-    every = np.concatenate(rows)
     return np.concatenate([every[:, :2].min(axis=0), every[:, 2:].max(axis=0)])
 
 
@@ -296,41 +299,57 @@ def _buckets(plates: Array, body: Body, keep: float) -> Buckets:
     return Buckets(start, items, float(low[0]), float(low[1]), cell, columns, rows, reach)
 
 
+class _Moving(NamedTuple):
+    """One moving obstacle, seen from a world's frame."""
+
+    pieces: list[tuple[Array, float]]
+    motion: Motion
+    rate: Array  # (n, 3)
+    speed: float
+    middle: Array
+    reach: float
+    box: Array  # (4,) [low x, low y, high x, high y] of where it goes
+
+
 def _moving_obstacles(
-    moving: list[Obstacle], frame: Array, present: tuple[tuple[float, float], ...]
+    every: list[_Moving], present: tuple[tuple[float, float], ...]
 ) -> MovingObstacles:
-    pieces: list[tuple[Array, float]] = []
-    first_piece, first_knot = [0], [0]
-    times, poses, rates, arcs, speeds, middles, reaches = [], [], [], [], [], [], []
-    for obstacle in moving:
-        assert obstacle.motion is not None
-        own = convex_pieces(obstacle.shape)
-        pieces += own
-        first_piece.append(len(pieces))
-        low = np.min([ring.min(axis=0) - r for ring, r in own], axis=0)
-        high = np.max([ring.max(axis=0) + r for ring, r in own], axis=0)
-        middle = 0.5 * (low + high)
-        motion = _seen_motion(obstacle.motion, frame)
-        times.append(motion.time)
-        poses.append(motion.pose)
-        rates.append(np.vstack([motion.rates, np.zeros(3)]))
-        arcs.append(motion.twist is not None)
-        first_knot.append(first_knot[-1] + motion.time.size)
-        middles.append(middle)
-        reaches.append(max(float(np.hypot(*(ring - middle).T).max()) + r for ring, r in own))
-        speeds.append(motion.fastest(max(float(np.hypot(*ring.T).max()) + r for ring, r in own)))
+    knots = [one.motion.time.size for one in every]
     return MovingObstacles(
-        solids=solids_of(pieces),
-        first_piece=np.array(first_piece, dtype=np.int64),
-        first_knot=np.array(first_knot, dtype=np.int64),
-        time=np.concatenate([np.zeros(0), *times]),
-        pose=np.concatenate([np.zeros((0, 3)), *poses]),
-        speed=np.array(speeds, dtype=np.float64),
-        middle=np.array(middles, dtype=np.float64).reshape(-1, 2),
-        reach=np.array(reaches, dtype=np.float64),
+        solids=solids_of([piece for one in every for piece in one.pieces]),
+        first_piece=np.cumsum([0, *(len(one.pieces) for one in every)], dtype=np.int64),
+        first_knot=np.cumsum([0, *knots], dtype=np.int64),
+        time=np.concatenate([np.zeros(0), *(one.motion.time for one in every)]),
+        pose=np.concatenate([np.zeros((0, 3)), *(one.motion.pose for one in every)]),
+        speed=np.array([one.speed for one in every], dtype=np.float64),
+        middle=np.array([one.middle for one in every], dtype=np.float64).reshape(-1, 2),
+        reach=np.array([one.reach for one in every], dtype=np.float64),
         present=np.array(present, dtype=np.float64).reshape(-1, 2),
-        rate=np.concatenate([np.zeros((0, 3)), *rates]),
-        arcs=np.array(arcs, dtype=np.bool_),
+        rate=np.concatenate([np.zeros((0, 3)), *(one.rate for one in every)]),
+        arcs=np.array([one.motion.twist is not None for one in every], dtype=np.bool_),
+    )
+
+
+@functools.lru_cache(maxsize=1024)
+def _one_moving(obstacle: Obstacle, frame: tuple[float, ...]) -> _Moving:
+    """A moving obstacle as a world sees it: the same for all bodies, and whatever is beside it."""
+    assert obstacle.motion is not None
+    own = convex_pieces(obstacle.shape)
+    low = np.min([ring.min(axis=0) - r for ring, r in own], axis=0)
+    high = np.max([ring.max(axis=0) + r for ring, r in own], axis=0)
+    middle = 0.5 * (low + high)
+    motion = _seen_motion(obstacle.motion, np.array(frame))
+    far = max(float(np.hypot(*ring.T).max()) + r for ring, r in own)
+    reach = max(float(np.hypot(*(ring - middle).T).max()) + r for ring, r in own)
+    way = np.asarray(SE2(motion.at(motion.times_for_lines(ALONG))).act(middle))
+    return _Moving(
+        pieces=own,
+        motion=motion,
+        rate=np.vstack([motion.rates, np.zeros(3)]),
+        speed=motion.fastest(far),
+        middle=middle,
+        reach=reach,
+        box=np.concatenate([way.min(axis=0) - reach, way.max(axis=0) + reach]),
     )
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import enum
 import functools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.audit import Audit, audit_plan, origin_of
+from maneuver_automaton.audit import Audit, audit_plan, closest_to, origin_of
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.budget import UNLIMITED, Budget
@@ -30,6 +30,7 @@ from maneuver_automaton.refinement.conditions import broken_condition
 from maneuver_automaton.search.inside import stays_inside
 
 PROVEN = (1e-3, 2e-5)  # [m] a hit counts if it is one for the finer cover of round shapes too
+CONTACT = 1e-9  # [m] what is closer touches: places are rounded
 AUDIT_S, SAMPLE_S = 5e-3, 1.5e-5  # [s] that an audit takes, in all and a sample among obstacles
 
 
@@ -81,6 +82,7 @@ def check_plan(
         return Checked(audit=None, broken=Condition.BOUNDS, reason="it leaves the bounds")
     try:
         reason = what_is_hit(problem, plan, goal, workspace, budget=budget)
+        reason = reason or what_passes_later(problem, plan, goal, workspace)
         if reason:
             return Checked(audit=None, broken=Condition.COLLISION, reason=reason)
         _ask(budget, _audit_takes(problem, plan))
@@ -102,6 +104,35 @@ def check_plan(
         return Checked(audit=None, broken=Condition.TIME)
     broken = None if audit.passed else Condition.AUDIT
     return Checked(audit=audit, broken=broken, reason=audit.reason)
+
+
+def what_passes_later(
+    problem: Problem, plan: Plan, goal: Goal, workspace: Workspace | None = None
+) -> str:
+    """What hits a vehicle that stays where its plan ends; empty if nothing does, or it need not.
+
+    By FCL, and in the plane by the audit's bounds, of every part.
+    """
+    arrival = plan.start_time + plan.duration
+    lasting = problem.quiet_after - arrival
+    if not problem.horizon.stay or not 0.0 < lasting < math.inf:
+        return ""
+    bodies = [("", plan.end, problem.footprint)]
+    for name, shapes in problem.parts.items():
+        part = carried(plan, problem.automaton.model, name)
+        bodies.append((f"the {name}: ", part.end, shapes))
+    still = Trim(name="at the goal", body_velocity=np.zeros(plan.start.size), control=np.zeros(2))
+    for what, pose, shapes in bodies:
+        body = replace(problem, footprint=shapes, parts={}, zones=())
+        stands = Plan(pose, (still,), durations=[lasting], start_time=arrival)
+        if said := what_is_hit(body, stands, goal, workspace):
+            return f"{what}{said}"
+        if pose.size > 3:
+            continue
+        least = closest_to(stands, Unicycle(), problem.obstacles, footprint=shapes)
+        if least.distance <= max(problem.margin - CONTACT, CONTACT):
+            return f"{what}at {least.time:.6g} s an obstacle comes too near to where it stays"
+    return ""
 
 
 def _ask(budget: Budget, needed: float = 0.0) -> None:

@@ -130,6 +130,8 @@ class LatticeQuery:
     @property
     def stay_until(self) -> float:
         """Time of the world [s] until which a plan rests at its goal; -inf if it need not."""
+        if self.problem.horizon.stay:
+            return self.world.last_event
         fixed = self.problem.horizon.time
         return -math.inf if fixed is None else self.problem.start_time + fixed
 

@@ -1,0 +1,164 @@
+"""Which vehicles come too near to each other if they drive their plans, and when."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import networkx as nx
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.collision.body import Body, body_of, fastest_points
+from maneuver_automaton.collision.shapes import Box, Disc, Motion, Obstacle, Polygon, Shape
+from maneuver_automaton.collision.world import MovingObstacles, world_of
+from maneuver_automaton.fleet import _kernels_meetings as kernels
+
+PROOF = 1e-4  # [m] more than the distance to keep, wherever two bodies are looked at
+AFTER = 1.0  # [s] that is looked at once nothing moves any more
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Course:
+    """A vehicle's bodies in time: each of its parts with a motion, while it is there."""
+
+    shapes: tuple[tuple[Shape, ...], ...]  # of the vehicle and of what it carries
+    motions: tuple[Motion, ...]
+    until: float = math.inf  # [s] when it is gone; inf if it stays
+    grown: float = 0.0  # [m] by how much larger others see it
+    bodies: tuple[Obstacle, ...] = field(init=False)  # as they are
+    obstacles: tuple[Obstacle, ...] = field(init=False)  # as others see them
+
+    def __post_init__(self) -> None:
+        present = None if self.until == math.inf else (-math.inf, self.until)
+        rows = [
+            (shape, motion)
+            for shapes, motion in zip(self.shapes, self.motions, strict=True)
+            for shape in shapes
+        ]
+        bodies = tuple(Obstacle(shape, motion=way, present_s=present) for shape, way in rows)
+        object.__setattr__(self, "bodies", bodies)
+        seen = bodies
+        if self.grown > 0.0:
+            seen = tuple(replace(one, shape=larger(one.shape, self.grown)) for one in bodies)
+        object.__setattr__(self, "obstacles", seen)
+
+    @property
+    def quiet_after(self) -> float:
+        """When it has come to rest for good, or is gone [s]."""
+        return min(self.until, max(float(one.time[-1]) for one in self.motions))
+
+
+def larger(shape: Shape, by: float) -> Shape:
+    """A shape that holds all within a length [m] of another, with square corners.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.collision import Box, Disc
+    >>> larger(Disc(1.0), 0.5).radius, larger(Box([2.0, 1.0]), 0.5).size.tolist()
+    (1.5, [3.0, 2.0])
+    """
+    if by <= 0.0:
+        return shape
+    if isinstance(shape, Disc):
+        return Disc(shape.radius + by, shape.center)
+    if isinstance(shape, Box):
+        return Box(shape.size + 2.0 * by, shape.center, shape.heading)
+    import shapely
+
+    whole = shapely.Polygon(shape.corners, shape.holes).buffer(by, join_style="mitre")
+    return Polygon(whole)
+
+
+class Meeting(NamedTuple):
+    """Two vehicles, by number, and when they first come too near to each other [s]."""
+
+    one: int
+    other: int
+    time: float
+
+
+def meetings(
+    courses: Mapping[int, Course], *, keep: float, among: Sequence[int] | None = None
+) -> list[Meeting]:
+    """Pairs of vehicles that come closer than a distance [m], the first that does so first.
+
+    Whatever is not among the pairs keeps the distance at all times, also after all have arrived.
+    Only pairs with one of the vehicles `among`, if these are given.
+    """
+    numbers = sorted(courses)
+    if len(numbers) < 2:
+        return []
+    first = courses[numbers[0]].motions[0].pose[0]
+    frame = (float(first[0]), float(first[1]), 0.0)
+    owners, obstacles = [], []
+    for number in numbers:
+        bodies = courses[number].bodies
+        owners += [number] * len(bodies)
+        obstacles += list(bodies)
+    world = world_of(tuple(obstacles), (), frame)
+    quiet = max(one.quiet_after for one in courses.values()) + AFTER
+    owner = np.array(owners)
+    found: dict[tuple[int, int], float] = {}
+    wanted = set(numbers if among is None else among)
+    for number in numbers:
+        if number not in wanted:
+            continue
+        times = first_meetings(world.arrays.moving, courses[number], frame, quiet, keep)
+        for other in numbers:
+            if other == number or (other in wanted and other < number):
+                continue
+            when = float(times[owner == other].min())
+            if when < math.inf:
+                pair = (min(number, other), max(number, other))
+                found[pair] = min(when, found.get(pair, math.inf))
+    rows = [Meeting(*pair, when) for pair, when in found.items()]
+    return sorted(rows, key=lambda row: (row.time, row.one, row.other))
+
+
+def first_meetings(
+    moving: MovingObstacles,
+    course: Course,
+    frame: tuple[float, float, float],
+    quiet: float,
+    keep: float,
+) -> Array:
+    """When a vehicle first comes within a distance [m] of each of what moves (M,) [s]."""
+    least = np.full(moving.speed.size, math.inf)
+    for shapes, motion in zip(course.shapes, course.motions, strict=True):
+        body, out = body_of(shapes), np.empty(moving.speed.size)
+        rows = _coasts(motion, body, frame, min(quiet, course.until))
+        kernels.first_meetings(moving, body, rows, keep, PROOF, out)
+        np.minimum(least, out, out=least)
+    return least
+
+
+def _coasts(motion: Motion, body: Body, frame: tuple[float, float, float], until: float) -> Array:
+    """Rows of `first_meetings`: the coasts of a motion, then it stands until a time."""
+    poses, times = motion.pose - np.array(frame), motion.time
+    begins = times[0] - AFTER
+    lasting = np.concatenate([[AFTER], np.diff(times), [max(until - times[-1], 0.0)]])
+    rows = np.zeros((len(times) + 1, 9))
+    rows[:, :3] = poses[np.maximum(np.arange(len(times) + 1) - 1, 0)]
+    rows[1:-1, 3:6] = motion.rates  # it coasts, or never moves
+    rows[:, 6] = fastest_points(body, rows[:, 3:6])
+    rows[:, 7] = lasting
+    rows[:, 8] = np.concatenate([[begins], times])
+    return rows
+
+
+def components(numbers: Sequence[int], found: Sequence[Meeting]) -> list[tuple[int, ...]]:
+    """Groups of vehicles that meet, directly or by way of others; the largest first.
+
+    Examples
+    --------
+    >>> components([0, 1, 2, 3], [Meeting(0, 2, 1.0)])
+    [(0, 2), (1,), (3,)]
+    """
+    graph: nx.Graph[int] = nx.Graph()
+    graph.add_nodes_from(numbers)
+    graph.add_edges_from((row.one, row.other) for row in found)
+    groups = [tuple(sorted(group)) for group in nx.connected_components(graph)]
+    return sorted(groups, key=lambda group: (-len(group), group))

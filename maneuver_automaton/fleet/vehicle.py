@@ -1,0 +1,201 @@
+"""One vehicle of a fleet: its way alone, and its way past what the others do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.carried import carried
+from maneuver_automaton.budget import Budget
+from maneuver_automaton.collision.shapes import Disc, Motion, Obstacle
+from maneuver_automaton.fleet.conflicts import Course
+from maneuver_automaton.planning.blocked import blocked_ends, goals_left
+from maneuver_automaton.planning.bounds import lattice_bound
+from maneuver_automaton.planning.needs import has_inertia
+from maneuver_automaton.planning.plan import plan_in
+from maneuver_automaton.planning.result import LowerBound, PlanResult
+from maneuver_automaton.planning.workspace import Workspace
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.refinement.improve import Patience, improve
+from maneuver_automaton.search.lattice import first_plan
+from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
+from maneuver_automaton.search.waiting import with_waits
+from maneuver_automaton.search.word_plan import plan_of_word
+from maneuver_automaton.words.word import Word
+
+WAYS = 6  # alone, that are tried with rests
+QUICK = 1500  # expansions in space and time at first ...
+LONG = 20_000  # ... and where nothing else helps
+AT_ONCE = Patience(attempts=0, passes=0)
+WITH_TIME = Patience(attempts=400, passes=2)
+NEARLY = 1.05  # times the way alone: what costs more is searched for in space and time as well
+LEAST_S, INERTIA_S = 0.01, 2.0  # [s] that a whole query gets at least, and with inertia at most
+POINT = (Disc(1e-6),)  # the body of a vehicle that is a point, as others see it
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """A plan of a vehicle, its cost, and where that leaves its bodies."""
+
+    plan: Plan
+    cost: float
+    goal_index: int
+    course: Course
+
+    @property
+    def arrival(self) -> float:
+        """When it arrives [s]."""
+        return self.plan.start_time + self.plan.duration
+
+
+@dataclass(slots=True, eq=False)
+class Vehicle:
+    """One vehicle: `problem` is its own, with the obstacles that it has without the others."""
+
+    number: int
+    name: str
+    problem: Problem
+    leaves: bool
+    grown: float  # [m] by which others see it larger
+    workspace: Workspace
+    alone: Found | None = None  # its plan by itself
+    bound: LowerBound | None = None  # no plan of it costs less
+    why_none: str = ""  # why it has no plan by itself
+    ways: list[Word] = field(default_factory=list)  # alone, the cheapest first
+    standing: Course = field(init=False)  # at its start, for ever
+    expansions: int = 0
+
+    def __post_init__(self) -> None:
+        problem = self.problem
+        shapes, poses = [problem.footprint or POINT], [problem.start[:3]]
+        if problem.parts:
+            here = Plan(problem.start, (problem.first_trim,), durations=[0.0])
+        for name, of_part in problem.parts.items():
+            shapes.append(of_part)
+            poses.append(carried(here, problem.automaton.model, name).start[:3])
+        motions = tuple(Motion([problem.start_time], [pose]) for pose in poses)
+        self.standing = Course(tuple(shapes), motions, grown=self.grown)
+
+    @property
+    def at_will(self) -> bool:
+        """Whether it switches at will in a plane, so that its plans are words of the lattice."""
+        return not has_inertia(self.problem) and self.problem.start.size == 3
+
+    def course_of(self, plan: Plan) -> Course:
+        """Its bodies in time if it drives a plan."""
+        plans = [(self.problem.footprint or POINT, plan)]
+        for name, shapes in self.problem.parts.items():
+            plans.append((shapes, carried(plan, self.problem.automaton.model, name)))
+        until = plan.start_time + plan.duration if self.leaves else math.inf
+        return Course(
+            tuple(shapes for shapes, _ in plans),
+            tuple(Motion.of_plan(one) for _, one in plans),
+            until,
+            self.grown,
+        )
+
+    def plan_alone(self, budget: Budget) -> None:
+        """Find its way past what stands still, by itself, and a few others beside it."""
+        blocked = blocked_ends(self.problem)
+        if blocked is not None:
+            self.why_none = blocked.reason
+        elif self.at_will:
+            self._plan_words(budget)
+        else:
+            result = plan_in(
+                self.workspace, self.problem, time_limit=max(budget.left, LEAST_S), alternatives=0
+            )
+            self._count(result.counts.get("expansions", 0))
+            self.alone, self.why_none = self._found(result), result.reason
+            self.bound = result.bound
+
+    def _plan_words(self, budget: Budget) -> None:
+        """The same for one whose plans are words of the lattice."""
+        query = self._query(self.problem)
+        first = first_plan(query, budget=replace(budget, expansions=LONG))
+        self._count(first.expansions)
+        if first.word is None:
+            self.why_none = first.enclosed or "no way was found"
+            return
+        self._keep_ways(query, first.word, budget, AT_ONCE)
+        self.bound = lattice_bound(query)
+
+    def look_for_better_ways(self, budget: Budget) -> None:
+        """Better ways past what stands still, and others beside them."""
+        if self.ways and self.problem.obstacles:
+            self._keep_ways(self._query(self.problem), self.ways[0], budget, WITH_TIME)
+
+    def _keep_ways(
+        self, query: LatticeQuery, word: Word, budget: Budget, patience: Patience
+    ) -> None:
+        better = improve(query, word, budget=budget, patience=patience)
+        self._count(better.expansions)
+        words = [better.word, word, *better.others, *self.ways]
+        words = sorted(words, key=lambda one: one.cost)
+        distinct = {tuple(one.trims.tolist()): one for one in reversed(words)}
+        self.ways = list(distinct.values())[::-1][:WAYS]
+        self.alone = self._word_found(query, self.ways[0])
+
+    def _word_found(self, query: LatticeQuery, word: Word) -> Found:
+        plan = plan_of_word(query, word)
+        goal_index = query.goal_index[word.goal]
+        return Found(plan, word.cost + query.padding, goal_index, self.course_of(plan))
+
+    def _found(self, result: PlanResult) -> Found | None:
+        if result.plan is None or result.cost is None:
+            return None
+        return Found(result.plan, result.cost, result.goal_index or 0, self.course_of(result.plan))
+
+    def past(
+        self,
+        others: Sequence[Obstacle],
+        budget: Budget,
+        *,
+        most: int = QUICK,
+        known: float = math.inf,
+    ) -> Found | None:
+        """The cheapest way found past what the others do; None if there is none below a cost."""
+        if not others:
+            return self.alone if self.alone is not None and self.alone.cost < known else None
+        problem = replace(
+            self.problem,
+            obstacles=(*self.problem.obstacles, *others),
+            horizon=replace(self.problem.horizon, stay=not self.leaves),
+        )
+        if not self.at_will:
+            return self._past_with_inertia(problem, budget, known)
+        query = self._query(problem)
+        best: Word | None = None
+        for way in self.ways:
+            if way.cost >= (best.cost if best else known) or budget.is_over:
+                break
+            timed = with_waits(query, way)
+            if timed is not None and timed.cost < (best.cost if best else known):
+                best = timed
+        if best is None or best.cost > NEARLY * self.ways[0].cost:
+            first = first_plan(query, budget=replace(budget, expansions=most))
+            self._count(first.expansions)
+            if first.word is not None and first.word.cost < (best.cost if best else math.inf):
+                best = first.word
+        if best is None:
+            return None
+        best = improve(query, best, budget=budget, patience=AT_ONCE).word
+        if not best.cost < known:
+            return None
+        return self._word_found(query, best)
+
+    def _past_with_inertia(self, problem: Problem, budget: Budget, known: float) -> Found | None:
+        workspace = Workspace(problem.obstacles, self.workspace.prepared)
+        share = max(min(budget.left, INERTIA_S), LEAST_S)
+        result = plan_in(workspace, problem, time_limit=share, alternatives=0)
+        self._count(result.counts.get("expansions", 0))
+        found = self._found(result)
+        return found if found is not None and found.cost < known else None
+
+    def _query(self, problem: Problem) -> LatticeQuery:
+        return lattice_query(problem, goals_left(problem), prepared=self.workspace.prepared)
+
+    def _count(self, expansions: int) -> None:
+        self.expansions += expansions

@@ -1,0 +1,143 @@
+"""The last word on the plans of a fleet: each past what stands still, and every pair."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from maneuver_automaton.audit import closest_to, terminal_error
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.collision.shapes import Motion
+from maneuver_automaton.fleet.conflicts import Course, meetings
+from maneuver_automaton.fleet.problem import FleetProblem
+from maneuver_automaton.fleet.result import Closest, FleetResult, FleetStatus
+from maneuver_automaton.fleet.vehicle import Found, Vehicle
+from maneuver_automaton.models import Omnidirectional
+from maneuver_automaton.planning.checking import check_plan
+from maneuver_automaton.planning.result import PlanResult, PlanStatus
+from maneuver_automaton.primitives import Trim
+from maneuver_automaton.problem import SearchSettings
+
+NEAR = 1.0  # [m] beyond the margin: pairs that come so near are measured
+CONTACT = 1e-9  # [m] what is closer touches
+
+
+def verified(
+    fleet: FleetProblem,
+    vehicles: Sequence[Vehicle],
+    held: Mapping[int, Found],
+    reasons: Mapping[int, str],
+) -> FleetResult:
+    """The answer for these plans; a plan that does not pass is left out, with its reason."""
+    results: dict[str, PlanResult] = {}
+    why = {vehicles[k].name: said for k, said in reasons.items()}
+    passed: dict[int, Course] = {}
+    for one in vehicles:
+        result, said = _checked(one, held.get(one.number), fleet.problems[one.number].search)
+        if said:
+            why.setdefault(one.name, said)
+        results[one.name] = result
+        if result.plan is not None:
+            passed[one.number] = held[one.number].course
+    names = [one.name for one in vehicles]
+    while True:
+        courses = {one.number: passed.get(one.number, one.standing) for one in vehicles}
+        closest = measured(courses, names, keep=fleet.margin)
+        near = [row for row in closest if row.distance_m <= max(fleet.margin - CONTACT, CONTACT)]
+        driven = [name for row in near for name in row.pair if results[name].plan is not None]
+        if not driven:
+            break
+        # What two libraries do not agree on is not returned.
+        name, row = driven[-1], near[0]
+        why[name] = f"{' and '.join(row.pair)} come within {row.distance_m:.3g} m of each other"
+        results[name] = PlanResult(
+            problem=results[name].problem, status=PlanStatus.NO_PLAN, reason=why[name]
+        )
+        del passed[names.index(name)]
+    n = sum(result.plan is not None for result in results.values())
+    status = FleetStatus.FOUND if n == len(vehicles) else FleetStatus.PARTIAL
+    return FleetResult(
+        problem=fleet,
+        status=status if n else FleetStatus.NO_PLAN,
+        results=results,
+        closest=closest,
+        clearance_m=min((row.distance_m for row in closest), default=math.inf),
+        reasons=why,
+    )
+
+
+def _checked(one: Vehicle, found: Found | None, settings: SearchSettings) -> tuple[PlanResult, str]:
+    """The answer for one vehicle, and why its plan was refused."""
+    problem = replace(one.problem, search=settings)
+    if found is None:
+        reason = one.why_none or "it has no plan past the others"
+        return PlanResult(problem=problem, status=PlanStatus.NO_PLAN, reason=reason), ""
+    goal = problem.goals[found.goal_index]
+    checked = check_plan(problem, found.plan, goal, one.workspace)
+    if checked.broken is not None or checked.audit is None:
+        said = f"its plan was refused: {checked.reason}"
+        return PlanResult(problem=problem, status=PlanStatus.NO_PLAN, reason=said), said
+    cost = problem.cost_of(found.plan)
+    bound = one.bound
+    lower = min(cost, bound.value if bound is not None else 0.0)
+    return (
+        PlanResult(
+            problem=problem,
+            status=PlanStatus.FOUND,
+            reason="",
+            plan=found.plan,
+            goal_index=found.goal_index,
+            cost=cost,
+            lower_bound=lower,
+            gap=(cost - lower) / cost if cost > 0.0 else 0.0,
+            bound=None if bound is None else replace(bound, value=lower, optimal=lower == cost),
+            terminal_error=terminal_error(found.plan, goal),
+            clearance_m=checked.audit.min_clearance_m,
+            audit=checked.audit,
+        ),
+        "",
+    )
+
+
+def measured(
+    courses: Mapping[int, Course], names: Sequence[str], *, keep: float
+) -> tuple[Closest, ...]:
+    """Pairs of vehicles that come near each other, the nearest first, by the audit's bounds.
+
+    Those that are left out keep a metre more than the distance to keep, for all times.
+    """
+    near = meetings(courses, keep=keep + NEAR)
+    rows = []
+    for meeting in near:
+        one, other = courses[meeting.one], courses[meeting.other]
+        quiet = max(one.quiet_after, other.quiet_after)
+        distance, time = math.inf, meeting.time
+        for shapes, motion in zip(one.shapes, one.motions, strict=True):
+            plan = plan_of_motion(motion, min(quiet, one.until))
+            least = closest_to(plan, Omnidirectional(), other.bodies, footprint=shapes)
+            if least.distance < distance:
+                distance, time = least.distance, least.time
+        rows.append(Closest((names[meeting.one], names[meeting.other]), time, distance))
+    return tuple(sorted(rows, key=lambda row: row.distance_m))
+
+
+def plan_of_motion(motion: Motion, until: float) -> Plan:
+    """A motion on arcs as a plan of something that moves at will; then it stands until a time [s].
+
+    Examples
+    --------
+    >>> motion = Motion([0.0, 2.0], [[0, 0, 0], [2, 0, 0]], [[1.0, 0, 0]])
+    >>> plan = plan_of_motion(motion, 5.0)
+    >>> plan.duration, plan.end.tolist()
+    (5.0, [2.0, 0.0, 0.0])
+    """
+    last = float(motion.time[-1])
+    twists = [*motion.rates, np.zeros(3)]
+    durations = [*np.diff(motion.time), max(until - last, 0.0)]
+    trims = tuple(
+        Trim(name=str(k), body_velocity=twist, control=twist) for k, twist in enumerate(twists)
+    )
+    return Plan(motion.pose[0], trims, durations=durations, start_time=float(motion.time[0]))
