@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from maneuver_automaton._files import relative
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import WEIGHTS, Cost, StageCost
 from maneuver_automaton.formats.yaml_source import scalar
@@ -20,7 +21,6 @@ from maneuver_automaton.scenario.fleet_schema import FleetFile
 from maneuver_automaton.scenario.scenario import Scenario
 from maneuver_automaton.scenario.schema import ScenarioFile
 from maneuver_automaton.scenario.shapes import (
-    relative,
     stated_footprint,
     stated_obstacle,
     stated_zone,
