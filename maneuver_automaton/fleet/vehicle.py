@@ -11,6 +11,7 @@ from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.shapes import Disc, Motion, Obstacle
 from maneuver_automaton.fleet.conflicts import Course
+from maneuver_automaton.fleet.refuge import by_a_refuge
 from maneuver_automaton.planning.blocked import blocked_ends, goals_left
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.needs import has_inertia
@@ -186,6 +187,8 @@ class Vehicle:
             self._count(first.expansions)
             if first.word is not None and first.word.cost < (best.cost if best else math.inf):
                 best = first.word
+        if best is None and most == LONG and not budget.is_over:
+            best = by_a_refuge(self.problem, query, self._query, budget)
         if best is None:
             return None
         best = improve(query, best, budget=budget, patience=AT_ONCE).word
