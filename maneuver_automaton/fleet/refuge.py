@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.advancement import free_times
 from maneuver_automaton.problem import Goal, Problem
@@ -20,9 +21,9 @@ from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word, word_of_steps
 
 SAMPLES = 400  # places that are looked at
-MOST_TRIED = 24  # refuges that ways are searched to
+MOST_TRIED = 40  # refuges that ways are searched to
 SEED = 14  # of the places
-NEAR, FAR = 1.0, 12.0  # [lengths of the body] from the start
+FAR = 8.0  # [lengths of the body] from the way alone
 EXPANSIONS = 4000  # of the way to a refuge, and of that from there
 
 
@@ -30,16 +31,17 @@ def by_a_refuge(
     problem: Problem,
     query: LatticeQuery,
     query_of: Callable[[Problem], LatticeQuery],
+    way: Plan,
     budget: Budget,
 ) -> Word | None:
     """The cheapest way found past what moves, with a stop where nothing ever passes; None if none.
 
-    Places near the start, the nearest first; the vehicle drives there, waits, and goes on, as soon
-    as rests along that way allow.
+    Places beside the `way` alone, the nearest first; the vehicle drives there, waits, and goes on,
+    as soon as rests along that way allow.
     """
     best: Word | None = None
     counted = replace(budget, expansions=EXPANSIONS)
-    for pose in _refuges(problem, query)[:MOST_TRIED]:
+    for pose in _refuges(problem, query, way)[:MOST_TRIED]:
         if budget.is_over:
             break
         aim = problem.starting_at(problem.start, time=problem.start_time, goals=Goal(pose))
@@ -61,27 +63,32 @@ def by_a_refuge(
     return best
 
 
-def _refuges(problem: Problem, query: LatticeQuery) -> list[Array]:
-    """Poses (3,) at which the vehicle may stand at all times, the nearest to the start first."""
+def _refuges(problem: Problem, query: LatticeQuery, way: Plan) -> list[Array]:
+    """Poses (3,) beside a way at which the vehicle may stand from when it gets there, for ever.
+
+    The nearest to the way first.
+    """
     rng, world = np.random.default_rng(SEED), query.world
-    start, size = problem.start, max(world.body.reach, query.library.radius * 0.5)
-    # Seen from the start, so that a moved problem has the moved refuges.
-    away = size * rng.uniform(NEAR, FAR, SAMPLES)
-    bearing = start[2] + rng.uniform(-math.pi, math.pi, SAMPLES)
-    heading = start[2] + rng.uniform(-math.pi, math.pi, SAMPLES)
+    size = max(world.body.reach, query.library.radius * 0.5)
+    # Seen from the way, so that a moved problem has the moved refuges.
+    since = way.duration * rng.uniform(0.0, 1.0, SAMPLES)
+    bases = way.pose_at(way.start_time + since)[:, :3]
+    away = size * rng.uniform(0.0, FAR, SAMPLES)
+    bearing, heading = bases[:, 2] + rng.uniform(-math.pi, math.pi, (2, SAMPLES))
     poses = np.column_stack(
-        [start[0] + away * np.cos(bearing), start[1] + away * np.sin(bearing), heading]
+        [bases[:, 0] + away * np.cos(bearing), bases[:, 1] + away * np.sin(bearing), heading]
     )
-    quiet = max(world.last_event - problem.start_time, 0.0) + 1.0
+    begins = problem.start_time + since
+    lasting = np.maximum(world.last_event - begins, 0.0) + 1.0
     stands = free_times(
         world,
         world.into(poses),
         twists=np.zeros((SAMPLES, 3)),
-        durations=np.full(SAMPLES, quiet),
+        durations=lasting,
         margin=query.margin,
         keep=problem.margin,
-        times=problem.start_time,
+        times=begins,
     )
-    kept = np.flatnonzero(stands >= quiet)
+    kept = np.flatnonzero(stands >= lasting)
     order = kept[np.argsort(away[kept], kind="stable")]
     return [poses[k] for k in order if not outside(poses[k], problem.bounds)]

@@ -187,8 +187,8 @@ class Vehicle:
             self._count(first.expansions)
             if first.word is not None and first.word.cost < (best.cost if best else math.inf):
                 best = first.word
-        if best is None and most == LONG and not budget.is_over:
-            best = by_a_refuge(self.problem, query, self._query, budget)
+        if best is None and most == LONG and self.alone is not None:
+            best = by_a_refuge(self.problem, query, self._query, self.alone.plan, budget)
         if best is None:
             return None
         best = improve(query, best, budget=budget, patience=AT_ONCE).word
