@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from maneuver_automaton._arrays import FEW
+
 FARTHEST = 1e10  # [m] of a coordinate or a size, and of any other number of a file
 FASTEST = 5e3  # [m/s] of a trim, and of an obstacle that moves
 FASTEST_TURN = 1e4  # [rad/s] of an obstacle that moves
@@ -32,6 +34,10 @@ def check_size(name: str, values: ArrayLike) -> None:
     ValueError: disc: radius: got 1e+12 m, need at most 1e+10 m in size
     """
     numbers = np.asarray(values, dtype=np.float64)
+    if numbers.ndim == 1 and numbers.size <= FEW:
+        few: list[float] = numbers.tolist()
+        if all(abs(number) <= FARTHEST for number in few):
+            return
     if numbers.size and not np.abs(numbers).max() <= FARTHEST:
         far = np.atleast_1d(numbers)
         far = far[np.abs(far) > FARTHEST]

@@ -409,14 +409,20 @@ class Problem:
 
     def rates_of(self, plan: Plan) -> Array:
         """Cost per second (n,) of the trims of a plan, which may be others than the library's."""
-        if not plan.trims:
+        return self.rates_of_trims(plan.trims)
+
+    def rates_of_trims(self, trims: Sequence[Trim]) -> Array:
+        """Cost per second (n,) of some trims, which may be others than the library's."""
+        if not trims:
             return np.zeros(0)
-        known = _known_rates(self.automaton, self.cost)
-        entries = [known.get(trim.name, _UNKNOWN) for trim in plan.trims]
-        if all(entry[0] is trim for entry, trim in zip(entries, plan.trims, strict=True)):
-            return np.array([entry[1] for entry in entries])
-        controls = np.array([trim.control for trim in plan.trims])
-        return self.cost.rates(controls, np.array([trim.body_velocity for trim in plan.trims]))
+        known, rates = _known_rates(self.automaton, self.cost), list[float]()
+        for trim in trims:
+            entry = known.get(trim.name)
+            if entry is None or entry[0] is not trim:
+                controls = np.array([one.control for one in trims])
+                return self.cost.rates(controls, np.array([one.body_velocity for one in trims]))
+            rates.append(entry[1])
+        return np.array(rates)
 
     def cost_of(self, plan: Plan) -> float:
         """Cost of a plan, whatever primitives it uses: their rates, and the prices of switches.
@@ -424,17 +430,22 @@ class Problem:
         Along a maneuver the rates are integrated from sample to sample by the trapezoidal rule:
         exact for time and effort, and for the length wherever the speed is linear.
         """
-        if not plan.trims:
-            return 0.0
-        coasting = float(self.rates_of(plan) @ plan.durations)
         if not any(plan.maneuvers):
-            if not prices_switches(self.cost):
-                return coasting
-            velocities = np.array([trim.body_velocity for trim in plan.trims])
-            return coasting + self.cost.switching(velocities)
+            return self.cost_of_trims(plan.trims, plan.durations)
+        coasting = float(self.rates_of(plan) @ plan.durations)
         maneuvers = sum(self.maneuver_cost(one) for one in plan.maneuvers if one)
         driven = [self._velocities(one) for one in plan.primitives]
         return coasting + maneuvers + self.cost.switching(np.concatenate(driven))
+
+    def cost_of_trims(self, trims: Sequence[Trim], durations: Array) -> float:
+        """Cost of trims that last `durations` (n,) [s], with the prices of the switches between."""
+        if not trims:
+            return 0.0
+        coasting = float(self.rates_of_trims(trims) @ durations)
+        if not prices_switches(self.cost):
+            return coasting
+        velocities = np.array([trim.body_velocity for trim in trims])
+        return coasting + self.cost.switching(velocities)
 
     def maneuver_cost(self, maneuver: Maneuver) -> float:
         """Cost of a maneuver without the prices of switches.
@@ -573,9 +584,6 @@ def apart(one: Array, other: Array) -> tuple[float, float]:
 def moves(obstacle: AnyObstacle) -> bool:
     """Whether an obstacle moves."""
     return isinstance(obstacle, Obstacle) and obstacle.motion is not None
-
-
-_UNKNOWN: tuple[Trim | None, float] = (None, math.nan)
 
 
 @kept_by_first

@@ -55,6 +55,10 @@ def head_of(plan: Plan, until: float) -> Plan:
     >>> head_of(plan, 1.0).end.tolist(), head_of(plan, 3.0).end.tolist()
     ([0.25, 0.0, 0.0], [2.0, 0.0, 0.0])
     """
+    if not plan.maneuvers:
+        heads = first_times(plan.durations.tolist(), until)
+        trims = plan.trims[: len(heads)]
+        return Plan.of_parts(plan.start, trims, heads, start_time=plan.start_time)
     word, times, between, left = [plan.trims[0]], [0.0], list[Maneuver | None](), until
     for k, (trim, duration) in enumerate(zip(plan.trims, plan.durations.tolist(), strict=True)):
         if k and left <= NOTHING:
@@ -92,6 +96,12 @@ def tail_of(plan: Plan, after: float, *, start: Array | None = None) -> Plan:
     >>> tail_of(plan, 3.5).start.tolist(), tail_of(plan, 3.5).durations.tolist()
     ([1.0, 0.0, 0.0], [2.5])
     """
+    if not plan.maneuvers:
+        lasting = last_times(plan.durations.tolist(), after)
+        at = plan.start_time + after
+        begin = plan.pose_at(at) if start is None else start
+        trims = plan.trims[len(plan.trims) - len(lasting) :]
+        return Plan.of_parts(begin, trims, lasting, start_time=at)
     word, times, between, passed = list[Trim](), list[float](), list[Maneuver | None](), after
     for k, (trim, duration) in enumerate(zip(plan.trims, plan.durations.tolist(), strict=True)):
         if k:
@@ -112,6 +122,39 @@ def tail_of(plan: Plan, after: float, *, start: Array | None = None) -> Plan:
             passed = max(passed - duration, 0.0)
     at = plan.start_time + after
     return _plan(plan, plan.pose_at(at) if start is None else start, word, times, between, at)
+
+
+def first_times(durations: Sequence[float], until: float) -> list[float]:
+    """How long the first trims of a word last in its first `until` seconds; one at least.
+
+    Examples
+    --------
+    >>> first_times([1.0, 2.0, 3.0], 1.5)
+    [1.0, 0.5]
+    """
+    times, left = list[float](), until
+    for duration in durations:
+        if times and left <= NOTHING:
+            break
+        times.append(min(duration, max(left, 0.0)))
+        left -= duration
+    return times
+
+
+def last_times(durations: Sequence[float], after: float) -> list[float]:
+    """How long the last trims of a word last after `after` seconds; the last one stays in any case.
+
+    Examples
+    --------
+    >>> last_times([1.0, 2.0, 3.0], 1.5)
+    [1.5, 3.0]
+    """
+    passed = after
+    for k, duration in enumerate(durations):
+        if duration - passed > NOTHING or k == len(durations) - 1:
+            return [max(duration - passed, 0.0), *durations[k + 1 :]]
+        passed = max(passed - duration, 0.0)
+    return []
 
 
 def committed(plan: Plan, after: float) -> float:

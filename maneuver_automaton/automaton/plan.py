@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import accumulate
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -15,7 +17,7 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton._display import Player, picture, player_frame, player_page
 from maneuver_automaton.errors import MissingExtra
 from maneuver_automaton.groups import SE2, LieGroup, group_of
-from maneuver_automaton.groups.chain import chained, coasted, coasted_once
+from maneuver_automaton.groups.chain import chained, coasted, end_of_coasting
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 
@@ -93,6 +95,37 @@ class Plan:
                 )
 
     @classmethod
+    def of_parts(
+        cls,
+        start: Array,
+        trims: tuple[Trim, ...],
+        durations: Sequence[float],
+        *,
+        start_time: float,
+    ) -> Plan:
+        """A plan of trims alone, from parts of another plan, which was checked when it was made.
+
+        Checks would take most of the time of cutting a plan.
+
+        Examples
+        --------
+        >>> ahead = Trim(name="ahead", body_velocity=[1.0, 0.0, 0.0], control=[1.0, 0.0])
+        >>> plan = Plan([0.0, 0.0, 0.0], (ahead,), durations=[2.0])
+        >>> Plan.of_parts(plan.start, plan.trims, [0.5], start_time=1.0).end.tolist()
+        [0.5, 0.0, 0.0]
+        """
+        lasting = np.array(durations, dtype=np.float64)
+        lasting.setflags(write=False)
+        if start.flags.writeable:
+            start = start.copy()
+            start.setflags(write=False)
+        plan: Plan = object.__new__(cls)
+        vars(plan).update(
+            start=start, trims=trims, durations=lasting, maneuvers=(), start_time=start_time
+        )
+        return plan
+
+    @classmethod
     def of_primitives(
         cls,
         start: ArrayLike,
@@ -159,11 +192,15 @@ class Plan:
     @cached_property
     def primitives(self) -> tuple[Primitive, ...]:
         """Trims and maneuvers in order; beside maneuvers without the trims that last no time."""
+        if not self.maneuvers:
+            return self.trims
         return tuple(primitive for primitive, _ in self._pieces)
 
     @cached_property
     def primitive_durations(self) -> Array:
         """Duration (m,) of each primitive [s]."""
+        if not self.maneuvers:
+            return self.durations
         return np.array([duration for _, duration in self._pieces], dtype=np.float64)
 
     @cached_property
@@ -211,7 +248,8 @@ class Plan:
     @cached_property
     def switching_times(self) -> Array:
         """Times (m + 1,) at which primitives begin and the plan ends [s]."""
-        return self.start_time + np.concatenate([[0.0], np.cumsum(self.primitive_durations)])
+        ends = list(accumulate(self.primitive_durations.tolist(), initial=0.0))
+        return self.start_time + np.array(ends)
 
     @cached_property
     def switching_poses(self) -> Array:
@@ -284,18 +322,19 @@ class Plan:
     @property
     def end(self) -> Array:
         """Pose (dof,) at the end."""
-        return np.asarray(self.switching_poses[-1])
+        if any(self.maneuvers) or "switching_poses" in vars(self):
+            return np.asarray(self.switching_poses[-1])
+        twists = [trim.body_velocity for trim in self.trims]
+        return end_of_coasting(self.start, twists, self.durations.tolist())
 
     def pose_at(self, time: ArrayLike) -> Array:
         """Poses (..., dof) at `time` (...,) [s]; held before the start and after the end."""
         times = np.asarray(time, dtype=np.float64)
         if not self.primitives:
             return np.broadcast_to(self.start, (*times.shape, self.start.size)).copy()
-        index = self._index_at(times)
         if not (times.ndim or any(self.maneuvers)):
-            passed = max(float(times - self.switching_times[index]), 0.0)
-            passed = min(passed, float(self.primitive_durations[index]))
-            return coasted_once(self.switching_poses[index], self._twists[index], passed)
+            return self._coasted_until(float(times))
+        index = self._index_at(times)
         begin = group_of(self.start.size)(self.switching_poses[index])
         since = np.clip(times - self.switching_times[index], 0.0, self.primitive_durations[index])
         steps = np.array(begin.exp(since[..., None] * self._twists[index]).pose)
@@ -303,6 +342,15 @@ class Plan:
             if isinstance(primitive, Maneuver) and (here := index == k).any():
                 steps[here] = _within(primitive, since[here])
         return (begin @ type(begin)(steps)).pose
+
+    def _coasted_until(self, time: float) -> Array:
+        """Pose (dof,) at one time [s], of trims alone."""
+        durations: list[float] = self.durations.tolist()
+        begins = [self.start_time + since for since in accumulate(durations[:-1], initial=0.0)]
+        index = bisect_right(begins, time, lo=1) - 1
+        lasting = [*durations[:index], min(max(time - begins[index], 0.0), durations[index])]
+        twists = [trim.body_velocity for trim in self.trims[: index + 1]]
+        return end_of_coasting(self.start, twists, lasting)
 
     def control_at(self, time: ArrayLike) -> Array:
         """Controls (..., n_u) at `time` (...,) [s]; at a switch, that of what begins."""

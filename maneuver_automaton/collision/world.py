@@ -170,13 +170,13 @@ def world_of(
     static = tuple(o for o in obstacles if isinstance(o, OccupancyMap) or o.motion is None)
     solids, buckets, field = _static_arrays(static, footprint, frame, keep)
     there = present or tuple(one.presence for one in moving)
-    followed = [_one_moving(obstacle, frame) for obstacle in moving]
-    moving_arrays = _moving_obstacles(followed, there)
+    followed = [_moving_of(obstacle) for obstacle in moving]
+    moving_arrays = _moving_obstacles(followed, pose, there)
     return World(
         frame=pose,
         body=body,
         arrays=WorldArrays(solids=solids, buckets=buckets, field=field, moving=moving_arrays),
-        box=_box(solids.plates[:, :4], followed),
+        box=_box(solids.plates[:, :4], followed, pose),
         last_event=_last_event(moving_arrays),
     )
 
@@ -244,11 +244,18 @@ def _cells(one: OccupancyMap, frame: Array) -> Array:
     return seen_from(turned + shift, np.array([0.0, 0.0, frame[2]]))
 
 
-def _box(boxes: Array, moving: list[_Moving]) -> Array:
-    every = np.concatenate([boxes, *(one.box[None] for one in moving)])
-    if not len(every):
+def _box(boxes: Array, moving: list[_Moving], frame: Array) -> Array:
+    low, high = boxes[:, :2], boxes[:, 2:]
+    if moving:
+        back = SE2(frame).inverse()
+        ways = np.asarray(back.act(np.concatenate([one.way for one in moving])))
+        reaches = np.repeat([one.reach for one in moving], [len(one.way) for one in moving])[
+            :, None
+        ]
+        low, high = np.vstack([low, ways - reaches]), np.vstack([high, ways + reaches])
+    if not len(low):
         return np.array([math.inf, math.inf, -math.inf, -math.inf])
-    return np.concatenate([every[:, :2].min(axis=0), every[:, 2:].max(axis=0)])
+    return np.concatenate([low.min(axis=0), high.max(axis=0)])
 
 
 def _field(solids: Solids, listed: int, maps: list[OccupancyMap], body: Body, keep: float) -> Field:
@@ -300,27 +307,28 @@ def _buckets(plates: Array, body: Body, keep: float) -> Buckets:
 
 
 class _Moving(NamedTuple):
-    """One moving obstacle, seen from a world's frame."""
+    """What a moving obstacle is in every world, whatever its frame and whatever is beside it."""
 
     pieces: list[tuple[Array, float]]
     motion: Motion
-    rate: Array  # (n, 3)
+    rate: Array  # (n, 3) twists of what coasts on arcs; else 0, as its poses tell all
     speed: float
     middle: Array
     reach: float
-    box: Array  # (4,) [low x, low y, high x, high y] of where it goes
+    way: Array  # (m, 2) places of the middle along its motion
 
 
 def _moving_obstacles(
-    every: list[_Moving], present: tuple[tuple[float, float], ...]
+    every: list[_Moving], frame: Array, present: tuple[tuple[float, float], ...]
 ) -> MovingObstacles:
     knots = [one.motion.time.size for one in every]
+    poses = np.concatenate([np.zeros((0, 3)), *(one.motion.pose for one in every)])
     return MovingObstacles(
         solids=solids_of([piece for one in every for piece in one.pieces]),
         first_piece=np.cumsum([0, *(len(one.pieces) for one in every)], dtype=np.int64),
         first_knot=np.cumsum([0, *knots], dtype=np.int64),
         time=np.concatenate([np.zeros(0), *(one.motion.time for one in every)]),
-        pose=np.concatenate([np.zeros((0, 3)), *(one.motion.pose for one in every)]),
+        pose=_seen_poses(poses, frame),
         speed=np.array([one.speed for one in every], dtype=np.float64),
         middle=np.array([one.middle for one in every], dtype=np.float64).reshape(-1, 2),
         reach=np.array([one.reach for one in every], dtype=np.float64),
@@ -330,26 +338,27 @@ def _moving_obstacles(
     )
 
 
-@functools.lru_cache(maxsize=1024)
-def _one_moving(obstacle: Obstacle, frame: tuple[float, ...]) -> _Moving:
-    """A moving obstacle as a world sees it: the same for all bodies, and whatever is beside it."""
-    assert obstacle.motion is not None
+@functools.lru_cache(maxsize=4096)
+def _moving_of(obstacle: Obstacle) -> _Moving:
+    """A moving obstacle as all worlds see it."""
+    motion = obstacle.motion
+    assert motion is not None
     own = convex_pieces(obstacle.shape)
     low = np.min([ring.min(axis=0) - r for ring, r in own], axis=0)
     high = np.max([ring.max(axis=0) + r for ring, r in own], axis=0)
     middle = 0.5 * (low + high)
-    motion = _seen_motion(obstacle.motion, np.array(frame))
     far = max(float(np.hypot(*ring.T).max()) + r for ring, r in own)
-    reach = max(float(np.hypot(*(ring - middle).T).max()) + r for ring, r in own)
-    way = np.asarray(SE2(motion.at(motion.times_for_lines(ALONG))).act(middle))
+    rate = np.zeros((motion.time.size, 3))
+    if motion.twist is not None:
+        rate[:-1] = motion.twist
     return _Moving(
         pieces=own,
         motion=motion,
-        rate=np.vstack([motion.rates, np.zeros(3)]),
+        rate=rate,
         speed=motion.fastest(far),
         middle=middle,
-        reach=reach,
-        box=np.concatenate([way.min(axis=0) - reach, way.max(axis=0) + reach]),
+        reach=max(float(np.hypot(*(ring - middle).T).max()) + r for ring, r in own),
+        way=np.asarray(SE2(motion.at(motion.times_for_lines(ALONG))).act(middle)),
     )
 
 
@@ -359,7 +368,8 @@ def _last_event(moving: MovingObstacles) -> float:
     return float(times[np.isfinite(times)].max(initial=-math.inf))
 
 
-def _seen_motion(motion: Motion, frame: Array) -> Motion:
-    there = motion.moved(SE2(np.array([-frame[0], -frame[1], 0.0])))
-    turned = there.moved(SE2(np.array([0.0, 0.0, -frame[2]])))
-    return Motion(turned.time, np.round(turned.pose, DIGITS), turned.twist)
+def _seen_poses(poses: Array, frame: Array) -> Array:
+    """Poses (n, 3) from a frame, their headings going on as they do."""
+    there = SE2(np.array([-frame[0], -frame[1], 0.0])) @ SE2(poses)
+    turned = SE2(np.array([0.0, 0.0, -frame[2]])) @ there
+    return np.asarray(np.round(turned.pose, DIGITS))

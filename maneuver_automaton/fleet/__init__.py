@@ -13,3 +13,5 @@ from maneuver_automaton.fleet.result import Closest as Closest
 from maneuver_automaton.fleet.result import FleetResult as FleetResult
 from maneuver_automaton.fleet.result import FleetStatus as FleetStatus
 from maneuver_automaton.fleet.simulation import simulate_fleet as simulate_fleet
+from maneuver_automaton.fleet.verify import FleetVerdict as FleetVerdict
+from maneuver_automaton.fleet.verify import verify_fleet as verify_fleet

@@ -46,12 +46,15 @@ def verified(
     while True:
         courses = {one.number: passed.get(one.number, one.standing) for one in vehicles}
         closest = measured(courses, names, keep=fleet.margin)
+        driving = {names[k] for k in passed}
         near = [row for row in closest if row.distance_m <= max(fleet.margin - CONTACT, CONTACT)]
-        driven = [name for row in near for name in row.pair if results[name].plan is not None]
-        if not driven:
+        pairs = [(row, [name for name in row.pair if name in driving]) for row in near]
+        row, driven = next(((row, some) for row, some in pairs if some), (None, []))
+        if row is None:
             break
-        # What two libraries do not agree on is not returned.
-        name, row = driven[-1], near[0]
+        # Past a vehicle that has no plan nobody may drive; and what two libraries do not agree on
+        # is not returned.
+        name = driven[-1]
         why[name] = f"{' and '.join(row.pair)} come within {row.distance_m:.3g} m of each other"
         results[name] = PlanResult(
             problem=results[name].problem, status=PlanStatus.NO_PLAN, reason=why[name]

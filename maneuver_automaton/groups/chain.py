@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -59,15 +60,18 @@ def coasted(start: Array, twists: Array, durations: Array) -> Array:
     return np.array(poses)
 
 
-def coasted_once(start: Array, twist: Array, duration: float) -> Array:
-    """Pose (dof,) after one trim from `start` (dof,): the last one of `coasted`.
+def end_of_coasting(start: Array, twists: Iterable[Array], durations: Iterable[float]) -> Array:
+    """Pose (dof,) from `start` (dof,) after all trims: the last one of `coasted`.
 
     Examples
     --------
-    >>> coasted_once(np.zeros(3), np.array([2.0, 0.0, 0.0]), 1.5).tolist()
+    >>> end_of_coasting(np.zeros(3), [np.array([2.0, 0.0, 0.0])], [1.5]).tolist()
     [3.0, 0.0, 0.0]
     """
-    return np.array(_after(start.tolist(), twist.tolist(), duration))
+    pose: list[float] = start.tolist()
+    for twist, duration in zip(twists, durations, strict=False):
+        pose = _after(pose, twist.tolist(), duration)
+    return np.array(pose)
 
 
 def seen_from(start: Array, pose: Array) -> Array:

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.cutting import first_times, last_times
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.log import Origin, first_part
 from maneuver_automaton.receding_horizon.pace import at_best_pace, base_name
 from maneuver_automaton.receding_horizon.settings import EXACT, Settings
-from maneuver_automaton.receding_horizon.shifting import costliest_first, moving_pieces, rest_of
+from maneuver_automaton.receding_horizon.shifting import (
+    costliest_first,
+    merged,
+    moving_pieces,
+    rest_of,
+)
 from maneuver_automaton.search.alternatives import TIE
 from maneuver_automaton.search.inside import outside, stays_inside
 
@@ -52,13 +60,12 @@ def candidate(
         dearer = here.cost_of(ordered)
         if dearer <= cost + TIE * (1.0 + abs(cost)) and allowed(here, ordered):
             plan, cost = ordered, dearer
-    piece = first_part(plan, settings.step)
     return Candidate(
         plan=plan,
         cost=cost,
         goal_index=goal_index,
         origin=origin,
-        at_first=here.cost_of(piece),
+        at_first=_cost_of_first(here, plan, settings.step),
     )
 
 
@@ -75,7 +82,19 @@ def bounded(problem: Problem) -> bool:
 def cost_until(problem: Problem, plan: Plan, until: float) -> float:
     """Cost of the first `until` seconds of a plan, the switches in them included."""
     # The cost does not depend on where the rest begins, and to find out where takes longer.
-    return problem.cost_of(plan) - problem.cost_of(rest_of(plan, until, start=plan.start))
+    if any(plan.maneuvers):
+        return problem.cost_of(plan) - problem.cost_of(rest_of(plan, until, start=plan.start))
+    left = last_times(plan.durations.tolist(), until)
+    trims, times = merged(plan.trims[len(plan.trims) - len(left) :], left)
+    return problem.cost_of(plan) - problem.cost_of_trims(trims, np.array(times))
+
+
+def _cost_of_first(problem: Problem, plan: Plan, until: float) -> float:
+    """Cost of the first `until` seconds of a plan."""
+    if plan.maneuvers or not plan.trims:
+        return problem.cost_of(first_part(plan, until))
+    times = first_times(plan.durations.tolist(), until)
+    return problem.cost_of_trims(plan.trims[: len(times)], np.array(times))
 
 
 def is_rest_of(plan: Plan, rest: Plan | None) -> bool:

@@ -146,7 +146,7 @@ def broken(
             reason=f"the rest of the last plan does not lead to the goal in time{free}; {why}",
         )
     padding = promised.rest_rate * last.applied
-    if last.plan.trims and last.plan.trims[-1].body_velocity.any():  # rest is a new switch
+    if last.plan.trims and not last.plan.trims[-1].is_rest:  # rest is a new switch
         padding += promised.switch
     allowed = last.value - last.applied_cost + padding
     if now.value > allowed + tolerance and not (now.arrived or last.arrived):
@@ -177,7 +177,7 @@ def too_cheap(promised: Promises, now: Step) -> Iterator[Violation]:
     """Whether the piece applied costs less than the cheapest motion, without arriving."""
     moves = promised.step - ACCURACY
     needed = (promised.least_rate + promised.rest_rate) * promised.step
-    resting = now.plan.trims and not now.plan.trims[0].body_velocity.any()
+    resting = now.plan.trims and now.plan.trims[0].is_rest
     ends = _time_moving(now) <= moves
     if resting or (not ends and now.applied_cost < needed - ACCURACY * (1.0 + needed)):
         yield Violation(
@@ -188,5 +188,5 @@ def too_cheap(promised: Promises, now: Step) -> Iterator[Violation]:
 
 
 def _time_moving(step: Step) -> float:
-    moving = [trim.body_velocity.any() for trim in step.plan.trims]
+    moving = [not trim.is_rest for trim in step.plan.trims]
     return float(step.plan.durations[moving].sum()) if moving else 0.0

@@ -55,7 +55,8 @@ class InFreeSpace:
                 now.exhaustive = False
                 self._over_budget()
                 break
-            if known is not None and self._is_sole(known, goal):
+            cost = kept.cost if kept is not None and same_goal else None
+            if cost is not None and self._is_sole(cost, goal):
                 continue
             results = search_goal(
                 here,
@@ -63,9 +64,10 @@ class InFreeSpace:
                 alternatives=None if bounded(here) else alternatives,
                 budget=now.budget,
                 known=None if self.settings.retimed else known,
+                known_cost=cost,
                 ties=True,
                 second_opinion=SECOND_OPINION,
-                not_first=None if known is None else self._driven(known),
+                not_first=None if cost is None else self._driven(cost),
             )
             proven = any(one.exhaustive for one in results)
             decisive = not (self.settings.retimed or bounded(here))
@@ -81,21 +83,21 @@ class InFreeSpace:
                         found.append(now.candidate(plan, index, Origin.SEARCHED))
         return found
 
-    def _is_sole(self, known: Plan, goal: Goal) -> bool:
-        """Whether a plan is proven to be the cheapest, and the only one that is so cheap."""
+    def _is_sole(self, cost: float, goal: Goal) -> bool:
+        """Whether a plan of this cost is the cheapest, and the only one that is so cheap."""
         searched = self.settings.retimed or bounded(self.here)
-        return not searched and self.here.cost_of(known) <= tied(sole_bound(self.here, goal))
+        return not searched and cost <= tied(sole_bound(self.here, goal))
 
-    def _driven(self, known: Plan) -> int | None:
+    def _driven(self, cost: float) -> int | None:
         """The trim that was driven since the last step, where that tells which words may win.
 
         Bellman's principle of optimality: where the last step has searched every word of up to S
-        trims, no word W of fewer than S trims from here costs less than `known`, the rest of its
-        plan; nor does one of S trims that begins with the trim driven since, for as long as one
-        trim was driven alone. For with the part that was driven in front, W would have been a word
-        of at most S trims from there, to the same goal, and cheaper than the plan found. Its cost
-        is the sum, since switches cost nothing, and no time is fixed or limited. Where no other
-        plan cost as much there, none does here.
+        trims, no word W of fewer than S trims from here costs less than the rest of its plan,
+        which has this `cost`; nor does one of S trims that begins with the trim driven since, for
+        as long as one trim was driven alone. For with the part that was driven in front, W would
+        have been a word of at most S trims from there, to the same goal, and cheaper than the plan
+        found. Its cost is the sum, since switches cost nothing, and no time is fixed or limited.
+        Where no other plan cost as much there, none does here.
 
         Source: Bellman (1957), *Dynamic Programming*, Sec. III.3.
         """
@@ -107,7 +109,7 @@ class InFreeSpace:
         if not now.rounding or now.changed or not (last.exhaustive and last.is_sole):
             return None
         left = last.value - last.applied_cost
-        if self.settings.retimed or bounded(here) or here.cost_of(known) > tied(left):
+        if self.settings.retimed or bounded(here) or cost > tied(left):
             return None
         if not last.plan.trims or last.plan.durations[0] < last.applied - NOTHING:
             return None

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan, Primitive
 from maneuver_automaton.automaton.cutting import NOTHING, joined, tail_of
@@ -60,6 +58,8 @@ def rested(plan: Plan, pad: Trim, duration: float) -> Plan:
     else:
         word, times = (*plan.trims, pad), [*times, duration]
         between = (*between, None) if between else ()
+    if not between:
+        return Plan.of_parts(plan.start, *merged(word, times), start_time=plan.start_time)
     return without_nothing(replace(plan, trims=word, durations=times, maneuvers=between))
 
 
@@ -77,12 +77,13 @@ def without_nothing(plan: Plan) -> Plan:
     word, times = merged(plan.trims, plan.durations.tolist())
     if len(word) == len(plan.trims):
         return plan
-    return replace(plan, trims=word, durations=np.array(times))
+    return Plan.of_parts(plan.start, word, times, start_time=plan.start_time)
 
 
 def moving_pieces(plan: Plan) -> Iterator[Primitive]:
     """The trims and maneuvers of a plan that last, without those that stand still."""
-    for piece, duration in zip(plan.primitives, plan.primitive_durations.tolist(), strict=True):
+    durations: list[float] = plan.primitive_durations.tolist()
+    for piece, duration in zip(plan.primitives, durations, strict=True):
         if isinstance(piece, Maneuver) or (duration > NOTHING and not piece.is_rest):
             yield piece
 
@@ -110,6 +111,8 @@ def merged(
 
 
 def _same(one: Trim, other: Trim) -> bool:
+    if one is other:
+        return True
     return one.name == other.name and bool((one.body_velocity == other.body_velocity).all())
 
 
@@ -129,17 +132,18 @@ def costliest_first(plan: Plan, rates: Array) -> Plan:
     moving = [k for k, move in enumerate(moves) if move]
     order: list[int] = []
     block: list[int] = []
+    dear: list[float] = (-rates).tolist()
     for k in moving:
         if not all(commute(twists[j], twists[k]) for j in block):  # a climb commutes with both
-            order += sorted(block, key=lambda i: -rates[i])
+            order += block if len(block) == 1 else sorted(block, key=dear.__getitem__)
             block = []
         block.append(k)
-    order += sorted(block, key=lambda i: -rates[i])
+    order += sorted(block, key=dear.__getitem__)
     order += [k for k, move in enumerate(moves) if not move]
     if order == list(range(len(twists))):
         return plan
     word, times = merged([plan.trims[k] for k in order], plan.durations[order].tolist())
-    return Plan(plan.start, word, durations=times, start_time=plan.start_time)
+    return Plan.of_parts(plan.start, word, times, start_time=plan.start_time)
 
 
 def commute(one: Sequence[float] | Array, other: Sequence[float] | Array) -> bool:
@@ -147,11 +151,13 @@ def commute(one: Sequence[float] | Array, other: Sequence[float] | Array) -> boo
 
     Examples
     --------
-    >>> commute(np.array([1.0, 0.0, 0.0]), np.array([-2.0, 0.0, 0.0]))
+    >>> commute([1.0, 0.0, 0.0], [-2.0, 0.0, 0.0])
     True
-    >>> commute(np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+    >>> commute([1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
     False
     """
-    bracket = max(abs(one[2] * other[k] - other[2] * one[k]) for k in range(2))
+    bracket = max(
+        abs(one[2] * other[0] - other[2] * one[0]), abs(one[2] * other[1] - other[2] * one[1])
+    )
     scale = max(map(abs, one)) * max(map(abs, other))
     return bool(bracket <= 1e-12 * scale)

@@ -6,8 +6,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numpy as np
-
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING, committed, head_of, joined
@@ -98,10 +96,11 @@ class Situation:
         gap = self.settings.gap
         return gap is not None and kept is not None and kept.cost - self.bound <= gap * kept.cost
 
-    @property
+    @cached_property
     def size(self) -> float:
         """The size [m or rad] that errors of rounding grow with."""
-        return 1.0 + float(np.abs(self.here.start).max())
+        numbers: list[float] = self.here.start.tolist()
+        return 1.0 + max(map(abs, numbers))
 
     @cached_property
     def head(self) -> Plan | None:
@@ -293,7 +292,7 @@ class Situation:
             return kept
         tied = [one for one in everything if one.cost <= least + TIE * (1.0 + abs(least))]
         self.is_sole = len(tied) == 1
-        return min(tied, key=lambda one: one.preference)
+        return tied[0] if self.is_sole else min(tied, key=lambda one: one.preference)
 
     def candidate(self, plan: Plan, index: int, origin: Origin) -> Candidate:
         """A plan from here, with the costs by which it is compared."""

@@ -21,6 +21,8 @@ from maneuver_automaton.words._kernels_times import assign, end_and_columns, jac
 if TYPE_CHECKING:
     from maneuver_automaton._arrays import Array, IntArray
 
+SLACK = 1e-12  # relative, of prices
+
 
 @inner_kernel
 def price_of_row(rows: Array, p: Array, trim: int) -> float:
@@ -29,6 +31,68 @@ def price_of_row(rows: Array, p: Array, trim: int) -> float:
     for r in range(rows.shape[0]):
         value += p[3 + r] * rows[r, trim]
     return value
+
+
+@inner_kernel
+def least_at_ends(
+    base: Array, across: Array, a: float, b: float, turn: float, late: float, bounds: Array
+) -> float:
+    """Fill `bounds` with the price of every trim along a straight; the least of them."""
+    for j in range(base.size):
+        level = base[j] + across[0, j] * a + across[1, j] * b
+        early_value = level + across[2, j] * turn
+        late_value = level + across[2, j] * late
+        bounds[j] = early_value if early_value < late_value else late_value
+    least = np.inf
+    for j in range(base.size):
+        if bounds[j] < least:
+            least = bounds[j]
+    return least
+
+
+@inner_kernel
+def least_on_arc(
+    base: Array,
+    across: Array,
+    a: float,
+    b: float,
+    centre: float,
+    twist: tuple[float, float, float],
+    angle: float,
+    bounds: Array,
+) -> float:
+    """Fill `bounds` with lower bounds of the price of every trim along an arc of `angle`.
+
+    Returns the least price at either end, which the best price does not exceed. Inside the arc a
+    price, a sine, has its least only where it falls at the begin and rises at the end, or where the
+    arc is longer than half a turn. `SLACK` is for rounding, which decides differently where the
+    least lies next to an end.
+    """
+    cos_end, sin_end = math.cos(angle), math.sin(angle)
+    sign = 1.0 if angle > 0.0 else -1.0
+    long = abs(angle) > 3.0
+    ends = np.empty(base.size)
+    for j in range(base.size):
+        ratio = across[2, j] / twist[2]
+        along = across[0, j] - ratio * twist[0]
+        aside = across[1, j] - ratio * twist[1]
+        level = base[j] + across[2, j] * centre
+        cosine = along * a + aside * b
+        sine = along * b - aside * a
+        begin = level + cosine
+        end = level + cosine * cos_end + sine * sin_end
+        rising = sine * cos_end - cosine * sin_end
+        size = math.sqrt(cosine * cosine + sine * sine)
+        least = begin if begin < end else end
+        inside = long | ((sign * sine < 0.0) & (sign * rising > 0.0))
+        ends[j] = least
+        least = level - size if inside else least
+        bounds[j] = least - SLACK * (abs(level) + size)
+    attained = np.inf
+    for j in range(base.size):
+        if ends[j] < attained:
+            attained = ends[j]
+    return attained
 
 
 @inner_kernel
@@ -57,8 +121,16 @@ def price_positions(
     end_x, end_y, _ = end_and_columns(some, times[:n], columns)
     least_position = 0
     base = np.empty(n_priced)
+    across = np.empty((3, n_priced))  # v, u and turn rate of all trims
     for j in range(n_priced):
         base[j] = rates[j] + price_of_row(rows, p, j)
+        for k in range(3):
+            across[k, j] = twists[j, k]
+    # Most trims of a large library are far from being the least anywhere. A first pass, without
+    # branches so that the processor takes several trims at once, bounds the price of each from
+    # below in `bounds`, and `attained` is the price that one of them has: what is above is no
+    # candidate for the second pass, which decides.
+    bounds = np.empty(n_priced)
     x, y, heading = 0.0, 0.0, 0.0
     for i in range(max(n, 1)):
         c, s = math.cos(heading), math.sin(heading)
@@ -73,7 +145,10 @@ def price_positions(
             # a and b stay, the momentum of turning runs linearly: an end is the least
             slope = u_i * a - v_i * b
             late = turn + slope * time
+            attained = least_at_ends(base, across, a, b, turn, late, bounds)
             for j in range(n_priced):
+                if bounds[j] > attained:
+                    continue
                 level = base[j] + twists[j, 0] * a + twists[j, 1] * b
                 early_value = level + twists[j, 2] * turn
                 late_value = level + twists[j, 2] * late
@@ -85,7 +160,10 @@ def price_positions(
             angle = w_i * time
             cos_end, sin_end = math.cos(angle), math.sin(angle)
             centre = turn + (a * v_i + b * u_i) / w_i
+            attained = least_on_arc(base, across, a, b, centre, (v_i, u_i, w_i), angle, bounds)
             for j in range(n_priced):
+                if bounds[j] > attained:
+                    continue
                 ratio = twists[j, 2] / w_i
                 along = twists[j, 0] - ratio * v_i
                 aside = twists[j, 1] - ratio * u_i

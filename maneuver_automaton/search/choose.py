@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from maneuver_automaton.automaton import Plan
+from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.insertion import search_insertion
@@ -50,6 +51,7 @@ def search_goal(
     alternatives: int | None,
     budget: Budget = UNLIMITED,
     known: Plan | None = None,
+    known_cost: float | None = None,
     ties: bool = False,
     second_opinion: float = AFFORDABLE,
     not_first: int | None = None,
@@ -68,6 +70,8 @@ def search_goal(
     known : Plan, optional
         A plan from the problem's start to the goal. Exhaustive search then lists only what is at
         least as cheap (it may find nothing); insertion improves it beside its own seeds.
+    known_cost : float, optional
+        Its cost, where the caller has it.
     ties : bool
         Whether exhaustive search lists all that cost as much as the last solution asked for.
     second_opinion : float
@@ -83,7 +87,9 @@ def search_goal(
     method = problem.search.method
     if problem.horizon.min_coast > 0.0:
         return [search_with_least_times(problem, goal, alternatives=alternatives, budget=budget)]
-    upper_bound = math.inf if known is None else problem.cost_of(known)
+    upper_bound = math.inf
+    if known is not None:
+        upper_bound = problem.cost_of(known) if known_cost is None else known_cost
     if method == "words" or (method == "auto" and _affordable(problem, goal)):
         return [
             search_words(
@@ -123,12 +129,16 @@ def search_goal(
     return results
 
 
+@kept_by_first
+def _seconds(automaton: Automaton, most: int, tail: int) -> float:
+    """How long a search of all words of up to `most` trims, and of a `tail`, may take [s]."""
+    moving = int(automaton.body_velocities.any(axis=1).sum())
+    return math.fsum(moving**n * SECONDS_PER_WORD[n + tail] for n in range(1, most + 1))
+
+
 def _affordable(problem: Problem, goal: Goal, most_seconds: float = AFFORDABLE) -> bool:
     """Whether every admitted word can be searched in a moment."""
     most = problem.horizon.max_trims
     if most is None or most > MOST_TRIMS - int(goal.free_heading):
         return False
-    moving = int(problem.automaton.body_velocities.any(axis=1).sum())
-    tail = int(goal.free_heading)
-    seconds = sum(moving**n * SECONDS_PER_WORD[n + tail] for n in range(1, most + 1))
-    return bool(seconds <= most_seconds)
+    return _seconds(problem.automaton, most, int(goal.free_heading)) <= most_seconds

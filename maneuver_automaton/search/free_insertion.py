@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.automaton import Plan
+from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost, prices_switches
 from maneuver_automaton.problem import Horizon, Problem
@@ -235,11 +236,16 @@ def _as_seed(work: _Work, known: Plan) -> Iterator[TimedWord]:
     None if a trim is not in the library, or the word is longer than those that are searched.
     """
     automaton, library = work.problem.automaton, work.library
-    names = set(automaton.trim_names)
+    names = _names(automaton)
     if len(known.trims) <= LONGEST and all(trim.name in names for trim in known.trims):
         word = np.array([automaton.index_of(trim.name) for trim in known.trims], dtype=np.int64)
         if not word.size or (library.number_of[word] >= 0).all():
             yield _in_library(work, word, known.durations)
+
+
+@kept_by_first
+def _names(automaton: Automaton) -> frozenset[str]:
+    return frozenset(automaton.trim_names)
 
 
 def _with_insertions(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,19 +19,30 @@ def sub_library(setup: SearchSetup) -> SearchSetup:
     """A few trims that reach far: extreme in eight directions, fast and cheap straights, spins."""
     if len(setup.trims) <= FEW:
         return setup
-    rows = _far_reaching(setup.library)
-    return replace(
-        setup,
-        trims=setup.trims[rows],
-        twists=setup.twists[rows],
-        rates=setup.rates[rows],
-        periods=setup.periods[rows],
-    )
+    few = few_of(setup.library)
+    return replace(setup, trims=few.trims, twists=few.twists, rates=few.rates, periods=few.periods)
+
+
+class FewTrims(NamedTuple):
+    """The trims of a sub-library: the same for every start and goal."""
+
+    trims: IntArray  # (M,) by the automaton's numbers
+    twists: Array  # (M, 4)
+    rates: Array  # (M,)
+    periods: Array  # (M,) [s]
 
 
 @kept_by_first
+def few_of(library: MovingTrims) -> FewTrims:
+    """The few trims that stand for a library."""
+    rows = _far_reaching(library)
+    return FewTrims(
+        library.trims[rows], library.twists[rows], library.rates[rows], library.periods[rows]
+    )
+
+
 def _far_reaching(library: MovingTrims) -> IntArray:
-    """The trims of a sub-library: the same for every start and goal."""
+    """Rows of the few trims."""
     twists, rates = library.twists, library.rates
     scaled = twists / np.abs(twists).max(axis=0).clip(min=1e-300)
     chosen: list[int] = []

@@ -9,21 +9,26 @@ import functools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.budget import Budget, EvenPace
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.alternatives import TIE, tied
 from maneuver_automaton.search.setup import SearchSetup
+from maneuver_automaton.search.sub_library import FEW, few_of
 from maneuver_automaton.search.timed_word import TimedWord
 from maneuver_automaton.words.library import FULL_TURN, MovingTrims
+from maneuver_automaton.words.transitions import Transitions
 from maneuver_automaton.words.word import Word
+
+if TYPE_CHECKING:
+    from maneuver_automaton.search._kernels_problem import Links
 
 MOST_TRIMS = 5  # moving trims of one word; each beyond three is scanned on a grid
 NODES = 64  # per scanned time, bisected where the function bends
@@ -273,50 +278,42 @@ class WordScan:
             yield Mode(self._kernel_problem(horizon.time, pad=True, fixed=False), self.most - 1)
         if exact is not None:
             most = min(2, self.most) if self.spare else self.most
-            at_least = exact * float(setup.rates.min()) if len(setup.rates) else math.inf
+            at_least = exact * self.tables.least_rate if len(setup.rates) else math.inf
             if at_least > tied(float(self.found.best[-1])):
                 return
             yield Mode(self._kernel_problem(exact, pad=False, fixed=True), most, at_least)
 
     def _kernel_problem(self, limit: float | None, *, pad: bool, fixed: bool) -> tuple[Any, Any]:
         """The kernels' problem and its transitions; of one class of trims, the identity."""
-        from maneuver_automaton.search._kernels_problem import Links, WordProblem
+        from maneuver_automaton.search._kernels_problem import WordProblem
 
         setup, cost, tables = self.setup, self.problem.cost, self.tables
-        weights = tables.weights
-        known = setup.transitions
-        rows, targets, gains = [], [], []
-        if setup.climbs:
-            rows.append(tables.twists[:, 3])
-            targets.append(setup.goal[3])
-            gains.append(known.displacement[..., 3])
-        if fixed:
-            rows.append(weights)
+        rest_rate = setup.rest_rate if pad else 0.0
+        ends = setup.start_class, setup.goal_class
+        same = _same_for_all(tables, setup.transitions, rest_rate, setup.climbs, fixed, *ends)
+        targets = [float(setup.goal[3])] if setup.climbs else []
+        if fixed and limit is not None:
             targets.append(limit)
-            gains.append(known.time)
-        prices = known.cost
-        rates, per_unit = _rates_above(tables, setup.rest_rate if pad else 0.0)
-        if pad:
-            prices = prices - setup.rest_rate * known.time
-        linked = len(prices) > 1
-        distance = math.hypot(*setup.goal[:2])
-        turn = abs(math.remainder(setup.goal[2], FULL_TURN))
+        linked = len(same.links.cost) > 1
+        x, y, heading, _ = setup.goal.tolist()
+        distance = math.hypot(x, y)
+        turn = abs(math.remainder(heading, FULL_TURN))
         bounded = math.inf if limit is None else limit
         fixed_time = self.problem.horizon.time is not None
         problem = WordProblem(
-            trims=np.arange(len(rates)),
-            size=np.zeros(1, dtype=np.int64),
+            trims=same.trims,
+            size=same.size,
             twists=tables.twists,
-            rates=rates,
-            prices=per_unit,
-            rows=np.array(rows).reshape(len(rows), len(rates)),
+            rates=same.rates,
+            prices=same.per_unit,
+            rows=same.rows,
             targets=np.array(targets, dtype=np.float64),
             periods=tables.periods,
-            reaches=np.minimum(tables.reaches(setup), bounded),
+            reaches=tables.reaches(setup, most=bounded),
             parallel=tables.parallel,
-            weights=weights,
+            weights=tables.weights,
             goal=np.array(setup.goal),
-            fixed=np.array([0.0, 0.0, distance, turn, 0.0, 0.0, 0.0, *setup.goal[:2]]),
+            fixed=np.array([0.0, 0.0, distance, turn, 0.0, 0.0, 0.0, x, y]),
             time_limit=float(bounded),
             pad=int(pad),
             pad_cost=float(setup.rest_rate * bounded) if pad else 0.0,
@@ -328,46 +325,38 @@ class WordScan:
             slack=self.slack,
             tolerance=TOLERANCE,
             shortest=setup.shortest,
-            tail=len(rates) - 1 if setup.free_heading else -1,
+            tail=len(same.rates) - 1 if setup.free_heading else -1,
         )
-        links = Links(
-            class_of=known.class_of[setup.trims],
-            start=setup.start_class,
-            goal=setup.goal_class,
-            displacement=np.array(known.displacement),
-            cost=np.array(prices),
-            time=np.array(known.time),
-            gains=np.array(gains).reshape(len(gains), *known.time.shape),
-        )
-        return problem, links
+        return problem, same.links
 
     def solutions(self) -> Iterator[Word]:
         """Words found by rising cost, rest last; if pruned, those asked for, and ties."""
-        yield from map(self._padded, self.timed())
+        for word, times, cost in self._rows():
+            yield self._padded(word, times, cost)
 
     def timed(self) -> Iterator[TimedWord]:
         """The moving trims of what was found, by the automaton's numbers, and their times."""
-        n = self.n_found
-        costs = self.found.costs[:n]
+        for word, times, cost in self._rows():
+            yield TimedWord(tuple(word.tolist()), times, cost=cost)
+
+    def _rows(self) -> Iterator[tuple[IntArray, Array, float]]:
+        """Moving trims, their times and cost of what was found, by rising cost."""
+        costs: list[float] = self.found.costs[: self.n_found].tolist()
         dearest = math.inf if self.own_prices else tied(float(self.found.best[-1]))
-        for k in np.argsort(costs, kind="stable"):
+        for k in sorted(range(len(costs)), key=costs.__getitem__):
             if self.pruned and costs[k] > dearest:
                 break
-            size = int(np.count_nonzero(self.found.words[k] >= 0))
-            if self.setup.free_heading:
-                size -= 1
-            word = self.setup.trims[self.found.words[k, :size]]
-            times = self.found.times[k, :size]
-            yield TimedWord(tuple(word.tolist()), times, cost=float(costs[k]))
+            numbers = self.found.words[k]
+            size = sum(number >= 0 for number in numbers.tolist()) - int(self.setup.free_heading)
+            yield self.setup.trims[numbers[:size]], self.found.times[k, :size], costs[k]
 
-    def _padded(self, found: TimedWord) -> Word:
-        word, times, cost = found.numbers, found.durations, found.cost
+    def _padded(self, word: IntArray, times: Array, cost: float) -> Word:
         time_s = self.problem.horizon.time
         if time_s is not None and self.setup.rest is not None:
             left = time_s - float(times.sum())
             if left > 1e-9:
-                word = np.append(word, self.setup.rest)
-                times = np.append(times, left)
+                word = np.array([*word.tolist(), self.setup.rest], dtype=np.int64)
+                times = np.array([*times.tolist(), left])
         if self.own_prices:
             cost += self.problem.cost.switching(self.problem.automaton.body_velocities[word])
         return Word(trims=word, durations=times, cost=cost)
@@ -377,22 +366,29 @@ class WordScan:
 class _Tables:
     """Tables of every trim for kernels, the turn of a free heading last."""
 
+    trims: IntArray  # (M,) or one less, by the automaton's numbers
     twists: Array  # (M, 4)
     rates: Array  # (M,)
+    least_rate: float  # of all trims but the free turn
     periods: Array  # (M,) [s]
     weights: Array  # (M,) 0 for the free turn, otherwise 1
     paces: Array  # (M, 2) metres and radians per second
     parallel: BoolArray  # (M, M)
-    fastest: Array  # (M,) [m/s] on the way to a goal, in the plane or upwards
+    turns: Array  # (M,) [s] of a full turn, 0 for straights
+    straights: IntArray  # trims that move and do not turn
+    fastest: Array  # [m/s] of these on the way to a goal, in the plane or upwards
     largest: float  # [m] radius of a turn
 
-    def reaches(self, setup: SearchSetup) -> Array:
-        """Longest time of interest per trim: a full turn, or a path well beyond the goal."""
+    def reaches(self, setup: SearchSetup, *, most: float) -> Array:
+        """Longest time of interest per trim: a full turn, or a path well beyond the goal.
+
+        Not more than `most` [s].
+        """
         place = math.hypot(float(setup.goal[0]), float(setup.goal[1]))
         length = max(2.0 * (place + 4.0 * self.largest) + abs(float(setup.goal[3])), 1e-3)
-        moves = self.fastest > 0.0
-        straight = np.divide(length, self.fastest, out=np.zeros(moves.size), where=moves)
-        return np.where(self.twists[:, 2] != 0.0, self.periods, straight)
+        reaches = self.turns.copy()
+        reaches[self.straights] = length / self.fastest
+        return reaches if most == math.inf else np.minimum(reaches, most)
 
 
 def _row_of(setup: SearchSetup, trim: int) -> int | None:
@@ -404,6 +400,60 @@ def _row_of(setup: SearchSetup, trim: int) -> int | None:
 def load_tables(setup: SearchSetup) -> None:
     """Have ready what all problems of a library share."""
     _tables(setup)
+
+
+class _SameForAll(NamedTuple):
+    """What all searches of a library with some conditions share, for every start and goal."""
+
+    trims: IntArray  # (M,)
+    size: IntArray  # (1,)
+    rates: Array  # (M,)
+    per_unit: Array  # (M, 2)
+    rows: Array  # (m, M)
+    links: Links
+
+
+@kept_by_first
+def _same_for_all(
+    tables: _Tables,
+    known: Transitions,
+    rest_rate: float,
+    climbs: bool,
+    fixed: bool,
+    start: int,
+    goal: int,
+) -> _SameForAll:
+    """The arrays of trims above a rest of this rate, the linear conditions, and the transitions.
+
+    Kernels read these arrays and write to none of them.
+    """
+    from maneuver_automaton.search._kernels_problem import Links
+
+    rates, per_unit = _rates_above(tables, rest_rate)
+    rows, gains = [], []
+    if climbs:
+        rows.append(tables.twists[:, 3])
+        gains.append(known.displacement[..., 3])
+    if fixed:
+        rows.append(tables.weights)
+        gains.append(known.time)
+    links = Links(
+        class_of=known.class_of[tables.trims],
+        start=start,
+        goal=goal,
+        displacement=np.array(known.displacement),
+        cost=known.cost - rest_rate * known.time if rest_rate else np.array(known.cost),
+        time=np.array(known.time),
+        gains=np.array(gains).reshape(len(gains), *known.time.shape),
+    )
+    return _SameForAll(
+        trims=np.arange(len(rates)),
+        size=np.zeros(1, dtype=np.int64),
+        rates=rates,
+        per_unit=per_unit,
+        rows=np.array(rows).reshape(len(rows), len(rates)),
+        links=links,
+    )
 
 
 @kept_by_first
@@ -419,18 +469,28 @@ def _rates_above(tables: _Tables, rest: float) -> tuple[Array, Array]:
 
 def _tables(setup: SearchSetup) -> _Tables:
     """The tables of a search, which those for the whole of a library share."""
-    if setup.trims is setup.library.trims and setup.rates is setup.library.rates:
-        return _tables_of_all(setup.library, setup.free_heading)
-    return _tables_of(setup.twists, setup.rates, setup.periods, setup.free_heading)
+    library = setup.library
+    if setup.trims is library.trims and setup.rates is library.rates:
+        return _tables_kept(library, False, setup.free_heading)
+    if len(library.trims) > FEW and setup.trims is few_of(library).trims:
+        return _tables_kept(library, True, setup.free_heading)
+    rows = setup.trims, setup.twists, setup.rates, setup.periods
+    return _tables_of(*rows, setup.free_heading)
 
 
 @kept_by_first
-def _tables_of_all(library: MovingTrims, free_heading: bool) -> _Tables:
-    return _tables_of(library.twists, library.rates, library.periods, free_heading)
+def _tables_kept(library: MovingTrims, is_few: bool, free_heading: bool) -> _Tables:
+    """The tables of a whole library, or of the few trims that stand for it."""
+    if is_few:
+        return _tables_of(*few_of(library), free_heading)
+    return _tables_of(library.trims, library.twists, library.rates, library.periods, free_heading)
 
 
-def _tables_of(twists: Array, rates: Array, periods: Array, free_heading: bool) -> _Tables:
+def _tables_of(
+    trims: IntArray, twists: Array, rates: Array, periods: Array, free_heading: bool
+) -> _Tables:
     twists, rates, periods = np.array(twists), np.array(rates), np.array(periods)
+    least = float(rates.min(initial=math.inf))
     weights = np.ones(len(rates))
     if free_heading:
         twists = np.vstack([twists, [0.0, 0.0, 1.0, 0.0]])
@@ -439,14 +499,20 @@ def _tables_of(twists: Array, rates: Array, periods: Array, free_heading: bool) 
         weights = np.append(weights, 0.0)
     turning = twists[:, 2] != 0.0
     speeds = np.sqrt(twists[:, 0] ** 2 + twists[:, 1] ** 2)
+    fastest = np.maximum(speeds, np.abs(twists[:, 3]))
+    straights = np.flatnonzero(~turning & (fastest > 0.0))
     return _Tables(
+        trims=trims,
         twists=twists,
         rates=rates,
+        least_rate=least,
         periods=periods,
         weights=weights,
         paces=np.stack([np.hypot(twists[:, 0], twists[:, 1]), np.abs(twists[:, 2])], axis=1),
         parallel=_parallel(twists),
-        fastest=np.maximum(speeds, np.abs(twists[:, 3])),
+        turns=np.where(turning, periods, 0.0),
+        straights=straights,
+        fastest=fastest[straights],
         largest=float((speeds[turning] / np.abs(twists[turning, 2])).max(initial=0.0)),
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from maneuver_automaton.automaton.cutting import (
     tail_of,
     with_samples_at,
 )
+from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal
 from tests.inertia import car_automaton
 from tests.quickly import draws
@@ -92,3 +94,28 @@ def test_the_end_of_a_plan_is_its_last_trim():
     assert [trim.name for trim in tail.trims] == ["rest"]
     assert tail.duration == pytest.approx(0.0, abs=1e-12)
     assert head_of(plan, 0.0).duration == 0.0
+
+
+TRIMS = [
+    Trim(name=name, body_velocity=twist, control=[0.0])
+    for name, twist in (("ahead", [2, 0, 0]), ("left", [1, 0, 1]), ("rest", [0, 0, 0]))
+]
+TIMES = st.sampled_from([0.0, 1e-10, 0.5, 1.0]) | st.floats(0.0, 5.0)
+
+
+@given(
+    pieces=st.lists(st.tuples(st.sampled_from(TRIMS), TIMES), min_size=2, max_size=5),
+    at=TIMES | st.floats(0.0, 20.0),
+)
+def test_a_plan_of_trims_is_cut_as_one_whose_switches_are_named(pieces, at):
+    word, times = zip(*pieces, strict=True)
+    plan = Plan([1.0, 2.0, 0.5], word, durations=times, start_time=3.0)
+    named = replace(plan, maneuvers=(None,) * (len(word) - 1))
+    for cut in (head_of, tail_of):
+        part, expected = cut(plan, at), cut(named, at)
+        assert part.trims == expected.trims
+        assert part.durations.tolist() == expected.durations.tolist()
+        assert (part.start_time, part.maneuvers) == (expected.start_time, ())
+        assert part.start.tolist() == expected.start.tolist()
+        assert not part.start.flags.writeable
+        assert not part.durations.flags.writeable

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from maneuver_automaton.groups import group_of
-from maneuver_automaton.groups.chain import chained, coasted, coasted_once, seen_from
+from maneuver_automaton.groups.chain import chained, coasted, end_of_coasting, seen_from
 
 RATES = st.sampled_from([0.0, 1.0]) | st.floats(-3.0, 3.0) | st.floats(-1e-7, 1e-7)
 
@@ -27,10 +27,12 @@ def test_coasting_on_plain_numbers_is_the_group_s_exponential_to_the_last_bit(do
     durations = data.draw(arrays(np.float64, n, elements=st.just(0.0) | st.floats(0.0, 20.0)))
     group = group_of(dof)
     steps = group.exp(durations[:, None] * twists).pose
-    assert coasted(start, twists, durations).tolist() == chained(start, steps).tolist()
+    poses_along = chained(start, steps)
+    assert coasted(start, twists, durations).tolist() == poses_along.tolist()
+    assert end_of_coasting(start, twists, durations.tolist()).tolist() == poses_along[-1].tolist()
     for twist, duration in zip(twists, durations.tolist(), strict=True):
         once = (group(start) @ group.exp(duration * twist)).pose
-        assert coasted_once(start, twist, duration).tolist() == once.tolist()
+        assert end_of_coasting(start, [twist], [duration]).tolist() == once.tolist()
 
 
 @pytest.mark.parametrize("dof", [3, 4])

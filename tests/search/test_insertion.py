@@ -24,6 +24,7 @@ from maneuver_automaton.search import (
     search_insertion,
     search_words,
 )
+from maneuver_automaton.search._kernels_price import price_word
 from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.insertion import insertion_stages
 from maneuver_automaton.search.library_arrays import library_arrays
@@ -194,6 +195,30 @@ def test_the_certificate_is_the_smallest_reduced_cost(max_trims):
     reported = certificate(problem, problem.goals[0], solution)
     assert brute > reported - 1e-6
     assert brute == pytest.approx(reported, abs=5e-3)  # samples are coarse
+
+
+@pytest.mark.parametrize("seed", range(3 if INTERPRETED else 20))
+def test_a_library_is_priced_as_each_of_its_trims_alone(seed):
+    random = np.random.default_rng(seed)
+    axis = np.linspace(-2.0, 2.0, 5)
+    values = np.array([(v, 0.0, turn, 0.0) for v in axis for turn in axis])
+    rates = (values**2).sum(axis=1)
+    rows = np.ones((1, len(values)))
+    word, times = random.integers(len(values), size=4), random.uniform(0.0, 4.0, 4)
+    prices = random.normal(size=4)
+
+    def priced(order, n):
+        numbers = np.argsort(order)[word]
+        twists, costs = np.array(values[order]), np.array(rates[order])
+        return price_word(twists, costs, rows, n, numbers, times, 0, len(word), prices)
+
+    every = np.arange(len(values))
+    alone = [priced(np.append(j, np.delete(every, j)), 1) for j in every]
+    least = min(value for value, *_ in alone)
+    value, trim, position, moment = priced(every, len(values))
+    assert value == least == alone[trim][0]
+    assert trim == min(j for j in every if alone[j][0] == least and alone[j][2] == position)
+    assert (position, moment) == alone[trim][2:]
 
 
 @pytest.mark.parametrize(
