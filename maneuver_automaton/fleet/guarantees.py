@@ -144,13 +144,16 @@ def gap_between(courses: Mapping[int, Course], *, keep: float, frame: Frame) -> 
         return math.inf
     if meetings(courses, keep=keep, frame=frame):
         return 0.0
-    low, high, more = keep, keep + FAR, 2.0 * FINE
-    while low + more < high:
-        if meetings(courses, keep=low + more, frame=frame):
-            high = low + more
-            break
-        low, more = low + more, 2.0 * more
-    while high - low > FINE and high < keep + FAR:
+    low, high, most, more = keep, math.inf, keep + FAR, 2.0 * FINE
+    while high == math.inf and low < most:
+        wanted = min(low + more, most)
+        if meetings(courses, keep=wanted, frame=frame):
+            high = wanted
+        else:
+            low, more = wanted, 2.0 * more
+    if high == math.inf:
+        return low
+    while high - low > FINE:
         middle = 0.5 * (low + high)
         if meetings(courses, keep=middle, frame=frame):
             high = middle

@@ -345,14 +345,15 @@ class FleetStepUnderWay:
             around = [self.held[k], *self._expected_by(k)]
             if _same(state.in_vain.get(k, []), around):
                 continue
-            before = len(self.swaps)
-            self._look_for_better(k)
-            # Later no more is to be had from the same plans: what is left of them is less.
-            if len(self.swaps) == before and not self.budget.is_over:
+            # Later no more is to be had past the same plans: what is left of them is less.
+            if not self._look_for_better(k) and not self.budget.is_over:
                 state.in_vain[k] = around
 
-    def _look_for_better(self, k: int) -> None:
-        """A vehicle looks for a plan that costs less and arrives no later; else a group does."""
+    def _look_for_better(self, k: int) -> bool:
+        """A vehicle looks for a plan that costs less and arrives no later; else a group does.
+
+        Whether there is one, also if not all agreed to it.
+        """
         settings, base = self.state.settings, self.held[k]
         self.asked.append(k)
         known = self._better_than(self._left_to_pay(k))
@@ -360,14 +361,16 @@ class FleetStepUnderWay:
         if alone is None:
             if leads(base) and not self.budget.is_over:
                 self.state.settled[k] = base
-            return
+            return False
         if found is not None and found.arrival <= arrival(base) * (1.0 + LATER) + LATER:
             if settings.delay_steps:
                 self.state.due[k] = (self.number + settings.delay_steps, found, base)
             else:
                 self._swap({k: found})
-        elif settings.group_size > 1 and not settings.delay_steps:
-            self._look_in_group(k, alone)
+            return True
+        if settings.group_size > 1 and not settings.delay_steps:
+            return self._look_in_group(k, alone)
+        return False
 
     def _exchange_what_is_due(self) -> None:
         """Answers that come now: exchanged if the plan is still held, and they are proven now."""
@@ -383,7 +386,7 @@ class FleetStepUnderWay:
                 if self._swap({k: one}):
                     break
 
-    def _look_in_group(self, k: int, alone: Found) -> None:
+    def _look_in_group(self, k: int, alone: Found) -> bool:
         """A vehicle and those in its way look for plans whose sum is less."""
         state = self.state
         courses = {j: self._course(one) for j, one in self.held.items() if j != k}
@@ -394,22 +397,23 @@ class FleetStepUnderWay:
         movable = [j for j in near if j not in state.broken and j not in state.arrived]
         group = [k, *movable[: state.settings.group_size - 1]]
         if len(group) < 2 or any(j in state.due for j in group):
-            return
-        if self.number % 2:
-            group.reverse()
-        others = self._expected_by(k, but=group)
+            return False
+        return self._exchange_in_order(group) or self._exchange_in_order(group[::-1])
+
+    def _exchange_in_order(self, group: Sequence[int]) -> bool:
+        """Plans of a group, one after another, exchanged at once if their sum is less."""
+        others = self._expected_by(group[0], but=group)
         found: dict[int, Found] = {}
         for n, j in enumerate(group):
-            to_come = [self.held[i] for i in group[n + 1 :]]
             here = [*others, *found.values()]
             still = [resting(self.vehicles[i], self.poses[i], self.time) for i in group[n + 1 :]]
-            one = None
-            for more in (still, []) if to_come else ([],):
-                one = one or self._search(j, self.held[j], [*here, *more], math.inf)[0]
+            one = self._search(j, self.held[j], [*here, *still], math.inf)[0]
+            if one is None and still:
+                one = self._search(j, self.held[j], here, math.inf)[0]
             if one is None:
-                return
+                return False
             found[j] = one
-        self._swap(found)
+        return self._swap(found)
 
     def _swap(self, found: dict[int, Found]) -> bool:
         """Exchange plans if these pay and are proven past all that is held now, and each other."""

@@ -1,0 +1,322 @@
+"""The closed loop of a fleet: laws, guarantees, and scenes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import maneuver_automaton as ma
+from maneuver_automaton import FleetHorizon, FleetProblem, simulate_fleet
+from maneuver_automaton.collision import Disc
+from maneuver_automaton.collision.shapes import Motion
+from maneuver_automaton.fleet import FleetGuarantee, FleetStatus, Swap, plan_fleet
+from maneuver_automaton.fleet.agreement import Agreement
+from maneuver_automaton.fleet.conflicts import Course, meetings
+from maneuver_automaton.fleet.guarantees import After, Before, broken, gap_between
+from maneuver_automaton.fleet.held import left_to_pay, off_plan, rest_of_plan, resting
+from maneuver_automaton.fleet.planning import vehicles_of
+from maneuver_automaton.fleet.vehicle import Found
+from maneuver_automaton.groups import SE2
+from tests.fleet.robots import (
+    at_rest,
+    crossing,
+    least_distance,
+    problem_of,
+    scattered,
+    swapping,
+    through_a_door,
+)
+
+LONG_S = 60.0  # [s] for a step: no clock decides
+ORIGIN = (0.0, 0.0, 0.0)
+
+
+def loop_of(fleet, **more):
+    """A loop that begins at rest, so that it depends on no clock."""
+    more = {"step": 0.5, "first": at_rest(fleet), "time_limit": LONG_S} | more
+    return simulate_fleet(fleet, **more)
+
+
+def assert_kept(log, *, margin=0.1):
+    """Everybody arrived, every guarantee held, and nobody came nearer than the margin."""
+    assert log.reached, log.reason
+    assert [*log.violations] == []
+    assert log.distance_m >= margin - 1e-9
+    assert least_distance(log) >= margin - 1e-9
+
+
+def test_two_that_cross():
+    log = loop_of(crossing())
+    assert_kept(log)
+    assert {swap.names for _, swap in log.swaps} >= {("a",), ("b",)}
+    assert sorted(log.arrived_s) == ["a", "b"]
+    assert log.last_s < 8.0  # 6 m at 1 m/s, and one of them waits a moment
+    assert min(step.gap_m for step in log.steps) >= 0.1
+
+
+@pytest.mark.parametrize("scene", [swapping, through_a_door])
+def test_scenes(scene):
+    fleet = scene()
+    first = plan_fleet(fleet, time_limit=20.0, max_rounds=0)
+    assert first.status is FleetStatus.FOUND
+    log = loop_of(fleet, first=first)
+    assert_kept(log)
+    assert log.sum_s <= first.sum_s + 1e-9
+
+
+def test_swapping_from_rest_in_a_group():
+    assert_kept(loop_of(swapping(), group_size=2))
+
+
+@pytest.mark.parametrize("by", [(3.0, -2.0, 0.0), (1.0, 4.0, 2.1)])
+def test_a_moved_fleet_has_the_moved_loop(by):
+    pushes = {"a": ma.Disturbance(pushes={2: (0.1, 0.2, 0.3)})}
+    fleet = crossing(tolerance=0.05)
+    here = loop_of(fleet, disturbance=pushes)
+    there = loop_of(fleet.moved(SE2(by)), disturbance=pushes)
+    assert [step.number for step in here.steps] == [step.number for step in there.steps]
+    for one, other in zip(here.steps, there.steps, strict=True):
+        assert one.arrivals == pytest.approx(other.arrivals, abs=1e-6)
+        assert [swap.names for swap in one.swaps] == [swap.names for swap in other.swaps]
+        assert one.void == other.void
+        for name, pose in one.poses.items():
+            moved = (SE2(by) @ SE2(pose)).pose
+            assert other.poses[name][:2] == pytest.approx(moved[:2], abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_random_fleets_lose_no_plan(seed):
+    check_random(seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3, 40))
+def test_more_random_fleets_lose_no_plan(seed):
+    check_random(seed)
+
+
+def check_random(seed):
+    n = 2 + seed % 7
+    fleet = scattered(n, seed)
+    first = plan_fleet(fleet, time_limit=20.0, max_rounds=0)
+    if first.status is not FleetStatus.FOUND:
+        first = at_rest(fleet)
+    log = loop_of(fleet, first=first, group_size=1 + seed % 3, steps=80)
+    assert [*log.violations] == []
+    assert log.distance_m >= 0.1 - 1e-9
+    assert least_distance(log) >= 0.1 - 1e-9
+    for step in log.steps:
+        assert set(step.plans) == set(fleet.names)  # nobody ever without a plan
+    for one, other in zip(log.steps[:-1], log.steps[1:], strict=True):
+        assert other.value <= one.value + 1e-9
+    if first.status is FleetStatus.FOUND:
+        assert log.reached
+        assert log.sum_s <= first.sum_s + 1e-9 or any(len(s.names) > 1 for _, s in log.swaps)
+
+
+def test_whoever_finds_nothing_holds_on():
+    fleet = crossing()
+    first = plan_fleet(fleet, time_limit=20.0, max_rounds=0)
+    log = loop_of(fleet, first=first, time_limit=1e-9)
+    assert_kept(log)
+    assert [*log.swaps] == []
+    assert log.sum_s == pytest.approx(first.sum_s, abs=1e-6)
+
+
+def test_swaps_per_step_and_the_rotating_order():
+    log = loop_of(scattered(4, 2), swaps_per_step=1)
+    assert all(len(step.asked) <= 1 for step in log.steps)
+    assert len({name for step in log.steps for name in step.asked}) == 4
+
+
+def test_a_control_and_a_log_of_one_step():
+    fleet = crossing()
+    loop = FleetHorizon(fleet, step=0.5, first=at_rest(fleet), time_limit=LONG_S)
+    step = loop.step({"a": [-3, 0, 0], "b": [0, -3, np.pi / 2]})
+    assert step.time == 0.0
+    assert step.control_of("a").tolist() == [1.0, 0.0]
+    assert step.value == pytest.approx(sum(step.values.values()))
+    assert math.isinf(step.swaps[0].gain)
+    assert loop.step({"a": [-2.5, 0, 0], "b": step.plans["b"].pose_at(0.5)}).time == 0.5
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"step": 0.0}, "step must be positive, got 0.0 s"),
+        ({"step": 1.0, "time_limit": -1.0}, "time_limit must be positive"),
+        ({"step": 1.0, "margin": -1.0}, "margin must be at least 0"),
+        ({"step": 1.0, "tube_m": 0.2}, "tube_m is 0.2 m, need at most half of the margin"),
+        ({"step": 1.0, "group_size": 0}, "group_size must be at least 1, got 0"),
+        ({"step": 1.0, "delay_steps": -1}, "delay_steps must be at least 0, got -1"),
+    ],
+)
+def test_wrong_numbers(wrong, said):
+    with pytest.raises(ValueError, match=said):
+        FleetHorizon(crossing(), **wrong)
+
+
+def test_wrong_states():
+    loop = FleetHorizon(crossing(), step=0.5)
+    with pytest.raises(ValueError, match="no vehicle is named 'c', there are a, b"):
+        loop.step({"c": [0, 0, 0]})
+    with pytest.raises(ValueError, match="state of 'a'"):
+        loop.step({"a": [0, 0]})
+    loop.step({"a": [-3, 0, 0]}, time=1.0)
+    with pytest.raises(ValueError, match="before the last step, 1 s"):
+        loop.step({"a": [-3, 0, 0]}, time=0.5)
+
+
+def test_who_stands_too_near_is_not_let_in():
+    ends = ([0, 0, 0], [3, 0, 0]), ([0.5, 0, 0], [3, 2, 0])
+    fleet = FleetProblem([problem_of(*one) for one in ends], names=("a", "b"), margin=0.1)
+    step = FleetHorizon(fleet, step=0.5).step({"a": [0, 0, 0], "b": [0.5, 0, 0]})
+    assert step.refused == ("b",)
+    assert [one.guarantee for one in step.violations] == [FleetGuarantee.HELD]
+
+
+# -- the guarantees themselves: each is broken by hand
+
+
+def found_on(vehicle, *, cost=2.0, start=(0.0, 0.0, 0.0), duration=2.0):
+    """A robot's plan straight on."""
+    trim = vehicle.problem.automaton["on"]
+    plan = ma.Plan(start, (trim,), durations=[duration])
+    return Found(plan, cost, 0, vehicle.course_of(plan))
+
+
+def after_of(held, *, time=0.0, swaps=(), off=None, keep=0.1):
+    return After(
+        time=time,
+        held=held,
+        courses={k: one.course.after(time) for k, one in held.items()},
+        off=off or dict.fromkeys(held, 0.0),
+        disturbed=set(),
+        in_group=set(),
+        swaps=swaps,
+        tube_m=0.05,
+        keep=keep,
+        frame=ORIGIN,
+    )
+
+
+def pair(gap=1.0):
+    """Two robots that drive beside each other, their bodies a distance apart."""
+    ends = ([0, 0, 0], [2, 0, 0]), ([0, 0.6 + gap, 0], [2, 0.6 + gap, 0])
+    fleet = FleetProblem([problem_of(*one) for one in ends], names=("a", "b"), margin=0.1)
+    vehicles = vehicles_of(fleet)
+    held = {k: found_on(one, start=one.problem.start) for k, one in enumerate(vehicles)}
+    agreement = Agreement(fleet.names)
+    agreement.start(held)
+    return vehicles, held, agreement
+
+
+def broken_by(vehicles, agreement, before, after):
+    return [(one.guarantee, one.names) for one in broken(vehicles, agreement, before, after)]
+
+
+def test_apart():
+    for gap, expected in ((0.2, []), (0.09, [(FleetGuarantee.APART, ("a", "b"))])):
+        vehicles, held, agreement = pair(gap)
+        before = Before.of(vehicles, held, 0.0, None)
+        assert broken_by(vehicles, agreement, before, after_of(held)) == expected
+
+
+def test_held():
+    vehicles, held, agreement = pair()
+    before = Before.of(vehicles, held, 0.0, None)
+    after = after_of(held, off={0: 0.06, 1: 0.0})
+    assert broken_by(vehicles, agreement, before, after) == [(FleetGuarantee.HELD, ("a",))]
+
+
+def test_value_and_arrival():
+    vehicles, held, agreement = pair()
+    before = Before.of(vehicles, held, 0.0, None)
+    later = dict(held)
+    later[1] = found_on(vehicles[1], cost=3.0, start=held[1].plan.start, duration=3.0)
+    agreement.start(later)
+    said = broken_by(vehicles, agreement, before, after_of(later))
+    assert said == [
+        (FleetGuarantee.DECREASE, ("b",)),
+        (FleetGuarantee.ARRIVAL, ("b",)),
+        (FleetGuarantee.DECREASE, ("a", "b")),
+    ]
+
+
+def test_still_is_free():
+    vehicles, held, agreement = pair()
+    wall = replace(vehicles[0].problem, obstacles=(ma.Obstacle(Disc(0.5, [2.0, 0.0])),))
+    vehicles[0].problem = wall
+    before = Before.of(vehicles, held, 0.0, None)
+    said = broken_by(vehicles, agreement, before, after_of(held))
+    assert said == [(FleetGuarantee.STILL, ("a",))]
+
+
+def test_commit_order():
+    vehicles, held, agreement = pair()
+    before = Before.of(vehicles, held, 0.0, None)
+    numbers = {"before": 3.0, "after": 2.0}
+    one = Swap(names=("a",), past=(("b", 0),), holds=(("a", 1),), order=0, **numbers)
+    stale = Swap(names=("b",), past=(("a", 0),), holds=(("b", 1),), order=1, **numbers)
+    fresh = replace(stale, past=(("a", 1),))
+    assert not broken_by(vehicles, agreement, before, after_of(held, swaps=(one, fresh)))
+    said = broken_by(vehicles, agreement, before, after_of(held, swaps=(one, stale)))
+    assert said == [(FleetGuarantee.ORDER, ("b",))]
+
+
+def test_known():
+    vehicles, held, agreement = pair()
+    before = Before.of(vehicles, held, 0.0, None)
+    other = dict(held)
+    other[0] = replace(held[0])
+    said = broken_by(vehicles, agreement, before, after_of(other))
+    assert said == [(FleetGuarantee.KNOWN, ("a",))]
+
+
+def test_the_gap_that_is_proven():
+    for gap in (0.15, 0.4, 0.9):
+        _, held, _ = pair(gap)
+        proven = gap_between({k: one.course for k, one in held.items()}, keep=0.1, frame=ORIGIN)
+        assert gap - 0.05 < proven <= gap
+    _, held, _ = pair(0.05)
+    assert gap_between({k: one.course for k, one in held.items()}, keep=0.1, frame=ORIGIN) == 0.0
+
+
+# -- what is left of a plan
+
+
+def test_what_is_left_of_a_plan():
+    (vehicle, _), held, _ = pair()
+    found = held[0]
+    assert left_to_pay(vehicle, found, 0.5) == pytest.approx(1.5)
+    assert left_to_pay(vehicle, found, 5.0) == 0.0
+    assert math.isinf(left_to_pay(vehicle, resting(vehicle, found.plan.start, 0.0), 1.0))
+    assert rest_of_plan(vehicle, found, 0.5).start == pytest.approx([0.5, 0.0, 0.0])
+
+
+def test_how_far_a_body_is_off_its_plan():
+    (vehicle, _), held, _ = pair()
+    assert off_plan(vehicle, held[0], 1.0, np.array([1.0, 0.1, 0.0])) == pytest.approx(0.1)
+    turned = off_plan(vehicle, held[0], 1.0, np.array([1.0, 0.0, 0.2]))
+    assert turned == pytest.approx(2.0 * 0.3 * math.sin(0.1))  # a disc that turns does not move
+
+
+def test_what_is_left_of_a_course():
+    motion = Motion([0.0, 2.0, 3.0], [[0, 0, 0], [2, 0, 0], [2, 0, 1.0]], [[1, 0, 0], [0, 0, 1]])
+    course = Course(((Disc(0.3),),), (motion,))
+    for time in (0.0, 0.7, 2.0, 2.5, 3.0, 4.0):
+        (left,) = course.after(time).motions
+        assert left.time[0] == pytest.approx(time)
+        for later in np.linspace(time, 5.0, 7):
+            assert left.at(later) == pytest.approx(motion.at(later), abs=1e-12)
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_who_begins_later_stands_at_its_start_until_then(first):
+    passing = Course(((Disc(0.3),),), (Motion([0.0, 4.0], [[-2, 0, 0], [2, 0, 0]], [[1, 0, 0]]),))
+    later = Course(((Disc(0.3),),), (Motion([9.0, 10.0], [[0, 0, 0], [0, 1, 0]], [[0, 1, 0]]),))
+    (met,) = meetings({first: passing, 1 - first: later}, keep=0.0)
+    assert met.time == pytest.approx(1.4, abs=1e-3)
