@@ -35,6 +35,7 @@ class Agreement:
 
     names: Sequence[str]
     lost: Lost | None = None
+    tries: int = 3  # to be heard, and to hear an answer, in a step
     expected: dict[int, dict[int, list[Found]]] = field(default_factory=dict)
     step: int = 0
     sent: int = 0
@@ -69,23 +70,34 @@ class Agreement:
         for others in self.expected.values():
             others.pop(k, None)
 
-    def agree(
-        self, k: int, found: Found, holds: Found, refuses: Callable[[int, Found], bool]
-    ) -> bool:
-        """Whether all others agree that a vehicle drives another plan than the one it holds."""
-        agreed = True
+    def agree(self, k: int, found: Found, holds: Found, refuses: Callable[[int], bool]) -> bool:
+        """Whether all others agree that a vehicle drives another plan than the one it holds.
+
+        Who holds a plan that the other one is not proven past refuses.
+        """
         others = [j for j in self.expected if j != k]
-        for j in others:
-            if not self._say(k, j, "asks"):
-                agreed = False
-                continue
-            self.expected[j].setdefault(k, [holds]).append(found)
-            agreed = not refuses(j, found) and self._say(j, k, "agrees") and agreed
+        agreed = all(self._agrees(j, k, found, holds, refuses) for j in others)
         if agreed:
             self._tell(k, found, "drives")
         else:
             self._tell(k, holds, "withdraws")
         return agreed
+
+    def _agrees(
+        self, j: int, k: int, found: Found, holds: Found, refuses: Callable[[int], bool]
+    ) -> bool:
+        """Whether a vehicle answers that it expects another plan of one that asks."""
+        for _ in range(self.tries):
+            if not self._say(k, j, "asks"):
+                continue
+            known = self.expected[j].setdefault(k, [holds])
+            if not any(one is found for one in known):
+                known.append(found)
+            if refuses(j):
+                return False
+            if self._say(j, k, "agrees"):
+                return True
+        return False
 
     def announce(self, k: int, found: Found) -> None:
         """A vehicle drives another plan, whether the others agree or not."""
@@ -101,7 +113,7 @@ class Agreement:
             (j, k)
             for j, others in self.expected.items()
             for k, found in held.items()
-            if k != j and not any(one is found for one in others.get(k, ()))
+            if k != j and not any(one.course is found.course for one in others.get(k, ()))
         ]
 
     def _tell(self, sender: int, found: Found, kind: Kind) -> None:

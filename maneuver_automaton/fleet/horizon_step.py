@@ -32,6 +32,9 @@ from maneuver_automaton.fleet.vehicle import LONG, QUICK, Found, Vehicle
 from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.settings import EXACT
 
+Around = tuple[tuple[int, int], ...]  # who is there, and which plan it holds
+
+NEARLY = 0.005  # share of its cost: a plan rejoined that is no dearer is the same one
 WORTH = 1e-6  # share of its cost that another plan saves at least
 EASED = (1.0, 0.5, 0.0)  # shares of the margin, where a void plan has none that keeps all of it
 LEAST = 1e-3  # [m] kept even then
@@ -63,8 +66,10 @@ class LoopState:
     arrived: set[int] = field(default_factory=set)
     broken: set[int] = field(default_factory=set)
     versions: dict[int, int] = field(default_factory=dict)  # how often a plan was exchanged
-    settled: dict[int, Found] = field(default_factory=dict)  # held, and no way alone is cheaper
-    in_vain: dict[int, list[Found]] = field(default_factory=dict)  # past which nothing was found
+    # Plans are the same as long as they are only driven, or rejoined at nearly the same cost.
+    lineage: dict[int, int] = field(default_factory=dict)
+    settled: dict[int, int] = field(default_factory=dict)  # no way alone is cheaper than this one
+    in_vain: dict[int, Around] = field(default_factory=dict)  # past these nothing was found
     due: dict[int, tuple[int, Found, Found]] = field(default_factory=dict)  # when, what, for what
     last: FleetStep | None = None
 
@@ -161,7 +166,8 @@ class FleetStepUnderWay:
                 proven = self._is_proven(k, found, list(others.values()))
                 if proven and (at_first or agreement.enter(k, found, self.held)):
                     self.held[k] = found
-                    self.state.versions[k] = 0
+                    for count in (self.state.versions, self.state.lineage):
+                        count[k] = count.get(k, -1) + 1
                     self.disturbed.add(k)
                     break
             else:
@@ -181,13 +187,15 @@ class FleetStepUnderWay:
                 continue
             # It stays where it is, or where its plan ends, and looks for another one.
             stay = resting(self.vehicles[k], self.poses[k], self.time)
-            proven = self._is_proven(k, stay, self._expected_by(k))
-            self._hold(k, stay if proven else replace(found, cost=math.inf))
+            if not (self._is_proven(k, stay, self._expected_by(k)) and self._agreed(k, stay)):
+                stay = replace(found, cost=math.inf)
+            self._hold(k, stay)
 
     def _hold(self, k: int, found: Found) -> None:
         """Another plan is held, whatever the others say to it."""
         self.held[k] = found
         self.state.versions[k] += 1
+        self.state.lineage[k] += 1
         self.disturbed.add(k)
         self.off[k] = self._off(k, found)
         self.state.agreement.announce(k, found)
@@ -212,12 +220,13 @@ class FleetStepUnderWay:
                 self._rejoin_within(k, found)
 
     def _rejoin_within(self, k: int, found: Found) -> None:
-        others = self._expected_by(k)
+        others, left = self._expected_by(k), self._left_to_pay(k)
         for again in rejoined(self.vehicles[k], found, self.time, self.poses[k]):
             if self._is_proven(k, again, others):
                 if self._agreed(k, again):
                     self.held[k] = again
                     self.state.versions[k] += 1
+                    self.state.lineage[k] += int(again.cost > left * (1.0 + NEARLY))
                     self.disturbed.add(k)
                     self.off[k] = 0.0
                     if k in self.state.due:
@@ -226,12 +235,14 @@ class FleetStepUnderWay:
                 return
 
     def _agreed(self, k: int, found: Found) -> bool:
-        """Whether all others agree to a plan."""
-        return self.state.agreement.agree(k, found, self.held[k], self._refuses)
-
-    def _refuses(self, j: int, found: Found) -> bool:
-        """Whether a vehicle refuses another's plan: it would meet it."""
-        return self._first_meeting(found, [self.held[j]], self.keep) < math.inf
+        """Whether all others agree to a plan: it is proven past the one that each of them holds."""
+        past = self.state.agreement.others_of(k)
+        return self.state.agreement.agree(
+            k,
+            found,
+            self.held[k],
+            lambda j: not any(one.course is self.held[j].course for one in past[j]),
+        )
 
     def _stop(self, broken_down: set[int]) -> None:
         """Who breaks down stops as soon as it can; plans that would hit it are void."""
@@ -340,10 +351,10 @@ class FleetStepUnderWay:
             most = settings.swaps_per_step
             if self.budget.is_over or (most is not None and len(self.asked) >= most):
                 return
-            if state.settled.get(k) is self.held[k] or k in state.due:
+            if state.settled.get(k) == state.lineage[k] or k in state.due:
                 continue
-            around = [self.held[k], *self._expected_by(k)]
-            if _same(state.in_vain.get(k, []), around):
+            around = tuple((j, state.lineage[j]) for j in self.held)
+            if state.in_vain.get(k) == around:
                 continue
             # Later no more is to be had past the same plans: what is left of them is less.
             if not self._look_for_better(k) and not self.budget.is_over:
@@ -360,7 +371,7 @@ class FleetStepUnderWay:
         found, alone = self._search(k, base, self._expected_by(k), known)
         if alone is None:
             if leads(base) and not self.budget.is_over:
-                self.state.settled[k] = base
+                self.state.settled[k] = self.state.lineage[k]
             return False
         if found is not None and found.arrival <= arrival(base) * (1.0 + LATER) + LATER:
             if settings.delay_steps:
@@ -441,6 +452,7 @@ class FleetStepUnderWay:
             self.in_group |= set(found)
         for k, one in found.items():
             versions[k] += 1
+            self.state.lineage[k] += 1
             self.off[k] = self._off(k, one)
         names = tuple(self.vehicles[k].name for k in found)
         self.swaps.append(
@@ -494,8 +506,3 @@ class FleetStepUnderWay:
             violations=tuple(self.violations),
             solve_s=self.budget.elapsed,
         )
-
-
-def _same(one: Sequence[Found], other: Sequence[Found]) -> bool:
-    """Whether these are the same plans."""
-    return len(one) == len(other) and all(a is b for a, b in zip(one, other, strict=True))

@@ -37,12 +37,12 @@ def three(*dropped: int):
     """Three vehicles that hold plans, and what they say to each other."""
     drops = Drops(*dropped)
     held = {k: found(float(k)) for k in range(3)}
-    agreement = Agreement("abc", drops)
+    agreement = Agreement("abc", drops, tries=1)
     agreement.start(held)
     return agreement, held, drops
 
 
-def never(_j, _found):
+def never(_):
     return False
 
 
@@ -62,9 +62,16 @@ def test_who_does_not_hear_from_all_holds_on(lost):
     assert agreement.others_of(1)[0] == [held[0]]  # told that it was withdrawn
 
 
+def test_it_is_said_again():
+    agreement, held, drops = three(0, 2)  # the first word to b, and the first answer of b
+    agreement.tries = 3
+    assert agreement.agree(0, found(9.0), held[0], never)
+    assert [one.kind for one in drops.seen[:5]] == ["asks", "asks", "agrees", "asks", "agrees"]
+
+
 def test_who_refuses():
     agreement, held, drops = three()
-    assert not agreement.agree(0, found(9.0), held[0], lambda j, _: j == 2)
+    assert not agreement.agree(0, found(9.0), held[0], lambda j: j == 2)
     assert agreement.unknown(held) == []
     assert [one.kind for one in drops.seen if one.sender == "c"] == []
 
@@ -81,7 +88,7 @@ def test_both_plans_are_expected_until_the_doubt_ends():
 
 
 def test_a_withdrawal_that_is_lost():
-    agreement, held, _ = three(1, 4)  # b's answer, and the withdrawal to b
+    agreement, held, _ = three(1, 2)  # b's answer, and the withdrawal to b
     other = found(9.0)
     assert not agreement.agree(0, other, held[0], never)
     assert agreement.others_of(1)[0] == [held[0], other]

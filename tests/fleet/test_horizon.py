@@ -271,7 +271,7 @@ def test_known():
     vehicles, held, agreement = pair()
     before = Before.of(vehicles, held, 0.0, None)
     other = dict(held)
-    other[0] = replace(held[0])
+    other[0] = found_on(vehicles[0])
     said = broken_by(vehicles, agreement, before, after_of(other))
     assert said == [(FleetGuarantee.KNOWN, ("a",))]
 
