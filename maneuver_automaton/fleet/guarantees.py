@@ -98,27 +98,28 @@ def _too_near(names: Sequence[str], after: After) -> Iterator[FleetViolation]:
 
 def _dearer(vehicles: Sequence[Vehicle], before: Before, after: After) -> Iterator[FleetViolation]:
     """Whose value rose, or who arrives later, and whether the sum did."""
-    sums = [0.0, 0.0, 0.0]
+    sum_now = sum_before = 0.0
+    fewer_arrive_not = False  # then the sum, which was infinite, has fallen
     for k, found in after.held.items():
         if k in after.disturbed:
             continue
         was, promised = before.values[k], before.promised[k]
         now = left_to_pay(vehicles[k], found, after.time)
         if was < math.inf:
-            sums[0] += now
-            sums[1] += was
-            sums[2] += abs(was)
-        allowed = was + ACCURACY * (1.0 + abs(was)) if k not in after.in_group else math.inf
-        if now > allowed or was > promised + ACCURACY * (1.0 + abs(was)):
+            sum_now, sum_before = sum_now + now, sum_before + was
+        fewer_arrive_not = fewer_arrive_not or now < was == math.inf
+        rounding = ACCURACY * (1.0 + abs(was))
+        dearer = now > was + rounding and k not in after.in_group
+        if dearer or was > promised + rounding:
             reason = f"the value is {now:.9g}, was {was:.9g} and {promised:.9g} a step before"
             yield FleetViolation(FleetGuarantee.DECREASE, (vehicles[k].name,), reason)
         later = arrival(found) - before.arrivals[k] if arrival(found) < math.inf else 0.0
         if later > LATER * (1.0 + abs(before.arrivals[k])) and k not in after.in_group:
             reason = f"it arrives {later:.3g} s later than its last plan said"
             yield FleetViolation(FleetGuarantee.ARRIVAL, (vehicles[k].name,), reason)
-    if sums[0] > sums[1] + ACCURACY * (1.0 + sums[2]):
+    if not fewer_arrive_not and sum_now > sum_before + ACCURACY * (1.0 + abs(sum_before)):
         everybody = tuple(vehicles[k].name for k in after.held)
-        reason = f"the sum is {sums[0]:.9g}, was {sums[1]:.9g}"
+        reason = f"the sum is {sum_now:.9g}, was {sum_before:.9g}"
         yield FleetViolation(FleetGuarantee.DECREASE, everybody, reason)
 
 

@@ -248,7 +248,7 @@ class FleetStepUnderWay:
         """Who breaks down stops as soon as it can; plans that would hit it are void."""
         new = broken_down - self.state.broken
         for k in sorted(new):
-            self._hold(k, stopping(self.vehicles[k], self.held[k], self.time, self.poses[k]))
+            self._hold(k, stopping(self.vehicles[k], self.held[k], self.time, self._begin(k)))
         self.state.broken |= new
         self.void = [k for k in self.void if k not in self.state.broken]
         stopped = [self.held[k] for k in new]
@@ -267,46 +267,78 @@ class FleetStepUnderWay:
                 for k in waiting
             }
             waiting.sort(key=lambda k: self._first_meeting(self.held[k], others[k], self.keep))
+        stopped, anew = set(self.state.broken), set[int]()
         while waiting:
             k = waiting.pop(0)
-            found = self._anew(k, waiting)
+            stop = stopping(self.vehicles[k], self.held[k], self.time, self._begin(k))
+            found = None if k in anew else self._another(k, waiting)
+            anew.add(k)
+            if found is None:
+                found = self._stopped(k, stop, stopped)
+                stopped.add(k)
             self._hold(k, found)
             self.state.arrived.discard(k)
+            for j, other in self.held.items():
+                if j in stopped or j in waiting or j == k:
+                    continue
+                if self._first_meeting(other, [found], self.keep) < math.inf:
+                    waiting.append(j)
+                    if j not in self.void:
+                        self.void.append(j)
 
-    def _anew(self, k: int, waiting: Sequence[int]) -> Found:
-        """A plan for a vehicle whose plan is void."""
-        vehicle, pose, held = self.vehicles[k], self.poses[k], self.held[k]
-        all_others = [one for j, one in self.held.items() if j != k]
-        firm = [one for j, one in self.held.items() if j != k and j not in waiting]
-        stop = stopping(vehicle, held, self.time, pose)
-        again = list(rejoined(vehicle, held, self.time, pose))
-        for one in again:
-            if self._is_proven(k, one, all_others):
+    def _another(self, k: int, waiting: Sequence[int]) -> Found | None:
+        """A plan for a vehicle whose plan is void; None if none is found.
+
+        Past all others, or else past those whose plans are not void and past where the others stop.
+        """
+        vehicle, pose = self.vehicles[k], self._begin(k)
+        others = {j: one for j, one in self.held.items() if j != k}
+        everyone = list(others.values())
+        for one in rejoined(vehicle, self.held[k], self.time, pose):
+            if self._is_proven(k, one, everyone):
                 return one
-        for others in (all_others, firm) if waiting else (all_others,):
-            found = self._search(k, self._from_here(k), others, math.inf, most=LONG)[0]
-            if found is not None and self._is_proven(k, found, others):
+        past = everyone
+        for _ in range(2 if waiting else 1):
+            found = self._search(k, self._from_here(k, pose), past, math.inf, most=LONG)[0]
+            if found is not None and self._is_proven(k, found, past):
                 return found
+            past = [
+                stopping(self.vehicles[j], one, self.time, self._begin(j)) if j in waiting else one
+                for j, one in others.items()
+            ]
+        return None
+
+    def _stopped(self, k: int, stop: Found, stopped: Collection[int]) -> Found:
+        """The plan of a vehicle that comes to rest, past those that do so already.
+
+        Whoever would hit it is planned anew after it: this ends, at the latest, with all at rest.
+        """
+        last = [one for j, one in self.held.items() if j in stopped and j != k]
         for share in EASED:
             keep = max(share * self.keep, LEAST)
-            for one in (stop, *again):
-                free = self._first_meeting(one, firm, keep) == math.inf
-                if free and not why_not_free(vehicle, self._course(one)):
-                    if share < 1.0:
-                        reason = f"no plan was found that keeps more than {keep:.3g} m"
-                        self._flag(FleetGuarantee.APART, [k], reason)
-                    return one
-        choices = [(self._first_meeting(one, firm, LEAST), n) for n, one in enumerate((stop, held))]
-        when, n = max(choices)
-        reason = f"it meets another vehicle at {when:.6g} s, or what stands still"
-        self._flag(FleetGuarantee.SAFETY, [k], f"unavoidable: {reason}")
-        return (stop, held)[n]
+            if self._first_meeting(stop, last, keep) < math.inf:
+                continue
+            if share < 1.0:
+                reason = f"no plan was found that keeps more than {keep:.3g} m"
+                self._flag(FleetGuarantee.APART, [k], reason)
+            return stop
+        motions = (stop, self.held[k])
+        times = [self._first_meeting(one, last, LEAST) for one in motions]
+        reason = f"unavoidable: at {max(times):.6g} s it meets another vehicle"
+        self._flag(FleetGuarantee.SAFETY, [k], reason)
+        return motions[times.index(max(times))]
 
-    def _from_here(self, k: int) -> Found:
-        """What a vehicle holds, if it begins where it was measured."""
+    def _begin(self, k: int) -> Array:
+        """Where plans of a vehicle begin: on its plan if it is within its tube, else measured."""
+        on_it = self.off[k] <= self.state.settings.tube_m
+        return self.held[k].plan.pose_at(self.time) if on_it else self.poses[k]
+
+    def _from_here(self, k: int, pose: Array | None = None) -> Found:
+        """What a vehicle holds, if it begins at a pose, or where it was measured."""
         vehicle, found = self.vehicles[k], self.held[k]
         rest = rest_of_plan(vehicle, found, self.time)
-        return replace(found, plan=replace(rest, start=self.poses[k]))
+        start = self.poses[k] if pose is None else pose
+        return replace(found, plan=replace(rest, start=start))
 
     # -- exchanges
 
@@ -315,8 +347,9 @@ class FleetStepUnderWay:
     ) -> tuple[Found | None, Found | None]:
         """Another plan past the others, and the way alone; None for what does not cost less."""
         settings = self.state.settings
-        if is_over(base, self.time):
-            base = self._from_here(k)  # it stands, so it may begin where it was measured
+        goals = self.vehicles[k].problem.goals
+        if is_over(base, self.time) and any(within(base.plan.end, goal) for goal in goals):
+            base = self._from_here(k)  # its plan says it is there, but it was measured elsewhere
         seen: list[Obstacle] = [body for one in others for body in self._course(one).obstacles]
         return proposal(
             self.vehicles[k],
