@@ -35,6 +35,7 @@ from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon.candidates import allowed, within
 from maneuver_automaton.receding_horizon.reanchoring import reanchored
+from maneuver_automaton.receding_horizon.settings import switches_at_will
 from maneuver_automaton.receding_horizon.shifting import followed_by, moves_on
 
 CONTACT = 1e-9  # [m] what is closer touches
@@ -107,7 +108,7 @@ def onward(
     if not moves_on(rest):
         head = _standing(rest, after) if after > NOTHING else None
         return head, own.starting_at(rest.end, time=rest.start_time + after)
-    if vehicle.at_will:
+    if switches_at_will(vehicle.problem):
         busy, name = after, None
     else:
         known = _next_in_library(vehicle, rest, max(after, after + committed(rest, after)))
@@ -185,7 +186,7 @@ def _after(vehicle: Vehicle, head: Plan | None, found: Found) -> Found:
         return found
     plan = head
     if found.plan.trims:
-        follows = followed_by if vehicle.at_will else joined
+        follows = followed_by if switches_at_will(vehicle.problem) else joined
         plan = follows(head, found.plan)
     cost = vehicle.problem.cost_of(plan)
     return Found(plan, cost, found.goal_index, vehicle.course_of(plan))
@@ -219,7 +220,7 @@ def rejoined(vehicle: Vehicle, found: Found, time: float, pose: Array) -> Iterat
 
 def stopping(vehicle: Vehicle, found: Found, time: float, pose: Array) -> Found:
     """The plan that comes to rest soonest; what is held where the library cannot stop it."""
-    if vehicle.at_will or not moves_on(rest_of_plan(vehicle, found, time)):
+    if switches_at_will(vehicle.problem) or not moves_on(rest_of_plan(vehicle, found, time)):
         return resting(vehicle, pose, time)
     head, problem = onward(vehicle, found, time)
     if problem is None:  # it is driven to its end

@@ -29,6 +29,7 @@ from maneuver_automaton.receding_horizon.disturbance import (
     checked,
     draws,
 )
+from maneuver_automaton.receding_horizon.settings import switches_at_will
 from maneuver_automaton.receding_horizon.shifting import moves_on
 
 TOUCHES = 1e-9  # [m] what is closer touches
@@ -164,7 +165,7 @@ def _upsets(
         else:
             upset = calm if disturbance is None else disturbance
         dof = one.problem.start.size
-        if upset.twist_scale is not None and not one.at_will:
+        if upset.twist_scale is not None and not switches_at_will(one.problem):
             raise ValueError(
                 "fleet: disturbance: twist_scale is for vehicles without inertia: "
                 "a maneuver is driven as its model says"
