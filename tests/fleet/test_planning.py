@@ -64,11 +64,11 @@ def test_who_arrives_stays_or_leaves():
     """One car ends where the other has to pass: it lets it pass first, or is gone."""
     wall = [Obstacle(Box([20.0, 1.0], center=[0.0, y])) for y in (-1.2, 1.2)]
     ends = [([-3, 0, 0], [0, 0, 0]), ([-6, 0, 0], [6, 0, 0])]
-    body = (Box([1.0, 0.8]),)
-    stays = plan_fleet(fleets.fleet_of(ends, obstacles=wall, footprint=body), time_limit=2.0)
+    room = {"footprint": (Box([1.0, 0.8]),), "bounds": Bounds(x=(-9.0, 9.0), y=(-2.0, 2.0))}
+    stays = plan_fleet(fleets.fleet_of(ends, obstacles=wall, **room), time_limit=2.0)
     assert stays.status is not FleetStatus.FOUND
     assert "1" in " ".join(stays.reasons.values()) or "2" in stays.reasons
-    leaving = fleets.fleet_of(ends, obstacles=wall, footprint=body, leaves=[True, False])
+    leaving = fleets.fleet_of(ends, obstacles=wall, leaves=[True, False], **room)
     leaves = plan_fleet(leaving, time_limit=5.0, max_rounds=2)
     assert leaves.status is FleetStatus.FOUND
 
