@@ -17,10 +17,12 @@ from maneuver_automaton.plotting.colors import INK, Color
 from maneuver_automaton.plotting.ends import draw_ends, end_handles
 from maneuver_automaton.plotting.limits import draw_limits, limit_handles
 from maneuver_automaton.plotting.obstacles import (
+    MOVING,
     MovingShape,
     draw_obstacles,
     moving_shapes,
     obstacle_handles,
+    show_presence,
 )
 from maneuver_automaton.plotting.pages import (
     DPI,
@@ -51,6 +53,8 @@ class Stage:
     def show(self, time: float) -> None:
         """Put moving obstacles where they are at `time` [s]."""
         self.traffic.set_paths([one.at(time) for one in self.moving])
+        there = [one.there(time) for one in self.moving]
+        show_presence(self.traffic, [MOVING] * len(there), there)
 
 
 def stage_of(
