@@ -149,19 +149,21 @@ def moving_collection(
     return drawn
 
 
-def show_presence(
-    drawn: PathCollection, colors: Sequence[Color], there: Sequence[bool]
-) -> None:
+def show_presence(drawn: PathCollection, colors: Sequence[Color], there: Sequence[bool]) -> None:
     """Give moving shapes their colours: faint and dashed those that are not there."""
     alphas = [THERE_ALPHA if here else GONE_ALPHA for here in there]
-    edges = [(*shaded(color, -0.25), 1.0 if here else 0.45) for color, here in zip(colors, there, strict=True)]
+    edges = [1.0 if here else 0.45 for here in there]
     drawn.set_facecolor([(*color, alpha) for color, alpha in zip(colors, alphas, strict=True)])
-    drawn.set_edgecolor(edges)
+    drawn.set_edgecolor(
+        [(*shaded(color, -0.25), alpha) for color, alpha in zip(colors, edges, strict=True)]
+    )
     drawn.set_linestyle(["solid" if here else (0, (3, 2)) for here in there] or ["solid"])
 
 
-def round_times(begin: float, end: float) -> Array:
+def round_times(begin: float, end: float, *, most: int = MOST_STEPS) -> Array:
     """A few round times (n,) [s] from `begin` to `end`, which are the first and the last.
+
+    There are at most so many steps between them, and one more.
 
     Examples
     --------
@@ -170,9 +172,9 @@ def round_times(begin: float, end: float) -> Array:
     """
     if not end > begin:
         return np.array([begin])
-    tens = 10.0 ** np.floor(np.log10((end - begin) / MOST_STEPS))
+    tens = 10.0 ** np.floor(np.log10((end - begin) / most))
     steps = tens * np.array([1.0, 2.0, 5.0, 10.0])
-    step = steps[(end - begin) / steps <= MOST_STEPS][0]
+    step = steps[(end - begin) / steps <= most][0]
     inner = step * np.arange(np.floor(begin / step) + 1.0, np.ceil(end / step))
     apart = inner[(inner - begin > 0.3 * step) & (end - inner > 0.3 * step)]
     return np.array([begin, *apart.tolist(), end])
