@@ -68,3 +68,11 @@ def _sweep(folder: Path) -> None:
 def write_text_atomically(path: Path, text: str) -> None:
     """Replace the file `path` by `text` in UTF-8 in one step; see `write_bytes_atomically`."""
     write_bytes_atomically(path, text.encode("utf-8"))
+
+
+def relative(path: Path, folder: Path) -> str:
+    """The path as seen from a folder, with the slashes of every system."""
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:  # on another drive
+        return path.absolute().as_posix()

@@ -195,8 +195,9 @@ def plan(
     from maneuver_automaton.cli import plan_command
     from maneuver_automaton.cli.inputs import Parts
     from maneuver_automaton.cli.looks import LookOptions
+    from maneuver_automaton.cli.plan_settings import Settings
 
-    settings = plan_command.Settings(
+    settings = Settings(
         time_limit=time_limit,
         alternatives=alternatives,
         plot=plot,
@@ -261,11 +262,12 @@ def mpc(
 
     A folder that was interrupted goes on where it was when the same command is called again.
     """
-    from maneuver_automaton.cli import mpc_command, plan_command
+    from maneuver_automaton.cli import mpc_command
     from maneuver_automaton.cli.inputs import Parts
     from maneuver_automaton.cli.looks import LookOptions
+    from maneuver_automaton.cli.plan_settings import Settings
 
-    plan_command.Settings(time_limit=time_limit, gap=gap)  # checked alike
+    Settings(time_limit=time_limit, gap=gap)  # checked alike
     if alternatives:
         raise InvalidScenario(
             f"--alternatives: got {alternatives}, but a closed loop keeps one plan a step; "
@@ -295,7 +297,11 @@ def mpc(
 @app.command(epilog=ending("check"))
 @exits
 def check(file: File, with_file: With = None, case: Case = None, model: OwnModel = None) -> int:
-    """Report symmetry, consistency and feasibility, without a plan."""
+    """Report symmetry, consistency and feasibility, without a plan.
+
+    FILE may be a plan.json: its plans are proven again, in the world of the file that they were
+    planned from, which is that of --with or, of several vehicles, the one that they name.
+    """
     from maneuver_automaton.cli import check_command
     from maneuver_automaton.cli.inputs import Parts
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from maneuver_automaton.automaton.validation import validate
 from maneuver_automaton.cli.automaton_command import few, report_lines
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN
-from maneuver_automaton.cli.inputs import Parts, scenario_of
+from maneuver_automaton.cli.inputs import Parts, problem_of
 from maneuver_automaton.cli.progress import waiting
 from maneuver_automaton.cli.tables import console, table
 from maneuver_automaton.collision import Shape
@@ -45,15 +45,29 @@ class Finding:
 
 
 def check_file(path: Path, *, parts: Parts) -> int:
-    """Print the report of a problem, and return the exit code."""
-    scenario = scenario_of(path, parts)
+    """Print the report of a problem, of a fleet, or of plans, and return the exit code."""
+    from maneuver_automaton.cli import check_fleet, check_plans
+    from maneuver_automaton.scenario import Scenario
+
+    if (proven := check_plans.findings(path, parts)) is not None:
+        return reported(*proven)
+    scenario = problem_of(path, parts)
+    if not isinstance(scenario, Scenario):
+        return reported(scenario.name, check_fleet.findings(scenario))
     problem = scenario.problem
-    findings = [
-        *_symmetry(problem),
-        *_automaton(problem.automaton),
-        _lemma(problem),
-        *_feasibility(problem, scenario.time_limit_s),
-    ]
+    return reported(
+        scenario.name,
+        [
+            *of_vehicle(problem),
+            *of_ends(problem),
+            _feasibility(problem, scenario.time_limit_s),
+        ],
+    )
+
+
+def reported(name: str, findings: Iterable[Finding]) -> int:
+    """Print findings, and return the exit code."""
+    findings = list(findings)
     signs = {True: "yes", False: "NO", None: "note"}
     rows = [
         [
@@ -64,8 +78,15 @@ def check_file(path: Path, *, parts: Parts) -> int:
         ]
         for finding in findings
     ]
-    console().print(table(scenario.name, ["check", "holds", "worst", "where, why"], rows))
+    console().print(table(name, ["check", "holds", "worst", "where, why"], rows))
     return NO_PLAN if any(finding.holds is False for finding in findings) else FOUND
+
+
+def of_vehicle(problem: Problem) -> Iterator[Finding]:
+    """What holds of a vehicle, its library and its cost."""
+    yield from _symmetry(problem)
+    yield from _automaton(problem.automaton)
+    yield _lemma(problem)
 
 
 def _symmetry(problem: Problem) -> Iterator[Finding]:
@@ -203,7 +224,8 @@ def _lemma(problem: Problem) -> Finding:
     )
 
 
-def _feasibility(problem: Problem, time_limit: float) -> Iterator[Finding]:
+def of_ends(problem: Problem) -> Iterator[Finding]:
+    """Whether start and goals are where a vehicle can be."""
     ends = [("start", problem.start), *(("goal", goal.pose) for goal in problem.goals)]
     bounds = problem.bounds
     bounded = any(pair is not None for pair in (bounds.x, bounds.y, bounds.z))
@@ -220,10 +242,13 @@ def _feasibility(problem: Problem, time_limit: float) -> Iterator[Finding]:
         yield Finding(what="body: seen from the pose", holds=None, words=_reach(problem.footprint))
     if problem.obstacles:
         yield from _ends_free(problem)
+
+
+def _feasibility(problem: Problem, time_limit: float) -> Finding:
     with announced(), waiting(f"planning, at most {time_limit:g} s", quiet=False):
         result = planning.plan(problem, time_limit=time_limit)
     found = result.status is PlanStatus.FOUND
-    yield Finding(
+    return Finding(
         what="goal: can be reached",
         holds=None if result.status in UNDECIDED else found,
         words=_reached(result),

@@ -18,6 +18,7 @@ from maneuver_automaton.cli.inputs import (
     automaton_of,
     make_folder,
     not_written,
+    problem_of,
     scenario_of,
 )
 from maneuver_automaton.cli.looks import LookOptions
@@ -37,7 +38,7 @@ from maneuver_automaton.formats.movingai import save_movingai_map
 from maneuver_automaton.formats.nav2_map import save_nav2_map
 from maneuver_automaton.formats.recognition import YAML_ENDINGS
 from maneuver_automaton.formats.statement import MapFile
-from maneuver_automaton.scenario import Scenario, statements_of, to_yaml
+from maneuver_automaton.scenario import FleetScenario, Scenario, statements_of, to_yaml
 
 if TYPE_CHECKING:
     from maneuver_automaton.planning import PlanResult
@@ -74,7 +75,7 @@ def convert(source: Path, target: Path, *, parts: Parts) -> int:
             make_folder(target.parent)
             save_nav2_map(plain, target)
         else:
-            _write_scenario(scenario_of(source, parts), source, target)
+            _write_scenario(problem_of(source, parts), source, target)
     except OSError as error:
         raise not_written(Path(error.filename or target), error) from error
     return FOUND
@@ -114,9 +115,7 @@ def _only_map(source: Path, parts: Parts) -> OccupancyMap:
     """The one map of a file, which may be among other obstacles."""
     statements = statements_of(source)
     obstacles = (
-        scenario_of(source, parts).problem.obstacles
-        if statements is None
-        else statements[0].obstacles
+        _obstacles(problem_of(source, parts)) if statements is None else statements[0].obstacles
     )
     cells = _one_map(obstacles)
     if cells is None:
@@ -124,18 +123,24 @@ def _only_map(source: Path, parts: Parts) -> OccupancyMap:
     return cells
 
 
+def _obstacles(scenario: Scenario | FleetScenario) -> tuple[AnyObstacle, ...]:
+    """The obstacles of all vehicles, each once."""
+    all_of_them = {id(one): one for problem in scenario.problems for one in problem.obstacles}
+    return tuple(all_of_them.values())
+
+
 def _one_map(obstacles: tuple[AnyObstacle, ...]) -> OccupancyMap | None:
     maps = [obstacle for obstacle in obstacles if isinstance(obstacle, OccupancyMap)]
     return maps[0] if len(maps) == 1 else None
 
 
-def _write_scenario(scenario: Scenario, source: Path, target: Path) -> None:
+def _write_scenario(scenario: Scenario | FleetScenario, source: Path, target: Path) -> None:
     """Write a scenario; a map that no Nav2 file states is written beside it, as one."""
     known = [file.map for file in scenario.maps]
     path = target.with_name(f"{target.stem}_map.yaml")
     new = [
         MapFile(map=obstacle, path=path)
-        for obstacle in scenario.problem.obstacles
+        for obstacle in _obstacles(scenario)
         if isinstance(obstacle, OccupancyMap) and not any(obstacle is cells for cells in known)
     ]
     try:

@@ -11,7 +11,7 @@ from maneuver_automaton.errors import InvalidScenario
 
 if TYPE_CHECKING:
     from maneuver_automaton.automaton import Automaton
-    from maneuver_automaton.scenario import Scenario
+    from maneuver_automaton.scenario import FleetScenario, Scenario
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,15 +23,27 @@ class Parts:
     model: str | None = None  # MODULE:OBJECT
 
 
-def scenario_of(path: Path, parts: Parts | None = None) -> Scenario:
-    """The problem of a file, completed by `parts`; no drive on roads."""
-    from maneuver_automaton.scenario import Scenario, load_scenario
+def problem_of(path: Path, parts: Parts | None = None) -> Scenario | FleetScenario:
+    """The problem of a file, or its fleet, completed by `parts`; no drive on roads."""
+    from maneuver_automaton.scenario import RoadScenario, load_scenario
 
     parts = parts or Parts()
     own = None if parts.model is None else user_model(parts.model)
     found = load_scenario(path, beside=parts.beside, case=parts.case, model=own)
-    if not isinstance(found, Scenario):
+    if isinstance(found, RoadScenario):
         raise InvalidScenario(f"{path}: is a drive on roads, which only plan and mpc know")
+    return found
+
+
+def scenario_of(path: Path, parts: Parts | None = None) -> Scenario:
+    """The problem of a file of one vehicle, completed by `parts`."""
+    from maneuver_automaton.scenario import Scenario
+
+    found = problem_of(path, parts)
+    if not isinstance(found, Scenario):
+        raise InvalidScenario(
+            f"{path}: states several vehicles, which only plan, check and convert know"
+        )
     return found
 
 

@@ -4,54 +4,23 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import math
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from maneuver_automaton._interrupts import stopped
-from maneuver_automaton.budget import Watch
 from maneuver_automaton.cli import road_command
+from maneuver_automaton.cli.answers import Answer, PlanTask, Task
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.folder_runs import Row, check_address, run_folder
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
-from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, scenario_of
-from maneuver_automaton.cli.looks import LookOptions
+from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, problem_of
 from maneuver_automaton.cli.pictures import Draughtsman, draughtsman, skip_documentation
-from maneuver_automaton.cli.progress import has_terminal, waiting
-from maneuver_automaton.errors import InvalidScenario
-
-if TYPE_CHECKING:
-    from maneuver_automaton.planning import PlanResult
-    from maneuver_automaton.scenario import Scenario
+from maneuver_automaton.cli.plan_settings import Settings
+from maneuver_automaton.cli.progress import waiting
 
 PICTURES = (
     "plan.png", "plan_3d.png", "alternatives.png", "plan.gif", "plan.html", "progress.png",
 )  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Settings:
-    """Options of `plan`, the same for every file of a folder."""
-
-    time_limit: float | None = None  # [s], None: that of the scenario
-    alternatives: int = 0
-    plot: bool = True
-    animate: bool = False
-    html: bool = False
-    quiet: bool = False
-    gap: float | None = None  # share of the cost, None: nothing is proven beside the search
-    look: LookOptions = field(default_factory=LookOptions)
-
-    def __post_init__(self) -> None:
-        if self.time_limit is not None and not 0.0 < self.time_limit < math.inf:
-            raise InvalidScenario(
-                f"--time-limit: got {self.time_limit}, need a positive number of seconds"
-            )
-        if self.gap is not None and not 0.0 <= self.gap < 1.0:
-            raise InvalidScenario(
-                f"--gap: got {self.gap}, need a share of the cost from 0 to below 1, such as 0.05"
-            )
 
 
 def plan_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> int:
@@ -70,35 +39,41 @@ def plan_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> int
 def _plan_alone(
     path: Path, out: Path, settings: Settings, parts: Parts, beside: Draughtsman | None
 ) -> int:
-    scenario = scenario_of(path, parts)
-    limit = settings.time_limit or scenario.time_limit_s
-    said = f"planning, at most {limit:g} s"
-    shown = None if settings.quiet or not has_terminal() else SoFar.of_gap(settings.gap)
-    with waiting(said, quiet=settings.quiet, more=lambda: shown.text if shown else ""):
-        result = _plan(scenario, out, settings, shown)
-    pictures = (result, scenario.name, out, settings)
-    drawn = beside is not None and not stopped() and beside.begin(_draw, *pictures)
+    task = _task(path, parts, settings)
+    said = f"planning, at most {task.limit_s:g} s"
+    with waiting(said, quiet=settings.quiet, more=task.so_far):
+        answer = _answered(task, out, settings)
+    drawn = beside is not None and not stopped() and beside.begin(answer.draw, out, settings)
     if not drawn:
-        _drawn_here(*pictures)
+        _drawn_here(answer, out, settings)
     try:
-        return _told(path, scenario.name, result, out, settings)
+        return _told(path, answer, out, settings)
     finally:
         if drawn and beside is not None and not beside.is_done():
-            _drawn_here(*pictures)
+            _drawn_here(answer, out, settings)
 
 
-def _told(path: Path, name: str, result: PlanResult, out: Path, settings: Settings) -> int:
-    """Print the plan, or why there is none, and return the exit code."""
-    if result.plan is None:
-        complain(f"{path}: {result.status.value}: {result.reason}")
-        return NO_PLAN
-    if stopped():
+def _task(path: Path, parts: Parts, settings: Settings) -> Task:
+    """What there is to plan in a file."""
+    from maneuver_automaton.scenario import Scenario
+
+    found = problem_of(path, parts)
+    if isinstance(found, Scenario):
+        return PlanTask.of(found, settings)
+    from maneuver_automaton.cli.fleets import FleetTask
+
+    return FleetTask(scenario=found, settings=settings, path=path, parts=parts)
+
+
+def _told(path: Path, answer: Answer, out: Path, settings: Settings) -> int:
+    """Print what was planned, or why there is no plan, and return the exit code."""
+    if answer.why_not:
+        complain(f"{path}: {answer.why_not}")
+    elif stopped():
         complain(f"{path}: interrupted: the best plan so far is in {out / 'plan.json'}")
     if not settings.quiet:
-        from maneuver_automaton.cli.tables import print_result
-
-        print_result(name, result, folder=str(out))
-    return FOUND
+        answer.tell(str(out))
+    return NO_PLAN if answer.why_not else FOUND
 
 
 def plan_folder(
@@ -128,107 +103,34 @@ def plan_folder(
     )
 
 
-@dataclass(slots=True, kw_only=True)
-class SoFar:
-    """The best plan while it is being improved, for a line on the terminal."""
-
-    watch: Watch
-    best: PlanResult | None = None
-
-    @classmethod
-    def of_gap(cls, gap: float | None) -> SoFar:
-        """Nothing yet of a search that ends with a `gap`, if one is stated."""
-        return cls(watch=Watch(gap=-math.inf if gap is None else gap))
-
-    def better(self, result: PlanResult) -> None:
-        """Take a plan that is better than the one before, and passed all checks."""
-        self.best = result
-
-    @property
-    def text(self) -> str:
-        """Cost, bound, gap and clearance."""
-        best = self.best
-        if best is None or best.cost is None:
-            return ""
-        bound = max(self.watch.bound, best.lower_bound or 0.0)
-        share = max(0.0, 1.0 - bound / best.cost) if best.cost > 0.0 else 0.0
-        parts = [f"cost {best.cost:.6g}, at least {bound:.6g}, gap {100.0 * share:.2g} %"]
-        if best.clearance_m is not None:
-            parts.append(f"clearance {best.clearance_m:.3g} m")
-        return ", ".join(parts)
-
-
-def _plan(
-    scenario: Scenario, out: Path, settings: Settings, shown: SoFar | None = None
-) -> PlanResult:
+def _answered(task: Task, out: Path, settings: Settings) -> Answer:
     """Plan and write plan.json."""
-    from maneuver_automaton import planning
-
     make_folder(out)
     try:
         with announced(quiet=settings.quiet):
-            result = planning.plan(
-                scenario.problem,
-                time_limit=settings.time_limit or scenario.time_limit_s,
-                alternatives=settings.alternatives,
-                gap=settings.gap,
-                watch=shown.watch if shown else None,
-                on_better=shown.better if shown else None,
-            )
+            answer = task.answer()
     except KeyboardInterrupt:
         if not stopped():
             raise  # in somebody else's program
-        result = planning.PlanResult(
-            problem=scenario.problem,
-            status=planning.PlanStatus.OUT_OF_BUDGET,
-            reason="interrupted before there was a plan",
-        )
-    if stopped() and result.plan is None:
-        result = replace(result, reason="interrupted before there was a plan")
-    result = replace(result, timing_s={**scenario.timing_s, **result.timing_s})
+        answer = task.given_up()
     try:
-        _write(result, scenario.name, out)
+        answer.save(out / "plan.json")
+        for picture in PICTURES:
+            (out / picture).unlink(missing_ok=True)  # of an earlier plan
     except OSError as error:
         raise not_written(Path(error.filename or out), error) from error
-    return result
+    return answer
 
 
-def _write(result: PlanResult, name: str, out: Path) -> None:
-    from maneuver_automaton.formats.plan_json import save_plan
-
-    save_plan(result, out / "plan.json", name=name, interrupted=stopped())
-    for picture in PICTURES:
-        (out / picture).unlink(missing_ok=True)  # of an earlier plan
-
-
-def _drawn_here(result: PlanResult, name: str, out: Path, settings: Settings) -> None:
+def _drawn_here(answer: Answer, out: Path, settings: Settings) -> None:
     """Draw in this process."""
     if stopped() or not (settings.plot or settings.animate or settings.html):
         return
     skip_documentation()
     try:
-        _draw(result, name, out, settings)
+        answer.draw(out, settings)
     except OSError as error:
         raise not_written(Path(error.filename or out), error) from error
-
-
-def _draw(result: PlanResult, name: str, out: Path, settings: Settings) -> None:
-    """Write the pictures of a plan."""
-    from maneuver_automaton import plotting
-
-    if settings.plot:
-        look = settings.look.look(name)
-        plotting.save_plan_figure(result, out / "plan.png", nodes=result.nodes, look=look)
-        if plotting.flies_among_heights(result.problem):
-            plotting.save_space_figure(result, out / "plan_3d.png", title=look.title)
-        if settings.gap is not None and result.plan is not None:
-            plotting.save_progress_figure(result, out / "progress.png", title=look.title)
-        if result.alternatives:
-            plotting.save_alternatives_figure(result, out / "alternatives.png", title=look.title)
-    if settings.animate and result.plan is not None:
-        plotting.save_plan_animation(result.plan, out / "plan.gif", problem=result.problem)
-    if settings.html:
-        result.player(title=settings.look.title or name).save(out / "plan.html")
 
 
 def _row(problem: tuple[Path, Parts], *, out: Path, settings: Settings, folder: Path) -> Row:
@@ -245,23 +147,11 @@ def _row(problem: tuple[Path, Parts], *, out: Path, settings: Settings, folder: 
         with contextlib.chdir(folder):
             if road_command.is_road(path):
                 return _road_row(path, parts, out, settings)
-            scenario = scenario_of(path, parts)
-            result = _plan(scenario, out, settings)
-            _drawn_here(result, scenario.name, out, settings)
+            answer = _answered(_task(path, parts, settings), out, settings)
+            _drawn_here(answer, out, settings)
     except Exception as error:  # noqa: BLE001, one bad file must not stop the others
         return Row(name=path.name, code=BAD_INPUT, status="bad input", reason=explained(error))
-    found = result.plan is not None
-    status = result.status.value
-    return Row(
-        name=path.name,
-        code=FOUND if found else NO_PLAN,
-        status=status,
-        reason="" if found else f"{path}: {status}: {result.reason}",
-        cost=result.cost,
-        duration=None if result.plan is None else result.plan.duration,
-        clearance=result.clearance_m,
-        first_plan=result.timing_s.get("first_plan"),
-    )
+    return answer.row(path)
 
 
 def _road_row(path: Path, parts: Parts, out: Path, settings: Settings) -> Row:

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from rich.text import Text
 
     from maneuver_automaton.automaton import Plan
-    from maneuver_automaton.cli import mpc_command, plan_command
+    from maneuver_automaton.cli import mpc_command
+    from maneuver_automaton.cli.plan_settings import Settings as PlanSettings
     from maneuver_automaton.roads import RoadDrive, RoadPlanResult, RoadScene, RoadVehicle
 
 TIME_LIMIT = 10.0  # [s] of one plan
@@ -32,9 +33,7 @@ def is_road(path: Path) -> bool:
     return path.suffix.lower() == ENDING
 
 
-def plan_file(
-    path: Path, out: Path, *, settings: plan_command.Settings, parts: Parts
-) -> RoadPlanResult:
+def plan_file(path: Path, out: Path, *, settings: PlanSettings, parts: Parts) -> RoadPlanResult:
     """Plan one drive into the folder `out`, and print the plan; the result."""
     from maneuver_automaton.formats.plan_json import write_document
     from maneuver_automaton.formats.road_json import road_plan_to_dict
@@ -146,7 +145,7 @@ def _draw(
     vehicle: RoadVehicle,
     plan: Plan,
     file: Path,
-    settings: plan_command.Settings | mpc_command.Settings,
+    settings: PlanSettings | mpc_command.Settings,
 ) -> None:
     """Write the pictures that were asked for, `file` with their endings."""
     if stopped() or not (settings.plot or settings.animate):

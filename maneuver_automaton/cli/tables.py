@@ -71,8 +71,8 @@ def print_result(name: str, result: PlanResult, *, folder: str) -> None:
         "turning points": f"{_direction_changes(result.problem, plan)} between forward and reverse",
         "clearance": _clearance(result),
         "terminal error": f"{error.position_m:.2g} m, {error.heading_rad:.2g} rad",
-        "timing": ", ".join(f"{_spoken(k)} {v:.3f} s" for k, v in result.timing_s.items()),
-        "counts": ", ".join(f"{_spoken(k)} {n}" for k, n in result.counts.items()),
+        "timing": ", ".join(f"{spoken(k)} {v:.3f} s" for k, v in result.timing_s.items()),
+        "counts": ", ".join(f"{spoken(k)} {n}" for k, n in result.counts.items()),
         "written to": folder,
     }
     for what, value in facts.items():
@@ -121,7 +121,8 @@ def _direction_changes(problem: Problem, plan: Plan) -> int:
     return round(replace(problem, cost=Cost(direction_change=1.0)).cost_of(plan))
 
 
-def _spoken(name: str) -> str:
+def spoken(name: str) -> str:
+    """A key of plan.json as people say it."""
     return name.replace("_", " ").replace("fcl", "FCL")
 
 

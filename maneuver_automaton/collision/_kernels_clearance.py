@@ -15,10 +15,13 @@ from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 if TYPE_CHECKING:
     from maneuver_automaton.collision.body import Body
     from maneuver_automaton.collision.convex import Solids
+    from maneuver_automaton.collision.swept_areas import SweptAreas
     from maneuver_automaton.collision.world import Buckets, Field, WorldArrays
 
 NEAR = 0.1  # share of a body's reach below which solids are looked at one by one
 SHARP = 0.3  # share of that below which clearances to sharp corners are made exact
+NEGLIGIBLE = 1e-7  # [m] no rounding is as large
+ROUGH = 1e-6  # share of a radius by which a corner has to be higher to be passed over
 
 
 @inlined_kernel
@@ -43,7 +46,7 @@ def point_to_segment(x: float, y: float, ax: float, ay: float, bx: float, by: fl
 
 @inlined_kernel
 def separation(
-    body: Body,
+    body: Body | SweptAreas,
     b: int,
     x: float,
     y: float,
@@ -97,16 +100,38 @@ def separation(
 
 @bare_inner_kernel
 def core_distance(
-    body: Body, b: int, x: float, y: float, c: float, s: float, solids: Solids, p: int
+    body: Body,
+    b: int,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    solids: Solids,
+    p: int,
+    n_x: float,
+    n_y: float,
 ) -> tuple[float, float, float]:
-    """Distance of two convex cores that do not overlap, and its direction towards the body."""
+    """Distance of two convex cores that do not overlap, and its direction towards the body.
+
+    The direction (n_x, n_y), towards the body, parts the two, or is none, (0, 0).
+    """
     b_0, b_1 = body.first[b], body.first[b + 1]
     p_0, p_1 = solids.first[p], solids.first[p + 1]
     best, axis_x, axis_y = math.inf, 0.0, 0.0
     # Two convex polygons that do not overlap are nearest at a corner of one of them: all corners of
     # the body against all edges of the solid, then the other way round. A single corner is an edge
-    # of length zero, so discs need no case of their own.
+    # of length zero, so discs need no case of their own. Along the direction that parts them a
+    # corner may be farther from all of the other one than the nearest so far: it is passed over.
+    top, low = -math.inf, math.inf  # of the solid, and of the body over the pose
+    m_x, m_y = c * n_x + s * n_y, c * n_y - s * n_x
+    for j in range(p_0, p_1):
+        top = max(top, n_x * (solids.edges[j, 0] - x) + n_y * (solids.edges[j, 1] - y))
     for j in range(b_0, b_1):
+        height = m_x * body.edges[j, 0] + m_y * body.edges[j, 1]
+        low = min(low, height)
+        away = max(height - top - NEGLIGIBLE, 0.0)
+        if away * away > best:
+            continue
         at_x = x + c * body.edges[j, 0] - s * body.edges[j, 1]
         at_y = y + s * body.edges[j, 0] + c * body.edges[j, 1]
         before = p_1 - 1
@@ -124,6 +149,9 @@ def core_distance(
             before = k
     for j in range(p_0, p_1):
         d_x, d_y = solids.edges[j, 0] - x, solids.edges[j, 1] - y
+        away = max(low - n_x * d_x - n_y * d_y - NEGLIGIBLE, 0.0)
+        if away * away > best:
+            continue
         at_x, at_y = c * d_x + s * d_y, c * d_y - s * d_x
         before = b_1 - 1
         for k in range(b_0, b_1):
@@ -179,7 +207,7 @@ def piece_clearance(
     # case, and needed: no normal parts the line from a point beyond its end.
     apart = not -math.inf < distance <= 0.0 or corners <= 3  # two points, or a point and a line
     if apart and distance - rounding <= min(exact, enough):
-        distance, axis_x, axis_y = core_distance(body, b, x, y, c, s, solids, p)
+        distance, axis_x, axis_y = core_distance(body, b, x, y, c, s, solids, p, axis_x, axis_y)
     return distance - rounding, axis_x, axis_y
 
 
@@ -270,6 +298,24 @@ def corner_time(a: float, b: float, ahead: float, turn: float, limit: float) -> 
 
 
 @inlined_kernel
+def stays_above(a: float, b: float, ahead: float, turn: float, limit: float, most: float) -> bool:
+    """Whether a corner on a circle, as in `corner_time`, surely does not meet `limit` by `most`.
+
+    Its height after an angle is ``ahead + a cos(angle) - b sin(angle)``, the angle with the sign of
+    the turn. The parabola that has its height, its slope and its second derivative now is off by no
+    more than ``radius angle^3 / 6``.
+    Source: Taylor's theorem, Lagrange's form of the remainder.
+    """
+    angle = turn * most
+    size = abs(a) + abs(b)  # not below the radius
+    # Where the parabola is convex its chord may lie above it, and its tangent does not.
+    falls = -b * angle - 0.5 * max(a, 0.0) * angle * angle
+    rest = size * abs(angle) * angle * angle / 6.0
+    # Cosines are inverted in `corner_time`, which costs half of the digits.
+    return ahead + a + min(falls, 0.0) - rest > limit + ROUGH * size
+
+
+@inlined_kernel
 def axis_time(
     body: Body,
     b: int,
@@ -285,10 +331,13 @@ def axis_time(
     axis_x: float,
     axis_y: float,
     drop: float,
+    lasts: float,
+    most: float,
 ) -> float:
     """How long a piece of the body stays apart along a fixed axis: until it is nearer by `drop`.
 
-    The body turns about the centre, or moves with the world velocity (v_x, v_y).
+    The body turns about the centre, or moves with the world velocity (v_x, v_y). Need not be exact
+    where it is `lasts` at most, which is known to hold, nor where it is `most` at least.
     """
     lowest = math.inf
     b_0, b_1 = body.first[b], body.first[b + 1]
@@ -310,8 +359,13 @@ def axis_time(
             w_x, w_y = u_x - (center_x - x), u_y - (center_y - y)
             height = axis_x * (center_x - x) + axis_y * (center_y - y)
             a, b_side = axis_x * w_x + axis_y * w_y, axis_x * w_y - axis_y * w_x
+            # Most corners are too high to come down in time: a look at how fast each falls says so.
+            if stays_above(a, b_side, height, turn, limit, most):
+                continue
             t = corner_time(a, b_side, height, turn, limit)
         time = min(time, t)
+        if time <= lasts:
+            break
     return time
 
 
@@ -396,6 +450,8 @@ def near_step(
                     axis_x,
                     axis_y,
                     clearance - margin,
+                    lasts,
+                    step,
                 )
                 lasts = max(lasts, along)
             step = min(step, lasts)

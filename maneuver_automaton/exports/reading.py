@@ -16,7 +16,7 @@ from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.exports.driven import Driven, driven_of, driven_on_road
 from maneuver_automaton.formats.driven_json import load_closed_loop, read_closed_loop_document
 from maneuver_automaton.formats.plan_json import load_plan, read_plan_document
-from maneuver_automaton.scenario import RoadScenario, Scenario, load_scenario
+from maneuver_automaton.scenario import FleetScenario, RoadScenario, Scenario, load_scenario
 
 if TYPE_CHECKING:
     from maneuver_automaton.models import Model
@@ -61,6 +61,8 @@ def load_driven(
         )
     if isinstance(problem, RoadScenario):
         return _on_road(path, problem, loop)
+    if isinstance(problem, FleetScenario):
+        raise InvalidScenario(f"{beside}: states several vehicles, need the scenario of one")
     if loop is not None:
         assert problem is not None
         return replace(driven_of(load_closed_loop(path, problem.problem)), name=problem.name)

@@ -5,3 +5,5 @@ from maneuver_automaton.fleet.problem import FleetProblem as FleetProblem
 from maneuver_automaton.fleet.result import Closest as Closest
 from maneuver_automaton.fleet.result import FleetResult as FleetResult
 from maneuver_automaton.fleet.result import FleetStatus as FleetStatus
+from maneuver_automaton.fleet.verify import FleetVerdict as FleetVerdict
+from maneuver_automaton.fleet.verify import verify_fleet as verify_fleet

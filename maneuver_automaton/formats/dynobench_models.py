@@ -1,7 +1,8 @@
 """Vehicles of dynobench: unicycles of first and second order, a car with one trailer.
 
-A vehicle has limits, a body that is a box centred on the pose, and, with a trailer, a second one.
-dynobench steps such a model with a fixed `dt`; here time is continuous and motion exact.
+A vehicle has limits, a body that is a box or a disc centred on the pose, and, with a trailer, a
+second one. dynobench steps such a model with a fixed `dt`; here time is continuous and motion
+exact. db-CBS drives the same vehicles, and one that is a disc, under names of its own.
 """
 
 from __future__ import annotations
@@ -16,10 +17,11 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, wrapped
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.collision import Box
+from maneuver_automaton.collision import Box, Disc
 from maneuver_automaton.formats.statement import StatedVehicle
-from maneuver_automaton.formats.text_source import FARTHEST, read_text
+from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import Document, Where, parse, shown
+from maneuver_automaton.formats.yaml_values import number_at, numbers_at, sizes_at, value_at
 from maneuver_automaton.models import CarWithTrailer, SecondOrderUnicycle, Unicycle
 from maneuver_automaton.primitives.hitching import connect_hitches, hitch_trims
 
@@ -55,7 +57,22 @@ BUILT_IN: Mapping[str, Mapping[str, Any]] = {
         "size_trailer": [0.3, 0.25],
     },
 }
-READ = f"a unicycle or a car with one trailer such as {', '.join(BUILT_IN)}"
+_DB_CBS: Mapping[str, Mapping[str, Any]] = {  # the names of its robots, by src/robots.cpp
+    "unicycle_first_order_0": BUILT_IN["unicycle1_v0"],
+    "unicycle_first_order_0_sphere": {
+        "dynamics": "unicycle1",
+        "max_vel": 0.5,
+        "min_vel": -0.5,
+        "max_angular_vel": 2.0,
+        "min_angular_vel": -2.0,
+        "shape": "sphere",
+        "radius": 0.4,
+    },
+    "unicycle_second_order_0": BUILT_IN["unicycle2_v0"],
+    "car_first_order_with_1_trailers_0": BUILT_IN["car1_v0"],
+}
+_KNOWN: Mapping[str, Mapping[str, Any]] = {**BUILT_IN, **_DB_CBS}
+READ = f"a unicycle or a car with one trailer such as {', '.join(_KNOWN)}"
 MAX_HITCH = math.pi / 4.0  # [rad] of dynobench's car; its files do not state it
 HITCHES = 7  # angles of the hitch, to both sides, that have trims
 NEXT_TO = 1e-9  # [m/s, rad/s, rad] between a level and a state that is stated
@@ -91,21 +108,21 @@ class StatedModel:
         return _MAKERS[self.dynamics](self.name, self.document, states)
 
 
-def dynobench_model(path: Path, document: Document) -> StatedModel:
-    """The model that a problem names.
+def dynobench_model(path: Path, document: Document, *, robot: int = 0) -> StatedModel:
+    """The model of a robot of a problem, by its number.
 
     Raises
     ------
     InvalidScenario
         If it is none that is read.
     """
-    where: Where = ("robots", 0, "type")
+    where: Where = ("robots", robot, "type")
     name = value_at(document, where, str, "the name of a model")
     file = _model_file(path, name)
     if file is not None:
         model = parse(read_text(file, what="a model"), name=str(file), what="a model")
-    elif name in BUILT_IN:
-        model = Document(name=f"the built-in model {name}", value=BUILT_IN[name], lines={})
+    elif name in _KNOWN:
+        model = Document(name=f"the built-in model {name}", value=_KNOWN[name], lines={})
     else:
         raise document.error(
             where,
@@ -146,7 +163,7 @@ def _first_order(name: str, model: Document, states: Sequence[Array]) -> StatedV
         name=name,
         automaton=Automaton.of_grid(body, axes),
         limits=np.array([speeds, turns]),
-        footprint=(_box(model, "size", "shape"),),
+        footprint=(_body(model, "size", "shape"),),
     )
 
 
@@ -172,7 +189,7 @@ def _second_order(name: str, model: Document, states: Sequence[Array]) -> Stated
         name=name,
         automaton=Automaton.of_model(body, {"speed": speeds, "turn_rate": turns}, pairs="all"),
         limits=body.control_limits,
-        footprint=(_box(model, "size", "shape"),),
+        footprint=(_body(model, "size", "shape"),),
     )
 
 
@@ -199,8 +216,8 @@ def _with_trailer(name: str, model: Document, states: Sequence[Array]) -> Stated
         name=name,
         automaton=Automaton(car, trims, connect_hitches(car, trims)),
         limits=car.control_limits,
-        footprint=(_box(model, "size", "shape"),),
-        parts={"trailer": (_box(model, "size_trailer", "shape_trailer"),)},
+        footprint=(_body(model, "size", "shape"),),
+        parts={"trailer": (_body(model, "size_trailer", "shape_trailer"),)},
     )
 
 
@@ -250,47 +267,10 @@ def _steering(model: Document) -> float:
     return value
 
 
-def _box(model: Document, size: str, shape: str) -> Box:
-    kind = value_at(model, (shape,), str, "box")
+def _body(model: Document, size: str, shape: str) -> Box | Disc:
+    kind = value_at(model, (shape,), str, "box or sphere")
+    if kind == "sphere":
+        return Disc(_positive(model, "radius"))
     if kind != "box":
-        raise model.error((shape,), f"got {shown(kind)}, need box")
+        raise model.error((shape,), f"got {shown(kind)}, need box or sphere")
     return Box(sizes_at(model, (size,)))
-
-
-def value_at(document: Document, where: Where, kind: Any, need: str) -> Any:
-    """The value at a place, of a kind; raises InvalidScenario."""
-    value = document.value
-    for step in where:
-        held = range(len(value)) if isinstance(value, list) else value
-        if not isinstance(held, range | dict) or step not in held:
-            raise document.error(where, f"is missing, need {need}")
-        value = value[step]
-    if not isinstance(value, kind) or isinstance(value, bool):
-        raise document.error(where, f"got {shown(value)}, need {need}")
-    return value
-
-
-def number_at(document: Document, where: Where) -> float:
-    """The number at a place; raises InvalidScenario."""
-    value = value_at(document, where, int | float, "a finite number")
-    if not abs(value) <= FARTHEST:
-        raise document.error(
-            where, f"got {shown(value)}, need a finite number of at most {FARTHEST:g} in size"
-        )
-    return float(value)
-
-
-def numbers_at(document: Document, where: Where, n: int, need: str) -> tuple[float, ...]:
-    """The list of n numbers at a place; raises InvalidScenario."""
-    values = value_at(document, where, list, need)
-    if len(values) != n:
-        raise document.error(where, f"got {len(values)} numbers, need {n}: {need}")
-    return tuple(number_at(document, (*where, k)) for k in range(n))
-
-
-def sizes_at(document: Document, where: Where) -> tuple[float, ...]:
-    """Length and width at a place; raises InvalidScenario."""
-    sizes = numbers_at(document, where, 2, "[length, width]")
-    if not all(size > 0.0 for size in sizes):
-        raise document.error(where, f"got {shown(list(sizes))}, need positive sizes")
-    return sizes

@@ -36,7 +36,15 @@ FAR = 1e6  # [m] from here on poses are written relative to the start
 TIMINGS = ("load", "automaton", "search", "first_plan", "refine", "audit")
 COUNTS = ("expansions", "collision_queries")
 TRAJECTORY = ("origin", "time_s", "pose", "reduced_state", "control")
-LISTS = ("primitives", "stop", "alternatives", "steps", "broken_guarantees")  # of objects
+LISTS = (
+    "primitives",
+    "stop",
+    "alternatives",
+    "steps",
+    "broken_guarantees",
+    "closest",
+)  # of objects
+FLEET = "fleet"  # the kind of a file with plans of several vehicles
 TIME_TOLERANCE = 1e-9  # [s], relative to the duration, between a switch and its sample
 
 
@@ -139,8 +147,7 @@ def write_document(
         If the file cannot be written.
     """
     said = {**document, "interrupted": True} if interrupted else document
-    lines = [f"  {json.dumps(key)}: {_json(key, value)}" for key, value in said.items()]
-    write_text_atomically(Path(path), "{\n" + ",\n".join(lines) + "\n}\n")
+    write_text_atomically(Path(path), _object(said, "") + "\n")
 
 
 def read_plan_document(path: Path | str) -> dict[str, Any]:
@@ -151,8 +158,34 @@ def read_plan_document(path: Path | str) -> dict[str, Any]:
     InvalidScenario
         If the file cannot be read, or is no plan.json.
     """
-    needed = ("schema", "status", "primitives", "trajectory")
-    return read_json(path, needed=needed, kind="plan")
+    document = _parsed(Path(path), "plan")
+    if _is_of_fleet(document):
+        names = ", ".join(map(str, document.get("vehicles") or ())) or "none"
+        raise InvalidScenario(
+            f"{path}: holds plans of several vehicles ({names}), need that of one; see load_plans"
+        )
+    return _checked(document, path, ("schema", "status", "primitives", "trajectory"), "plan")
+
+
+def read_fleet_document(path: Path | str) -> dict[str, Any] | None:
+    """The content of a plan.json of several vehicles, as plain values; None of any other.
+
+    Raises
+    ------
+    InvalidScenario
+        If the file cannot be read, or misses what plans of several vehicles have.
+    """
+    document = _parsed(Path(path), "plan")
+    if not _is_of_fleet(document):
+        return None
+    found = _checked(document, path, ("schema", "status", "vehicles"), "plan")
+    if not isinstance(found["vehicles"], dict):
+        raise InvalidScenario(f"{path}: vehicles: need an object with a plan for each name")
+    return found
+
+
+def _is_of_fleet(document: Any) -> bool:
+    return isinstance(document, dict) and document.get("kind") == FLEET
 
 
 def read_json(path: Path | str, *, needed: Sequence[str], kind: str) -> dict[str, Any]:
@@ -163,48 +196,98 @@ def read_json(path: Path | str, *, needed: Sequence[str], kind: str) -> dict[str
     InvalidScenario
         If the file cannot be read, or is no such object; `kind` is what it should be.
     """
-    path = Path(path)
-    name = f"{kind.replace(' ', '_')}.json"
+    return _checked(_parsed(Path(path), kind), path, needed, kind)
+
+
+def _parsed(path: Path, kind: str) -> Any:
+    """The value of a strict JSON file; or InvalidScenario."""
     try:
         with open_input(path) as stream:
             text = stream.read().decode("utf-8")
-        document = json.loads(text, parse_constant=_refuse_constant)
+        return json.loads(text, parse_constant=_refuse_constant)
     except FileNotFoundError as error:
         raise InvalidScenario(f"{path}: no such file") from error
     except IsADirectoryError as error:
-        raise InvalidScenario(f"{path}: is a folder, need a {name}") from error
+        raise InvalidScenario(f"{path}: is a folder, need a {_file_name(kind)}") from error
     except OSError as error:
         raise InvalidScenario(f"{path}: cannot be read: {error.strerror}") from error
     except json.JSONDecodeError as error:
         raise InvalidScenario(f"{path}:{error.lineno}: not valid JSON: {error.msg}") from error
     except (ValueError, RecursionError) as error:
         raise InvalidScenario(f"{path}: not valid JSON: {error}") from error
+
+
+def _checked(document: Any, path: Path | str, needed: Sequence[str], kind: str) -> dict[str, Any]:
+    """The object that a file holds, of our `SCHEMA`, with the keys `needed`."""
     if not isinstance(document, dict) or any(key not in document for key in needed):
-        raise InvalidScenario(f"{path}: is no {name}, need an object with {', '.join(needed)}")
+        raise InvalidScenario(
+            f"{path}: is no {_file_name(kind)}, need an object with {', '.join(needed)}"
+        )
     if document["schema"] != SCHEMA:
         raise InvalidScenario(f"{path}: schema: got {document['schema']!r}, need {SCHEMA}")
     return document
 
 
-def load_plan(path: Path | str) -> Plan:
+def _file_name(kind: str) -> str:
+    return f"{kind.replace(' ', '_')}.json"
+
+
+def load_plan(path: Path | str, *, vehicle: str | None = None) -> Plan:
     """The plan of a plan.json; no automaton is needed.
 
     The body velocity of each trim is taken from the samples: the logarithm of the motion over a
     stretch of less than half a turn, per second.
 
+    Parameters
+    ----------
+    path : Path or str
+    vehicle : str, optional
+        Which of several vehicles, by its name, if the file holds their plans.
+
     Raises
     ------
     InvalidScenario
-        If the file cannot be read, is no plan.json, or holds no plan.
+        If the file cannot be read, is no plan.json, or holds no plan, or none of that vehicle.
     """
-    document = read_plan_document(path)
-    if document["status"] != "found":
-        raise InvalidScenario(f"{path}: holds no plan, its status is {document['status']!r}")
+    if vehicle is None:
+        return _plan_of_file(read_plan_document(path), str(path))
+    document = read_fleet_document(path)
+    vehicles = {} if document is None else document["vehicles"]
+    if vehicle not in vehicles:
+        names = ", ".join(vehicles) or "one vehicle without a name"
+        raise InvalidScenario(f"{path}: holds no vehicle {vehicle!r}, but {names}")
+    return _plan_of_file(vehicles[vehicle], f"{path}: vehicles.{vehicle}")
+
+
+def load_plans(path: Path | str) -> dict[str, Plan]:
+    """The plans of a plan.json of several vehicles, by the names of those that have one.
+
+    Raises
+    ------
+    InvalidScenario
+        If the file cannot be read, or holds no plans of several vehicles.
+    """
+    document = read_fleet_document(path)
+    if document is None:
+        raise InvalidScenario(f"{path}: holds the plan of one vehicle, need load_plan")
+    return {
+        name: _plan_of_file(one, f"{path}: vehicles.{name}")
+        for name, one in document["vehicles"].items()
+        if not isinstance(one, dict) or one.get("status") == "found"
+    }
+
+
+def _plan_of_file(document: Any, place: str) -> Plan:
+    """The plan of a document at a place of a file; or InvalidScenario."""
     try:
+        if document["status"] != "found":
+            raise InvalidScenario(f"{place}: holds no plan, its status is {document['status']!r}")
         return plan_of_document(document)
+    except InvalidScenario:
+        raise
     except (ValueError, KeyError, TypeError, IndexError) as error:
         said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
-        raise InvalidScenario(f"{path}: {said}") from error
+        raise InvalidScenario(f"{place}: {said}") from error
 
 
 @functools.cache
@@ -293,16 +376,32 @@ def _floats(values: Mapping[str, float]) -> dict[str, float]:
     return {key: float(value) for key, value in values.items()}
 
 
-def _json(key: str, value: Any) -> str:
-    """A value of the file in one line, but lists of objects one object a line."""
+def _object(document: Mapping[str, Any], left: str) -> str:
+    """An object, a key a line, `left` of which that many spaces stand."""
+    inside = left + "  "
+    rows = (
+        f"{inside}{json.dumps(key)}: {_json(key, value, inside)}" for key, value in document.items()
+    )
+    return "{\n" + ",\n".join(rows) + f"\n{left}}}"
+
+
+def _json(key: str, value: Any, left: str = "") -> str:
+    """A value of the file in one line, but lists of objects one object a line, and vehicles."""
     if key in LISTS and value:
-        rows = ",\n".join(f"    {_json('', row)}" for row in value)
-        return f"[\n{rows}\n  ]"
+        rows = ",\n".join(f"{left}  {_json('', row)}" for row in value)
+        return f"[\n{rows}\n{left}]"
     if key == "trajectory":
         rows = ",\n".join(
-            f"    {json.dumps(name)}: {_json('', row)}" for name, row in value.items()
+            f"{left}  {json.dumps(name)}: {_json('', row)}" for name, row in value.items()
         )
-        return "{\n" + rows + "\n  }"
+        return "{\n" + rows + f"\n{left}}}"
+    if key == "vehicles":
+        inside = left + "  "
+        rows = ",\n".join(
+            f"{inside}{json.dumps(name, ensure_ascii=False)}: {_object(row, inside)}"
+            for name, row in value.items()
+        )
+        return "{\n" + rows + f"\n{left}}}"
     return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 

@@ -82,13 +82,17 @@ def yaml_statements(document: Document, path: Path) -> tuple[Statement, ...] | N
     InvalidScenario
         If the file belongs to a problem and states none, or cannot be used.
     """
-    from maneuver_automaton.formats import dynobench, nav2_map
+    from maneuver_automaton.formats import cl_cbs, dynobench, nav2_map
 
     if dynobench.is_dynobench(document):
         return dynobench.read_dynobench(path, document)
+    if cl_cbs.is_cl_cbs(document):
+        return cl_cbs.read_cl_cbs(path, document)
     if nav2_map.is_nav2_map(document):
         return nav2_map.read_nav2_map(path, document)
     if dynobench.belongs_to_dynobench(document):
         what = "is a model or a solution of dynobench, need the problem (environment, robots)"
         raise document.error((), what)
+    if cl_cbs.belongs_to_cl_cbs(document):
+        raise document.error((), "is a solution of CL-CBS, need the problem (agents, map)")
     return None

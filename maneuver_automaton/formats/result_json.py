@@ -28,7 +28,17 @@ def load_result(path: Path | str, problem: Problem) -> PlanResult:
     InvalidScenario
         If the file cannot be read, or was planned with another library.
     """
-    document = read_plan_document(path)
+    return result_of_document(read_plan_document(path), problem, path=str(path))
+
+
+def result_of_document(document: Mapping[str, Any], problem: Problem, *, path: str) -> PlanResult:
+    """The result of a document that is read already; `path` is its place, for messages.
+
+    Raises
+    ------
+    InvalidScenario
+        If it was planned with another library, or is damaged.
+    """
     if document.get("automaton_hash") != automaton_hash(problem.automaton):
         raise InvalidScenario(f"{path}: automaton_hash: this was planned with another library")
     try:

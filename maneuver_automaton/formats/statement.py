@@ -53,3 +53,4 @@ class Statement:
     vehicle: StatedVehicle | None = None
     maps: tuple[MapFile, ...] = ()  # those of the obstacles that are in the format of Nav2
     road: RoadScene | None = None  # lanelets, traffic, start and goals of a drive on roads
+    fleet: tuple[Statement, ...] = ()  # of several vehicles: what is stated of each, by its name

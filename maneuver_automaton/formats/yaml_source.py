@@ -45,19 +45,28 @@ class Document:
     name: str  # what messages call the file
     value: Any
     lines: Mapping[Where, int] = field(repr=False)
+    homes: Mapping[Where, Where] = field(default_factory=dict, repr=False)  # of what was moved
 
     def line_of(self, where: Where) -> int:
         """Line of a value, or of the nearest one around it that is in the file."""
+        where = self._in_file(where)
         while where not in self.lines and where:
             where = where[:-1]
         return self.lines.get(where, 1)
 
     def error(self, where: Where, what: str) -> InvalidScenario:
         """An error that names file, line and field: raise it."""
-        label = spelled(where)
+        label = spelled(self._in_file(where))
         return InvalidScenario(
             f"{self.name}:{self.line_of(where)}: {label + ': ' if label else ''}{what}"
         )
+
+    def _in_file(self, where: Where) -> Where:
+        """Where a value stands in the file, if `value` holds it elsewhere."""
+        for n in range(len(where), -1, -1) if self.homes else ():
+            if where[:n] in self.homes:
+                return (*self.homes[where[:n]], *where[n:])
+        return where
 
 
 def spelled(where: Where) -> str:

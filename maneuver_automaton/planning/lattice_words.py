@@ -23,6 +23,7 @@ from maneuver_automaton.planning.no_way import before_proof
 from maneuver_automaton.planning.result import LowerBound
 from maneuver_automaton.planning.steps import BY_TIME, Steps
 from maneuver_automaton.problem import moves
+from maneuver_automaton.refinement.clear_insertion import has_paces, paced, whole_of
 from maneuver_automaton.refinement.improve import Improved, Patience, improve
 from maneuver_automaton.refinement.incumbent_words import quick_word
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
@@ -224,9 +225,11 @@ def _needs_quick_word(query: LatticeQuery) -> bool:
 
 def improved(lattice: LatticeWords) -> list[Candidate]:
     """Plans to be checked, the cheapest first: what was found, and others if they are asked for."""
-    query, found = lattice.query, lattice.found
     if not lattice.words:
         return []
+    if has_paces(lattice.query):
+        _at_pace(lattice)
+    query, found = lattice.query, lattice.found
     if query.problem.moves and lattice.knows_all:
         _let_pass(lattice)
     better = lattice.improve(
@@ -236,6 +239,7 @@ def improved(lattice: LatticeWords) -> list[Candidate]:
         patience=Patience(),
         floor=lattice.bound.value - query.padding if lattice.bound else -math.inf,
         better=lattice.gained,
+        every_trim=whole_of(query),
         meanwhile=lambda: load_checks(query.problem, found.workspace),
     )
     if not lattice.knows_all:
@@ -245,6 +249,15 @@ def improved(lattice: LatticeWords) -> list[Candidate]:
         candidates += _free_words(lattice)
         candidates += _detours(lattice, better.word, 2 * found.alternatives)
     return sorted(candidates, key=lambda one: one.cost)
+
+
+def _at_pace(lattice: LatticeWords) -> None:
+    """Take the trims of a large library that fill the time, once the first word is shortened."""
+    query, budget = lattice.query, lattice.for_others
+    lattice.improve(query, lattice.words[-1], budget, patience=AT_ONCE, better=lattice.gained)
+    lattice.query, word = paced(query, lattice.words[-1])
+    if word is not lattice.words[-1]:
+        lattice.gained(word)
 
 
 def _for_the_best(lattice: LatticeWords) -> Budget:

@@ -24,8 +24,9 @@ from maneuver_automaton.refinement.ready import load_lattice, load_maneuver_kern
 from maneuver_automaton.search.choose import load_search
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
 from maneuver_automaton.search.lattice_library import lattice_library
+from maneuver_automaton.search.lattice_trims import stands_for_more
 from maneuver_automaton.search.linked_words import load_linked_words, load_words_of
-from maneuver_automaton.search.ready import load_times_kernels
+from maneuver_automaton.search.ready import load_insertion_kernels, load_times_kernels
 
 BY_TIME = Cost(time=1.0)  # one value: what is prepared for it is found again
 
@@ -82,6 +83,8 @@ def load_steps(problem: Problem, workspace: Workspace) -> None:
     load_lattice()
     if steps.at_will:
         cost_to_go_table(problem, prepared=workspace.prepared)
+        if stands_for_more(problem):
+            load_insertion_kernels()
         return
     load_checking()
     if follows_paths(problem.automaton.model) and rests_at_both_ends(problem):

@@ -10,13 +10,14 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.refinement._kernels_improve import attempt_all
+from maneuver_automaton.refinement.clear_insertion import Whole
 from maneuver_automaton.refinement.restarts import RANDOM, Restart, Restarts
 from maneuver_automaton.refinement.work import improve_task, shortcut, word_of, work_of
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
@@ -25,6 +26,7 @@ from maneuver_automaton.search.lattice import distance_grids
 from maneuver_automaton.search.lattice_memory import SearchArrays
 from maneuver_automaton.search.lattice_pass import pass_of, with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
+from maneuver_automaton.search.lattice_task import Resolution
 from maneuver_automaton.words.word import Word
 
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)  # of the time between points, by which they move in a round
@@ -37,6 +39,8 @@ MOST_CHUNK = 16384  # expansions between two looks at the word of a search
 SEED = 20_09  # of the random draws
 MOST_OTHERS = 50  # words kept beside the best
 DRAWN = 400  # attempts whose random numbers are drawn at once
+DENSE_SLICE = 200  # attempts with many trims, each of which takes longer
+OTHER_TRIMS = Restart(Resolution(), SLICE)
 TIMELY, TIMELY_LINKED = 100, 10  # attempts before the first look at the clock: some ms
 
 
@@ -99,6 +103,7 @@ class Improvement:
     table: CostTable = NO_TABLE
     restarts: Restarts = RANDOM
     meanwhile: Callable[[], None] = lambda: None  # to prepare once the first gains are made
+    every_trim: Whole | None = None  # what the searches leave out of a large library
     attempts: int = 0
     expansions: int = 0
     queries: int = 0
@@ -135,15 +140,19 @@ class Improvement:
             step += 1
             if step == FIRST_GAINS:
                 self.meanwhile()
+            if self.every_trim is not None and self.every_trim.is_due(step):
+                yield from self._with_every_trim(self.every_trim, step)
             begun, restart = restart, next(restarts, None)
             if restart is not None and restart.all_words != begun.all_words:
                 yield from self._considered(self._shortened(self.best, restart, SLICE))
+        if self.every_trim is not None:
+            yield from self._with_every_trim(self.every_trim, step)
 
     def result(self) -> Improved:
         """The result so far."""
         return Improved(
-            word=self.best,
-            attempts=self.attempts,
+            word=self._cheapest,
+            attempts=self.attempts + (self.every_trim.attempts if self.every_trim else 0),
             expansions=self.expansions,
             queries=self.queries,
             passes=self.passes,
@@ -155,7 +164,7 @@ class Improvement:
         return self.best.cost < before * (1.0 - 1e-4)
 
     def _over(self) -> bool:
-        return self._late() or self.best.cost <= self.floor * (1.0 + 1e-12)
+        return self._late() or self._cheapest.cost <= self.floor * (1.0 + 1e-12)
 
     def _late(self) -> bool:
         if self.budget.expansions is not None and self.expansions >= self.budget.expansions:
@@ -166,8 +175,27 @@ class Improvement:
         """The candidate, if it is the best."""
         self.others.append(candidate)
         if candidate.cost < self.best.cost:
+            cheapest = candidate.cost < self._cheapest.cost
             self.best = candidate
-            yield candidate
+            if cheapest:
+                yield candidate
+
+    @property
+    def _cheapest(self) -> Word:
+        """The cheapest word, whatever trims it has."""
+        whole = self.every_trim
+        return self.best if whole is None else whole.cheaper_than(self.best)
+
+    def _with_every_trim(self, whole: Whole, step: int) -> Iterator[Word]:
+        """Words that any trims of a large library have made cheaper: attempts, no expansions."""
+        if not self.budget.is_over:
+            shorten = self._shortened_with
+            yield from whole.gains(self.best, step=step, budget=self.budget, shorten=shorten)
+
+    def _shortened_with(self, query: LatticeQuery, word: Word) -> Word:
+        """The word shortened with the trims of another query, the draws of this one left alone."""
+        other = replace(self, query=query, rng=np.random.default_rng(SEED), attempts=0)
+        return other._shortened(word, OTHER_TRIMS, DENSE_SLICE)
 
     def _searched_again(self, restart: Restart, grids: tuple[DistanceGrid, ...]) -> Iterator[Word]:
         """Words found by a new search that is pruned by the best, and made shorter."""

@@ -1,5 +1,6 @@
 """The scenario file: YAML to `Problem` and back; files of other formats, with a scenario beside."""
 
+from maneuver_automaton.scenario.fleet import FleetScenario as FleetScenario
 from maneuver_automaton.scenario.loading import RoadScenario as RoadScenario
 from maneuver_automaton.scenario.loading import load_scenario as load_scenario
 from maneuver_automaton.scenario.loading import statements_of as statements_of

@@ -5,9 +5,9 @@ goal keeps the scenario's trim and tolerances, and, where the file states no hea
 heading. Cost, horizon, margin, search and closed loop are the scenario's, and so are automaton and
 body, unless the file names its vehicle.
 
-Two formats do without a scenario. TPCAP has one car for every case; dynobench has its own models,
-whose trims are then all combinations of extreme controls, or, with inertia, a grid of trims and the
-maneuvers between them; its cost is time.
+Three formats do without a scenario. TPCAP and CL-CBS have one car each; dynobench has its own
+models, whose trims are then all combinations of extreme controls, or, with inertia, a grid of trims
+and the maneuvers between them; its cost is time.
 """
 
 from __future__ import annotations
@@ -40,6 +40,27 @@ start: {pose: [0.0, 0.0, 0.0]}
 goal: {pose: [0.0, 0.0, 0.0]}
 cost: {length: 1.0}
 """
+CL_CBS = """\
+schema: 1
+name: The car of CL-CBS
+vehicle:
+  model: car
+  wheelbase_m: 2.0
+  max_steering_rad: 0.5880026035475675
+  footprint: {rectangle_m: [3.0, 2.0], reference_m: [-0.5, 0.0]}
+automaton:
+  trims:
+    - {name: rest, control: [0.0, 0.0]}
+    - {name: left, control: [1.0, 0.5880026035475675]}
+    - {name: straight, control: [1.0, 0.0]}
+    - {name: right, control: [1.0, -0.5880026035475675]}
+    - {name: back left, control: [-1.0, 0.5880026035475675]}
+    - {name: back, control: [-1.0, 0.0]}
+    - {name: back right, control: [-1.0, -0.5880026035475675]}
+start: {pose: [0.0, 0.0, 0.0]}
+goal: {pose: [0.0, 0.0, 0.0]}
+cost: {time: 1.0}
+"""
 
 
 def combined(statement: Statement, beside: Scenario | None, *, path: Path) -> Scenario:
@@ -50,7 +71,7 @@ def combined(statement: Statement, beside: Scenario | None, *, path: Path) -> Sc
     InvalidScenario
         If something is missing still, or the scenario's trims are not for the file's vehicle.
     """
-    rest = _own(statement, path) if beside is None else beside
+    rest = own_scenario(statement, path) if beside is None else beside
     problem = rest.problem
     start_trim, goals = problem.start_trim, _goals(statement, problem)
     if (vehicle := statement.vehicle) is not None:
@@ -82,12 +103,13 @@ def combined(statement: Statement, beside: Scenario | None, *, path: Path) -> Sc
     )
 
 
-def _own(statement: Statement, path: Path) -> Scenario:
-    """What a format means where no scenario stands beside the file."""
-    from maneuver_automaton.formats.tpcap import FORMAT
+def own_scenario(statement: Statement, path: Path) -> Scenario:
+    """What a format means where no scenario stands beside the file; raises InvalidScenario."""
+    from maneuver_automaton.formats import cl_cbs, tpcap
 
-    if statement.format == FORMAT:
-        return scenario_of_text(TPCAP, name=FORMAT)
+    cars = {tpcap.FORMAT: TPCAP, cl_cbs.FORMAT: CL_CBS}
+    if statement.format in cars:
+        return scenario_of_text(cars[statement.format], name=statement.format)
     vehicle, start, goal = statement.vehicle, statement.start, statement.goal
     if vehicle is not None and start is not None and goal is not None:
         problem = Problem(vehicle.automaton, start, goal, cost=Cost(time=1.0))

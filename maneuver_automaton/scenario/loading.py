@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,10 +17,17 @@ from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.recognition import reader_of, yaml_statements
 from maneuver_automaton.formats.statement import Statement
 from maneuver_automaton.formats.text_source import read_text
-from maneuver_automaton.formats.yaml_source import parse
+from maneuver_automaton.formats.yaml_source import Document, parse
 from maneuver_automaton.models import Model, SecondOrderCar
 from maneuver_automaton.roads import RoadScene, RoadVehicle
 from maneuver_automaton.scenario.combining import combined
+from maneuver_automaton.scenario.fleet import (
+    FleetScenario,
+    fleet_of_document,
+    fleet_of_statement,
+    states_several,
+    without_fleet,
+)
 from maneuver_automaton.scenario.scenario import Scenario, scenario_of_document
 
 
@@ -40,19 +48,22 @@ def load_scenario(
     beside: Path | str | None = None,
     case: int | None = None,
     model: Model | None = None,
-) -> Scenario | RoadScenario:
+) -> Scenario | FleetScenario | RoadScenario:
     """The problem of a file: a scenario, or another format that states one or a part of one.
 
     A CommonRoad file states a drive on roads: `plan_road` and `drive_road` take its scene and its
     vehicle. That is the BMW 320i of CommonRoad, or the one of the scenario `beside`: a second-order
     car with a rectangular body along its axis.
 
+    A scenario with `vehicles`, a problem of CL-CBS, and one of dynobench with several robots state
+    a fleet: `plan_fleet` takes it.
+
     Parameters
     ----------
     path : Path or str
-        Scenario, CommonRoad scenario, TPCAP case, Nav2 map, dynobench problem, MovingAI map or
-        queries, SBPL environment, Bench-MR world: told apart by their endings, YAML files by
-        their keys.
+        Scenario, CommonRoad scenario, TPCAP case, Nav2 map, dynobench problem, CL-CBS problem,
+        MovingAI map or queries, SBPL environment, Bench-MR world: told apart by their endings, YAML
+        files by their keys.
     beside : Path or str, optional
         A scenario for what the file leaves out, such as the vehicle. What the file states wins;
         start and goal may be missing in the scenario where the file states them.
@@ -81,20 +92,31 @@ def load_scenario(
         if found is None:
             if isinstance(document.value, dict) and "schema" in document.value:
                 _refuse_parts(path, beside, case)
+            if states_several(document):
+                return fleet_of_document(document, path=path, begin=begin, own=model)
             return scenario_of_document(document, path=path, begin=begin, own=model)
         statements = found
     statement = _chosen(path, statements, case)
     if statement.road is not None:
         vehicle = RoadVehicle() if beside is None else _road_vehicle(Path(beside))
         return RoadScenario(name=statement.name, scene=statement.road, vehicle=vehicle)
-    rest = None
+    rest, settings = None, None
     if beside is not None:
-        rest = _scenario_beside(Path(beside), start=statement.start, goal=statement.goal, own=model)
+        stated = statement.fleet[0] if statement.fleet else statement
+        document = _beside(Path(beside), start=stated.start, goal=stated.goal)
+        with _told_of_beside():
+            if statement.fleet:
+                document, settings = without_fleet(document)
+            rest = scenario_of_document(document, path=Path(beside), begin=begin, own=model)
     elif model is not None:
         raise InvalidScenario(
             f"{path}: names no vehicle of yours; need --with and a scenario that does"
         )
-    scenario = combined(statement, rest, path=path)
+    scenario: Scenario | FleetScenario
+    if statement.fleet:
+        scenario = fleet_of_statement(statement, rest, path=path, settings=settings)
+    else:
+        scenario = combined(statement, rest, path=path)
     made = scenario.timing_s.get("automaton", 0.0)
     load = time.perf_counter() - begin - made
     return replace(scenario, timing_s={"load": load, "automaton": made})
@@ -102,8 +124,10 @@ def load_scenario(
 
 def _road_vehicle(beside: Path) -> RoadVehicle:
     """The vehicle of a scenario beside a drive on roads."""
-    anywhere = np.zeros(3)  # the scene states its own
-    rest = _scenario_beside(beside, start=anywhere, goal=anywhere).problem
+    anywhere, begin = np.zeros(3), time.perf_counter()  # the scene states its own
+    document = _beside(beside, start=anywhere, goal=anywhere)
+    with _told_of_beside():
+        rest = scenario_of_document(document, path=beside, begin=begin).problem
     model, footprint = rest.automaton.model, rest.footprint
     if not isinstance(model, SecondOrderCar):
         raise InvalidScenario(
@@ -134,18 +158,21 @@ def statements_of(path: Path) -> tuple[Statement, ...] | None:
     return read(path) if read else yaml_statements(parse(read_text(path), name=str(path)), path)
 
 
-def _scenario_beside(
-    path: Path, *, start: Array | None, goal: Array | None, own: Model | None = None
-) -> Scenario:
+def _beside(path: Path, *, start: Array | None, goal: Array | None) -> Document:
     """The scenario of --with; it needs no start and goal where the problem states them."""
-    begin = time.perf_counter()
-    try:
+    with _told_of_beside():
         document = parse(read_text(path), name=str(path))
-        if isinstance(document.value, dict):
-            known = {"start": start, "goal": goal}
-            ends = {k: {"pose": pose.tolist()} for k, pose in known.items() if pose is not None}
-            document = replace(document, value=ends | document.value)
-        return scenario_of_document(document, path=path, begin=begin, own=own)
+    if not isinstance(document.value, dict):
+        return document
+    known = {"start": start, "goal": goal}
+    ends = {key: {"pose": pose.tolist()} for key, pose in known.items() if pose is not None}
+    return replace(document, value=ends | document.value)
+
+
+@contextlib.contextmanager
+def _told_of_beside() -> Iterator[None]:
+    try:
+        yield
     except InvalidScenario as error:
         raise InvalidScenario(f"--with: {error}") from error
 

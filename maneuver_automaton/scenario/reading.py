@@ -16,6 +16,7 @@ File = TypeVar("File", bound=BaseModel)
 OTHER_KINDS: Mapping[str, set[str]] = {  # and what only they have
     "a library of trims": {"format", "trims"},
     "a plan": {"status", "primitives"},
+    "plans of a fleet": {"status", "kind", "vehicles"},
     "a build file": {"library", "trims"},
 }
 
@@ -28,12 +29,14 @@ def values_of(document: Document, *, own: Model | None = None) -> ScenarioFile:
     InvalidScenario
         If a key is unknown or missing, or holds what it may not: the first one in the file.
     """
-    _check_schema(document)
+    check_schema(document)
     return checked(document, ScenarioFile, own=own)
 
 
-def checked(document: Document, kind: type[File], *, own: Model | None = None) -> File:
-    """The values of a file of this kind.
+def checked(
+    document: Document, kind: type[File], *, own: Model | None = None, several: bool = False
+) -> File:
+    """The values of a file of this kind; of `several` vehicles `own` may be the model of some.
 
     Raises
     ------
@@ -41,15 +44,16 @@ def checked(document: Document, kind: type[File], *, own: Model | None = None) -
         If a key is unknown or missing, or holds what it may not: the first one in the file.
     """
     try:
-        return kind.model_validate(document.value, context=_context(document.value, own))
+        context = {"one_is": own and own.name} if several else _context(document.value, own)
+        return kind.model_validate(document.value, context=context)
     except ValidationError as error:
         found = [_message(document, item) for item in error.errors(include_url=False)]
         where, what = min(found, key=lambda item: document.line_of(item[0]))
         raise document.error(where, what) from error
 
 
-def _check_schema(document: Document) -> None:
-    """A file of another kind or schema is told before its keys are."""
+def check_schema(document: Document) -> None:
+    """A file of another kind or schema is told before its keys are; raises InvalidScenario."""
     if not isinstance(document.value, dict):
         return
     for kind, keys in OTHER_KINDS.items():

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Automaton
@@ -35,6 +35,7 @@ from maneuver_automaton.scenario.shapes import (
 )
 from maneuver_automaton.scenario.vehicles import carried_of, model_of
 
+T = TypeVar("T")
 Footprint = tuple[Mapping[str, Any], ...]  # shapes, each {rectangle_m, reference_m} and so on
 
 
@@ -52,6 +53,11 @@ class Scenario:
     timing_s: Mapping[str, float] = field(default_factory=dict)  # load, automaton [s]
 
     __repr__ = brief
+
+    @property
+    def problems(self) -> tuple[Problem, ...]:
+        """The one that it states."""
+        return (self.problem,)
 
     @property
     def footprint(self) -> Footprint:
@@ -84,10 +90,21 @@ def scenario_of_text(text: str, *, name: str) -> Scenario:
     return scenario_of_document(parse(text, name=name), path=None, begin=begin)
 
 
+Made: TypeAlias = dict[tuple[object, ...], Any]
+"""What was made of parts of a file: several vehicles of one file share it."""
+
+
 def scenario_of_document(
-    document: Document, *, path: Path | None, begin: float, own: Model | None = None
+    document: Document,
+    *,
+    path: Path | None,
+    begin: float,
+    own: Model | None = None,
+    made: Made | None = None,
 ) -> Scenario:
     """The scenario of a YAML file that was read since `begin` [s]; its vehicle is `own` if given.
+
+    What is in `made` is taken from there, and what is made is kept in it.
 
     Raises
     ------
@@ -98,29 +115,55 @@ def scenario_of_document(
     if file.search.method == "words":
         _refuse_long_words(document, file)
     folder = path.parent if path else Path()
+    once = _Once(document.value, {} if made is None else made)
+    model, bodies = once.of(("vehicle",), lambda: _vehicle(document, file, own))
+    obstacles, maps = once.of(
+        ("obstacles",), lambda: obstacles_of(document, file.obstacles, folder)
+    )
+    read = time.perf_counter()
+    automaton = once.of(
+        ("vehicle", "automaton"),
+        lambda: automaton_of(document, file.automaton, model, folder=folder),
+    )
+    built = time.perf_counter()
+    return Scenario(
+        name=(path.stem if path else document.name) if file.name is None else file.name,
+        problem=_problem(document, file, automaton, bodies=bodies, obstacles=obstacles, once=once),
+        time_limit_s=file.search.time_limit_s,
+        receding_horizon=file.receding_horizon,
+        maps=maps,
+        stated=file.automaton,
+        path=path,
+        timing_s={"load": read - begin, "automaton": built - read},
+    )
+
+
+class _Once(NamedTuple):
+    """What is made of a document, once of the same parts."""
+
+    value: Mapping[str, Any]  # of the document
+    made: Made
+
+    def of(self, keys: tuple[str, ...], make: Callable[[], T]) -> T:
+        """What `make` returns, of the parts at some keys of the document."""
+        key = (*keys, *(id(self.value.get(key)) for key in keys))
+        if key not in self.made:
+            self.made[key] = make()
+        found: T = self.made[key]
+        return found
+
+
+def _vehicle(document: Document, file: ScenarioFile, own: Model | None) -> tuple[Model, _Bodies]:
+    """The model of a file, and the bodies that it moves."""
     with at(document, ("vehicle",)):
         model = model_of(file.vehicle, own=own)
-    bodies = _Bodies(
+    return model, _Bodies(
         vehicle=footprint_of(document, file.vehicle.footprint, key="footprint"),
         parts={
             name: footprint_of(document, body, key=name)
             for name, body in carried_of(file.vehicle).items()
         },
         height=_height_of(document, file.vehicle, model),
-    )
-    obstacles, maps = obstacles_of(document, file.obstacles, folder)
-    read = time.perf_counter()
-    automaton = automaton_of(document, file.automaton, model, folder=folder)
-    made = time.perf_counter()
-    return Scenario(
-        name=(path.stem if path else document.name) if file.name is None else file.name,
-        problem=_problem(document, file, automaton, bodies=bodies, obstacles=obstacles),
-        time_limit_s=file.search.time_limit_s,
-        receding_horizon=file.receding_horizon,
-        maps=maps,
-        stated=file.automaton,
-        path=path,
-        timing_s={"load": read - begin, "automaton": made - read},
     )
 
 
@@ -162,6 +205,7 @@ def _problem(
     *,
     bodies: _Bodies,
     obstacles: tuple[AnyObstacle, ...],
+    once: _Once,
 ) -> Problem:
     goals = file.goal if isinstance(file.goal, tuple) else (file.goal,)
     many = isinstance(file.goal, tuple)
@@ -177,7 +221,11 @@ def _problem(
     for k, zone in enumerate(file.zones):
         for n, name in enumerate(zone.trims or ()):
             _check_trim(document, ("zones", k, "trims", n), name, automaton)
-    cost, horizon = cost_of(document, file.cost, automaton), _horizon(document, file.horizon)
+    cost = once.of(
+        ("vehicle", "automaton", "cost"), lambda: cost_of(document, file.cost, automaton)
+    )
+    zones = once.of(("zones",), lambda: zones_of(document, file.zones))
+    horizon = _horizon(document, file.horizon)
     with at(document, ()):
         return Problem(
             automaton,
@@ -194,7 +242,7 @@ def _problem(
             parts=bodies.parts,
             body_height=bodies.height,
             margin=file.margin_m,
-            zones=zones_of(document, file.zones),
+            zones=zones,
         )
 
 
@@ -233,11 +281,13 @@ def _search(part: SearchPart) -> SearchSettings:
 
 
 def _horizon(document: Document, part: HorizonPart) -> Horizon:
-    fixed = part.time_s != "free" and part.max_time_s is not None
-    with at(document, ("horizon", "max_time_s") if fixed else ("horizon",)):
+    fixed = part.time_s != "free"
+    wrong = "max_time_s" if part.max_time_s is not None else "stay"
+    with at(document, ("horizon", wrong) if fixed else ("horizon",)):
         return Horizon(
             time=None if part.time_s == "free" else part.time_s,
             max_trims=part.max_trims,
             min_coast=part.min_coast_s,
             max_time=part.max_time_s,
+            stay=part.stay,
         )

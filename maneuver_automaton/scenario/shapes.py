@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from maneuver_automaton._files import relative
 from maneuver_automaton.collision import (
     AnyObstacle,
     Box,
@@ -246,11 +246,3 @@ def _stated_shape(shape: Shape) -> dict[str, Any]:
         return {"box_m": {"center": shape.center.tolist(), "size": shape.size.tolist(), **heading}}
     holes = {"holes_m": [ring.tolist() for ring in shape.holes]} if shape.holes else {}
     return {"polygon_m": shape.corners.tolist(), **holes}
-
-
-def relative(path: Path, folder: Path) -> str:
-    """The path as seen from a folder, with the slashes of every system."""
-    try:
-        return Path(os.path.relpath(path, folder)).as_posix()
-    except ValueError:  # on another drive
-        return path.absolute().as_posix()

@@ -208,10 +208,17 @@ class OmnidirectionalPart(Part):
     footprint: Footprint | None = Field(None, description="shape of the body")
 
 
+def _other_than_known(schema: dict[str, Any]) -> None:
+    schema["not"] = {"enum": list(MODELS)}
+
+
 class OwnPart(Part):
     """A vehicle of the user's own, by its name: the model itself is given to the program."""
 
-    model: Name = Field(description="the name of a model that is given with --model")
+    model: Name = Field(
+        description="the name of a model that is given with --model",
+        json_schema_extra=_other_than_known,
+    )
     footprint: Footprint | None = Field(None, description="shape of the body")
     footprint_height_m: Interval | None = Field(
         None, description="[low, high] of the body about its altitude; left out: a flat body"
@@ -239,8 +246,10 @@ MODELS = tuple(str(part.model_fields["model"].description) for part in PARTS)
 def _check_model(value: Any, info: ValidationInfo) -> Any:
     if not isinstance(value, dict):
         raise need("a mapping with the key model")
-    own = (info.context or {}).get("own")  # the name of the model that is given beside the file
-    if own is not None and value.get("model") == own:
+    context = info.context or {}
+    own = context.get("own")  # the name of the model that is given beside the file
+    known = context.get("one_is", own)  # the same, where other vehicles may have other models
+    if known is not None and value.get("model") == known:
         return value
     what = f"{own!r}, the model that is given" if own else f"one of {', '.join(MODELS)}"
     if "model" not in value:

@@ -5,31 +5,38 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from maneuver_automaton._files import relative
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import WEIGHTS, Cost, StageCost
 from maneuver_automaton.formats.yaml_source import scalar
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
+from maneuver_automaton.scenario.fleet import FleetScenario
+from maneuver_automaton.scenario.fleet_schema import FleetFile
 from maneuver_automaton.scenario.scenario import Scenario
 from maneuver_automaton.scenario.schema import ScenarioFile
 from maneuver_automaton.scenario.shapes import (
-    relative,
     stated_footprint,
     stated_obstacle,
     stated_zone,
 )
 from maneuver_automaton.scenario.vehicles import described
 
+EACH = ("start", "goal")  # keys that every vehicle has of its own
+WIDTH = 110  # characters of a line with a vehicle, beyond which it is cut
 _PLAIN = re.compile(r"[A-Za-z][A-Za-z0-9_ ()-]*[A-Za-z0-9_)]|[A-Za-z]")
 _HARD = re.compile(r"[^\x20-\x7e\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]")
 
 
-def to_yaml(scenario: Scenario, *, folder: Path | None = None) -> str:
+def to_yaml(scenario: Scenario | FleetScenario, *, folder: Path | None = None) -> str:
     """The scenario as a file that reads back to the same problem, to the last bit.
 
+    Of several vehicles, what most of them have stands at the top, and in an entry what differs.
     The trims of a kinematic vehicle are listed, whatever named them before; the automaton of any
     other is written as its file states it. Maps and libraries stay references to their files, as
     seen from `folder`, where the file will be; None: that of the scenario's own file. The names of
@@ -60,14 +67,31 @@ def to_yaml(scenario: Scenario, *, folder: Path | None = None) -> str:
     search: {method: auto, time_limit_s: 5.0}
     <BLANKLINE>
     """
+    if folder is None:
+        folder = scenario.path.parent if scenario.path else Path()
+    alone = [
+        _stated(replace(one, maps=scenario.maps), folder)
+        for one in (scenario.vehicles if isinstance(scenario, FleetScenario) else (scenario,))
+    ]
+    top = alone[0] if isinstance(scenario, Scenario) else _of_most(alone)
+    entries: dict[str, Any] = {"schema": 1, "name": scenario.name, **top}
+    entries["margin_m"] = entries["margin_m"] or None
+    if isinstance(scenario, FleetScenario):
+        entries |= _several(scenario, alone, top)
+    entries["receding_horizon"] = scenario.receding_horizon and (
+        scenario.receding_horizon.model_dump(exclude_none=True)
+    )
+    return "".join(
+        _block(key, value) for key, value in entries.items() if value not in ({}, [], None)
+    )
+
+
+def _stated(scenario: Scenario, folder: Path) -> dict[str, Any]:
+    """What a file states of one vehicle, key by key; nothing of what is as if left out."""
     problem = scenario.problem
     bounds = {name: getattr(problem.bounds, name) for name in ("x", "y", "z")}
     goals = [_goal(goal) for goal in problem.goals]
-    if folder is None:
-        folder = scenario.path.parent if scenario.path else Path()
-    entries: dict[str, Any] = {
-        "schema": 1,
-        "name": scenario.name,
+    return {
         "vehicle": _vehicle(scenario),
         "automaton": _automaton(scenario, folder),
         "start": _start(problem),
@@ -75,16 +99,54 @@ def to_yaml(scenario: Scenario, *, folder: Path | None = None) -> str:
         "cost": _cost(problem.cost),
         "horizon": _horizon(problem.horizon),
         "bounds_m": {name: list(pair) for name, pair in bounds.items() if pair is not None},
-        "margin_m": problem.margin or None,
+        "margin_m": problem.margin,
         "obstacles": [stated_obstacle(one, scenario.maps, folder) for one in problem.obstacles],
         "zones": [stated_zone(one) for one in problem.zones],
         "search": _search(problem.search, scenario.time_limit_s),
-        "receding_horizon": scenario.receding_horizon
-        and scenario.receding_horizon.model_dump(exclude_none=True),
     }
-    return "".join(
-        _block(key, value) for key, value in entries.items() if value not in ({}, [], None)
-    )
+
+
+def _of_most(alone: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """What stands at the top for several vehicles: of each key what most of them have."""
+    return {
+        key: Counter(_Stated(one[key]) for one in alone).most_common(1)[0][0].value
+        for key in alone[0]
+        if key not in EACH
+    }
+
+
+class _Stated:
+    """A value of a file, equal to what is written alike: 0.0 is not -0.0."""
+
+    def __init__(self, value: Any) -> None:
+        self.value = value
+        self.text = _flow(value)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Stated) and self.text == other.text
+
+    def __hash__(self) -> int:
+        return hash(self.text)
+
+
+def _several(
+    scenario: FleetScenario, alone: Sequence[Mapping[str, Any]], top: Mapping[str, Any]
+) -> dict[str, Any]:
+    """The entries of several vehicles, what differs from the top in each, and the fleet's."""
+    fleet, written = scenario.fleet, {key: _flow(value) for key, value in top.items()}
+    rows = [
+        {
+            "name": name,
+            **({"priority": priority} if priority else {}),
+            **({"leaves": True} if leaves else {}),
+            **{key: value for key, value in one.items() if written.get(key) != _flow(value)},
+        }
+        for name, priority, leaves, one in zip(
+            fleet.names, fleet.priority, fleet.leaves, alone, strict=True
+        )
+    ]
+    settings = scenario.settings.model_dump() | {"between_m": fleet.margin}
+    return {"vehicles": rows, "fleet": settings}
 
 
 def _vehicle(scenario: Scenario) -> dict[str, Any]:
@@ -103,9 +165,20 @@ def _vehicle(scenario: Scenario) -> dict[str, Any]:
 
 
 def json_schema() -> dict[str, Any]:
-    """JSON Schema of scenario files, for editors."""
-    schema = _without_null(ScenarioFile.model_json_schema(by_alias=True))
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+    """JSON Schema of scenario files, for editors: of one vehicle, or of several."""
+    one = _without_null(ScenarioFile.model_json_schema(by_alias=True))
+    several = _without_null(FleetFile.model_json_schema(by_alias=True))
+    kinds = [kind["required"] for kind in (one, several)]
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **one,
+        "$defs": several["$defs"] | one["$defs"],
+        "properties": one["properties"]
+        | {key: several["properties"][key] for key in ("vehicles", "fleet")},
+        "required": [key for key in kinds[0] if key in kinds[1]],
+        "oneOf": [{"required": keys} for keys in kinds],
+        "dependentRequired": {"fleet": ["vehicles"]},
+    }
 
 
 def _without_null(schema: Any) -> Any:
@@ -172,7 +245,8 @@ def _cost(cost: StageCost) -> dict[str, Any]:
 
 def _horizon(horizon: Horizon) -> dict[str, Any]:
     entry = _given(time_s=horizon.time, max_trims=horizon.max_trims, max_time_s=horizon.max_time)
-    return entry | ({"min_coast_s": horizon.min_coast} if horizon.min_coast else {})
+    entry |= {"min_coast_s": horizon.min_coast} if horizon.min_coast else {}
+    return entry | ({"stay": True} if horizon.stay else {})
 
 
 def _search(search: SearchSettings, time_limit_s: float) -> dict[str, Any]:
@@ -200,9 +274,20 @@ def _block(key: str, value: Any) -> str:
         rows = "".join(f"    - {_flow(row)}\n" for row in value["trims"])
         rest = "".join(f"  {k}: {_flow(v)}\n" for k, v in value.items() if k != "trims")
         return f"automaton:\n  trims:\n{rows}{rest}"
+    if key == "vehicles":
+        return f"{key}:\n" + "".join(map(_row, value))
     if isinstance(value, list):
         return f"{key}:\n" + "".join(f"  - {_flow(row)}\n" for row in value)
     return f"{key}: {_flow(value)}\n"
+
+
+def _row(entry: Mapping[str, Any]) -> str:
+    """An entry of a list in one line, or in one a key if that is long."""
+    line = f"  - {_flow(entry)}\n"
+    if len(line) <= WIDTH:
+        return line
+    rows = [f"    {key}: {_flow(value)}\n" for key, value in entry.items()]
+    return "".join(rows).replace("    ", "  - ", 1)
 
 
 def _flow(value: Any) -> str:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 from maneuver_automaton.collision._kernels_advancement import free_time
 from maneuver_automaton.collision._kernels_layers import layer_world, times_between
+from maneuver_automaton.collision._kernels_swept import UNKNOWN, not_parted
 from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search._kernels_parts import part_body, part_coast
 from maneuver_automaton.search._kernels_window import inside_window
@@ -56,6 +57,34 @@ def coast_proven(
     else:
         free, clearance = coast_proven_everywhere(scene, lib, trim, pose, t, clock)
     return free, clearance
+
+
+@inlined_kernel
+def edge_swept(
+    scene: Scene, lib: LatticeArrays, motion: int, pose: tuple[float, float, float, float]
+) -> int:
+    """A solid that may be in the way of an edge of coasting, FREE for none, or UNKNOWN.
+
+    `motion` is its place in `lib.swept`. FREE is a proof, and what it calls free `coast_proven`
+    would too: no pose along the edge comes as near to a solid as it would stop at.
+    """
+    if not (scene.layers.low.shape[0] == 1 and scene.layers.flat and lib.n_parts == 1):
+        return UNKNOWN
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    enough = scene.keep + scene.margin
+    return not_parted(
+        scene.layers.first, lib.body, lib.swept, motion, pose[0], pose[1], c, s, enough
+    )
+
+
+@inlined_kernel
+def swept_end(
+    lib: LatticeArrays, motion: int, pose: tuple[float, float, float, float]
+) -> tuple[float, float]:
+    """Cosine and sine of the heading at the end of an edge of coasting."""
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    turn_c, turn_s = lib.swept.places[motion, 3], lib.swept.places[motion, 4]
+    return c * turn_c - s * turn_s, s * turn_c + c * turn_s
 
 
 @bare_inner_kernel

@@ -6,7 +6,16 @@ import math
 from typing import TYPE_CHECKING
 
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
-from maneuver_automaton.search._kernels_coast import coast_inside, coast_proven, coasted, too_short
+from maneuver_automaton.collision._kernels_clearance import field_bound
+from maneuver_automaton.collision._kernels_swept import FREE, UNKNOWN, overlaps
+from maneuver_automaton.search._kernels_coast import (
+    coast_inside,
+    coast_proven,
+    coasted,
+    edge_swept,
+    swept_end,
+    too_short,
+)
 from maneuver_automaton.search._kernels_estimate import cost_to_go
 from maneuver_automaton.search._kernels_maneuver import edge_end, edge_inside, edge_proven
 from maneuver_automaton.search._kernels_nodes import (
@@ -101,10 +110,12 @@ def relax_coasts(
             key = cell_key(task, n_x, n_y, n_heading, n_z, layer, time, 0)
             slot = slot_of(search.table, generation, key)
             old = node_in(search.table, generation, slot)
-            if old >= 0 and nodes[old, COST] <= cost and not task.truncated:
-                continue
             child = (n_x, n_y, n_heading, n_z)
-            ahead = cost_to_go(task, grid, table, scene.layers.plane, child, trim)
+            ahead = math.inf
+            if not (old >= 0 and nodes[old, COST] <= cost):
+                ahead = cost_to_go(task, grid, table, scene.layers.plane, child, trim)
+            elif not task.truncated:
+                continue
             if cost + ahead >= limit and not task.truncated:
                 continue
             # The proof without a test: no point of the body moves farther than `fastest * t`, so
@@ -113,8 +124,25 @@ def relax_coasts(
             clearance, free = nodes[node, CLEARANCE] - lib.fastest[trim] * t, t
             if clearance <= scene.margin or climbs or not known:
                 state[QUERIES] += 1
-                clock = task.clock + task.sign * spent
-                free, clearance = coast_proven(scene, lib, trim, pose, task.sign * t, clock)
+                # The price of a proof rises in three steps: one polygon that holds all of the edge;
+                # where that meets a solid, whether the vehicle does at the end, unless the time of
+                # the contact is asked for; and the proof along the edge.
+                motion = trim * lib.edge_durations.shape[1] + q
+                met = edge_swept(scene, lib, motion, pose) if known else UNKNOWN
+                first = scene.layers.first
+                end_cos, end_sin = swept_end(lib, motion, pose)
+                if met == FREE:
+                    clearance = field_bound(first.field, lib.body, n_x, n_y, end_cos, end_sin)
+                    clearance = max(clearance - scene.keep, scene.margin)
+                elif (
+                    met >= 0
+                    and not task.truncated
+                    and overlaps(first, lib.body, n_x, n_y, end_cos, end_sin, met)
+                ):
+                    free = 0.0
+                else:
+                    clock = task.clock + task.sign * spent
+                    free, clearance = coast_proven(scene, lib, trim, pose, task.sign * t, clock)
             if free < t:
                 if not task.truncated or not lib.fastest[trim] > 0.0:
                     break  # longer coasts of this trim pass the same place

@@ -12,6 +12,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.body import Body
+from maneuver_automaton.collision.swept_areas import SweptAreas, swept_areas
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.search.part_motion import (
     BodyArrays,
@@ -45,6 +46,7 @@ class LatticeArrays(NamedTuple):
     fastest: Array  # (m,) [m/s] over the parts
     edge_durations: Array  # (m, 2) [s] of coasts, 0 for none
     moves: Array  # (m, 2, 4) poses they lead to, forwards or backwards
+    swept: SweptAreas  # what the first part covers along them
     first_trim: IntArray  # (C + 1,) where the trims of each class begin ...
     trims_of: IntArray  # (m,) ... in this list
     first_edge: IntArray  # (C + 1,)
@@ -188,7 +190,7 @@ def lattice_arrays(
         speeds=speeds,
         fastest=speeds.max(axis=0),
         edge_durations=edge_durations,
-        moves=moves_of(twists, edge_durations),
+        **coasts_of(twists, edge_durations, bodies[0])._asdict(),
         first_trim=np.concatenate([[0], np.cumsum(coasts)]),
         trims_of=np.argsort(classes, kind="stable"),
         first_edge=np.concatenate([[0], np.cumsum(edges_of)]),
@@ -204,10 +206,18 @@ def lattice_arrays(
     )
 
 
-def moves_of(twists: Array, durations: Array) -> Array:
-    """Poses (m, k, 4) reached from the identity by twists (m, 4) after durations (m, k) [s]."""
+class Coasts(NamedTuple):
+    """Where coasts lead from the identity, and what the first part covers along them."""
+
+    moves: Array  # (m, k, 4)
+    swept: SweptAreas
+
+
+def coasts_of(twists: Array, durations: Array, body: Body) -> Coasts:
+    """Coasts by twists (m, 4) for durations (m, k) [s], negative ones backwards."""
     steps = durations[..., None] * twists[:, None, :]
-    return np.concatenate([SE2.exp(steps[..., :3]).pose, steps[..., 3:]], axis=-1)
+    moves = np.concatenate([SE2.exp(steps[..., :3]).pose, steps[..., 3:]], axis=-1)
+    return Coasts(moves, swept_areas(body, twists, durations))
 
 
 def edge_durations_of(twists: Array, radius: float, *, waits: bool) -> Array:

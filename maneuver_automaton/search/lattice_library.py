@@ -17,10 +17,10 @@ from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.lattice_arrays import (
     CELL,
     LatticeLibrary,
+    coasts_of,
     edge_durations_of,
     lattice_arrays,
     length_scale,
-    moves_of,
     tightest_turn,
 )
 from maneuver_automaton.search.lattice_edges import (
@@ -32,6 +32,7 @@ from maneuver_automaton.search.lattice_edges import (
 )
 from maneuver_automaton.search.lattice_trims import (
     TURN,
+    Chosen,
     PricedTrims,
     is_mirrored,
     priced_library,
@@ -72,7 +73,28 @@ def lattice_library(
         fixed_time=problem.horizon.time is not None,
         waits=problem.moves,
         min_coast=problem.horizon.min_coast,
+        limited=_limited(problem),
     )
+
+
+def library_with(problem: Problem, choice: Chosen) -> LatticeLibrary:
+    """`lattice_library` with other trims, for a vehicle that switches at will; not kept."""
+    return _library(
+        problem.automaton,
+        problem.cost,
+        problem.footprint,
+        tuple(problem.parts.items()),
+        fixed_time=problem.horizon.time is not None,
+        waits=problem.moves,
+        min_coast=problem.horizon.min_coast,
+        limited=_limited(problem),
+        choice=choice,
+    )
+
+
+def _limited(problem: Problem) -> bool:
+    """Whether a plan may last only so long."""
+    return problem.horizon.time is not None or problem.horizon.max_time is not None
 
 
 def _library(
@@ -84,10 +106,18 @@ def _library(
     fixed_time: bool,
     waits: bool,
     min_coast: float,
+    limited: bool,
+    choice: Chosen | None = None,
 ) -> LatticeLibrary:
     if automaton.is_kinematic and automaton.model.group.dof == 3:
         trims = trims_at_will(
-            automaton, cost, fixed_time=fixed_time, waits=waits, min_coast=min_coast
+            automaton,
+            cost,
+            fixed_time=fixed_time,
+            waits=waits,
+            min_coast=min_coast,
+            limited=limited,
+            choice=choice,
         )
     else:
         trims = trims_of(priced_library(automaton, cost), cost)
@@ -121,7 +151,7 @@ def library_of_trims(
     )
     return LatticeLibrary(
         arrays=made,
-        backwards=made._replace(moves=moves_of(twists, -durations)),
+        backwards=made._replace(**coasts_of(twists, -durations, made.body)._asdict()),
         priced=library,
         parts=parts,
         trims=library.trims,

@@ -13,7 +13,7 @@ from maneuver_automaton.search import _kernels_lattice as kernels
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.distance_grid import DistanceGrid
-from maneuver_automaton.search.lattice_arrays import LatticeArrays, moves_of
+from maneuver_automaton.search.lattice_arrays import LatticeArrays, coasts_of
 from maneuver_automaton.search.lattice_memory import (
     SearchArrays,
     begin_anew,
@@ -179,7 +179,8 @@ def _with_coasts(query: LatticeQuery, resolution: Resolution, sign: float) -> La
         lasting = np.asarray(twists.any(axis=1))[:, None] & (durations > 0.0)
         least = query.least_coast * np.array([1.0, LONGER])
         durations = np.where(lasting, np.maximum(durations, least), durations)
-    return library._replace(edge_durations=durations, moves=moves_of(twists, sign * durations))
+    coasts = coasts_of(twists, sign * durations, library.body)
+    return library._replace(edge_durations=durations, **coasts._asdict())
 
 
 def _word(one: Pass) -> Word:

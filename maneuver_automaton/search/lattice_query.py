@@ -145,20 +145,24 @@ class LatticeQuery:
 
 
 def lattice_query(
-    problem: Problem, goals: Sequence[int], *, prepared: Prepared = RECENT
+    problem: Problem,
+    goals: Sequence[int],
+    *,
+    prepared: Prepared = RECENT,
+    library: LatticeLibrary | None = None,
 ) -> LatticeQuery:
     """The query of a search from the start of a problem to the goals of these numbers.
 
     A vehicle that switches at will begins and ends in any trim. Unless it does so in a plane,
     several headings are asked for where any will do: best times then let the heading go. A fixed
-    time is a longest one, since rest fills it.
+    time is a longest one, since rest fills it. A `library` takes the place of the usual one.
 
     Raises
     ------
     ValueError
         If a maneuver has no course, and so no known cost.
     """
-    library = lattice_library(problem, goals, prepared=prepared)
+    library = library or lattice_library(problem, goals, prepared=prepared)
     worlds, horizon = worlds_around(problem, library.parts, prepared=prepared), problem.horizon
     turns = library.at_will  # at the end, to any heading
     rows = [

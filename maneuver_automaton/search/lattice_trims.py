@@ -14,6 +14,7 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.headings import origin_of
 from maneuver_automaton.costs import StageCost
 from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.search.trim_choice import coarse_trims
 from maneuver_automaton.words.library import (
     NO_TRIM,
     STRAIGHT,
@@ -26,7 +27,7 @@ from maneuver_automaton.words.library import (
 )
 from maneuver_automaton.words.transitions import identities
 
-MOST_TRIMS = 10  # of a larger library the most useful ones
+MOST_TRIMS = 10  # moving; of a larger library a few stand for all where the lattice is searched
 TURN = 4.0  # length scales that a full turn is taken for, whose radius the speed decides
 WORDS_AN_EXPANSION = 150.0  # words of a connection that take as long as an expansion
 MOST_INTERVAL = 400.0  # expansions between two connections that are tried
@@ -44,17 +45,37 @@ class PricedTrims(NamedTuple):
     at_will: bool  # whether plans begin and end in any trim
 
 
+class Chosen(NamedTuple):
+    """Trims of a large library that a search uses, by their indices in the automaton."""
+
+    words: tuple[int, ...]  # that words of connections are made of
+    others: tuple[int, ...] = ()  # that a known word has beside them
+
+
 def trims_at_will(
-    automaton: Automaton, cost: StageCost, *, fixed_time: bool, waits: bool, min_coast: float
+    automaton: Automaton,
+    cost: StageCost,
+    *,
+    fixed_time: bool,
+    waits: bool,
+    min_coast: float,
+    limited: bool = False,
+    choice: Chosen | None = None,
 ) -> PricedTrims:
     """The most useful trims in the plane of a vehicle that switches at will between all.
 
-    `waits`: rest is a trim like any other, since obstacles move.
+    `waits`: rest is a trim like any other, since obstacles move; `limited`: so is the time, and
+    the fastest trims of a large library are taken. A `choice` says which are taken instead.
     """
     known = moving_trims(automaton, cost)
     pads = fixed_time and known.rest is not None
     rates = known.rates - (known.rest_rate if pads else 0.0)
-    chosen = _most_useful(known.twists, rates)
+    if choice is not None:
+        chosen = np.flatnonzero(np.isin(known.trims, choice.words + choice.others))
+    elif len(known.trims) <= MOST_TRIMS:
+        chosen = np.arange(len(known.trims))
+    else:
+        chosen = coarse_trims(known.twists, np.ones(len(rates)) if limited else rates)
     trims = known.trims[chosen]
     twists, rates = known.twists[chosen, :3], rates[chosen]
     twists[np.abs(twists[:, 2]) < STRAIGHT, 2] = 0.0
@@ -64,6 +85,8 @@ def trims_at_will(
         twists = np.vstack([twists, np.zeros(3)])
         rates = np.append(rates, 0.0 if pads else known.rest_rate)
     moving, m = np.flatnonzero(twists.any(axis=1)), len(trims)
+    if choice is not None:
+        moving = moving[np.isin(trims[moving], choice.words)]
     words = _words(moving, twists)
     arrays = library_arrays(four_columns(twists), rates, identities(automaton), trims=trims)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -93,6 +116,13 @@ def trims_at_will(
         interval=(0.0, math.inf),
         at_will=True,
     )
+
+
+def stands_for_more(problem: Problem) -> bool:
+    """Whether a few trims stand for all where trims are switched at will in the plane."""
+    automaton = problem.automaton
+    planar = automaton.is_kinematic and automaton.model.group.dof == 3
+    return planar and len(moving_trims(automaton, problem.cost).trims) > MOST_TRIMS
 
 
 def trims_of(library: Library, cost: StageCost) -> PricedTrims:
@@ -163,42 +193,3 @@ def _words(moving: IntArray, twists: Array) -> IntArray:
         (i, i, i) for i in every
     ]
     return np.array(words, dtype=np.int64).reshape(-1, 3)
-
-
-def _most_useful(twists: Array, rates: Array) -> IntArray:
-    """All trims of a small library; of a large one straight, sharp and middling turns, and spins.
-
-    For each kind the cheapest for the path or the turn it makes, and the fastest.
-    """
-    n = len(twists)
-    if n <= MOST_TRIMS:
-        return np.arange(n)
-    speed = np.hypot(twists[:, 0], twists[:, 1])
-    turn = twists[:, 2]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        curvature = np.where(speed > 0.0, turn / speed, 0.0)
-    drives = speed > 0.0
-    sharpest = float(np.abs(curvature[drives]).max()) if drives.any() else 0.0
-    kinds = []
-    for gear in (1.0, -1.0):
-        going = drives & (np.sign(twists[:, 0]) == gear)
-        kinds += [going & (curvature == 0.0)]
-        for side in (1.0, -1.0):
-            turning = going & (np.sign(curvature) == side)
-            gentle = turning & (np.abs(curvature) <= 0.3 * min(sharpest, 4.0))
-            kinds += [turning & ~gentle, gentle]
-    for side in (1.0, -1.0):
-        kinds.append(~drives & (np.sign(turn) == side))
-        kinds.append((twists[:, 0] == 0.0) & (np.sign(twists[:, 1]) == side) & (turn == 0.0))
-    chosen: list[int] = []
-    amount = np.where(drives, speed, np.abs(turn))
-    for kind in kinds:
-        members = np.flatnonzero(kind)
-        if not members.size:
-            continue
-        price = rates[members] / amount[members]
-        order = np.lexsort((-amount[members], np.round(price, 9)))
-        chosen.append(int(members[order[0]]))
-    fastest = int(np.argmax(np.where(turn == 0.0, speed, -1.0)))
-    chosen.append(fastest)
-    return np.array(sorted(set(chosen)), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Rests along a path that is free of static obstacles, so that moving obstacles pass."""
+"""Whether a word is free as it is driven, and rests along it so that moving obstacles pass."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.groups.chain import chained
+from maneuver_automaton.groups.chain import coasted
 from maneuver_automaton.search import _kernels_waiting as kernels
 from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
@@ -18,6 +18,7 @@ from maneuver_automaton.words.word import Word
 MOST_PIECES = 60  # joints at which it may wait
 MOST_STATES = 4096  # of joints, each for a stretch of time
 TICK = 0.1  # [s] between departures that are tried
+SHORT_TURN = 0.2  # [rad] of the pieces whose bulge is bounded
 
 
 class PathArrays(NamedTuple):
@@ -49,13 +50,62 @@ def with_waits(query: LatticeQuery, word: Word) -> Word | None:
     twists = library.library.twists
     still = np.flatnonzero(~twists[: library.library.n_trims].any(axis=1))
     rest = int(still[0]) if still.size else -1
-    trims, durations = _pieces(word, query)
-    quiet = query.world.last_event - query.problem.start_time
-    steps = SE2.exp(durations[:, None] * twists[trims, :3]).pose
+    path = _path_of(query, *_pieces(word, query))
+    state = _arrival(query, path, rest)
+    if state < 0:
+        return None
+    parts = _with_fewer_rests(query, _with_rests(path, state, rest), rest)
+    driven = [(SWITCH, int(query.library.trims[trim]), t) for trim, t in parts]
+    return with_cost(query.word_of(driven, word.goal), query)
+
+
+def _with_fewer_rests(
+    query: LatticeQuery, parts: list[tuple[int, float]], rest: int
+) -> list[tuple[int, float]]:
+    """The same arrival with rests together, where they stood apart: fewer switches are cheaper.
+
+    Each rest, the last first, is taken at an earlier one or at the start, if that is free.
+    """
+    at = len(parts) - 1
+    while at > 0:
+        if parts[at][0] == rest:
+            earlier = [k for k in range(at) if parts[k][0] == rest]
+            for to in dict.fromkeys([*earlier[-1:], *earlier[:1], 0]):
+                moved = [*parts[:at], *parts[at + 1 :]]
+                if moved[to][0] == rest:
+                    moved[to] = (rest, moved[to][1] + parts[at][1])
+                else:
+                    moved.insert(to, (rest, parts[at][1]))
+                trims, durations = (np.array(column) for column in zip(*moved, strict=True))
+                if _arrival(query, _path_of(query, trims, durations), -1) >= 0:
+                    parts = moved
+                    break
+        at -= 1
+    return parts
+
+
+def is_free(query: LatticeQuery, word: Word) -> bool:
+    """Whether a word without maneuvers stays inside the window, and is proven free as it is.
+
+    Its trims are in the library of the query.
+    """
+    library = query.library.arrays
+    numbers = query.library.number_of[word.trims]
+    twists = library.library.twists[numbers, :3]
+    poses = coasted(query.start[:3], twists, word.durations)
+    if not _inside(query.window, poses[:-1], twists, word.durations):
+        return False
+    path = _path_of(query, np.asarray(numbers, dtype=np.int64), np.array(word.durations))
+    return _arrival(query, path, -1) >= 0
+
+
+def _path_of(query: LatticeQuery, trims: IntArray, durations: Array) -> PathArrays:
+    """A path in pieces from the start of a query, and room for the states along it."""
+    twists = query.library.arrays.library.twists
     poses = np.zeros((len(trims) + 1, 4))
-    poses[:, :3] = chained(query.start[:3], steps)
+    poses[:, :3] = coasted(query.start[:3], twists[trims, :3], durations)
     poses[:, 3] = query.start[3] + np.append(0.0, np.cumsum(durations * twists[trims, 3]))
-    path = PathArrays(
+    return PathArrays(
         trims=trims,
         durations=durations,
         poses=poses,
@@ -66,14 +116,41 @@ def with_waits(query: LatticeQuery, word: Word) -> Word | None:
         keys=np.empty(MOST_STATES),
         items=np.empty(MOST_STATES, dtype=np.int64),
     )
+
+
+def _arrival(query: LatticeQuery, path: PathArrays, rest: int) -> int:
+    """The state in which a path ends first, if it may wait in the trim `rest`; -1 for none."""
+    quiet = max(query.world.last_event - query.problem.start_time, 0.0)
     clock, most, stay = float(query.start_time), float(query.most_time), float(query.stay_until)
-    clocks = clock, most, stay, max(quiet, 0.0)
-    state = kernels.earliest_arrival(library, query.scene(), clocks, path, rest, TICK)
-    if state < 0:
-        return None
-    parts = _with_rests(path, state, rest)
-    driven = [(SWITCH, int(query.library.trims[trim]), t) for trim, t in parts]
-    return with_cost(query.word_of(driven, word.goal), query)
+    clocks = clock, most, stay, quiet
+    state = kernels.earliest_arrival(query.library.arrays, query.scene(), clocks, path, rest, TICK)
+    return int(state)
+
+
+def _inside(window: Array, poses: Array, twists: Array, durations: Array) -> bool:
+    """Whether motions stay inside a window (9,), as in `_kernels_window`; some near its rim do not.
+
+    They are looked at in short pieces: where both ends are inside by the bulge of the arc between
+    them, so is the arc. Without bounds the window is far from everything.
+    """
+    turns = np.abs(twists[:, 2]) * durations
+    counts = np.maximum(1, np.ceil(turns / SHORT_TURN).astype(int))
+    times, steps = np.repeat(durations / counts, counts), np.repeat(np.arange(len(counts)), counts)
+    firsts = np.repeat(np.cumsum(counts) - counts, counts)
+    begins = times * (np.arange(len(steps)) - firsts)
+    before = SE2(poses[steps]) @ SE2.exp(begins[:, None] * twists[steps])
+    after = before @ SE2.exp(times[:, None] * twists[steps])
+    lengths = np.hypot(twists[steps, 0], twists[steps, 1]) * times
+    bulge = 0.5 * lengths * np.tan(0.25 * np.abs(twists[steps, 2]) * times)  # at most: of chords
+    slack = window[8] - bulge
+    for place in (before.pose[:, :2], after.pose[:, :2]):
+        x, y = place[:, 0] - window[4], place[:, 1] - window[5]
+        seen_x, seen_y = window[6] * x - window[7] * y, window[7] * x + window[6] * y
+        inside = (seen_x >= window[0] - slack) & (seen_x <= window[2] + slack)
+        inside &= (seen_y >= window[1] - slack) & (seen_y <= window[3] + slack)
+        if not inside.all():
+            return False
+    return True
 
 
 def _pieces(word: Word, query: LatticeQuery) -> tuple[IntArray, Array]:

@@ -133,9 +133,84 @@ def test_what_is_wrong(tmp_path, old, new, message):
     assert message_of(read, problem(tmp_path), PROBLEM.replace(old, new)) == message
 
 
-def test_two_robots(tmp_path):
-    text = PROBLEM + "  - {type: unicycle1_v0, start: [0, 0, 0], goal: [1, 1, 1]}\n"
-    assert message_of(read, problem(tmp_path), text) == ":9: robots: got 2 robots, need one"
+SECOND_ROBOT = "  - {type: car1_v0, start: [0, 0, 0, 0], goal: [1, 1, 1, 1]}\n"
+THIRD_ROBOT = "  - {type: unicycle1_v0, start: [0, 3, 0], goal: [1, 3, 1]}\n"
+
+
+def test_several_robots_are_a_fleet(tmp_path):
+    case = read(problem(tmp_path, PROBLEM + SECOND_ROBOT + THIRD_ROBOT))
+    assert (case.name, case.start, case.vehicle) == ("yard", None, None)
+    one, two, three = case.fleet
+    assert [robot.name for robot in case.fleet] == ["robot 1", "robot 2", "robot 3"]
+    assert one.start.tolist() == [1.0, 0.0, 0.0]
+    assert two.goal.tolist() == [1.0, 1.0, 1.0]
+    assert one.vehicle is three.vehicle  # one library for both
+    assert "trailer" in two.vehicle.parts
+    assert all(robot.obstacles is case.obstacles for robot in case.fleet)
+    scenario = load_scenario(problem(tmp_path, PROBLEM + SECOND_ROBOT + THIRD_ROBOT))
+    assert scenario.fleet.names == ("robot 1", "robot 2", "robot 3")
+    alone = load_scenario(problem(tmp_path, PROBLEM)).problem
+    of_fleet = scenario.fleet.problems[0]
+    assert of_fleet.start.tolist() == alone.start.tolist()
+    assert of_fleet.automaton.controls.tolist() == alone.automaton.controls.tolist()
+    assert of_fleet.automaton is scenario.fleet.problems[2].automaton
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (SECOND_ROBOT, "  - {type: tank, start: [0, 0, 0], goal: [1, 1, 1]}\n",
+         ":13: robots[1].type: got 'tank', which is not built in, and there is no "
+         f"models/tank.yaml above this file; need {READ}"),
+        ("goal: [1, 1, 1, 1]", "goal: [1, 1, 1]", ":13: robots[1].goal: got 3 numbers, need 4: "
+         "[x, y, heading, heading of the trailer]"),
+        ("goal: [1, 1, 1, 1]", "goal: [1, 1, 1, 4]",
+         ":13: robots[1].goal: got the hitch -3, need -0.785398 to 0.785398"),
+        ("start: [0, 3, 0]", "start: [0, 3, 1e9]",
+         ":14: robots[2].start[2]: got the heading 1e+09, need at most 1e+06 rad"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_one_of_several(tmp_path, old, new, message):
+    text = PROBLEM + SECOND_ROBOT + THIRD_ROBOT
+    assert text.count(old) == 1
+    assert message_of(read, problem(tmp_path), text.replace(old, new)) == message
+
+
+def test_no_robot(tmp_path):
+    text = PROBLEM[: PROBLEM.index("robots:")] + "robots: []\n"
+    assert (
+        message_of(read, problem(tmp_path), text) == ":9: robots: got no robot, need at least one"
+    )
+
+
+def test_the_names_of_db_cbs(tmp_path):
+    for name, same in (("unicycle_first_order_0", "unicycle1_v0"),):
+        case, known = (
+            read(problem(tmp_path, PROBLEM.replace("unicycle1_v0", n))) for n in (name, same)
+        )
+        assert controls(case) == controls(known)
+        assert case.footprint[0].size.tolist() == known.footprint[0].size.tolist()
+    disc = read(problem(tmp_path, PROBLEM.replace("unicycle1_v0", "unicycle_first_order_0_sphere")))
+    assert disc.vehicle.limits.tolist() == [[-0.5, 0.5], [-2.0, 2.0]]
+    assert (disc.footprint[0].radius, disc.footprint[0].center.tolist()) == (0.4, [0.0, 0.0])
+
+
+@needs_data
+@pytest.mark.parametrize("name", sorted(p.name for p in (DATA / "fleet/db-cbs").glob("*.yaml")))
+def test_the_examples_of_db_cbs(name):
+    path = DATA / "fleet/db-cbs" / name
+    document = parse(read_text(path), name=str(path)).value
+    fleet = load_scenario(path).fleet
+    assert len(fleet) == len(document["robots"])
+    assert len({id(one.automaton) for one in fleet.problems}) == len(
+        {robot["type"] for robot in document["robots"]}
+    )
+    for robot, one in zip(document["robots"], fleet.problems, strict=True):
+        assert one.start.tolist() == robot["start"][:3]
+        assert one.goals[0].pose.tolist() == robot["goal"][:3]
+        assert len(one.obstacles) == len(document["environment"]["obstacles"])
+        assert one.bounds.x == (0.0, document["environment"]["max"][0])
+        assert one.automaton.rest is not None
 
 
 @pytest.mark.parametrize(
@@ -144,7 +219,8 @@ def test_two_robots(tmp_path):
         ("max_vel: 1.5\n", "", ":1: max_vel: is missing, need a finite number"),
         ("max_vel: 1.5", "max_vel: -1", ":2: max_vel: got -1, need more than min_vel, -0.5"),
         ("[.8, .4]", "[.8]", ":6: size: got 1 numbers, need 2: [length, width]"),
-        ('"box"', "sphere", ":7: shape: got 'sphere', need box"),
+        ('"box"', "cone", ":7: shape: got 'cone', need box or sphere"),
+        ('"box"', "sphere", ":1: radius: is missing, need a finite number"),
         (MODEL, "", ": is empty, need a model"),
     ],
 )

@@ -15,6 +15,7 @@ from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.scenario import load_scenario
 from tests.formats import (
     test_benchmr,
+    test_cl_cbs,
     test_dynobench,
     test_movingai,
     test_nav2_map,
@@ -22,6 +23,7 @@ from tests.formats import (
     test_tpcap,
 )
 from tests.quickly import draws
+from tests.scenario import test_fleet
 from tests.scenario.files import SCENARIO
 from tests.scenario.test_loading import BESIDE
 from tests.scenario.test_obstacles import WORLD
@@ -63,8 +65,11 @@ FILES = {
     "worlds/cart.svg": (test_benchmr.ROBOT.encode(), "worlds/yard.svg"),
     "queries.csv": (test_benchmr.QUERIES.encode(), "queries.csv"),
     "world.yaml": ((SCENARIO + WORLD).encode(), "world.yaml"),
+    "fleet.yaml": (test_fleet.FLEET.encode(), "fleet.yaml"),
+    "cars.yaml": (test_cl_cbs.PROBLEM.encode(), "cars.yaml"),
+    "robots.yaml": ((test_dynobench.PROBLEM + test_dynobench.SECOND_ROBOT).encode(), "robots.yaml"),
 }
-ALONE = ("Case0.csv", "yard.yaml", "world.yaml")
+ALONE = ("Case0.csv", "yard.yaml", "world.yaml", "fleet.yaml", "cars.yaml", "robots.yaml")
 
 
 @st.composite
@@ -110,4 +115,5 @@ def test_it_is_a_problem_or_one_line(folder, name):
         tried()
     finally:
         (folder / name).write_bytes(content)
-    assert load_scenario(folder / loaded, beside=beside, case=case).problem.start.size == 3
+    again = load_scenario(folder / loaded, beside=beside, case=case)
+    assert again.problems[0].start.size == 3

@@ -307,11 +307,15 @@ def test_what_a_file_cannot_state():
 
 def test_the_json_schema_knows_every_key():
     schema = json_schema()
-    assert schema["required"] == ["schema", "vehicle", "automaton", "start", "goal"]
+    assert schema["oneOf"] == [
+        {"required": ["schema", "vehicle", "automaton", "start", "goal"]},
+        {"required": ["schema", "vehicles"]},
+    ]
     assert "null" not in str(schema)
     assert schema["$defs"]["HorizonPart"]["properties"].keys() == {
         "time_s",
         "max_trims",
         "min_coast_s",
         "max_time_s",
+        "stay",
     }

@@ -1,0 +1,90 @@
+"""The table of a fleet: a row for each vehicle, and what holds of all together."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from maneuver_automaton.cli.tables import console, spoken, table
+
+if TYPE_CHECKING:
+    from maneuver_automaton.fleet import Closest, FleetResult
+
+MOST_PAIRS = 3  # that are named, the nearest first
+
+
+def print_fleet(name: str, result: FleetResult, *, folder: str) -> None:
+    """Cost, arrival, clearance and length of every plan; sums, bound, gap, and who is nearest."""
+    from rich.text import Text
+
+    out = console()
+    rows = [
+        [
+            vehicle,
+            one.status.value,
+            _shown(one.cost, 6),
+            "" if one.plan is None else f"{one.plan.start_time + one.plan.duration:.6g}",
+            _shown(one.clearance_m, 3),
+            "" if one.plan is None else str(len(one.plan.primitives)),
+        ]
+        for vehicle, one in result.results.items()
+    ]
+    columns = ["vehicle", "status", "cost", "arrival [s]", "clearance [m]", "primitives"]
+    out.print(table(name, columns, rows, numbers=(2, 3, 4, 5)))
+    for what, value in _facts(result, folder).items():
+        if value:
+            out.print(Text(f"  {what + ':':<16}{value}"), soft_wrap=True)
+
+
+def _facts(result: FleetResult, folder: str) -> dict[str, str]:
+    n, of = len(result.plans), len(result.results)
+    kept = f", {result.problem.margin:g} m asked for" if result.problem.margin else ""
+    near = "; ".join(map(_pair, result.closest[:MOST_PAIRS]))
+    return {
+        "plans": f"{n} of {of}",
+        "cost": f"{result.cost:.9g}{_bound(result)}",
+        "sum": f"{result.sum_s:.9g} s",
+        "last arrival": f"{result.last_s:.9g} s",
+        "apart": f"{result.clearance_m:.3g} m at least{kept}"
+        if math.isfinite(result.clearance_m)
+        else "",
+        "nearest": near,
+        "order": ", ".join(result.order),
+        "timing": ", ".join(f"{spoken(k)} {v:.3f} s" for k, v in result.timing_s.items()),
+        "counts": ", ".join(f"{spoken(k)} {v}" for k, v in result.counts.items()),
+        "written to": folder,
+    }
+
+
+def least_clearance(result: FleetResult) -> float | None:
+    """The least distance [m] of any vehicle to an obstacle or another one; None if there is none.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.fleet import FleetProblem, FleetResult, FleetStatus
+    >>> from maneuver_automaton import Automaton, Problem, Unicycle
+    >>> alone = Problem(Automaton.of_controls(Unicycle(), {"on": (1, 0)}), [0, 0, 0], [1, 0, 0])
+    >>> fleet = FleetProblem([alone])
+    >>> least_clearance(FleetResult(problem=fleet, status=FleetStatus.NO_PLAN, results={}))
+    """
+    to_obstacles = [
+        one.clearance_m for one in result.results.values() if one.clearance_m is not None
+    ]
+    least = min([result.clearance_m, *to_obstacles])
+    return least if math.isfinite(least) else None
+
+
+def _bound(result: FleetResult) -> str:
+    if result.gap is None:
+        return ""
+    bound = f"{result.lower_bound:.9g}" + (" s" if result.objective == "last" else "")
+    of = "" if result.objective == "sum" else " of the last arrival"
+    return f" (at least {bound}{of}, gap {100 * result.gap:.2g} %)"
+
+
+def _pair(one: Closest) -> str:
+    return f"{' and '.join(one.pair)} {one.distance_m:.3g} m at {one.time_s:.4g} s"
+
+
+def _shown(value: float | None, digits: int) -> str:
+    return "" if value is None or math.isinf(value) else f"{value:.{digits}g}"

@@ -1,0 +1,199 @@
+"""What a body covers along a motion, as convex polygons, and whether solids keep out of it.
+
+One test of a polygon that holds the whole motion spares the tests of the poses along it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
+from maneuver_automaton.collision._kernels_clearance import separation
+
+if TYPE_CHECKING:
+    from maneuver_automaton._arrays import Array, IntArray
+    from maneuver_automaton.collision.body import Body
+    from maneuver_automaton.collision.swept_areas import SweptAreas
+    from maneuver_automaton.collision.world import WorldArrays
+
+WIDEST = 0.5 * math.pi  # [rad] of a turn whose tangents hold it closely
+SHORT = 1e-9  # [m] of an edge without a normal
+FREE, UNKNOWN = -1, -2  # in place of the solid that is not parted from a motion
+
+
+@inner_kernel
+def hull_of(points: Array, n: int, hull: Array) -> int:
+    """Corners of the convex hull of `n` points, counter-clockwise; how many. Sorts the points.
+
+    `hull` has room for twice as many.
+    Source: Andrew (1979), *Another efficient algorithm for convex hulls in two dimensions*.
+    """
+    for k in range(1, n):
+        x, y = points[k, 0], points[k, 1]
+        j = k
+        while j > 0 and (points[j - 1, 0] > x or (points[j - 1, 0] == x and points[j - 1, 1] > y)):
+            points[j, 0], points[j, 1] = points[j - 1, 0], points[j - 1, 1]
+            j -= 1
+        points[j, 0], points[j, 1] = x, y
+    # From left to right along the lower side, then back along the upper one: a corner that does not
+    # turn left between its neighbours is none.
+    m, base = 0, 2
+    for step in range(2 * n - 1):
+        k = step if step < n else 2 * n - 2 - step
+        if step == n:
+            base = m + 1
+        x, y = points[k, 0], points[k, 1]
+        if m > 0 and hull[m - 1, 0] == x and hull[m - 1, 1] == y:
+            continue
+        while m >= base:
+            a_x, a_y = hull[m - 2, 0], hull[m - 2, 1]
+            b_x, b_y = hull[m - 1, 0], hull[m - 1, 1]
+            if (b_x - a_x) * (y - a_y) - (b_y - a_y) * (x - a_x) > 0.0:
+                break
+            m -= 1
+        hull[m, 0], hull[m, 1] = x, y
+        m += 1
+    return max(m - 1, 1)  # the last one is the first
+
+
+@kernel
+def sweep(
+    edges: Array, first: IntArray, radius: Array, twists: Array, durations: Array
+) -> tuple[Array, IntArray, Array]:
+    """The rows of `SweptAreas` for every twist (m, 3 or more) and duration (m, k), signs included.
+
+    A corner that turns is between the chord of its arc and the tangents at both ends and in the
+    middle, so what these corners span holds all that the body covers.
+    """
+    n_pieces = first.shape[0] - 1
+    n_motions = durations.shape[0] * durations.shape[1]
+    most = 4 * edges.shape[0]
+    rows = np.empty((n_motions * most, 5))
+    starts = np.zeros(n_motions * n_pieces + 1, dtype=np.int64)
+    places = np.empty((n_motions, 5))
+    points, hull = np.empty((most, 2)), np.empty((2 * most, 2))
+    used = 0
+    for motion in range(n_motions):
+        trim, q = motion // durations.shape[1], motion % durations.shape[1]
+        v_x, v_y, turn_rate = twists[trim, 0], twists[trim, 1], twists[trim, 2]
+        t = durations[trim, q]
+        turn = turn_rate * t
+        c, s = math.cos(turn), math.sin(turn)
+        # Half of the chord, and how far the tangents reach, without a quotient of zeros.
+        half, quarter = 0.5 * turn, 0.25 * turn
+        scale = t if half == 0.0 else t * (math.sin(half) / half)
+        ahead, aside = scale * math.cos(half), scale * math.sin(half)
+        d_x, d_y = ahead * v_x - aside * v_y, aside * v_x + ahead * v_y
+        along = 0.25 * t if quarter == 0.0 else 0.25 * t * (math.tan(quarter) / quarter)
+        begin = used
+        for b in range(n_pieces):
+            n = 0
+            for j in range(first[b], first[b + 1]):
+                x, y = edges[j, 0], edges[j, 1]
+                e_x, e_y = d_x + c * x - s * y, d_y + s * x + c * y
+                u_x, u_y = along * (v_x - turn_rate * y), along * (v_y + turn_rate * x)
+                points[n, 0], points[n, 1] = x, y
+                points[n + 1, 0], points[n + 1, 1] = x + u_x, y + u_y
+                points[n + 2, 0], points[n + 2, 1] = (
+                    e_x - c * u_x + s * u_y,
+                    e_y - s * u_x - c * u_y,
+                )
+                points[n + 3, 0], points[n + 3, 1] = e_x, e_y
+                n += 4
+            m = hull_of(points, n, hull)
+            for k in range(m):
+                before = k - 1 if k > 0 else m - 1
+                n_x, n_y = hull[k, 1] - hull[before, 1], hull[before, 0] - hull[k, 0]
+                length = math.sqrt(n_x * n_x + n_y * n_y)
+                # An edge that is all rounding has no normal: it parts the area from nothing.
+                n_x = n_x / length if length > SHORT else 0.0
+                n_y = n_y / length if length > SHORT else 0.0
+                # The offset holds all points, also where rounding has bent a normal.
+                offset = -math.inf
+                for j in range(n):
+                    offset = max(offset, n_x * points[j, 0] + n_y * points[j, 1])
+                rows[used, 0], rows[used, 1] = hull[k, 0], hull[k, 1]
+                rows[used, 2], rows[used, 3], rows[used, 4] = n_x, n_y, offset
+                used += 1
+            starts[motion * n_pieces + b + 1] = used
+        # The middle of the two corners that are farthest apart: of what is long, the disc around it
+        # is hardly larger than the least one.
+        m_x, m_y, widest = rows[begin, 0], rows[begin, 1], 0.0
+        for j in range(begin, used):
+            for k in range(begin, j):
+                e_x, e_y = rows[j, 0] - rows[k, 0], rows[j, 1] - rows[k, 1]
+                if e_x * e_x + e_y * e_y > widest:
+                    widest = e_x * e_x + e_y * e_y
+                    m_x, m_y = 0.5 * (rows[j, 0] + rows[k, 0]), 0.5 * (rows[j, 1] + rows[k, 1])
+        reach = 0.0
+        for b in range(n_pieces):
+            for j in range(starts[motion * n_pieces + b], starts[motion * n_pieces + b + 1]):
+                e_x, e_y = rows[j, 0] - m_x, rows[j, 1] - m_y
+                reach = max(reach, math.sqrt(e_x * e_x + e_y * e_y) + radius[b])
+        places[motion, 0], places[motion, 1] = m_x, m_y
+        places[motion, 2] = reach if abs(turn) <= WIDEST else math.inf
+        places[motion, 3], places[motion, 4] = c, s
+    return rows[:used].copy(), starts, places
+
+
+@bare_inner_kernel
+def not_parted(
+    world: WorldArrays,
+    body: Body,
+    swept: SweptAreas,
+    motion: int,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    enough: float,
+) -> int:
+    """A solid that is not parted by more than `enough` from all that a motion covers; or FREE.
+
+    The motion begins at (x, y, cos, sin). UNKNOWN where it covers more than the buckets know.
+    """
+    # FREE is a proof for the whole motion: its polygons hold all that the body covers, the lists of
+    # the buckets all solids within `reach`, and along an axis each is farther than `enough`.
+    buckets, solids = world.buckets, world.solids
+    reach = swept.places[motion, 2] + enough
+    if not reach <= body.reach + buckets.reach:
+        return UNKNOWN
+    m_x = x + c * swept.places[motion, 0] - s * swept.places[motion, 1]
+    m_y = y + s * swept.places[motion, 0] + c * swept.places[motion, 1]
+    i = math.floor((m_x - buckets.origin_x) / buckets.cell)
+    j = math.floor((m_y - buckets.origin_y) / buckets.cell)
+    if not (0 <= i < buckets.columns and 0 <= j < buckets.rows):
+        return FREE
+    k = j * buckets.columns + i
+    n_pieces = body.first.shape[0] - 1
+    for item in range(buckets.start[k], buckets.start[k + 1]):
+        p = buckets.items[item]
+        d_x = max(max(solids.plates[p, 0] - m_x, m_x - solids.plates[p, 2]), 0.0)
+        d_y = max(max(solids.plates[p, 1] - m_y, m_y - solids.plates[p, 3]), 0.0)
+        if d_x * d_x + d_y * d_y >= reach * reach:
+            continue
+        for b in range(n_pieces):
+            wanted = enough + body.radius[b] + solids.plates[p, 4]
+            piece = motion * n_pieces + b
+            apart, _, _ = separation(swept, piece, x, y, c, s, solids, p, wanted)
+            if not apart > wanted:
+                return int(p)
+    return FREE
+
+
+@bare_inner_kernel
+def overlaps(
+    world: WorldArrays, body: Body, x: float, y: float, c: float, s: float, p: int
+) -> bool:
+    """Whether the core of the body at (x, y, cos, sin) surely overlaps that of one solid."""
+    n_corners = world.solids.first[p + 1] - world.solids.first[p]
+    for b in range(body.first.shape[0] - 1):
+        # Normals do not part a point from a line beyond its end, nor two points.
+        if body.first[b + 1] - body.first[b] + n_corners > 3:
+            apart, _, _ = separation(body, b, x, y, c, s, world.solids, p, 0.0)
+            if apart <= 0.0:
+                return True
+    return False

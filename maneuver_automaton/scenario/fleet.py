@@ -1,0 +1,229 @@
+"""Scenarios of several vehicles: each entry with the top of the file is a scenario of its own."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from maneuver_automaton._brief import brief
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.fleet import FleetProblem
+from maneuver_automaton.formats.statement import MapFile, Statement
+from maneuver_automaton.formats.yaml_source import Document, Where, shown
+from maneuver_automaton.models import Model
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.scenario.combining import combined, own_scenario
+from maneuver_automaton.scenario.fleet_schema import OWN, SHARED, FleetFile, FleetPart, VehicleEntry
+from maneuver_automaton.scenario.places import at
+from maneuver_automaton.scenario.reading import check_schema, checked
+from maneuver_automaton.scenario.scenario import Made, Scenario, scenario_of_document
+from maneuver_automaton.scenario.schema import RecedingHorizonPart, ScenarioFile
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class FleetScenario:
+    """What a file of several vehicles describes: their problems, and how they are planned."""
+
+    name: str
+    fleet: FleetProblem
+    vehicles: tuple[Scenario, ...]  # each alone, in the order of the file
+    settings: FleetPart = field(default_factory=FleetPart)
+    receding_horizon: RecedingHorizonPart | None = None
+    maps: tuple[MapFile, ...] = ()  # files of the maps among the obstacles of any
+    path: Path | None = None
+    timing_s: Mapping[str, float] = field(default_factory=dict)  # load, automaton [s]
+
+    __repr__ = brief
+
+    @property
+    def time_limit_s(self) -> float:
+        """Upper bound for planning them all [s]."""
+        return self.settings.time_limit_s
+
+    @property
+    def problems(self) -> tuple[Problem, ...]:
+        """Those of all vehicles."""
+        return self.fleet.problems
+
+
+def states_several(document: Document) -> bool:
+    """Whether a scenario file is one of several vehicles."""
+    value = document.value
+    return isinstance(value, dict) and not {"vehicles", "fleet"}.isdisjoint(value)
+
+
+def fleet_of_document(
+    document: Document, *, path: Path | None, begin: float, own: Model | None = None
+) -> FleetScenario:
+    """The scenario of a YAML file of several vehicles that was read since `begin` [s].
+
+    Raises
+    ------
+    InvalidScenario
+        If it cannot be used: one line with file, line, field, the value met, and what would be
+        right.
+    """
+    check_schema(document)
+    for key in ("start", "goal"):
+        if key in document.value:
+            raise document.error((key,), "stands beside vehicles, need it in each of them instead")
+    file = checked(document, FleetFile, own=own, several=True)
+    made: Made = {}
+    alone = [
+        scenario_of_document(
+            _entry(document, k, one),
+            path=path,
+            begin=begin,
+            own=_if_named(own, one, file),
+            made=made,
+        )
+        for k, one in enumerate(file.vehicles)
+    ]
+    names = _names(document, file.vehicles)
+    for k, one in enumerate(alone):
+        fixed = one.problem.horizon.time
+        if fixed is not None:
+            raise _entry(document, k, file.vehicles[k]).error(
+                ("horizon", "time_s"),
+                f"got {fixed:g}, need free: vehicles that give way arrive later",
+            )
+    making = sum(one.timing_s["automaton"] for one in alone)
+    with at(document, ("vehicles",)):
+        fleet = FleetProblem(
+            [one.problem for one in alone],
+            names=names,
+            margin=_between(file.fleet, alone),
+            leaves=[one.leaves for one in file.vehicles],
+            priority=[one.priority for one in file.vehicles],
+        )
+    return FleetScenario(
+        name=(path.stem if path else document.name) if file.name is None else file.name,
+        fleet=fleet,
+        vehicles=tuple(replace(one, name=name) for one, name in zip(alone, names, strict=True)),
+        settings=file.fleet,
+        receding_horizon=file.receding_horizon,
+        maps=_maps(alone),
+        path=path,
+        timing_s={"load": time.perf_counter() - begin - making, "automaton": making},
+    )
+
+
+def fleet_of_statement(
+    statement: Statement,
+    beside: Scenario | None,
+    *,
+    path: Path,
+    settings: FleetPart | None = None,
+) -> FleetScenario:
+    """The fleet that a file `path` of another format states, with the scenario `beside` it.
+
+    Raises
+    ------
+    InvalidScenario
+        If something is missing still, or a vehicle has a fixed time.
+    """
+    settings = settings or FleetPart()
+    kinds: dict[int, tuple[Scenario, Automaton]] = {}  # by the vehicle that the file names
+    alone = []
+    for one in statement.fleet:
+        rest, automaton = kinds.get(id(one.vehicle)) or (
+            beside or own_scenario(one, path),
+            None,
+        )
+        its = combined(one, rest, path=path)
+        if automaton is not None:  # an equal one, made again
+            its = replace(its, problem=replace(its.problem, automaton=automaton))
+        kinds[id(one.vehicle)] = (rest, its.problem.automaton)
+        alone.append(its)
+    try:
+        fleet = FleetProblem(
+            [one.problem for one in alone],
+            names=[one.name for one in alone],
+            margin=_between(settings, alone),
+        )
+    except ValueError as error:
+        raise InvalidScenario(f"{path}: {error}") from error
+    return FleetScenario(
+        name=statement.name,
+        fleet=fleet,
+        vehicles=tuple(alone),
+        settings=settings,
+        receding_horizon=alone[0].receding_horizon,
+        maps=_maps(alone),
+        path=path,
+    )
+
+
+def without_fleet(document: Document) -> tuple[Document, FleetPart]:
+    """A scenario beside a fleet, and what it says of how to plan one.
+
+    Raises
+    ------
+    InvalidScenario
+        If that part cannot be used.
+    """
+    if not (isinstance(document.value, dict) and "fleet" in document.value):
+        return document, FleetPart()
+    value = {key: value for key, value in document.value.items() if key != "fleet"}
+    inside = replace(document, value=document.value["fleet"], homes={(): ("fleet",)})
+    return replace(document, value=value), checked(inside, FleetPart)
+
+
+def _maps(alone: Sequence[Scenario]) -> tuple[MapFile, ...]:
+    """Files of the maps of all, each once."""
+    return tuple({id(file): file for one in alone for file in one.maps}.values())
+
+
+def _between(settings: FleetPart, alone: Sequence[Scenario]) -> float:
+    """Distance of any two vehicles [m]."""
+    if settings.between_m is not None:
+        return settings.between_m
+    return max(one.problem.margin for one in alone)
+
+
+def _entry(document: Document, k: int, entry: VehicleEntry) -> Document:
+    """What an entry and the top of the file state together, as a file of one vehicle."""
+    where: Where = ("vehicles", k)
+    top = {key: value for key, value in document.value.items() if key not in SHARED}
+    its = {key: value for key, value in document.value["vehicles"][k].items() if key not in OWN}
+    homes: dict[Where, Where] = {(key,): (*where, key) for key in its} | {(): where}
+    homes |= {(key,): (key,) for key in top if key not in its}
+    value: dict[str, Any] = top | its
+    for key in ("vehicle", "automaton"):
+        if key not in value:
+            need = ScenarioFile.model_fields[key].description
+            raise document.error(
+                where, f"the key {key!r} is missing here and at the top, need {key}: {need}"
+            )
+    if entry.start_time_s is not None:
+        if "time_s" in value["start"]:
+            raise document.error(
+                (*where, "start_time_s"), "the start has a time_s too, need one of them"
+            )
+        value["start"] = {**value["start"], "time_s": entry.start_time_s}
+        homes["start", "time_s"] = (*where, "start_time_s")
+    return replace(document, value=value, homes=homes)
+
+
+def _if_named(own: Model | None, entry: VehicleEntry, file: FleetFile) -> Model | None:
+    """A user's model, if it is that of an entry: the others are the package's."""
+    vehicle = file.vehicle if entry.vehicle is None else entry.vehicle
+    return own if own is not None and vehicle is not None and vehicle.model == own.name else None
+
+
+def _names(document: Document, entries: Sequence[VehicleEntry]) -> tuple[str, ...]:
+    """The names of all, each another one; the number of those that have none."""
+    names: dict[str, int] = {}
+    for k, entry in enumerate(entries):
+        name = entry.name or str(k + 1)
+        if name in names:
+            raise document.error(
+                ("vehicles", k, "name"),
+                f"got {shown(name)}, the name of vehicles[{names[name]}] too, need another one",
+            )
+        names[name] = k
+    return tuple(names)

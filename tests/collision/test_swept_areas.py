@@ -1,0 +1,140 @@
+"""The polygons of a motion hold all that the body covers, and part it from solids soundly."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from maneuver_automaton._compile import kernel
+from maneuver_automaton.collision._kernels_swept import FREE, UNKNOWN, not_parted, overlaps
+from maneuver_automaton.collision.body import body_of, fastest_points
+from maneuver_automaton.collision.swept_areas import swept_areas
+from maneuver_automaton.groups import SE2
+from tests.collision import scenes
+from tests.quickly import draws
+from tests.reference_collision import (
+    driven,
+    free_times_and_clearances,
+    shapely_world,
+    world_around,
+)
+
+ROUNDED = 1e-8  # [m]
+AROUND = np.stack([f(np.linspace(0.0, 2.0 * np.pi, 64)) for f in (np.cos, np.sin)])  # directions
+TWIST = st.tuples(
+    st.floats(-1.5, 1.5) | st.just(0.0),
+    st.floats(-1.0, 1.0) | st.just(0.0),
+    st.floats(-1.0, 1.0) | st.floats(-1e-7, 1e-7) | st.just(0.0),
+)
+
+
+def polygons(body, swept, motion):
+    """Of a motion, one for each piece of the body, its rounding included."""
+    n = len(body.first) - 1
+    firsts = swept.first[motion * n : (motion + 1) * n + 1]
+    return [
+        (swept.edges[a:b], radius)
+        for a, b, radius in zip(firsts[:-1], firsts[1:], body.radius, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("name", scenes.FOOTPRINTS)
+@settings(max_examples=draws(25))
+@given(twist=TWIST, duration=st.floats(-3.0, 3.0))
+def test_no_pose_along_a_motion_stands_out(name, twist, duration):
+    body = body_of(scenes.FOOTPRINTS[name])
+    swept = swept_areas(body, np.array([twist]), np.array([[duration]]))
+    middle, reach = swept.places[0, :2], swept.places[0, 2]
+    assert math.isinf(reach) == (abs(twist[2] * duration) > 0.5 * math.pi)
+    if math.isinf(reach):
+        return
+    for pose in driven(np.zeros(3), twist, np.linspace(0.0, duration, 41)):
+        for b, (edges, radius) in enumerate(polygons(body, swept, 0)):
+            corners = SE2(pose).act(body.edges[body.first[b] : body.first[b + 1], :2])
+            heights = corners @ edges[:, 2:4].T - edges[:, 4]
+            assert heights.max() <= ROUNDED  # every half plane holds every corner
+            farthest = (edges[:, :2] @ AROUND).max(axis=0)
+            assert ((corners @ AROUND).max(axis=0) <= farthest + ROUNDED).all()
+            assert np.hypot(*(corners - middle).T).max() + radius <= reach + ROUNDED
+
+
+@settings(max_examples=draws(25))
+@given(turn=st.floats(-1.5, 1.5), length=st.floats(0.1, 3.0))
+def test_an_area_is_not_much_larger_than_what_is_covered(turn, length):
+    body = body_of(scenes.FOOTPRINTS["car"])
+    swept = swept_areas(body, np.array([[length, 0.0, turn]]), np.array([[1.0]]))
+    along = driven(np.zeros(3), (length, 0.0, turn), np.linspace(0.0, 1.0, 201))
+    covered = shapely.union_all(
+        [shapely.Polygon(SE2(pose).act(body.edges[:, :2])) for pose in along]
+    )
+    far = max(np.hypot(*body.edges[:, :2].T)) + length / max(abs(turn), 1e-3)
+    hull = shapely.Polygon(swept.edges[:, :2])
+    beyond = hull.hausdorff_distance(covered.convex_hull)
+    assert beyond <= far * (1.0 / math.cos(turn / 4.0) - 1.0) + 0.01
+
+
+def test_the_polygon_of_a_motion_goes_once_around():
+    body = body_of(scenes.FOOTPRINTS["truck"])
+    twists = np.array(scenes.TWISTS)
+    swept = swept_areas(body, twists, np.full((len(twists), 2), [0.4, -0.7]))
+    for motion in range(2 * len(twists)):
+        for edges, _ in polygons(body, swept, motion):
+            ring = shapely.Polygon(edges[:, :2]) if len(edges) > 2 else None
+            assert ring is None or (ring.is_valid and ring.exterior.is_ccw)
+
+
+@kernel
+def parted(world, body, swept, poses, enough, ends, out):
+    """`not_parted` of every pose and motion, and whether what is met overlaps the end."""
+    for k in range(poses.shape[0]):
+        for motion in range(swept.places.shape[0]):
+            x, y, c, s = poses[k, 0], poses[k, 1], math.cos(poses[k, 2]), math.sin(poses[k, 2])
+            p = not_parted(world, body, swept, motion, x, y, c, s, enough)
+            out[k, motion, 0] = p
+            e = ends[k, motion]
+            if p >= 0 and overlaps(world, body, e[0], e[1], math.cos(e[2]), math.sin(e[2]), p):
+                out[k, motion, 1] = 1
+
+
+@pytest.mark.parametrize("name", scenes.FOOTPRINTS)
+@pytest.mark.parametrize("keep", [0.0, 0.1])
+def test_what_it_calls_free_or_blocked_the_proof_along_the_motion_does_too(name, keep):
+    rng = np.random.default_rng([9, *name.encode()])
+    footprint, margin = scenes.FOOTPRINTS[name], 0.005
+    twists = np.array(scenes.TWISTS)
+    durations = np.full((len(twists), 2), [0.3, -0.9]) * rng.uniform(0.3, 1.0, (len(twists), 1))
+    verdicts = np.zeros(3, dtype=int)
+    for _ in range(4):
+        obstacles = scenes.random_scene(rng, moving=0)
+        world = world_around(footprint, obstacles, keep=keep)
+        exact = shapely_world(footprint, obstacles)
+        swept = swept_areas(world.body, twists, durations)
+        poses = np.array([scenes.random_pose(rng) for _ in range(40)])
+        seen = world.into(poses)
+        steps = SE2.exp(durations.reshape(-1, 1) * np.repeat(twists, 2, axis=0))
+        ends = np.array([(SE2(pose) @ steps).pose for pose in seen])
+        met = np.zeros((len(poses), 2 * len(twists), 2), dtype=np.int64)
+        parted(world.arrays, world.body, swept, seen, keep + margin, ends, met)
+        for motion in range(2 * len(twists)):
+            twist, t = twists[motion // 2], durations[motion // 2, motion % 2]
+            every = np.repeat(twist[None], len(poses), axis=0)
+            free, _ = free_times_and_clearances(
+                world, seen, every, np.full(len(poses), t), margin=margin, keep=keep, times=0.0
+            ).T
+            called = met[:, motion, 0]
+            assert (free[called == FREE] == abs(t)).all()
+            assert (free[met[:, motion, 1] == 1] < abs(t)).all()
+            fastest = fastest_points(world.body, twist[None])[0]
+            for pose in poses[called == FREE]:
+                since = np.linspace(0.0, t, 9)
+                apart = exact.clearance(driven(pose, twist, since), since)
+                assert apart.min() >= keep + margin - 1e-8
+            verdicts += [(called == FREE).sum(), (called >= 0).sum(), (called == UNKNOWN).sum()]
+            assert fastest >= 0.0
+    assert verdicts[0] > 0
+    assert verdicts[1] > 0 or name == "point"

@@ -1,0 +1,154 @@
+"""Plans of fleets: nobody meets anybody, and a moved fleet has the moved plans."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from maneuver_automaton.collision import Box, Obstacle
+from maneuver_automaton.fleet import FleetProblem, FleetStatus, plan_fleet
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.problem import Bounds, Horizon
+from tests.fleet import fleets
+
+
+def test_cars_whose_ways_cross_let_each_other_pass():
+    result = plan_fleet(fleets.crossing(), time_limit=5.0, max_rounds=10)
+    assert result.status is FleetStatus.FOUND
+    assert set(result.plans) == {"a", "b"}
+    assert 16.0 < result.sum_s < 19.0  # alone each takes eight seconds
+    assert result.lower_bound == pytest.approx(16.0)
+    assert result.gap == pytest.approx(1.0 - 16.0 / result.cost)
+    between, _ = fleets.least_distances(result)
+    assert 0.0 < result.clearance_m <= between + 1e-6
+    assert result.closest[0].pair == ("a", "b")
+
+
+@pytest.mark.parametrize("n", [2, 3, 5])
+def test_cars_on_a_circle_change_sides(n):
+    result = plan_fleet(fleets.swap(n), time_limit=20.0, max_rounds=10)
+    assert result.status is FleetStatus.FOUND
+    between, _ = fleets.least_distances(result)
+    assert 0.0 < result.clearance_m <= between + 1e-6
+
+
+def test_bodies_keep_the_margin():
+    fleet = fleets.crossing()
+    wide = FleetProblem(fleet.problems, names=fleet.names, margin=0.5)
+    result = plan_fleet(wide, time_limit=5.0, max_rounds=5)
+    between, _ = fleets.least_distances(result)
+    assert between >= 0.5
+    assert result.clearance_m >= 0.5 - 1e-9
+
+
+def test_a_moved_fleet_has_the_moved_plans():
+    by = SE2([30.0, -20.0, 2.0])
+    one = plan_fleet(fleets.swap(3), time_limit=30.0, max_rounds=6)
+    other = plan_fleet(fleets.swap(3).moved(by), time_limit=30.0, max_rounds=6)
+    assert other.cost == pytest.approx(one.cost, rel=1e-6)
+    for name, plan in one.plans.items():
+        assert other.plans[name].word == plan.word
+        assert other.plans[name].durations == pytest.approx(plan.durations, abs=1e-5)
+
+
+def test_the_same_seed_makes_the_same_plans():
+    runs = [plan_fleet(fleets.swap(4), time_limit=60.0, max_rounds=8, seed=3) for _ in range(2)]
+    for name, plan in runs[0].plans.items():
+        assert runs[1].plans[name].word == plan.word
+        assert runs[1].plans[name].durations.tolist() == plan.durations.tolist()
+
+
+def test_who_arrives_stays_or_leaves():
+    """One car ends where the other has to pass: it lets it pass first, or is gone."""
+    wall = [Obstacle(Box([20.0, 1.0], center=[0.0, y])) for y in (-1.2, 1.2)]
+    ends = [([-3, 0, 0], [0, 0, 0]), ([-6, 0, 0], [6, 0, 0])]
+    body = (Box([1.0, 0.8]),)
+    stays = plan_fleet(fleets.fleet_of(ends, obstacles=wall, footprint=body), time_limit=2.0)
+    assert stays.status is not FleetStatus.FOUND
+    assert "1" in " ".join(stays.reasons.values()) or "2" in stays.reasons
+    leaving = fleets.fleet_of(ends, obstacles=wall, footprint=body, leaves=[True, False])
+    leaves = plan_fleet(leaving, time_limit=5.0, max_rounds=2)
+    assert leaves.status is FleetStatus.FOUND
+
+
+def test_a_goal_that_is_passed_later_is_taken_later():
+    """The one that is near its goal waits until the other has driven across it."""
+    ends = [([0, -2, math.pi / 2], [0, 0, math.pi / 2]), ([-8, 0, 0], [8, 0, 0])]
+    wall = [Obstacle(Box([14.0, 1.0], center=[x, y])) for x in (-9.0, 9.0) for y in (-1.6, 1.6)]
+    result = plan_fleet(
+        fleets.fleet_of(ends, obstacles=wall, priority=[0.0, 1.0]), time_limit=10.0, max_rounds=5
+    )
+    assert result.status is FleetStatus.FOUND
+    assert fleets.least_distances(result)[0] > 0.0
+
+
+def test_who_is_enclosed_is_named_with_those_in_the_way():
+    fleet = fleets.crossing()
+    inside = [Obstacle(Box([0.2, 3.0], center=[x, -4.0])) for x in (-1.0, 1.0)]
+    lids = [Obstacle(Box([2.2, 0.2], center=[0.0, y])) for y in (-5.6, -2.4)]
+    closed = [
+        fleet.problems[0],
+        *fleets.fleet_of(
+            [([0, -4, math.pi / 2], [0, 4, math.pi / 2])], obstacles=[*inside, *lids]
+        ).problems,
+    ]
+    result = plan_fleet(FleetProblem(closed, names="ab"), time_limit=3.0, max_rounds=2)
+    assert result.status is FleetStatus.PARTIAL
+    assert list(result.plans) == ["a"]
+    assert "alone" in result.reasons["b"]
+    assert result.gap is None
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_random_fleets_keep_apart(seed):
+    result = plan_fleet(fleets.random_fleet(4, seed), time_limit=10.0, max_rounds=4)
+    between, static = fleets.least_distances(result)
+    assert between > 0.0
+    assert static > 0.0
+    assert result.status is FleetStatus.FOUND
+
+
+def test_improvements_only_improve():
+    result = plan_fleet(fleets.random_fleet(6, 11), time_limit=6.0, max_rounds=20)
+    values = [value for _, value in result.improvements]
+    assert values == sorted(values, reverse=True)
+    assert result.cost == pytest.approx(values[-1])
+
+
+def test_the_last_arrival_may_be_what_counts():
+    result = plan_fleet(fleets.swap(3), objective="last", time_limit=10.0, max_rounds=5)
+    assert result.value == result.last_s
+    assert result.lower_bound <= result.last_s
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"names": ["a", "a"]}, "two vehicles have the name 'a'"),
+        ({"names": ["a"]}, "got 1 names, need one for each of 2 vehicles"),
+        ({"margin": -1.0}, "margin must be a number of at least 0, got -1.0 m"),
+    ],
+)
+def test_bad_fleets_are_refused(change, message):
+    with pytest.raises(ValueError, match=message):
+        FleetProblem(fleets.crossing().problems, **change)
+
+
+def test_times_of_vehicles_are_free():
+    from dataclasses import replace
+
+    fixed = replace(fleets.crossing().problems[0], horizon=Horizon(time=20.0))
+    with pytest.raises(ValueError, match="vehicle '1' has a fixed time"):
+        FleetProblem([fixed])
+
+
+def test_bounds_hold_for_every_vehicle():
+    bounds = Bounds(x=(-5.0, 5.0), y=(-5.0, 5.0))
+    ends = [([-4, 0, 0], [4, 0, 0]), ([4, 0, math.pi], [-4, 0, math.pi])]
+    result = plan_fleet(fleets.fleet_of(ends, bounds=bounds), time_limit=5.0, max_rounds=3)
+    assert result.status is FleetStatus.FOUND
+    for plan in result.plans.values():
+        poses = plan.pose_at(np.linspace(0.0, plan.duration, 500))
+        assert (np.abs(poses[:, :2]) <= 5.0 + 1e-9).all()

@@ -1,0 +1,133 @@
+"""Large libraries among obstacles: what all trims gain, and what is promised of such plans."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Polygon
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.models import Car, Unicycle
+from maneuver_automaton.planning import PlanStatus, plan
+from maneuver_automaton.problem import Bounds, Horizon, Problem, SearchSettings
+from maneuver_automaton.search.trim_choice import coarse_trims
+from maneuver_automaton.words.library import moving_trims
+from tests.planning.test_among_obstacles import assert_moved
+from tests.search.cases import compiled_only
+from tests.solids import check_plan
+
+pytestmark = compiled_only
+LIMIT = 60.0  # [s] a ceiling that a busy machine does not reach
+SEARCH = SearchSettings(max_expansions=1500)
+AXIS = np.round(np.linspace(-1.0, 1.0, 41), 12)
+GRID = Automaton.of_grid(Unicycle(), [AXIS, AXIS])
+CAR = Automaton.of_grid(Car(wheelbase=1.0, max_steering=0.6), [AXIS, 0.6 * AXIS])
+BLOCKS = (
+    Obstacle(Box([2.0, 0.4], [2.0, 0.6], 0.4)),
+    Obstacle(Disc(0.5, [3.4, -0.9])),
+    Obstacle(Polygon([[0.7, -2.8], [1.3, -2.8], [1.3, -0.8], [0.7, -0.8]])),
+)
+MIXED, TIME, EFFORT = Cost(time=1.0, effort=1.0), Cost(time=1.0), Cost(effort=1.0)
+BASE = Problem(
+    GRID, [0, 0, 0], [4.5, 1.0, 0.5], obstacles=BLOCKS, footprint=(Box([0.8, 0.5]),), search=SEARCH,
+    cost=MIXED,
+)  # fmt: skip
+CASES = {
+    "time": replace(BASE, cost=TIME),
+    "mixed": BASE,
+    "car": replace(BASE, automaton=CAR),
+    "effort in a fixed time": replace(BASE, cost=EFFORT, horizon=Horizon(time=12.0)),
+    "effort in a longest time": replace(BASE, cost=EFFORT, horizon=Horizon(max_time=12.0)),
+    "switches cost": replace(BASE, cost=replace(MIXED, switch=0.2, direction_change=0.3)),
+    "few trims": replace(BASE, horizon=Horizon(max_trims=6)),
+    "least times": replace(BASE, horizon=Horizon(min_coast=0.3)),
+    "any heading": replace(BASE, goals=(replace(BASE.goals[0], free_heading=True),)),
+    "two parts": replace(BASE, footprint=(Box([0.8, 0.3]), Disc(0.25, [0.2, 0.0]))),
+    "bounds": replace(BASE, bounds=Bounds(x=(-0.5, 5.0), y=(-0.5, 2.0)), margin=0.05),
+}
+
+
+@functools.cache
+def planned(name):
+    return plan(CASES[name], time_limit=LIMIT)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_plan_keeps_all_promises(name):
+    """Clear of everything by shapely, in bounds, at the goal, of trims of the library, in time."""
+    problem, result = CASES[name], planned(name)
+    assert result.status is PlanStatus.FOUND, result.reason
+    assert check_plan(problem, result.plan, result.goal_index).passes(problem, result.goal_index)
+    assert result.audit.passed
+    assert set(result.plan.word) <= set(problem.automaton.trim_names)
+    assert result.cost == pytest.approx(problem.cost_of(result.plan), rel=1e-9)
+    assert result.lower_bound <= result.cost
+    horizon, lasting = problem.horizon, result.plan.durations[result.plan.durations > 0.0]
+    if horizon.time is not None:
+        assert result.plan.duration == pytest.approx(horizon.time, abs=1e-8)
+    assert result.plan.duration <= (horizon.max_time or math.inf) * (1.0 + 1e-9)
+    assert len(lasting) <= (horizon.max_trims or math.inf)
+    assert lasting.min() >= horizon.min_coast - 1e-9
+
+
+@pytest.mark.parametrize("name", ["time", "mixed", "car", "switches cost", "any heading"])
+def test_all_trims_are_never_dearer_than_the_few_that_are_searched(name):
+    """The searches are those of the few, expansion by expansion; the others only gain."""
+    problem = CASES[name]
+    known = moving_trims(problem.automaton, problem.cost)
+    rows = known.trims[coarse_trims(known.twists, known.rates)]
+    trims = tuple(problem.automaton.trims[k] for k in rows)
+    few = plan(
+        replace(problem, automaton=Automaton(problem.automaton.model, trims)), time_limit=LIMIT
+    )
+    assert planned(name).cost <= few.cost * (1.0 + 1e-9)
+
+
+def test_trims_between_the_few_gain():
+    """A turn as wide as the place allows costs less than sharp turns and straights."""
+    known = moving_trims(GRID, MIXED)
+    few = {GRID.trim_names[k] for k in known.trims[coarse_trims(known.twists, known.rates)]}
+    assert not set(planned("mixed").plan.word) <= few
+
+
+def test_an_effort_is_spread_over_the_time_there_is():
+    """By hand: the path of least time at its pace costs its square; to fill T is to go slower."""
+    fast = planned("time")
+    for name in ("effort in a fixed time", "effort in a longest time"):
+        problem, result = CASES[name], planned(name)
+        assert result.cost < 0.75 * problem.cost_of(fast.plan)
+        assert result.plan.duration > 0.95 * 12.0
+
+
+@pytest.mark.parametrize("name", ["mixed", "car", "effort in a fixed time"])
+def test_a_moved_problem_has_the_moved_plan(name):
+    assert assert_moved(CASES[name], SE2([3.0, -2.0, 0.7]))
+
+
+@pytest.mark.parametrize("name", ["mixed", "effort in a fixed time"])
+def test_the_same_expansions_find_the_same_plan(name):
+    again = plan(CASES[name], time_limit=LIMIT)
+    assert again.plan.word == planned(name).plan.word
+    np.testing.assert_array_equal(again.plan.durations, planned(name).plan.durations)
+
+
+def test_a_short_time_limit_gets_less_far_and_no_worse():
+    first = plan(replace(BASE, search=replace(SEARCH, improve=False)), time_limit=LIMIT)
+    assert planned("mixed").cost < first.cost
+
+
+def test_alternatives_and_moving_obstacles():
+    """Words of all trims stay out of searches that know only a few."""
+    result = plan(BASE, time_limit=LIMIT, alternatives=2)
+    assert result.cost <= min(other.cost for other in result.alternatives)
+    cart = Obstacle(Box([0.5, 0.5]), motion=Motion([0.0, 4.0], [[2.5, -3.0, 0.0], [2.5, 3.0, 0.0]]))
+    problem = replace(BASE, obstacles=(*BLOCKS, cart))
+    result = plan(problem, time_limit=LIMIT)
+    assert result.status is PlanStatus.FOUND, result.reason
+    assert check_plan(problem, result.plan, result.goal_index).passes(problem, result.goal_index)
