@@ -50,6 +50,7 @@ class FleetArtists:
     missing: PolyCollection  # hatched, at the starts of those without a plan
     missing_marks: PathCollection  # crosses for those of them that are too small
     wanted: PolyCollection  # dashed, at their goals
+    wanted_marks: PathCollection  # the same for those that are too small
     numbers: tuple[Text, ...]  # at the starts, if there are too many for a legend
     steps: tuple[Text, ...]  # at the bodies, on request
     obstacles: ObstacleArtists
@@ -113,6 +114,12 @@ def draw_fleet_plane(ax: Axes, cast: Cast, *, numbered: bool = False) -> FleetAr
             [ring for ring, _ in wanted], facecolors="none",
             edgecolors=[one.color for _, one in wanted], linewidths=1.0, linestyles=[(0, (3, 2))],
             zorder=2.2,
+        ),
+        wanted_marks=ax.scatter(
+            [goal.pose[0] for one in lost for goal in one.problem.goals],
+            [goal.pose[1] for one in lost for goal in one.problem.goals],
+            s=24.0, marker="o", facecolors="none", linewidths=1.0, linestyles=[(0, (2, 1.5))],
+            edgecolors=[one.color for one in lost for _ in one.problem.goals], zorder=3.6,
         ),
         numbers=tuple(_number(ax, one) for one in cast.members) if cast.many else (),
         steps=_steps(ax, along, cast.scene.times) if numbered else (),
