@@ -66,6 +66,7 @@ def draw_fleet_plane(ax: Axes, cast: Cast, *, numbered: bool = False) -> FleetAr
     driving = [one for one in cast.members if one.plan is not None]
     standing = [one for one in cast.members if one.plan is None]
     lost = [one for one in standing if one.reach < TINY * extent]
+    stuck = [one for one in standing if one.reach >= TINY * extent]
     seen = [one for one in driving if one.reach >= TINY * extent]
     small = [one for one in driving if one.reach < TINY * extent]
     width, alpha = _weights(len(cast.members))
@@ -73,8 +74,8 @@ def draw_fleet_plane(ax: Axes, cast: Cast, *, numbered: bool = False) -> FleetAr
     bodies, body_colors = _bodies([(one, [time]) for one, time in along])
     starts, start_colors = _bodies([(one, [one.begin]) for one in seen])
     goals, goal_colors = _bodies([(one, [one.arrival]) for one in seen])
-    missing, missing_colors = _bodies([(one, [one.begin]) for one in standing])
-    wanted = [(ring, one) for one in standing for ring in one.goal_outlines]
+    missing, missing_colors = _bodies([(one, [one.begin]) for one in stuck])
+    wanted = [(ring, one) for one in stuck for ring in one.goal_outlines]
     fronts = [_front(one, time) for one in seen for time in (one.begin, one.arrival)]
     artists = FleetArtists(
         paths=LineCollection(

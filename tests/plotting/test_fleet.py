@@ -71,6 +71,9 @@ def test_one_without_a_plan_is_hatched_at_its_start():
     assert "stuck: walls enclose the start" in said
     alone = fleet_of([no_answer([0, 0, 0], [1, 0, 0])], names=["a"])
     assert "a: too narrow" in [text.get_text() for text in draw_fleet(alone).texts]
+    many = fleet_of([no_answer([0, k, 0], [1, k, 0]) for k in range(7)], names=list("abcdefg"))
+    said = [text.get_text() for text in draw_fleet(many).texts]
+    assert "a, b, c, d and 3 more: too narrow" in said
 
 
 def test_points_are_marks():
