@@ -40,6 +40,9 @@ if TYPE_CHECKING:
     from maneuver_automaton.exports import save_geojson as save_geojson
     from maneuver_automaton.exports import save_rerun as save_rerun
     from maneuver_automaton.exports import save_ros2_bag as save_ros2_bag
+    from maneuver_automaton.fleet import FleetProblem as FleetProblem
+    from maneuver_automaton.fleet import FleetResult as FleetResult
+    from maneuver_automaton.fleet import plan_fleet as plan_fleet
     from maneuver_automaton.fleet import verify_fleet as verify_fleet
     from maneuver_automaton.formats.fleet_json import save_fleet as save_fleet
     from maneuver_automaton.formats.maps import load_map as load_map
@@ -103,6 +106,8 @@ _HOMES = {
     "Disc": "collision",
     "DispersedLibrary": "design",
     "Disturbance": "receding_horizon",
+    "FleetProblem": "fleet",
+    "FleetResult": "fleet",
     "FleetScenario": "scenario",
     "Goal": "problem",
     "Helicopter": "models",
@@ -150,6 +155,7 @@ _HOMES = {
     "lower_bound": "planning.lower_bound",
     "plan": "planning",
     "plan_road": "roads",
+    "plan_fleet": "fleet",
     "plan_many": "planning",
     "plans": "planning",
     "ros_messages": "exports",

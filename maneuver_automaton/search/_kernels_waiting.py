@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.search.scene import Scene
     from maneuver_automaton.search.waiting import PathArrays
 
-HALVINGS = 7  # of a tick, for the time at which the way is free again
+HALVINGS = 10  # of a tick, for the time at which the way is free again
 PATIENT = 16  # departures that are blocked before ticks become longer
 MOST_ASKED = 20_000  # departures tried in all
 JOINT, PARENT = range(2)  # columns of `path.links`
@@ -66,7 +66,7 @@ def earliest_arrival(
                 step = tick * (1 + blocked // PATIENT)
                 leave, blocked = leave + step, blocked + 1
                 continue
-            if step > 0.0:  # when exactly it is free again
+            if blocked > 0:  # when exactly it is free again
                 low, high = leave - step, leave
                 for _ in range(HALVINGS):
                     middle = 0.5 * (low + high)
@@ -84,7 +84,7 @@ def earliest_arrival(
             if leave > quiet:
                 break
             # What arrives while it may stand there anyway is of no use.
-            leave, step, blocked = max(leave, until - t) + tick, tick, 0
+            leave, blocked = max(leave, until - t) + tick, 0
     return -1
 
 

@@ -1,0 +1,107 @@
+"""Who meets whom: proven for all times, against dense looks by shapely."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from maneuver_automaton.collision import Box, Disc, Polygon
+from maneuver_automaton.collision.surroundings import parts_of
+from maneuver_automaton.fleet.conflicts import Course, Meeting, components, larger, meetings
+from maneuver_automaton.fleet.verdict import measured
+from maneuver_automaton.groups import SE2
+from tests.collision.test_arcs import arcs
+
+BODY = (Box([1.0, 0.6]),)
+rates = st.tuples(st.floats(-2.0, 2.0), st.just(0.0), st.floats(-1.5, 1.5))
+runs = st.lists(st.tuples(rates, st.floats(0.3, 2.0)), min_size=1, max_size=3)
+places = st.tuples(st.floats(-4.0, 4.0), st.floats(-4.0, 4.0), st.floats(-3.0, 3.0))
+
+
+def course(start, parts, begin=0.0, **more):
+    return Course((BODY,), (arcs(start, parts, begin),), **more)
+
+
+def dense(one, other, step=0.002):
+    """Times and distances of two bodies, before and after they drive too."""
+    last = max(one.quiet_after, other.quiet_after) + 0.5
+    times = np.arange(-0.5, last, step)
+    (part,) = parts_of(BODY)
+    bodies = [part.at(way.motions[0].at(times)) for way in (one, other)]
+    return times, shapely.distance(*bodies)
+
+
+@settings(max_examples=60)
+@given(places, runs, places, runs, st.floats(0.0, 2.0), st.floats(0.0, 0.5))
+def test_meetings_against_dense_looks(here, parts, there, others, begin, keep):
+    ways = {3: course(here, parts), 5: course(there, others, begin)}
+    times, apart = dense(ways[3], ways[5])
+    met = meetings(ways, keep=keep)
+    near = np.flatnonzero(apart <= keep)
+    if near.size:
+        (row,) = met
+        assert (row.one, row.other) == (3, 5)
+        assert row.time <= times[near[0]] + 1e-9 or times[near[0]] < min(0.0, begin)
+    if not met:
+        assert apart.min() > keep
+    if apart.min() > keep + 0.02:
+        assert not met
+
+
+@settings(max_examples=30)
+@given(places, runs, places, runs)
+def test_measured_distances_against_dense_looks(here, parts, there, others):
+    ways = {0: course(here, parts), 1: course(there, others)}
+    _, apart = dense(ways[0], ways[1])
+    rows = measured(ways, ["a", "b"], keep=0.0)
+    if apart.min() > 1.1:
+        assert not rows
+    if apart.min() < 0.99:
+        ((pair, _, distance),) = rows
+        assert pair == ("a", "b")
+        assert distance <= apart.min() + 1e-9
+        assert distance >= 0.99 * apart.min() - 0.02
+
+
+def test_who_leaves_is_met_before():
+    stays = course([0, 0, 0], [((1.0, 0.0, 0.0), 2.0)])
+    passes = course([2.0, -6.0, math.pi / 2], [((1.0, 0.0, 0.0), 12.0)])
+    assert meetings({0: stays, 1: passes}, keep=0.0)
+    leaves = course([0, 0, 0], [((1.0, 0.0, 0.0), 2.0)], until=2.0)
+    assert not meetings({0: leaves, 1: passes}, keep=0.0)
+
+
+def test_only_those_that_are_asked_for():
+    ways = {k: course([0.0, 0.0, 0.0], [((1.0, 0.0, 0.0), 2.0)]) for k in range(3)}
+    assert len(meetings(ways, keep=0.0)) == 3
+    assert {(m.one, m.other) for m in meetings(ways, keep=0.0, among=[1])} == {(0, 1), (1, 2)}
+
+
+def test_a_moved_pair_meets_at_the_same_time():
+    by = SE2([100.0, -30.0, 2.0])
+    ways = {
+        0: course([0, 0, 0], [((1.0, 0.0, 0.2), 5.0)]),
+        1: course([4, -3, 1.5], [((1.0, 0.0, 0.0), 5.0)]),
+    }
+    moved = {k: Course(one.shapes, (one.motions[0].moved(by),)) for k, one in ways.items()}
+    (first,), (second,) = meetings(ways, keep=0.3), meetings(moved, keep=0.3)
+    assert second.time == pytest.approx(first.time, abs=1e-4)
+
+
+def test_groups_are_connected():
+    met = [Meeting(0, 1, 1.0), Meeting(1, 4, 2.0)]
+    assert components(range(6), met) == [(0, 1, 4), (2,), (3,), (5,)]
+
+
+@pytest.mark.parametrize(
+    "shape", [Disc(0.5, [1, 2]), Box([2, 1], [1, 0], 0.3), Polygon([[0, 0], [2, 0], [1, 2]])]
+)
+def test_a_larger_shape_holds_all_that_is_near(shape):
+    (small,), (large,) = parts_of((shape,)), parts_of((larger(shape, 0.2),))
+    around = small.core.buffer(small.radius + 0.2 - 1e-6)
+    assert large.core.buffer(large.radius + 1e-9).covers(around)
