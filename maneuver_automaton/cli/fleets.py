@@ -37,7 +37,8 @@ class FleetAnswer:
         result = self.result
         if result.status is FleetStatus.FOUND:
             return ""
-        return f"{result.status.value}: {reason_of(result)}"
+        said = "interrupted before all had a plan: " if stopped() else ""
+        return f"{result.status.value}: {said}{reason_of(result)}"
 
     def save(self, path: Path) -> None:
         """Write plan.json."""
