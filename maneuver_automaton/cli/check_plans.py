@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -117,14 +118,19 @@ def _source(path: Path, document: Mapping[str, Any], parts: Parts) -> tuple[Path
             f"{path}: source: is missing, need --with and the file it was planned from"
         )
     beside, case = said.get("with"), said.get("case")
-    file = path.parent / said["file"]
+    file = _beside(path, said["file"])
     if not file.is_file():
         raise InvalidScenario(f"{path}: source: there is no {file}, need --with and that file")
     return file, replace(
         parts,
-        beside=path.parent / beside if isinstance(beside, str) else None,
+        beside=_beside(path, beside) if isinstance(beside, str) else None,
         case=case if isinstance(case, int) and parts.case is None else parts.case,
     )
+
+
+def _beside(path: Path, name: str) -> Path:
+    """A file as seen from another one: by its name alone, whatever links are on the way."""
+    return Path(os.path.normpath(path.parent / name))
 
 
 @contextlib.contextmanager
