@@ -21,6 +21,7 @@ import numpy as np
 from maneuver_automaton._interrupts import patient
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.shapes import Obstacle
+from maneuver_automaton.costs import Cost
 from maneuver_automaton.fleet.conflicts import Course, components, meetings
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import FleetResult
@@ -146,7 +147,7 @@ class _FleetSearch:
     def _plan_alone(self) -> None:
         """The way of each by itself."""
         for one in self.vehicles:
-            one.plan_alone(self.budget.part(ALONE_SHARE / max(len(self.vehicles), 1)))
+            one.plan_alone(self.budget.stage(ALONE_SHARE))
             if one.alone is None:
                 self.reasons[one.number] = f"it has no way even alone: {one.why_none}"
 
@@ -344,11 +345,21 @@ class _FleetSearch:
         listed = ", ".join(names) or "nobody"
         return f"no way was found past the others; alone it would meet {listed}"
 
+    def _last_at_least(self) -> float:
+        """No fleet arrives sooner [s]: each vehicle by itself, where its cost is its time."""
+        times = [0.0]
+        for one in self.vehicles:
+            cost = one.problem.cost
+            timed = isinstance(cost, Cost) and cost.time > 0.0 and cost == Cost(time=cost.time)
+            if one.bound is not None and isinstance(cost, Cost) and timed:
+                times.append(one.problem.start_time + one.bound.value / cost.time)
+        return max(times)
+
     def _result(self) -> FleetResult:
         """The answer: the plans checked, each alone and each pair."""
         result = verified(self.fleet, self.vehicles, self.held, self.reasons)
         lower = [one.bound.value for one in self.vehicles if one.bound is not None]
-        bound = math.fsum(lower) if self.objective == "sum" else 0.0
+        bound = math.fsum(lower) if self.objective == "sum" else self._last_at_least()
         counts = {
             "expansions": sum(one.expansions for one in self.vehicles),
             "queries": self.queries,
@@ -358,6 +369,7 @@ class _FleetSearch:
             result,
             objective=self.objective,
             lower_bound=bound,
+            alone_cost=math.fsum(one.alone.cost for one in self.vehicles if one.alone is not None),
             order=tuple(self.vehicles[k].name for k in self.order),
             improvements=tuple(self.improvements),
             counts=counts,

@@ -42,6 +42,7 @@ class FleetResult:
     results: dict[str, PlanResult]
     objective: str = "sum"  # what was improved: the sum of costs, or the last arrival
     lower_bound: float = 0.0  # no plans of all vehicles have less of the objective
+    alone_cost: float = 0.0  # sum of the costs of the ways of all by themselves, as found
     clearance_m: float = math.inf  # that any two vehicles keep at least, proven
     closest: tuple[Closest, ...] = ()  # pairs that come near each other, the nearest first
     reasons: dict[str, str] = field(default_factory=dict)  # who has no plan, and what is in the way

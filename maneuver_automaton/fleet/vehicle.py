@@ -11,6 +11,7 @@ from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.shapes import Disc, Motion, Obstacle
 from maneuver_automaton.fleet.conflicts import Course
+from maneuver_automaton.fleet.refuge import by_a_refuge
 from maneuver_automaton.planning.blocked import blocked_ends, goals_left
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.needs import has_inertia
@@ -31,7 +32,8 @@ LONG = 20_000  # ... and where nothing else helps
 AT_ONCE = Patience(attempts=0, passes=0)
 WITH_TIME = Patience(attempts=400, passes=2)
 NEARLY = 1.05  # times the way alone: what costs more is searched for in space and time as well
-LEAST_S, INERTIA_S = 0.01, 2.0  # [s] that a whole query gets at least, and with inertia at most
+LONGEST = 400_000  # expansions for a way alone
+LEAST_S, INERTIA_S, BETTER_S = 0.01, 5.0, 2.0  # [s] of a whole query: at least, and with inertia
 POINT = (Disc(1e-6),)  # the body of a vehicle that is a point, as others see it
 
 
@@ -66,6 +68,7 @@ class Vehicle:
     ways: list[Word] = field(default_factory=list)  # alone, the cheapest first
     standing: Course = field(init=False)  # at its start, for ever
     expansions: int = 0
+    held_before: bool = False  # whether it had a plan past others already
 
     def __post_init__(self) -> None:
         problem = self.problem
@@ -104,17 +107,14 @@ class Vehicle:
         elif self.at_will:
             self._plan_words(budget)
         else:
-            result = plan_in(
-                self.workspace, self.problem, time_limit=max(budget.left, LEAST_S), alternatives=0
-            )
-            self._count(result.counts.get("expansions", 0))
+            result = self._planned(self.problem, budget, INERTIA_S, improve=False)
             self.alone, self.why_none = self._found(result), result.reason
             self.bound = result.bound
 
     def _plan_words(self, budget: Budget) -> None:
         """The same for one whose plans are words of the lattice."""
         query = self._query(self.problem)
-        first = first_plan(query, budget=replace(budget, expansions=LONG))
+        first = first_plan(query, budget=replace(budget, expansions=LONGEST))
         self._count(first.expansions)
         if first.word is None:
             self.why_none = first.enclosed or "no way was found"
@@ -126,6 +126,10 @@ class Vehicle:
         """Better ways past what stands still, and others beside them."""
         if self.ways and self.problem.obstacles:
             self._keep_ways(self._query(self.problem), self.ways[0], budget, WITH_TIME)
+        elif not self.at_will and self.alone is not None:
+            better = self._found(self._planned(self.problem, budget, BETTER_S, improve=True))
+            if better is not None and better.cost < self.alone.cost:
+                self.alone = better
 
     def _keep_ways(
         self, query: LatticeQuery, word: Word, budget: Budget, patience: Patience
@@ -165,7 +169,11 @@ class Vehicle:
             horizon=replace(self.problem.horizon, stay=not self.leaves),
         )
         if not self.at_will:
-            return self._past_with_inertia(problem, budget, known)
+            wants_better = self.held_before and most == QUICK
+            limit = BETTER_S if wants_better else INERTIA_S
+            found = self._found(self._planned(problem, budget, limit, improve=wants_better))
+            self.held_before = self.held_before or found is not None
+            return found if found is not None and found.cost < known else None
         query = self._query(problem)
         best: Word | None = None
         for way in self.ways:
@@ -179,6 +187,8 @@ class Vehicle:
             self._count(first.expansions)
             if first.word is not None and first.word.cost < (best.cost if best else math.inf):
                 best = first.word
+        if best is None and most == LONG and self.alone is not None:
+            best = by_a_refuge(self.problem, query, self._query, self.alone.plan, budget)
         if best is None:
             return None
         best = improve(query, best, budget=budget, patience=AT_ONCE).word
@@ -186,13 +196,20 @@ class Vehicle:
             return None
         return self._word_found(query, best)
 
-    def _past_with_inertia(self, problem: Problem, budget: Budget, known: float) -> Found | None:
-        workspace = Workspace(problem.obstacles, self.workspace.prepared)
-        share = max(min(budget.left, INERTIA_S), LEAST_S)
-        result = plan_in(workspace, problem, time_limit=share, alternatives=0)
+    def _planned(
+        self, problem: Problem, budget: Budget, most_s: float, *, improve: bool
+    ) -> PlanResult:
+        """What the planner answers for one that does not switch at will, by counted work."""
+        search = replace(problem.search, improve=improve, max_expansions=LONG)
+        if problem.obstacles == self.workspace.obstacles:
+            workspace = self.workspace
+        else:
+            workspace = Workspace(problem.obstacles, self.workspace.prepared)
+        limit = max(min(budget.left, most_s), LEAST_S)
+        counted = replace(problem, search=search)
+        result = plan_in(workspace, counted, time_limit=limit, alternatives=0)
         self._count(result.counts.get("expansions", 0))
-        found = self._found(result)
-        return found if found is not None and found.cost < known else None
+        return result
 
     def _query(self, problem: Problem) -> LatticeQuery:
         return lattice_query(problem, goals_left(problem), prepared=self.workspace.prepared)

@@ -1,0 +1,94 @@
+"""A way by a refuge: where a vehicle stands aside until those that need its place have passed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.budget import Budget
+from maneuver_automaton.collision.advancement import free_times
+from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.search.inside import outside
+from maneuver_automaton.search.lattice import first_plan
+from maneuver_automaton.search.lattice_query import LatticeQuery
+from maneuver_automaton.search.waiting import with_waits
+from maneuver_automaton.words.transitions import SWITCH
+from maneuver_automaton.words.word import Word, word_of_steps
+
+SAMPLES = 400  # places that are looked at
+MOST_TRIED = 40  # refuges that ways are searched to
+SEED = 14  # of the places
+FAR = 8.0  # [lengths of the body] from the way alone
+EXPANSIONS = 4000  # of the way to a refuge, and of that from there
+
+
+def by_a_refuge(
+    problem: Problem,
+    query: LatticeQuery,
+    query_of: Callable[[Problem], LatticeQuery],
+    way: Plan,
+    budget: Budget,
+) -> Word | None:
+    """The cheapest way found past what moves, with a stop where nothing ever passes; None if none.
+
+    Places beside the `way` alone, the nearest first; the vehicle drives there, waits, and goes on,
+    as soon as rests along that way allow.
+    """
+    best: Word | None = None
+    counted = replace(budget, expansions=EXPANSIONS)
+    for pose in _refuges(problem, query, way)[:MOST_TRIED]:
+        if budget.is_over:
+            break
+        aim = problem.starting_at(problem.start, time=problem.start_time, goals=Goal(pose))
+        there = first_plan(query_of(aim), budget=counted).word
+        if there is None or (best is not None and there.cost >= best.cost):
+            continue
+        leaving = problem.starting_at(pose, time=problem.start_time)
+        back = first_plan(query_of(leaving), budget=counted).word
+        if back is None:
+            continue
+        steps = [
+            (SWITCH, int(k), float(t))
+            for word in (there, back)
+            for k, t in zip(word.trims, word.durations, strict=True)
+        ]
+        timed = with_waits(query, word_of_steps(steps, goal=back.goal))
+        if timed is not None and (best is None or timed.cost < best.cost):
+            best = timed
+    return best
+
+
+def _refuges(problem: Problem, query: LatticeQuery, way: Plan) -> list[Array]:
+    """Poses (3,) beside a way at which the vehicle may stand from when it gets there, for ever.
+
+    The nearest to the way first.
+    """
+    rng, world = np.random.default_rng(SEED), query.world
+    size = max(world.body.reach, query.library.radius * 0.5)
+    # Seen from the way, so that a moved problem has the moved refuges.
+    since = way.duration * rng.uniform(0.0, 1.0, SAMPLES)
+    bases = way.pose_at(way.start_time + since)[:, :3]
+    away = size * rng.uniform(0.0, FAR, SAMPLES)
+    bearing, heading = bases[:, 2] + rng.uniform(-math.pi, math.pi, (2, SAMPLES))
+    poses = np.column_stack(
+        [bases[:, 0] + away * np.cos(bearing), bases[:, 1] + away * np.sin(bearing), heading]
+    )
+    begins = problem.start_time + since
+    lasting = np.maximum(world.last_event - begins, 0.0) + 1.0
+    stands = free_times(
+        world,
+        world.into(poses),
+        twists=np.zeros((SAMPLES, 3)),
+        durations=lasting,
+        margin=query.margin,
+        keep=problem.margin,
+        times=begins,
+    )
+    kept = np.flatnonzero(stands >= lasting)
+    order = kept[np.argsort(away[kept], kind="stable")]
+    return [poses[k] for k in order if not outside(poses[k], problem.bounds)]
