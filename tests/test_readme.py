@@ -134,7 +134,7 @@ def test_the_yaml_is_that_of_the_scenario():
 def test_several_vehicles_are_a_scenario(tmp_path):
     (text,) = blocks("yml")
     (tmp_path / "x.yaml").write_text(text)
-    assert load_scenario(tmp_path / "x.yaml").fleet.names == ("behind", "ahead")
+    assert load_scenario(tmp_path / "x.yaml").fleet.names == ("east", "west")
 
 
 def test_every_key_of_the_plans_of_a_fleet_is_explained():
