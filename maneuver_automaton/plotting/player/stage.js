@@ -161,14 +161,17 @@ class Stage {
       one.pose.forEach((pose, n) => context[n ? "lineTo" : "moveTo"](pose[0], pose[1]));
       context.stroke();
       context.setLineDash([]);
-      if (one.present && (time < one.present[0] || time > one.present[1])) continue;
+      const [from, to] = one.present || [null, null];
+      const there = (from === null || time >= from) && (to === null || time <= to);
       if (one.leaves && (time < one.t[0] - 1e-9 || time > one.t[one.t.length - 1] + 1e-9)) continue;
       const path = new Path2D(), pose = posedAt(one, time);
       one.rings.forEach((ring) => trace(path, ring.map((place) => acted(pose, place))));
-      context.fillStyle = withAlpha(colors.moving, 0.75);
-      context.strokeStyle = colors.moving;
+      context.fillStyle = withAlpha(colors.moving, there ? 0.75 : 0.07);
+      context.strokeStyle = withAlpha(colors.moving, there ? 1 : 0.4);
+      if (!there) context.setLineDash([4 * this.thin, 3 * this.thin]);
       context.fill(path, "evenodd");
       context.stroke(path);
+      context.setLineDash([]);
     }
   }
 

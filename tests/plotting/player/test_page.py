@@ -18,6 +18,7 @@ from maneuver_automaton.plotting.player.clearances import clearance_entry
 from maneuver_automaton.plotting.player.composing import names_of
 from maneuver_automaton.plotting.player.local import Local, hex_color
 from maneuver_automaton.plotting.player.motions import motion_entry, part_frames
+from maneuver_automaton.plotting.player.surroundings import obstacle_entries
 from maneuver_automaton.plotting.track import track_of_plan
 from maneuver_automaton.primitives import Maneuver, Trajectory
 from maneuver_automaton.problem import Problem
@@ -128,6 +129,10 @@ def test_clearances_are_distances():
     assert apart(there) == pytest.approx([1.0, 0.0, 2.5])
     gone = replace(there, motion=Motion([0.0, 1.0], [[-3.0, 0, 0], [7.0, 0, 0]]))
     assert clearance_entry(times, robot, [gone], leave=True)["t"] == [0.0, 1.0]
+    door = Obstacle(Box([2.0, 2.0], [3.0, 5.0]), present_s=(1.0, np.inf))
+    assert clearance_entry(times, robot, [door])["t"] == [1.0, 2.0]
+    assert clearance_entry(times, robot, [replace(door, present_s=(7.0, 9.0))]) is None
+    assert obstacle_entries([door], Local(np.zeros(2)), leave=False)[0]["present"] == [1.0, None]
     tower = Obstacle(Box([2.0, 2.0], [3.0, 0.0]), height=(0.0, 3.0))
     heights = np.array([[7.0, 8.0], [7.0, 8.0], [-2.0, -1.0]])
     assert apart(tower, heights=heights) == pytest.approx([np.hypot(1.0, 4.0), 4.0, 1.0], abs=1e-4)
