@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from maneuver_automaton import fleet, plotting
+from maneuver_automaton import fleet
 from maneuver_automaton.cli import run
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.fleet import FleetProblem, plan_fleet, verify_fleet
@@ -47,9 +47,9 @@ fleet: {between_m: 0.1, time_limit_s: 1}
 """
 QUICK = ("--no-plot", "--time-limit", "0.5")
 KEYS = [
-    "schema", "version", "kind", "name", "status", "reason", "objective", "cost", "sum_s", "last_s",
-    "lower_bound", "gap", "clearance_m", "closest", "order", "improvements", "timing_s", "counts",
-    "vehicles",
+    "schema", "version", "kind", "name", "status", "reason", "objective", "cost", "alone_cost",
+    "sum_s", "last_s", "lower_bound", "gap", "clearance_m", "closest", "order", "improvements",
+    "timing_s", "counts", "vehicles",
 ]  # fmt: skip
 
 
@@ -156,19 +156,10 @@ class TestPlan:
         assert document(".")["vehicles"]["north"]["status"] == "out_of_budget"
         assert not _interrupts.stopped()
 
-    def test_the_picture_is_drawn_where_there_is_one(self, folder, monkeypatch):
-        from matplotlib.figure import Figure
-
-        drawn = []
-
-        def draw(result):
-            drawn.append(result)
-            return Figure()
-
-        monkeypatch.setattr(plotting, "draw_fleet", draw, raising=False)
-        assert run(["plan", "x.yaml", "--quiet", "--time-limit", "0.5"]) == 0
-        assert (folder / "out/plan.png").exists()
-        assert drawn[0].status is fleet.FleetStatus.FOUND
+    def test_pictures(self, folder):
+        assert run(["plan", "x.yaml", "--quiet", "--time-limit", "0.5", "--animate"]) == 0
+        names = sorted(path.name for path in Path("out").iterdir())
+        assert names == ["plan.gif", "plan.json", "plan.png"]
 
     def test_a_folder_of_both_kinds(self, folder, capsys):
         Path("many").mkdir()

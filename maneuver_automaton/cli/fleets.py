@@ -48,12 +48,14 @@ class FleetAnswer:
         save_fleet(self.result, path, name=self.name, source=source, interrupted=stopped())
 
     def draw(self, out: Path, settings: Settings) -> None:
-        """Draw all vehicles in one picture."""
+        """Write the pictures that were asked for."""
         from maneuver_automaton import plotting
 
-        draw = getattr(plotting, "draw_fleet", None)
-        if settings.plot and draw is not None:
-            draw(self.result).savefig(out / "plan.png")
+        if settings.plot:
+            look = settings.look.look(self.name)
+            plotting.save_fleet_figure(self.result, out / "plan.png", look=look)
+        if settings.animate and self.result.plans:
+            plotting.animate_fleet(self.result, out / "plan.gif")
 
     def tell(self, folder: str) -> None:
         """Print it."""
@@ -107,7 +109,6 @@ class FleetTask:
         for option, given in (
             ("--alternatives", settings.alternatives > 0),
             ("--gap", settings.gap is not None),
-            ("--animate", settings.animate),
             ("--html", settings.html),
         ):
             if given:
