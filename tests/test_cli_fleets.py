@@ -266,6 +266,19 @@ class TestCheck:
         assert capsys.readouterr().err == said
 
 
+class TestPlot:
+    def test_the_plans_again(self, folder, capsys):
+        assert run(["plan", "x.yaml", "--quiet", *QUICK]) == 0
+        assert run(["plot", "out/plan.json"]) == 0
+        assert run(["plot", "out/plan.json", "--out", "y.pdf", "--with", "x.yaml"]) == 0
+        assert Path("out/plan.png").exists()
+        assert Path("y.pdf").exists()
+        Path("x.yaml").unlink()
+        assert run(["plot", "out/plan.json"]) == 2
+        said = "out/plan.json: source: there is no x.yaml, need --with and that file\n"
+        assert capsys.readouterr().err == said
+
+
 class TestConvert:
     def test_to_a_scenario_and_again(self, folder):
         Path("cars.yaml").write_text(PROBLEM)

@@ -168,7 +168,9 @@ def plot(
         raise InvalidScenario("--html: writes a page, and --animate an animation; need one of them")
     what = "animation" if animate else "page" if html else "picture"
     path = _picture(file, out, what)
-    if beside is None:
+    if (plans := _plans_of_fleet(file)) is not None:
+        draw = functools.partial(_draw_fleet, plans, file, beside, path, what, look)
+    elif beside is None:
         document = _drawn(file)
         draw = functools.partial(_draw_file, document, path, what, look)
     else:
@@ -181,10 +183,42 @@ def plot(
         draw()
     except OSError as error:
         raise not_written(path, error) from error
+    except InvalidScenario:
+        raise
     except (KeyError, ValueError, TypeError, IndexError, AttributeError) as error:
         said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
         raise InvalidScenario(f"{file}: {said}") from error
     return FOUND
+
+
+def _plans_of_fleet(file: Path) -> dict[str, Any] | None:
+    """The content of a plan.json of several vehicles; None of anything else."""
+    from maneuver_automaton.formats.plan_json import read_fleet_document
+
+    try:
+        return read_fleet_document(file)
+    except InvalidScenario:  # told by who reads the plan of one vehicle
+        return None
+
+
+def _draw_fleet(
+    plans: dict[str, Any], file: Path, beside: Path | None, path: Path, what: str, look: LookOptions
+) -> None:
+    """Draw plans of several vehicles as `plan` does."""
+    from maneuver_automaton import plotting
+    from maneuver_automaton.cli.planned import fleet_planned
+    from maneuver_automaton.formats.fleet_json import load_fleet
+
+    scenario = fleet_planned(file, plans, Parts(beside=beside))
+    result = load_fleet(file, scenario.fleet)
+    if what == "picture":
+        plotting.save_fleet_figure(result, path, look=look.look(scenario.name))
+    elif not result.plans:
+        raise ValueError(f"holds no plan, its status is {result.status.value!r}")
+    elif what == "animation":
+        plotting.animate_fleet(result, path)
+    else:
+        raise InvalidScenario(f"--html: is for one vehicle, but {file} has plans of several")
 
 
 def _draw_file(document: dict[str, Any], path: Path, what: str, look: LookOptions) -> None:
