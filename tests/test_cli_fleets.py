@@ -157,9 +157,9 @@ class TestPlan:
         assert not _interrupts.stopped()
 
     def test_pictures(self, folder):
-        assert run(["plan", "x.yaml", "--quiet", "--time-limit", "0.5", "--animate"]) == 0
+        assert run(["plan", "x.yaml", "--quiet", "--time-limit", "0.5", "--animate", "--html"]) == 0
         names = sorted(path.name for path in Path("out").iterdir())
-        assert names == ["plan.gif", "plan.json", "plan.png"]
+        assert names == ["plan.gif", "plan.html", "plan.json", "plan.png"]
 
     def test_a_folder_of_both_kinds(self, folder, capsys):
         Path("many").mkdir()
@@ -273,6 +273,8 @@ class TestPlot:
         assert run(["plot", "out/plan.json", "--out", "y.pdf", "--with", "x.yaml"]) == 0
         assert Path("out/plan.png").exists()
         assert Path("y.pdf").exists()
+        assert run(["plot", "out/plan.json", "--html", "--out", "y.html"]) == 0
+        assert "A crossing" in Path("y.html").read_text(encoding="utf-8")
         Path("x.yaml").unlink()
         assert run(["plot", "out/plan.json"]) == 2
         said = "out/plan.json: source: there is no x.yaml, need --with and that file\n"

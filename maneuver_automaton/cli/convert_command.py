@@ -41,6 +41,7 @@ from maneuver_automaton.formats.statement import MapFile
 from maneuver_automaton.scenario import FleetScenario, Scenario, statements_of, to_yaml
 
 if TYPE_CHECKING:
+    from maneuver_automaton.fleet import FleetResult
     from maneuver_automaton.planning import PlanResult
     from maneuver_automaton.problem import Problem
     from maneuver_automaton.receding_horizon import ClosedLoop
@@ -169,7 +170,12 @@ def plot(
     what = "animation" if animate else "page" if html else "picture"
     path = _picture(file, out, what)
     if (plans := _plans_of_fleet(file)) is not None:
-        draw = functools.partial(_draw_fleet, plans, file, beside, path, what, look)
+        from maneuver_automaton.cli.planned import fleet_planned
+        from maneuver_automaton.formats.fleet_json import load_fleet
+
+        fleet = fleet_planned(file, plans, Parts(beside=beside))
+        result = load_fleet(file, fleet.fleet)
+        draw = functools.partial(_draw_fleet, result, path, what, look, fleet.name)
     elif beside is None:
         document = _drawn(file)
         draw = functools.partial(_draw_file, document, path, what, look)
@@ -183,8 +189,6 @@ def plot(
         draw()
     except OSError as error:
         raise not_written(path, error) from error
-    except InvalidScenario:
-        raise
     except (KeyError, ValueError, TypeError, IndexError, AttributeError) as error:
         said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
         raise InvalidScenario(f"{file}: {said}") from error
@@ -201,24 +205,18 @@ def _plans_of_fleet(file: Path) -> dict[str, Any] | None:
         return None
 
 
-def _draw_fleet(
-    plans: dict[str, Any], file: Path, beside: Path | None, path: Path, what: str, look: LookOptions
-) -> None:
+def _draw_fleet(result: FleetResult, path: Path, what: str, look: LookOptions, name: str) -> None:
     """Draw plans of several vehicles as `plan` does."""
     from maneuver_automaton import plotting
-    from maneuver_automaton.cli.planned import fleet_planned
-    from maneuver_automaton.formats.fleet_json import load_fleet
 
-    scenario = fleet_planned(file, plans, Parts(beside=beside))
-    result = load_fleet(file, scenario.fleet)
     if what == "picture":
-        plotting.save_fleet_figure(result, path, look=look.look(scenario.name))
+        plotting.save_fleet_figure(result, path, look=look.look(name))
+    elif what == "page":
+        result.player(title=look.title or name).save(path)
     elif not result.plans:
         raise ValueError(f"holds no plan, its status is {result.status.value!r}")
-    elif what == "animation":
-        plotting.animate_fleet(result, path)
     else:
-        raise InvalidScenario(f"--html: is for one vehicle, but {file} has plans of several")
+        plotting.animate_fleet(result, path)
 
 
 def _draw_file(document: dict[str, Any], path: Path, what: str, look: LookOptions) -> None:

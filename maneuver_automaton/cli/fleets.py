@@ -56,6 +56,8 @@ class FleetAnswer:
             plotting.save_fleet_figure(self.result, out / "plan.png", look=look)
         if settings.animate and self.result.plans:
             plotting.animate_fleet(self.result, out / "plan.gif")
+        if settings.html:
+            self.result.player(title=settings.look.title or self.name).save(out / "plan.html")
 
     def tell(self, folder: str) -> None:
         """Print it."""
@@ -109,7 +111,6 @@ class FleetTask:
         for option, given in (
             ("--alternatives", settings.alternatives > 0),
             ("--gap", settings.gap is not None),
-            ("--html", settings.html),
         ):
             if given:
                 raise InvalidScenario(
