@@ -23,7 +23,7 @@ from maneuver_automaton.formats import (
 from maneuver_automaton.formats.fleet_json import load_fleet
 from maneuver_automaton.formats.plan_json import read_plan_document
 from maneuver_automaton.scenario import load_scenario
-from tests.fleet.fleets import crossing
+from tests.fleet.fleets import crossing, least_distances
 from tests.formats.outside import DATA, needs_data
 from tests.formats.test_cl_cbs import PROBLEM
 from tests.scenario.files import SCENARIO
@@ -185,9 +185,16 @@ class TestPlan:
         "name", ["cl-cbs/map_50by50_obst25_agents5_ex1.yaml", "db-cbs/swap2_unicycle.yaml"]
     )
     def test_other_formats(self, folder, name):
-        assert run(["plan", str(DATA / "fleet" / name), "--no-plot", "--quiet"]) == 0
+        """Planned, proven again from the file, and looked at by shapely at short steps."""
+        path = DATA / "fleet" / name
+        assert run(["plan", str(path), "--no-plot", "--quiet", "--time-limit", "2"]) == 0
         assert document()["status"] == "found"
         assert run(["check", "out/plan.json"]) == 0
+        read = load_fleet("out/plan.json", load_scenario(path).fleet)
+        between, to_obstacles = least_distances(read)
+        assert between > 0.0
+        assert to_obstacles > 0.0
+        assert between >= read.clearance_m - 1e-9
 
 
 class TestCheck:

@@ -69,15 +69,14 @@ class FleetAnswer:
         """For the table of a folder."""
         from maneuver_automaton.cli.fleet_tables import least_clearance
 
-        result = self.result
-        some = bool(result.plans)
+        result, whole = self.result, not self.why_not
         return Row(
             name=path.name,
-            code=NO_PLAN if self.why_not else FOUND,
+            code=FOUND if whole else NO_PLAN,
             status=result.status.value,
-            reason=f"{path}: {self.why_not}" if self.why_not else "",
-            cost=result.cost if some else None,
-            duration=result.last_s if some else None,
+            reason="" if whole else f"{path}: {self.why_not}",
+            cost=result.cost if whole else None,
+            duration=result.last_s if whole else None,
             clearance=least_clearance(result),
             first_plan=result.timing_s.get("first_plan"),
         )
