@@ -67,9 +67,16 @@ def verified(
         status=status if n else FleetStatus.NO_PLAN,
         results=results,
         closest=closest,
-        clearance_m=min((row.distance_m for row in closest), default=math.inf),
+        clearance_m=least_apart(closest, fleet),
         reasons=why,
     )
+
+
+def least_apart(closest: Sequence[Closest], fleet: FleetProblem) -> float:
+    """What any two vehicles keep at least [m]: pairs that are not measured keep `NEAR` more."""
+    if len(fleet) < 2:
+        return math.inf
+    return min([fleet.margin + NEAR, *(row.distance_m for row in closest)])
 
 
 def _checked(one: Vehicle, found: Found | None, settings: SearchSettings) -> tuple[PlanResult, str]:
