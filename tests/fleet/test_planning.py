@@ -7,10 +7,13 @@ import math
 import numpy as np
 import pytest
 
+from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import Box, Disc, Obstacle
+from maneuver_automaton.costs import Cost
 from maneuver_automaton.fleet import FleetProblem, FleetStatus, plan_fleet
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.problem import Bounds, Horizon
+from maneuver_automaton.models import Unicycle
+from maneuver_automaton.problem import Bounds, Horizon, Problem
 from tests.fleet import fleets
 
 
@@ -181,3 +184,14 @@ def test_who_has_arrived_is_passed_by_another_way():
     result = plan_fleet(fleets.fleet_of(ends, priority=[1.0, 0.0]), time_limit=5.0, max_rounds=0)
     assert result.status is FleetStatus.FOUND
     assert fleets.least_distances(result)[0] > 0.0
+
+
+def test_vehicles_that_cannot_turn_drive_ahead():
+    robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "ahead": (1, 0)})
+    body = Disc(0.3)
+    pair = [
+        Problem(robot, [0, y, 0], [3, y, 0], footprint=body, cost=Cost(time=1.0)) for y in (0, 2)
+    ]
+    result = plan_fleet(FleetProblem(pair), time_limit=2.0, max_rounds=1)
+    assert result.status is FleetStatus.FOUND
+    assert result.sum_s == pytest.approx(6.0)
