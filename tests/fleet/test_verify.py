@@ -57,6 +57,24 @@ def test_what_misses_it_by_a_hair_does_not(margin, less, turned):
     assert 3.0 <= verdict.too_near[0].time_s <= 5.0
 
 
+@given(st.floats(0.05, 0.7), st.floats(SHARPLY, 0.004), st.floats(1.0, 6.0))
+def test_around_another_one_too(margin, more, turn):
+    """A car on a circle of a metre around a disc: its left side, 0.2 m aside, is the nearest."""
+    robot, side = car(), 0.2
+    disc = Disc(1.0 - side - margin - more)
+    end = [math.cos(turn), math.sin(turn), turn + math.pi / 2]
+    around = Problem(robot, [1, 0, math.pi / 2], end, footprint=Box([0.8, 2.0 * side]))
+    stands = Problem(robot, [0, 0, 0], [0, 0, 0], footprint=disc)
+    fleet = FleetProblem([around, stands], names=["around", "stands"], margin=margin)
+    plans = {
+        "around": Plan([1, 0, math.pi / 2], (robot["left"],), durations=[turn]),
+        "stands": Plan([0, 0, 0], (), durations=[]),
+    }
+    assert verify_fleet(fleet, plans).passed
+    nearer = FleetProblem(fleet.problems, names=fleet.names, margin=margin + 2.0 * more)
+    assert not verify_fleet(nearer, plans).passed
+
+
 def test_who_is_farther_is_not_measured():
     fleet, plans = lanes(2.0 * NEAR, margin=0.5)
     verdict = verify_fleet(fleet, plans)
