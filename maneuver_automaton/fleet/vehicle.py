@@ -182,6 +182,8 @@ class Vehicle:
             timed = with_waits(query, way)
             if timed is not None and timed.cost < (best.cost if best else known):
                 best = timed
+        if best is None:
+            best = self._round_the_arrived(query, others, budget)
         if best is None or best.cost > NEARLY * self.ways[0].cost:
             first = first_plan(query, budget=replace(budget, expansions=most))
             self._count(first.expansions)
@@ -195,6 +197,22 @@ class Vehicle:
         if not best.cost < known:
             return None
         return self._word_found(query, best)
+
+    def _round_the_arrived(
+        self, query: LatticeQuery, others: Sequence[Obstacle], budget: Budget
+    ) -> Word | None:
+        """A way round those that stay at their goals, wherever they are now, with rests."""
+        arrived = [
+            Obstacle(one.at(float(one.motion.time[-1])))
+            for one in others
+            if one.motion is not None and one.present_s is None
+        ]
+        calm = replace(self.problem, obstacles=(*self.problem.obstacles, *arrived))
+        if blocked_ends(calm) is not None:
+            return None
+        first = first_plan(self._query(calm), budget=replace(budget, expansions=QUICK))
+        self._count(first.expansions)
+        return None if first.word is None else with_waits(query, first.word)
 
     def _planned(
         self, problem: Problem, budget: Budget, most_s: float, *, improve: bool

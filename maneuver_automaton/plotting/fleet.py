@@ -37,7 +37,7 @@ LABELS, GAP = 0.56, 0.32  # [in] below axes with numbers, and between those over
 ROW, LEAST_BARS, MOST_BARS, CURVE = 0.19, 0.5, 3.0, 1.2  # [in] heights over time
 MOST_ROW, MOST_CURVE = 0.36, 2.6  # [in] where there is room for more
 CURVE_SHARE, LEAST_PLANE = 0.6, 0.8  # of the room, and [in], where there is little
-MOST_REASONS = 4  # of vehicles without a plan, above the picture
+MOST_REASONS = 4  # above the picture, and names of vehicles for each
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,10 +134,18 @@ def headline(result: FleetResult) -> str:
 
 
 def _reasons(cast: Cast) -> list[str]:
-    """Why some have no plan."""
-    said = [f"{one.name}: {one.reason or 'no plan'}" for one in cast.members if one.plan is None]
-    more = len(said) - MOST_REASONS
-    return said if more <= 0 else [*said[:MOST_REASONS], f"and {more} more without a plan"]
+    """Why some have no plan: a line for each reason, with the names that it holds for."""
+    named: dict[str, list[str]] = {}
+    for one in cast.members:
+        if one.plan is None:
+            named.setdefault(one.reason or "no plan", []).append(one.name)
+    lines = []
+    for reason, names in named.items():
+        more = len(names) - MOST_REASONS
+        rest = f" and {more} more" if more > 0 else ""
+        lines.append(f"{', '.join(names[:MOST_REASONS])}{rest}: {reason}")
+    more = len(lines) - MOST_REASONS
+    return lines if more <= 0 else [*lines[:MOST_REASONS], f"and {more} more reasons"]
 
 
 def _entries(cast: Cast, *, curve: bool) -> tuple[list[Artist], list[str]]:

@@ -50,6 +50,7 @@ class FleetArtists:
     missing: PolyCollection  # hatched, at the starts of those without a plan
     missing_marks: PathCollection  # crosses for those of them that are too small
     wanted: PolyCollection  # dashed, at their goals
+    wanted_marks: PathCollection  # the same for those that are too small
     numbers: tuple[Text, ...]  # at the starts, if there are too many for a legend
     steps: tuple[Text, ...]  # at the bodies, on request
     obstacles: ObstacleArtists
@@ -65,6 +66,7 @@ def draw_fleet_plane(ax: Axes, cast: Cast, *, numbered: bool = False) -> FleetAr
     driving = [one for one in cast.members if one.plan is not None]
     standing = [one for one in cast.members if one.plan is None]
     lost = [one for one in standing if one.reach < TINY * extent]
+    stuck = [one for one in standing if one.reach >= TINY * extent]
     seen = [one for one in driving if one.reach >= TINY * extent]
     small = [one for one in driving if one.reach < TINY * extent]
     width, alpha = _weights(len(cast.members))
@@ -72,8 +74,8 @@ def draw_fleet_plane(ax: Axes, cast: Cast, *, numbered: bool = False) -> FleetAr
     bodies, body_colors = _bodies([(one, [time]) for one, time in along])
     starts, start_colors = _bodies([(one, [one.begin]) for one in seen])
     goals, goal_colors = _bodies([(one, [one.arrival]) for one in seen])
-    missing, missing_colors = _bodies([(one, [one.begin]) for one in standing])
-    wanted = [(ring, one) for one in standing for ring in one.goal_outlines]
+    missing, missing_colors = _bodies([(one, [one.begin]) for one in stuck])
+    wanted = [(ring, one) for one in stuck for ring in one.goal_outlines]
     fronts = [_front(one, time) for one in seen for time in (one.begin, one.arrival)]
     artists = FleetArtists(
         paths=LineCollection(
@@ -113,6 +115,12 @@ def draw_fleet_plane(ax: Axes, cast: Cast, *, numbered: bool = False) -> FleetAr
             [ring for ring, _ in wanted], facecolors="none",
             edgecolors=[one.color for _, one in wanted], linewidths=1.0, linestyles=[(0, (3, 2))],
             zorder=2.2,
+        ),
+        wanted_marks=ax.scatter(
+            [goal.pose[0] for one in lost for goal in one.problem.goals],
+            [goal.pose[1] for one in lost for goal in one.problem.goals],
+            s=24.0, marker="o", facecolors="none", linewidths=1.0, linestyles=[(0, (2, 1.5))],
+            edgecolors=[one.color for one in lost for _ in one.problem.goals], zorder=3.6,
         ),
         numbers=tuple(_number(ax, one) for one in cast.members) if cast.many else (),
         steps=_steps(ax, along, cast.scene.times) if numbered else (),

@@ -71,6 +71,21 @@ def test_one_without_a_plan_is_hatched_at_its_start():
     assert "stuck: walls enclose the start" in said
     alone = fleet_of([no_answer([0, 0, 0], [1, 0, 0])], names=["a"])
     assert "a: too narrow" in [text.get_text() for text in draw_fleet(alone).texts]
+    many = fleet_of([no_answer([0, k, 0], [1, k, 0]) for k in range(7)], names=list("abcdefg"))
+    said = [text.get_text() for text in draw_fleet(many).texts]
+    assert "a, b, c, d and 3 more: too narrow" in said
+
+
+def test_points_are_marks():
+    ahead = plan_of(["straight"], [2.0])
+    lost = no_answer([0, 5, 0], [3, 5, 0])
+    _, artists = plane_of(fleet_of([answer(ahead), lost], names=["a", "b"]))
+    starts, goals = (marks.get_offsets().tolist() for marks in artists.marks)
+    assert (starts, goals) == ([ahead.start[:2].tolist()], [ahead.end[:2].tolist()])
+    assert not artists.marks[0].get_facecolor().size
+    assert artists.missing_marks.get_offsets().tolist() == [[0.0, 5.0]]
+    assert artists.wanted_marks.get_offsets().tolist() == [[3.0, 5.0]]
+    assert artists.starts.get_paths() == artists.missing.get_paths() == []
 
 
 def test_each_has_its_colour_everywhere():

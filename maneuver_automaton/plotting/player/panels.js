@@ -12,13 +12,16 @@ const KEYS = [
   ["home end", "to the begin or the end"],
   ["+ − f", "closer, farther, show all; or wheel, drag, pinch, double click"],
   ["s S", "faster, slower"],
-  ["1 … 9", data.fleet ? "a vehicle; or click it" : "the plan, and its alternatives"],
+  ["1 … 9", "the plan, and its alternatives"],
   ["b w p", "bodies, swept region, path"],
   ["d", "dark or light"],
   ["?", "these keys"],
 ];
 
-const FLEET_KEYS = [["Esc", "all vehicles; or click where there is none"]];
+const FLEET_KEYS = [
+  ["1 … 9", "a vehicle; or click it"],
+  ["Esc", "all vehicles; or click where there is none"],
+];
 
 /** Black or white, whichever reads better on a colour "#rrggbb". */
 function inkOn(color) {
@@ -287,9 +290,15 @@ function buildSearch() {
   });
 }
 
+/** What keys do; those of a fleet stand for those of a plan. */
+function keysOfPage() {
+  if (!fleet) return KEYS;
+  return [...KEYS.filter(([keys]) => FLEET_KEYS.every(([others]) => others !== keys)), ...FLEET_KEYS];
+}
+
 function buildKeys() {
   const table = document.createElement("table");
-  for (const [keys, what] of fleet ? [...KEYS, ...FLEET_KEYS] : KEYS) {
+  for (const [keys, what] of keysOfPage()) {
     const row = table.insertRow(), cell = row.insertCell();
     keys.split(" ").forEach((key) => cell.append(element("kbd", "", key), " "));
     row.insertCell().textContent = what;

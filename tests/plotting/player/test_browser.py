@@ -110,6 +110,8 @@ def test_the_page_of_a_fleet_plays_all_and_picks_one(tmp_path):
         assert page.evaluate("player.choice") == -1
         for key in ("2", "]", "Escape", "]", "?", "?", "w", "b", "p", "d"):
             page.keyboard.press(key)
+        assert "a vehicle; or click it" in page.inner_html("#keys")
+        assert "alternatives" not in page.inner_html("#keys")
         page.evaluate("player.seek(player.end)")
         assert page.inner_text("#clock") == "5.50 s · 2 of 3 arrived"
 
