@@ -10,7 +10,11 @@ from pathlib import Path
 from setuptools import Distribution, setup
 from setuptools.command.build_py import build_py
 
-SCENARIOS = ("*.yaml", "maps/*")  # of the folder `scenarios`; its pictures stay behind
+SCENARIOS = (
+    "*.yaml",
+    "fleets/*.yaml",
+    "maps/*",
+)  # of the folder `scenarios`; its pictures stay behind
 COMPILE = (
     "import sys, pathlib\n"
     "from maneuver_automaton._compile_all import ship\n"

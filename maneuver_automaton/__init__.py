@@ -46,8 +46,11 @@ if TYPE_CHECKING:
     from maneuver_automaton.fleet import FleetResult as FleetResult
     from maneuver_automaton.fleet import plan_fleet as plan_fleet
     from maneuver_automaton.fleet import simulate_fleet as simulate_fleet
+    from maneuver_automaton.fleet import verify_fleet as verify_fleet
+    from maneuver_automaton.formats.fleet_json import save_fleet as save_fleet
     from maneuver_automaton.formats.maps import load_map as load_map
     from maneuver_automaton.formats.plan_json import load_plan as load_plan
+    from maneuver_automaton.formats.plan_json import load_plans as load_plans
     from maneuver_automaton.formats.plan_json import save_plan as save_plan
     from maneuver_automaton.groups import SE2 as SE2
     from maneuver_automaton.groups import SE2xR as SE2xR
@@ -88,6 +91,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.roads import RoadVehicle as RoadVehicle
     from maneuver_automaton.roads import drive_road as drive_road
     from maneuver_automaton.roads import plan_road as plan_road
+    from maneuver_automaton.scenario import FleetScenario as FleetScenario
     from maneuver_automaton.scenario import RoadScenario as RoadScenario
     from maneuver_automaton.scenario import Scenario as Scenario
     from maneuver_automaton.scenario import load_scenario as load_scenario
@@ -109,6 +113,7 @@ _HOMES = {
     "FleetLog": "fleet",
     "FleetProblem": "fleet",
     "FleetResult": "fleet",
+    "FleetScenario": "scenario",
     "Goal": "problem",
     "Helicopter": "models",
     "Horizon": "problem",
@@ -149,6 +154,7 @@ _HOMES = {
     "load_library": "automaton.library",
     "load_map": "formats.maps",
     "load_plan": "formats.plan_json",
+    "load_plans": "formats.plan_json",
     "load_scenario": "scenario",
     "load_stock_library": "automaton.stock",
     "lower_bound": "planning.lower_bound",
@@ -160,6 +166,7 @@ _HOMES = {
     "ros_messages": "exports",
     "save_commonroad_solution": "exports",
     "save_csv": "exports",
+    "save_fleet": "formats.fleet_json",
     "save_geojson": "exports",
     "save_library": "automaton.library",
     "save_plan": "formats.plan_json",
@@ -170,6 +177,7 @@ _HOMES = {
     "translations": "groups",
     "trims_of": "primitives",
     "verify": "planning.verdict",
+    "verify_fleet": "fleet",
 }
 
 __all__ = [*_HOMES, "plotting"]

@@ -23,7 +23,7 @@ class Player(Protocol):
 
 
 def player_page(value: Any, *, title: str = "") -> Player:
-    """The player of a plan, a plan's result, a closed loop, or a plan or drive on roads."""
+    """The player of a plan, an answer for one or a fleet, a closed loop, or a plan on roads."""
     page: Player = _drawing().player_of(value, title=title)
     return page
 

@@ -74,7 +74,9 @@ def test_the_shell_completes(capsys, monkeypatch):
 def test_examples_are_listed_with_a_line_each(capsys):
     assert run(["example"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines] == sorted(p.stem for p in SCENARIOS.glob("*.yaml"))
+    assert [line.split()[0] for line in lines] == sorted(
+        p.stem for p in (*SCENARIOS.glob("*.yaml"), *SCENARIOS.glob("fleets/*.yaml"))
+    )
     assert "parking_loop                mpc   Parallel parking in closed loop" in lines
 
 

@@ -78,6 +78,23 @@ obstacles: [{box_m: {center: [2, 0.3], size: [0.8, 0.8]}}]
 search: {time_limit_s: 20.0, max_expansions: 500}
 receding_horizon: {step_s: 1.0}
 """
+FLEET = """\
+schema: 1
+vehicle: {model: boat, footprint: {disc_m: 0.3}}
+automaton:
+  trims:
+    - {name: rest, control: [0.0, 0.0]}
+    - {name: ahead, control: [1.0, 0.0]}
+    - {name: left, control: [1.0, 1.0]}
+    - {name: right, control: [1.0, -1.0]}
+vehicles:
+  - {name: boat, start: {pose: [0, 0, 0]}, goal: {pose: [6, 0, 0]}}
+  - name: robot
+    vehicle: {model: unicycle, footprint: {disc_m: 0.3}}
+    automaton: {preset: reeds_shepp}
+    start: {pose: [3, -3, 1.57]}
+    goal: {pose: [3, 3, 1.57]}
+"""
 QUIET = ["--no-plot", "--quiet"]
 
 
@@ -99,6 +116,27 @@ def folder(tmp_path, monkeypatch):
 
 def document(folder="out", name="plan"):
     return json.loads((Path(folder) / f"{name}.json").read_text())
+
+
+def test_one_of_several_vehicles_may_be_a_users(folder, capsys):
+    Path("fleet.yaml").write_text(FLEET)
+    assert (
+        run(["plan", "fleet.yaml", "--model", "test_boats:BOAT", "--time-limit", "1", *QUIET]) == 0
+    )
+    vehicles = document()["vehicles"]
+    assert [one["vehicle"]["model"] for one in vehicles.values()] == ["boat", "unicycle"]
+    assert run(["check", "out/plan.json", "--model", "test_boats:BOAT"]) == 0
+    capsys.readouterr()
+    Path("fleet.yaml").write_text(FLEET.replace("model: unicycle", "model: unicylce"))
+    assert run(["plan", "fleet.yaml", "--model", "test_boats:BOAT", *QUIET]) == 2
+    assert capsys.readouterr().err.startswith(
+        "fleet.yaml:12: vehicles[1].vehicle.model: got 'unicylce', need 'boat', the model that is "
+        "given, or one of unicycle, car, "
+    )
+    assert run(["plan", "fleet.yaml", *QUIET]) == 2
+    assert capsys.readouterr().err.startswith(
+        "fleet.yaml:2: vehicle.model: got 'boat', need one of unicycle, car, "
+    )
 
 
 def test_a_library_of_a_users_model_is_planned_with(folder):

@@ -16,6 +16,8 @@ import pytest
 import yaml
 
 from maneuver_automaton.cli import run
+from maneuver_automaton.fleet import plan_fleet
+from maneuver_automaton.formats.fleet_json import fleet_to_dict
 from maneuver_automaton.formats.plan_json import plan_to_dict
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.scenario import json_schema, load_scenario, scenario_of_text
@@ -127,6 +129,19 @@ def test_the_yaml_is_that_of_the_scenario():
     text, obstacles = blocks("yaml")
     assert (ROOT / "scenarios" / "parking.yaml").read_text(encoding="utf-8").endswith(text)
     assert len(scenario_of_text(text + obstacles, name="README").problem.obstacles) == 4
+
+
+def test_several_vehicles_are_a_scenario(tmp_path):
+    (text,) = blocks("yml")
+    (tmp_path / "x.yaml").write_text(text)
+    assert load_scenario(tmp_path / "x.yaml").fleet.names == ("east", "west")
+
+
+def test_every_key_of_the_plans_of_a_fleet_is_explained():
+    fleet = load_scenario(ROOT / "scenarios/fleets/intersection.yaml").fleet
+    document = fleet_to_dict(plan_fleet(fleet, time_limit=0.5))
+    for key in [*document, *document["clearance_m"], *document["timing_s"], *document["counts"]]:
+        assert f"`{key}`" in TEXT
 
 
 def keys_of(schema: Any) -> set[str]:

@@ -15,7 +15,14 @@ from mkdocs.structure.files import File
 
 ROOT = Path(__file__).parents[2]
 PAGES = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")
-FILES = ("LICENSE", "CITATION.cff", "scenarios/*.yaml", "scenarios/maps/*", "scenarios/pictures/*")
+FILES = (
+    "LICENSE",
+    "CITATION.cff",
+    "scenarios/*.yaml",
+    "scenarios/fleets/*.yaml",
+    "scenarios/maps/*",
+    "scenarios/pictures/*",
+)
 LINK = re.compile(r"\]\((?!https?:|#)([^)#\s]+)")
 
 

@@ -148,6 +148,7 @@ def closest_to(
     *,
     footprint: tuple[Shape, ...],
     within: tuple[float, float] = (-math.inf, math.inf),
+    enough: float = 0.0,
 ) -> Least:
     """The least clearance of a plan to obstacles, and when.
 
@@ -161,6 +162,8 @@ def closest_to(
         Parts of the body; empty for a point.
     within : (float, float)
         First and last time that counts, on the plan's clock [s].
+    enough : float
+        Clearance [m] that decides: the bound is made sharp enough to tell on which side it is.
 
     Returns
     -------
@@ -187,7 +190,7 @@ def closest_to(
     drive = driven(seen_from(plan, goal), model)
     body = _body(drive.frames, footprint, plan, goal, (0.0, 0.0))
     around = surroundings_of(obstacles, origin_of(goal.pose))
-    least = least_clearance(body, around, spans_within(body, first, last))
+    least = least_clearance(body, around, spans_within(body, first, last), enough=enough)
     return least._replace(time=clock + least.time)
 
 

@@ -295,7 +295,12 @@ def _cut_where_motions_change(
 
 def frames_at(around: Surroundings, times: Array) -> Array:
     """Poses (motions, m, 3) of what moves: linear or on arcs between its times, else still."""
-    return np.stack([_frames_of(motion, times) for motion in around.motions])
+    knots = around.knots
+    if knots is None:
+        return np.stack([_frames_of(motion, times) for motion in around.motions])
+    k = knots.before(times)
+    since = np.maximum(times - knots.time[k], 0.0)
+    return _coasted(knots.pose[k], knots.twist[k], since)
 
 
 def on_arcs(frames: Array, body: Body, around: Surroundings, pairs: Pairs) -> None:
@@ -317,9 +322,13 @@ def _frames_of(motion: Motion, times: Array) -> Array:
         return np.stack(columns, axis=1)
     inside = np.clip(times, motion.time[0], motion.time[-1])
     k = np.minimum(np.searchsorted(motion.time, inside, side="right"), motion.time.size - 1) - 1
-    since, (ahead, aside, turn) = inside - motion.time[k], motion.twist[k].T
+    return _coasted(motion.pose[k], motion.twist[k], inside - motion.time[k])
+
+
+def _coasted(poses: Array, twists: Array, since: Array) -> Array:
+    """Poses (..., 3) after coasting with twists (..., 3) for some time (...,) [s]."""
     # A chord of an arc leads in the direction that the frame has half way.
-    half = 0.5 * turn * since
-    chord = since * np.sinc(half / np.pi) * directions(motion.pose[k, 2] + half)
-    place = points_of(motion.pose[k]) + (ahead + 1j * aside) * chord
-    return np.stack([place.real, place.imag, motion.pose[k, 2] + 2.0 * half], axis=1)
+    half = 0.5 * twists[..., 2] * since
+    chord = since * np.sinc(half / np.pi) * directions(poses[..., 2] + half)
+    place = points_of(poses) + points_of(twists) * chord
+    return np.stack([place.real, place.imag, poses[..., 2] + 2.0 * half], axis=-1)

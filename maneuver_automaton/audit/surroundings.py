@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +15,26 @@ from maneuver_automaton.audit.outlines import Outline, joined, map_outline, outl
 from maneuver_automaton.collision.shapes import AnyObstacle, Motion, OccupancyMap
 
 GRID = 65536.0  # [m] between the places from where obstacles are counted
+
+
+class Knots(NamedTuple):
+    """Motions that coast on arcs, one after another."""
+
+    time: Array  # (k,) [s]
+    pose: Array  # (k, 3)
+    twist: Array  # (k, 3) after each knot; none after the last of a motion
+    first: IntArray  # (motions + 1,) where those of each begin
+
+    def before(self, times: Array) -> IntArray:
+        """The last knot (motions, m) of each motion at or before times (m,), or its first."""
+        # One search for all: the times of each motion come after those of the motion before it.
+        low = float(self.time.min())
+        width = max(float(self.time.max()), float(times.max())) - min(low, float(times.min())) + 1.0
+        number = np.arange(len(self.first) - 1)
+        keys = self.time - low + width * np.repeat(number, np.diff(self.first))
+        asked = times - low + width * number[:, None]
+        found = np.searchsorted(keys, asked, side="right") - 1
+        return np.clip(found, self.first[:-1, None], self.first[1:, None] - 1)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -34,6 +54,7 @@ class Surroundings:
     heights: Array  # (n, 2) [m] from where to where they stand
     motion_of_edge: IntArray  # (n,) which motion an edge has; -1 if it stands still
     motions: tuple[Motion, ...]
+    knots: Knots | None  # of all motions side by side, where all coast on arcs or stand
     present: Array  # (motions, 2) [s] from when until when what moves is there
     speeds: Array  # (motions,) [m/s] of the frame at most, where it coasts on arcs; else 0
     bends: Array  # (motions,) [m/s^2] how fast its velocity changes then; else 0
@@ -118,6 +139,7 @@ def surroundings_around(
         heights=heights_of,
         motion_of_edge=index,
         motions=tuple(motions),
+        knots=_knots_of(motions),
         present=np.array(present, dtype=np.float64).reshape(-1, 2),
         speeds=np.array([_fastest(one) for one in motions]),
         bends=np.array([float(one.bends.max(initial=0.0)) for one in motions]),
@@ -129,6 +151,20 @@ def surroundings_around(
         tree=shapely.STRtree(_geometries(whole, still, heights_of)),
         rounds=bool(whole.radius.any()),
         right=float((whole.begins.real + whole.radius).max(initial=0.0)),
+    )
+
+
+def _knots_of(motions: list[Motion]) -> Knots | None:
+    """The knots of motions side by side; None if one runs from pose to pose."""
+    if not motions or any(one.twist is None and one.time.size > 1 for one in motions):
+        return None
+    sizes = [one.time.size for one in motions]
+    twists = [np.vstack([one.rates, np.zeros(3)]) for one in motions]
+    return Knots(
+        time=np.concatenate([one.time for one in motions]),
+        pose=np.concatenate([one.pose for one in motions]),
+        twist=np.concatenate(twists),
+        first=np.cumsum([0, *sizes]),
     )
 
 

@@ -10,7 +10,8 @@ from typing import Any
 
 from maneuver_automaton.cli.check_command import Finding
 from maneuver_automaton.cli.compiling import announced
-from maneuver_automaton.cli.inputs import Parts, problem_of, scenario_of
+from maneuver_automaton.cli.inputs import Parts, scenario_of
+from maneuver_automaton.cli.planned import fleet_planned
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.fleet import Closest, verify_fleet
 from maneuver_automaton.formats.plan_json import (
@@ -20,7 +21,6 @@ from maneuver_automaton.formats.plan_json import (
     read_plan_document,
 )
 from maneuver_automaton.planning.verdict import Verdict, verify
-from maneuver_automaton.scenario import FleetScenario
 
 ENDING = ".json"
 AGREES = 1e-9  # share by which a cost may differ from that of the file
@@ -53,10 +53,7 @@ def findings(path: Path, parts: Parts) -> tuple[str, Iterator[Finding]] | None:
 def _of_fleet(
     path: Path, document: Mapping[str, Any], parts: Parts
 ) -> tuple[str, Iterator[Finding]]:
-    file, its = _source(path, document, parts)
-    scenario = problem_of(file, its)
-    if not isinstance(scenario, FleetScenario):
-        raise InvalidScenario(f"{path}: holds plans of several vehicles, but {file} states one")
+    scenario = fleet_planned(path, document, parts)
     plans = load_plans(path)
     with announced(), _of_this(path):
         verdict = verify_fleet(scenario.fleet, plans)
@@ -105,26 +102,6 @@ def _plan(what: str, verdict: Verdict, stated: Any) -> Finding:
 def _why_none(stated: Any) -> str:
     reason = stated.get("reason") if isinstance(stated, dict) else None
     return f"there is none: {reason}" if reason else "there is none"
-
-
-def _source(path: Path, document: Mapping[str, Any], parts: Parts) -> tuple[Path, Parts]:
-    """The file that plans were made from, and what completes it: by --with, or as they say."""
-    if parts.beside is not None:
-        return parts.beside, replace(parts, beside=None)
-    said = document.get("source")
-    if not isinstance(said, dict) or not isinstance(said.get("file"), str):
-        raise InvalidScenario(
-            f"{path}: source: is missing, need --with and the file it was planned from"
-        )
-    beside, case = said.get("with"), said.get("case")
-    file = path.parent / said["file"]
-    if not file.is_file():
-        raise InvalidScenario(f"{path}: source: there is no {file}, need --with and that file")
-    return file, replace(
-        parts,
-        beside=path.parent / beside if isinstance(beside, str) else None,
-        case=case if isinstance(case, int) and parts.case is None else parts.case,
-    )
 
 
 @contextlib.contextmanager

@@ -41,6 +41,7 @@ from maneuver_automaton.formats.statement import MapFile
 from maneuver_automaton.scenario import FleetScenario, Scenario, statements_of, to_yaml
 
 if TYPE_CHECKING:
+    from maneuver_automaton.fleet import FleetResult
     from maneuver_automaton.planning import PlanResult
     from maneuver_automaton.problem import Problem
     from maneuver_automaton.receding_horizon import ClosedLoop
@@ -168,7 +169,14 @@ def plot(
         raise InvalidScenario("--html: writes a page, and --animate an animation; need one of them")
     what = "animation" if animate else "page" if html else "picture"
     path = _picture(file, out, what)
-    if beside is None:
+    if (plans := _plans_of_fleet(file)) is not None:
+        from maneuver_automaton.cli.planned import fleet_planned
+        from maneuver_automaton.formats.fleet_json import load_fleet
+
+        fleet = fleet_planned(file, plans, Parts(beside=beside))
+        result = load_fleet(file, fleet.fleet)
+        draw = functools.partial(_draw_fleet, result, path, what, look, fleet.name)
+    elif beside is None:
         document = _drawn(file)
         draw = functools.partial(_draw_file, document, path, what, look)
     else:
@@ -185,6 +193,30 @@ def plot(
         said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
         raise InvalidScenario(f"{file}: {said}") from error
     return FOUND
+
+
+def _plans_of_fleet(file: Path) -> dict[str, Any] | None:
+    """The content of a plan.json of several vehicles; None of anything else."""
+    from maneuver_automaton.formats.plan_json import read_fleet_document
+
+    try:
+        return read_fleet_document(file)
+    except InvalidScenario:  # told by who reads the plan of one vehicle
+        return None
+
+
+def _draw_fleet(result: FleetResult, path: Path, what: str, look: LookOptions, name: str) -> None:
+    """Draw plans of several vehicles as `plan` does."""
+    from maneuver_automaton import plotting
+
+    if what == "picture":
+        plotting.save_fleet_figure(result, path, look=look.look(name))
+    elif what == "page":
+        result.player(title=look.title or name).save(path)
+    elif not result.plans:
+        raise ValueError(f"holds no plan, its status is {result.status.value!r}")
+    else:
+        plotting.animate_fleet(result, path)
 
 
 def _draw_file(document: dict[str, Any], path: Path, what: str, look: LookOptions) -> None:

@@ -33,7 +33,7 @@ def scenario_folder() -> Path:
 
 def show() -> int:
     """List the scenarios with a line each, and the command that they are for."""
-    found = {path.stem: _content(path) for path in sorted(scenario_folder().glob("*.yaml"))}
+    found = {name: _content(path) for name, path in sorted(_scenarios().items())}
     width = max(map(len, found))
     for name, content in found.items():
         command = "mpc" if "receding_horizon" in content else "plan"
@@ -69,7 +69,7 @@ def write(name: str, out: Path | None) -> int:
 
 
 def _source(name: str) -> Path:
-    known = {path.stem: path for path in scenario_folder().glob("*.yaml")}
+    known = _scenarios()
     wanted = name.removesuffix(".yaml")
     if wanted in known:
         return known[wanted]
@@ -78,6 +78,12 @@ def _source(name: str) -> Path:
     raise InvalidScenario(
         f"example: no scenario {name!r}; {hint}`maneuver-automaton example` lists them"
     )
+
+
+def _scenarios() -> dict[str, Path]:
+    """Files of the scenarios by name, those of one vehicle and those of several."""
+    folder = scenario_folder()
+    return {path.stem: path for path in (*folder.glob("*.yaml"), *folder.glob("fleets/*.yaml"))}
 
 
 def _content(path: Path) -> dict[str, object]:

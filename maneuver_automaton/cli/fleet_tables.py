@@ -43,6 +43,7 @@ def _facts(result: FleetResult, folder: str) -> dict[str, str]:
     return {
         "plans": f"{n} of {of}",
         "cost": f"{result.cost:.9g}{_bound(result)}",
+        "each alone": f"{result.alone_cost:.9g}" if result.alone_cost else "",
         "sum": f"{result.sum_s:.9g} s",
         "last arrival": f"{result.last_s:.9g} s",
         "apart": f"{result.clearance_m:.3g} m at least{kept}"

@@ -37,7 +37,8 @@ class FleetAnswer:
         result = self.result
         if result.status is FleetStatus.FOUND:
             return ""
-        return f"{result.status.value}: {reason_of(result)}"
+        said = "interrupted before all had a plan: " if stopped() else ""
+        return f"{result.status.value}: {said}{reason_of(result)}"
 
     def save(self, path: Path) -> None:
         """Write plan.json."""
@@ -47,12 +48,16 @@ class FleetAnswer:
         save_fleet(self.result, path, name=self.name, source=source, interrupted=stopped())
 
     def draw(self, out: Path, settings: Settings) -> None:
-        """Draw all vehicles in one picture."""
+        """Write the pictures that were asked for."""
         from maneuver_automaton import plotting
 
-        draw = getattr(plotting, "draw_fleet", None)
-        if settings.plot and draw is not None:
-            draw(self.result).savefig(out / "plan.png")
+        if settings.plot:
+            look = settings.look.look(self.name)
+            plotting.save_fleet_figure(self.result, out / "plan.png", look=look)
+        if settings.animate and self.result.plans:
+            plotting.animate_fleet(self.result, out / "plan.gif")
+        if settings.html:
+            self.result.player(title=settings.look.title or self.name).save(out / "plan.html")
 
     def tell(self, folder: str) -> None:
         """Print it."""
@@ -64,15 +69,14 @@ class FleetAnswer:
         """For the table of a folder."""
         from maneuver_automaton.cli.fleet_tables import least_clearance
 
-        result = self.result
-        some = bool(result.plans)
+        result, whole = self.result, not self.why_not
         return Row(
             name=path.name,
-            code=NO_PLAN if self.why_not else FOUND,
+            code=FOUND if whole else NO_PLAN,
             status=result.status.value,
-            reason=f"{path}: {self.why_not}" if self.why_not else "",
-            cost=result.cost if some else None,
-            duration=result.last_s if some else None,
+            reason="" if whole else f"{path}: {self.why_not}",
+            cost=result.cost if whole else None,
+            duration=result.last_s if whole else None,
             clearance=least_clearance(result),
             first_plan=result.timing_s.get("first_plan"),
         )
@@ -106,8 +110,6 @@ class FleetTask:
         for option, given in (
             ("--alternatives", settings.alternatives > 0),
             ("--gap", settings.gap is not None),
-            ("--animate", settings.animate),
-            ("--html", settings.html),
         ):
             if given:
                 raise InvalidScenario(

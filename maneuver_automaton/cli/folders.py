@@ -6,11 +6,13 @@ import contextlib
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from maneuver_automaton.cli.inputs import Parts
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats import (
     benchmr_svg,
+    cl_cbs,
     commonroad,
     dynobench,
     movingai,
@@ -82,7 +84,9 @@ def _document(path: Path) -> Document | None:
 def _states_a_problem(path: Path, document: Document | None) -> bool:
     ending = _ending(path)
     if ending in YAML_ENDINGS:
-        return document is None or not dynobench.belongs_to_dynobench(document)
+        return document is None or not (
+            dynobench.belongs_to_dynobench(document) or cl_cbs.belongs_to_cl_cbs(document)
+        )
     try:
         if ending == ".csv":
             return tpcap.is_tpcap(path)
@@ -105,18 +109,29 @@ def _used(folder: Path, documents: dict[Path, Document | None]) -> Iterator[Path
                 yield movingai.map_beside(path).resolve()
         document = documents.get(path)
         value = document.value if document is not None else None
-        obstacles = value.get("obstacles") if isinstance(value, dict) else None
-        for obstacle in obstacles if isinstance(obstacles, list) else []:
+        for obstacle in _obstacles(value):
             name = obstacle.get("map") if isinstance(obstacle, dict) else None
             if isinstance(name, str) and "\0" not in name:
                 yield (folder / name).resolve()
+
+
+def _obstacles(value: Any) -> Iterator[Any]:
+    """What a scenario lists as obstacles, at the top and of any of several vehicles."""
+    vehicles = value.get("vehicles") if isinstance(value, dict) else None
+    for part in (value, *(vehicles if isinstance(vehicles, list) else ())):
+        listed = part.get("obstacles") if isinstance(part, dict) else None
+        yield from listed if isinstance(listed, list) else ()
 
 
 def _parts_for(path: Path, document: Document | None, parts: Parts) -> Parts:
     ending, several = _ending(path), False
     if ending in YAML_ENDINGS and not (
         document is not None
-        and (dynobench.is_dynobench(document) or nav2_map.is_nav2_map(document))
+        and (
+            dynobench.is_dynobench(document)
+            or nav2_map.is_nav2_map(document)
+            or cl_cbs.is_cl_cbs(document)
+        )
     ):
         return Parts(model=parts.model)
     if ending == ".svg":

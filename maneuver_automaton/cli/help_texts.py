@@ -6,6 +6,7 @@ STOPPED = "130 interrupted (the best so far is written)"
 BAD = "2 bad input (one line says which)"
 CODES = {
     "plan": f"0 a plan was found and audited, 1 no plan (one line says why), {BAD}, {STOPPED}; "
+    "of several vehicles: 0 all have plans, 1 some not; "
     "of a folder: 0 all found, 1 some not, 2 some file bad",
     "mpc": f"0 the goal was reached, 1 not, or a collision, {BAD}, {STOPPED}",
     "check": f"0 all holds, 1 something does not, {BAD}",
@@ -24,6 +25,7 @@ EXAMPLES = {
         "maneuver-automaton plan scenarios/parking.yaml",
         "maneuver-automaton plan scenarios/car_slot.yaml --gap 0.1 --time-limit 20",
         "maneuver-automaton plan scenarios --out out --jobs 2",
+        "maneuver-automaton plan scenarios/fleets/car_park.yaml",
         "maneuver-automaton plan Case1.csv --with scenarios/tpcap.yaml",
     ),
     "mpc": (
@@ -31,7 +33,10 @@ EXAMPLES = {
         "maneuver-automaton mpc scenarios/parking_noise.yaml --seeds 20 --jobs 2",
         "maneuver-automaton mpc scenarios --jobs 2",
     ),
-    "check": ("maneuver-automaton check scenarios/parking.yaml",),
+    "check": (
+        "maneuver-automaton check scenarios/parking.yaml",
+        "maneuver-automaton check out/plan.json --with scenarios/parking.yaml",
+    ),
     "automaton": ("maneuver-automaton automaton show scenarios/parking.yaml",),
     "automaton build": (
         "maneuver-automaton automaton build scenarios/grid_1681.yaml --out grid.json",

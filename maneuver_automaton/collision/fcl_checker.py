@@ -376,23 +376,20 @@ class FclChecker:
         halves = 0.5 * durations
         centers = (SE2(starts) @ SE2.exp(halves[:, None] * twists)).act(body.middle)
         speeds = np.hypot(twists[:, 0] - twists[:, 2] * y, twists[:, 1] + twists[:, 2] * x)
-        near = [
-            may_meet(
-                one.path,
-                centers,
-                times=clock + halves,
-                halves=halves,
-                speeds=speeds,
-                reach=body.reach,
-            )
-            for one in self._ground.moving
-        ]
+        near = may_meet(
+            [one.path for one in self._ground.moving],
+            centers,
+            times=clock + halves,
+            halves=halves,
+            speeds=speeds,
+            reach=body.reach,
+        )
         for k in np.flatnonzero(np.any(near, axis=0)).tolist():
             ask()
             (v_x, v_y, turn), (at_x, at_y, heading) = twists[k].tolist(), starts[k].tolist()
             start, twist = (at_x, at_y, heading), (v_x, v_y, turn)
             coasting = CoastingBody(start, twist, complex(x, y), body.reach, (half_x, half_y))
-            for number in np.flatnonzero([row[k] for row in near]).tolist():
+            for number in np.flatnonzero(near[:, k]).tolist():
                 one = self._ground.moving[number]
                 if meet(
                     coasting,

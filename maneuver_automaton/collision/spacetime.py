@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -28,6 +28,9 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision.shapes import Motion
 from maneuver_automaton.collision.swept import Twist
 from maneuver_automaton.groups import SE2
+
+SHORT_TURN = 0.5  # [rad] of the pieces of arcs whose bulge is bounded
+EVERYWHERE = np.array([-math.inf, -math.inf, math.inf, math.inf])
 
 Place: TypeAlias = tuple[float, float, float]
 """A pose on plain numbers: x [m], y [m], heading [rad]."""
@@ -71,6 +74,7 @@ class MovingBody(NamedTuple):
     middle: complex  # x + i y of the middle of a disc around the body, in its frame [m]
     radius: float  # [m] of that disc
     half: tuple[float, float] | None = None  # [m] half the sides of a rectangle about the middle
+    box: Array = EVERYWHERE  # (4,) [low x, low y, high x, high y] that it never leaves [m]
 
     @classmethod
     def of(
@@ -91,7 +95,9 @@ class MovingBody(NamedTuple):
         speed = float(motion.speeds.max(initial=0.0))
         turn_rate = float(motion.turn_rates.max(initial=0.0))
         size = reach if radius is None else radius
-        return cls(motion, present, reach, speed, turn_rate, middle, size, half)
+        return cls(
+            motion, present, reach, speed, turn_rate, middle, size, half, _box(motion, reach)
+        )
 
     @property
     def fastest_middle(self) -> float:
@@ -126,6 +132,17 @@ class MovingBody(NamedTuple):
         return Stretch(pose, complex(v_x, v_y), turn, end, 0.0)
 
 
+def _box(motion: Motion, reach: float) -> Array:
+    """A box (4,) around all that is within a reach [m] of a motion's frame."""
+    times = motion.times_for_lines(SHORT_TURN)
+    places = motion.at(times)[:, :2]
+    bulge = 0.0  # an arc leaves its chord by at most an eighth of its acceleration times t squared
+    if motion.twist is not None and times.size > 1:
+        bends = float(motion.bends.max(initial=0.0))
+        bulge = 0.125 * bends * float(np.diff(times).max()) ** 2
+    return np.concatenate([places.min(axis=0) - reach - bulge, places.max(axis=0) + reach + bulge])
+
+
 class Stretch(NamedTuple):
     """A pose at a time, and the rates from then on."""
 
@@ -137,16 +154,33 @@ class Stretch(NamedTuple):
 
 
 def may_meet(
-    other: MovingBody, centers: Array, *, times: Array, halves: Array, speeds: Array, reach: float
+    others: Sequence[MovingBody],
+    centers: Array,
+    *,
+    times: Array,
+    halves: Array,
+    speeds: Array,
+    reach: float,
 ) -> NDArray[np.bool_]:
-    """False (n,) where bodies are too far and too slow to meet another.
+    """False (m, n) where bodies are too far and too slow to meet others (m,).
 
     Each lasts from `halves` (n,) [s] before one of `times` (n,) to as long after it; then its
     middle is at one of `centers` (n, 2), and never faster than one of `speeds` (n,) [m/s]. No point
     of it is further than `reach` [m] from its middle.
     """
-    apart = np.hypot(*(centers - other.centers(times)).T) - reach - other.radius
-    return np.asarray(apart <= halves * (speeds + other.fastest_middle))
+    if not others or not len(times):
+        return np.zeros((len(others), len(times)), dtype=np.bool_)
+    low, high = centers.min(axis=0), centers.max(axis=0)
+    most = reach + float((halves * speeds).max(initial=0.0))
+    found = np.zeros((len(others), len(times)), dtype=np.bool_)
+    for row, other in enumerate(others):
+        # What never comes near the place where all of it happens is not followed.
+        gap = np.maximum(other.box[:2] - high, low - other.box[2:]).max()
+        if gap > most:
+            continue
+        apart = np.hypot(*(centers - other.centers(times)).T) - reach - other.radius
+        found[row] = apart <= halves * (speeds + other.fastest_middle)
+    return found
 
 
 class Apart(NamedTuple):

@@ -333,6 +333,8 @@ class _FleetSearch:
 
     def _who_is_in_the_way(self, k: int) -> str:
         """Why a vehicle has no plan, and whom its way alone would meet."""
+        if self.budget.is_over:
+            return f"no time was left to plan it within {self.budget.seconds:.4g} s"
         alone = self.vehicles[k].alone
         if alone is None:
             return "it has no way even alone"

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from maneuver_automaton._brief import brief
+from maneuver_automaton._display import Player, picture, player_frame, player_page
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.planning.result import PlanResult
@@ -52,6 +53,16 @@ class FleetResult:
     counts: dict[str, int] = field(default_factory=dict)
 
     __repr__ = brief
+
+    def player(self, *, title: str = "") -> Player:
+        """A page that plays all vehicles: `.html`, or `.save(path)`; `title` heads it."""
+        return player_page(self, title=title)
+
+    def _repr_html_(self) -> str:
+        return player_frame(self)
+
+    def _repr_png_(self) -> bytes | None:
+        return picture(self)
 
     @property
     def plans(self) -> dict[str, Plan]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -14,7 +15,7 @@ from maneuver_automaton.fleet.conflicts import Course
 from maneuver_automaton.fleet.refuge import by_a_refuge
 from maneuver_automaton.planning.blocked import blocked_ends, goals_left
 from maneuver_automaton.planning.bounds import lattice_bound
-from maneuver_automaton.planning.needs import has_inertia
+from maneuver_automaton.planning.needs import has_inertia, uses_lattice
 from maneuver_automaton.planning.plan import plan_in
 from maneuver_automaton.planning.result import LowerBound, PlanResult
 from maneuver_automaton.planning.workspace import Workspace
@@ -52,7 +53,7 @@ class Found:
         return self.plan.start_time + self.plan.duration
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(eq=False)
 class Vehicle:
     """One vehicle: `problem` is its own, with the obstacles that it has without the others."""
 
@@ -81,10 +82,12 @@ class Vehicle:
         motions = tuple(Motion([problem.start_time], [pose]) for pose in poses)
         self.standing = Course(tuple(shapes), motions, grown=self.grown)
 
-    @property
+    @functools.cached_property
     def at_will(self) -> bool:
         """Whether it switches at will in a plane, so that its plans are words of the lattice."""
-        return not has_inertia(self.problem) and self.problem.start.size == 3
+        searched = replace(self.problem.search, method="lattice")
+        steers = uses_lattice(replace(self.problem, search=searched))
+        return steers and not has_inertia(self.problem) and self.problem.start.size == 3
 
     def course_of(self, plan: Plan) -> Course:
         """Its bodies in time if it drives a plan."""
@@ -107,7 +110,7 @@ class Vehicle:
         elif self.at_will:
             self._plan_words(budget)
         else:
-            result = self._planned(self.problem, budget, INERTIA_S, improve=False)
+            result = self._planned(self.problem, budget, math.inf, improve=False)
             self.alone, self.why_none = self._found(result), result.reason
             self.bound = result.bound
 
@@ -182,6 +185,8 @@ class Vehicle:
             timed = with_waits(query, way)
             if timed is not None and timed.cost < (best.cost if best else known):
                 best = timed
+        if best is None:
+            best = self._round_the_arrived(query, others, budget)
         if best is None or best.cost > NEARLY * self.ways[0].cost:
             first = first_plan(query, budget=replace(budget, expansions=most))
             self._count(first.expansions)
@@ -196,18 +201,35 @@ class Vehicle:
             return None
         return self._word_found(query, best)
 
+    def _round_the_arrived(
+        self, query: LatticeQuery, others: Sequence[Obstacle], budget: Budget
+    ) -> Word | None:
+        """A way round those that stay at their goals, wherever they are now, with rests."""
+        arrived = [
+            Obstacle(one.at(float(one.motion.time[-1])))
+            for one in others
+            if one.motion is not None and one.present_s is None
+        ]
+        calm = replace(self.problem, obstacles=(*self.problem.obstacles, *arrived))
+        if blocked_ends(calm) is not None:
+            return None
+        first = first_plan(self._query(calm), budget=replace(budget, expansions=QUICK))
+        self._count(first.expansions)
+        return None if first.word is None else with_waits(query, first.word)
+
     def _planned(
         self, problem: Problem, budget: Budget, most_s: float, *, improve: bool
     ) -> PlanResult:
         """What the planner answers for one that does not switch at will, by counted work."""
-        search = replace(problem.search, improve=improve, max_expansions=LONG)
+        counted = LONG if improve or problem is not self.problem else None
+        search = replace(problem.search, improve=improve, max_expansions=counted)
         if problem.obstacles == self.workspace.obstacles:
             workspace = self.workspace
         else:
             workspace = Workspace(problem.obstacles, self.workspace.prepared)
         limit = max(min(budget.left, most_s), LEAST_S)
-        counted = replace(problem, search=search)
-        result = plan_in(workspace, counted, time_limit=limit, alternatives=0)
+        wanted = replace(problem, search=search)
+        result = plan_in(workspace, wanted, time_limit=limit, alternatives=0)
         self._count(result.counts.get("expansions", 0))
         return result
 

@@ -47,7 +47,7 @@ def verified(
         courses = {one.number: passed.get(one.number, one.standing) for one in vehicles}
         closest = measured(courses, names, keep=fleet.margin)
         driving = {names[k] for k in passed}
-        near = [row for row in closest if row.distance_m <= max(fleet.margin - CONTACT, CONTACT)]
+        near = [row for row in closest if row.distance_m <= enough_for(fleet.margin)]
         pairs = [(row, [name for name in row.pair if name in driving]) for row in near]
         row, driven = next(((row, some) for row, some in pairs if some), (None, []))
         if row is None:
@@ -67,9 +67,21 @@ def verified(
         status=status if n else FleetStatus.NO_PLAN,
         results=results,
         closest=closest,
-        clearance_m=min((row.distance_m for row in closest), default=math.inf),
+        clearance_m=least_apart(closest, fleet),
         reasons=why,
     )
+
+
+def enough_for(keep: float) -> float:
+    """The distance [m] that two bodies must exceed which are to keep one; touching never is."""
+    return max(keep - CONTACT, CONTACT)
+
+
+def least_apart(closest: Sequence[Closest], fleet: FleetProblem) -> float:
+    """What any two vehicles keep at least [m]: pairs that are not measured keep `NEAR` more."""
+    if len(fleet) < 2:
+        return math.inf
+    return min([fleet.margin + NEAR, *(row.distance_m for row in closest)])
 
 
 def _checked(one: Vehicle, found: Found | None, settings: SearchSettings) -> tuple[PlanResult, str]:
@@ -120,7 +132,9 @@ def measured(
         distance, time = math.inf, meeting.time
         for shapes, motion in zip(one.shapes, one.motions, strict=True):
             plan = plan_of_motion(motion, min(quiet, one.until))
-            least = closest_to(plan, Omnidirectional(), other.bodies, footprint=shapes)
+            least = closest_to(
+                plan, Omnidirectional(), other.bodies, footprint=shapes, enough=enough_for(keep)
+            )
             if least.distance < distance:
                 distance, time = least.distance, least.time
         rows.append(Closest((names[meeting.one], names[meeting.other]), time, distance))

@@ -10,7 +10,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.fleet.planning import vehicles_of
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import Closest
-from maneuver_automaton.fleet.verdict import CONTACT, measured
+from maneuver_automaton.fleet.verdict import enough_for, measured
 from maneuver_automaton.planning.verdict import Verdict, verify
 
 
@@ -71,8 +71,7 @@ def verify_fleet(fleet: FleetProblem, plans: Mapping[str, Plan]) -> FleetVerdict
         for one in vehicles_of(fleet)
     }
     closest = measured(courses, fleet.names, keep=fleet.margin)
-    least = max(fleet.margin - CONTACT, CONTACT)
-    too_near = tuple(row for row in closest if row.distance_m <= least)
+    too_near = tuple(row for row in closest if row.distance_m <= enough_for(fleet.margin))
     complete = len(plans) == len(fleet) and all(one.passed for one in verdicts.values())
     return FleetVerdict(
         passed=complete and not too_near, verdicts=verdicts, closest=closest, too_near=too_near

@@ -52,6 +52,7 @@ def fleet_to_dict(result: FleetResult, *, name: str = "") -> dict[str, Any]:
         "reason": reason_of(result),
         "objective": result.objective,
         "cost": float(result.cost),
+        "alone_cost": float(result.alone_cost),
         "sum_s": float(result.sum_s),
         "last_s": float(result.last_s),
         "lower_bound": float(result.lower_bound),
@@ -154,6 +155,7 @@ def load_fleet(path: Path | str, fleet: FleetProblem) -> FleetResult:
             results=results,
             objective=document.get("objective", "sum"),
             lower_bound=float(document["lower_bound"]),
+            alone_cost=float(document["alone_cost"]),
             clearance_m=math.inf if between is None else float(between),
             closest=tuple(
                 Closest(tuple(one["pair"]), float(one["time_s"]), float(one["distance_m"]))

@@ -123,8 +123,9 @@ def where_touched(problem: Problem, pose: Array, time: float) -> str:
     if not obstacles:
         return ""
     at = time if math.isfinite(time) else 0.0
-    if obstacles == problem.obstacles:
-        world = world_around(problem)
+    if pose.size == 3:
+        whole = obstacles == problem.obstacles
+        world = world_around(problem if whole else replace(problem, obstacles=obstacles))
         (clearance,) = clearances(world, world.into(pose[:3]), times=at)
         if clearance > problem.margin + CLEARLY:
             return ""

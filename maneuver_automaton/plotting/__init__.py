@@ -1,7 +1,8 @@
 """Pictures: draw on the axes given and return the artists, or write a whole figure to a file.
 
 `draw_plan(ax, plan)` and others that begin with ``draw_`` draw on axes of Matplotlib; those with
-``save_`` and ``figure_`` write a file, whose ending says the format. ``dir`` lists them.
+``save_`` and ``figure_`` write a file, whose ending says the format. `draw_fleet` makes a whole
+figure, `animate_fleet` writes a film. ``dir`` lists them.
 """
 
 from __future__ import annotations
@@ -41,6 +42,9 @@ if TYPE_CHECKING:
     from maneuver_automaton.plotting.factors import save_factor_figure as save_factor_figure
     from maneuver_automaton.plotting.feasible import draw_feasible_slice as draw_feasible_slice
     from maneuver_automaton.plotting.feasible import save_feasible_figure as save_feasible_figure
+    from maneuver_automaton.plotting.fleet import draw_fleet as draw_fleet
+    from maneuver_automaton.plotting.fleet import save_fleet_figure as save_fleet_figure
+    from maneuver_automaton.plotting.fleet_animation import animate_fleet as animate_fleet
     from maneuver_automaton.plotting.footprint import footprint_polygons as footprint_polygons
     from maneuver_automaton.plotting.labels import control_labels as control_labels
     from maneuver_automaton.plotting.lessons import figure_shift as figure_shift
@@ -100,6 +104,9 @@ _HOMES = {
     "save_factor_figure": "factors",
     "draw_feasible_slice": "feasible",
     "save_feasible_figure": "feasible",
+    "draw_fleet": "fleet",
+    "save_fleet_figure": "fleet",
+    "animate_fleet": "fleet_animation",
     "footprint_polygons": "footprint",
     "control_labels": "labels",
     "figure_shift": "lessons",

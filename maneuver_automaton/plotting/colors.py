@@ -45,6 +45,19 @@ SEQUENCE: tuple[Color, ...] = (
     (0.42, 0.20, 0.52),
     (0.55, 0.56, 0.58),
 )
+# for vehicles: ten that are told apart, also on what is grey
+TEN: tuple[Color, ...] = (
+    (0.00, 0.40, 0.70),
+    (0.90, 0.45, 0.05),
+    (0.00, 0.58, 0.40),
+    (0.78, 0.14, 0.20),
+    (0.48, 0.25, 0.62),
+    (0.20, 0.68, 0.92),
+    (0.86, 0.42, 0.66),
+    (0.50, 0.58, 0.05),
+    (0.52, 0.33, 0.18),
+    (0.90, 0.68, 0.00),
+)
 NEGLIGIBLE = 1e-6  # of the largest component of a twist
 ALIKE = 0.13  # distance in RGB
 SHADES = (0.0, -0.2, -0.36, 0.25, 0.42, -0.5, 0.58)  # towards white, towards black
@@ -87,6 +100,18 @@ def twist_color(twist: Array) -> Color:
     red, green, blue = hue.tolist()
     pace = np.hypot(drive, turn)
     return _rounded(shaded((red, green, blue), 0.5 * (0.5 - pace / (1.0 + pace))))
+
+
+def fleet_colors(count: int) -> list[Color]:
+    """A colour for each of `count` vehicles: ten, then their shades.
+
+    Examples
+    --------
+    >>> len(set(fleet_colors(70)))
+    70
+    """
+    shades = [SHADES[(k // len(TEN)) % len(SHADES)] for k in range(count)]
+    return [_rounded(shaded(TEN[k % len(TEN)], shade)) for k, shade in enumerate(shades)]
 
 
 def shaded(color: Color, amount: float) -> Color:

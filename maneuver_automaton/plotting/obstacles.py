@@ -23,7 +23,8 @@ SOLID: Color = (0.36, 0.38, 0.42)
 MOVING: Color = (0.44, 0.22, 0.58)
 ROBOT: Color = (0.90, 0.58, 0.05)  # the vehicle, at the times at which moving obstacles are shown
 PALEST, DARKEST = 0.72, -0.15  # of moving obstacles, at the first of several times and at the last
-TRACK_POINTS = 60
+TRACK_POINTS, TURN_RAD = 60, 0.05  # of a track at least, and between two of them on an arc at most
+THERE_ALPHA, GONE_ALPHA = 0.62, 0.08  # of a moving obstacle while it is there, and while it is not
 MOST_STEPS = 5  # between the times at which moving obstacles are shown
 
 
@@ -43,6 +44,11 @@ class MovingShape:
 
     path: Path
     motion: Motion
+    presence: tuple[float, float]  # from when until when it is there [s]
+
+    def there(self, time: float) -> bool:
+        """Whether it is there at `time` [s]."""
+        return self.presence[0] <= time <= self.presence[1]
 
     def at(self, time: float) -> Path:
         """Where it is at `time` [s]."""
@@ -50,7 +56,8 @@ class MovingShape:
 
     def track(self, begin: float, end: float) -> Array:
         """Places (n, 2) of its middle between two times [m]."""
-        corners = self.motion.time[(self.motion.time > begin) & (self.motion.time < end)]
+        corners = self.motion.times_for_lines(TURN_RAD)
+        corners = corners[(corners > begin) & (corners < end)]
         times = np.union1d(np.linspace(begin, end, TRACK_POINTS), corners)
         box = self.path.get_extents()
         middle = np.array([0.5 * (box.x0 + box.x1), 0.5 * (box.y0 + box.y1)])
@@ -66,7 +73,8 @@ def draw_obstacles(
     """Draw `obstacles` on `ax`, which keeps its limits.
 
     Static obstacles are dark grey, moving ones violet, at several times the darker the later, over
-    its track from the first time to the last.
+    its track from the first time to the last. One that is not there at a time is faint, its edge
+    dashed.
 
     Parameters
     ----------
@@ -96,17 +104,19 @@ def draw_obstacles(
     moving = moving_shapes(known)
     if time is None:
         shown = [one.at(float(one.motion.time[0])) for one in moving]
+        there = [True] * len(shown)
         tracks = [one.track(*one.motion.time[[0, -1]].tolist()) for one in moving]
         colors = [MOVING] * len(shown)
     else:
         times = np.atleast_1d(as_array("obstacles: time", time))
         shown = [one.at(t) for t in times.tolist() for one in moving]
+        there = [one.there(t) for t in times.tolist() for one in moving]
         tracks = [one.track(float(times[0]), float(times[-1])) for one in moving]
         colors = [color for color in moment_colors(len(times)) for _ in moving]
     artists = ObstacleArtists(
         static=_solid([shape_path(one.shape) for one in static_shapes(known)]),
         maps=tuple(_solid(map_paths(one)) for one in known if isinstance(one, OccupancyMap)),
-        moving=moving_collection(shown, colors),
+        moving=moving_collection(shown, colors, there),
         tracks=LineCollection(
             tracks, colors=[(*MOVING, 0.45)], linewidths=0.8, linestyles=[(0, (4, 2))], zorder=1.3
         ),
@@ -124,22 +134,36 @@ def static_shapes(obstacles: Sequence[AnyObstacle]) -> list[Obstacle]:
 def moving_shapes(obstacles: Sequence[AnyObstacle]) -> list[MovingShape]:
     """The moving shapes, ready to be drawn at many times."""
     return [
-        MovingShape(path=shape_path(one.shape), motion=one.motion)
+        MovingShape(path=shape_path(one.shape), motion=one.motion, presence=one.presence)
         for one in obstacles
         if isinstance(one, Obstacle) and one.motion is not None
     ]
 
 
-def moving_collection(paths: Sequence[Path], colors: Sequence[Color]) -> PathCollection:
-    """Moving shapes, each in its colour."""
-    return PathCollection(
-        paths, facecolors=[(*color, 0.62) for color in colors],
-        edgecolors=[shaded(color, -0.25) for color in colors], linewidths=0.7, zorder=1.9,
-    )  # fmt: skip
+def moving_collection(
+    paths: Sequence[Path], colors: Sequence[Color], there: Sequence[bool]
+) -> PathCollection:
+    """Moving shapes, each in its colour, and whether each is there."""
+    drawn = PathCollection(paths, linewidths=0.7, zorder=1.9)
+    show_presence(drawn, colors, there)
+    return drawn
 
 
-def round_times(begin: float, end: float) -> Array:
+def show_presence(drawn: PathCollection, colors: Sequence[Color], there: Sequence[bool]) -> None:
+    """Give moving shapes their colours: faint and dashed those that are not there."""
+    alphas = [THERE_ALPHA if here else GONE_ALPHA for here in there]
+    edges = [1.0 if here else 0.45 for here in there]
+    drawn.set_facecolor([(*color, alpha) for color, alpha in zip(colors, alphas, strict=True)])
+    drawn.set_edgecolor(
+        [(*shaded(color, -0.25), alpha) for color, alpha in zip(colors, edges, strict=True)]
+    )
+    drawn.set_linestyle(["solid" if here else (0, (3, 2)) for here in there] or ["solid"])
+
+
+def round_times(begin: float, end: float, *, most: int = MOST_STEPS) -> Array:
     """A few round times (n,) [s] from `begin` to `end`, which are the first and the last.
+
+    There are at most so many steps between them, and one more.
 
     Examples
     --------
@@ -148,9 +172,9 @@ def round_times(begin: float, end: float) -> Array:
     """
     if not end > begin:
         return np.array([begin])
-    tens = 10.0 ** np.floor(np.log10((end - begin) / MOST_STEPS))
+    tens = 10.0 ** np.floor(np.log10((end - begin) / most))
     steps = tens * np.array([1.0, 2.0, 5.0, 10.0])
-    step = steps[(end - begin) / steps <= MOST_STEPS][0]
+    step = steps[(end - begin) / steps <= most][0]
     inner = step * np.arange(np.floor(begin / step) + 1.0, np.ceil(end / step))
     apart = inner[(inner - begin > 0.3 * step) & (end - inner > 0.3 * step)]
     return np.array([begin, *apart.tolist(), end])
@@ -174,9 +198,14 @@ def obstacle_handles(
         names.append("obstacle")
     if moving:
         colors = moment_colors(len(times))
-        handles += [Patch(facecolor=(*c, 0.62), edgecolor=shaded(c, -0.25)) for c in colors]
+        handles += [Patch(facecolor=(*c, THERE_ALPHA), edgecolor=shaded(c, -0.25)) for c in colors]
         later = [f"at {t:.3g} s" for t in times[1:].tolist()]
         names += [f"moving, at {times[0]:.3g} s", *later] if later else ["moving"]
+    if any(one.present_s is not None for one in moving):
+        handles.append(
+            Patch(facecolor=(*MOVING, GONE_ALPHA), edgecolor=(*MOVING, 0.6), linestyle="dashed")
+        )
+        names.append("not there at that time")
     return handles, names
 
 

@@ -17,10 +17,12 @@ from maneuver_automaton.plotting.colors import INK, Color
 from maneuver_automaton.plotting.ends import draw_ends, end_handles
 from maneuver_automaton.plotting.limits import draw_limits, limit_handles
 from maneuver_automaton.plotting.obstacles import (
+    MOVING,
     MovingShape,
     draw_obstacles,
     moving_shapes,
     obstacle_handles,
+    show_presence,
 )
 from maneuver_automaton.plotting.pages import (
     DPI,
@@ -51,6 +53,8 @@ class Stage:
     def show(self, time: float) -> None:
         """Put moving obstacles where they are at `time` [s]."""
         self.traffic.set_paths([one.at(time) for one in self.moving])
+        there = [one.there(time) for one in self.moving]
+        show_presence(self.traffic, [MOVING] * len(there), there)
 
 
 def stage_of(
@@ -62,7 +66,7 @@ def stage_of(
     wide, high = np.ptp(box, axis=0).tolist()
     height = min(max(inner * high / wide, LOWEST), HIGHEST)
     bottom = 0.62 + 0.2 * legend_rows(names, inner)
-    figure = new_figure(WIDTH, _even(bottom + height + TOP))
+    figure = new_figure(WIDTH, even_height(bottom + height + TOP))
     ax = axes_at(figure, left=LEFT, bottom=bottom, width=inner, height=height)
     bottom_legend(figure, handles, names, left=LEFT, width=inner)
     draw_ends(ax, track.start, scene.goals, size=size, reached=scene.reached)
@@ -96,6 +100,6 @@ def _legend_entries(
     )
 
 
-def _even(inches: float) -> float:
+def even_height(inches: float) -> float:
     """A height that is an even number of pixels, as films need it."""
     return 2.0 * round(inches * DPI / 2.0) / DPI

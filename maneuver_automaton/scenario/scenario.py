@@ -281,11 +281,13 @@ def _search(part: SearchPart) -> SearchSettings:
 
 
 def _horizon(document: Document, part: HorizonPart) -> Horizon:
-    fixed = part.time_s != "free" and part.max_time_s is not None
-    with at(document, ("horizon", "max_time_s") if fixed else ("horizon",)):
+    fixed = part.time_s != "free"
+    wrong = "max_time_s" if part.max_time_s is not None else "stay"
+    with at(document, ("horizon", wrong) if fixed else ("horizon",)):
         return Horizon(
             time=None if part.time_s == "free" else part.time_s,
             max_trims=part.max_trims,
             min_coast=part.min_coast_s,
             max_time=part.max_time_s,
+            stay=part.stay,
         )

@@ -216,6 +216,9 @@ class HorizonPart(Part):
     max_trims: Count | None = Field(None, description="largest number of trims, rest included")
     min_coast_s: NotNegative = Field(0.0, description="shortest time in a trim")
     max_time_s: Positive | None = Field(None, description="longest time, when time_s is free")
+    stay: bool = Field(
+        False, description="it stays at the goal, when time_s is free: nothing may pass there later"
+    )
 
 
 class BoundsPart(Part):

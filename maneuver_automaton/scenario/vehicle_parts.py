@@ -252,6 +252,8 @@ def _check_model(value: Any, info: ValidationInfo) -> Any:
     if known is not None and value.get("model") == known:
         return value
     what = f"{own!r}, the model that is given" if own else f"one of {', '.join(MODELS)}"
+    if known is not None and own is None:
+        what = f"{known!r}, the model that is given, or {what}"
     if "model" not in value:
         raise PydanticCustomError("missing_key", "", {"key": "model", "what": what})
     if value["model"] not in MODELS or own is not None:

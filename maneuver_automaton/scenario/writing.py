@@ -245,7 +245,8 @@ def _cost(cost: StageCost) -> dict[str, Any]:
 
 def _horizon(horizon: Horizon) -> dict[str, Any]:
     entry = _given(time_s=horizon.time, max_trims=horizon.max_trims, max_time_s=horizon.max_time)
-    return entry | ({"min_coast_s": horizon.min_coast} if horizon.min_coast else {})
+    entry |= {"min_coast_s": horizon.min_coast} if horizon.min_coast else {}
+    return entry | ({"stay": True} if horizon.stay else {})
 
 
 def _search(search: SearchSettings, time_limit_s: float) -> dict[str, Any]:

@@ -38,8 +38,8 @@ def clearance(here, there):
 
 def possible(rover, other, duration):
     """Whether a rover may meet another within a time."""
-    (near,) = may_meet(
-        other,
+    ((near,),) = may_meet(
+        [other],
         np.array([rover.center(rover.at(0.5 * duration))]).view(np.float64).reshape(1, 2),
         times=np.array([0.5 * duration]),
         halves=np.array([0.5 * duration]),

@@ -7,10 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from maneuver_automaton.collision import Box, Obstacle
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.collision import Box, Disc, Obstacle
+from maneuver_automaton.costs import Cost
 from maneuver_automaton.fleet import FleetProblem, FleetStatus, plan_fleet
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.problem import Bounds, Horizon
+from maneuver_automaton.models import Unicycle
+from maneuver_automaton.problem import Bounds, Horizon, Problem
 from tests.fleet import fleets
 
 
@@ -64,11 +67,11 @@ def test_who_arrives_stays_or_leaves():
     """One car ends where the other has to pass: it lets it pass first, or is gone."""
     wall = [Obstacle(Box([20.0, 1.0], center=[0.0, y])) for y in (-1.2, 1.2)]
     ends = [([-3, 0, 0], [0, 0, 0]), ([-6, 0, 0], [6, 0, 0])]
-    body = (Box([1.0, 0.8]),)
-    stays = plan_fleet(fleets.fleet_of(ends, obstacles=wall, footprint=body), time_limit=2.0)
+    room = {"footprint": (Box([1.0, 0.8]),), "bounds": Bounds(x=(-9.0, 9.0), y=(-2.0, 2.0))}
+    stays = plan_fleet(fleets.fleet_of(ends, obstacles=wall, **room), time_limit=2.0)
     assert stays.status is not FleetStatus.FOUND
     assert "1" in " ".join(stays.reasons.values()) or "2" in stays.reasons
-    leaving = fleets.fleet_of(ends, obstacles=wall, footprint=body, leaves=[True, False])
+    leaving = fleets.fleet_of(ends, obstacles=wall, leaves=[True, False], **room)
     leaves = plan_fleet(leaving, time_limit=5.0, max_rounds=2)
     assert leaves.status is FleetStatus.FOUND
 
@@ -152,3 +155,43 @@ def test_bounds_hold_for_every_vehicle():
     for plan in result.plans.values():
         poses = plan.pose_at(np.linspace(0.0, plan.duration, 500))
         assert (np.abs(poses[:, :2]) <= 5.0 + 1e-9).all()
+
+
+def test_one_stands_aside_in_a_bay_until_the_other_has_passed():
+    """A corridor for one, with a bay that is on nobody's way: searched for, not stumbled upon."""
+    rows = [
+        ([24.0, 1.0], [0.0, -1.2]),
+        ([14.1, 1.0], [-4.95, 1.2]),
+        ([8.1, 1.0], [7.95, 1.2]),
+        ([2.2, 0.5], [3.0, 2.7]),
+        *(([0.2, 2.0], [3.0 + side, 1.7]) for side in (-1.1, 1.1)),
+        *(([0.5, 3.0], [side, 0.0]) for side in (-12.0, 12.0)),
+    ]
+    walls = [Obstacle(Box(size, center=center)) for size, center in rows]
+    ends = [([-10, 0, 0], [10, 0, 0]), ([10, 0, math.pi], [-10, 0, math.pi])]
+    fleet = fleets.fleet_of(ends, obstacles=walls, footprint=(Disc(0.4),))
+    result = plan_fleet(fleet, time_limit=20.0, max_rounds=0)
+    assert result.status is FleetStatus.FOUND
+    between, static = fleets.least_distances(result)
+    assert between > 0.0
+    assert static > 0.0
+    assert 40.0 < result.sum_s < 50.0
+
+
+def test_who_has_arrived_is_passed_by_another_way():
+    """The short way leads over the goal of a car that is there already: round it is another one."""
+    ends = [([4, -3, math.pi / 2], [4, 0, math.pi / 2]), ([0, 0, 0], [8, 0, 0])]
+    result = plan_fleet(fleets.fleet_of(ends, priority=[1.0, 0.0]), time_limit=5.0, max_rounds=0)
+    assert result.status is FleetStatus.FOUND
+    assert fleets.least_distances(result)[0] > 0.0
+
+
+def test_vehicles_that_cannot_turn_drive_ahead():
+    robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "ahead": (1, 0)})
+    body = Disc(0.3)
+    pair = [
+        Problem(robot, [0, y, 0], [3, y, 0], footprint=body, cost=Cost(time=1.0)) for y in (0, 2)
+    ]
+    result = plan_fleet(FleetProblem(pair), time_limit=2.0, max_rounds=1)
+    assert result.status is FleetStatus.FOUND
+    assert result.sum_s == pytest.approx(6.0)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap, Polygon
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting import draw_obstacles
-from maneuver_automaton.plotting.obstacles import round_times
+from maneuver_automaton.plotting.obstacles import obstacle_handles, round_times
 from maneuver_automaton.plotting.regions import map_paths, shape_path
 
 RING = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
@@ -112,6 +112,28 @@ def test_several_times_go_from_pale_to_dark_over_the_track():
     track = artists.tracks.get_segments()[1]
     for row, time in ((0, 0.5), (-1, 1.5)):
         np.testing.assert_allclose(track[row], SE2(AROUND.at(time)).act([0.0, 1.0]), atol=1e-9)
+
+
+def test_what_is_not_there_at_a_time_is_faint_and_dashed():
+    door = Obstacle(Box([1.0, 0.2]), present_s=(0.0, 1.2))
+    _, artists = drawn([door, Obstacle(Disc(0.2), motion=AROUND)], time=[0.5, 1.5])
+    alphas = artists.moving.get_facecolor()[:, 3]
+    assert alphas[2] < 0.2 < 0.5 < alphas[0] == alphas[1] == alphas[3]
+    dashed = [pattern is not None for _, pattern in artists.moving.get_linestyle()]
+    assert dashed == [False, False, True, False]
+    _, names = obstacle_handles([door], np.array([0.5, 1.5]))
+    assert names == ["moving, at 0.5 s", "at 1.5 s", "not there at that time"]
+
+
+def test_the_track_on_an_arc_is_the_arc():
+    turns = 20
+    time = np.arange(turns + 1.0)
+    poses = [[0.0, 0.0, np.pi * k] if k % 2 == 0 else [0.0, 2.0, np.pi * k] for k in range(21)]
+    circling = Motion(time, poses, [[np.pi, 0.0, np.pi]] * turns)
+    _, artists = drawn(Obstacle(Disc(0.2), motion=circling), time=[0.0, 20.0])
+    track = artists.tracks.get_segments()[0]
+    np.testing.assert_allclose(np.linalg.norm(track - [0.0, 1.0], axis=1), 1.0, atol=1e-9)
+    assert np.linalg.norm(np.diff(track, axis=0), axis=1).max() < 0.06
 
 
 def test_without_a_time_it_stands_where_the_motion_begins():

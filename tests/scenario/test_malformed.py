@@ -93,7 +93,7 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
     "unknown key inside": (
         horizon("time_s: free, max_trim: 4"),
         ":12: horizon.max_trim: unknown key; did you mean 'max_trims'? Known keys: "
-        "time_s, max_trims, min_coast_s, max_time_s",
+        "time_s, max_trims, min_coast_s, max_time_s, stay",
     ),
     "unknown key of a trim": (
         but("{name: spin, control: [0.0, 1.0]}", "{name: spin, contrl: [0.0, 1.0]}"),

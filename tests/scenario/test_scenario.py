@@ -317,4 +317,5 @@ def test_the_json_schema_knows_every_key():
         "max_trims",
         "min_coast_s",
         "max_time_s",
+        "stay",
     }

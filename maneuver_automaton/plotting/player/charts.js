@@ -12,8 +12,9 @@ function roomFor(values) {
 
 /** One quantity over the time of a motion, drawn once, with a cursor over it. */
 class Chart {
-  constructor(parent, { label, value, points, last }) {
-    Object.assign(this, { label, value, points, last });
+  /** A `level` is a line across, say a margin. */
+  constructor(parent, { label, value, points, last, level = null }) {
+    Object.assign(this, { label, value, points, last, level });
     this.holder = document.createElement("div");
     this.holder.className = "chart";
     this.canvas = document.createElement("canvas");
@@ -21,7 +22,8 @@ class Chart {
     this.holder.append(this.canvas);
     if (last) this.holder.style.flexBasis = "100px";
     parent.append(this.holder);
-    this.range = roomFor(points.map((point) => point[1]));
+    const values = points.map((point) => point[1]);
+    this.range = roomFor(level === null ? values : [...values, level]);
     this.still = new Still();
   }
 
@@ -45,8 +47,8 @@ class Chart {
     return area.y + (area.height * (high - value)) / (high - low);
   }
 
-  draw(motion, time, hover, colors, trims, stamp) {
-    this.span = { begin: motion.begin, end: motion.end };
+  draw(motion, span, time, hover, colors, trims, stamp) {
+    this.span = { begin: span.begin, end: span.end };
     const sheet = prepared(this.canvas), { context } = sheet;
     this.still.put(sheet, stamp, (below) => this.curve(below, motion, colors, trims));
     const area = this.area;
@@ -87,8 +89,23 @@ class Chart {
     }
     context.strokeStyle = colors.line;
     context.strokeRect(area.x, area.y, area.width, area.height);
-    context.lineWidth = 2.2;
+    if (this.level !== null) {
+      context.strokeStyle = colors.broken;
+      line(context, [area.x, this.up(this.level)], [area.x + area.width, this.up(this.level)]);
+    }
     context.lineJoin = "round";
+    const draw = () => {
+      context.beginPath();
+      this.points.forEach(([at, value], n) =>
+        context[n ? "lineTo" : "moveTo"](this.across(at), this.up(value)));
+      context.stroke();
+    };
+    if (motion.begin > this.span.begin || motion.end < this.span.end || !motion.runs.length) {
+      context.lineWidth = motion.runs.length ? 1 : 1.8;
+      context.strokeStyle = motion.runs.length ? colors.dim : colors.accent;
+      draw();
+    }
+    context.lineWidth = 2.2;
     for (const run of motion.runs) {
       context.save();
       context.beginPath();
@@ -96,10 +113,7 @@ class Chart {
       context.rect(left - 0.5, area.y, right - left + 1, area.height);
       context.clip();
       context.strokeStyle = trims[run.trim].color;
-      context.beginPath();
-      this.points.forEach(([at, value], n) =>
-        context[n ? "lineTo" : "moveTo"](this.across(at), this.up(value)));
-      context.stroke();
+      draw();
       context.restore();
     }
     if (this.last) this.timeAxis(context, colors);

@@ -38,7 +38,7 @@ def clearance_entry(
     heights: Array | None = None,
     leave: bool = False,
 ) -> dict[str, Any] | None:
-    """Least distance at each of the `times` (n,) [s]; None without obstacles.
+    """Least distance at each of the `times` (n,) [s]; None if there is never an obstacle.
 
     Parameters
     ----------
@@ -76,6 +76,8 @@ def clearance_entry(
             (asked, _), found = tree.query_nearest(body, return_distance=True, all_matches=False)
             least[asked] = np.minimum(least[asked], found)
     known = np.isfinite(least)
+    if not known.any():
+        return None
     return {"t": rounded(times[known], POSE_DIGITS), "v": rounded(least[known], 4)}
 
 
@@ -116,7 +118,9 @@ def _moved(one: Obstacle, times: Array) -> list[Any]:
 
 
 def _there(one: Obstacle, times: Array, leave: bool) -> Any:
+    from_s, until_s = one.presence
+    there = (times >= from_s) & (times <= until_s)
     if not leave or one.motion is None:
-        return np.ones(len(times), dtype=np.bool_)
+        return there
     first, last = one.motion.time[[0, -1]]
-    return (times >= first) & (times <= last)
+    return there & (times >= first) & (times <= last)

@@ -96,9 +96,14 @@ class Motion {
     return [pose, ...this.parts.map((course) => composed(pose, posedAt(course, time)))];
   }
 
+  /** Whether it is under way at a time: others of its fleet may begin before it, and end after. */
+  drivesAt(time) {
+    return this.twists.length > 0 && time >= this.begin && time <= this.end;
+  }
+
   /** Speed [m/s], climbing included. */
   speedAt(time) {
-    if (!this.twists.length) return 0;
+    if (!this.drivesAt(time)) return 0;
     const twist = this.twists[this.arcAt(time)];
     return Math.hypot(twist[0], twist[1], twist[3] || 0);
   }
@@ -139,6 +144,11 @@ class Motion {
       });
     }
     return this._strokes;
+  }
+
+  /** Whether it is there at a time: it may leave once it has arrived. */
+  isThere(time) {
+    return !(this.leaves && time > this.end);
   }
 
   /** Time at which the path passes next to a place, and how far that is [m]. */
@@ -198,6 +208,16 @@ function sweptRegion(motion, bodies) {
     }
   }
   return path;
+}
+
+/** Whether a place is inside a ring (even-odd rule). */
+function inside(ring, [x, y]) {
+  let odd = false;
+  ring.forEach(([x1, y1], n) => {
+    const [x0, y0] = ring[(n || ring.length) - 1];
+    if ((y0 > y) !== (y1 > y) && x < x0 + ((y - y0) / (y1 - y0)) * (x1 - x0)) odd = !odd;
+  });
+  return odd;
 }
 
 /** Add a closed ring of places to a path. */

@@ -3,6 +3,7 @@
 // `state` of player.js, and change it by its functions.
 
 const MOST_NAMES = 14; // of trims in the legend
+const MOST_ROWS = 20; // of vehicles on the bar
 const SEEN = 0.005; // of the time: a trim that takes less can hardly be seen
 const KEYS = [
   ["space", "play or pause"],
@@ -15,6 +16,11 @@ const KEYS = [
   ["b w p", "bodies, swept region, path"],
   ["d", "dark or light"],
   ["?", "these keys"],
+];
+
+const FLEET_KEYS = [
+  ["1 … 9", "a vehicle; or click it"],
+  ["Esc", "all vehicles; or click where there is none"],
 ];
 
 /** Black or white, whichever reads better on a colour "#rrggbb". */
@@ -40,14 +46,17 @@ function buildHead() {
 }
 
 function buildBar() {
-  const bar = find("bar"), now = motion();
+  const bar = find("bar"), now = motion(), { begin, end } = span();
   bar.replaceChildren();
-  bar.setAttribute("aria-valuemin", now.begin);
-  bar.setAttribute("aria-valuemax", now.end);
-  const wide = bar.getBoundingClientRect().width;
+  bar.setAttribute("aria-valuemin", begin);
+  bar.setAttribute("aria-valuemax", end);
+  const wide = bar.getBoundingClientRect().width, length = end - begin || 1;
+  const first = element("div", "before");
+  first.style.width = `${(100 * (now.begin - begin)) / length}%`;
+  bar.append(...(now.runs.length ? [first] : fleetRows()));
   for (const run of now.runs) {
     const { name, color } = data.trims[run.trim];
-    const share = (run.end - run.begin) / (now.end - now.begin || 1);
+    const share = (run.end - run.begin) / length;
     const fits = share * wide > 16 + 7 * Math.min(name.length, 9);
     const part = element("div", "trim", fits ? name : "");
     part.style.width = `${100 * share}%`;
@@ -60,11 +69,44 @@ function buildBar() {
   for (const entry of steps ? steps.entries : []) {
     if (!entry.replanned && !entry.broken.length) continue;
     const mark = element("div", entry.broken.length ? "mark broken" : "mark");
-    mark.style.left = `${(100 * (entry.t - now.begin)) / (now.end - now.begin || 1)}%`;
+    mark.style.left = `${(100 * (entry.t - now.begin)) / length}%`;
     bar.append(mark);
   }
   find("legend").replaceChildren(...(manyTrims() ? [] : trimsShown().map(legendItem)));
   find("limits").replaceChildren(...limitItems());
+}
+
+/** While no vehicle is picked, the time of each as a row of the bar. */
+function fleetRows() {
+  if (!fleet || motions.length > MOST_ROWS) return [];
+  const length = fleet.end - fleet.begin || 1, high = 100 / motions.length;
+  return motions.filter((one) => one.runs.length).map((one) => {
+    const row = element("div", "row"), { style } = row;
+    style.left = `${(100 * (one.begin - fleet.begin)) / length}%`;
+    style.width = `${(100 * (one.end - one.begin)) / length}%`;
+    style.top = `${high * (motions.indexOf(one) + 0.1)}%`;
+    style.height = `${0.8 * high}%`;
+    style.background = one.color;
+    return row;
+  });
+}
+
+/** A button for each vehicle of a fleet, which picks it. */
+function buildVehicles() {
+  if (!fleet) return;
+  find("vehicles").hidden = false;
+  motions.forEach((one, k) => {
+    const button = element("button", one.runs.length || !one.reason ? "" : "none");
+    const swatch = element("i");
+    swatch.style.background = one.color;
+    button.type = "button";
+    button.title = one.reason ? `${one.name}: ${one.reason}` : one.name;
+    button.setAttribute("aria-pressed", "false");
+    const text = one.label === one.name ? one.name : `${one.label} · ${one.name}`;
+    button.append(swatch, element("span", "", text));
+    button.addEventListener("click", () => pick(k === state.choice ? -1 : k));
+    find("vehicles").append(button);
+  });
 }
 
 /** Trims of the motion that is shown, in order, but those that take next to no time. */
@@ -103,9 +145,16 @@ function legendItem(trim) {
 function quantities() {
   const now = motion(), list = [];
   const curve = (label, { t, v }) => ({
-    label, value: (time) => curveAt({ t, v }, time), points: t.map((at, k) => [at, v[k]]),
+    label, points: t.map((at, k) => [at, v[k]]),
+    value: (time) => (!fleet || now.drivesAt(time) ? curveAt({ t, v }, time) : NaN),
   });
   if (now.clearance) list.push(curve("clearance [m]", now.clearance));
+  const others = now === overview ? fleet.distance : now.others;
+  if (others) {
+    const label = now === overview ? "nearest two [m]" : "nearest other [m]";
+    list.push({ ...curve(label, others), value: (time) => curveAt(others, time), level: fleet.margin });
+  }
+  if (now === overview) return list;
   if (!now.curves.some((one) => /^speed\b/.test(one.label))) {
     const points = now.twists.flatMap((_, k) =>
       [now.times[k], now.times[k + 1]].map((at) => [at, now.speedAt(now.times[k])]));
@@ -122,7 +171,7 @@ function quantities() {
 function buildCharts() {
   const parent = find("charts");
   parent.replaceChildren();
-  const list = motion().runs.length ? quantities() : [];
+  const list = motion().runs.length || motion() === overview ? quantities() : [];
   charts = list.map((one, k) => new Chart(parent, { ...one, last: k === list.length - 1 }));
   parent.hidden = !charts.length;
   for (const chart of charts) {
@@ -153,9 +202,10 @@ function scrubbed(target, timeOf) {
 function buildLayers() {
   const labels = {
     swept: "swept region", bodies: "bodies at switches", path: "path",
-    others: "alternatives", search: "search",
+    others: fleet ? "other paths" : "alternatives", search: "search",
   };
-  const moves = motion().runs.length > 0, swept = moves && data.bodies.length > 0;
+  const moves = motions.some((one) => one.runs.length > 0);
+  const swept = moves && (data.bodies.length > 0 || motions.some((one) => (one.bodies || []).length));
   const known = {
     swept, bodies: swept, path: moves,
     others: motions.length > 1,
@@ -183,7 +233,7 @@ function toggleLayer(name) {
 
 /** A small picture of every plan, the best first, all at the same time. */
 function buildAlternatives() {
-  if (motions.length < 2) return;
+  if (motions.length < 2 || fleet) return;
   const figure = find("alternatives"), cards = figure.querySelector(".cards");
   figure.hidden = false;
   figure.querySelector("figcaption").textContent =
@@ -240,9 +290,15 @@ function buildSearch() {
   });
 }
 
+/** What keys do; those of a fleet stand for those of a plan. */
+function keysOfPage() {
+  if (!fleet) return KEYS;
+  return [...KEYS.filter(([keys]) => FLEET_KEYS.every(([others]) => others !== keys)), ...FLEET_KEYS];
+}
+
 function buildKeys() {
   const table = document.createElement("table");
-  for (const [keys, what] of KEYS) {
+  for (const [keys, what] of keysOfPage()) {
     const row = table.insertRow(), cell = row.insertCell();
     keys.split(" ").forEach((key) => cell.append(element("kbd", "", key), " "));
     row.insertCell().textContent = what;

@@ -3,23 +3,27 @@
 
 const RATES = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16];
 const LONGEST_FILM = 30; // s, longer motions start at a higher rate
-const NEAR = 14; // px from the path within which the cursor reads it
 
 const data = JSON.parse(document.getElementById("data").textContent);
 const find = (name) => document.getElementById(name);
 const motions = data.motions.map((entry) => new Motion(entry));
+const fleet = data.fleet || null; // several vehicles at once, of which one may be picked
+const overview = fleet && new Motion({
+  times: [fleet.begin, fleet.end], poses: [[0, 0, 0]], twists: [], trims: [], bodies: [], goals: [],
+});
 const dark = window.matchMedia("(prefers-color-scheme: dark)");
 
 const state = {
-  time: motions[0].begin, hover: null, choice: 0, playing: false, rate: 1, theme: null,
-  layers: { path: true, swept: true, bodies: true, search: false, others: false },
+  time: (fleet || motions[0]).begin, hover: null, choice: fleet ? -1 : 0, playing: false, rate: 1, theme: null,
+  layers: { path: true, swept: true, bodies: true, search: false, others: Boolean(fleet) },
 };
 const stage = new Stage(find("stage"), data);
-const space = motions[0].poses[0].length > 3 ? new Space(find("space"), data) : null;
+const space = !fleet && motions[0].poses[0].length > 3 ? new Space(find("space"), data) : null;
 const steps = data.steps && data.steps.length ? loopSteps(data.steps) : null;
 let charts = [], minis = [], searchChart = null, searchHover = null, waiting = false;
 
-const motion = () => motions[state.choice];
+const motion = () => motions[state.choice] || overview;
+const span = () => fleet || motion(); // begin and end of the time that is shown
 
 /** Steps of a closed loop as motions, and which is under way. */
 function loopSteps(entries) {
@@ -36,6 +40,18 @@ function valuesAt(time) {
   const now = motion(), pose = now.poseAt(time), { origin } = data;
   const run = now.runs.length ? now.runAt(time) : null;
   const rows = [["time", `${shownNumber(time)} s`]];
+  if (fleet && now !== overview) rows.unshift(["vehicle", now.name]);
+  const others = now === overview ? fleet.distance : now.others;
+  if (others) {
+    const label = now === overview ? "nearest two" : "nearest other";
+    rows.push([label, `${shownNumber(curveAt(others, time), 3)} m`]);
+  }
+  if (now === overview) return rows;
+  if (fleet && !now.drivesAt(time)) {
+    const done = time > now.end ? "arrived" : "has not left";
+    rows.push(["state", now.runs.length ? done : now.reason]);
+    return rows;
+  }
   if (run) rows.push(["trim", data.trims[run.trim].name]);
   if (!now.curves.some((curve) => /^speed\b/.test(curve.label))) {
     rows.push(["speed", `${shownNumber(now.speedAt(time), 3)} m/s`]);
@@ -67,9 +83,11 @@ function drawAll() {
   const others = motions.filter((_, k) => k !== state.choice);
   const stamp = `${state.choice} ${document.documentElement.dataset.theme}`;
   const seen = `${stamp} ${Object.values(state.layers)}`;
-  stage.draw(motion(), time, { colors, layers: state.layers, hover, others, steps, stamp: seen });
+  stage.draw(motion(), time, {
+    colors, layers: state.layers, hover, others, steps, fleet, stamp: seen,
+  });
   if (space) space.draw(motion(), time, { colors, hover, stamp });
-  charts.forEach((chart) => chart.draw(motion(), time, hover, colors, data.trims, stamp));
+  charts.forEach((chart) => chart.draw(motion(), span(), time, hover, colors, data.trims, stamp));
   minis.forEach((mini) => mini(colors, time, stamp));
   if (searchChart) searchChart.draw(colors, searchHover);
   drawBar();
@@ -77,7 +95,7 @@ function drawAll() {
 }
 
 function drawBar() {
-  const bar = find("bar"), { begin, end } = motion();
+  const bar = find("bar"), { begin, end } = span();
   const share = (time) => `${(100 * (time - begin)) / (end - begin || 1)}%`;
   bar.querySelector(".now").style.left = share(state.time);
   bar.querySelector(".past").style.width = share(state.time);
@@ -95,9 +113,12 @@ function drawBar() {
 }
 
 function drawClock() {
-  find("clock").hidden = !motion().runs.length;
+  find("clock").hidden = !motions.some((one) => one.runs.length);
   const parts = [`${state.time.toFixed(2)} s`];
-  if (steps) {
+  if (fleet) {
+    const done = motions.filter((one) => one.runs.length && state.time >= one.end - 1e-6).length;
+    parts.push(`${done} of ${motions.length} arrived`);
+  } else if (steps) {
     const entry = steps.entries[steps.at(state.time)];
     if (state.time >= motion().end) parts.push(data.ending);
     else {
@@ -110,13 +131,13 @@ function drawClock() {
 }
 
 function seek(time) {
-  state.time = Math.min(Math.max(time, motion().begin), motion().end);
+  state.time = Math.min(Math.max(time, span().begin), span().end);
   redraw();
 }
 
 function play(on) {
-  if (on && state.time >= motion().end) state.time = motion().begin;
-  state.playing = on && motion().end > motion().begin;
+  if (on && state.time >= span().end) state.time = span().begin;
+  state.playing = on && span().end > span().begin;
   find("play").textContent = state.playing ? "❚❚" : "▶";
   find("play").setAttribute("aria-pressed", String(state.playing));
   let before = null;
@@ -124,7 +145,7 @@ function play(on) {
     if (!state.playing) return;
     if (before !== null) seek(state.time + (state.rate * (now - before)) / 1000);
     before = now;
-    if (state.time >= motion().end) play(false);
+    if (state.time >= span().end) play(false);
     else requestAnimationFrame(advance);
   };
   if (state.playing) requestAnimationFrame(advance);
@@ -136,12 +157,13 @@ function setRate(rate) {
 }
 
 function pick(choice) {
-  if (choice < 0 || choice >= motions.length) return;
+  if (choice < (fleet ? -1 : 0) || choice >= motions.length) return;
   state.choice = choice;
+  state.hover = null;
   seek(state.time);
   buildBar();
   buildCharts();
-  document.querySelectorAll(".card").forEach((card, k) =>
+  document.querySelectorAll(".card, #vehicles button").forEach((card, k) =>
     card.setAttribute("aria-pressed", String(k === choice)));
   redraw();
 }
@@ -184,7 +206,8 @@ function showKeys() {
 }
 
 function jump(forwards) {
-  const times = [...motion().runs.map((run) => run.begin), motion().end];
+  const now = motion(), arrivals = motions.map((one) => one.end).sort((a, b) => a - b);
+  const times = now === overview ? arrivals : [...now.runs.map((run) => run.begin), now.end];
   const slack = 1e-6;
   const ahead = times.find((at) => at > state.time + slack);
   const back = times.filter((at) => at < state.time - slack).pop();
@@ -193,14 +216,14 @@ function jump(forwards) {
 
 function onKey(event) {
   if (event.ctrlKey || event.metaKey || event.altKey || event.target.tagName === "SELECT") return;
-  const step = ((motion().end - motion().begin) / 50) * (event.shiftKey ? 0.1 : 1);
+  const step = ((span().end - span().begin) / 50) * (event.shiftKey ? 0.1 : 1);
   const around = RATES.indexOf(state.rate);
   const acts = {
     " ": () => play(!state.playing),
     ArrowLeft: () => seek(state.time - step),
     ArrowRight: () => seek(state.time + step),
-    Home: () => seek(motion().begin),
-    End: () => seek(motion().end),
+    Home: () => seek(span().begin),
+    End: () => seek(span().end),
     "[": () => jump(false),
     "]": () => jump(true),
     "+": () => zoomStage(1.25),
@@ -215,6 +238,7 @@ function onKey(event) {
     d: () => setTheme(document.documentElement.dataset.theme === "dark" ? "light" : "dark"),
     "?": showKeys,
   };
+  if (fleet) acts.Escape = () => pick(-1);
   const act = acts[event.key] || (/^[1-9]$/.test(event.key) && (() => pick(Number(event.key) - 1)));
   if (!act || (event.key === " " && /^(BUTTON|INPUT)$/.test(event.target.tagName))) return;
   event.preventDefault();
@@ -235,7 +259,7 @@ function fitAll() {
 function listenAll() {
   const bar = find("bar");
   scrubbed(bar, (event) => {
-    const box = bar.getBoundingClientRect(), { begin, end } = motion();
+    const box = bar.getBoundingClientRect(), { begin, end } = span();
     const share = Math.min(Math.max((event.clientX - box.left) / box.width, 0), 1);
     return begin + share * (end - begin);
   });
@@ -252,13 +276,26 @@ function listenAll() {
       stage.view.zoom(factor, place);
       redraw();
     },
-    hover: (place, event) => hoverAt(pathTime(place), event),
+    hover: (place, event) => (fleet ? hoverFleet(place, event) : hoverAt(pathTime(place), event)),
     leave: () => hoverAt(null),
     tap: (place) => {
-      const time = pathTime(place);
-      if (time !== null) seek(time);
+      const time = pathTime(place), other = fleet ? stage.vehicleAt(place, motions, state) : null;
+      if (fleet && (time === null || (other >= 0 && other !== state.choice))) pick(other);
+      else if (time !== null) seek(time);
     },
   });
+  /** What is known of the vehicle under the pointer; along the path of the one picked, at that time. */
+  const hoverFleet = (place, event) => {
+    const time = pathTime(place), other = stage.vehicleAt(place, motions, state);
+    stage.canvas.style.cursor = other >= 0 ? "pointer" : "";
+    if (other < 0 || other === state.choice) return hoverAt(time, event);
+    const one = motions[other], rows = [["vehicle", one.name]];
+    if (one.reason) rows.push(["no plan", one.reason]);
+    else rows.push(["arrives", `${shownNumber(one.end)} s`]);
+    state.hover = null;
+    showTip(rows, event);
+    return redraw();
+  };
   stage.canvas.addEventListener("dblclick", fitAll);
   if (space) space.changed = redraw;
   find("play").addEventListener("click", () => play(!state.playing));
@@ -284,14 +321,15 @@ function begin() {
     option.value = String(rate);
     find("rate").append(option);
   });
-  const duration = motion().end - motion().begin;
+  const duration = span().end - span().begin;
   setRate(RATES.find((rate) => rate >= 1 && duration / rate <= LONGEST_FILM) || 16);
-  find("transport").hidden = !motion().runs.length;
+  find("transport").hidden = !motions.some((one) => one.runs.length);
   if (space) find("space-plane").hidden = false;
   buildLayers();
   buildKeys();
   buildSearch();
   buildAlternatives();
+  buildVehicles();
   const [[left, low], [right, high]] = data.box;
   find("planes").style.setProperty("--shape", String((high - low) / (right - left || 1)));
   setTheme(null);
@@ -316,7 +354,11 @@ window.player = {
   pick,
   play,
   setTheme,
+  /** Poses of all vehicles of a fleet, or of all plans. */
+  posesAt: (time) => motions.map((one) =>
+    one.poseAt(time).map((value, k) => value + (data.origin[k] || 0))),
   get time() { return state.time; },
-  get begin() { return motion().begin; },
-  get end() { return motion().end; },
+  get choice() { return state.choice; },
+  get begin() { return span().begin; },
+  get end() { return span().end; },
 };

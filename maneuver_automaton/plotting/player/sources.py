@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.fleet import FleetResult
 from maneuver_automaton.planning import PlanResult
 from maneuver_automaton.plotting.closed_loop_track import (
     driven_track,
@@ -28,6 +29,7 @@ from maneuver_automaton.plotting.player.composing import (
     trim_entries,
 )
 from maneuver_automaton.plotting.player.drives import drive_content
+from maneuver_automaton.plotting.player.fleets import fleet_content
 from maneuver_automaton.plotting.player.local import Local, rounded
 from maneuver_automaton.plotting.player.motions import motion_entry
 from maneuver_automaton.plotting.player.page import Player
@@ -41,11 +43,11 @@ MOST_NODES = 20_000  # shown of a search
 
 
 def player_of(value: Any, *, title: str = "") -> Player:
-    """The player of a plan, a plan's result, a closed loop, or a plan or drive on roads.
+    """The player of a plan, an answer for one or a fleet, a closed loop, or a plan on roads.
 
     Parameters
     ----------
-    value : Plan, PlanResult, ClosedLoop, RoadPlanResult or RoadDrive
+    value : Plan, PlanResult, FleetResult, ClosedLoop, RoadPlanResult or RoadDrive
         What to play.
     title : str
         Heads the page; the kind of `value` if left out.
@@ -96,9 +98,12 @@ def player_of_file(document: Mapping[str, Any], plan: Plan, *, title: str) -> Pl
 def content_of(value: Any) -> dict[str, Any]:
     """Title, facts, motions, and what is around them, as plain values."""
     raise TypeError(
-        f"player: got {type(value).__name__}, need a Plan, PlanResult, ClosedLoop, RoadPlanResult "
-        "or RoadDrive"
+        f"player: got {type(value).__name__}, need a Plan, PlanResult, FleetResult, ClosedLoop, "
+        "RoadPlanResult or RoadDrive"
     )
+
+
+content_of.register(FleetResult, fleet_content)
 
 
 @content_of.register

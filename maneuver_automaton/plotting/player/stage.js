@@ -1,11 +1,15 @@
 "use strict";
 // The plane seen from above: what is around a motion, the motion, and the body at a time.
 
+const NEAR = 14; // px from a path within which the cursor reads it
 const MARGINS = { left: 54, right: 12, top: 12, bottom: 46 };
 const DART = [[0.6, 0], [-0.4, 0.32], [-0.22, 0], [-0.4, -0.32]];
 const DART_SIZE = 0.066; // of the size of the path
 const ARROW_SIZE = 0.13;
 const LONGEST_ARROW = 64; // px
+const DIMMED = 0.3, FULL = 0.85; // bodies of a fleet, while another one is picked, and else
+const MOST_LABELS = 40; // vehicles whose names and outlines are shown
+const SMALLEST = 4; // px of a dot that stands for a body that is smaller
 const FADING = 6; // old plans of a closed loop that are shown
 
 class Stage {
@@ -32,17 +36,26 @@ class Stage {
     this.swept = new Map();
     this.below = new Still();
     this.above = new Still();
-    // a vehicle without a body is shown as a dart
-    this.bodies = data.bodies.length
-      ? data.bodies
-      : [{ frame: 0, ring: DART.map((place) => place.map((c) => c * DART_SIZE * data.mark)) }];
+    const ring = DART.map((place) => place.map((c) => c * DART_SIZE * data.mark));
+    this.dart = [{ frame: 0, ring }];
+  }
+
+  /** Outlines of a vehicle, in a fleet its own; none where the body is not known. */
+  bodiesOf(motion) {
+    return motion.bodies || this.data.bodies;
+  }
+
+  /** The same, with a dart where the body is not known. */
+  outlines(motion) {
+    const known = this.bodiesOf(motion);
+    return known.length ? known : this.dart;
   }
 
   /**
    * Draw everything at a `time`; `hover` is the time under the cursor, or null. What does not move is
    * kept until the `stamp`, which names all that it shows, or the view changes.
    */
-  draw(motion, time, { colors, layers, hover, others, steps, stamp }) {
+  draw(motion, time, { colors, layers, hover, others, steps, stamp, fleet = null }) {
     const sheet = prepared(this.canvas), { view } = this;
     view.refit();
     this.thin = 1 / view.scale; // a line of one pixel
@@ -52,15 +65,19 @@ class Stage {
       this.inMetres(context, () => {
         this.standing(context, colors);
         if (layers.search) this.search(context, colors);
-        if (layers.swept && this.data.bodies.length) this.sweep(context, colors, motion);
+        if (layers.swept && this.bodiesOf(motion).length) this.sweep(context, colors, motion);
       });
     });
     this.inMetres(sheet.context, () => {
       this.traffic(sheet.context, colors, time);
       if (steps) this.plans(sheet.context, colors, time, steps);
     });
+    const picked = Boolean(fleet && motion.color); // the overview of a fleet has no colour
     this.above.put(sheet, whole, (context) => this.inMetres(context, () => {
-      if (layers.others) {
+      if (fleet) {
+        others.forEach((one) => this.member(context, colors, one, { layers, picked }));
+        if (!picked) return;
+      } else if (layers.others) {
         others.forEach((other) => this.path(context, other, { width: 1.2, alpha: 0.55 }));
       }
       if (layers.path) this.path(context, motion, { width: 3.2, casing: colors.casing });
@@ -68,9 +85,85 @@ class Stage {
       if (layers.bodies) this.switches(context, colors, motion);
     }));
     this.inMetres(sheet.context, () => {
+      if (fleet) {
+        others.filter((one) => one.isThere(time)).forEach((one) =>
+          this.fellow(sheet.context, colors, one, time, { picked, many: others.length > MOST_LABELS }));
+        if (!picked) return;
+      }
       if (hover !== null) this.body(sheet.context, colors, motion, hover, 0.25);
-      this.body(sheet.context, colors, motion, time, 0.6);
+      if (motion.isThere(time)) this.body(sheet.context, colors, motion, time, picked ? FULL : 0.6);
     });
+    if (fleet) {
+      const named = others.length <= MOST_LABELS ? others : [];
+      this.labels(sheet.context, colors, picked ? [...named, motion] : named, time, motion);
+    }
+  }
+
+  /** Path, start and goal of a vehicle of a fleet; faint while another one is picked. */
+  member(context, colors, motion, { layers, picked }) {
+    const alpha = picked ? 0.3 : 0.9;
+    if (layers.others && layers.path) {
+      this.path(context, motion, { width: picked ? 1.2 : 2, alpha, color: motion.color });
+    }
+    if (!layers.bodies || !motion.runs.length) return;
+    context.lineWidth = 1.3 * this.thin;
+    context.strokeStyle = withAlpha(motion.color, 0.9 * alpha);
+    context.stroke(this.placed(motion, motion.begin));
+    context.fillStyle = withAlpha(motion.color, 0.35 * alpha);
+    context.fill(this.placed(motion, motion.end));
+    context.stroke(this.placed(motion, motion.end));
+  }
+
+  /** The body of a vehicle of a fleet that is not picked: a dot where it is tiny on the page. */
+  fellow(context, colors, motion, time, { picked, many }) {
+    const reach = Math.max(...this.outlines(motion).flatMap((one) => one.ring.flat().map(Math.abs)));
+    const alpha = picked ? DIMMED : FULL, dot = SMALLEST * this.thin;
+    context.strokeStyle = "transparent";
+    if (reach < dot) circle(context, motion.poseAt(time), dot, withAlpha(motion.color, alpha));
+    else if (picked || many) {
+      const run = motion.runs.length > 0, path = this.placed(motion, time);
+      context.fillStyle = withAlpha(run ? motion.color : colors.dim, run ? alpha : 0.2);
+      context.fill(path);
+      if (!run) this.hatch(context, path, motion.poseAt(time), withAlpha(motion.color, alpha));
+    } else this.body(context, colors, motion, time, alpha);
+  }
+
+  /** Names beside vehicles, upright; those that are not picked are pale while one is. */
+  labels(context, colors, motions, time, picked) {
+    context.font = "600 11.5px system-ui, sans-serif";
+    context.textAlign = "left";
+    context.textBaseline = "bottom";
+    context.lineJoin = "round";
+    context.lineWidth = 3;
+    for (const one of motions.filter((member) => member.isThere(time))) {
+      const [x, y] = this.view.toPage(one.poseAt(time));
+      context.globalAlpha = picked.color && one !== picked ? 0.45 : 1;
+      context.strokeStyle = colors.paper;
+      context.strokeText(one.label, x + 7, y - 6);
+      context.fillStyle = colors.ink;
+      context.fillText(one.label, x + 7, y - 6);
+    }
+    context.globalAlpha = 1;
+  }
+
+  /** Number of the vehicle at a place of the canvas: its body, or else its path; -1 if none is. */
+  vehicleAt(place, motions, { time, layers }) {
+    const there = this.view.toPlane(place), near = NEAR / this.view.scale;
+    let best = -1, least = near;
+    motions.forEach((one, k) => {
+      if (!one.isThere(time)) return;
+      const frames = one.framesAt(time), pose = frames[0];
+      const hit = this.outlines(one).some((body) => frames[body.frame] &&
+        inside(body.ring.map((corner) => acted(frames[body.frame], corner)), there));
+      const apart = hit ? -1 : Math.hypot(pose[0] - there[0], pose[1] - there[1]);
+      if (apart < least) [best, least] = [k, apart];
+    });
+    if (best >= 0 || !(layers.others && layers.path)) return best;
+    motions.forEach((one, k) => {
+      const { apart } = one.nearest(there);
+      if (apart < 0.5 * least) [best, least] = [k, 2 * apart];
+    });
+    return best;
   }
 
   /** Draw in metres, within the area of the plane. */
@@ -161,14 +254,17 @@ class Stage {
       one.pose.forEach((pose, n) => context[n ? "lineTo" : "moveTo"](pose[0], pose[1]));
       context.stroke();
       context.setLineDash([]);
-      if (one.present && (time < one.present[0] || time > one.present[1])) continue;
+      const [from, to] = one.present || [null, null];
+      const there = (from === null || time >= from) && (to === null || time <= to);
       if (one.leaves && (time < one.t[0] - 1e-9 || time > one.t[one.t.length - 1] + 1e-9)) continue;
       const path = new Path2D(), pose = posedAt(one, time);
       one.rings.forEach((ring) => trace(path, ring.map((place) => acted(pose, place))));
-      context.fillStyle = withAlpha(colors.moving, 0.75);
-      context.strokeStyle = colors.moving;
+      context.fillStyle = withAlpha(colors.moving, there ? 0.75 : 0.07);
+      context.strokeStyle = withAlpha(colors.moving, there ? 1 : 0.4);
+      if (!there) context.setLineDash([4 * this.thin, 3 * this.thin]);
       context.fill(path, "evenodd");
       context.stroke(path);
+      context.setLineDash([]);
     }
   }
 
@@ -195,7 +291,7 @@ class Stage {
   }
 
   sweep(context, colors, motion) {
-    if (!this.swept.has(motion)) this.swept.set(motion, sweptRegion(motion, this.data.bodies));
+    if (!this.swept.has(motion)) this.swept.set(motion, sweptRegion(motion, this.bodiesOf(motion)));
     context.fillStyle = colors.swept;
     context.fill(this.swept.get(motion), "nonzero");
   }
@@ -256,7 +352,7 @@ class Stage {
       context.lineTo(...acted(pose, [0.7 * size, -0.12 * size]));
       context.fill();
     };
-    for (const goal of this.data.goals) {
+    for (const goal of motion.goals || this.data.goals) {
       const color = goal.reached ? colors.goal : colors.dim;
       context.strokeStyle = color;
       if (goal.tolerance > 0) circle(context, goal.pose, goal.tolerance, withAlpha(color, 0.15));
@@ -270,7 +366,7 @@ class Stage {
 
   /** The body where trims begin, and at the end. */
   switches(context, colors, motion) {
-    if (!this.data.bodies.length) return;
+    if (!this.bodiesOf(motion).length) return;
     context.lineWidth = 0.8 * this.thin;
     const times = [...motion.runs.map((run) => run.begin), motion.end];
     const alpha = Math.max(0.22, 0.6 * Math.min(1, 10 / times.length));
@@ -284,22 +380,37 @@ class Stage {
   body(context, colors, motion, time, alpha) {
     const run = motion.runs.length ? motion.runAt(time) : null;
     const path = this.placed(motion, time), pose = motion.poseAt(time);
-    context.fillStyle = withAlpha(run ? this.data.trims[run.trim].color : colors.dim, alpha);
+    const color = motion.color || (run ? this.data.trims[run.trim].color : colors.dim);
+    context.fillStyle = run ? withAlpha(color, alpha) : withAlpha(colors.dim, 0.2);
     context.strokeStyle = withAlpha(colors.ink, Math.min(1, alpha + 0.4));
     context.lineWidth = 1.4 * this.thin;
     context.lineJoin = "round";
     context.fill(path);
     context.stroke(path);
-    if (!this.data.bodies.length) return;
-    const front = Math.max(...this.bodies.filter((one) => !one.frame)
+    if (!run && motion.color) this.hatch(context, path, pose, withAlpha(motion.color, alpha));
+    if (!this.bodiesOf(motion).length) return;
+    const front = Math.max(...this.outlines(motion).filter((one) => !one.frame)
       .flatMap((one) => one.ring.map((place) => place[0])));
     line(context, pose, acted(pose, [0.85 * front, 0])); // where it looks
     circle(context, pose, 2.2 * this.thin, colors.ink);
   }
 
+  /** Slanting lines over a body: it has no plan. */
+  hatch(context, path, [x, y], color) {
+    const step = 5 * this.thin, reach = 400 * this.thin;
+    context.save();
+    context.clip(path);
+    context.strokeStyle = color;
+    context.lineWidth = 1.3 * this.thin;
+    for (let off = -reach; off <= reach; off += step) {
+      line(context, [x + off - reach, y - reach], [x + off + reach, y + reach]);
+    }
+    context.restore();
+  }
+
   placed(motion, time) {
     const path = new Path2D(), frames = motion.framesAt(time);
-    for (const body of this.bodies) {
+    for (const body of this.outlines(motion)) {
       const frame = frames[body.frame];
       if (frame) trace(path, body.ring.map((place) => acted(frame, place)));
     }

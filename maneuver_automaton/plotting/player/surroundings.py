@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -88,7 +89,7 @@ def _obstacle_entry(one: Obstacle, local: Local, *, leave: bool) -> dict[str, An
     if one.motion is None:
         return entry | {"rings": [local.places(ring) for ring in rings]}
     if one.present_s is not None:
-        entry["present"] = [one.present_s[0], one.present_s[1]]
+        entry["present"] = [time if math.isfinite(time) else None for time in one.present_s]
     times = one.motion.times_for_lines(TURN)
     return entry | {
         "rings": [rounded(ring, PLACE_DIGITS) for ring in rings],

@@ -14,6 +14,7 @@ from maneuver_automaton.formats.plan_json import load_plan
 from maneuver_automaton.planning import LowerBound, PlanResult, PlanStatus
 from maneuver_automaton.problem import Bounds
 from tests.plotting.cases import flight_plan, parking_plan, plan_of, result_of, slalom_problem
+from tests.plotting.fleets import crossing
 from tests.plotting.loops import pushed_loop
 from tests.plotting.player.browser import browser, opened, poses
 
@@ -75,6 +76,55 @@ def test_the_page_plays_what_was_planned(tmp_path):
             assert "unreachable: too narrow" in page.inner_text("#facts")
             assert page.is_hidden("#transport")
             assert page.locator("#layers input").count() == 1
+
+
+def test_the_page_of_a_fleet_plays_all_and_picks_one(tmp_path):
+    result = crossing()
+    result.player(title="Crossing").save(tmp_path / "fleet.html")
+    with browser() as running, opened(running, tmp_path / "fleet.html") as page:
+        for time in (0.0, 1.2, 3.0, 5.5):
+            there = [plan.pose_at(time) for plan in result.plans.values()]
+            shown = page.evaluate("time => player.posesAt(time)", time)
+            np.testing.assert_allclose(shown[:2], there, atol=MILLIMETRE)
+            np.testing.assert_allclose(shown[2], [5.0, 3.0, 0.0], atol=MILLIMETRE)
+        assert (page.evaluate("player.begin"), page.evaluate("player.end")) == (0.0, 5.5)
+        assert page.evaluate("player.choice") == -1
+        assert page.locator("#bar .row").count() == 2
+        assert page.locator("#vehicles button").count() == 3
+        page.evaluate("player.seek(3)")
+        assert page.inner_text("#clock") == "3.00 s · 0 of 3 arrived"
+        assert [row[0] for row in page.evaluate("player.valuesAt(3)")] == ["time", "nearest two"]
+        _click_on(page, result.plans["back"].pose_at(3.0))
+        assert page.evaluate("player.choice") == 1
+        box = page.locator("#bar").bounding_box()
+        begins = [one.bounding_box()["x"] for one in page.locator("#bar .trim").all()]
+        expected = box["x"] + box["width"] * np.array([0.5, 1.5]) / 5.5
+        np.testing.assert_allclose(begins, expected, atol=1.0)
+        named = {row[0]: row[1] for row in page.evaluate("player.valuesAt(3)")}
+        assert (named["vehicle"], named["trim"]) == ("back", "straight")
+        assert named.keys() >= {"speed", "turn rate", "clearance", "nearest other"}
+        assert dict(page.evaluate("player.valuesAt(0.2)"))["state"] == "has not left"
+        _click_on(page, [5.0, 3.0])
+        assert dict(page.evaluate("player.valuesAt(3)"))["state"] == "walls enclose the start"
+        _click_on(page, [3.5, 4.0])  # nobody
+        assert page.evaluate("player.choice") == -1
+        for key in ("2", "]", "Escape", "]", "?", "?", "w", "b", "p", "d"):
+            page.keyboard.press(key)
+        assert "a vehicle; or click it" in page.inner_html("#keys")
+        assert "alternatives" not in page.inner_html("#keys")
+        page.evaluate("player.seek(player.end)")
+        assert page.inner_text("#clock") == "5.50 s · 2 of 3 arrived"
+
+
+def _click_on(page, pose):
+    """Click at a place of the plane."""
+    x, y = page.evaluate(
+        "([x, y]) => stage.view.toPage([x - data.origin[0], y - data.origin[1]])",
+        list(map(float, pose[:2])),
+    )
+    box = page.locator("#stage").bounding_box()
+    page.mouse.move(box["x"] + x, box["y"] + y)
+    page.mouse.click(box["x"] + x, box["y"] + y)
 
 
 def _follows(page, plan):

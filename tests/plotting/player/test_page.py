@@ -6,18 +6,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap
 from maneuver_automaton.formats.plan_json import plan_of_document
 from maneuver_automaton.groups import SE2, group_of
+from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.plotting import Player, player_of, player_of_file
-from maneuver_automaton.plotting.colors import trim_colors
+from maneuver_automaton.plotting.colors import trim_colors, twist_color
 from maneuver_automaton.plotting.player.clearances import clearance_entry
 from maneuver_automaton.plotting.player.composing import names_of
 from maneuver_automaton.plotting.player.local import Local, hex_color
 from maneuver_automaton.plotting.player.motions import motion_entry, part_frames
+from maneuver_automaton.plotting.player.surroundings import obstacle_entries
 from maneuver_automaton.plotting.track import track_of_plan
 from maneuver_automaton.primitives import Maneuver, Trajectory
 from maneuver_automaton.problem import Problem
@@ -31,6 +33,7 @@ from tests.plotting.cases import (
     result_of,
     slalom_problem,
 )
+from tests.plotting.fleets import answer, crossing, fleet_of
 from tests.plotting.loops import LOOPS
 
 
@@ -128,14 +131,53 @@ def test_clearances_are_distances():
     assert apart(there) == pytest.approx([1.0, 0.0, 2.5])
     gone = replace(there, motion=Motion([0.0, 1.0], [[-3.0, 0, 0], [7.0, 0, 0]]))
     assert clearance_entry(times, robot, [gone], leave=True)["t"] == [0.0, 1.0]
+    door = Obstacle(Box([2.0, 2.0], [3.0, 5.0]), present_s=(1.0, np.inf))
+    assert clearance_entry(times, robot, [door])["t"] == [1.0, 2.0]
+    assert clearance_entry(times, robot, [replace(door, present_s=(7.0, 9.0))]) is None
+    assert obstacle_entries([door], Local(np.zeros(2)), leave=False)[0]["present"] == [1.0, None]
     tower = Obstacle(Box([2.0, 2.0], [3.0, 0.0]), height=(0.0, 3.0))
     heights = np.array([[7.0, 8.0], [7.0, 8.0], [-2.0, -1.0]])
     assert apart(tower, heights=heights) == pytest.approx([np.hypot(1.0, 4.0), 4.0, 1.0], abs=1e-4)
     assert clearance_entry(times, robot, []) is None
 
 
+def test_a_fleet_is_where_its_plans_are():
+    result = crossing()
+    content = player_of(result, title="Crossing").content
+    assert content["title"] == "Crossing"
+    assert dict(content["facts"])["vehicles"] == "2 of 3 with a plan"
+    names = [one["name"] for one in content["motions"]]
+    assert names == ["there", "back", "stuck"]
+    for name, plan in result.plans.items():
+        motion = content["motions"][names.index(name)]
+        for time in np.linspace(plan.start_time, plan.start_time + plan.duration, 9):
+            pose = posed(motion, content["origin"], time)
+            np.testing.assert_allclose(pose, plan.pose_at(time), rtol=0.0, atol=1e-8)
+        trims = [content["trims"][k]["name"] for k in motion["trims"]]
+        assert trims == [trim.name for trim in plan.trims]
+    stuck = content["motions"][2]
+    assert (stuck["twists"], stuck["reason"]) == ([], "walls enclose the start")
+    assert (content["fleet"]["begin"], content["fleet"]["end"]) == (0.0, 5.5)
+    assert min(content["fleet"]["distance"]["v"]) == pytest.approx(1.0, abs=1e-3)
+    assert content["motions"][1]["leaves"]
+    assert "http" not in result._repr_html_()
+
+
+def test_vehicles_of_two_kinds_keep_the_colours_of_their_trims():
+    other = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "straight": (-1, 0)})
+    back = Plan([0, 5, 0], (other["straight"],), durations=[1.0])
+    problem = Problem(other, back.start, back.end)
+    found = PlanResult(problem=problem, status=PlanStatus.FOUND, reason="", plan=back)
+    ahead = plan_of(["straight"], [1.0])
+    result = fleet_of([answer(ahead), found], names=["ahead", "back"])
+    content = player_of(result).content
+    colors = [content["trims"][one["trims"][0]]["color"] for one in content["motions"]]
+    twists = [plan.trims[0].body_velocity for plan in (ahead, back)]
+    assert colors == [hex_color(twist_color(twist)) for twist in twists]
+    assert colors[0] != colors[1]
+
+
 def test_a_carried_part_is_where_its_plan_is():
-    from maneuver_automaton.automaton import Automaton
     from maneuver_automaton.models import CarWithTrailer
 
     truck = CarWithTrailer(wheelbase=2.5, hitch_length=3.0, max_steering=0.6, max_speed=3.0)
@@ -208,7 +250,8 @@ def test_other_values_are_refused():
     with pytest.raises(TypeError) as error:
         player_of(3)
     assert str(error.value) == (
-        "player: got int, need a Plan, PlanResult, ClosedLoop, RoadPlanResult or RoadDrive"
+        "player: got int, need a Plan, PlanResult, FleetResult, ClosedLoop, "
+        "RoadPlanResult or RoadDrive"
     )
 
 

@@ -1,0 +1,108 @@
+"""How near the vehicles of a fleet are to each other over time, at samples, by shapely.
+
+These are distances to be looked at. What is proven between the samples is in the result.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.plotting.fleet_cast import Cast, Member
+
+STEP_S, MOST_STEPS = 0.05, 20_000  # between samples; no more of them, however long it takes
+AT_ONCE = 2_000_000  # pairs in memory
+Numbers = NDArray[Any]
+
+
+def distance_times(cast: Cast) -> Array:
+    """Times (n,) at which distances are measured [s], 0.05 s apart unless it takes long."""
+    steps = min(max(1, int(np.ceil((cast.end - cast.begin) / STEP_S))), MOST_STEPS)
+    return np.linspace(cast.begin, cast.end, steps + 1)
+
+
+def nearest_others(members: Sequence[Member], times: Array) -> Array:
+    """Distance of each vehicle from the nearest other at times (n,) [s]: (n, vehicles) [m].
+
+    It is inf where there is no other. Pairs that a circle around each shows to be further apart
+    than another pair are not measured.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Disc, Problem, Unicycle
+    >>> from maneuver_automaton.fleet import FleetProblem, plan_fleet
+    >>> from maneuver_automaton.plotting.fleet_cast import cast_of
+    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "on": (1, 0), "spin": (0, 1)})
+    >>> rows = [Problem(robot, [0, y, 0], [3, y, 0], footprint=Disc(0.3)) for y in (0.0, 1.0)]
+    >>> cast = cast_of(plan_fleet(FleetProblem(rows), max_rounds=0))
+    >>> nearest_others(cast.members, np.array([0.0, 1.5])).round(9).tolist()
+    [[0.4, 0.4], [0.4, 0.4]]
+    """
+    rows = [
+        (owner, ring, grown, part.motion.pose_at(times))
+        for owner, one in enumerate(members)
+        for part in one.parts
+        for ring, grown in part.rings
+    ]
+    owners = np.array([owner for owner, *_ in rows])
+    there = np.array([times <= members[owner].gone_after for owner in owners])  # (parts, n)
+    apart = np.full((len(times), len(members)), np.inf)
+    chunk = max(1, AT_ONCE // len(rows) ** 2)
+    for first in range(0, len(times), chunk):
+        part = slice(first, first + chunk)
+        moved = [(ring, grown, poses[part, :3]) for _, ring, grown, poses in rows]
+        nearest = _nearest(moved, owners, there[:, part])
+        for row, owner in enumerate(owners):
+            apart[part, owner] = np.minimum(apart[part, owner], nearest[row])
+    return apart
+
+
+def _nearest(rows: Sequence[tuple[Array, float, Array]], owners: Numbers, there: Numbers) -> Array:
+    """Distance (parts, n) of each part from the nearest part of another vehicle."""
+    import shapely
+
+    middles, radii, placed = [], [], []
+    for ring, grown, poses in rows:
+        middle = 0.5 * (ring.min(axis=0) + ring.max(axis=0))
+        middles.append(SE2(poses).act(middle))
+        radii.append(float(np.linalg.norm(ring - middle, axis=1).max()) + grown)
+        corners = SE2(poses[:, None]).act(ring)
+        one = shapely.points(corners[:, 0]) if len(ring) == 1 else shapely.polygons(corners)
+        placed.append(one)
+    at, solid = np.array(middles), np.array(placed)
+    wide, larger = np.array(radii), np.array([by for _, by, _ in rows])
+    low = np.linalg.norm(at[:, None] - at[None], axis=-1) - (wide[:, None] + wide)[..., None]
+    low[owners[:, None] == owners] = np.inf
+    low[~(there[:, None] & there[None])] = np.inf
+
+    def measured(one: Numbers, other: Numbers, time: Numbers) -> Array:
+        apart = shapely.distance(solid[one, time], solid[other, time])
+        return np.asarray(np.maximum(apart - larger[one] - larger[other], 0.0))
+
+    parts, steps = np.indices(low.shape[1:])
+    likely = low.argmin(axis=1)
+    least = measured(parts, likely, steps)
+    least[np.isinf(low.min(axis=1))] = np.inf
+    one, other, time = np.nonzero(low < least[:, None])
+    np.minimum.at(least, (one, time), measured(one, other, time))
+    return np.asarray(least)
+
+
+def thinned(times: Array, values: Array, *, most: int) -> tuple[Array, Array]:
+    """At most about so many of the samples, with the least of those between them.
+
+    Examples
+    --------
+    >>> thinned(np.arange(6.0), np.array([5.0, 4.0, 1.0, 2.0, 3.0, 6.0]), most=3)
+    (array([0., 1., 2., 4., 5.]), array([5., 4., 1., 3., 6.]))
+    """
+    width = -(-len(times) // most)
+    begins = range(0, len(times), width)
+    least = [begin + int(np.argmin(values[begin : begin + width])) for begin in begins]
+    kept = np.unique([0, *least, len(times) - 1])
+    return times[kept], values[kept]
