@@ -7,6 +7,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.shapes import Obstacle
 from maneuver_automaton.fleet.agreement import Agreement
@@ -37,6 +38,7 @@ Around = tuple[tuple[int, int], ...]  # who is there, and which plan it holds
 NEARLY = 0.005  # share of its cost: a plan rejoined that is no dearer is the same one
 WORTH = 1e-6  # share of its cost that another plan saves at least
 EASED = (1.0, 0.5, 0.0)  # shares of the margin, where a void plan has none that keeps all of it
+SHARES = (0.5, 1.0, 2.0)  # of a step, when it is looked at how far a plan is beside another one
 LEAST = 1e-3  # [m] kept even then
 
 
@@ -98,6 +100,7 @@ class FleetStepUnderWay:
         self.off: dict[int, float] = {}
         self.disturbed: set[int] = set()  # who has another plan not by an exchange of its own
         self.in_group: set[int] = set()
+        self.beside: dict[int, Plan] = {}  # driven, within the tube of the plan that is held
         self._left: dict[int, tuple[Found, Course]] = {}  # what is left of courses, by identity
 
     def run(self, broken_down: set[int]) -> FleetStep:
@@ -194,6 +197,7 @@ class FleetStepUnderWay:
     def _hold(self, k: int, found: Found) -> None:
         """Another plan is held, whatever the others say to it."""
         self.held[k] = found
+        self.beside.pop(k, None)
         self.state.versions[k] += 1
         self.state.lineage[k] += 1
         self.disturbed.add(k)
@@ -221,18 +225,30 @@ class FleetStepUnderWay:
 
     def _rejoin_within(self, k: int, found: Found) -> None:
         others, left = self._expected_by(k), self._left_to_pay(k)
-        for again in rejoined(self.vehicles[k], found, self.time, self.poses[k]):
-            if self._is_proven(k, again, others):
-                if self._agreed(k, again):
-                    self.held[k] = again
-                    self.state.versions[k] += 1
-                    self.state.lineage[k] += int(again.cost > left * (1.0 + NEARLY))
-                    self.disturbed.add(k)
-                    self.off[k] = 0.0
-                    if k in self.state.due:
-                        when, other, _ = self.state.due[k]
-                        self.state.due[k] = (when, other, again)
-                return
+        choices = list(rejoined(self.vehicles[k], found, self.time, self.poses[k]))
+        again = next((one for one in choices if self._is_proven(k, one, others)), None)
+        if again is None or not self._agreed(k, again):
+            self._drive_beside(k, found, choices)
+            return
+        self.held[k] = again
+        self.state.versions[k] += 1
+        self.state.lineage[k] += int(again.cost > left * (1.0 + NEARLY))
+        self.disturbed.add(k)
+        self.off[k] = 0.0
+        if k in self.state.due:
+            when, other, _ = self.state.due[k]
+            self.state.due[k] = (when, other, again)
+
+    def _drive_beside(self, k: int, found: Found, choices: Sequence[Found]) -> None:
+        """Of the ways back to a plan that is still held, drive the one that is nearest to it."""
+        vehicle, step = self.vehicles[k], self.state.settings.step
+
+        def farthest(plan: Plan) -> float:
+            times = [self.time + share * step for share in SHARES]
+            return max(off_plan(vehicle, found, time, plan.pose_at(time)) for time in times)
+
+        plans = [self._from_here(k).plan, *(one.plan for one in choices)]
+        self.beside[k] = min(plans, key=farthest)
 
     def _agreed(self, k: int, found: Found) -> bool:
         """Whether all others agree to a plan: it is proven past the one that each of them holds."""
@@ -487,6 +503,7 @@ class FleetStepUnderWay:
             versions[k] += 1
             self.state.lineage[k] += 1
             self.off[k] = self._off(k, one)
+            self.beside.pop(k, None)
         names = tuple(self.vehicles[k].name for k in found)
         self.swaps.append(
             Swap(
@@ -526,7 +543,7 @@ class FleetStepUnderWay:
             time=self.time,
             poses={names[k]: self.poses[k] for k in self.held},
             plans=plans,
-            driven={names[k]: self._from_here(k).plan for k in self.held},
+            driven={names[k]: self.beside.get(k) or self._from_here(k).plan for k in self.held},
             values={names[k]: self._left_to_pay(k) for k in self.held},
             arrivals={names[k]: arrival(one) for k, one in self.held.items()},
             off_plan={names[k]: self.off[k] for k in self.held},
