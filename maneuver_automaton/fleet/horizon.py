@@ -37,10 +37,11 @@ class FleetHorizon:
     holds on. Guarantees are asserted in every step; its log has each that is broken, and why.
 
     Off its plan by no more than its tube, a vehicle rejoins it if that is proven, and otherwise
-    drives on beside it. Beyond, its plan is void: it is planned anew at once.
+    drives back towards it. Beyond, its plan is void: it is planned anew at once.
 
-    Source: Scheffe et al. (2024), *Distributed MPC with prioritization*, for the idea that plans
-    are exchanged one after another; here past the plans held, not past predictions of this step.
+    Source: the paper, Theorem 17, for the value that falls. Prioritized distributed MPC (Scheffe et
+    al., p-dmpc) plans one after another too, past predictions of the same step; here it is past the
+    plans that are held, so that one that holds on touches nobody.
 
     Parameters
     ----------

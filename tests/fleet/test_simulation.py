@@ -42,6 +42,18 @@ def test_noise_within_the_tubes(scene):
     assert all(off <= 0.05 for step in log.steps for off in step.off_plan.values())
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_beside_each_other_at_the_margin(seed):
+    """No plan that starts nearer can be proven: both drive back to the plans that they hold."""
+    ends = ([0, 0, 0], [8, 0, 0]), ([0, 0.702, 0], [8, 0.702, 0])
+    fleet = FleetProblem([problem_of(*one, tolerance=0.1) for one in ends], margin=0.1)
+    log = loop_of(fleet, disturbance=NOISE, seed=seed)
+    assert log.reached
+    assert_free(log)
+    assert all(off <= 0.05 for step in log.steps for off in step.off_plan.values())
+    assert not any(step.void for step in log.steps)
+
+
 @pytest.mark.parametrize("seed", range(2))
 def test_random_fleets_with_noise(seed):
     check_noisy(seed)
