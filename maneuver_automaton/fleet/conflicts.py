@@ -46,6 +46,17 @@ class Course:
         object.__setattr__(self, "obstacles", seen)
 
     @property
+    def arrived(self) -> tuple[Obstacle, ...]:
+        """What is left of it once it has arrived: where it stands, or nothing if it leaves."""
+        if self.until < math.inf:
+            return ()
+        return tuple(
+            Obstacle(one.at(float(one.motion.time[-1])))
+            for one in self.obstacles
+            if one.motion is not None
+        )
+
+    @property
     def quiet_after(self) -> float:
         """When it has come to rest for good, or is gone [s]."""
         return min(self.until, max(float(one.time[-1]) for one in self.motions))

@@ -25,6 +25,7 @@ from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.waiting import with_waits
 from maneuver_automaton.search.word_plan import plan_of_word
+from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word
 
 WAYS = 6  # alone, that are tried with rests
@@ -200,6 +201,27 @@ class Vehicle:
         if not best.cost < known:
             return None
         return self._word_found(query, best)
+
+    def past_arrived(
+        self, arrived: Sequence[Obstacle], begin: float, budget: Budget
+    ) -> Found | None:
+        """A plan that rests until a time [s], and drives past others that all stand then."""
+        calm = replace(self.problem, obstacles=(*self.problem.obstacles, *arrived))
+        if not self.at_will or blocked_ends(calm) is not None:
+            return None
+        query = self._query(calm)
+        first = first_plan(query, budget=replace(budget, expansions=QUICK))
+        self._count(first.expansions)
+        rest = query.library.rest
+        if first.word is None or rest is None:
+            return None
+        word = improve(query, first.word, budget=budget, patience=AT_ONCE).word
+        waits = [(SWITCH, rest, begin - self.problem.start_time)]
+        drives = zip(word.trims.tolist(), word.durations.tolist(), strict=True)
+        steps = [*waits, *((SWITCH, trim, t) for trim, t in drives)]
+        found = self._word_found(query, query.word_of(steps, word.goal))
+        # The rest is in no library of a search past what stands still, and so has no price there.
+        return replace(found, cost=self.problem.cost_of(found.plan))
 
     def _round_the_arrived(
         self, query: LatticeQuery, others: Sequence[Obstacle], budget: Budget

@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Box, Disc, Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.fleet import FleetProblem, FleetStatus, plan_fleet
+from maneuver_automaton.fleet.conflicts import meetings
+from maneuver_automaton.fleet.planning import _FleetSearch, vehicles_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.problem import Bounds, Horizon, Problem
@@ -195,3 +198,24 @@ def test_vehicles_that_cannot_turn_drive_ahead():
     result = plan_fleet(FleetProblem(pair), time_limit=2.0, max_rounds=1)
     assert result.status is FleetStatus.FOUND
     assert result.sum_s == pytest.approx(6.0)
+
+
+def test_by_turns_everybody_has_a_plan_without_a_search_in_time():
+    """What is returned where there is no time for more: one drives at a time."""
+    fleet = fleets.random_fleet(6, 2)
+    search = _FleetSearch(fleet, vehicles_of(fleet), "sum", Budget.from_now(30.0), 0, None)
+    search._plan_alone()
+    held = search._by_turns(range(6))
+    assert sorted(held) == list(range(6))
+    assert not meetings({k: one.course for k, one in held.items()}, keep=0.0)
+    arrivals = sorted(one.arrival for one in held.values())
+    assert all(held[k].cost == pytest.approx(held[k].arrival) for k in held)
+    assert np.diff(arrivals).min() > 1.0
+
+
+def test_a_short_limit_still_has_plans_for_all():
+    """Orders get a share of the time; then one drives at a time."""
+    fleet = fleets.random_fleet(8, 5)
+    result = plan_fleet(fleet, time_limit=3.0, max_rounds=0, orders=1)
+    assert result.status is FleetStatus.FOUND
+    assert fleets.least_distances(result)[0] > 0.0
