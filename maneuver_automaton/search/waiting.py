@@ -54,15 +54,18 @@ def with_waits(query: LatticeQuery, word: Word) -> Word | None:
     state = _arrival(query, path, rest)
     if state < 0:
         return None
-    parts = _with_fewer_rests(query, _with_rests(path, state, rest), rest)
-    driven = [(SWITCH, int(query.library.trims[trim]), t) for trim, t in parts]
-    return with_cost(query.word_of(driven, word.goal), query)
+    parts = _with_rests(path, state, rest)
+    words = []
+    for one in (parts, _with_fewer_rests(query, parts, rest)):
+        driven = [(SWITCH, int(query.library.trims[trim]), t) for trim, t in one]
+        words.append(with_cost(query.word_of(driven, word.goal), query))
+    return min(words, key=lambda timed: timed.cost)
 
 
 def _with_fewer_rests(
     query: LatticeQuery, parts: list[tuple[int, float]], rest: int
 ) -> list[tuple[int, float]]:
-    """The same arrival with rests together, where they stood apart: fewer switches are cheaper.
+    """The same arrival with rests together, where they stood apart: it may have fewer switches.
 
     Each rest, the last first, is taken at an earlier one or at the start, if that is free.
     """
