@@ -18,11 +18,13 @@ SMALL = {  # the sum of arrivals that CL-CBS and db-CBS report, or what was foun
     "db-cbs/alcove_unicycle": 13.5,
 }
 LARGE = {
-    "cl-cbs/map_50by50_obst25_agents15_ex4": 409.1,
     "cl-cbs/map_50by50_obst25_agents20_ex8": 533.9,
+    "db-cbs/window4_unicycle": 31.0,
+}
+LARGEST = {
+    "cl-cbs/map_50by50_obst25_agents15_ex4": 409.1,
     "cl-cbs/map_100by100_obst50_agents50_ex4": 2194.0,
     "cl-cbs/map_300by300_obst100_agents100_ex1": 12189.0,
-    "db-cbs/window4_unicycle": 31.0,
     "db-cbs/swap2_trailer": 13.0,
 }
 
@@ -45,3 +47,10 @@ def test_few_vehicles(name):
 @pytest.mark.parametrize("name", LARGE)
 def test_many_vehicles(name):
     check(name, LARGE[name])
+
+
+@pytest.mark.slow
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("name", LARGEST)
+def test_most_vehicles(name):
+    check(name, LARGEST[name])

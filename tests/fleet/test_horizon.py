@@ -93,6 +93,7 @@ def test_random_fleets_lose_no_plan(seed):
 
 
 @pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("seed", range(3, 40))
 def test_more_random_fleets_lose_no_plan(seed):
     check_random(seed)

@@ -60,6 +60,7 @@ def test_random_fleets_with_noise(seed):
 
 
 @pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("seed", range(2, 30))
 def test_more_random_fleets_with_noise(seed):
     check_noisy(seed)
