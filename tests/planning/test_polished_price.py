@@ -40,6 +40,7 @@ def posed(**changes):
 
 
 @pytest.mark.slow
+@pytest.mark.exhaustive
 @compiled_only
 @needs_casadi
 def test_all_of_a_fixed_time_is_used_where_effort_is_priced():
@@ -53,6 +54,7 @@ def test_all_of_a_fixed_time_is_used_where_effort_is_priced():
 
 
 @pytest.mark.slow
+@pytest.mark.exhaustive
 @compiled_only
 @needs_casadi
 def test_a_user_s_cost_is_polished_in_time():

@@ -178,6 +178,7 @@ FREE = {
 
 
 @pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("cost", [Cost(effort=1.0), Cost(length=1.0)], ids=["effort", "length"])
 @pytest.mark.parametrize("name", quick_are(["single_track"], FREE))
 def test_words_come_first_where_nothing_is_in_the_way(name, cost):

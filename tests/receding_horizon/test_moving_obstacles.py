@@ -212,6 +212,7 @@ def test_a_moved_scene_has_the_moved_loop():
 
 
 @pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("after", [2, 8])
 def test_a_loop_goes_on_from_its_file(tmp_path, after):
     problem = among(on_the_goal(6.0))
