@@ -22,7 +22,7 @@ from maneuver_automaton._interrupts import patient
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.shapes import Obstacle
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.fleet.conflicts import Course, components, meetings
+from maneuver_automaton.fleet.conflicts import Course, components, load_meetings, meetings
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import FleetResult
 from maneuver_automaton.fleet.vehicle import LONG, QUICK, Found, Vehicle
@@ -106,6 +106,7 @@ def plan_fleet(
     }.values():
         prepare(problem, workspace)
     load_lattice()
+    load_meetings()
     with patient():
         return _FleetSearch(
             fleet, vehicles, objective, Budget.from_now(time_limit), seed, on_better
