@@ -12,12 +12,12 @@ from maneuver_automaton.fleet.held import (
     CONTACT,
     LATER,
     arrival,
-    least_apart,
     left_to_pay,
     why_not_free,
 )
 from maneuver_automaton.fleet.log import FleetGuarantee, FleetStep, FleetViolation, Swap
 from maneuver_automaton.fleet.vehicle import Found, Vehicle
+from maneuver_automaton.fleet.verdict import nearest
 
 Frame = tuple[float, float, float]
 
@@ -89,7 +89,7 @@ def broken(
 def _too_near(names: Sequence[str], after: After) -> Iterator[FleetViolation]:
     """Pairs that the kernel cannot prove apart, and the audit's bounds neither."""
     for row in meetings(after.courses, keep=after.keep, frame=after.frame):
-        least = least_apart(after.courses, row.one, row.other)
+        least = nearest(after.courses[row.one], after.courses[row.other]).distance
         if least <= max(after.keep - CONTACT, CONTACT):
             pair = (names[row.one], names[row.other])
             reason = f"at {row.time:.6g} s they come within {least:.6g} m, need {after.keep:g} m"

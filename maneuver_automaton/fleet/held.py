@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 
 import networkx as nx
@@ -292,15 +292,3 @@ def why_not_free(vehicle: Vehicle, course: Course) -> str:
         if least.distance <= max(problem.margin - CONTACT, CONTACT):
             return f"at {least.time:.6g} s it comes within {least.distance:.3g} m of an obstacle"
     return ""
-
-
-def least_apart(courses: Mapping[int, Course], one: int, other: int) -> float:
-    """Least distance of two vehicles along their courses [m], by the audit's bounds."""
-    first, second = courses[one], courses[other]
-    quiet = max(first.quiet_after, second.quiet_after)
-    least = math.inf
-    for shapes, motion in zip(first.shapes, first.motions, strict=True):
-        plan = plan_of_motion(motion, min(quiet, first.until))
-        found = closest_to(plan, Omnidirectional(), second.bodies, footprint=shapes)
-        least = min(least, found.distance)
-    return least

@@ -20,12 +20,10 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.fleet.agreement import Agreement, Lost
 from maneuver_automaton.fleet.horizon_step import FleetStepUnderWay, LoopSettings, LoopState
 from maneuver_automaton.fleet.log import FleetStep
-from maneuver_automaton.fleet.planning import vehicles_of
+from maneuver_automaton.fleet.planning import prepare_vehicles, vehicles_of
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import FleetResult
 from maneuver_automaton.fleet.vehicle import Found, Vehicle
-from maneuver_automaton.planning.plan import prepare
-from maneuver_automaton.refinement.ready import load_lattice
 
 
 class FleetHorizon:
@@ -134,9 +132,7 @@ class FleetHorizon:
             _plans_of(first, vehicles),
         )
         self._numbers = {name: k for k, name in enumerate(fleet.names)}
-        for one in vehicles:
-            prepare(one.problem, one.workspace)
-        load_lattice()
+        prepare_vehicles(vehicles)
 
     def step(
         self,

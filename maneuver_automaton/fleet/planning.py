@@ -73,7 +73,7 @@ def plan_fleet(
     Returns
     -------
     FleetResult
-        Every plan checked past what stands still, and every pair of vehicles proven apart, now and
+        Every plan checked past static obstacles, and every pair of vehicles proven apart, now and
         after all have arrived, by two libraries.
 
     Raises
@@ -100,13 +100,7 @@ def plan_fleet(
     if orders < 1:
         raise ValueError(f"orders must be at least 1, got {orders}")
     vehicles = vehicles_of(fleet)
-    for problem, workspace in {
-        (id(one.problem.automaton), id(one.workspace)): (one.problem, one.workspace)
-        for one in vehicles
-    }.values():
-        prepare(problem, workspace)
-    load_lattice()
-    load_meetings()
+    prepare_vehicles(vehicles)
     with patient():
         return _FleetSearch(
             fleet, vehicles, objective, Budget.from_now(time_limit), seed, on_better
@@ -414,6 +408,15 @@ class _FleetSearch:
         )
 
 
+def prepare_vehicles(vehicles: Sequence[Vehicle]) -> None:
+    """Have ready what every search of a fleet needs, once for each kind and map."""
+    kinds = {(id(one.problem.automaton), id(one.workspace)): one for one in vehicles}
+    for one in kinds.values():
+        prepare(one.problem, one.workspace)
+    load_lattice()
+    load_meetings()
+
+
 def vehicles_of(fleet: FleetProblem) -> list[Vehicle]:
     """The vehicles of a fleet; those of one map share what is prepared for it."""
     prepared = Prepared()
@@ -427,6 +430,8 @@ def vehicles_of(fleet: FleetProblem) -> list[Vehicle]:
         key = tuple(map(id, problem.obstacles))
         workspace = workspaces.setdefault(key, Workspace(problem.obstacles, prepared))
         settings = replace(problem.search, improve=False)
-        own = replace(problem, search=settings, obstacles=workspace.obstacles)
+        # Obstacles of its own may move too, and pass where it stays.
+        horizon = replace(problem.horizon, stay=not fleet.leaves[k])
+        own = replace(problem, search=settings, obstacles=workspace.obstacles, horizon=horizon)
         vehicles.append(Vehicle(k, fleet.names[k], own, fleet.leaves[k], grown, workspace))
     return vehicles

@@ -34,7 +34,7 @@ class Closest(NamedTuple):
 class FleetResult:
     """The answer to a fleet's problem. Who has no plan stands at its start, past which others go.
 
-    `results` has the answer of every vehicle by its name: its plan past what stands still and past
+    `results` has the answer of every vehicle by its name: its plan past static obstacles and past
     the plans of the others, its cost, a lower bound of it, its audit; or why it has none.
     """
 

@@ -104,7 +104,7 @@ class Vehicle:
         )
 
     def plan_alone(self, budget: Budget) -> None:
-        """Find its way past what stands still, by itself, and a few others beside it."""
+        """Find its way past static obstacles, by itself, and a few others beside it."""
         blocked = blocked_ends(self.problem)
         if blocked is not None:
             self.why_none = blocked.reason
@@ -127,7 +127,7 @@ class Vehicle:
         self.bound = lattice_bound(query)
 
     def look_for_better_ways(self, budget: Budget) -> None:
-        """Better ways past what stands still, and others beside them."""
+        """Better ways past static obstacles, and others beside them."""
         if self.ways and self.problem.obstacles:
             self._keep_ways(self._query(self.problem), self.ways[0], budget, WITH_TIME)
         elif not self.at_will and self.alone is not None:
@@ -167,11 +167,7 @@ class Vehicle:
         """The cheapest way found past what the others do; None if there is none below a cost."""
         if not others:
             return self.alone if self.alone is not None and self.alone.cost < known else None
-        problem = replace(
-            self.problem,
-            obstacles=(*self.problem.obstacles, *others),
-            horizon=replace(self.problem.horizon, stay=not self.leaves),
-        )
+        problem = replace(self.problem, obstacles=(*self.problem.obstacles, *others))
         if not self.at_will:
             wants_better = self.held_before and most == QUICK
             limit = BETTER_S if wants_better else INERTIA_S
@@ -216,11 +212,12 @@ class Vehicle:
         if first.word is None or rest is None:
             return None
         word = improve(query, first.word, budget=budget, patience=AT_ONCE).word
-        waits = [(SWITCH, rest, begin - self.problem.start_time)]
+        wait = begin - self.problem.start_time
+        waits = [(SWITCH, rest, wait)] if wait > 0.0 else []
         drives = zip(word.trims.tolist(), word.durations.tolist(), strict=True)
         steps = [*waits, *((SWITCH, trim, t) for trim, t in drives)]
         found = self._word_found(query, query.word_of(steps, word.goal))
-        # The rest is in no library of a search past what stands still, and so has no price there.
+        # The rest is in no library of a search past static obstacles, and so has no price there.
         return replace(found, cost=self.problem.cost_of(found.plan))
 
     def _round_the_arrived(
@@ -243,8 +240,9 @@ class Vehicle:
         self, problem: Problem, budget: Budget, most_s: float, *, improve: bool
     ) -> PlanResult:
         """What the planner answers for one that does not switch at will, by counted work."""
-        counted = LONG if improve or problem is not self.problem else None
-        search = replace(problem.search, improve=improve, max_expansions=counted)
+        counted = [LONG] if improve or problem is not self.problem else []
+        most = [*counted, *filter(None, [problem.search.max_expansions])]
+        search = replace(problem.search, improve=improve, max_expansions=min(most, default=None))
         if problem.obstacles == self.workspace.obstacles:
             workspace = self.workspace
         else:

@@ -1,4 +1,4 @@
-"""The last word on the plans of a fleet: each past what stands still, and every pair."""
+"""The last word on the plans of a fleet: each past static obstacles, and every pair."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from maneuver_automaton.audit import closest_to, terminal_error
+from maneuver_automaton.audit import Least, closest_to, terminal_error
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision.shapes import Motion
 from maneuver_automaton.fleet.conflicts import Course, meetings
@@ -124,37 +124,52 @@ def measured(
 
     Those that are left out keep a metre more than the distance to keep, for all times.
     """
-    near = meetings(courses, keep=keep + NEAR)
     rows = []
-    for meeting in near:
-        one, other = courses[meeting.one], courses[meeting.other]
-        quiet = max(one.quiet_after, other.quiet_after)
-        distance, time = math.inf, meeting.time
-        for shapes, motion in zip(one.shapes, one.motions, strict=True):
-            plan = plan_of_motion(motion, min(quiet, one.until))
-            least = closest_to(
-                plan, Omnidirectional(), other.bodies, footprint=shapes, enough=enough_for(keep)
-            )
-            if least.distance < distance:
-                distance, time = least.distance, least.time
-        rows.append(Closest((names[meeting.one], names[meeting.other]), time, distance))
+    for meeting in meetings(courses, keep=keep + NEAR):
+        least = nearest(courses[meeting.one], courses[meeting.other], enough=enough_for(keep))
+        pair = names[meeting.one], names[meeting.other]
+        rows.append(Closest(pair, least.time, least.distance))
     return tuple(sorted(rows, key=lambda row: row.distance_m))
 
 
-def plan_of_motion(motion: Motion, until: float) -> Plan:
-    """A motion on arcs as a plan of something that moves at will; then it stands until a time [s].
+def nearest(one: Course, other: Course, *, enough: float = 0.0) -> Least:
+    """Least distance of two vehicles at all times [m], and when, by the audit's bounds.
+
+    From the first begin of the two on, as who begins later stands at its start until then, until
+    both have come to rest. `enough` decides: the bound is sharp enough to tell its side.
+    """
+    begin = min(float(way.time[0]) for way in (*one.motions, *other.motions))
+    quiet = min(max(one.quiet_after, other.quiet_after), one.until)
+    found = [
+        closest_to(
+            plan_of_motion(motion, quiet, since=begin),
+            Omnidirectional(),
+            other.bodies,
+            footprint=shapes,
+            enough=enough,
+        )
+        for shapes, motion in zip(one.shapes, one.motions, strict=True)
+    ]
+    return min(found, key=lambda least: least.distance)
+
+
+def plan_of_motion(motion: Motion, until: float, *, since: float = math.inf) -> Plan:
+    """A motion on arcs as a plan of something that moves at will; it stands before and after.
+
+    From a time `since` [s], or when the motion begins if that is sooner, until another.
 
     Examples
     --------
     >>> motion = Motion([0.0, 2.0], [[0, 0, 0], [2, 0, 0]], [[1.0, 0, 0]])
-    >>> plan = plan_of_motion(motion, 5.0)
-    >>> plan.duration, plan.end.tolist()
-    (5.0, [2.0, 0.0, 0.0])
+    >>> plan = plan_of_motion(motion, 5.0, since=-1.0)
+    >>> plan.start_time, plan.duration, plan.end.tolist()
+    (-1.0, 6.0, [2.0, 0.0, 0.0])
     """
-    last = float(motion.time[-1])
-    twists = [*motion.rates, np.zeros(3)]
-    durations = [*np.diff(motion.time), max(until - last, 0.0)]
+    first, last = float(motion.time[0]), float(motion.time[-1])
+    begin, still = min(first, since), np.zeros(3)
+    twists = [still, *motion.rates, still]
+    durations = [first - begin, *np.diff(motion.time), max(until - last, 0.0)]
     trims = tuple(
         Trim(name=str(k), body_velocity=twist, control=twist) for k, twist in enumerate(twists)
     )
-    return Plan(motion.pose[0], trims, durations=durations, start_time=float(motion.time[0]))
+    return Plan(motion.pose[0], trims, durations=durations, start_time=begin)

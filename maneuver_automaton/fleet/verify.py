@@ -29,7 +29,7 @@ class FleetVerdict:
 def verify_fleet(fleet: FleetProblem, plans: Mapping[str, Plan]) -> FleetVerdict:
     """Check plans of a fleet, say from a file, as `plan_fleet` checks its own.
 
-    Each plan is verified past what stands still, and every pair of vehicles is proven apart at all
+    Each plan is verified past static obstacles, and every pair of vehicles is proven apart at all
     times, also after all have arrived. Who has no plan stands at its start.
 
     Parameters
@@ -64,11 +64,12 @@ def verify_fleet(fleet: FleetProblem, plans: Mapping[str, Plan]) -> FleetVerdict
         raise ValueError(
             f"plans: there is no vehicle {unknown[0]!r}, need some of {', '.join(fleet.names)}"
         )
-    problems = dict(zip(fleet.names, fleet.problems, strict=True))
+    vehicles = vehicles_of(fleet)
+    problems = {one.name: one.problem for one in vehicles}
     verdicts = {name: verify(problems[name], plan) for name, plan in plans.items()}
     courses = {
         one.number: one.course_of(plans[one.name]) if one.name in plans else one.standing
-        for one in vehicles_of(fleet)
+        for one in vehicles
     }
     closest = measured(courses, fleet.names, keep=fleet.margin)
     too_near = tuple(row for row in closest if row.distance_m <= enough_for(fleet.margin))

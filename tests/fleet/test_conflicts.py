@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from maneuver_automaton.collision import Box, Disc, Polygon
 from maneuver_automaton.collision.surroundings import parts_of
 from maneuver_automaton.fleet.conflicts import Course, Meeting, components, larger, meetings
-from maneuver_automaton.fleet.verdict import measured
+from maneuver_automaton.fleet.verdict import measured, nearest
 from maneuver_automaton.groups import SE2
 from tests.collision.test_arcs import arcs
 
@@ -66,6 +66,18 @@ def test_measured_distances_against_dense_looks(here, parts, there, others):
         assert pair == ("a", "b")
         assert distance <= apart.min() + 1e-9
         assert distance >= 0.99 * apart.min() - 0.02
+
+
+def test_who_begins_later_stands_at_its_start_until_then():
+    """By the kernels and by the audit, in whatever order the two are asked for."""
+    passes = course([-6.0, 0.0, 0.0], [((1.0, 0.0, 0.0), 12.0)])
+    later = course([0.0, 1.2, 0.0], [((1.0, 0.0, 0.0), 2.0)], begin=30.0)
+    for ways in ({0: passes, 1: later}, {0: later, 1: passes}):
+        assert nearest(ways[0], ways[1]).distance == pytest.approx(0.6, abs=0.01)
+        assert meetings(ways, keep=0.7)
+        ((_, time, distance),) = measured(ways, ["a", "b"], keep=0.5)
+        assert distance == pytest.approx(0.6, abs=0.01)
+        assert time < 12.0
 
 
 def test_who_leaves_is_met_before():

@@ -9,9 +9,9 @@ import pytest
 
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.collision import Box, Disc, Obstacle
+from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.fleet import FleetProblem, FleetStatus, plan_fleet
+from maneuver_automaton.fleet import FleetProblem, FleetStatus, plan_fleet, verify_fleet
 from maneuver_automaton.fleet.conflicts import meetings
 from maneuver_automaton.fleet.planning import _FleetSearch, vehicles_of
 from maneuver_automaton.groups import SE2
@@ -219,3 +219,15 @@ def test_a_short_limit_still_has_plans_for_all():
     result = plan_fleet(fleet, time_limit=3.0, max_rounds=0, orders=1)
     assert result.status is FleetStatus.FOUND
     assert fleets.least_distances(result)[0] > 0.0
+
+
+def test_an_obstacle_of_its_own_may_pass_its_goal_later():
+    """A plan alone is told to stay too, and its checks look at where it stays."""
+    cart = Obstacle(Disc(0.4), motion=Motion([0.0, 12.0], [[4.0, -6.0, 0.0], [4.0, 6.0, 0.0]]))
+    fleet = fleets.fleet_of([([0, 0, 0], [4, 0, 0])], obstacles=(cart,))
+    result = plan_fleet(fleet, time_limit=5.0, max_rounds=0)
+    assert result.status is FleetStatus.FOUND
+    assert result.last_s > 6.0  # alone in the world it would be there after four seconds
+    too_soon = plan_fleet(fleets.fleet_of([([0, 0, 0], [4, 0, 0])]), time_limit=2.0, max_rounds=0)
+    assert not verify_fleet(fleet, too_soon.plans).passed
+    assert verify_fleet(fleet, result.plans).passed
