@@ -79,8 +79,7 @@ def _with_fewer_rests(
                     moved[to] = (rest, moved[to][1] + parts[at][1])
                 else:
                     moved.insert(to, (rest, parts[at][1]))
-                trims, durations = (np.array(column) for column in zip(*moved, strict=True))
-                if _arrival(query, _path_of(query, trims, durations), -1) >= 0:
+                if _drives(query, *(np.array(column) for column in zip(*moved, strict=True))):
                     parts = moved
                     break
         at -= 1
@@ -98,11 +97,18 @@ def is_free(query: LatticeQuery, word: Word) -> bool:
     poses = coasted(query.start[:3], twists, word.durations)
     if not _inside(query.window, poses[:-1], twists, word.durations):
         return False
-    path = _path_of(query, np.asarray(numbers, dtype=np.int64), np.array(word.durations))
+    return _drives(query, np.asarray(numbers, dtype=np.int64), np.array(word.durations))
+
+
+def _drives(query: LatticeQuery, trims: IntArray, durations: Array) -> bool:
+    """Whether a path in pieces is proven free as it is."""
+    path = _path_of(query, trims, durations, states=len(trims) + 1)  # each joint at one time
     return _arrival(query, path, -1) >= 0
 
 
-def _path_of(query: LatticeQuery, trims: IntArray, durations: Array) -> PathArrays:
+def _path_of(
+    query: LatticeQuery, trims: IntArray, durations: Array, *, states: int = MOST_STATES
+) -> PathArrays:
     """A path in pieces from the start of a query, and room for the states along it."""
     twists = query.library.arrays.library.twists
     poses = np.zeros((len(trims) + 1, 4))
@@ -112,12 +118,12 @@ def _path_of(query: LatticeQuery, trims: IntArray, durations: Array) -> PathArra
         trims=trims,
         durations=durations,
         poses=poses,
-        links=np.empty((MOST_STATES, 2), dtype=np.int64),
-        times=np.empty((MOST_STATES, 3)),
-        before=np.empty(MOST_STATES, dtype=np.int64),
+        links=np.empty((states, 2), dtype=np.int64),
+        times=np.empty((states, 3)),
+        before=np.empty(states, dtype=np.int64),
         latest=np.full(len(trims) + 1, -1, dtype=np.int64),
-        keys=np.empty(MOST_STATES),
-        items=np.empty(MOST_STATES, dtype=np.int64),
+        keys=np.empty(states),
+        items=np.empty(states, dtype=np.int64),
     )
 
 
