@@ -21,7 +21,7 @@ from maneuver_automaton.audit.passages import (
     places_of,
 )
 from maneuver_automaton.audit.surroundings import Surroundings
-from maneuver_automaton.collision.shapes import Motion
+from maneuver_automaton.collision.motion import Motion
 
 CHORD = 0.25  # [rad] of the first stretches
 LONGEST = 64.0  # of which the path of a small body has so many

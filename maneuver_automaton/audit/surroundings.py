@@ -12,7 +12,11 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.audit.outlines import Outline, joined, map_outline, outline_of
-from maneuver_automaton.collision.shapes import AnyObstacle, Motion, OccupancyMap
+from maneuver_automaton.collision.motion import Motion
+from maneuver_automaton.collision.shapes import (
+    AnyObstacle,
+    OccupancyMap,
+)
 
 GRID = 65536.0  # [m] between the places from where obstacles are counted
 

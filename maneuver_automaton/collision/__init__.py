@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from maneuver_automaton.collision.motion import Motion as Motion
 from maneuver_automaton.collision.shapes import (
     AnyObstacle as AnyObstacle,
 )
@@ -13,9 +14,6 @@ from maneuver_automaton.collision.shapes import (
 )
 from maneuver_automaton.collision.shapes import (
     Disc as Disc,
-)
-from maneuver_automaton.collision.shapes import (
-    Motion as Motion,
 )
 from maneuver_automaton.collision.shapes import (
     Obstacle as Obstacle,

@@ -19,7 +19,12 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, IntArray, as_array
 from maneuver_automaton.collision.approach import least_over_poses, travel
-from maneuver_automaton.collision.shapes import AnyObstacle, Motion, Obstacle, Shape
+from maneuver_automaton.collision.motion import Motion
+from maneuver_automaton.collision.shapes import (
+    AnyObstacle,
+    Obstacle,
+    Shape,
+)
 from maneuver_automaton.collision.solids import (
     Region,
     Skin,

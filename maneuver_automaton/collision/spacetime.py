@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.collision.shapes import Motion
+from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.collision.swept import Twist
 from maneuver_automaton.groups import SE2
 

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.collision.outline import outlines
 from maneuver_automaton.collision.shapes import (
     AnyObstacle,
     Disc,
-    Motion,
     OccupancyMap,
     Shape,
 )

@@ -25,12 +25,12 @@ from maneuver_automaton.collision.convex import (
     seen_from,
     solids_of,
 )
+from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.collision.rectangles import blocked_rectangles
 from maneuver_automaton.collision.shapes import (
     AnyObstacle,
     Box,
     Disc,
-    Motion,
     Obstacle,
     OccupancyMap,
     Shape,

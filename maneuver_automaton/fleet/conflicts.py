@@ -13,7 +13,14 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision.body import Body, body_of, fastest_points
-from maneuver_automaton.collision.shapes import Box, Disc, Motion, Obstacle, Polygon, Shape
+from maneuver_automaton.collision.motion import Motion
+from maneuver_automaton.collision.shapes import (
+    Box,
+    Disc,
+    Obstacle,
+    Polygon,
+    Shape,
+)
 from maneuver_automaton.collision.world import MovingObstacles, world_of
 from maneuver_automaton.fleet import _kernels_meetings as kernels
 

@@ -10,7 +10,11 @@ from dataclasses import dataclass, field, replace
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.collision.shapes import Disc, Motion, Obstacle
+from maneuver_automaton.collision.motion import Motion
+from maneuver_automaton.collision.shapes import (
+    Disc,
+    Obstacle,
+)
 from maneuver_automaton.fleet.conflicts import Course
 from maneuver_automaton.fleet.refuge import by_a_refuge
 from maneuver_automaton.planning.blocked import blocked_ends, goals_left

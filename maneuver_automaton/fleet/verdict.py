@@ -10,7 +10,7 @@ import numpy as np
 
 from maneuver_automaton.audit import Least, closest_to, terminal_error
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.collision.shapes import Motion
+from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.fleet.conflicts import Course, meetings
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import Closest, FleetResult, FleetStatus

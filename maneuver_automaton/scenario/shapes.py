@@ -20,7 +20,7 @@ from maneuver_automaton.collision import (
     Shape,
     Zone,
 )
-from maneuver_automaton.collision.shapes import STANDS
+from maneuver_automaton.collision.motion import STANDS
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.nav2_map import load_nav2_map
 from maneuver_automaton.formats.polygons import simple_polygon

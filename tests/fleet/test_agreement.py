@@ -6,7 +6,10 @@ import pytest
 
 from maneuver_automaton import simulate_fleet
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.collision.shapes import Disc, Motion
+from maneuver_automaton.collision.motion import Motion
+from maneuver_automaton.collision.shapes import (
+    Disc,
+)
 from maneuver_automaton.fleet import Message
 from maneuver_automaton.fleet.agreement import Agreement
 from maneuver_automaton.fleet.conflicts import Course

@@ -11,7 +11,7 @@ import pytest
 import maneuver_automaton as ma
 from maneuver_automaton import FleetHorizon, FleetProblem, simulate_fleet
 from maneuver_automaton.collision import Disc
-from maneuver_automaton.collision.shapes import Motion
+from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.fleet import FleetGuarantee, FleetStatus, Swap, plan_fleet
 from maneuver_automaton.fleet.agreement import Agreement
 from maneuver_automaton.fleet.conflicts import Course, meetings
