@@ -201,7 +201,8 @@ class Problem:
     parts : mapping of str to shapes
         Bodies of what the vehicle carries, such as its trailer, each in the frame of its part.
     body_height : (float, float)
-        Lowest and highest point of the body [m] about the altitude of the pose.
+        Lowest and highest point of the body [m] about the altitude of the pose; in the plane above
+        the ground, where other vehicles fly: (0, 0), nothing stated, counts at all heights.
     margin : float
         Distance [m] that the body keeps from every obstacle.
     zones : sequence of Zone

@@ -147,6 +147,7 @@ def closest_to(
     obstacles: tuple[AnyObstacle, ...],
     *,
     footprint: tuple[Shape, ...],
+    body_height: tuple[float, float] = (0.0, 0.0),
     within: tuple[float, float] = (-math.inf, math.inf),
     enough: float = 0.0,
 ) -> Least:
@@ -160,6 +161,8 @@ def closest_to(
     obstacles : tuple of Obstacle or OccupancyMap
     footprint : tuple of Shape
         Parts of the body; empty for a point.
+    body_height : (float, float)
+        From where to where the body of a plan in space reaches about its altitude [m].
     within : (float, float)
         First and last time that counts, on the plan's clock [s].
     enough : float
@@ -188,7 +191,7 @@ def closest_to(
     if not obstacles or first > last:
         return Least(math.inf, math.inf, clock)
     drive = driven(seen_from(plan, goal), model)
-    body = _body(drive.frames, footprint, plan, goal, (0.0, 0.0))
+    body = _body(drive.frames, footprint, plan, goal, body_height)
     around = surroundings_of(obstacles, origin_of(goal.pose))
     least = least_clearance(body, around, spans_within(body, first, last), enough=enough)
     return least._replace(time=clock + least.time)

@@ -23,6 +23,7 @@ from maneuver_automaton.collision.shapes import (
 )
 from maneuver_automaton.collision.world import MovingObstacles, world_of
 from maneuver_automaton.fleet import _kernels_meetings as kernels
+from maneuver_automaton.fleet.levels import ALWAYS, Levels, Stage
 
 PROOF = 1e-4  # [m] more than the distance to keep, wherever two bodies are looked at
 AFTER = 1.0  # [s] that is looked at once nothing moves any more
@@ -36,33 +37,38 @@ class Course:
     motions: tuple[Motion, ...]
     until: float = math.inf  # [s] when it is gone; inf if it stays
     grown: float = 0.0  # [m] by how much larger others see it
+    levels: Levels | None = None  # between which heights it is; None: it counts at all of them
     bodies: tuple[Obstacle, ...] = field(init=False)  # as they are
     obstacles: tuple[Obstacle, ...] = field(init=False)  # as others see them
 
     def __post_init__(self) -> None:
-        present = None if self.until == math.inf else (-math.inf, self.until)
-        rows = [
-            (shape, motion)
+        bodies = tuple(
+            _during(stage, shape, motion)
             for shapes, motion in zip(self.shapes, self.motions, strict=True)
             for shape in shapes
-        ]
-        bodies = tuple(Obstacle(shape, motion=way, present_s=present) for shape, way in rows)
+            for stage in self.stages
+        )
         object.__setattr__(self, "bodies", bodies)
         seen = bodies
         if self.grown > 0.0:
-            seen = tuple(replace(one, shape=larger(one.shape, self.grown)) for one in bodies)
+            seen = tuple(_seen_larger(one, self.grown) for one in bodies)
         object.__setattr__(self, "obstacles", seen)
+
+    @property
+    def stages(self) -> tuple[Stage, ...]:
+        """Stretches of time in which it keeps between two heights, as long as it is there."""
+        first = min(float(one.time[0]) for one in self.motions)
+        stages = ALWAYS if self.levels is None else self.levels.stages
+        there = [one for one in stages if one.begin < self.until and one.end > first] or stages[-1:]
+        rows = [one._replace(end=min(one.end, self.until)) for one in there]
+        return (rows[0]._replace(begin=-math.inf), *rows[1:])
 
     @property
     def arrived(self) -> tuple[Obstacle, ...]:
         """What is left of it once it has arrived: where it stands, or nothing if it leaves."""
         if self.until < math.inf:
             return ()
-        return tuple(
-            Obstacle(one.at(float(one.motion.time[-1])))
-            for one in self.obstacles
-            if one.motion is not None
-        )
+        return tuple(where_it_stays(one) for one in self.obstacles if one.presence[1] == math.inf)
 
     @property
     def quiet_after(self) -> float:
@@ -74,6 +80,36 @@ class Course:
         if all(time <= float(one.time[0]) for one in self.motions):
             return self
         return replace(self, motions=tuple(_left(one, time) for one in self.motions))
+
+
+def _during(stage: Stage, shape: Shape, motion: Motion) -> Obstacle:
+    """A body that is between the heights of a stage, while that lasts."""
+    lasts, there = (stage.begin, stage.end), (stage.low, stage.high)
+    return Obstacle(
+        shape,
+        motion=motion,
+        present_s=None if lasts == (-math.inf, math.inf) else lasts,
+        height=None if there == (-math.inf, math.inf) else there,
+    )
+
+
+def _seen_larger(body: Obstacle, by: float) -> Obstacle:
+    """A body that is larger by a length [m], in its height too."""
+    height = None if body.height is None else (body.height[0] - by, body.height[1] + by)
+    return replace(body, shape=larger(body.shape, by), height=height)
+
+
+def where_it_stays(body: Obstacle) -> Obstacle:
+    """What stands where a moving body ends.
+
+    Examples
+    --------
+    >>> way = Motion([0.0, 1.0], [[0, 0, 0], [2, 0, 0]])
+    >>> where_it_stays(Obstacle(Disc(0.3), motion=way)).shape.center.tolist()
+    [2.0, 0.0]
+    """
+    assert body.motion is not None
+    return Obstacle(body.at(float(body.motion.time[-1])), height=body.height)
 
 
 def _left(motion: Motion, time: float) -> Motion:
@@ -124,7 +160,8 @@ def meetings(
 ) -> list[Meeting]:
     """Pairs of vehicles that come closer than a distance [m], the first that does so first.
 
-    Whatever is not among the pairs keeps the distance at all times, also after all have arrived.
+    Whatever is not among the pairs keeps the distance at all times, also after all have arrived, in
+    the plane or in height.
     Only pairs with one of the vehicles `among`, if these are given. Places are counted from a pose
     `frame` nearby, that of the first vehicle if omitted: with the same one all that is prepared for
     a course is prepared once.
@@ -145,12 +182,15 @@ def meetings(
     began = min(float(way.time[0]) for one in courses.values() for way in one.motions)
     span = (began - AFTER, max(one.quiet_after for one in courses.values()) + AFTER)
     owner = np.array(owners)
+    heights = np.array([one.height or (-math.inf, math.inf) for one in obstacles])
     found: dict[tuple[int, int], float] = {}
     wanted = set(numbers if among is None else among)
     for number in numbers:
         if number not in wanted:
             continue
-        times = first_meetings(world.arrays.moving, courses[number], frame, span, keep)
+        times = first_meetings(
+            world.arrays.moving, courses[number], frame, span, keep, heights=heights
+        )
         for other in numbers:
             if other == number or (other in wanted and other < number):
                 continue
@@ -168,14 +208,25 @@ def first_meetings(
     frame: tuple[float, float, float],
     span: tuple[float, float],
     keep: float,
+    *,
+    heights: Array | None = None,
 ) -> Array:
-    """When a vehicle first comes within a distance [m] of each of what moves (M,) in a span [s]."""
+    """When a vehicle first comes within a distance [m] of each of what moves (M,) in a span [s].
+
+    What stands between `heights` (M, 2) [m], any if omitted, is met at those alone.
+    """
     least = np.full(moving.speed.size, math.inf)
     for shapes, motion in zip(course.shapes, course.motions, strict=True):
-        body, out = body_of(shapes), np.empty(moving.speed.size)
-        rows = _coasts(motion, body, frame, (span[0], min(span[1], course.until)))
-        kernels.first_meetings(moving, body, rows, keep, PROOF, out)
-        np.minimum(least, out, out=least)
+        body = body_of(shapes)
+        for stage in course.stages:
+            out = np.empty(moving.speed.size)
+            within = max(span[0], stage.begin), min(span[1], stage.end)
+            rows = _coasts(_left(motion, within[0]), body, frame, within)
+            kernels.first_meetings(moving, body, rows, keep, PROOF, out)
+            if heights is not None:
+                apart = np.maximum(heights[:, 0] - stage.high, stage.low - heights[:, 1])
+                out[apart > keep + PROOF] = math.inf
+            np.minimum(least, out, out=least)
     return least
 
 
@@ -185,13 +236,16 @@ def _coasts(
     """Rows of `first_meetings`: it stands from a time on, coasts, then stands until a time [s]."""
     poses, times = motion.pose - np.array(frame), motion.time
     before, after = max(times[0] - span[0], 0.0), max(span[1] - times[-1], 0.0)
+    begins = np.concatenate([[span[0]], times])
     lasting = np.concatenate([[before], np.diff(times), [after]])
+    late = begins + lasting > span[1]
+    lasting[late] = np.maximum(span[1] - begins[late], 0.0)
     rows = np.zeros((len(times) + 1, 9))
     rows[:, :3] = poses[np.maximum(np.arange(len(times) + 1) - 1, 0)]
     rows[1:-1, 3:6] = motion.rates  # it coasts, or never moves
     rows[:, 6] = fastest_points(body, rows[:, 3:6])
     rows[:, 7] = lasting
-    rows[:, 8] = np.concatenate([[span[0]], times])
+    rows[:, 8] = begins
     return rows
 
 

@@ -193,7 +193,7 @@ class _FleetSearch:
         """The more important first, then the shortest way first; later orders are shuffled."""
 
         def key(k: int) -> tuple[float, float]:
-            cost = self._alone_cost(k)
+            cost = float(f"{self._alone_cost(k):.9g}")  # equal ones stay so in a moved problem
             blur = 1.0 if n_th == 0 else float(rng.uniform(0.3, 1.7))
             return -self.fleet.priority[k], blur * cost
 

@@ -7,9 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from maneuver_automaton._brief import brief
 from maneuver_automaton._ceilings import check_size
-from maneuver_automaton.groups import LieGroup
+from maneuver_automaton.collision.motion import planar
+from maneuver_automaton.groups import LieGroup, SE2xR
 from maneuver_automaton.problem import Problem
 
 
@@ -19,7 +22,8 @@ class FleetProblem:
 
     Every vehicle stands at its start until it leaves, at its problem's `start_time` or later, and
     stays at its goal once it is there, unless it `leaves`. Obstacles and bounds of a problem are
-    those of its vehicle alone; times are of one clock.
+    those of its vehicle alone; times are of one clock. What flies passes above or below another one
+    by the `body_height` of both; one in the plane that states none counts at all heights.
 
     Parameters
     ----------
@@ -104,9 +108,27 @@ class FleetProblem:
     def moved(self, by: LieGroup) -> FleetProblem:
         """The fleet moved by a group element, all around it too; bounds must be open.
 
+        Where some vehicles fly and others do not, those of the plane move with it, and rise.
+
         Raises
         ------
         ValueError
             If there are bounds, or a vehicle does not look the same after a rotation in `by`.
         """
-        return replace(self, problems=tuple(one.moved(by) for one in self.problems))
+        return replace(self, problems=tuple(_moved(one, by) for one in self.problems))
+
+
+def _moved(problem: Problem, by: LieGroup) -> Problem:
+    """A problem moved by a pose in the plane or in space, whichever it is in itself."""
+    size = by.pose.size
+    if problem.start.size == size or "heading" not in by.coordinates:
+        return problem.moved(by)
+    if problem.start.size > size:
+        return problem.moved(SE2xR(np.append(by.pose, 0.0)))
+    there, rise = problem.moved(planar(by)), float(by.pose[3])
+    low, high = problem.body_height
+    return replace(
+        there,
+        obstacles=tuple(one.moved(by) for one in problem.obstacles),
+        body_height=(low + rise, high + rise) if low < high else (low, high),
+    )

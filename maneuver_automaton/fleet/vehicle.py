@@ -15,7 +15,8 @@ from maneuver_automaton.collision.shapes import (
     Disc,
     Obstacle,
 )
-from maneuver_automaton.fleet.conflicts import Course
+from maneuver_automaton.fleet.conflicts import PROOF, Course, where_it_stays
+from maneuver_automaton.fleet.levels import levels_of
 from maneuver_automaton.fleet.refuge import by_a_refuge
 from maneuver_automaton.planning.blocked import blocked_ends, goals_left
 from maneuver_automaton.planning.bounds import lattice_bound
@@ -85,7 +86,7 @@ class Vehicle:
             shapes.append(of_part)
             poses.append(carried(here, problem.automaton.model, name).start[:3])
         motions = tuple(Motion([problem.start_time], [pose]) for pose in poses)
-        self.standing = Course(tuple(shapes), motions, grown=self.grown)
+        self.standing = Course(tuple(shapes), motions, grown=self.grown, levels=levels_of(problem))
 
     @functools.cached_property
     def at_will(self) -> bool:
@@ -105,7 +106,23 @@ class Vehicle:
             tuple(Motion.of_plan(one) for _, one in plans),
             until,
             self.grown,
+            levels_of(self.problem, plan),
         )
+
+    def beside(self, others: Sequence[Obstacle]) -> Sequence[Obstacle]:
+        """Those that stand at its own heights: in the plane nothing else looks at these.
+
+        What has no height of its own is beside all others; in space every search looks at heights.
+        """
+        low, high = self.problem.body_height
+        if self.problem.start.size > 3 or not low < high:
+            return others
+        keep = self.problem.margin + PROOF
+        return [
+            one
+            for one in others
+            if one.height is None or (one.height[0] <= high + keep and one.height[1] >= low - keep)
+        ]
 
     def plan_alone(self, budget: Budget) -> None:
         """Find its way past static obstacles, by itself, and a few others beside it."""
@@ -169,6 +186,7 @@ class Vehicle:
         known: float = math.inf,
     ) -> Found | None:
         """The cheapest way found past what the others do; None if there is none below a cost."""
+        others = self.beside(others)
         if not others:
             return self.alone if self.alone is not None and self.alone.cost < known else None
         problem = replace(self.problem, obstacles=(*self.problem.obstacles, *others))
@@ -206,7 +224,8 @@ class Vehicle:
         self, arrived: Sequence[Obstacle], begin: float, budget: Budget
     ) -> Found | None:
         """A plan that rests until a time [s], and drives past others that all stand then."""
-        calm = replace(self.problem, obstacles=(*self.problem.obstacles, *arrived))
+        there = self.beside(arrived)
+        calm = replace(self.problem, obstacles=(*self.problem.obstacles, *there))
         if not self.at_will or blocked_ends(calm) is not None:
             return None
         query = self._query(calm)
@@ -229,9 +248,9 @@ class Vehicle:
     ) -> Word | None:
         """A way round those that stay at their goals, wherever they are now, with rests."""
         arrived = [
-            Obstacle(one.at(float(one.motion.time[-1])))
+            where_it_stays(one)
             for one in others
-            if one.motion is not None and one.present_s is None
+            if one.motion is not None and one.presence[1] == math.inf
         ]
         calm = replace(self.problem, obstacles=(*self.problem.obstacles, *arrived))
         if blocked_ends(calm) is not None:

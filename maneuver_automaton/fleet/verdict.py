@@ -12,10 +12,12 @@ from maneuver_automaton.audit import Least, closest_to, terminal_error
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.fleet.conflicts import Course, meetings
+from maneuver_automaton.fleet.levels import Levels
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import Closest, FleetResult, FleetStatus
 from maneuver_automaton.fleet.vehicle import Found, Vehicle
-from maneuver_automaton.models import Omnidirectional
+from maneuver_automaton.groups import SE2xR
+from maneuver_automaton.models import Omnidirectional, UserModel
 from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.primitives import Trim
@@ -23,6 +25,12 @@ from maneuver_automaton.problem import SearchSettings
 
 NEAR = 1.0  # [m] beyond the margin: pairs that come so near are measured
 CONTACT = 1e-9  # [m] what is closer touches
+IN_SPACE = UserModel(
+    name="at will in space",
+    group=SE2xR,
+    control_names=("speed", "lateral_speed", "turn_rate", "climb"),
+    velocity=lambda z, u: u,
+)
 
 
 def verified(
@@ -136,16 +144,28 @@ def nearest(one: Course, other: Course, *, enough: float = 0.0) -> Least:
     """Least distance of two vehicles at all times [m], and when, by the audit's bounds.
 
     From the first begin of the two on, as who begins later stands at its start until then, until
-    both have come to rest. `enough` decides: the bound is sharp enough to tell its side.
+    both have come to rest. `enough` decides: the bound is sharp enough to tell its side. Of two
+    that climb, each is taken once as it is, past the other in stages: the better bound counts.
     """
+    if len(other.stages) > len(one.stages):
+        one, other = other, one
+    pairs = [(one, other), (other, one)] if len(other.stages) > 1 else [(one, other)]
+    found = [_nearest(*pair, enough=enough) for pair in pairs]
+    return max(found, key=lambda least: least.distance)
+
+
+def _nearest(one: Course, other: Course, *, enough: float) -> Least:
+    """The same, the first driven as it is past the other's bodies."""
     begin = min(float(way.time[0]) for way in (*one.motions, *other.motions))
     quiet = min(max(one.quiet_after, other.quiet_after), one.until)
+    levels = one.levels if _heights_matter(one, other) else None
     found = [
         closest_to(
-            plan_of_motion(motion, quiet, since=begin),
-            Omnidirectional(),
+            plan_of_motion(motion, quiet, since=begin, levels=levels),
+            Omnidirectional() if levels is None else IN_SPACE,
             other.bodies,
             footprint=shapes,
+            body_height=(0.0, 0.0) if levels is None else levels.reach,
             enough=enough,
         )
         for shapes, motion in zip(one.shapes, one.motions, strict=True)
@@ -153,10 +173,18 @@ def nearest(one: Course, other: Course, *, enough: float = 0.0) -> Least:
     return min(found, key=lambda least: least.distance)
 
 
-def plan_of_motion(motion: Motion, until: float, *, since: float = math.inf) -> Plan:
+def _heights_matter(one: Course, other: Course) -> bool:
+    """Whether one may be above the other at some time."""
+    return any(mine.above(its.low, its.high) > 0.0 for mine in one.stages for its in other.stages)
+
+
+def plan_of_motion(
+    motion: Motion, until: float, *, since: float = math.inf, levels: Levels | None = None
+) -> Plan:
     """A motion on arcs as a plan of something that moves at will; it stands before and after.
 
-    From a time `since` [s], or when the motion begins if that is sooner, until another.
+    From a time `since` [s], or when the motion begins if that is sooner, until another. In space,
+    if `levels` say at which altitudes.
 
     Examples
     --------
@@ -164,12 +192,21 @@ def plan_of_motion(motion: Motion, until: float, *, since: float = math.inf) -> 
     >>> plan = plan_of_motion(motion, 5.0, since=-1.0)
     >>> plan.start_time, plan.duration, plan.end.tolist()
     (-1.0, 6.0, [2.0, 0.0, 0.0])
+    >>> climb = Levels([0.0, 2.0], [5.0, 9.0], (0.0, 1.0))
+    >>> plan_of_motion(motion, 5.0, levels=climb).end.tolist()
+    [2.0, 0.0, 0.0, 9.0]
     """
     first, last = float(motion.time[0]), float(motion.time[-1])
     begin, still = min(first, since), np.zeros(3)
-    twists = [still, *motion.rates, still]
+    twists = np.array([still, *motion.rates, still])
     durations = [first - begin, *np.diff(motion.time), max(until - last, 0.0)]
+    start = motion.pose[0]
+    if levels is not None:
+        altitudes = levels.at(motion.time)
+        climbs = np.diff(altitudes) / np.diff(motion.time)
+        twists = np.column_stack([twists, [0.0, *climbs, 0.0]])
+        start = np.append(start, altitudes[0])
     trims = tuple(
         Trim(name=str(k), body_velocity=twist, control=twist) for k, twist in enumerate(twists)
     )
-    return Plan(motion.pose[0], trims, durations=durations, start_time=begin)
+    return Plan(start, trims, durations=durations, start_time=begin)

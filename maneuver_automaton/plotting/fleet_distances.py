@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton.fleet.levels import levels_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.fleet_cast import Cast, Member
 
@@ -51,18 +52,29 @@ def nearest_others(members: Sequence[Member], times: Array) -> Array:
     ]
     owners = np.array([owner for owner, *_ in rows])
     there = np.array([times <= members[owner].gone_after for owner in owners])  # (parts, n)
+    heights = np.array([_heights(one, times) for one in members])[owners]  # (parts, n, 2)
     apart = np.full((len(times), len(members)), np.inf)
     chunk = max(1, AT_ONCE // len(rows) ** 2)
     for first in range(0, len(times), chunk):
         part = slice(first, first + chunk)
         moved = [(ring, grown, poses[part, :3]) for _, ring, grown, poses in rows]
-        nearest = _nearest(moved, owners, there[:, part])
+        nearest = _nearest(moved, owners, there[:, part], heights[:, part])
         for row, owner in enumerate(owners):
             apart[part, owner] = np.minimum(apart[part, owner], nearest[row])
     return apart
 
 
-def _nearest(rows: Sequence[tuple[Array, float, Array]], owners: Numbers, there: Numbers) -> Array:
+def _heights(one: Member, times: Array) -> Array:
+    """Lowest and highest point of a vehicle at times (n,) [s]: (n, 2) [m], infinite if any."""
+    levels = levels_of(one.problem, one.plan)
+    if levels is None:
+        return np.tile([-np.inf, np.inf], (len(times), 1))
+    return np.add.outer(levels.at(times), levels.body)
+
+
+def _nearest(
+    rows: Sequence[tuple[Array, float, Array]], owners: Numbers, there: Numbers, heights: Array
+) -> Array:
     """Distance (parts, n) of each part from the nearest part of another vehicle."""
     import shapely
 
@@ -77,12 +89,16 @@ def _nearest(rows: Sequence[tuple[Array, float, Array]], owners: Numbers, there:
     at, solid = np.array(middles), np.array(placed)
     wide, larger = np.array(radii), np.array([by for _, by, _ in rows])
     low = np.linalg.norm(at[:, None] - at[None], axis=-1) - (wide[:, None] + wide)[..., None]
+    above = np.maximum(heights[:, None, :, 0] - heights[None, :, :, 1], 0.0)
+    above = np.maximum(above, above.swapaxes(0, 1))
+    low = np.where(above > 0.0, np.hypot(np.maximum(low, 0.0), above), low)
     low[owners[:, None] == owners] = np.inf
     low[~(there[:, None] & there[None])] = np.inf
 
     def measured(one: Numbers, other: Numbers, time: Numbers) -> Array:
         apart = shapely.distance(solid[one, time], solid[other, time])
-        return np.asarray(np.maximum(apart - larger[one] - larger[other], 0.0))
+        aside = np.maximum(apart - larger[one] - larger[other], 0.0)
+        return np.asarray(np.hypot(aside, above[one, other, time]))
 
     parts, steps = np.indices(low.shape[1:])
     likely = low.argmin(axis=1)

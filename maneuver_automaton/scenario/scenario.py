@@ -163,7 +163,7 @@ def _vehicle(document: Document, file: ScenarioFile, own: Model | None) -> tuple
             name: footprint_of(document, body, key=name)
             for name, body in carried_of(file.vehicle).items()
         },
-        height=_height_of(document, file.vehicle, model),
+        height=getattr(file.vehicle, "footprint_height_m", None) or (0.0, 0.0),
     )
 
 
@@ -173,14 +173,6 @@ class _Bodies(NamedTuple):
     vehicle: tuple[Shape, ...]
     parts: Mapping[str, tuple[Shape, ...]]  # what it carries, by name
     height: tuple[float, float]  # [m] lowest and highest point about the altitude of the pose
-
-
-def _height_of(document: Document, part: Any, model: Model) -> tuple[float, float]:
-    """Lowest and highest point of the body about its altitude [m]; a flat one if not stated."""
-    stated: tuple[float, float] | None = getattr(part, "footprint_height_m", None)
-    if stated is not None and model.group.dof == 3:
-        raise document.error(("vehicle", "footprint_height_m"), f"the {model.name} has no height")
-    return stated or (0.0, 0.0)
 
 
 def _refuse_long_words(document: Document, file: ScenarioFile) -> None:

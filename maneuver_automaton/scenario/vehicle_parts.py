@@ -69,6 +69,12 @@ Footprint = Annotated[
 ]
 
 
+ABOVE_GROUND = (
+    "[low, high] of the body above the ground, where others of a fleet fly; left out: it counts at "
+    "all heights"
+)
+
+
 class UnicyclePart(Part):
     """A robot that drives ahead and turns on the spot; control [v, omega]."""
 
@@ -76,6 +82,7 @@ class UnicyclePart(Part):
     max_speed_m_s: Positive | None = Field(None, description="left out: no limit")
     max_turn_rate_rad_s: Positive | None = Field(None, description="left out: no limit")
     footprint: Footprint | None = Field(None, description="shape of the body")
+    footprint_height_m: Interval | None = Field(None, description=ABOVE_GROUND)
 
 
 class CarPart(Part):
@@ -86,6 +93,7 @@ class CarPart(Part):
     max_steering_rad: Sharp | None = Field(None, description="left out: no limit")
     max_speed_m_s: Positive | None = Field(None, description="left out: no limit")
     footprint: Footprint | None = Field(None, description="shape of the body")
+    footprint_height_m: Interval | None = Field(None, description=ABOVE_GROUND)
 
 
 class SecondOrderUnicyclePart(Part):
@@ -98,6 +106,7 @@ class SecondOrderUnicyclePart(Part):
     max_angular_acceleration_rad_s2: Positive = Field(description="a positive number")
     min_speed_m_s: Number | None = Field(None, description="left out: as fast in reverse")
     footprint: Footprint | None = Field(None, description="shape of the body")
+    footprint_height_m: Interval | None = Field(None, description=ABOVE_GROUND)
 
 
 class SecondOrderCarPart(Part):
@@ -111,6 +120,7 @@ class SecondOrderCarPart(Part):
     max_steering_rate_rad_s: Positive = Field(description="a positive number")
     min_speed_m_s: Number | None = Field(None, description="left out: as fast in reverse")
     footprint: Footprint | None = Field(None, description="shape of the body")
+    footprint_height_m: Interval | None = Field(None, description=ABOVE_GROUND)
 
 
 class CarWithTrailerPart(Part):
@@ -124,6 +134,7 @@ class CarWithTrailerPart(Part):
     min_speed_m_s: Number | None = Field(None, description="left out: as fast in reverse")
     max_hitch_rad: Positive | None = Field(None, description="left out: no limit")
     footprint: Footprint | None = Field(None, description="shape of the car")
+    footprint_height_m: Interval | None = Field(None, description=ABOVE_GROUND)
     trailer: Footprint | None = Field(
         None, description="shape of the trailer, seen from the middle of its axle"
     )
@@ -148,6 +159,7 @@ class SingleTrackPart(Part):
     max_lateral_speed_m_s: Positive | None = Field(None, description="left out: no limit")
     max_turn_rate_rad_s: Positive | None = Field(None, description="left out: no limit")
     footprint: Footprint | None = Field(None, description="shape of the body")
+    footprint_height_m: Interval | None = Field(None, description=ABOVE_GROUND)
 
 
 class HovercraftPart(Part):
@@ -166,6 +178,7 @@ class HovercraftPart(Part):
     max_lateral_speed_m_s: Positive | None = Field(None, description="left out: no limit")
     max_turn_rate_rad_s: Positive | None = Field(None, description="left out: no limit")
     footprint: Footprint | None = Field(None, description="shape of the body")
+    footprint_height_m: Interval | None = Field(None, description=ABOVE_GROUND)
 
 
 class HelicopterPart(Part):
@@ -196,6 +209,7 @@ class LatticeBodyPart(Part):
     resolution_m: Positive = Field(description="side of a cell, a positive number")
     turning_radius_m: Positive | None = Field(None, description="as the file of primitives has it")
     footprint: Footprint | None = Field(None, description="shape of the body")
+    footprint_height_m: Interval | None = Field(None, description=ABOVE_GROUND)
 
 
 class OmnidirectionalPart(Part):
@@ -206,6 +220,7 @@ class OmnidirectionalPart(Part):
     max_lateral_speed_m_s: Positive | None = Field(None, description="left out: no limit")
     max_turn_rate_rad_s: Positive | None = Field(None, description="left out: no limit")
     footprint: Footprint | None = Field(None, description="shape of the body")
+    footprint_height_m: Interval | None = Field(None, description=ABOVE_GROUND)
 
 
 def _other_than_known(schema: dict[str, Any]) -> None:
@@ -221,7 +236,7 @@ class OwnPart(Part):
     )
     footprint: Footprint | None = Field(None, description="shape of the body")
     footprint_height_m: Interval | None = Field(
-        None, description="[low, high] of the body about its altitude; left out: a flat body"
+        None, description="[low, high] of the body about its altitude, or above the ground"
     )
     parts: dict[str, Footprint] | None = Field(
         None, description="shapes of what it carries, by the model's names of these"

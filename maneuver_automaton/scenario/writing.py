@@ -156,7 +156,7 @@ def _vehicle(scenario: Scenario) -> dict[str, Any]:
     if scenario.footprint:
         shapes = list(scenario.footprint)
         vehicle["footprint"] = shapes if len(shapes) > 1 else shapes[0]
-    if any(problem.body_height) and problem.start.size > 3:
+    if any(problem.body_height):
         vehicle["footprint_height_m"] = list(problem.body_height)
     for name, body in problem.parts.items():
         stated = list(stated_footprint(body))

@@ -28,6 +28,13 @@ margin_m: 0.01
 obstacles: [{disc_m: {center: [1, 1], radius: 0.3}}]
 search: {time_limit_s: 20.0, max_expansions: 2000}
 """
+CART = """\
+schema: 1
+vehicle: {model: unicycle}
+automaton: {trims: [{name: rest, control: [0, 0]}, {name: ahead, control: [1, 0]}]}
+start: {pose: [0, 0, 0]}
+goal: {pose: [2.0, 0.0, 0.0]}
+"""
 
 
 @pytest.mark.parametrize("name", ["a.mprim", "a.nav2.json", "a.json"])
@@ -123,7 +130,10 @@ def test_a_height_that_is_none(stated, said):
     assert str(error.value).endswith(f"vehicle.footprint_height_m: {said}")
 
 
-def test_what_moves_in_the_plane_has_no_height():
-    text = LATTICE.replace("{disc_m: 0.1}", "{disc_m: 0.1}, footprint_height_m: [0, 1]")
-    with pytest.raises(InvalidScenario, match="unknown key; did you mean"):
-        scenario_of_text(text, name="x")
+def test_what_moves_in_the_plane_may_have_a_height_above_the_ground():
+    cart = CART.replace("{model: unicycle}", "{model: unicycle, footprint_height_m: [0, 1.5]}")
+    scenario = scenario_of_text(cart, name="cart")
+    assert scenario.problem.body_height == (0.0, 1.5)
+    again = scenario_of_text(to_yaml(scenario), name="again")
+    assert again.problem.body_height == (0.0, 1.5)
+    assert scenario_of_text(CART, name="any").problem.body_height == (0.0, 0.0)
