@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import importlib.util
 import multiprocessing
 import re
 import socket
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeAlias, TypeVar
 
 from maneuver_automaton._interrupts import patient, serving, stopped, unheard
 
@@ -19,6 +20,8 @@ _PLACE = re.compile(r"(?:\w+://)?(?P<host>[^:/@\s]+|\[[^\]]+\]):(?P<port>\d{1,5}
 
 Piece = TypeVar("Piece")
 Result = TypeVar("Result")
+Gathered: TypeAlias = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]
+"""A function that does work in processes which stay."""
 
 
 def in_parallel(
@@ -158,17 +161,49 @@ def _on_dask(
     client = _client(scheduler, jobs)
 
     def results() -> Iterator[Result]:
-        from distributed import as_completed
-
         with client:
-            futures = client.map(function, pieces, pure=False)
-            try:
-                for future in futures if order == "as given" else as_completed(futures):
-                    yield future.result()
-            finally:
-                client.cancel(futures)
+            yield from _of_client(client, function, pieces, order=order)
 
     return results()
+
+
+def _of_client(
+    client: Any, function: Callable[[Piece], Result], pieces: Sequence[Piece], *, order: str
+) -> Iterator[Result]:
+    from distributed import as_completed
+
+    futures = client.map(function, pieces, pure=False)
+    try:
+        for future in futures if order == "as given" else as_completed(futures):
+            yield future.result()
+    finally:
+        client.cancel(futures)
+
+
+@contextlib.contextmanager
+def gathered(*, jobs: int = 1, scheduler: str | None = None) -> Iterator[Gathered]:
+    """Processes that stay together for many calls: what each call takes comes off once.
+
+    The block is handed a function of a function and its pieces, which returns all results in
+    the order of the pieces. After a signal, functions are to come to an end by themselves.
+
+    Raises
+    ------
+    ValueError
+        As `in_parallel`.
+
+    Examples
+    --------
+    >>> with gathered() as run:
+    ...     list(run(abs, [-1, 2])), list(run(abs, [3]))
+    ([1, 2], [3])
+    """
+    if scheduler is None:
+        yield functools.partial(in_parallel, jobs=jobs, ends_early=True)
+        return
+    check_scheduler(scheduler)
+    with _client(scheduler, jobs) as client:
+        yield functools.partial(_of_client, client, order="as given")
 
 
 def _client(scheduler: str, jobs: int) -> Any:

@@ -75,7 +75,13 @@ Html = Annotated[
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")]
 Jobs = Annotated[
-    int, typer.Option("--jobs", min=1, metavar="N", help="Files (of a folder) or seeds at a time.")
+    int,
+    typer.Option(
+        "--jobs",
+        min=1,
+        metavar="N",
+        help="Files (of a folder), seeds, or searches for a fleet at a time.",
+    ),
 ]
 Dask = Annotated[
     str | None,
@@ -205,6 +211,7 @@ def plan(
         html=html,
         quiet=quiet,
         gap=gap,
+        jobs=1 if file.is_dir() else jobs,
         look=LookOptions(title=title, size=size, style=style),
     )
     parts = Parts(beside=with_file, case=case, model=model)

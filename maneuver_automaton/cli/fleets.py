@@ -136,6 +136,7 @@ class FleetTask:
             objective=said.objective,
             orders=said.orders,
             on_better=self.shown.better,
+            jobs=self.settings.jobs,
         )
         return self._answered(result)
 

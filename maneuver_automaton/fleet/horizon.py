@@ -20,10 +20,10 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.fleet.agreement import Agreement, Lost
 from maneuver_automaton.fleet.horizon_step import FleetStepUnderWay, LoopSettings, LoopState
 from maneuver_automaton.fleet.log import FleetStep
-from maneuver_automaton.fleet.planning import prepare_vehicles, vehicles_of
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import FleetResult
 from maneuver_automaton.fleet.vehicle import Found, Vehicle
+from maneuver_automaton.fleet.vehicles import prepare_vehicles, vehicles_of
 
 
 class FleetHorizon:

@@ -3,42 +3,37 @@
 A vehicle that holds a plan is a moving obstacle whose future is known to the last digit, so nobody
 has to agree on anything but who goes first. Vehicles that meet nobody need nothing more than their
 way alone.
-
-Source: Čáp, Novák, Kleiner, Selecký (2015), *Prioritized Planning Algorithms for Trajectory
-Coordination of Multiple Mobile Robots*, IEEE T-ASE 12(3): planned past the starts of those to come,
-nobody is ever enclosed by them.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
 from maneuver_automaton._interrupts import patient
+from maneuver_automaton._parallel import gathered
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.collision.shapes import Obstacle
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.fleet.conflicts import Course, components, load_meetings, meetings
+from maneuver_automaton.fleet.conflicts import Course, components, meetings
+from maneuver_automaton.fleet.crew import Crew, Done, Task
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import FleetResult
-from maneuver_automaton.fleet.vehicle import LONG, QUICK, Found, Vehicle
+from maneuver_automaton.fleet.turns import Held, Turns
+from maneuver_automaton.fleet.vehicle import Found, Vehicle
+from maneuver_automaton.fleet.vehicles import vehicles_of
 from maneuver_automaton.fleet.verdict import verified
-from maneuver_automaton.planning.plan import prepare
-from maneuver_automaton.planning.workspace import Workspace
-from maneuver_automaton.refinement.ready import load_lattice
-from maneuver_automaton.search.prepared import Prepared
 
 Objective = Literal["sum", "last"]
-Held = dict[int, Found]  # plans by the numbers of their vehicles
 
-MOST_EVICTED = 8  # times that plans are given up for one vehicle
 ALONE_SHARE = 0.5  # of the time, for all ways alone
 ORDERS_SHARE = 0.7  # of the time left, for orders of the vehicles before they drive by turns
 LARGEST_GROUP = 4  # vehicles that are planned anew together
+LEAST_AT_ONCE, VEHICLES_A_ROUND = 2, 6  # rounds of improvement at a time
 WORTH = 1e-6  # share of the objective that another plan has to save
 
 
@@ -51,6 +46,8 @@ def plan_fleet(
     seed: int = 0,
     max_rounds: int | None = None,
     on_better: Callable[[float, float], None] | None = None,
+    jobs: int = 1,
+    scheduler: str | None = None,
 ) -> FleetResult:
     """Plans for all vehicles of a fleet that keep apart at all times.
 
@@ -69,6 +66,12 @@ def plan_fleet(
         Attempts at improvement; as many as there is time for if omitted.
     on_better : callable, optional
         Called with seconds and objective when a better fleet is found.
+    jobs : int
+        Processes that plan vehicles, orders and groups at a time; 1 means none beside this one.
+        They begin before the time counts. With a limit of work instead of time (`max_rounds`) the
+        plans are the same for any number.
+    scheduler : str, optional
+        Address of a Dask scheduler, or "local": the same work is sent there, in `jobs` pieces.
 
     Returns
     -------
@@ -79,7 +82,7 @@ def plan_fleet(
     Raises
     ------
     ValueError
-        If a number is out of its range.
+        If a number is out of its range, or there is no such scheduler.
 
     Examples
     --------
@@ -99,20 +102,43 @@ def plan_fleet(
         raise ValueError(f"objective must be 'sum' or 'last', got {objective!r}")
     if orders < 1:
         raise ValueError(f"orders must be at least 1, got {orders}")
-    vehicles = vehicles_of(fleet)
-    prepare_vehicles(vehicles)
-    with patient():
-        return _FleetSearch(
-            fleet, vehicles, objective, Budget.from_now(time_limit), seed, on_better
-        ).run(orders, max_rounds)
+    if jobs < 1:
+        raise ValueError(f"jobs must be at least 1, got {jobs}")
+    apart = jobs > 1 or scheduler is not None
+    workers = gathered(jobs=jobs, scheduler=scheduler) if apart else nullcontext()
+    with workers as run, patient():
+        crew = Crew(fleet, vehicles_of(fleet), jobs, run)
+        crew.prepare()
+        search = _FleetSearch(crew, objective, Budget.from_now(time_limit), seed, on_better)
+        return search.run(orders, max_rounds)
+
+
+def _alone(turns: Turns, task: Task) -> Done:
+    """The ways of some by themselves."""
+    for k in task.numbers:
+        turns.vehicles[k].plan_alone(turns.budget)
+    return Done(None)
+
+
+def _in_order(turns: Turns, task: Task) -> Done:
+    """Plans in an order."""
+    return Done(turns.one_after_another(task.numbers, task.held), turns.queries)
+
+
+def _better(turns: Turns, task: Task) -> Done:
+    """Better plans of a group, or better ways of some by themselves."""
+    if not task.alone:
+        return Done(turns.anew(task.numbers, task.held), turns.queries)
+    for k in task.numbers:
+        turns.vehicles[k].look_for_better_ways(turns.budget)
+    return Done(None)
 
 
 @dataclass(slots=True, eq=False)
 class _FleetSearch:
     """One search for the plans of a fleet."""
 
-    fleet: FleetProblem
-    vehicles: list[Vehicle]
+    crew: Crew
     objective: Objective
     budget: Budget
     seed: int
@@ -123,10 +149,16 @@ class _FleetSearch:
     improvements: list[tuple[float, float]] = field(default_factory=list)
     queries: int = 0
     rounds: int = 0
-    until: Budget = field(init=False)  # of the part of the search that is under way
 
-    def __post_init__(self) -> None:
-        self.until = self.budget
+    @property
+    def fleet(self) -> FleetProblem:
+        """What is to be planned."""
+        return self.crew.fleet
+
+    @property
+    def vehicles(self) -> list[Vehicle]:
+        """Those of the fleet."""
+        return self.crew.vehicles
 
     def run(self, orders: int, max_rounds: int | None) -> FleetResult:
         """The whole search, and the checks of what it found."""
@@ -146,8 +178,10 @@ class _FleetSearch:
 
     def _plan_alone(self) -> None:
         """The way of each by itself."""
+        tasks = [Task((one.number,), {}) for one in self.vehicles]
+        for _ in self.crew.each(_alone, tasks, self.budget.stage(ALONE_SHARE)):
+            pass
         for one in self.vehicles:
-            one.plan_alone(self.budget.stage(ALONE_SHARE))
             if one.alone is None:
                 self.reasons[one.number] = f"it has no way even alone: {one.why_none}"
 
@@ -169,25 +203,39 @@ class _FleetSearch:
         if not rest:
             self.order = sorted(able)
             return
-        best: Held | None = None
-        rng, self.until = np.random.default_rng(self.seed), self.budget.stage(ORDERS_SHARE)
-        for n_th in range(orders):
-            order = self._order_of(rest, n_th, rng)
-            planned = self._one_after_another(order, dict(self.held))
-            better = best is None or self._rank(planned) < self._rank(best)
-            if better:
-                best, self.order = planned, order
-            if len(planned) == len(able) or self.until.is_over:
-                break
-        assert best is not None
-        self.until = self.budget
+        best = self._in_orders(rest, orders, len(able))
         if len(best) < len(able):
-            by_turns = self._by_turns(sorted(able, key=self._alone_cost))
+            turns = Turns(self.vehicles, self.fleet.margin, self.budget)
+            by_turns = turns.by_turns(sorted(able, key=self._alone_cost))
             best = by_turns if self._rank(by_turns) < self._rank(best) else best
         self.held = best
         for k in able:
             if k not in best:
                 self.reasons[k] = self._who_is_in_the_way(k)
+
+    def _in_orders(self, rest: Sequence[int], orders: int, wanted: int) -> Held:
+        """The best plans of some orders past those that are held: the first that has so many.
+
+        The first order alone at first, as it is enough most times; then some at a time.
+        """
+        rng, until = np.random.default_rng(self.seed), self.budget.stage(ORDERS_SHARE)
+        drawn = [self._order_of(rest, n_th, rng) for n_th in range(orders)]
+        best: Held | None = None
+        begin, size = 0, 1
+        while begin < orders:
+            chosen = drawn[begin : begin + size]
+            begin, size = begin + size, self.crew.jobs
+            tasks = [Task(tuple(order), self.held) for order in chosen]
+            found = list(self.crew.each(_in_order, tasks, until))
+            for order, done in zip(chosen, found, strict=True):
+                assert done.held is not None
+                self.queries += done.queries
+                if best is None or self._rank(done.held) < self._rank(best):
+                    best, self.order = done.held, order
+                if len(done.held) == wanted or until.is_over:
+                    return best
+        assert best is not None
+        return best
 
     def _order_of(self, numbers: Sequence[int], n_th: int, rng: np.random.Generator) -> list[int]:
         """The more important first, then the shortest way first; later orders are shuffled."""
@@ -210,128 +258,70 @@ class _FleetSearch:
             return last + 1e-6 * math.fsum(one.cost for one in held.values())
         return math.fsum(one.cost for one in held.values())
 
-    def _one_after_another(self, order: Sequence[int], held: Held) -> Held:
-        """Plans in an order, past those that are held; who fails goes before those it hits."""
-        waiting, evicted = list(order), 0
-        failed: set[int] = set()
-        while waiting and not self.until.is_over:
-            k = waiting.pop(0)
-            to_come = [*waiting, *self._without_plan(held, {k, *waiting})]
-            found = self._past(k, held, to_come)
-            if found is None:
-                found = self._past(k, held, self._without_plan(held, {k, *waiting}), most=LONG)
-            if found is None and evicted < MOST_EVICTED and k not in failed:
-                failed.add(k)
-                found, out = self._before_those_it_hits(k, held)
-                for other in out:
-                    del held[other]
-                waiting = [*out, *waiting]
-                evicted += len(out)
-            if found is not None:
-                held[k] = found
-        return held
-
-    def _by_turns(self, order: Sequence[int]) -> Held:
-        """One vehicle at a time, past all others where they stand: no search in time is needed.
-
-        Whoever has a way past all starts and goals has a plan then (well-formed, in the words of
-        the source). It takes as long as all together, and is what improvement begins with.
-        """
-        held: Held = {}
-        waiting, clock = list(order), max(one.problem.start_time for one in self.vehicles)
-        while waiting:
-            for k in waiting:
-                if self.budget.is_over:
-                    return held
-                there = {
-                    other: self.vehicles[other].standing for other in self._without_plan(held, {k})
-                }
-                there |= {other: one.course for other, one in held.items()}
-                arrived = [body for course in there.values() for body in course.arrived]
-                found = self.vehicles[k].past_arrived(arrived, clock, self.budget)
-                if found is not None:
-                    held[k], clock = found, found.arrival
-                    waiting.remove(k)
-                    break
-            else:
-                return held
-        return held
-
-    def _without_plan(self, held: Mapping[int, Found], but: set[int]) -> list[int]:
-        """Vehicles that stand at their starts for ever."""
-        return [k for k in range(len(self.vehicles)) if k not in held and k not in but]
-
-    def _before_those_it_hits(self, k: int, held: Held) -> tuple[Found | None, list[int]]:
-        """A way past those that have no plan, and whose plans it needs to be given up."""
-        found = self._past(k, {}, self._without_plan(held, {k}))
-        if found is None:
-            found = self._past(k, {}, [])
-        if found is None:
-            return None, []
-        courses = {other: one.course for other, one in held.items()}
-        met = meetings({**courses, k: found.course}, keep=self.fleet.margin, among=[k])
-        return found, sorted({m.one if m.other == k else m.other for m in met})
-
-    def _past(
-        self,
-        k: int,
-        held: Mapping[int, Found],
-        standing: Sequence[int],
-        *,
-        most: int = QUICK,
-        known: float = math.inf,
-    ) -> Found | None:
-        """A way of one vehicle past plans, and past others at their starts."""
-        self.queries += 1
-        others: list[Obstacle] = []
-        for other in sorted({*held, *standing} - {k}):
-            course = held[other].course if other in held else self.vehicles[other].standing
-            others += course.obstacles
-        return self.vehicles[k].past(others, self.until, most=most, known=known)
-
     def _improve(self, able: Sequence[int], max_rounds: int | None) -> None:
-        """Plan groups anew, those with the most to gain first, as long as there is time."""
+        """Plan groups anew, those with the most to gain first, as long as there is time.
+
+        Some rounds at a time, all from the same plans and none about a vehicle of another; their
+        plans are taken one after another, if they keep apart from those taken before.
+        """
         rng = np.random.default_rng([self.seed, 1])
         unseen = sorted(able, key=lambda k: -self._excess(k))
         idle, most_idle = 0, 40 + 8 * len(able)
-        while not self.budget.is_over and (max_rounds is None or self.rounds < max_rounds):
-            self.rounds += 1
-            if unseen and self.rounds % 2:
-                self.vehicles[unseen.pop(0)].look_for_better_ways(self.budget)
-                continue
-            group = self._group(rng)
-            if not group and unseen:
-                continue
-            if not group or idle > most_idle:
+        at_once = max(LEAST_AT_ONCE, len(able) // VEHICLES_A_ROUND)
+        while not self.budget.is_over and idle <= most_idle:
+            left = at_once if max_rounds is None else min(at_once, max_rounds - self.rounds)
+            tasks = self._drawn(left, unseen, rng)
+            if not tasks:
                 return
-            others = {k: one for k, one in self.held.items() if k not in group}
-            before = self._value(self.held)
-            now = self._anew(group, others)
-            if now is not None and self._value(now) < before * (1.0 - WORTH):
-                self.held, idle = now, 0
-                self._tell()
-            else:
-                idle += 1
+            self.rounds += len(tasks)
+            taken: set[int] = set()
+            for task, done in zip(tasks, self.crew.each(_better, tasks, self.budget), strict=True):
+                if task.alone:
+                    continue
+                self.queries += done.queries
+                if done.held is not None and self._is_taken(done.held, taken):
+                    taken |= set(task.numbers)
+                    idle = 0
+                else:
+                    idle += 1
 
-    def _anew(self, group: Sequence[int], held: Held) -> Held | None:
-        """Plans of a group, one after another, past all others; None if one has none."""
-        for n, k in enumerate(group):
-            if self.budget.is_over:
-                return None
-            found = self._past(k, held, [*group[n + 1 :], *self._without_plan(held, set(group))])
-            if found is None and n + 1 < len(group):
-                found = self._past(k, held, self._without_plan(held, set(group)))
-            if found is None:
-                return None
-            held = {**held, k: found}
-        return held
+    def _drawn(self, most: int, unseen: list[int], rng: np.random.Generator) -> list[Task]:
+        """Rounds: by turns, whose ways alone to look at again, and groups; no vehicle twice."""
+        tasks: list[Task] = []
+        busy: set[int] = set()
+        for n in range(most):
+            free = next((k for k in unseen if k not in busy), None)
+            if n % 2 == 0 and free is not None:
+                unseen.remove(free)
+                tasks.append(Task((free,), {}, alone=True))
+                busy.add(free)
+            elif group := self._group(rng, busy):
+                others = {k: one for k, one in self.held.items() if k not in group}
+                tasks.append(Task(group, others))
+                busy.update(group)
+        return tasks
 
-    def _group(self, rng: np.random.Generator) -> list[int]:
+    def _is_taken(self, now: Held, taken: set[int]) -> bool:
+        """Take plans of a group if they are better, and keep apart from those taken before."""
+        if not self._value({**self.held, **now}) < self._value(self.held) * (1.0 - WORTH):
+            return False
+        if taken:
+            courses = {k: self.held[k].course for k in taken} | {
+                k: one.course for k, one in now.items()
+            }
+            met = meetings(courses, keep=self.fleet.margin, among=list(now))
+            if any(len({m.one, m.other} & now.keys()) == 1 for m in met):
+                return False
+        self.held = {**self.held, **now}
+        self._tell()
+        return True
+
+    def _group(self, rng: np.random.Generator, busy: set[int]) -> tuple[int, ...]:
         """Vehicles to be planned anew: one that loses by others, and some that are in its way."""
-        excess = {k: self._excess(k) for k in self.held}
+        excess = {k: self._excess(k) for k in self.held if k not in busy}
         losing = [k for k, lost in excess.items() if lost > WORTH * self.held[k].cost]
         if not losing:
-            return []
+            return ()
         weights = np.array([excess[k] for k in losing])
         first = int(rng.choice(losing, p=weights / weights.sum()))
         size = int(rng.integers(1, LARGEST_GROUP + 1))
@@ -341,11 +331,12 @@ class _FleetSearch:
             courses[first] = alone.course
         met = meetings(courses, keep=self.fleet.margin, among=[first])
         near = [m.one if m.other == first else m.other for m in met]
+        near = [k for k in near if k not in busy]
         rng.shuffle(near)
         group = [first, *near[: size - 1]]
         if rng.random() < 0.5:
             rng.shuffle(group)
-        return group
+        return tuple(group)
 
     def _alone_cost(self, k: int) -> float:
         known = self.vehicles[k].alone
@@ -406,32 +397,3 @@ class _FleetSearch:
             improvements=tuple(self.improvements),
             counts=counts,
         )
-
-
-def prepare_vehicles(vehicles: Sequence[Vehicle]) -> None:
-    """Have ready what every search of a fleet needs, once for each kind and map."""
-    kinds = {(id(one.problem.automaton), id(one.workspace)): one for one in vehicles}
-    for one in kinds.values():
-        prepare(one.problem, one.workspace)
-    load_lattice()
-    load_meetings()
-
-
-def vehicles_of(fleet: FleetProblem) -> list[Vehicle]:
-    """The vehicles of a fleet; those of one map share what is prepared for it."""
-    prepared = Prepared()
-    workspaces: dict[tuple[int, ...], Workspace] = {}
-    keeps = [problem.margin for problem in fleet.problems]
-    # Every search keeps its own margin from what it must not touch: what that lacks of the fleet's,
-    # the others are larger by.
-    grown = max(fleet.margin - min(keeps), 0.0)
-    vehicles = []
-    for k, problem in enumerate(fleet.problems):
-        key = tuple(map(id, problem.obstacles))
-        workspace = workspaces.setdefault(key, Workspace(problem.obstacles, prepared))
-        settings = replace(problem.search, improve=False)
-        # Obstacles of its own may move too, and pass where it stays.
-        horizon = replace(problem.horizon, stay=not fleet.leaves[k])
-        own = replace(problem, search=settings, obstacles=workspace.obstacles, horizon=horizon)
-        vehicles.append(Vehicle(k, fleet.names[k], own, fleet.leaves[k], grown, workspace))
-    return vehicles

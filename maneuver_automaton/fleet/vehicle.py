@@ -75,7 +75,6 @@ class Vehicle:
     ways: list[Word] = field(default_factory=list)  # alone, the cheapest first
     standing: Course = field(init=False)  # at its start, for ever
     expansions: int = 0
-    held_before: bool = False  # whether it had a plan past others already
 
     def __post_init__(self) -> None:
         problem = self.problem
@@ -184,17 +183,19 @@ class Vehicle:
         *,
         most: int = QUICK,
         known: float = math.inf,
+        again: bool = False,
     ) -> Found | None:
-        """The cheapest way found past what the others do; None if there is none below a cost."""
+        """The cheapest way found past what the others do; None if there is none below a cost.
+
+        One that does not switch at will is improved if it is searched for `again`.
+        """
         others = self.beside(others)
         if not others:
             return self.alone if self.alone is not None and self.alone.cost < known else None
         problem = replace(self.problem, obstacles=(*self.problem.obstacles, *others))
         if not self.at_will:
-            wants_better = self.held_before and most == QUICK
-            limit = BETTER_S if wants_better else INERTIA_S
-            found = self._found(self._planned(problem, budget, limit, improve=wants_better))
-            self.held_before = self.held_before or found is not None
+            limit = BETTER_S if again else INERTIA_S
+            found = self._found(self._planned(problem, budget, limit, improve=again))
             return found if found is not None and found.cost < known else None
         query = self._query(problem)
         best: Word | None = None

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.fleet.planning import vehicles_of
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import Closest
+from maneuver_automaton.fleet.vehicles import vehicles_of
 from maneuver_automaton.fleet.verdict import enough_for, measured
 from maneuver_automaton.planning.verdict import Verdict, verify
 

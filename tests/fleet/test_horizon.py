@@ -17,8 +17,8 @@ from maneuver_automaton.fleet.agreement import Agreement
 from maneuver_automaton.fleet.conflicts import Course, meetings
 from maneuver_automaton.fleet.guarantees import After, Before, broken, gap_between
 from maneuver_automaton.fleet.held import left_to_pay, off_plan, rest_of_plan, resting
-from maneuver_automaton.fleet.planning import vehicles_of
 from maneuver_automaton.fleet.vehicle import Found
+from maneuver_automaton.fleet.vehicles import vehicles_of
 from maneuver_automaton.groups import SE2
 from tests.fleet.robots import (
     at_rest,

@@ -731,7 +731,7 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
     "trailer of a car without one": (
         vehicle("{model: car, wheelbase_m: 2.5, trailer: {rectangle_m: [1, 1]}}"),
         ":3: vehicle.trailer: unknown key; did you mean 'footprint'? Known keys: model, "
-        "wheelbase_m, max_steering_rad, max_speed_m_s, footprint",
+        "wheelbase_m, max_steering_rad, max_speed_m_s, footprint, footprint_height_m",
     ),
     "trailer that is no shape": (
         vehicle(
