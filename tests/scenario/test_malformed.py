@@ -267,7 +267,7 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
     "key of another model": (
         vehicle("{model: unicycle, wheelbase_m: 2.5}"),
         ":3: vehicle.wheelbase_m: unknown key; did you mean 'max_speed_m_s'? Known "
-        "keys: model, max_speed_m_s, max_turn_rate_rad_s, footprint",
+        "keys: model, max_speed_m_s, max_turn_rate_rad_s, footprint, footprint_height_m",
     ),
     "negative wheelbase": (
         vehicle("{model: car, wheelbase_m: -2.5}"),
