@@ -8,11 +8,12 @@ that only plans travel, as numbers: trims and maneuvers are those of the automat
 from __future__ import annotations
 
 import io
+import math
 import os
 import pickle
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 from maneuver_automaton._parallel import Gathered
 from maneuver_automaton.automaton import Plan
@@ -30,12 +31,17 @@ LEAST_S = 1e-3  # [s] a limit is positive
 PIECES = 2  # sent to each process at a time, so that none waits long for another
 
 
+How: TypeAlias = Literal["alone", "in turn", "by priorities", "by conflicts"]
+"""Better plans: of each by itself, one after another, or of a group at once."""
+
+
 class Task(NamedTuple):
     """A piece of work: whose plans are asked for, and past which."""
 
     numbers: tuple[int, ...]
     held: Held
-    alone: bool = False  # whether it is about ways by themselves
+    how: How = "in turn"  # to look for better plans
+    known: float = math.inf  # cost of those that they have
 
 
 class Done(NamedTuple):
@@ -69,7 +75,7 @@ class _Message(NamedTuple):
     """Pieces of one kind of work for another process."""
 
     work: Work | None  # None: only have all ready
-    tasks: tuple[tuple[tuple[int, ...], dict[int, _Told], bool], ...]
+    tasks: tuple[tuple[Task, dict[int, _Told]], ...]  # without plans, which follow
     known: dict[int, _Known]
     seconds: float  # [s] that are left
 
@@ -101,7 +107,8 @@ class Crew:
     def each(self, work: Work, tasks: Sequence[Task], budget: Budget) -> Iterator[Done]:
         """What comes of pieces of work, in their order.
 
-        No piece may be about a vehicle of which another one learns something.
+        What is learned of a vehicle alone counts for none of the other pieces: those about it come
+        before.
         """
         if self.gathered is None or len(tasks) < 2:
             for task in tasks:
@@ -125,7 +132,7 @@ class Crew:
     def _message(self, work: Work, tasks: Sequence[Task], seconds: float) -> bytes:
         numbers = {k for task in tasks for k in task.numbers}
         known = {k: _known(self.vehicles[k]) for k in sorted(numbers)}
-        rows = tuple((task.numbers, _told(task.held), task.alone) for task in tasks)
+        rows = tuple((task._replace(held={}), _told(task.held)) for task in tasks)
         return _packed(_Message(work, rows, known, seconds), self.vehicles)
 
     def _sent(self, bodies: Sequence[bytes]) -> Iterator[bytes]:
@@ -161,10 +168,10 @@ def _served(piece: tuple[str, FleetProblem | None, bytes]) -> bytes | None:
     before = [one.expansions for one in vehicles]
     done: list[tuple[dict[int, _Told] | None, int]] = []
     budget = Budget.from_now(max(message.seconds, LEAST_S))
-    for numbers, told, alone in message.tasks:
+    for task, told in message.tasks:
         assert message.work is not None
         turns = Turns(vehicles, fleet.margin, budget)
-        found = message.work(turns, Task(numbers, _held(vehicles, told), alone))
+        found = message.work(turns, task._replace(held=_held(vehicles, told)))
         done.append((None if found.held is None else _told(found.held), found.queries))
     known_now = {k: _known(vehicles[k]) for k in message.known}
     spent = {k: vehicles[k].expansions - before[k] for k in message.known}

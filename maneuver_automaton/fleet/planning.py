@@ -8,6 +8,7 @@ way alone.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
@@ -20,7 +21,8 @@ from maneuver_automaton._parallel import gathered
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.fleet.conflicts import Course, components, meetings
-from maneuver_automaton.fleet.crew import Crew, Done, Task
+from maneuver_automaton.fleet.crew import Crew, Done, How, Task
+from maneuver_automaton.fleet.groups import by_conflicts, by_priorities
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import FleetResult
 from maneuver_automaton.fleet.turns import Held, Turns
@@ -33,7 +35,9 @@ Objective = Literal["sum", "last"]
 ALONE_SHARE = 0.5  # of the time, for all ways alone
 ORDERS_SHARE = 0.7  # of the time left, for orders of the vehicles before they drive by turns
 LARGEST_GROUP = 4  # vehicles that are planned anew together
-LEAST_AT_ONCE, VEHICLES_A_ROUND = 2, 6  # rounds of improvement at a time
+AT_ONCE: tuple[How, ...] = ("in turn", "by priorities", "by conflicts")
+MOST_OF: dict[How, int] = {"in turn": LARGEST_GROUP, "by priorities": 4, "by conflicts": 3}
+VEHICLES_A_GROUP = 12  # of which one group is planned anew at a time, and one by itself
 WORTH = 1e-6  # share of the objective that another plan has to save
 
 
@@ -127,11 +131,14 @@ def _in_order(turns: Turns, task: Task) -> Done:
 
 def _better(turns: Turns, task: Task) -> Done:
     """Better plans of a group, or better ways of some by themselves."""
-    if not task.alone:
+    if task.how == "alone":
+        for k in task.numbers:
+            turns.vehicles[k].look_for_better_ways(turns.budget)
+        return Done(None)
+    if task.how == "in turn":
         return Done(turns.anew(task.numbers, task.held), turns.queries)
-    for k in task.numbers:
-        turns.vehicles[k].look_for_better_ways(turns.budget)
-    return Done(None)
+    search = by_priorities if task.how == "by priorities" else by_conflicts
+    return Done(search(turns, task.numbers, task.held, task.known), turns.queries)
 
 
 @dataclass(slots=True, eq=False)
@@ -149,6 +156,9 @@ class _FleetSearch:
     improvements: list[tuple[float, float]] = field(default_factory=list)
     queries: int = 0
     rounds: int = 0
+    whole: list[tuple[tuple[int, ...], How]] = field(default_factory=list)  # groups to begin with
+    versions: Counter[int] = field(default_factory=Counter)  # of what is known of each vehicle
+    asked: set[tuple[object, ...]] = field(default_factory=set)  # groups, how, and versions of all
 
     @property
     def fleet(self) -> FleetProblem:
@@ -199,6 +209,8 @@ class _FleetSearch:
         self.held = {
             group[0]: alone[group[0]] for group in groups if len(group) == 1 and group[0] not in hit
         }
+        for how in AT_ONCE[1:]:
+            self.whole += [(group, how) for group in groups if 2 <= len(group) <= MOST_OF[how]]
         rest = [k for group in groups for k in group if k not in self.held]
         if not rest:
             self.order = sorted(able)
@@ -261,69 +273,90 @@ class _FleetSearch:
     def _improve(self, able: Sequence[int], max_rounds: int | None) -> None:
         """Plan groups anew, those with the most to gain first, as long as there is time.
 
-        Some rounds at a time, all from the same plans and none about a vehicle of another; their
-        plans are taken one after another, if they keep apart from those taken before.
+        Some rounds at a time, all from the same plans; theirs are taken one after another, if they
+        keep apart from those taken before. What was asked of the same plans is not asked again.
         """
         rng = np.random.default_rng([self.seed, 1])
         unseen = sorted(able, key=lambda k: -self._excess(k))
+        self.whole = [row for row in self.whole if set(row[0]) <= self.held.keys()]
         idle, most_idle = 0, 40 + 8 * len(able)
-        at_once = max(LEAST_AT_ONCE, len(able) // VEHICLES_A_ROUND)
+        at_once = max(1, len(able) // VEHICLES_A_GROUP)
         while not self.budget.is_over and idle <= most_idle:
-            left = at_once if max_rounds is None else min(at_once, max_rounds - self.rounds)
-            tasks = self._drawn(left, unseen, rng)
-            if not tasks:
+            left = at_once if max_rounds is None else max_rounds - self.rounds
+            tasks = self._groups(min(at_once, left), rng)
+            idle += at_once - len(tasks)
+            ways = unseen[: min(at_once, left - len(tasks) if max_rounds is not None else left)]
+            del unseen[: len(ways)]
+            tasks += [Task((k,), {}, "alone") for k in ways]
+            if left <= 0 or not (tasks or self._losing(set())):
                 return
             self.rounds += len(tasks)
             taken: set[int] = set()
+            known = {k: self._known(k) for k in ways}
             for task, done in zip(tasks, self.crew.each(_better, tasks, self.budget), strict=True):
-                if task.alone:
-                    continue
                 self.queries += done.queries
-                if done.held is not None and self._is_taken(done.held, taken):
+                if task.how == "alone":
+                    self.versions.update(k for k in task.numbers if self._known(k) != known[k])
+                elif done.held is not None and self._is_taken(done.held, taken):
                     taken |= set(task.numbers)
                     idle = 0
                 else:
                     idle += 1
 
-    def _drawn(self, most: int, unseen: list[int], rng: np.random.Generator) -> list[Task]:
-        """Rounds: by turns, whose ways alone to look at again, and groups; no vehicle twice."""
+    def _groups(self, most: int, rng: np.random.Generator) -> list[Task]:
+        """Groups to plan anew, no vehicle twice."""
         tasks: list[Task] = []
         busy: set[int] = set()
-        for n in range(most):
-            free = next((k for k in unseen if k not in busy), None)
-            if n % 2 == 0 and free is not None:
-                unseen.remove(free)
-                tasks.append(Task((free,), {}, alone=True))
-                busy.add(free)
-            elif group := self._group(rng, busy):
-                others = {k: one for k, one in self.held.items() if k not in group}
-                tasks.append(Task(group, others))
-                busy.update(group)
+        for _ in range(most):
+            task = self._task(rng, busy)
+            if task is not None:
+                tasks.append(task)
+                busy.update(task.numbers)
         return tasks
+
+    def _task(self, rng: np.random.Generator, busy: set[int]) -> Task | None:
+        """A group and how to plan it, unless that was asked of the same plans before."""
+        first = next((row for row in self.whole if not busy & set(row[0])), None)
+        if first is not None:
+            self.whole.remove(first)
+            group, how = first
+        else:
+            group, how = self._group(rng, busy), AT_ONCE[int(rng.integers(len(AT_ONCE)))]
+        if not group:
+            return None
+        now = tuple(self.versions[k] for k in range(len(self.vehicles)))
+        if not 2 <= len(group) <= MOST_OF[how] or (how, *sorted(group), now) in self.asked:
+            how = "in turn"
+        asked = (how, *(group if how == "in turn" else sorted(group)), now)
+        if asked in self.asked:
+            return None
+        self.asked.add(asked)
+        others = {k: one for k, one in self.held.items() if k not in group}
+        priced = math.fsum(self.held[k].cost for k in group)
+        return Task(group, others, how, priced if self.objective == "sum" else math.inf)
 
     def _is_taken(self, now: Held, taken: set[int]) -> bool:
         """Take plans of a group if they are better, and keep apart from those taken before."""
         if not self._value({**self.held, **now}) < self._value(self.held) * (1.0 - WORTH):
             return False
         if taken:
-            courses = {k: self.held[k].course for k in taken} | {
-                k: one.course for k, one in now.items()
-            }
+            courses = {k: self.held[k].course for k in taken}
+            courses |= {k: one.course for k, one in now.items()}
             met = meetings(courses, keep=self.fleet.margin, among=list(now))
             if any(len({m.one, m.other} & now.keys()) == 1 for m in met):
                 return False
         self.held = {**self.held, **now}
+        self.versions.update(list(now))
         self._tell()
         return True
 
     def _group(self, rng: np.random.Generator, busy: set[int]) -> tuple[int, ...]:
         """Vehicles to be planned anew: one that loses by others, and some that are in its way."""
-        excess = {k: self._excess(k) for k in self.held if k not in busy}
-        losing = [k for k, lost in excess.items() if lost > WORTH * self.held[k].cost]
+        losing = self._losing(busy)
         if not losing:
             return ()
-        weights = np.array([excess[k] for k in losing])
-        first = int(rng.choice(losing, p=weights / weights.sum()))
+        weights = np.array(list(losing.values()))
+        first = int(rng.choice(list(losing), p=weights / weights.sum()))
         size = int(rng.integers(1, LARGEST_GROUP + 1))
         alone = self.vehicles[first].alone
         courses: dict[int, Course] = {k: one.course for k, one in self.held.items()}
@@ -337,6 +370,15 @@ class _FleetSearch:
         if rng.random() < 0.5:
             rng.shuffle(group)
         return tuple(group)
+
+    def _known(self, k: int) -> list[float]:
+        """What tells whether something new is known of a vehicle by itself."""
+        return [self._alone_cost(k), *(way.cost for way in self.vehicles[k].ways)]
+
+    def _losing(self, but: set[int]) -> dict[int, float]:
+        """What those lose whose plans cost more than their ways alone."""
+        excess = {k: self._excess(k) for k in self.held if k not in but}
+        return {k: lost for k, lost in excess.items() if lost > WORTH * self.held[k].cost}
 
     def _alone_cost(self, k: int) -> float:
         known = self.vehicles[k].alone

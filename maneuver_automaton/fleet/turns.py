@@ -117,11 +117,13 @@ class Turns:
         most: int = QUICK,
         known: float = math.inf,
         again: bool = False,
+        besides: Sequence[Obstacle] = (),
     ) -> Found | None:
-        """A way of one vehicle past plans, and others at their starts; better `again`."""
+        """A way of one vehicle past plans, others at their starts, and more; better `again`."""
         self.queries += 1
         others: list[Obstacle] = []
         for other in sorted({*held, *standing} - {k}):
             course = held[other].course if other in held else self.vehicles[other].standing
             others += course.obstacles
+        others += besides
         return self.vehicles[k].past(others, self.budget, most=most, known=known, again=again)

@@ -43,7 +43,7 @@ def planned(crew):
         Task(group, {k: found for k, found in one.held.items() if k not in group})
         for group in groups
     ]
-    better = list(crew.each(_better, [*tasks, Task((3,), {}, alone=True)], budget))
+    better = list(crew.each(_better, [*tasks, Task((3,), {}, "alone")], budget))
     return [one, other, *better], [vehicle.ways for vehicle in crew.vehicles]
 
 
