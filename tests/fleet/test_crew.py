@@ -7,8 +7,8 @@ import pickle
 import pytest
 
 from maneuver_automaton.budget import Budget
+from maneuver_automaton.fleet import FleetStatus, plan_fleet, verify_fleet
 from maneuver_automaton.fleet import crew as crews
-from maneuver_automaton.fleet import plan_fleet
 from maneuver_automaton.fleet.crew import Crew, Task
 from maneuver_automaton.fleet.planning import _alone, _better, _in_order
 from maneuver_automaton.fleet.vehicles import vehicles_of
@@ -82,7 +82,6 @@ def test_expansions_are_counted_wherever_they_are():
     "fleet",
     [
         fleets.random_fleet(5, 1),
-        over_a_truck(1.5),
         load_scenario(SCENARIOS / "fleets" / "alcove.yaml").fleet,
     ],
 )
@@ -91,6 +90,15 @@ def test_any_number_of_processes_finds_the_same_plans(fleet):
     assert answers(runs[0])
     assert all(answers(one) == answers(runs[0]) for one in runs)
     assert all(one.counts == runs[0].counts for one in runs)
+
+
+@pytest.mark.slow
+def test_what_a_vehicle_is_made_of_travels_too():
+    """A model of one's own, with functions that have no name."""
+    fleet = over_a_truck(1.5)
+    result = plan_fleet(fleet, time_limit=60.0, max_rounds=2, jobs=2)
+    assert result.status is FleetStatus.FOUND
+    assert verify_fleet(fleet, result.plans).passed
 
 
 @pytest.mark.slow
