@@ -146,7 +146,15 @@ class Crew:
             yield answer
 
 
-_FLEETS: dict[str, tuple[FleetProblem, list[Vehicle]]] = {}  # the last ones, by their tokens
+class _Fleet(NamedTuple):
+    """What a process keeps of a fleet."""
+
+    problem: FleetProblem
+    vehicles: list[Vehicle]
+    last: dict[int, Found]  # plans that were sent last, with all that is prepared for them
+
+
+_FLEETS: dict[str, _Fleet] = {}  # the last ones, by their tokens
 
 
 def _served(piece: tuple[str, FleetProblem | None, bytes]) -> bytes | None:
@@ -155,12 +163,11 @@ def _served(piece: tuple[str, FleetProblem | None, bytes]) -> bytes | None:
     if token not in _FLEETS:
         if fleet is None:
             return None
-        vehicles = vehicles_of(fleet)
-        prepare_vehicles(vehicles)
-        _FLEETS[token] = fleet, vehicles
+        _FLEETS[token] = _Fleet(fleet, vehicles_of(fleet), {})
+        prepare_vehicles(_FLEETS[token].vehicles)
         for old in list(_FLEETS)[:-KEPT]:
             del _FLEETS[old]
-    fleet, vehicles = _FLEETS[token]
+    problem, vehicles, last = _FLEETS[token]
     message = _unpacked(body, vehicles)
     assert isinstance(message, _Message)
     for k, known in message.known.items():
@@ -170,8 +177,9 @@ def _served(piece: tuple[str, FleetProblem | None, bytes]) -> bytes | None:
     budget = Budget.from_now(max(message.seconds, LEAST_S))
     for task, told in message.tasks:
         assert message.work is not None
-        turns = Turns(vehicles, fleet.margin, budget)
-        found = message.work(turns, task._replace(held=_held(vehicles, told)))
+        turns = Turns(vehicles, problem.margin, budget)
+        last |= {k: _found(vehicles[k], one, last.get(k)) for k, one in told.items()}
+        found = message.work(turns, task._replace(held={k: last[k] for k in told}))
         done.append((None if found.held is None else _told(found.held), found.queries))
     known_now = {k: _known(vehicles[k]) for k in message.known}
     spent = {k: vehicles[k].expansions - before[k] for k in message.known}
@@ -186,8 +194,17 @@ def _held(vehicles: Sequence[Vehicle], told: Mapping[int, _Told]) -> Held:
     return {k: _found(vehicles[k], one) for k, one in told.items()}
 
 
-def _found(vehicle: Vehicle, told: _Told) -> Found:
+def _found(vehicle: Vehicle, told: _Told, last: Found | None = None) -> Found:
+    """A plan that was sent; the last one of the vehicle if it is the same."""
+    if last is not None and last.cost == told.cost and _signed(last.plan) == _signed(told.plan):
+        return last
     return Found(told.plan, told.cost, told.goal_index, vehicle.course_of(told.plan))
+
+
+def _signed(plan: Plan) -> tuple[object, ...]:
+    """What tells plans apart that are made of the same trims and maneuvers."""
+    parts = [*map(id, plan.trims), *map(id, plan.maneuvers)]
+    return *parts, plan.durations.tobytes(), plan.start.tobytes(), plan.start_time
 
 
 def _known(vehicle: Vehicle) -> _Known:
