@@ -34,11 +34,12 @@ Objective = Literal["sum", "last"]
 
 ALONE_SHARE = 0.5  # of the time, for all ways alone
 ORDERS_SHARE = 0.7  # of the time left, for orders of the vehicles before they drive by turns
+WORTH = 1e-6  # share of the objective that another plan has to save
 LARGEST_GROUP = 4  # vehicles that are planned anew together
 AT_ONCE: tuple[How, ...] = ("in turn", "by priorities", "by conflicts")
 MOST_OF: dict[How, int] = {"in turn": LARGEST_GROUP, "by priorities": 4, "by conflicts": 3}
+LOST_BY: dict[How, float] = {"in turn": 0.0, "by priorities": WORTH, "by conflicts": 0.05}
 VEHICLES_A_GROUP = 12  # of which one group is planned anew at a time, and one by itself
-WORTH = 1e-6  # share of the objective that another plan has to save
 
 
 def plan_fleet(
@@ -278,7 +279,8 @@ class _FleetSearch:
         """
         rng = np.random.default_rng([self.seed, 1])
         unseen = sorted(able, key=lambda k: -self._excess(k))
-        self.whole = [row for row in self.whole if set(row[0]) <= self.held.keys()]
+        whole = [row for row in self.whole if set(row[0]) <= self.held.keys()]
+        self.whole = sorted(whole, key=lambda row: (AT_ONCE.index(row[1]), -self._lost(row[0])))
         idle, most_idle = 0, 40 + 8 * len(able)
         at_once = max(1, len(able) // VEHICLES_A_GROUP)
         while not self.budget.is_over and idle <= most_idle:
@@ -316,7 +318,8 @@ class _FleetSearch:
 
     def _task(self, rng: np.random.Generator, busy: set[int]) -> Task | None:
         """A group and how to plan it, unless that was asked of the same plans before."""
-        first = next((row for row in self.whole if not busy & set(row[0])), None)
+        open_ = [row for row in self.whole if not busy & set(row[0])]
+        first = next((row for row in open_ if self._lost(row[0]) > LOST_BY[row[1]]), None)
         if first is not None:
             self.whole.remove(first)
             group, how = first
@@ -325,7 +328,8 @@ class _FleetSearch:
         if not group:
             return None
         now = tuple(self.versions[k] for k in range(len(self.vehicles)))
-        if not 2 <= len(group) <= MOST_OF[how] or (how, *sorted(group), now) in self.asked:
+        suits = 2 <= len(group) <= MOST_OF[how] and self._lost(group) > LOST_BY[how]
+        if not suits or (how, *sorted(group), now) in self.asked:
             how = "in turn"
         asked = (how, *(group if how == "in turn" else sorted(group)), now)
         if asked in self.asked:
@@ -374,6 +378,11 @@ class _FleetSearch:
     def _known(self, k: int) -> list[float]:
         """What tells whether something new is known of a vehicle by itself."""
         return [self._alone_cost(k), *(way.cost for way in self.vehicles[k].ways)]
+
+    def _lost(self, group: Sequence[int]) -> float:
+        """What the vehicles of a group lose by others, as a share of their ways alone."""
+        alone = math.fsum(self._alone_cost(k) for k in group)
+        return math.fsum(self._excess(k) for k in group) / alone if alone > 0.0 else 0.0
 
     def _losing(self, but: set[int]) -> dict[int, float]:
         """What those lose whose plans cost more than their ways alone."""

@@ -97,6 +97,7 @@ def main() -> None:
     parser.add_argument("words", nargs="*")
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=1)
     given = parser.parse_args()
     best, rows = published(), []
     for path in files(given.words):
@@ -106,6 +107,7 @@ def main() -> None:
             fleet,
             time_limit=given.seconds,
             seed=given.seed,
+            jobs=given.jobs,
             on_better=lambda s, v, b=began, f=firsts: f.append(time.process_time() - b),
         )
         took = time.process_time() - began
