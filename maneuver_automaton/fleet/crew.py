@@ -105,7 +105,7 @@ class Crew:
             list(self.gathered(_served, [sent] * self.jobs))
 
     def each(self, work: Work, tasks: Sequence[Task], budget: Budget) -> Iterator[Done]:
-        """What comes of pieces of work, in their order.
+        """What comes of pieces of work, in their order; nothing of those that a signal broke off.
 
         What is learned of a vehicle alone counts for none of the other pieces: those about it come
         before.
@@ -118,6 +118,7 @@ class Crew:
         size = max(1, -(-len(tasks) // (PIECES * self.jobs)))
         chunks = [tasks[k : k + size] for k in range(0, len(tasks), size)]
         bodies = [self._message(work, chunk, budget.left) for chunk in chunks]
+        left = len(tasks)
         for answer in self._sent(bodies):
             reply = _unpacked(answer, self.vehicles)
             assert isinstance(reply, _Reply)
@@ -127,7 +128,9 @@ class Crew:
                 self.vehicles[k].expansions += spent
             for told, queries in reply.done:
                 held = None if told is None else _held(self.vehicles, told)
+                left -= 1
                 yield Done(held, queries)
+        yield from [Done(None)] * left
 
     def _message(self, work: Work, tasks: Sequence[Task], seconds: float) -> bytes:
         numbers = {k for task in tasks for k in task.numbers}
@@ -139,11 +142,11 @@ class Crew:
         """Answers to messages; who does not know the fleet is told of it."""
         assert self.gathered is not None
         pieces = [(self._token, None, body) for body in bodies]
-        for body, answer in zip(bodies, list(self.gathered(_served, pieces)), strict=True):
+        for body, answer in zip(bodies, list(self.gathered(_served, pieces)), strict=False):
             if answer is None:
-                (answer,) = self.gathered(_served, [(self._token, self.fleet, body)])
-            assert answer is not None
-            yield answer
+                yield from self.gathered(_served, [(self._token, self.fleet, body)])
+            else:
+                yield answer
 
 
 class _Fleet(NamedTuple):

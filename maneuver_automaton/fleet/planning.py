@@ -241,11 +241,11 @@ class _FleetSearch:
             tasks = [Task(tuple(order), self.held) for order in chosen]
             found = list(self.crew.each(_in_order, tasks, until))
             for order, done in zip(chosen, found, strict=True):
-                assert done.held is not None
+                planned = done.held or {}
                 self.queries += done.queries
-                if best is None or self._rank(done.held) < self._rank(best):
-                    best, self.order = done.held, order
-                if len(done.held) == wanted or until.is_over:
+                if best is None or self._rank(planned) < self._rank(best):
+                    best, self.order = planned, order
+                if len(planned) == wanted or until.is_over:
                     return best
         assert best is not None
         return best

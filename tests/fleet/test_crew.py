@@ -9,7 +9,7 @@ import pytest
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.fleet import FleetStatus, plan_fleet, verify_fleet
 from maneuver_automaton.fleet import crew as crews
-from maneuver_automaton.fleet.crew import Crew, Task
+from maneuver_automaton.fleet.crew import Crew, Done, Task
 from maneuver_automaton.fleet.planning import _alone, _better, _in_order
 from maneuver_automaton.fleet.vehicles import vehicles_of
 from maneuver_automaton.scenario import load_scenario
@@ -64,6 +64,13 @@ def test_what_travels_comes_back_the_same():
         assert [way.cost for way in ways] == [way.cost for way in others]
         assert [way.trims.tolist() for way in ways] == [way.trims.tolist() for way in others]
     assert len(crews._FLEETS) <= crews.KEPT
+
+
+def test_nothing_comes_of_what_a_signal_broke_off():
+    fleet = fleets.random_fleet(4, 3)
+    crew = Crew(fleet, vehicles_of(fleet), 2, lambda function, pieces: iter(()))
+    tasks = [Task((k,), {}) for k in range(4)]
+    assert list(crew.each(_alone, tasks, Budget.from_now(1.0))) == [Done(None)] * 4
 
 
 def test_expansions_are_counted_wherever_they_are():

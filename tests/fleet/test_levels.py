@@ -32,7 +32,9 @@ from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.plotting.fleet_cast import cast_of
 from maneuver_automaton.plotting.fleet_distances import nearest_others
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.scenario import load_scenario
 from tests.fleet.fleets import car
+from tests.scenario.test_vehicles import SCENARIOS
 
 DRONE = UserModel(
     name="drone",
@@ -219,6 +221,21 @@ def test_a_moved_fleet_in_space_has_the_moved_plans():
         for name, plan in one.plans.items():
             assert other.plans[name].word == plan.word
             assert other.plans[name].durations == pytest.approx(plan.durations, abs=1e-5)
+
+
+@pytest.mark.slow
+def test_the_helicopter_of_the_airfield_flies_as_if_it_were_alone():
+    fleet = load_scenario(SCENARIOS / "fleets" / "airfield.yaml").fleet
+    number = fleet.names.index("helicopter")
+    single = FleetProblem([fleet.problems[number]], margin=fleet.margin)
+    alone = plan_fleet(single, time_limit=60.0, max_rounds=0)
+    together = plan_fleet(fleet, time_limit=60.0, max_rounds=0)
+    assert together.status is FleetStatus.FOUND
+    assert together.results["helicopter"].cost == alone.cost
+    assert verify_fleet(fleet, together.plans).passed
+    blind = [replace(one, body_height=(0.0, 0.0)) for one in fleet.problems[:number]]
+    tall = FleetProblem([*blind, fleet.problems[number]], names=fleet.names, margin=fleet.margin)
+    assert not verify_fleet(tall, together.plans).passed  # it is above somebody at some time
 
 
 @pytest.mark.slow
