@@ -175,6 +175,7 @@ def _loop(path: Path, scenario: Scenario, settings: Settings) -> ClosedLoop:
                 last=last,
                 stay=part.stay,
                 retimed=part.retimed,
+                pieces=part.pieces or 0,
                 gap=settings.gap,
                 progress=lambda _: advance(),
             )
@@ -213,6 +214,7 @@ def _statistics(path: Path, scenario: Scenario, out: Path, settings: Settings) -
                 time_limit=settings.time_limit or scenario.time_limit_s,
                 stay=part.stay,
                 retimed=part.retimed,
+                pieces=part.pieces or 0,
                 gap=settings.gap,
                 audit=bool(scenario.problem.obstacles),  # else nothing looks for collisions
                 jobs=settings.jobs,

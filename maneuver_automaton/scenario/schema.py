@@ -368,6 +368,9 @@ class RecedingHorizonPart(Part):
         0.0, description="a new word must be cheaper by more than this; 0: the optimum"
     )
     retimed: bool = Field(False, description="drive plans at the pace of uniform effort")
+    pieces: Count | None = Field(
+        None, description="parts of a plan with controls between those of the library; left out: 0"
+    )
     stay: bool = Field(False, description="go on within the goal's tolerance for all steps")
     disturbance: Disturbance | None = Field(
         None, description="{position_m, heading_rad, seed, ...}"
