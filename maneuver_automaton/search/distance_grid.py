@@ -86,13 +86,16 @@ def distance_grid(
     n = columns * rows
     half_diagonal = cell * math.sqrt(0.5)
     aim_x, aim_y = aim[:2].tolist()
+    most = 8 * n + 8  # each cell is reached once from each of its neighbours at most
+    memory = prepared.room(2 * n + 3 * most, np.int64)
+    keys, items, links = (memory[2 * n + k * most : 2 * n + (k + 1) * most] for k in range(3))
     grid = DistanceGrid(
-        value=prepared.room(n, np.int64),
-        rank=prepared.room(n, np.int64),
+        value=memory[:n],
+        rank=memory[n : 2 * n],
         mark=np.zeros(n, dtype=np.uint8),
-        keys=prepared.room(8 * n + 8, np.float64),
-        items=prepared.room(8 * n + 8, np.int64),
-        links=prepared.room(8 * n + 8, np.int64),
+        keys=keys.view(np.float64),
+        items=items,
+        links=links,
         heads=np.zeros(BUCKETS, dtype=np.int64),
         state=np.zeros(6, dtype=np.int64),
         origin_x=start_x,
