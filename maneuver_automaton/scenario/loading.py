@@ -100,13 +100,13 @@ def load_scenario(
     if statement.road is not None:
         vehicle = RoadVehicle() if beside is None else _road_vehicle(Path(beside))
         return RoadScenario(name=statement.name, scene=statement.road, vehicle=vehicle)
-    rest, settings = None, None
+    rest, settings, loop = None, None, None
     if beside is not None:
         stated = statement.fleet[0] if statement.fleet else statement
         document = _beside(Path(beside), start=stated.start, goal=stated.goal)
         with _told_of_beside():
             if statement.fleet:
-                document, settings = without_fleet(document)
+                document, settings, loop = without_fleet(document)
             rest = scenario_of_document(document, path=Path(beside), begin=begin, own=model)
     elif model is not None:
         raise InvalidScenario(
@@ -114,7 +114,7 @@ def load_scenario(
         )
     scenario: Scenario | FleetScenario
     if statement.fleet:
-        scenario = fleet_of_statement(statement, rest, path=path, settings=settings)
+        scenario = fleet_of_statement(statement, rest, path=path, settings=settings, loop=loop)
     else:
         scenario = combined(statement, rest, path=path)
     made = scenario.timing_s.get("automaton", 0.0)

@@ -140,6 +140,7 @@ def _several(
             **({"priority": priority} if priority else {}),
             **({"leaves": True} if leaves else {}),
             **{key: value for key, value in one.items() if written.get(key) != _flow(value)},
+            **_loop_of(scenario, name),
         }
         for name, priority, leaves, one in zip(
             fleet.names, fleet.priority, fleet.leaves, alone, strict=True
@@ -147,6 +148,13 @@ def _several(
     ]
     settings = scenario.settings.model_dump() | {"between_m": fleet.margin}
     return {"vehicles": rows, "fleet": settings}
+
+
+def _loop_of(scenario: FleetScenario, name: str) -> dict[str, Any]:
+    """What happens to a vehicle in closed loop, if that is stated."""
+    if name not in scenario.loops:
+        return {}
+    return {"receding_horizon": scenario.loops[name].model_dump(exclude_none=True)}
 
 
 def _vehicle(scenario: Scenario) -> dict[str, Any]:
