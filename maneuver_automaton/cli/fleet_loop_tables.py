@@ -19,7 +19,8 @@ def print_fleet_loop(name: str, log: FleetLog, driven: DrivenVerdict, *, folder:
     """Every step, every vehicle, and how it ended."""
     out = console()
     spent = _spent(log)
-    rows = [_step_row(step, cost) for step, cost in zip(log.steps, spent, strict=True)]
+    values = log.values.tolist()
+    rows = [_step_row(*row) for row in zip(log.steps, values, spent, strict=True)]
     columns = ["", "time [s]", "value", "spent", "apart [m]", "swaps", "asked", "events",
                "solved [ms]"]  # fmt: skip
     if rows:
@@ -34,19 +35,18 @@ def print_fleet_loop(name: str, log: FleetLog, driven: DrivenVerdict, *, folder:
 
 def _spent(log: FleetLog) -> list[float]:
     """What all had spent before each step."""
-    problems = dict(zip(log.problem.names, log.problem.problems, strict=True))
     costs = np.zeros(len(log.steps))
-    for name, problem in problems.items():
-        for step, piece in log.pieces_of(name).items():
-            costs[step] += problem.cost_of(piece) if piece.trims else 0.0
+    for name in log.problem.names:
+        for step, cost in log.costs_of(name).items():
+            costs[step] += cost
     return [float(cost) for cost in np.cumsum(costs) - costs]
 
 
-def _step_row(step: FleetStep, spent: float) -> list[str]:
+def _step_row(step: FleetStep, value: float, spent: float) -> list[str]:
     return [
         str(step.number),
         f"{step.time:.6g}",
-        "" if math.isinf(step.value) else f"{step.value:.6g}",
+        "" if math.isinf(value) else f"{value:.6g}",
         f"{spent:.6g}",
         "" if math.isinf(step.distance_m) else f"{step.distance_m:.3g}",
         _several([" and ".join(swap.names) for swap in step.swaps]),
@@ -71,8 +71,6 @@ def _several(names: list[str] | tuple[str, ...]) -> str:
 
 def _vehicle_row(log: FleetLog, driven: DrivenVerdict, name: str) -> list[str]:
     arrived = log.arrived_s.get(name)
-    problem = log.problem.problems[log.problem.names.index(name)]
-    pieces = [piece for piece in log.driven[name] if piece.trims]
     swaps = sum(name in swap.names for _, swap in log.swaps)
     off = max((step.off_plan[name] for step in log.steps if name in step.off_plan), default=0.0)
     status = "under way" if arrived is None else "arrived"
@@ -82,7 +80,7 @@ def _vehicle_row(log: FleetLog, driven: DrivenVerdict, name: str) -> list[str]:
         name,
         status if log.driven[name] or arrived is not None else "not there",
         "" if arrived is None else f"{arrived:.6g}",
-        f"{math.fsum(map(problem.cost_of, pieces)):.6g}",
+        f"{math.fsum(log.costs_of(name).values()):.6g}",
         str(swaps),
         f"{off:.2g}",
         "" if math.isinf(clearance) else f"{clearance:.3g}",

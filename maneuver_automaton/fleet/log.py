@@ -18,6 +18,7 @@ from maneuver_automaton.automaton.cutting import NOTHING, head_of, with_samples_
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import Closest
 from maneuver_automaton.models import Model
+from maneuver_automaton.problem import Problem
 
 
 class FleetGuarantee(enum.Enum):
@@ -155,6 +156,29 @@ class FleetLog:
         return dict(zip(driving, self.driven[name], strict=True))
 
     @property
+    def values(self) -> Array:
+        """What all had left to pay when each step began (n,); inf if somebody held no such plan.
+
+        Who has broken down counts no more.
+        """
+        lost = set(self.broken_down)
+        return np.array(
+            [
+                math.fsum(
+                    value
+                    for name, value in step.values.items()
+                    if value < math.inf or name not in lost
+                )
+                for step in self.steps
+            ]
+        )
+
+    def costs_of(self, name: str) -> dict[int, float]:
+        """Cost of these pieces: a disturbed vehicle pays for what it was told to drive."""
+        problem = self.problem.problems[self.problem.names.index(name)]
+        return {k: _cost(problem, piece) for k, piece in self.pieces_of(name).items()}
+
+    @property
     def reached(self) -> bool:
         """Whether everybody who can has arrived."""
         return self.status == "reached"
@@ -188,3 +212,15 @@ class FleetLog:
         for step in self.steps:
             for swap in step.swaps:
                 yield step.number, swap
+
+
+def _cost(problem: Problem, piece: Plan) -> float:
+    """Cost of a piece at the velocities of the library."""
+    if not piece.trims:
+        return 0.0
+    known = problem.automaton
+    if not piece.maneuvers:
+        trims = tuple(known[t.name] if t.name in known.trim_names else t for t in piece.trims)
+        lasting: list[float] = piece.durations.tolist()
+        piece = Plan.of_parts(piece.start, trims, lasting, start_time=piece.start_time)
+    return float(problem.cost_of(piece))

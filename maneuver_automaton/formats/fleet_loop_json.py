@@ -136,14 +136,14 @@ def _steps(log: FleetLog, vehicles: Mapping[str, Any]) -> list[dict[str, Any]]:
     spent = {name: {e["time_s"]: e for e in one["steps"]} for name, one in vehicles.items()}
     known = dict.fromkeys(vehicles, 0.0)
     rows = []
-    for step in log.steps:
+    for step, value in zip(log.steps, log.values.tolist(), strict=True):
         for name, entries in spent.items():
             if step.time in entries:
                 known[name] = entries[step.time]["accumulated_cost"]
         rows.append(
             {
                 "time_s": float(step.time),
-                "value": finite_number(step.value),
+                "value": finite_number(value),
                 "accumulated_cost": math.fsum(known.values()),
                 "number": step.number,
                 "swaps": [_swap(one) for one in step.swaps],
@@ -162,7 +162,9 @@ def _steps(log: FleetLog, vehicles: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def _ended(log: FleetLog, vehicles: Mapping[str, Any]) -> dict[str, Any]:
     last = [one["steps"][-1] for one in vehicles.values()]
-    values = [one["value"] for one in last]
+    values = [
+        one["steps"][-1]["value"] for name, one in vehicles.items() if name not in log.broken_down
+    ]
     return {
         "time_s": float(log.times[-1]),
         "value": None if None in values else math.fsum(values),
@@ -197,8 +199,7 @@ def _broken(violation: FleetViolation) -> dict[str, Any]:
 def _vehicle(log: FleetLog, name: str, problem: Problem) -> dict[str, Any]:
     """What one vehicle did, as closed_loop.json of one vehicle says it."""
     automaton, pieces = problem.automaton, log.pieces_of(name)
-    costs = [_cost(problem, one) for one in pieces.values()]
-    spent = list(accumulate(costs, initial=0.0))
+    spent = list(accumulate(log.costs_of(name).values(), initial=0.0))
     rows, held = [], None
     for cost, (k, piece) in zip(spent, pieces.items(), strict=False):
         step = log.steps[k]
@@ -260,19 +261,6 @@ def _is_other(piece: Plan, plan: Plan) -> bool:
     )
 
 
-def _cost(problem: Problem, piece: Plan) -> float:
-    """Cost of a piece, which a disturbed vehicle is told to drive at the library's velocities."""
-    if not piece.trims:
-        return 0.0
-    known = problem.automaton
-    if not piece.maneuvers:
-        trims = tuple(known[t.name] if t.name in known.trim_names else t for t in piece.trims)
-        piece = Plan.of_parts(
-            piece.start, trims, piece.durations.tolist(), start_time=piece.start_time
-        )
-    return float(problem.cost_of(piece))
-
-
 def _last_row(log: FleetLog, name: str, problem: Problem, cost: float) -> dict[str, Any]:
     """Where a vehicle ended: at the end of the loop, or where it left."""
     when, pose, value = _end_of(log, name, problem)
@@ -295,5 +283,5 @@ def _end_of(log: FleetLog, name: str, problem: Problem) -> tuple[float, Array, f
     gone = next((step for step in log.steps[k + 1 :] if name in step.plans), None)
     if gone is not None:  # it has arrived, and left
         return float(gone.time), gone.poses[name], 0.0
-    value = 0.0 if name in log.arrived_s else log.steps[k].values[name] - _cost(problem, piece)
+    value = 0.0 if name in log.arrived_s else log.steps[k].values[name] - log.costs_of(name)[k]
     return float(log.times[k + 1]), piece.end, max(value, 0.0)
