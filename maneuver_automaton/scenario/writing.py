@@ -177,14 +177,19 @@ def json_schema() -> dict[str, Any]:
     one = _without_null(ScenarioFile.model_json_schema(by_alias=True))
     several = _without_null(FleetFile.model_json_schema(by_alias=True))
     kinds = [kind["required"] for kind in (one, several)]
+    loops = [kind["properties"]["receding_horizon"] for kind in (one, several)]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         **one,
         "$defs": several["$defs"] | one["$defs"],
         "properties": one["properties"]
-        | {key: several["properties"][key] for key in ("vehicles", "fleet")},
+        | {key: several["properties"][key] for key in ("vehicles", "fleet")}
+        | {"receding_horizon": {"anyOf": loops, "description": "only for mpc"}},
         "required": [key for key in kinds[0] if key in kinds[1]],
-        "oneOf": [{"required": keys} for keys in kinds],
+        "oneOf": [
+            {"required": keys, "properties": {"receding_horizon": loop}}
+            for keys, loop in zip(kinds, loops, strict=True)
+        ],
         "dependentRequired": {"fleet": ["vehicles"]},
     }
 
