@@ -18,7 +18,7 @@ from matplotlib.patches import Patch
 from maneuver_automaton.fleet import FleetLog
 from maneuver_automaton.plotting.closed_loop import MOST_REASONS, TEXT_WIDTH
 from maneuver_automaton.plotting.closed_loop_plane import JUMP, JUMP_STYLE, NEW_STYLE
-from maneuver_automaton.plotting.closed_loop_time import BROKEN, SPENT
+from maneuver_automaton.plotting.closed_loop_time import BROKEN
 from maneuver_automaton.plotting.colors import GREY, INK, shaded
 from maneuver_automaton.plotting.controls import TIME_LABEL
 from maneuver_automaton.plotting.fleet import reasons
@@ -123,7 +123,7 @@ def draw_fleet_values(ax: Axes, log: FleetLog, cast: Cast) -> None:
         zorder=2.0,
     )  # fmt: skip
     total = known.sum(axis=0) + spent
-    ax.plot(times, spent, color=SPENT, linewidth=1.4, zorder=2.6)
+    ax.plot(times, spent, color=GREY, linewidth=1.6, zorder=2.6)
     ax.plot(times, total, color=INK, linewidth=1.0, dashes=(4, 2), zorder=2.8)
     broken = [k for k, step in enumerate(log.steps) if step.violations]
     ax.scatter(
@@ -186,7 +186,7 @@ def _entries(log: FleetLog, cast: Cast, *, curve: bool) -> tuple[list[Artist], l
         more.append((_dot("x", face=INK), "plan void"))
     more += [
         (Patch(facecolor=shaded(GREY, VALUE)), "left to pay"),
-        (line_handle(SPENT, width=1.4), "spent"),
+        (line_handle(GREY, width=1.6), "spent"),
     ]
     both = line_handle(INK, width=1.0)
     both.set_linestyle((0, (4, 2)))
