@@ -122,6 +122,26 @@ def load_scenario(
     return replace(scenario, timing_s={"load": load, "automaton": made})
 
 
+def load_roads(path: Path | str, *, beside: Path | str | None = None) -> tuple[RoadScenario, ...]:
+    """The drives on roads of a CommonRoad file, one for each of its planning problems.
+
+    `plan_roads` takes their scenes.
+
+    Raises
+    ------
+    InvalidScenario
+        As `load_scenario`.
+    """
+    from maneuver_automaton.formats.commonroad import read_commonroad
+
+    vehicle = RoadVehicle() if beside is None else _road_vehicle(Path(beside))
+    return tuple(
+        RoadScenario(name=one.name, scene=one.road, vehicle=vehicle)
+        for one in read_commonroad(Path(path))
+        if one.road is not None
+    )
+
+
 def _road_vehicle(beside: Path) -> RoadVehicle:
     """The vehicle of a scenario beside a drive on roads."""
     anywhere, begin = np.zeros(3), time.perf_counter()  # the scene states its own
