@@ -25,14 +25,14 @@ def fleet_planned(path: Path, document: Mapping[str, Any], parts: Parts) -> Flee
     """
     from maneuver_automaton.scenario import FleetScenario
 
-    file, its = _source(path, document, parts)
+    file, its = source_of(path, document, parts)
     scenario = problem_of(file, its)
     if not isinstance(scenario, FleetScenario):
         raise InvalidScenario(f"{path}: holds plans of several vehicles, but {file} states one")
     return scenario
 
 
-def _source(path: Path, document: Mapping[str, Any], parts: Parts) -> tuple[Path, Parts]:
+def source_of(path: Path, document: Mapping[str, Any], parts: Parts) -> tuple[Path, Parts]:
     """The file that plans were made from, and what completes it: by --with, or as they say."""
     if parts.beside is not None:
         return parts.beside, replace(parts, beside=None)

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection
 from matplotlib.patches import Patch
 
-from maneuver_automaton.plotting.colors import Color, fleet_colors
+from maneuver_automaton.plotting.colors import INK, Color, fleet_colors
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.obstacles import MOVING, SOLID
 from maneuver_automaton.plotting.pages import (
@@ -23,6 +24,7 @@ from maneuver_automaton.plotting.pages import (
     title_lines,
     write_figure,
 )
+from maneuver_automaton.plotting.regions import shape_path
 from maneuver_automaton.plotting.roads import (
     FLATTEST,
     HIGHEST,
@@ -92,6 +94,7 @@ def save_road_fleet_figure(
         there = moments[(moments >= begin) & (moments <= end)]
         times = [*there.tolist(), *([end] if there.size == 0 or there[-1] < end else [])]
         draw_drive(plane, vehicle, plan, times, color=colors[name])
+        plane.add_collection(_goals(scenes[name], colors[name]), autolim=False)
         _draw_speed(speed, result, name, colors[name])
     set_road_view(plane, low, high)
     tidy(speed, x="time [s]", y="speed [m/s]")
@@ -104,8 +107,20 @@ def _draw_speed(ax: Axes, result: RoadFleetResult, name: str, color: Color) -> N
 
 
 def _others(scene: RoadScene, names: set[str]) -> RoadScene:
-    """A scene without the vehicles that are planned, which are among its road users."""
-    return replace(scene, traffic=tuple(one for one in scene.traffic if one.name not in names))
+    """A scene without goals, and without the vehicles that are planned: they are road users too."""
+    return replace(
+        scene,
+        goals=tuple(replace(goal, places=None) for goal in scene.goals),
+        traffic=tuple(one for one in scene.traffic if one.name not in names),
+    )
+
+
+def _goals(scene: RoadScene, color: Color) -> PathCollection:
+    paths = [shape_path(place) for goal in scene.goals for place in goal.places or ()]
+    return PathCollection(
+        paths, facecolors="none", edgecolors=[color], linewidths=1.0, linestyles=[(0, (4, 3))],
+        zorder=1.2,
+    )  # fmt: skip
 
 
 def _headline(result: RoadFleetResult) -> str:
@@ -123,6 +138,8 @@ def _entries(
     """Handles and names of the vehicles, of lanes and of what else is there."""
     handles: list[Artist] = [line_handle(colors[name], width=3.4) for name in result.plans]
     names = [f"problem {name}" for name in result.plans]
+    handles.append(Patch(facecolor="none", edgecolor=INK, linestyle=(0, (4, 3))))
+    names.append("goal")
     rows = [(LANE, "lane", True)]
     rows.append((MOVING, "traffic, the later the darker", any(o.motion for o in others.traffic)))
     rows.append((SOLID, "obstacle", any(o.motion is None for o in others.traffic)))
