@@ -82,7 +82,7 @@ def verify_driven(log: FleetLog) -> DrivenVerdict:
     >>> rows = [Problem(robot, [0, y, 0], [2, y, 0], footprint=Disc(0.3)) for y in (0.0, 1.0)]
     >>> log = simulate_fleet(FleetProblem(rows, names=["a", "b"]), step=0.5, first_time_limit=1.0)
     >>> verdict = verify_driven(log)
-    >>> verdict.passed, round(verdict.distance_m, 4), verdict.closest[0].pair
+    >>> verdict.passed, round(verdict.distance_m, 3), verdict.closest[0].pair
     (True, 0.4, ('a', 'b'))
     """
     fleet, edges = log.problem, log.times
