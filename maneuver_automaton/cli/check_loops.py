@@ -14,6 +14,7 @@ from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.fleet_tables import pair_text
 from maneuver_automaton.cli.inputs import Parts
 from maneuver_automaton.cli.planned import fleet_planned
+from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.fleet import DrivenVerdict, FleetLog, verify_driven
 from maneuver_automaton.fleet.driven import FINE
 from maneuver_automaton.formats.fleet_loop_reading import load_fleet_loop
@@ -37,14 +38,19 @@ def findings(
     """
     scenario = fleet_planned(path, document, parts)
     log = load_fleet_loop(path, scenario.fleet)
-    with announced():
-        verdict = verify_driven(log)
-    rows = [
-        one
-        for name, problem in zip(log.problem.names, log.problem.problems, strict=True)
-        for one in _vehicle(log, verdict, name, problem, document["vehicles"][name])
-    ]
-    return scenario.name, iter([*rows, *_together(log, verdict, document)])
+    try:
+        with announced():
+            verdict = verify_driven(log)
+        rows = [
+            one
+            for name, problem in zip(log.problem.names, log.problem.problems, strict=True)
+            for one in _vehicle(log, verdict, name, problem, document["vehicles"][name])
+        ]
+        rows += _together(log, verdict, document)
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
+        said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
+        raise InvalidScenario(f"{path}: {said}") from error
+    return scenario.name, iter(rows)
 
 
 def _vehicle(
@@ -53,7 +59,9 @@ def _vehicle(
     """Whether it begins and ends where the file says, drove as its model does, and hit nothing."""
     pieces = list(log.pieces_of(name).values())
     if not pieces:
-        yield Finding(what=f"{name}: driven", holds=None, words="it was never there")
+        claims = name in log.arrived_s
+        words = "it was never there" + (", but the file says that it arrived" if claims else "")
+        yield Finding(what=f"{name}: driven", holds=False if claims else None, words=words)
         return
     cost = math.fsum(log.costs_of(name).values())
     off = float(np.abs(pieces[0].start - problem.start).max())

@@ -59,7 +59,8 @@ def _judged(path: Path, log: FleetLog, driven: DrivenVerdict) -> int:
     for name, said in driven.defects.items():
         complain(f"{path}: {name} did not drive as its model says: {said}")
     if not log.reached:
-        complain(f"{path}: {log.status}: {log.reason}")
+        when = ", when the loop was interrupted" if stopped() else ""
+        complain(f"{path}: {log.status}: {log.reason}{when}")
     return FOUND if log.reached and driven.passed and not broken else NO_PLAN
 
 

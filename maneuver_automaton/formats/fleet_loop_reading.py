@@ -66,9 +66,9 @@ def load_fleet_loop(path: Path | str, fleet: FleetProblem) -> FleetLog:
         did = {}
         for name, problem in problems.items():
             place = f"vehicles.{name}: "
-            did[name] = _did(stated[name]["steps"][:-1], problem.automaton)
+            did[name] = _did(_applied(stated[name]["steps"]), problem.automaton)
         place = ""
-        steps = [_step(k, row, did) for k, row in enumerate(document["steps"][:-1])]
+        steps = [_step(k, row, did) for k, row in enumerate(_applied(document["steps"]))]
         _check_times(steps)
         pieces = {}
         for name, problem in problems.items():
@@ -103,6 +103,13 @@ def load_fleet_loop(path: Path | str, fleet: FleetProblem) -> FleetLog:
 
 def _hash_of(entry: Any) -> Any:
     return entry.get("automaton_hash") if isinstance(entry, dict) else None
+
+
+def _applied(rows: Any) -> Sequence[Row]:
+    """The steps but the last entry, which says where it ended."""
+    if not isinstance(rows, list) or not rows:
+        raise ValueError(f"steps: got {shown(rows)}, need a list of steps")
+    return rows[:-1]
 
 
 def _did(rows: Sequence[Row], automaton: Automaton) -> dict[int, tuple[Row, Plan, Plan]]:
