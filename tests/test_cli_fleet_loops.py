@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.receding_horizon import Disturbance
 from maneuver_automaton.scenario import load_scenario, to_yaml
 from tests.scenario.files import SCENARIO
-from tests.test_cli_fleets import FLEET
+from tests.test_cli_fleets import FLEET, SCENARIOS
 from tests.test_cli_mpc import LOOP as ONE
 
 NEAR = "tolerance_m: 0.05, tolerance_rad: 0.05}"
@@ -199,6 +200,18 @@ class TestMpc:
         rows = [row.split()[:2] for row in printed.splitlines() if ".yaml " in row]
         assert rows == [["fleet.yaml", "reached"], ["one.yaml", "reached"]]
         assert document("out/fleet")["kind"] == "fleet"
+
+
+@pytest.mark.parametrize(
+    "file",
+    [one for one in SCENARIOS if "receding_horizon:" in one.read_text()],
+    ids=lambda f: f.stem,
+)
+def test_every_scenario_with_a_loop(file, folder):
+    text = re.sub(r"(fleet: .*time_limit_s: )[0-9.]+", r"\g<1>1.0", file.read_text())
+    Path("y.yaml").write_text(text)
+    assert run(["mpc", "y.yaml", "--quiet", "--no-plot", "--time-limit", "1"]) == 0
+    assert run(["check", "out/closed_loop.json"]) == 0
 
 
 def _moved(scenario, by):

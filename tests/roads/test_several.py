@@ -155,6 +155,14 @@ class TestCommands:
         said = "road.xml: two planning problems have one id, need distinct ids\n"
         assert capsys.readouterr().err == said
 
+    def test_other_commands_do_not_read_it(self, folder, capsys):
+        assert run(["plan", "road.xml", "--quiet", "--no-plot"]) == 0
+        for command in ("check", "plot"):
+            assert run([command, "out/plan.json"]) == 2
+            assert capsys.readouterr().err == (
+                "out/plan.json: holds plans on the road of road.xml, which only export reads\n"
+            )
+
     @quiet
     def test_a_solution_of_all(self, folder):
         pytest.importorskip("commonroad.common.solution")
