@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.fleet.levels import levels_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.fleet_cast import Cast, Member
 
@@ -51,7 +50,8 @@ def nearest_others(members: Sequence[Member], times: Array) -> Array:
         for ring, grown in part.rings
     ]
     owners = np.array([owner for owner, *_ in rows])
-    there = np.array([times <= members[owner].gone_after for owner in owners])  # (parts, n)
+    seen = [[one.is_there(time) for time in times.tolist()] for one in members]
+    there = np.array(seen)[owners]  # (parts, n)
     heights = np.array([_heights(one, times) for one in members])[owners]  # (parts, n, 2)
     apart = np.full((len(times), len(members)), np.inf)
     chunk = max(1, AT_ONCE // len(rows) ** 2)
@@ -66,10 +66,11 @@ def nearest_others(members: Sequence[Member], times: Array) -> Array:
 
 def _heights(one: Member, times: Array) -> Array:
     """Lowest and highest point of a vehicle at times (n,) [s]: (n, 2) [m], infinite if any."""
-    levels = levels_of(one.problem, one.plan)
-    if levels is None:
-        return np.tile([-np.inf, np.inf], (len(times), 1))
-    return np.add.outer(levels.at(times), levels.body)
+    low, high = one.problem.body_height
+    altitude = one.parts[0].motion.pose_at(times)[:, 3:].sum(axis=1)  # 0 in the plane
+    if one.problem.start.size == 3 and not low < high:
+        low, high = -np.inf, np.inf
+    return np.column_stack([altitude + low, altitude + high])
 
 
 def _nearest(
