@@ -37,6 +37,8 @@ class Agreement:
     lost: Lost | None = None
     tries: int = 3  # to be heard, and to hear an answer, in a step
     expected: dict[int, dict[int, list[Found]]] = field(default_factory=dict)
+    # Of whom an emergency was not heard: the first drives what the second does not expect.
+    unheard: set[tuple[int, int]] = field(default_factory=set)
     step: int = 0
     sent: int = 0
 
@@ -69,6 +71,7 @@ class Agreement:
         self.expected.pop(k, None)
         for others in self.expected.values():
             others.pop(k, None)
+        self.unheard = {pair for pair in self.unheard if k not in pair}
 
     def agree(self, k: int, found: Found, holds: Found, refuses: Callable[[int], bool]) -> bool:
         """Whether all others agree that a vehicle drives another plan than the one it holds.
@@ -100,27 +103,52 @@ class Agreement:
         return False
 
     def announce(self, k: int, found: Found) -> None:
-        """A vehicle drives another plan, whether the others agree or not."""
-        self._tell(k, found, "drives")
+        """A vehicle drives another plan, whether the others agree or not.
+
+        It says so until each acknowledges it, some times. Whoever has not heard of it asks in vain
+        for another plan of its own: the vehicle refuses, as that is proven past its old one.
+        """
+        for j in self.expected:
+            if j == k:
+                continue
+            self.unheard.add((k, j))
+            for _ in range(self.tries):
+                if not self._say(k, j, "drives"):
+                    continue
+                self._expect(j, k, found)
+                if self._say(j, k, "agrees"):
+                    break
+
+    def knows(self, j: int, k: int, found: Found) -> bool:
+        """Whether a vehicle expects a plan of another one."""
+        return any(one.course is found.course for one in self.expected[j].get(k, ()))
+
+    def _expect(self, j: int, k: int, found: Found) -> None:
+        """A vehicle knows for sure what another one drives."""
+        self.expected[j][k] = [found]
+        self.unheard.discard((k, j))
 
     def others_of(self, k: int) -> dict[int, list[Found]]:
         """The plans that a vehicle expects of each of the others."""
         return self.expected[k]
 
     def unknown(self, held: Mapping[int, Found]) -> list[tuple[int, int]]:
-        """Pairs of which the first does not expect of the second what that drives."""
+        """Pairs of which the first does not expect of the second what that drives.
+
+        But for those that have not heard of an emergency.
+        """
         return [
             (j, k)
-            for j, others in self.expected.items()
+            for j in self.expected
             for k, found in held.items()
-            if k != j and not any(one.course is found.course for one in others.get(k, ()))
+            if k != j and (k, j) not in self.unheard and not self.knows(j, k, found)
         ]
 
     def _tell(self, sender: int, found: Found, kind: Kind) -> None:
         """A vehicle says to all others which plan it drives."""
         for receiver in self.expected:
             if receiver != sender and self._say(sender, receiver, kind):
-                self.expected[receiver][sender] = [found]
+                self._expect(receiver, sender, found)
 
     def _say(self, sender: int, receiver: int, kind: Kind) -> bool:
         """Whether a message arrives."""

@@ -16,6 +16,9 @@ from maneuver_automaton.fleet.guarantees import After, Before, broken, gap_betwe
 from maneuver_automaton.fleet.held import (
     LATER,
     arrival,
+    begin_of,
+    distance_to_obstacles,
+    given_up,
     is_over,
     leads,
     left_to_pay,
@@ -29,17 +32,21 @@ from maneuver_automaton.fleet.held import (
 )
 from maneuver_automaton.fleet.log import FleetGuarantee, FleetStep, FleetViolation, Swap
 from maneuver_automaton.fleet.problem import FleetProblem
+from maneuver_automaton.fleet.tracking import back_onto
 from maneuver_automaton.fleet.vehicle import LONG, QUICK, Found, Vehicle
+from maneuver_automaton.fleet.verdict import nearest
 from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.settings import EXACT
 
 Around = tuple[tuple[int, int], ...]  # who is there, and which plan it holds
+Other = tuple[int, Found]  # a plan that another one may drive, and who that is
 
 NEARLY = 0.005  # share of its cost: a plan rejoined that is no dearer is the same one
 WORTH = 1e-6  # share of its cost that another plan saves at least
 EASED = (1.0, 0.5, 0.0)  # shares of the margin, where a void plan has none that keeps all of it
 SHARES = (0.5, 1.0, 2.0)  # of a step, when it is looked at how far a plan is beside another one
 LEAST = 1e-3  # [m] kept even then
+ROUNDING = 2e-4  # [m] less than two bodies are apart, which the kernels can still prove
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -73,6 +80,7 @@ class LoopState:
     settled: dict[int, int] = field(default_factory=dict)  # no way alone is cheaper than this one
     in_vain: dict[int, Around] = field(default_factory=dict)  # past these nothing was found
     due: dict[int, tuple[int, Found, Found]] = field(default_factory=dict)  # when, what, for what
+    crossing: set[tuple[int, int]] = field(default_factory=set)  # whose plans are not apart
     last: FleetStep | None = None
 
 
@@ -101,6 +109,10 @@ class FleetStepUnderWay:
         self.disturbed: set[int] = set()  # who has another plan not by an exchange of its own
         self.in_group: set[int] = set()
         self.beside: dict[int, Plan] = {}  # driven, within the tube of the plan that is held
+        # Pairs that stand nearer to each other than the margin keep what they have [m], and who
+        # stands nearer to an obstacle than its own.
+        self.pressed: dict[tuple[int, int], float] = {}
+        self.near: dict[int, float] = {}
         self._left: dict[int, tuple[Found, Course]] = {}  # what is left of courses, by identity
 
     def run(self, broken_down: set[int]) -> FleetStep:
@@ -128,24 +140,37 @@ class FleetStepUnderWay:
             known = self._left[id(found)] = (found, found.course.after(self.time))
         return known[1]
 
-    def _first_meeting(self, found: Found, others: Collection[Found], keep: float) -> float:
-        """When a plan first comes within a distance [m] of one of others [s]; inf if never."""
-        if not others:
-            return math.inf
-        courses = {n: self._course(one) for n, one in enumerate((found, *others))}
-        met = meetings(courses, keep=keep, among=[0], frame=self.frame)
-        return min((row.time for row in met), default=math.inf)
+    def _keep_of(self, k: int, j: int) -> float:
+        """What two vehicles have to keep [m]: the margin, or what they have now if that is less."""
+        return self.pressed.get((min(k, j), max(k, j)), self.keep)
 
-    def _is_proven(self, k: int, found: Found, others: Collection[Found]) -> bool:
+    def _first_meeting(
+        self, k: int, found: Found, others: Collection[Other], most: float = math.inf
+    ) -> float:
+        """When a plan first comes too near to one of others [s]; inf if never.
+
+        Nearer than two vehicles have to keep, or than a distance `most` [m] that is less.
+        """
+        first = math.inf
+        keeps = [min(self._keep_of(k, j), most) for j, _ in others]
+        for keep in dict.fromkeys(keeps):
+            seen = [one for (_, one), own in zip(others, keeps, strict=True) if own == keep]
+            courses = {n: self._course(one) for n, one in enumerate((found, *seen))}
+            met = meetings(courses, keep=keep, among=[0], frame=self.frame)
+            first = min([first, *(row.time for row in met)])
+        return first
+
+    def _is_proven(self, k: int, found: Found, others: Collection[Other]) -> bool:
         """Whether a plan keeps apart from others, and is free of what is not of the fleet."""
-        if self._first_meeting(found, others, self.keep) < math.inf:
+        if self._first_meeting(k, found, others) < math.inf:
             return False
-        return not why_not_free(self.vehicles[k], self._course(found))
+        keep = self.near.get(k, math.inf)
+        return not why_not_free(self.vehicles[k], self._course(found), keep)
 
-    def _expected_by(self, k: int, but: Collection[int] = ()) -> list[Found]:
-        """All plans that others may drive, as a vehicle knows it."""
+    def _expected_by(self, k: int, but: Collection[int] = ()) -> list[Other]:
+        """All plans that others may drive, as a vehicle knows it, each with its number."""
         known = self.state.agreement.others_of(k)
-        return [one for j, some in known.items() if j not in but for one in some]
+        return [(j, one) for j, some in known.items() if j not in but for one in some]
 
     def _flag(self, guarantee: FleetGuarantee, numbers: Sequence[int], reason: str) -> None:
         names = tuple(self.vehicles[k].name for k in numbers)
@@ -162,9 +187,10 @@ class FleetStepUnderWay:
             first = self.state.first.pop(k, None)
             if first is not None and self._off(k, first) == 0.0:
                 choices.insert(0, first)
-            others = {id(one): one for one in self.held.values()}
+            others = {(j, id(one)): (j, one) for j, one in self.held.items()}
             for known in agreement.expected.values():
-                others.update({id(one): one for some in known.values() for one in some})
+                others.update({(j, id(one)): (j, one) for j, some in known.items() for one in some})
+            others = {key: other for key, other in others.items() if key[0] in self.held}
             for found in choices:
                 proven = self._is_proven(k, found, list(others.values()))
                 if proven and (at_first or agreement.enter(k, found, self.held)):
@@ -191,7 +217,7 @@ class FleetStepUnderWay:
             # It stays where it is, or where its plan ends, and looks for another one.
             stay = resting(self.vehicles[k], self.poses[k], self.time)
             if not (self._is_proven(k, stay, self._expected_by(k)) and self._agreed(k, stay)):
-                stay = replace(found, cost=math.inf)
+                stay = given_up(found)
             self._hold(k, stay)
 
     def _hold(self, k: int, found: Found) -> None:
@@ -214,21 +240,72 @@ class FleetStepUnderWay:
 
     def _rejoin(self) -> None:
         """Those off their plans by no more than their tubes rejoin them; the others' are void."""
+        self.off = {k: self._off(k, found) for k, found in self.held.items()}
+        self._note_pressed()
         for k, found in self.held.items():
-            self.off[k] = off = self._off(k, found)
+            off = self.off[k]
             if k in self.state.broken or off == 0.0:
                 continue
             if off > self.state.settings.tube_m:
-                self.void.append(k)
+                self._make_void(k)
             elif k not in self.state.arrived:
                 self._rejoin_within(k, found)
+        self._note_crossing()
+
+    def _make_void(self, k: int) -> None:
+        """A plan is void."""
+        if k in self.void:
+            return
+        self.void.append(k)
+        self._note_near(k)
+
+    def _note_near(self, k: int) -> None:
+        """Who stands nearer to an obstacle than its margin keeps what it has."""
+        vehicle, here = self.vehicles[k], self._standing(k)
+        if why_not_free(vehicle, here):
+            least = min(distance_to_obstacles(vehicle, here), vehicle.problem.margin)
+            self.near[k] = max(least - ROUNDING, 0.0)
+
+    def _standing(self, k: int) -> Course:
+        """A vehicle where its plans begin, for ever."""
+        return resting(self.vehicles[k], self._begin(k), self.time).course
+
+    def _note_pressed(self) -> None:
+        """Pairs that stand nearer to each other than the margin: on their plans, or measured."""
+        standing = {k: self._standing(k) for k in self.held}
+        for row in meetings(standing, keep=self.keep, frame=self.frame):
+            least = nearest(standing[row.one], standing[row.other]).distance
+            self.pressed[row.one, row.other] = max(min(least, self.keep) - ROUNDING, 0.0)
+        for k, found in self.held.items():
+            if not leads(found) and k not in self.state.broken:
+                self._note_near(k)
+
+    def _note_crossing(self) -> None:
+        """Plans that lead too near to others since the last step are void, if that is known.
+
+        Whoever had not heard of another one's emergency drove on.
+        """
+        for one, other in sorted(self.state.crossing):
+            if one not in self.held or other not in self.held:
+                continue
+            if {one, other} & {*self.void} or {one, other} <= self.state.broken:
+                continue
+            if self._first_meeting(one, self.held[one], [(other, self.held[other])]) == math.inf:
+                continue
+            able = [k for k in (other, one) if k not in self.state.broken]
+            moves = [k for k in able if not is_over(self.held[k], self.time)]
+            for k, j in ((one, other), (other, one)):
+                if k in (moves or able) and self.state.agreement.knows(k, j, self.held[j]):
+                    self._make_void(k)
+                    break
 
     def _rejoin_within(self, k: int, found: Found) -> None:
         others, left = self._expected_by(k), self._left_to_pay(k)
         choices = list(rejoined(self.vehicles[k], found, self.time, self.poses[k]))
         again = next((one for one in choices if self._is_proven(k, one, others)), None)
         if again is None or not self._agreed(k, again):
-            self._drive_beside(k, found, choices)
+            if not self._drive_beside(k, found, choices):
+                self._make_void(k)
             return
         self.held[k] = again
         self.state.versions[k] += 1
@@ -239,16 +316,25 @@ class FleetStepUnderWay:
             when, other, _ = self.state.due[k]
             self.state.due[k] = (when, other, again)
 
-    def _drive_beside(self, k: int, found: Found, choices: Sequence[Found]) -> None:
-        """Of the ways back to a plan that is still held, drive the one that is nearest to it."""
+    def _drive_beside(self, k: int, found: Found, choices: Sequence[Found]) -> bool:
+        """Of the ways back to a plan that is still held, drive the one that is nearest to it.
+
+        Whether there is one: it must not touch what is not of the fleet.
+        """
         vehicle, step = self.vehicles[k], self.state.settings.step
 
         def farthest(plan: Plan) -> float:
             times = [self.time + share * step for share in SHARES]
             return max(off_plan(vehicle, found, time, plan.pose_at(time)) for time in times)
 
+        tube = self.state.settings.tube_m
+        back = back_onto(vehicle, found, self.time, self.poses[k], step, tube)
         plans = [self._from_here(k).plan, *(one.plan for one in choices)]
-        self.beside[k] = min(plans, key=farthest)
+        for plan in [*([] if back is None else [back]), *sorted(plans, key=farthest)]:
+            if not why_not_free(vehicle, vehicle.course_of(begin_of(vehicle, plan, step)), 0.0):
+                self.beside[k] = plan
+                return True
+        return False
 
     def _agreed(self, k: int, found: Found) -> bool:
         """Whether all others agree to a plan: it is proven past the one that each of them holds."""
@@ -267,22 +353,26 @@ class FleetStepUnderWay:
             self._hold(k, stopping(self.vehicles[k], self.held[k], self.time, self._begin(k)))
         self.state.broken |= new
         self.void = [k for k in self.void if k not in self.state.broken]
-        stopped = [self.held[k] for k in new]
         for k, found in self.held.items():
-            if k in self.state.broken or k in self.void or not stopped:
+            if k in self.state.broken or k in self.void:
                 continue
-            if self._first_meeting(found, stopped, self.keep) < math.inf:
-                self.void.append(k)
+            stopped = [(j, self.held[j]) for j in new if self._knows(k, j)]
+            if self._first_meeting(k, found, stopped) < math.inf:
+                self._make_void(k)
+
+    def _knows(self, k: int, j: int) -> bool:
+        """Whether a vehicle expects of another one what that drives."""
+        return self.state.agreement.knows(k, j, self.held[j])
 
     def _plan_anew(self) -> None:
         """Plans for those whose plans are void, the most urgent first; the next in its order."""
         waiting = list(self.void)
         if len(waiting) > 1:
-            others = {
-                k: [one for j, one in self.held.items() if j != k and j not in waiting]
-                for k in waiting
-            }
-            waiting.sort(key=lambda k: self._first_meeting(self.held[k], others[k], self.keep))
+            waiting.sort(
+                key=lambda k: self._first_meeting(
+                    k, self.held[k], self._expected_by(k, but=waiting)
+                )
+            )
         stopped, anew = set(self.state.broken), set[int]()
         while waiting:
             k = waiting.pop(0)
@@ -297,19 +387,24 @@ class FleetStepUnderWay:
             for j, other in self.held.items():
                 if j in stopped or j in waiting or j == k:
                     continue
-                if self._first_meeting(other, [found], self.keep) < math.inf:
+                if self._first_meeting(j, other, [(k, found)]) == math.inf:
+                    continue
+                if self._knows(j, k):
                     waiting.append(j)
-                    if j not in self.void:
-                        self.void.append(j)
+                    self._make_void(j)
+                else:
+                    when = self._first_meeting(j, other, [(k, found)])
+                    reason = f"at {when:.6g} s it meets a vehicle that has not heard of it"
+                    self._flag(FleetGuarantee.SAFETY, [k, j], reason)
 
     def _another(self, k: int, waiting: Sequence[int]) -> Found | None:
         """A plan for a vehicle whose plan is void; None if none is found.
 
-        Past all others, or else past those whose plans are not void and past where the others stop.
+        Past all that others may drive, or else past those whose plans are not void and past where
+        the others stop.
         """
         vehicle, pose = self.vehicles[k], self._begin(k)
-        others = {j: one for j, one in self.held.items() if j != k}
-        everyone = list(others.values())
+        everyone = self._expected_by(k)
         for one in rejoined(vehicle, self.held[k], self.time, pose):
             if self._is_proven(k, one, everyone):
                 return one
@@ -318,10 +413,11 @@ class FleetStepUnderWay:
             found = self._search(k, self._from_here(k, pose), past, math.inf, most=LONG)[0]
             if found is not None and self._is_proven(k, found, past):
                 return found
-            past = [
-                stopping(self.vehicles[j], one, self.time, self._begin(j)) if j in waiting else one
-                for j, one in others.items()
+            stops = [
+                (j, stopping(self.vehicles[j], self.held[j], self.time, self._begin(j)))
+                for j in waiting
             ]
+            past = [*self._expected_by(k, but=waiting), *stops]
         return None
 
     def _stopped(self, k: int, stop: Found, stopped: Collection[int]) -> Found:
@@ -329,17 +425,17 @@ class FleetStepUnderWay:
 
         Whoever would hit it is planned anew after it: this ends, at the latest, with all at rest.
         """
-        last = [one for j, one in self.held.items() if j in stopped and j != k]
+        last = [(j, one) for j, one in self.held.items() if j in stopped and j != k]
         for share in EASED:
             keep = max(share * self.keep, LEAST)
-            if self._first_meeting(stop, last, keep) < math.inf:
+            if self._first_meeting(k, stop, last, keep) < math.inf:
                 continue
             if share < 1.0:
                 reason = f"no plan was found that keeps more than {keep:.3g} m"
                 self._flag(FleetGuarantee.APART, [k], reason)
             return stop
         motions = (stop, self.held[k])
-        times = [self._first_meeting(one, last, LEAST) for one in motions]
+        times = [self._first_meeting(k, one, last, LEAST) for one in motions]
         reason = f"unavoidable: at {max(times):.6g} s it meets another vehicle"
         self._flag(FleetGuarantee.SAFETY, [k], reason)
         return motions[times.index(max(times))]
@@ -359,14 +455,21 @@ class FleetStepUnderWay:
     # -- exchanges
 
     def _search(
-        self, k: int, base: Found, others: Collection[Found], known: float, *, most: int = QUICK
+        self, k: int, base: Found, others: Collection[Other], known: float, *, most: int = QUICK
     ) -> tuple[Found | None, Found | None]:
         """Another plan past the others, and the way alone; None for what does not cost less."""
         settings = self.state.settings
         goals = self.vehicles[k].problem.goals
         if is_over(base, self.time) and any(within(base.plan.end, goal) for goal in goals):
             base = self._from_here(k)  # its plan says it is there, but it was measured elsewhere
-        seen: list[Obstacle] = [body for one in others for body in self._course(one).obstacles]
+        seen: list[Obstacle] = []
+        keep = self.near.get(k, math.inf)
+        for j, one in others:
+            course, own = self._course(one), self._keep_of(k, j)
+            if own < self.keep:  # it is seen smaller, so that there is a way out
+                keep = min(keep, own)
+                course = replace(course, grown=max(course.grown - (self.keep - own), 0.0))
+            seen += course.obstacles
         return proposal(
             self.vehicles[k],
             base,
@@ -376,6 +479,7 @@ class FleetStepUnderWay:
             budget=self.budget,
             known=known,
             most=most,
+            keep=keep,
         )
 
     def _left_to_pay(self, k: int) -> float:
@@ -465,8 +569,10 @@ class FleetStepUnderWay:
         others = self._expected_by(group[0], but=group)
         found: dict[int, Found] = {}
         for n, j in enumerate(group):
-            here = [*others, *found.values()]
-            still = [resting(self.vehicles[i], self.poses[i], self.time) for i in group[n + 1 :]]
+            here = [*others, *found.items()]
+            still = [
+                (i, resting(self.vehicles[i], self.poses[i], self.time)) for i in group[n + 1 :]
+            ]
             one = self._search(j, self.held[j], [*here, *still], math.inf)[0]
             if one is None and still:
                 one = self._search(j, self.held[j], here, math.inf)[0]
@@ -482,7 +588,7 @@ class FleetStepUnderWay:
         if not after < self._better_than(before):
             return False
         for n, (k, one) in enumerate(found.items()):
-            others = [*self._expected_by(k, but=found), *list(found.values())[:n]]
+            others = [*self._expected_by(k, but=found), *list(found.items())[:n]]
             if not self._is_proven(k, one, others):
                 return False
         versions = self.state.versions
@@ -536,6 +642,13 @@ class FleetStepUnderWay:
             frame=self.frame,
         )
         self.violations += broken(self.vehicles, state.agreement, before, after)
+        numbers = {one.name: one.number for one in self.vehicles}
+        state.crossing = {
+            (min(pair), max(pair))
+            for one in self.violations
+            if one.guarantee is FleetGuarantee.APART and len(one.names) == 2
+            for pair in [[numbers[name] for name in one.names]]
+        }
         names = [one.name for one in self.vehicles]
         plans = {names[k]: one.plan for k, one in self.held.items()}
         return FleetStep(

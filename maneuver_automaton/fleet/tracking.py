@@ -1,0 +1,122 @@
+"""Back onto a plan that is still held, where none that begins at the vehicle can be proven."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.cutting import NOTHING, tail_of, with_samples_at
+from maneuver_automaton.fleet.held import off_plan
+from maneuver_automaton.fleet.vehicle import Found, Vehicle
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.primitives import Trim
+from maneuver_automaton.receding_horizon.settings import switches_at_will
+
+MOST = 16  # trims that are tried, those most like what the plan drives
+SHARES = 8  # of a step, at which one trim follows another
+TIMES = 3  # that the best share is refined
+LOOKS = 8  # within a step, at which it is looked at how far beside the plan it leads
+
+
+def back_onto(
+    vehicle: Vehicle, found: Found, time: float, pose: Array, step: float, tube: float
+) -> Plan | None:
+    """Two trims for a step that lead nearest to where a plan then is, and where it then heads.
+
+    They are followed by what is left of the plan. None for what does not switch at will in a plane,
+    and where none of them stays within the tube.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    found : Found
+        The plan that is held.
+    time : float
+        [s]
+    pose : (3,) array
+        Where the vehicle is.
+    step : float
+        [s]
+    tube : float
+        How far beside its plan the vehicle may be [m].
+    """
+    problem = vehicle.problem
+    if not switches_at_will(problem) or pose.size != 3 or problem.horizon.min_coast > 0.0:
+        return None
+    model = problem.automaton.model
+    left = found.plan
+    begun = max(time - left.start_time, 0.0)
+    wanted = SE2(_poses(left, [time, time + step, time + 2.0 * step]))
+    trims = _likely(problem.automaton.trims, left, begun, begun + step)
+    twists = np.array([trim.body_velocity for trim in trims])
+    here, ahead = SE2(pose), wanted.pose[1:2]
+    onward = SE2(ahead).inverse() @ SE2(wanted.pose[2:3])
+    first, second = (one.ravel() for one in np.indices((len(trims), len(trims))))
+    best, (a, b), switch = math.inf, (0, 0), 0.0
+    shares, near = np.linspace(0.0, 1.0, SHARES + 1), 1.0 / SHARES
+    for _ in range(TIMES):
+        times = step * shares[:, None, None]
+        ends = here @ SE2.exp(times * twists[first]) @ SE2.exp((step - times) * twists[second])
+        off = _off(ends, SE2(ahead)) + _off(ends @ onward, SE2(wanted.pose[2:3]))
+        row, column = np.unravel_index(int(np.argmin(off)), off.shape)
+        if off[row, column] >= best * (1.0 - NOTHING):
+            break
+        best, switch = float(off[row, column]), float(shares[row])
+        (a, b) = int(first[column]), int(second[column])
+        first, second = np.array([a]), np.array([b])
+        shares = np.clip(np.linspace(switch - near, switch + near, 2 * SHARES + 1), 0.0, 1.0)
+        near /= SHARES
+    rows = [(trims[a], step * switch), (trims[b], step * (1.0 - switch))]
+    word = [(trim, lasting) for trim, lasting in rows if lasting > NOTHING]
+    plan = Plan(
+        pose, tuple(trim for trim, _ in word), durations=[t for _, t in word], start_time=time
+    )
+    clock = (time + step * np.linspace(0.0, 1.0, LOOKS + 1)).tolist()
+    beside = [
+        off_plan(vehicle, found, at, one)
+        for at, one in zip(clock, _poses(plan, clock), strict=True)
+    ]
+    if max(beside) > max(tube, beside[0]):
+        return None
+    if left.start_time + left.duration <= time + step + NOTHING:
+        return plan
+    cut = with_samples_at(left, [time + step], model)
+    rest = tail_of(cut, time + step - left.start_time)
+    return replace(
+        plan,
+        trims=(*plan.trims, *rest.trims),
+        durations=np.concatenate([plan.durations, rest.durations]),
+    )
+
+
+def _poses(plan: Plan, times: Sequence[float]) -> Array:
+    """Where a plan is at times (n,) [s]: it stands before and after."""
+    return plan.pose_at(np.clip(times, plan.start_time, plan.start_time + plan.duration))
+
+
+def _likely(trims: tuple[Trim, ...], plan: Plan, begin: float, end: float) -> list[Trim]:
+    """The trims most like those that a plan drives between two times of it [s], and a rest."""
+    joints = np.cumsum([0.0, *plan.durations.tolist()])
+    now = [
+        trim
+        for trim, a, b in zip(plan.trims, joints[:-1], joints[1:], strict=True)
+        if a < end and b > begin
+    ] or [*plan.trims[-1:]]
+    twists = np.array([trim.body_velocity for trim in trims])
+    if not now:
+        return [trim for trim in trims if trim.is_rest] or [*trims[:1]]
+    unlike = np.min([np.linalg.norm(twists - trim.body_velocity, axis=1) for trim in now], axis=0)
+    order = np.argsort(unlike, kind="stable")[:MOST].tolist()
+    rest = [k for k, trim in enumerate(trims) if trim.is_rest and k not in order]
+    return [trims[k] for k in [*order, *rest[:1]]]
+
+
+def _off(poses: SE2, wanted: SE2) -> Array:
+    """Squares of distances [m^2]; the headings show in the place a step later."""
+    gap = poses.pose[..., :2] - wanted.pose[..., :2]
+    return np.asarray((gap * gap).sum(axis=-1))
