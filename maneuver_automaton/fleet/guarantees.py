@@ -143,20 +143,28 @@ def gap_between(courses: Mapping[int, Course], *, keep: float, frame: Frame) -> 
     """
     if len(courses) < 2:
         return math.inf
-    if meetings(courses, keep=keep, frame=frame):
+    low, most, more = keep, keep + FAR, 2.0 * FINE
+    rows = meetings(courses, keep=most, frame=frame)
+    if not rows:
+        return most
+    near = sorted({k for row in rows for k in (row.one, row.other)})
+    among, courses = sorted({row.one for row in rows}), {k: courses[k] for k in near}
+
+    def met(wanted: float) -> bool:
+        return bool(meetings(courses, keep=wanted, among=among, frame=frame))
+
+    if met(keep):
         return 0.0
-    low, high, most, more = keep, math.inf, keep + FAR, 2.0 * FINE
-    while high == math.inf and low < most:
+    high = math.inf
+    while high == math.inf:
         wanted = min(low + more, most)
-        if meetings(courses, keep=wanted, frame=frame):
+        if wanted >= most or met(wanted):
             high = wanted
         else:
             low, more = wanted, 2.0 * more
-    if high == math.inf:
-        return low
     while high - low > FINE:
         middle = 0.5 * (low + high)
-        if meetings(courses, keep=middle, frame=frame):
+        if met(middle):
             high = middle
         else:
             low = middle

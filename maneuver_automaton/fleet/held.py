@@ -103,16 +103,28 @@ def is_over(found: Found, time: float) -> bool:
 
 def off_plan(vehicle: Vehicle, found: Found, time: float, pose: Array) -> float:
     """How far any point of the body is from where its plan has it [m]: an upper bound."""
-    planned = found.plan.pose_at(time)
-    places = [0, 1, *range(3, pose.size)]
-    distance = float(np.linalg.norm(pose[places] - planned[places]))
-    turn = abs(math.remainder(float(pose[2] - planned[2]), 2.0 * math.pi))
-    reach = 0.0
-    for shapes, motion in zip(found.course.shapes, found.course.motions, strict=True):
-        beside = float(np.hypot(*(motion.at(time)[:2] - planned[:2])))
-        body = body_of(shapes)
-        reach = max(reach, beside + math.hypot(body.middle_x, body.middle_y) + body.reach)
-    return distance + 2.0 * reach * math.sin(min(turn, math.pi) / 2.0)
+    return float(beside(pose, found.plan.pose_at(time), reach_of(found, time)))
+
+
+def beside(poses: Array, planned: Array, reach: float) -> Array:
+    """How far any point of a body is from where it should be [m], at poses (..., dof)."""
+    gap = poses - planned
+    turn = np.abs(np.remainder(gap[..., 2] + math.pi, 2.0 * math.pi) - math.pi)
+    gap[..., 2] = 0.0
+    distance = np.sqrt((gap * gap).sum(axis=-1))
+    return np.asarray(distance + 2.0 * reach * np.sin(0.5 * np.minimum(turn, math.pi)))
+
+
+def reach_of(found: Found, time: float) -> float:
+    """How far any point of a vehicle is from its pose at a time of its plan [m]."""
+    bodies = [body_of(shapes) for shapes in found.course.shapes]
+    reaches = [math.hypot(body.middle_x, body.middle_y) + body.reach for body in bodies]
+    if len(reaches) == 1:
+        return reaches[0]
+    places = [motion.at(time)[:2] for motion in found.course.motions]
+    return max(
+        math.dist(place, places[0]) + reach for place, reach in zip(places, reaches, strict=True)
+    )
 
 
 def onward(

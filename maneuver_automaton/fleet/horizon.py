@@ -56,7 +56,8 @@ class FleetHorizon:
     time_limit : float
         [s] per step, for all searches.
     swaps_per_step : int, optional
-        Vehicles that look for a better plan in a step; all if omitted, as long as there is time.
+        So many vehicles look for a better plan in a step, by turns, those first that may gain most;
+        all if None, as long as there is time.
     group_size : int
         Up to so many exchange their plans at once where the sum falls: some of them may then arrive
         later. Not where messages may be lost, over which several cannot agree to change at once.
@@ -94,7 +95,7 @@ class FleetHorizon:
         margin: float = 0.0,
         tube_m: float | None = None,
         time_limit: float = 1.0,
-        swaps_per_step: int | None = None,
+        swaps_per_step: int | None = 2,
         group_size: int = 1,
         delay_steps: int = 0,
         lost: Lost | None = None,

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
+from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.collision.shapes import Obstacle
 from maneuver_automaton.fleet.agreement import Agreement
 from maneuver_automaton.fleet.conflicts import Course, meetings
@@ -31,10 +32,12 @@ from maneuver_automaton.fleet.held import (
     why_not_free,
 )
 from maneuver_automaton.fleet.log import FleetGuarantee, FleetStep, FleetViolation, Swap
+from maneuver_automaton.fleet.nearby import Nearby, near_pairs
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.tracking import back_onto
 from maneuver_automaton.fleet.vehicle import LONG, QUICK, Found, Vehicle
 from maneuver_automaton.fleet.verdict import nearest
+from maneuver_automaton.groups import SE2
 from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.settings import EXACT
 
@@ -45,6 +48,8 @@ NEARLY = 0.005  # share of its cost: a plan rejoined that is no dearer is the sa
 WORTH = 1e-6  # share of its cost that another plan saves at least
 EASED = (1.0, 0.5, 0.0)  # shares of the margin, where a void plan has none that keeps all of it
 SHARES = (0.5, 1.0, 2.0)  # of a step, when it is looked at how far a plan is beside another one
+REJOINS = 0.5  # share of the tube: farther beside its plan, a vehicle asks for one from there
+AGAIN = 4  # steps until who has no plan looks again past the same plans
 LEAST = 1e-3  # [m] kept even then
 ROUNDING = 2e-4  # [m] less than two bodies are apart, which the kernels can still prove
 
@@ -79,6 +84,8 @@ class LoopState:
     lineage: dict[int, int] = field(default_factory=dict)
     settled: dict[int, int] = field(default_factory=dict)  # no way alone is cheaper than this one
     in_vain: dict[int, Around] = field(default_factory=dict)  # past these nothing was found
+    attempts: dict[int, int] = field(default_factory=dict)  # in vain, since its last exchange
+    gains: dict[int, float] = field(default_factory=dict)  # what the way alone would have saved
     due: dict[int, tuple[int, Found, Found]] = field(default_factory=dict)  # when, what, for what
     crossing: set[tuple[int, int]] = field(default_factory=set)  # whose plans are not apart
     last: FleetStep | None = None
@@ -97,6 +104,7 @@ class FleetStepUnderWay:
         start = state.vehicles[0].problem.start
         self.frame = (float(start[0]), float(start[1]), 0.0)
         self.time = time
+        self.nearby = Nearby(time)
         self.poses = poses
         self.budget = budget
         self.number = 0 if state.last is None else state.last.number + 1
@@ -152,6 +160,8 @@ class FleetStepUnderWay:
         Nearer than two vehicles have to keep, or than a distance `most` [m] that is less.
         """
         first = math.inf
+        near = self.nearby.near(found.course, [one.course for _, one in others], keep=self.keep)
+        others = [other for other, is_near in zip(others, near, strict=True) if is_near]
         keeps = [min(self._keep_of(k, j), most) for j, _ in others]
         for keep in dict.fromkeys(keeps):
             seen = [one for (_, one), own in zip(others, keeps, strict=True) if own == keep]
@@ -226,6 +236,8 @@ class FleetStepUnderWay:
         self.beside.pop(k, None)
         self.state.versions[k] += 1
         self.state.lineage[k] += 1
+        self.state.attempts[k] = 0
+        self.state.gains.pop(k, None)
         self.disturbed.add(k)
         self.off[k] = self._off(k, found)
         self.state.agreement.announce(k, found)
@@ -248,7 +260,7 @@ class FleetStepUnderWay:
                 continue
             if off > self.state.settings.tube_m:
                 self._make_void(k)
-            elif k not in self.state.arrived:
+            elif k not in self.state.arrived and not self._tracks(k, found, REJOINS):
                 self._rejoin_within(k, found)
         self._note_crossing()
 
@@ -267,15 +279,23 @@ class FleetStepUnderWay:
             self.near[k] = max(least - ROUNDING, 0.0)
 
     def _standing(self, k: int) -> Course:
-        """A vehicle where its plans begin, for ever."""
-        return resting(self.vehicles[k], self._begin(k), self.time).course
+        """A vehicle as it is where its plans begin, for ever."""
+        course = self.held[k].course
+        poses = [way.at(self.time) for way in course.motions]
+        if self.off[k] > self.state.settings.tube_m:
+            moved = SE2(self.poses[k][:3]) @ SE2(poses[0]).inverse()
+            poses = [(moved @ SE2(pose)).pose for pose in poses]
+        ways = tuple(Motion([self.time], [pose]) for pose in poses)
+        return replace(course, motions=ways, until=math.inf)
 
     def _note_pressed(self) -> None:
         """Pairs that stand nearer to each other than the margin: on their plans, or measured."""
         standing = {k: self._standing(k) for k in self.held}
-        for row in meetings(standing, keep=self.keep, frame=self.frame):
-            least = nearest(standing[row.one], standing[row.other]).distance
-            self.pressed[row.one, row.other] = max(min(least, self.keep) - ROUNDING, 0.0)
+        for one, other in near_pairs(standing, keep=self.keep):
+            pair = {k: standing[k] for k in (one, other)}
+            if meetings(pair, keep=self.keep, frame=self.frame):
+                least = nearest(pair[one], pair[other]).distance
+                self.pressed[one, other] = max(min(least, self.keep) - ROUNDING, 0.0)
         for k, found in self.held.items():
             if not leads(found) and k not in self.state.broken:
                 self._note_near(k)
@@ -301,10 +321,14 @@ class FleetStepUnderWay:
 
     def _rejoin_within(self, k: int, found: Found) -> None:
         others, left = self._expected_by(k), self._left_to_pay(k)
-        choices = list(rejoined(self.vehicles[k], found, self.time, self.poses[k]))
-        again = next((one for one in choices if self._is_proven(k, one, others)), None)
+        choices, again = [], None
+        for one in rejoined(self.vehicles[k], found, self.time, self.poses[k]):
+            choices.append(one)
+            if self._is_proven(k, one, others):
+                again = one
+                break
         if again is None or not self._agreed(k, again):
-            if not self._drive_beside(k, found, choices):
+            if not (self._tracks(k, found) or self._drives_beside(k, found, choices)):
                 self._make_void(k)
             return
         self.held[k] = again
@@ -316,7 +340,23 @@ class FleetStepUnderWay:
             when, other, _ = self.state.due[k]
             self.state.due[k] = (when, other, again)
 
-    def _drive_beside(self, k: int, found: Found, choices: Sequence[Found]) -> bool:
+    def _tracks(self, k: int, found: Found, share: float = 1.0) -> bool:
+        """Whether a vehicle drives back onto the plan that it holds, without another one.
+
+        It stays nearer to it than a share of its tube, and than obstacles are.
+        """
+        vehicle, step = self.vehicles[k], self.state.settings.step
+        tube = share * self.state.settings.tube_m
+        if vehicle.problem.obstacles:
+            tube = min(tube, vehicle.problem.margin)
+        if self.off[k] > tube or not leads(found):
+            return False
+        back = back_onto(vehicle, found, self.time, self.poses[k], step, tube)
+        if back is not None:
+            self.beside[k] = back
+        return back is not None
+
+    def _drives_beside(self, k: int, found: Found, choices: Sequence[Found]) -> bool:
         """Of the ways back to a plan that is still held, drive the one that is nearest to it.
 
         Whether there is one: it must not touch what is not of the fleet.
@@ -492,26 +532,36 @@ class FleetStepUnderWay:
         return cost - max(self.state.settings.margin, WORTH * (1.0 + abs(cost)))
 
     def _exchange(self) -> None:
-        """Who may gain looks for a better plan, one after another, in an order that rotates."""
+        """Some look for better plans, one after another: who looked in vain least often first.
+
+        Among these who may gain most: what its way alone would have saved when it looked last.
+        """
         settings, state = self.state.settings, self.state
         able = [
             k
             for k in self.held
-            if k not in state.broken and k not in state.arrived and k not in self.void
+            if k not in state.broken
+            and k not in state.arrived
+            and k not in self.void
+            and k not in state.due
+            and state.settled.get(k) != state.lineage[k]
         ]
         turn = self.number % max(len(able), 1)
-        for k in [*able[turn:], *able[:turn]]:
+        order = [*able[turn:], *able[:turn]]
+        order.sort(key=lambda k: (state.attempts.get(k, 0), -state.gains.get(k, math.inf)))
+        for k in order:
             most = settings.swaps_per_step
             if self.budget.is_over or (most is not None and len(self.asked) >= most):
                 return
-            if state.settled.get(k) == state.lineage[k] or k in state.due:
-                continue
             around = tuple((j, state.lineage[j]) for j in self.held)
-            if state.in_vain.get(k) == around:
+            # Later no more is to be had past the same plans: what is left of them is less. Who has
+            # none looks again, as more steps of a search lead less far.
+            again = not leads(self.held[k]) and (self.number + k) % AGAIN == 0
+            if state.in_vain.get(k) == around and not again:
                 continue
-            # Later no more is to be had past the same plans: what is left of them is less.
             if not self._look_for_better(k) and not self.budget.is_over:
                 state.in_vain[k] = around
+                state.attempts[k] = state.attempts.get(k, 0) + 1
 
     def _look_for_better(self, k: int) -> bool:
         """A vehicle looks for a plan that costs less and arrives no later; else a group does.
@@ -522,6 +572,8 @@ class FleetStepUnderWay:
         self.asked.append(k)
         known = self._better_than(self._left_to_pay(k))
         found, alone = self._search(k, base, self._expected_by(k), known)
+        if alone is not None:
+            self.state.gains[k] = known - alone.cost
         if alone is None:
             if leads(base) and not self.budget.is_over:
                 self.state.settled[k] = self.state.lineage[k]
@@ -608,6 +660,7 @@ class FleetStepUnderWay:
         for k, one in found.items():
             versions[k] += 1
             self.state.lineage[k] += 1
+            self.state.attempts[k] = 0
             self.off[k] = self._off(k, one)
             self.beside.pop(k, None)
         names = tuple(self.vehicles[k].name for k in found)

@@ -48,7 +48,7 @@ def simulate_fleet(
     margin: float = 0.0,
     tube_m: float | None = None,
     time_limit: float = 1.0,
-    swaps_per_step: int | None = None,
+    swaps_per_step: int | None = 2,
     group_size: int = 1,
     delay_steps: int = 0,
     lost: Lost | None = None,

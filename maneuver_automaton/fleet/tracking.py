@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING, tail_of, with_samples_at
-from maneuver_automaton.fleet.held import off_plan
+from maneuver_automaton.fleet.held import beside, reach_of
 from maneuver_automaton.fleet.vehicle import Found, Vehicle
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.primitives import Trim
@@ -76,12 +76,9 @@ def back_onto(
     plan = Plan(
         pose, tuple(trim for trim, _ in word), durations=[t for _, t in word], start_time=time
     )
-    clock = (time + step * np.linspace(0.0, 1.0, LOOKS + 1)).tolist()
-    beside = [
-        off_plan(vehicle, found, at, one)
-        for at, one in zip(clock, _poses(plan, clock), strict=True)
-    ]
-    if max(beside) > max(tube, beside[0]):
+    clock = time + step * np.linspace(0.0, 1.0, LOOKS + 1)
+    off = beside(_poses(plan, clock), _poses(left, clock), reach_of(found, time))
+    if off.max() > max(tube, float(off[0])):
         return None
     if left.start_time + left.duration <= time + step + NOTHING:
         return plan
@@ -94,7 +91,7 @@ def back_onto(
     )
 
 
-def _poses(plan: Plan, times: Sequence[float]) -> Array:
+def _poses(plan: Plan, times: ArrayLike) -> Array:
     """Where a plan is at times (n,) [s]: it stands before and after."""
     return plan.pose_at(np.clip(times, plan.start_time, plan.start_time + plan.duration))
 
