@@ -8,12 +8,14 @@ from maneuver_automaton._lazy import lazily
 
 if TYPE_CHECKING:
     from maneuver_automaton.fleet.agreement import Message as Message
+    from maneuver_automaton.fleet.asking import Workers as Workers
     from maneuver_automaton.fleet.horizon import FleetHorizon as FleetHorizon
     from maneuver_automaton.fleet.log import FleetGuarantee as FleetGuarantee
     from maneuver_automaton.fleet.log import FleetLog as FleetLog
     from maneuver_automaton.fleet.log import FleetStep as FleetStep
     from maneuver_automaton.fleet.log import FleetViolation as FleetViolation
     from maneuver_automaton.fleet.log import Swap as Swap
+    from maneuver_automaton.fleet.on_dask import DaskWorkers as DaskWorkers
     from maneuver_automaton.fleet.planning import plan_fleet as plan_fleet
     from maneuver_automaton.fleet.problem import FleetProblem as FleetProblem
     from maneuver_automaton.fleet.result import Closest as Closest
@@ -25,12 +27,14 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "Message": "agreement",
+    "Workers": "asking",
     "FleetHorizon": "horizon",
     "FleetGuarantee": "log",
     "FleetLog": "log",
     "FleetStep": "log",
     "FleetViolation": "log",
     "Swap": "log",
+    "DaskWorkers": "on_dask",
     "plan_fleet": "planning",
     "FleetProblem": "problem",
     "Closest": "result",

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.fleet.agreement import Agreement, Lost
+from maneuver_automaton.fleet.asking import Workers
 from maneuver_automaton.fleet.horizon_step import FleetStepUnderWay, LoopSettings, LoopState
 from maneuver_automaton.fleet.log import FleetStep
 from maneuver_automaton.fleet.planning import prepare_vehicles, vehicles_of
@@ -58,6 +59,9 @@ class FleetHorizon:
     swaps_per_step : int, optional
         So many vehicles look for a better plan in a step, by turns, those first that may gain most;
         all if None, as long as there is time.
+    at_once : int
+        So many look at the same time, past the plans that are held then; each swap is proven past
+        those that were made before it.
     group_size : int
         Up to so many exchange their plans at once where the sum falls: some of them may then arrive
         later. Not where messages may be lost, over which several cannot agree to change at once.
@@ -65,6 +69,9 @@ class FleetHorizon:
         An answer comes so many steps late; meanwhile the plan that is held is driven.
     lost : callable, optional
         Whether a message is lost; none is if omitted.
+    workers : Workers, optional
+        Who looks for the vehicles' plans, such as `DaskWorkers`; this process if omitted. Whose
+        worker does not answer any more drives the plan that it holds.
 
     Raises
     ------
@@ -96,9 +103,11 @@ class FleetHorizon:
         tube_m: float | None = None,
         time_limit: float = 1.0,
         swaps_per_step: int | None = 2,
+        at_once: int = 1,
         group_size: int = 1,
         delay_steps: int = 0,
         lost: Lost | None = None,
+        workers: Workers | None = None,
     ) -> None:
         for name, value in (("step", step), ("time_limit", time_limit)):
             if not value > 0.0:
@@ -110,7 +119,8 @@ class FleetHorizon:
                 f"fleet horizon: tube_m is {tube_m:g} m, need at most half of the margin of the "
                 f"fleet, {fleet.margin:g} m: two bodies may both be off their plans"
             )
-        for name, count in (("group_size", group_size), ("swaps_per_step", swaps_per_step)):
+        counts = {"group_size": group_size, "swaps_per_step": swaps_per_step, "at_once": at_once}
+        for name, count in counts.items():
             if count is not None and count < 1:
                 raise ValueError(f"fleet horizon: {name} must be at least 1, got {count}")
         if delay_steps < 0:
@@ -125,12 +135,14 @@ class FleetHorizon:
                 tube_m=0.5 * fleet.margin if tube_m is None else tube_m,
                 time_limit=time_limit,
                 swaps_per_step=swaps_per_step,
+                at_once=at_once,
                 group_size=group_size if lost is None else 1,
                 delay_steps=delay_steps,
             ),
             vehicles,
             Agreement(fleet.names, lost),
             _plans_of(first, vehicles),
+            workers=workers,
         )
         self._numbers = {name: k for k, name in enumerate(fleet.names)}
         prepare_vehicles(vehicles)

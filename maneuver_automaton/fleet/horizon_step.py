@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
@@ -10,8 +11,8 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.motion import Motion
-from maneuver_automaton.collision.shapes import Obstacle
 from maneuver_automaton.fleet.agreement import Agreement
+from maneuver_automaton.fleet.asking import Answer, Past, Question, Workers, answered
 from maneuver_automaton.fleet.conflicts import Course, meetings
 from maneuver_automaton.fleet.guarantees import After, Before, broken, gap_between
 from maneuver_automaton.fleet.held import (
@@ -24,7 +25,6 @@ from maneuver_automaton.fleet.held import (
     leads,
     left_to_pay,
     off_plan,
-    proposal,
     rejoined,
     rest_of_plan,
     resting,
@@ -63,6 +63,7 @@ class LoopSettings:
     tube_m: float
     time_limit: float  # [s] per step
     swaps_per_step: int | None
+    at_once: int
     group_size: int
     delay_steps: int
 
@@ -87,6 +88,8 @@ class LoopState:
     attempts: dict[int, int] = field(default_factory=dict)  # in vain, since its last exchange
     gains: dict[int, float] = field(default_factory=dict)  # what the way alone would have saved
     due: dict[int, tuple[int, Found, Found]] = field(default_factory=dict)  # when, what, for what
+    workers: Workers | None = None
+    silent: set[int] = field(default_factory=set)  # whose workers do not answer any more
     crossing: set[tuple[int, int]] = field(default_factory=set)  # whose plans are not apart
     last: FleetStep | None = None
 
@@ -387,16 +390,21 @@ class FleetStepUnderWay:
         )
 
     def _stop(self, broken_down: set[int]) -> None:
-        """Who breaks down stops as soon as it can; plans that would hit it are void."""
+        """Who breaks down stops as soon as it can; plans that would hit it are void.
+
+        Who did so before, and is beside where it was to stop, stops there.
+        """
         new = broken_down - self.state.broken
-        for k in sorted(new):
+        tube = self.state.settings.tube_m
+        beyond = {k for k in self.state.broken & set(self.held) if self.off[k] > tube}
+        for k in sorted(new | beyond):
             self._hold(k, stopping(self.vehicles[k], self.held[k], self.time, self._begin(k)))
         self.state.broken |= new
         self.void = [k for k in self.void if k not in self.state.broken]
         for k, found in self.held.items():
             if k in self.state.broken or k in self.void:
                 continue
-            stopped = [(j, self.held[j]) for j in new if self._knows(k, j)]
+            stopped = [(j, self.held[j]) for j in sorted(new | beyond) if self._knows(k, j)]
             if self._first_meeting(k, found, stopped) < math.inf:
                 self._make_void(k)
 
@@ -417,7 +425,7 @@ class FleetStepUnderWay:
         while waiting:
             k = waiting.pop(0)
             stop = stopping(self.vehicles[k], self.held[k], self.time, self._begin(k))
-            found = None if k in anew else self._another(k, waiting)
+            found = None if k in anew or k in self.state.silent else self._another(k, waiting)
             anew.add(k)
             if found is None:
                 found = self._stopped(k, stop, stopped)
@@ -496,31 +504,42 @@ class FleetStepUnderWay:
 
     def _search(
         self, k: int, base: Found, others: Collection[Other], known: float, *, most: int = QUICK
-    ) -> tuple[Found | None, Found | None]:
+    ) -> Answer:
         """Another plan past the others, and the way alone; None for what does not cost less."""
+        (answer,) = self._answers([self._question(k, base, others, known, most=most)])
+        return answer
+
+    def _question(
+        self, k: int, base: Found, others: Collection[Other], known: float, *, most: int = QUICK
+    ) -> Question:
+        """What a vehicle is asked for."""
         settings = self.state.settings
         goals = self.vehicles[k].problem.goals
         if is_over(base, self.time) and any(within(base.plan.end, goal) for goal in goals):
             base = self._from_here(k)  # its plan says it is there, but it was measured elsewhere
-        seen: list[Obstacle] = []
-        keep = self.near.get(k, math.inf)
-        for j, one in others:
-            course, own = self._course(one), self._keep_of(k, j)
-            if own < self.keep:  # it is seen smaller, so that there is a way out
-                keep = min(keep, own)
-                course = replace(course, grown=max(course.grown - (self.keep - own), 0.0))
-            seen += course.obstacles
-        return proposal(
-            self.vehicles[k],
-            base,
+        return Question(
+            number=k,
+            base=base,
             time=self.time,
             after=0.0 if k in self.void else settings.delay_steps * settings.step,
-            others=seen,
-            budget=self.budget,
+            others=tuple(Past(j, one, self._keep_of(k, j)) for j, one in others),
+            between=self.keep,
             known=known,
             most=most,
-            keep=keep,
+            keep=self.near.get(k, math.inf),
         )
+
+    def _answers(self, questions: Sequence[Question]) -> list[Answer]:
+        """The answers to questions: of workers, or else found here."""
+        if self.state.workers is None:
+            return [
+                answered(self.vehicles[one.number], one, self.budget, self._course)
+                for one in questions
+            ]
+        asked = [one for one in questions if one.number not in self.state.silent]
+        found = dict(zip(map(id, asked), self.state.workers.ask(asked, self.budget), strict=True))
+        self.state.silent |= {one.number for one in asked if found[id(one)] is None}
+        return [found.get(id(one)) or Answer(None, None) for one in questions]
 
     def _left_to_pay(self, k: int) -> float:
         return left_to_pay(self.vehicles[k], self.held[k], self.time)
@@ -549,31 +568,54 @@ class FleetStepUnderWay:
         turn = self.number % max(len(able), 1)
         order = [*able[turn:], *able[:turn]]
         order.sort(key=lambda k: (state.attempts.get(k, 0), -state.gains.get(k, math.inf)))
-        for k in order:
-            most = settings.swaps_per_step
-            if self.budget.is_over or (most is not None and len(self.asked) >= most):
+        most = len(order) if settings.swaps_per_step is None else settings.swaps_per_step
+        waiting = iter([k for k in order if k not in state.silent])
+        while not self.budget.is_over:
+            turns = min(settings.at_once, most - len(self.asked))
+            batch = list(itertools.islice((k for k in waiting if self._may_gain(k)), turns))
+            if not batch:
                 return
-            around = tuple((j, state.lineage[j]) for j in self.held)
-            # Later no more is to be had past the same plans: what is left of them is less. Who has
-            # none looks again, as more steps of a search lead less far.
-            again = not leads(self.held[k]) and (self.number + k) % AGAIN == 0
-            if state.in_vain.get(k) == around and not again:
-                continue
-            if not self._look_for_better(k) and not self.budget.is_over:
-                state.in_vain[k] = around
-                state.attempts[k] = state.attempts.get(k, 0) + 1
+            self._look_for_better(batch)
 
-    def _look_for_better(self, k: int) -> bool:
-        """A vehicle looks for a plan that costs less and arrives no later; else a group does.
+    def _around(self) -> Around:
+        return tuple((j, self.state.lineage[j]) for j in self.held)
+
+    def _may_gain(self, k: int) -> bool:
+        """Whether something changed since a vehicle looked in vain.
+
+        Later no more is to be had past the same plans: what is left of them is less. But who has
+        none looks again, as as many expansions then lead farther.
+        """
+        again = not leads(self.held[k]) and (self.number + k) % AGAIN == 0
+        return again or self.state.in_vain.get(k) != self._around()
+
+    def _look_for_better(self, batch: Sequence[int]) -> None:
+        """Some look for better plans at once, past the same ones; then one after another swaps."""
+        around = self._around()
+        bases = [self.held[k] for k in batch]
+        values = [self._better_than(self._left_to_pay(k)) for k in batch]
+        questions = [
+            self._question(k, base, self._expected_by(k), known)
+            for k, base, known in zip(batch, bases, values, strict=True)
+        ]
+        self.asked += batch
+        answers = self._answers(questions)
+        for k, base, known, answer in zip(batch, bases, values, answers, strict=True):
+            # An exchange of another one of the batch may have changed it.
+            if self.held[k] is not base or k in self.state.silent:
+                continue
+            if answer.alone is not None:
+                self.state.gains[k] = known - answer.alone.cost
+            if not self._exchanges(k, base, answer) and not self.budget.is_over:
+                self.state.in_vain[k] = around
+                self.state.attempts[k] = self.state.attempts.get(k, 0) + 1
+
+    def _exchanges(self, k: int, base: Found, answer: Answer) -> bool:
+        """A vehicle exchanges its plan for one that arrives no later; else a group looks for one.
 
         Whether there is one, also if not all agreed to it.
         """
-        settings, base = self.state.settings, self.held[k]
-        self.asked.append(k)
-        known = self._better_than(self._left_to_pay(k))
-        found, alone = self._search(k, base, self._expected_by(k), known)
-        if alone is not None:
-            self.state.gains[k] = known - alone.cost
+        settings, (found, alone) = self.state.settings, answer
         if alone is None:
             if leads(base) and not self.budget.is_over:
                 self.state.settled[k] = self.state.lineage[k]
@@ -610,7 +652,8 @@ class FleetStepUnderWay:
             {**courses, k: self._course(alone)}, keep=self.keep, among=[k], frame=self.frame
         )
         near = [row.one if row.other == k else row.other for row in met]
-        movable = [j for j in near if j not in state.broken and j not in state.arrived]
+        fixed = state.broken | state.arrived | state.silent
+        movable = [j for j in near if j not in fixed]
         group = [k, *movable[: state.settings.group_size - 1]]
         if len(group) < 2 or any(j in state.due for j in group):
             return False
@@ -718,6 +761,7 @@ class FleetStepUnderWay:
             asked=tuple(names[k] for k in self.asked),
             void=tuple(names[k] for k in self.void),
             refused=tuple(names[k] for k in self.refused),
+            silent=tuple(names[k] for k in sorted(state.silent & set(self.held))),
             gap_m=gap_between(courses, keep=self.keep, frame=self.frame),
             violations=tuple(self.violations),
             solve_s=self.budget.elapsed,

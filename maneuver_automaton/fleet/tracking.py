@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +18,8 @@ from maneuver_automaton.receding_horizon.settings import switches_at_will
 
 MOST = 16  # trims that are tried, those most like what the plan drives
 SHARES = 8  # of a step, at which one trim follows another
-TIMES = 3  # that the best share is refined
+WIDE, NARROW = 24, 8  # pairs of trims that are refined, and again
+SIDEWAYS = 0.5  # how much a heading counts
 LOOKS = 8  # within a step, at which it is looked at how far beside the plan it leads
 
 
@@ -54,31 +54,19 @@ def back_onto(
     wanted = SE2(_poses(left, [time, time + step, time + 2.0 * step]))
     trims = _likely(problem.automaton.trims, left, begun, begun + step)
     twists = np.array([trim.body_velocity for trim in trims])
-    here, ahead = SE2(pose), wanted.pose[1:2]
-    onward = SE2(ahead).inverse() @ SE2(wanted.pose[2:3])
-    first, second = (one.ravel() for one in np.indices((len(trims), len(trims))))
-    best, (a, b), switch = math.inf, (0, 0), 0.0
-    shares, near = np.linspace(0.0, 1.0, SHARES + 1), 1.0 / SHARES
-    for _ in range(TIMES):
-        times = step * shares[:, None, None]
-        ends = here @ SE2.exp(times * twists[first]) @ SE2.exp((step - times) * twists[second])
-        off = _off(ends, SE2(ahead)) + _off(ends @ onward, SE2(wanted.pose[2:3]))
-        row, column = np.unravel_index(int(np.argmin(off)), off.shape)
-        if off[row, column] >= best * (1.0 - NOTHING):
-            break
-        best, switch = float(off[row, column]), float(shares[row])
-        (a, b) = int(first[column]), int(second[column])
-        first, second = np.array([a]), np.array([b])
-        shares = np.clip(np.linspace(switch - near, switch + near, 2 * SHARES + 1), 0.0, 1.0)
-        near /= SHARES
-    rows = [(trims[a], step * switch), (trims[b], step * (1.0 - switch))]
-    word = [(trim, lasting) for trim, lasting in rows if lasting > NOTHING]
-    plan = Plan(
-        pose, tuple(trim for trim, _ in word), durations=[t for _, t in word], start_time=time
-    )
+    here, reach = SE2(pose), reach_of(found, time)
     clock = time + step * np.linspace(0.0, 1.0, LOOKS + 1)
-    off = beside(_poses(plan, clock), _poses(left, clock), reach_of(found, time))
-    if off.max() > max(tube, float(off[0])):
+    planned = _poses(left, clock)
+    for first, second, switch in _pairs(twists, here, wanted, step, reach):
+        rows = [(trims[first], switch), (trims[second], step - switch)]
+        word = [(trim, lasting) for trim, lasting in rows if lasting > NOTHING]
+        plan = Plan(
+            pose, tuple(trim for trim, _ in word), durations=[t for _, t in word], start_time=time
+        )
+        off = beside(_poses(plan, clock), planned, reach)
+        if off.max() <= max(tube, float(off[0])):
+            break
+    else:
         return None
     if left.start_time + left.duration <= time + step + NOTHING:
         return plan
@@ -89,6 +77,32 @@ def back_onto(
         trims=(*plan.trims, *rest.trims),
         durations=np.concatenate([plan.durations, rest.durations]),
     )
+
+
+def _pairs(
+    twists: Array, here: SE2, wanted: SE2, step: float, reach: float
+) -> list[tuple[int, int, float]]:
+    """Pairs of trims, and when the second follows the first [s]: the best first.
+
+    The place counts after the step and a step later, the heading by how far it moves a body.
+    """
+    count = len(twists)
+    first, second = (one.ravel() for one in np.indices((count, count)))
+    middle, near = np.full(first.size, 0.5), 0.5
+    ahead, later = SE2(wanted.pose[1:2]), SE2(wanted.pose[2:3])
+    onward = ahead.inverse() @ later
+    for kept in (WIDE, NARROW, NARROW):
+        shares = np.clip(middle + near * np.linspace(-1.0, 1.0, SHARES + 1)[:, None], 0.0, 1.0)
+        times = step * shares[..., None]
+        ends = here @ SE2.exp(times * twists[first]) @ SE2.exp((step - times) * twists[second])
+        turn = np.abs(ends.pose[..., 2] - ahead.pose[..., 2])
+        off = _off(ends, ahead) + _off(ends @ onward, later) + (SIDEWAYS * reach * turn) ** 2
+        rows, columns = off.argmin(axis=0), np.arange(first.size)
+        order = np.argsort(off[rows, columns], kind="stable")[:kept]
+        first, second = first[order], second[order]
+        middle, near = shares[rows[order], columns[order]], near / (0.5 * SHARES)
+    switches = (step * middle).tolist()
+    return list(zip(first.tolist(), second.tolist(), switches, strict=True))
 
 
 def _poses(plan: Plan, times: ArrayLike) -> Array:
@@ -114,6 +128,6 @@ def _likely(trims: tuple[Trim, ...], plan: Plan, begin: float, end: float) -> li
 
 
 def _off(poses: SE2, wanted: SE2) -> Array:
-    """Squares of distances [m^2]; the headings show in the place a step later."""
+    """Squares of distances [m^2]."""
     gap = poses.pose[..., :2] - wanted.pose[..., :2]
     return np.asarray((gap * gap).sum(axis=-1))

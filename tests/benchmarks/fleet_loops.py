@@ -2,8 +2,9 @@
 
 ``python tests/benchmarks/fleet_loops.py [--fleets N] [--cases NAME ...] [--out FILE] [--jobs N]``:
 fleets of two to thirty vehicles of mixed kinds (`mixed_fleets.py`), driven undisturbed, with noise
-of 3 mm and 3 mrad a step, with a tenth of all messages lost besides, with a breakdown, or with
-answers a step late. What was driven is judged by shapely (`fleet_judge.py`). A loop is a line of
+of 3 mm and 3 mrad a step (a tenth of it for those with inertia), with a tenth of all messages lost
+besides, with a fifth of the workers killed or with a breakdown besides, or with answers a step
+late. What was driven is judged by shapely (`fleet_judge.py`). A loop is a line of
 FILE; lines that are there are not driven again, so it may be stopped at any time. Seconds are
 those of one processor.
 
@@ -21,6 +22,7 @@ import json
 import math
 import sys
 import time
+import traceback
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -44,15 +46,19 @@ from maneuver_automaton.fleet import (
 )
 from maneuver_automaton.fleet.planning import vehicles_of
 from maneuver_automaton.receding_horizon import Disturbance
+from maneuver_automaton.receding_horizon.settings import switches_at_will
 from tests.benchmarks.fleet_judge import distance_to, judged
 from tests.benchmarks.mixed_fleets import mixed_fleet
+from tests.fleet.mortal import Mortal
 from tests.fleet.robots import at_rest
 
 STEP = 0.5  # [s]
 STEPS = 400
 NOISE = Disturbance(position_m=0.003, heading_rad=0.003)
+LITTLE = Disturbance(position_m=0.0003, heading_rad=0.0003)  # of those with inertia
+DIES = 0.2  # share of the workers
 LOST = 0.1  # of all messages
-CASES = ("undisturbed", "noise", "lost", "breakdown", "late")
+CASES = ("undisturbed", "noise", "lost", "killed", "breakdown", "late")
 LONG_S = 600.0  # no clock decides
 
 Row = dict[str, Any]
@@ -68,18 +74,32 @@ def settings_of(case: str, fleet: FleetProblem, seed: int) -> dict[str, Any]:
     """What happens to a fleet."""
     rng = np.random.default_rng([seed, 1])
     broken = {str(rng.choice(fleet.names)): float(rng.uniform(1.0, 8.0))}
+    dies = {k: float(rng.uniform(0.0, 8.0)) for k in range(len(fleet)) if rng.random() < DIES}
+    rows = zip(fleet.names, fleet.problems, strict=True)
+    noise = {name: NOISE if switches_at_will(problem) else LITTLE for name, problem in rows}
+    upset: dict[str, Any] = {"disturbance": noise}
+    lost = upset | {"lost": losing(seed)}
     return {
         "undisturbed": {},
-        "noise": {"disturbance": NOISE},
-        "lost": {"disturbance": NOISE, "lost": losing(seed)},
-        "breakdown": {"disturbance": NOISE, "lost": losing(seed), "breaks_s": broken},
-        "late": {"disturbance": NOISE, "delay_steps": 1},
+        "noise": upset,
+        "lost": lost,
+        "killed": lost | {"workers": Mortal(fleet, dies)},
+        "breakdown": lost | {"breaks_s": broken},
+        "late": upset | {"delay_steps": 1},
     }[case]
 
 
-def driven(piece: tuple[int, str], least: int, most: int) -> Row:
+def tried(piece: tuple[int, str], least: int, most: int) -> Row:
+    """One loop, or what was raised."""
+    try:
+        return driven(*piece, least, most)
+    except Exception as error:  # noqa: BLE001, it is shown
+        traceback.print_exc()
+        return {"seed": piece[0], "case": piece[1], "raised": repr(error)}
+
+
+def driven(seed: int, case: str, least: int, most: int) -> Row:
     """One loop, and what became of it."""
-    seed, case = piece
     fleet = mixed_fleet(seed, least=least, most=most)
     first = plan_fleet(fleet, time_limit=LONG_S, max_rounds=0, seed=seed)
     begun = time.process_time()
@@ -237,7 +257,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--least", type=int, default=2)
     parser.add_argument("--most", type=int, default=30)
-    parser.add_argument("--cases", nargs="+", choices=CASES, default=["undisturbed", "lost"])
+    parser.add_argument("--cases", nargs="+", choices=CASES, default=["undisturbed", "killed"])
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("out/fleet_loops.jsonl"))
     arguments = parser.parse_args()
@@ -248,10 +268,13 @@ def main() -> None:
     done = {(row["seed"], row["case"]) for row in rows}
     seeds = range(arguments.seed, arguments.seed + arguments.fleets)
     wanted = [(seed, case) for seed in seeds for case in arguments.cases]
-    work = functools.partial(driven, least=arguments.least, most=arguments.most)
+    work = functools.partial(tried, least=arguments.least, most=arguments.most)
     missing = [one for one in wanted if one not in done]
     with arguments.out.open("a") as file:
         for row in in_parallel(work, missing, jobs=arguments.jobs, order="as done"):
+            if "raised" in row:
+                print(row, file=sys.stderr)
+                continue
             rows.append(row)
             file.write(json.dumps(row) + "\n")
             file.flush()
