@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections.abc import Iterator
@@ -70,6 +71,7 @@ def arrival(found: Found) -> float:
     return found.arrival if leads(found) else math.inf
 
 
+@functools.lru_cache(maxsize=4096)  # a step asks for the same ones several times
 def rest_of_plan(vehicle: Vehicle, found: Found, time: float) -> Plan:
     """What is left of a plan from a time on [s]."""
     plan = found.plan
@@ -87,6 +89,7 @@ def begin_of(vehicle: Vehicle, plan: Plan, lasting: float) -> Plan:
     return head_of(cut, lasting)
 
 
+@functools.lru_cache(maxsize=4096)
 def left_to_pay(vehicle: Vehicle, found: Found, time: float) -> float:
     """Cost of what is left of a plan; inf if it does not arrive."""
     if not leads(found) or time <= found.plan.start_time:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.fleet.agreement import Agreement, Lost
+from maneuver_automaton.fleet.agreement import Agreement, AllHeard, Knowledge, Lost
 from maneuver_automaton.fleet.asking import Workers
 from maneuver_automaton.fleet.horizon_step import FleetStepUnderWay, LoopSettings, LoopState
 from maneuver_automaton.fleet.log import FleetStep
@@ -140,12 +140,17 @@ class FleetHorizon:
                 delay_steps=delay_steps,
             ),
             vehicles,
-            Agreement(fleet.names, lost),
+            self._knowledge(lost),
             _plans_of(first, vehicles),
             workers=workers,
         )
         self._numbers = {name: k for k, name in enumerate(fleet.names)}
         prepare_vehicles(vehicles)
+
+    def _knowledge(self, lost: Lost | None) -> Knowledge:
+        if lost is not None:
+            return Agreement(self.fleet.names, lost)
+        return AllHeard(lambda k, found: self._under_way.how_many_near(k, found))
 
     def step(
         self,
@@ -186,7 +191,8 @@ class FleetHorizon:
             )
         stopped = {self._number_of(name) for name in broken_down}
         budget = Budget.from_now(state.settings.time_limit)
-        state.last = FleetStepUnderWay(state, at, poses, budget).run(stopped)
+        self._under_way = FleetStepUnderWay(state, at, poses, budget)
+        state.last = self._under_way.run(stopped)
         return state.last
 
     def _number_of(self, name: str) -> int:

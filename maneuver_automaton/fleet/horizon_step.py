@@ -7,11 +7,13 @@ import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.motion import Motion
-from maneuver_automaton.fleet.agreement import Agreement
+from maneuver_automaton.fleet.agreement import Knowledge
 from maneuver_automaton.fleet.asking import Answer, Past, Question, Workers, answered
 from maneuver_automaton.fleet.conflicts import Course, meetings
 from maneuver_automaton.fleet.guarantees import After, Before, broken, gap_between
@@ -25,6 +27,7 @@ from maneuver_automaton.fleet.held import (
     leads,
     left_to_pay,
     off_plan,
+    reach_of,
     rejoined,
     rest_of_plan,
     resting,
@@ -41,7 +44,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.settings import EXACT
 
-Around = tuple[tuple[int, int], ...]  # who is there, and which plan it holds
+Around = tuple[int, int, int]  # how many are there, and how often plans were exchanged
 Other = tuple[int, Found]  # a plan that another one may drive, and who that is
 
 NEARLY = 0.005  # share of its cost: a plan rejoined that is no dearer is the same one
@@ -49,6 +52,8 @@ WORTH = 1e-6  # share of its cost that another plan saves at least
 EASED = (1.0, 0.5, 0.0)  # shares of the margin, where a void plan has none that keeps all of it
 SHARES = (0.5, 1.0, 2.0)  # of a step, when it is looked at how far a plan is beside another one
 REJOINS = 0.5  # share of the tube: farther beside its plan, a vehicle asks for one from there
+MANY = 40  # others that a search looks at; all that are proven
+AWAY = 0.5  # of its way, from which on others are not looked at if there are many
 AGAIN = 4  # steps until who has no plan looks again past the same plans
 LEAST = 1e-3  # [m] kept even then
 ROUNDING = 2e-4  # [m] less than two bodies are apart, which the kernels can still prove
@@ -75,7 +80,7 @@ class LoopState:
     fleet: FleetProblem
     settings: LoopSettings
     vehicles: list[Vehicle]
-    agreement: Agreement
+    agreement: Knowledge
     first: dict[int, Found]  # plans for those that enter
     held: dict[int, Found] = field(default_factory=dict)
     arrived: set[int] = field(default_factory=set)
@@ -91,6 +96,7 @@ class LoopState:
     workers: Workers | None = None
     silent: set[int] = field(default_factory=set)  # whose workers do not answer any more
     crossing: set[tuple[int, int]] = field(default_factory=set)  # whose plans are not apart
+    proven: dict[int, Course] = field(default_factory=dict)  # apart from all, and free
     last: FleetStep | None = None
 
 
@@ -201,9 +207,9 @@ class FleetStepUnderWay:
             if first is not None and self._off(k, first) == 0.0:
                 choices.insert(0, first)
             others = {(j, id(one)): (j, one) for j, one in self.held.items()}
-            for known in agreement.expected.values():
-                others.update({(j, id(one)): (j, one) for j, some in known.items() for one in some})
-            others = {key: other for key, other in others.items() if key[0] in self.held}
+            for j, one in agreement.everything():
+                if j in self.held:
+                    others.setdefault((j, id(one)), (j, one))
             for found in choices:
                 proven = self._is_proven(k, found, list(others.values()))
                 if proven and (at_first or agreement.enter(k, found, self.held)):
@@ -293,9 +299,13 @@ class FleetStepUnderWay:
 
     def _note_pressed(self) -> None:
         """Pairs that stand nearer to each other than the margin: on their plans, or measured."""
-        standing = {k: self._standing(k) for k in self.held}
-        for one, other in near_pairs(standing, keep=self.keep):
-            pair = {k: standing[k] for k in (one, other)}
+        discs = [
+            (k, *place, reach_of(found, self.time))
+            for k, found in self.held.items()
+            for place in [self._begin(k)[:2].tolist()]
+        ]
+        for one, other in near_pairs(discs, self.keep):
+            pair = {k: self._standing(k) for k in (one, other)}
             if meetings(pair, keep=self.keep, frame=self.frame):
                 least = nearest(pair[one], pair[other]).distance
                 self.pressed[one, other] = max(min(least, self.keep) - ROUNDING, 0.0)
@@ -522,12 +532,30 @@ class FleetStepUnderWay:
             base=base,
             time=self.time,
             after=0.0 if k in self.void else settings.delay_steps * settings.step,
-            others=tuple(Past(j, one, self._keep_of(k, j)) for j, one in others),
+            others=tuple(
+                Past(j, one, self._keep_of(k, j)) for j, one in self._seen(k, base, others)
+            ),
             between=self.keep,
             known=known,
             most=most,
             keep=self.near.get(k, math.inf),
         )
+
+    def _seen(self, k: int, base: Found, others: Collection[Other]) -> Collection[Other]:
+        """Of many others those that may come nearest to where a vehicle is, drives and wants to go.
+
+        A plan that is found past these alone is proven past all.
+        """
+        if len(others) <= MANY:
+            return others
+        courses = [one.course for _, one in others]
+        low, high = np.split(self.nearby.box_of(base.course), 2)
+        for goal in self.vehicles[k].problem.goals:
+            low, high = np.minimum(low, goal.pose[:2]), np.maximum(high, goal.pose[:2])
+        gaps = self.nearby.gaps(np.concatenate([low, high]), courses)
+        nearest_first = np.argsort(gaps, kind="stable")[:MANY].tolist()
+        rows = list(others)
+        return [rows[n] for n in sorted(nearest_first) if gaps[n] <= AWAY * (high - low).max()]
 
     def _answers(self, questions: Sequence[Question]) -> list[Answer]:
         """The answers to questions: of workers, or else found here."""
@@ -578,7 +606,9 @@ class FleetStepUnderWay:
             self._look_for_better(batch)
 
     def _around(self) -> Around:
-        return tuple((j, self.state.lineage[j]) for j in self.held)
+        """What is held, as a number that changes with it."""
+        lineage = self.state.lineage
+        return len(self.held), sum(lineage.values()), sum(lineage[k] for k in self.held)
 
     def _may_gain(self, k: int) -> bool:
         """Whether something changed since a vehicle looked in vain.
@@ -725,6 +755,7 @@ class FleetStepUnderWay:
         """All of the step, and the guarantees that it broke."""
         state = self.state
         courses = {k: self._course(one) for k, one in self.held.items()}
+        fresh = self._fresh()
         after = After(
             time=self.time,
             held=self.held,
@@ -736,15 +767,15 @@ class FleetStepUnderWay:
             tube_m=state.settings.tube_m,
             keep=self.keep,
             frame=self.frame,
+            fresh=fresh,
         )
-        self.violations += broken(self.vehicles, state.agreement, before, after)
-        numbers = {one.name: one.number for one in self.vehicles}
-        state.crossing = {
-            (min(pair), max(pair))
-            for one in self.violations
-            if one.guarantee is FleetGuarantee.APART and len(one.names) == 2
-            for pair in [[numbers[name] for name in one.names]]
-        }
+        said = list(broken(self.vehicles, state.agreement, before, after))
+        self.violations += said
+        self._note_proven(said)
+        few = len(self.held) <= MANY
+        gap = gap_between(courses, keep=self.keep, frame=self.frame) if few else self.keep
+        if state.crossing:
+            gap = 0.0
         names = [one.name for one in self.vehicles]
         plans = {names[k]: one.plan for k, one in self.held.items()}
         return FleetStep(
@@ -762,7 +793,42 @@ class FleetStepUnderWay:
             void=tuple(names[k] for k in self.void),
             refused=tuple(names[k] for k in self.refused),
             silent=tuple(names[k] for k in sorted(state.silent & set(self.held))),
-            gap_m=gap_between(courses, keep=self.keep, frame=self.frame),
+            gap_m=gap,
             violations=tuple(self.violations),
             solve_s=self.budget.elapsed,
         )
+
+    def _fresh(self) -> dict[int, list[int]]:
+        """Who holds a plan that is not proven yet, and whose plans may come near it."""
+        held, proven = self.held, self.state.proven
+        fresh = {}
+        for k, found in held.items():
+            if proven.get(k) is not found.course:
+                others = [j for j in held if j != k]
+                near = self.nearby.near(
+                    found.course, [held[j].course for j in others], keep=self.keep
+                )
+                fresh[k] = [j for j, is_near in zip(others, near, strict=True) if is_near]
+        return fresh
+
+    def _note_proven(self, said: Sequence[FleetViolation]) -> None:
+        """Which plans are proven for all later times, and which pairs are not apart."""
+        state, numbers = self.state, {one.name: one.number for one in self.vehicles}
+        unproven = {
+            numbers[name]
+            for one in said
+            if one.guarantee in {FleetGuarantee.APART, FleetGuarantee.STILL}
+            for name in one.names
+        }
+        state.proven = {k: one.course for k, one in self.held.items() if k not in unproven}
+        state.crossing = {
+            (min(pair), max(pair))
+            for one in said
+            if one.guarantee is FleetGuarantee.APART
+            for pair in [[numbers[name] for name in one.names]]
+        }
+
+    def how_many_near(self, k: int, found: Found) -> int:
+        """How many may come near a vehicle that drives a plan."""
+        others = [one.course for j, one in self.held.items() if j != k]
+        return sum(self.nearby.near(found.course, others, keep=self.keep))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from maneuver_automaton.groups import SE2
 
 SLOT = 1.0  # [s]
 FIRST = 32  # slots and rows to begin with
+Pair = tuple[int, int]
 NOWHERE = (math.inf, math.inf, -math.inf, -math.inf)
 
 
@@ -95,25 +96,25 @@ def _places(way: Motion, times: Array) -> Array:
     return np.asarray((SE2(way.pose[piece]) @ SE2.exp(gone)).pose[:, :2])
 
 
-def near_pairs(standing: Mapping[int, Course], *, keep: float) -> list[tuple[int, int]]:
-    """Pairs of vehicles that stand, by number, whose discs come within a distance [m]."""
-    owners, rows = [], []
-    for k, course in standing.items():
-        for shapes, way in zip(course.shapes, course.motions, strict=True):
-            body = body_of(shapes)
-            owners.append(k)
-            reach = math.hypot(body.middle_x, body.middle_y) + body.reach
-            rows.append([*way.pose[0, :2], reach])
-    if len(standing) < 2:
+def near_pairs(discs: Sequence[tuple[int, float, float, float]], keep: float) -> list[Pair]:
+    """Pairs of owners of discs (owner, x, y, radius) that come within a distance [m].
+
+    Examples
+    --------
+    >>> near_pairs([(4, 0.0, 0.0, 1.0), (2, 2.5, 0.0, 1.0), (7, 9.0, 0.0, 1.0)], 1.0)
+    [(2, 4)]
+    """
+    if len(discs) < 2:
         return []
     import shapely
 
-    discs = np.array(rows)
-    index = shapely.STRtree(shapely.points(discs[:, :2]))
-    most = 2.0 * float(discs[:, 2].max()) + keep
+    owners = [owner for owner, *_ in discs]
+    rows = np.array([row for _, *row in discs])
+    index = shapely.STRtree(shapely.points(rows[:, :2]))
+    most = 2.0 * float(rows[:, 2].max()) + keep
     one, other = index.query(index.geometries, predicate="dwithin", distance=most)
-    apart = np.hypot(*(discs[one, :2] - discs[other, :2]).T)
-    near = np.flatnonzero((one < other) & (apart <= discs[one, 2] + discs[other, 2] + keep))
+    apart = np.hypot(*(rows[one, :2] - rows[other, :2]).T)
+    near = np.flatnonzero((one < other) & (apart <= rows[one, 2] + rows[other, 2] + keep))
     pairs = {
         (min(owners[a], owners[b]), max(owners[a], owners[b]))
         for a, b in zip(one[near].tolist(), other[near].tolist(), strict=True)
@@ -140,6 +141,20 @@ class Nearby:
         apart |= theirs[..., 2] < mine[:, 0] - keep
         apart |= theirs[..., 3] < mine[:, 1] - keep
         return [bool(may) for may in ~np.asarray(apart.all(axis=1))[rows]]
+
+    def gaps(self, box: Array, others: Sequence[Course]) -> Array:
+        """How far each of others (n,) is from a box (4,) at least, whenever it is there [m]."""
+        rows = [self._row(one) for one in others]
+        boxes = self._boxes[rows]
+        least = boxes[..., :2].min(axis=1)
+        most = boxes[..., 2:].max(axis=1)
+        beside = np.maximum(np.maximum(least - box[2:], box[:2] - most), 0.0)
+        return np.asarray(np.hypot(beside[:, 0], beside[:, 1]))
+
+    def box_of(self, course: Course) -> Array:
+        """The box (4,) around all that a course sweeps from now on."""
+        boxes = self._boxes[self._row(course)]
+        return np.array([*boxes[:, :2].min(axis=0), *boxes[:, 2:].max(axis=0)])
 
     def _row(self, course: Course) -> int:
         row = self._rows.get(course)

@@ -105,10 +105,10 @@ def truck(start: list[float], goal: list[float], around: Sequence[Shape]) -> ma.
 
 
 def mixed_fleet(seed: int, *, least: int = 2, most: int = 30) -> FleetProblem:
-    """A fleet at random; of five seeds one has inertia among them, and one drives full-size."""
+    """A fleet at random; of twenty seeds one has inertia among them, and one drives full-size."""
     rng = np.random.default_rng([seed, 3])
     n = int(rng.integers(least, most + 1))
-    scene = seed % 5
+    scene = seed % 20
     if scene == 4:
         n = max(least, n // 3)
         trucks = min(n, int(rng.integers(1, 4)))

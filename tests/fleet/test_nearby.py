@@ -79,8 +79,9 @@ def test_pairs_that_stand_near(seed):
         for k in range(20)
     }
     met = {(row.one, row.other) for row in meetings(standing, keep=0.2)}
-    pairs = near_pairs(standing, keep=0.2)
+    discs = [(k, *one.motions[0].pose[0, :2], math.hypot(0.9, 0.3)) for k, one in standing.items()]
+    pairs = near_pairs(discs, 0.2)
     assert met <= set(pairs)
     assert pairs == sorted(pairs)
     assert set(pairs) <= set(itertools.combinations(standing, 2))
-    assert near_pairs({0: standing[0]}, keep=0.2) == []
+    assert near_pairs(discs[:1], 0.2) == []
