@@ -11,20 +11,25 @@ anybody on more than the order of swaps, and no plan is ever lost.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.budget import Budget
+from maneuver_automaton.collision.shapes import AnyObstacle
 from maneuver_automaton.fleet.agreement import Agreement, AllHeard, Knowledge, Lost
 from maneuver_automaton.fleet.asking import Workers
+from maneuver_automaton.fleet.held import given_up
 from maneuver_automaton.fleet.horizon_step import FleetStepUnderWay, LoopSettings, LoopState
 from maneuver_automaton.fleet.log import FleetStep
 from maneuver_automaton.fleet.planning import prepare_vehicles, vehicles_of
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import FleetResult
 from maneuver_automaton.fleet.vehicle import Found, Vehicle
+from maneuver_automaton.planning.workspace import Workspace
+from maneuver_automaton.problem import Problem
 
 
 class FleetHorizon:
@@ -145,6 +150,8 @@ class FleetHorizon:
             workers=workers,
         )
         self._numbers = {name: k for k, name in enumerate(fleet.names)}
+        # What is prepared for obstacles that vehicles have got since, which are kept alive.
+        self._workspaces: dict[tuple[int, ...], tuple[tuple[AnyObstacle, ...], Workspace]] = {}
         prepare_vehicles(vehicles)
 
     def _knowledge(self, lost: Lost | None) -> Knowledge:
@@ -194,6 +201,44 @@ class FleetHorizon:
         self._under_way = FleetStepUnderWay(state, at, poses, budget)
         state.last = self._under_way.run(stopped)
         return state.last
+
+    def assign(self, name: str, problem: Problem) -> None:
+        """Give a vehicle another problem from the next step on: another goal, other obstacles.
+
+        It drives the plan that it holds, to its end, until it has one that leads to the new goal.
+        Among the obstacles must be all that this plan passes: it is not proven again.
+
+        Parameters
+        ----------
+        name : str
+        problem : Problem
+            Its start is no matter; automaton and body are those of before.
+
+        Raises
+        ------
+        ValueError
+            If no vehicle has that name, the margin is less than that of all before, or the time
+            is fixed.
+        """
+        k, state = self._number_of(name), self.state
+        old = state.vehicles[k]
+        if problem.margin < min(one.margin for one in self.fleet.problems):
+            raise ValueError(
+                f"vehicle {name!r}: its margin is {problem.margin:g} m, need at least the least "
+                "of the fleet: the others are seen larger by what that lacks"
+            )
+        (new,) = vehicles_of(FleetProblem([problem], leaves=[old.leaves]))
+        key = tuple(map(id, problem.obstacles))
+        kept = self._workspaces.setdefault(key, (problem.obstacles, new.workspace))[1]
+        own = replace(new.problem, obstacles=kept.obstacles)
+        state.vehicles[k] = Vehicle(k, name, own, old.leaves, old.grown, kept)
+        state.arrived.discard(k)
+        for known in (state.settled, state.in_vain, state.due, state.attempts, state.gains):
+            known.pop(k, None)
+        if k in state.held:
+            state.held[k] = given_up(state.held[k])
+            state.lineage[k] += 1
+            state.assigned.add(k)
 
     def _number_of(self, name: str) -> int:
         if name not in self._numbers:

@@ -96,6 +96,7 @@ class LoopState:
     workers: Workers | None = None
     silent: set[int] = field(default_factory=set)  # whose workers do not answer any more
     crossing: set[tuple[int, int]] = field(default_factory=set)  # whose plans are not apart
+    assigned: set[int] = field(default_factory=set)  # who got another problem since the last step
     proven: dict[int, Course] = field(default_factory=dict)  # apart from all, and free
     last: FleetStep | None = None
 
@@ -123,7 +124,9 @@ class FleetStepUnderWay:
         self.refused: list[int] = []
         self.violations: list[FleetViolation] = []
         self.off: dict[int, float] = {}
-        self.disturbed: set[int] = set()  # who has another plan not by an exchange of its own
+        # Who has another plan, or another problem, not by an exchange of its own.
+        self.disturbed: set[int] = set(state.assigned)
+        state.assigned.clear()
         self.in_group: set[int] = set()
         self.beside: dict[int, Plan] = {}  # driven, within the tube of the plan that is held
         # Pairs that stand nearer to each other than the margin keep what they have [m], and who
