@@ -34,7 +34,7 @@ def encoded(vehicle: Vehicle, found: Found) -> bytes:
     >>> (vehicle,) = vehicles_of(FleetProblem([there]))
     >>> said = encoded(vehicle, resting(vehicle, [1.0, 2.0, 3.0], 0.5))
     >>> len(said), decoded(vehicle, said).plan.start.tolist()
-    (56, [1.0, 2.0, 3.0])
+    (57, [1.0, 2.0, 3.0])
     """
     plan, automaton = found.plan, vehicle.problem.automaton
     trims = {id(one): n for n, one in enumerate(automaton.trims)}
