@@ -57,7 +57,7 @@ class After:
 
     time: float
     held: Mapping[int, Found]
-    courses: Mapping[int, Course]  # what is left of them
+    courses: Mapping[int, Course]  # what is left of those that are looked at
     off: Mapping[int, float]  # [m] beside the plans
     disturbed: set[int]  # who has another plan not by an exchange of its own
     in_group: set[int]  # who has another one by an exchange of several at once

@@ -58,7 +58,10 @@ def _not_leading(vehicle: Vehicle, plan: Plan) -> Found:
 
 def given_up(found: Found) -> Found:
     """A plan that is driven to its end, but does not arrive there."""
-    return replace(found, cost=math.inf, course=replace(found.course, until=math.inf))
+    course = found.course
+    if course.until < math.inf:
+        course = replace(course, until=math.inf)
+    return replace(found, cost=math.inf, course=course)
 
 
 def leads(found: Found) -> bool:

@@ -313,7 +313,8 @@ class FleetStepUnderWay:
                 least = nearest(pair[one], pair[other]).distance
                 self.pressed[one, other] = max(min(least, self.keep) - ROUNDING, 0.0)
         for k, found in self.held.items():
-            if not leads(found) and k not in self.state.broken:
+            proven = self.state.proven.get(k) is found.course  # it stands on a plan that is free
+            if not (leads(found) or proven or k in self.state.broken):
                 self._note_near(k)
 
     def _note_crossing(self) -> None:
@@ -757,8 +758,9 @@ class FleetStepUnderWay:
     def _logged(self, before: Before) -> FleetStep:
         """All of the step, and the guarantees that it broke."""
         state = self.state
-        courses = {k: self._course(one) for k, one in self.held.items()}
-        fresh = self._fresh()
+        fresh, few = self._fresh(), len(self.held) <= MANY
+        looked_at = self.held if few else {k for j, near in fresh.items() for k in (j, *near)}
+        courses = {k: self._course(self.held[k]) for k in looked_at}
         after = After(
             time=self.time,
             held=self.held,
@@ -775,7 +777,6 @@ class FleetStepUnderWay:
         said = list(broken(self.vehicles, state.agreement, before, after))
         self.violations += said
         self._note_proven(said)
-        few = len(self.held) <= MANY
         gap = gap_between(courses, keep=self.keep, frame=self.frame) if few else self.keep
         if state.crossing:
             gap = 0.0
