@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.fleet import FleetResult as FleetResult
     from maneuver_automaton.fleet import plan_fleet as plan_fleet
     from maneuver_automaton.fleet import simulate_fleet as simulate_fleet
+    from maneuver_automaton.fleet import verify_driven as verify_driven
     from maneuver_automaton.fleet import verify_fleet as verify_fleet
     from maneuver_automaton.formats.fleet_json import save_fleet as save_fleet
     from maneuver_automaton.formats.maps import load_map as load_map
@@ -92,6 +93,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.roads import RoadVehicle as RoadVehicle
     from maneuver_automaton.roads import drive_road as drive_road
     from maneuver_automaton.roads import plan_road as plan_road
+    from maneuver_automaton.roads import plan_roads as plan_roads
     from maneuver_automaton.scenario import FleetScenario as FleetScenario
     from maneuver_automaton.scenario import RoadScenario as RoadScenario
     from maneuver_automaton.scenario import Scenario as Scenario
@@ -162,6 +164,7 @@ _HOMES = {
     "lower_bound": "planning.lower_bound",
     "plan": "planning",
     "plan_road": "roads",
+    "plan_roads": "roads",
     "plan_fleet": "fleet",
     "plan_many": "planning",
     "plans": "planning",
@@ -179,6 +182,7 @@ _HOMES = {
     "translations": "groups",
     "trims_of": "primitives",
     "verify": "planning.verdict",
+    "verify_driven": "fleet",
     "verify_fleet": "fleet",
 }
 

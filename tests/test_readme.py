@@ -16,8 +16,9 @@ import pytest
 import yaml
 
 from maneuver_automaton.cli import run
-from maneuver_automaton.fleet import plan_fleet
+from maneuver_automaton.fleet import plan_fleet, simulate_fleet, verify_driven
 from maneuver_automaton.formats.fleet_json import fleet_to_dict
+from maneuver_automaton.formats.fleet_loop_json import fleet_loop_to_dict
 from maneuver_automaton.formats.plan_json import plan_to_dict
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.scenario import json_schema, load_scenario, scenario_of_text
@@ -142,6 +143,16 @@ def test_every_key_of_the_plans_of_a_fleet_is_explained():
     document = fleet_to_dict(plan_fleet(fleet, time_limit=0.5))
     for key in [*document, *document["clearance_m"], *document["timing_s"], *document["counts"]]:
         assert f"`{key}`" in TEXT
+
+
+def test_every_key_of_the_loop_of_a_fleet_is_explained():
+    fleet = load_scenario(ROOT / "scenarios/fleets/alcove.yaml").fleet
+    log = simulate_fleet(fleet, step=0.5, steps=2, first_time_limit=0.5)
+    document = fleet_loop_to_dict(log, verify_driven(log))
+    vehicle = document["vehicles"]["east"]
+    for key in [*document, *vehicle, *vehicle["steps"][0], *document["steps"][0]]:
+        if key not in ("schema", "version", "name"):
+            assert f"`{key}`" in TEXT
 
 
 def keys_of(schema: Any) -> set[str]:

@@ -58,3 +58,4 @@ from maneuver_automaton.refinement.effort import effort_report as effort_report
 from maneuver_automaton.refinement.effort import effort_threshold as effort_threshold
 from maneuver_automaton.refinement.retiming import Retiming as Retiming
 from maneuver_automaton.refinement.retiming import retime as retime
+from maneuver_automaton.refinement.shooting import least_effort as least_effort

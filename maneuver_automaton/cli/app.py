@@ -300,7 +300,8 @@ def check(file: File, with_file: With = None, case: Case = None, model: OwnModel
     """Report symmetry, consistency and feasibility, without a plan.
 
     FILE may be a plan.json: its plans are proven again, in the world of the file that they were
-    planned from, which is that of --with or, of several vehicles, the one that they name.
+    planned from, which is that of --with or, of several vehicles, the one that they name. So is
+    what was driven in a closed_loop.json of several vehicles.
     """
     from maneuver_automaton.cli import check_command
     from maneuver_automaton.cli.inputs import Parts

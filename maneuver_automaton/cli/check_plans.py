@@ -1,4 +1,4 @@
-"""`check PLAN.json`: the plans of a file proven again, each alone and every pair."""
+"""`check PLAN.json`: the plans of a file proven again, each alone and every pair; loops too."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from maneuver_automaton.cli import check_loops
 from maneuver_automaton.cli.check_command import Finding
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.inputs import Parts, scenario_of
 from maneuver_automaton.cli.planned import fleet_planned
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.fleet import Closest, verify_fleet
+from maneuver_automaton.formats.fleet_loop_reading import read_fleet_loop_document
 from maneuver_automaton.formats.plan_json import (
     load_plan,
     load_plans,
@@ -38,6 +40,8 @@ def findings(path: Path, parts: Parts) -> tuple[str, Iterator[Finding]] | None:
     """
     if path.suffix.lower() != ENDING:
         return None
+    if (driven := read_fleet_loop_document(path)) is not None:
+        return check_loops.findings(path, driven, parts)
     document = read_fleet_document(path)
     if document is not None:
         return _of_fleet(path, document, parts)

@@ -41,7 +41,7 @@ from maneuver_automaton.formats.statement import MapFile
 from maneuver_automaton.scenario import FleetScenario, Scenario, statements_of, to_yaml
 
 if TYPE_CHECKING:
-    from maneuver_automaton.fleet import FleetResult
+    from maneuver_automaton.fleet import FleetLog, FleetResult
     from maneuver_automaton.planning import PlanResult
     from maneuver_automaton.problem import Problem
     from maneuver_automaton.receding_horizon import ClosedLoop
@@ -169,7 +169,14 @@ def plot(
         raise InvalidScenario("--html: writes a page, and --animate an animation; need one of them")
     what = "animation" if animate else "page" if html else "picture"
     path = _picture(file, out, what)
-    if (plans := _plans_of_fleet(file)) is not None:
+    if (driven := _loop_of_fleet(file)) is not None:
+        from maneuver_automaton.cli.planned import fleet_planned
+        from maneuver_automaton.formats.fleet_loop_reading import load_fleet_loop
+
+        fleet = fleet_planned(file, driven, Parts(beside=beside))
+        log = load_fleet_loop(file, fleet.fleet)
+        draw = functools.partial(_draw_fleet_loop, log, path, what, look, fleet.name)
+    elif (plans := _plans_of_fleet(file)) is not None:
         from maneuver_automaton.cli.planned import fleet_planned
         from maneuver_automaton.formats.fleet_json import load_fleet
 
@@ -203,6 +210,25 @@ def _plans_of_fleet(file: Path) -> dict[str, Any] | None:
         return read_fleet_document(file)
     except InvalidScenario:  # told by who reads the plan of one vehicle
         return None
+
+
+def _loop_of_fleet(file: Path) -> dict[str, Any] | None:
+    """The content of a closed_loop.json of several vehicles; None of anything else."""
+    from maneuver_automaton.formats.fleet_loop_reading import read_fleet_loop_document
+
+    return read_fleet_loop_document(file)
+
+
+def _draw_fleet_loop(log: FleetLog, path: Path, what: str, look: LookOptions, name: str) -> None:
+    """Draw the closed loop of several vehicles as `mpc` does."""
+    from maneuver_automaton import plotting
+
+    if what == "picture":
+        plotting.save_fleet_loop_figure(log, path, look=look.look(name))
+    elif what == "page":
+        log.player(title=look.title or name).save(path)
+    else:
+        plotting.animate_fleet_loop(log, path)
 
 
 def _draw_fleet(result: FleetResult, path: Path, what: str, look: LookOptions, name: str) -> None:

@@ -5,12 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from maneuver_automaton.cli.guard import FOUND, complain
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written
+from maneuver_automaton.cli.planned import source_of
+from maneuver_automaton.cli.road_command import is_road
 from maneuver_automaton.cli.user_model import user_model
 from maneuver_automaton.errors import InvalidScenario, ManeuverAutomatonError
+
+if TYPE_CHECKING:
+    from maneuver_automaton.exports import Driven
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,8 +54,8 @@ def export(
     form = FORMATS[kind]
     if step is not None and not form.steps:
         raise InvalidScenario(f"--step: {kind} has no rows in time; leave it out")
-    own = None if parts.model is None else user_model(parts.model)
-    driven = exports.load_driven(file, beside=parts.beside, case=parts.case, model=own)
+    several = _on_one_road(file, parts) if kind == "commonroad" else None
+    driven: Any = several or _of_one(file, parts)
     path = _target(file, out, form, kind)
     options: dict[str, Any] = {} if step is None else {"step": step}
     write: Callable[..., None] = getattr(exports, form.function)
@@ -63,9 +68,34 @@ def export(
         raise not_written(path, error) from error
     except ValueError as error:
         raise InvalidScenario(f"{file}: {error}") from error
-    if kind == "commonroad" and not driven.reached:
+    if kind == "commonroad" and several is None and not driven.reached:
         complain(f"{file}: the goal was not reached: the official checker refuses {path}")
     return FOUND
+
+
+def _of_one(file: Path, parts: Parts) -> Driven:
+    """The plan or loop of one vehicle."""
+    from maneuver_automaton import exports
+
+    own = None if parts.model is None else user_model(parts.model)
+    return exports.load_driven(file, beside=parts.beside, case=parts.case, model=own)
+
+
+def _on_one_road(file: Path, parts: Parts) -> tuple[Driven, ...] | None:
+    """The plans of several vehicles on the road of a CommonRoad file; None of any other."""
+    from maneuver_automaton import exports
+    from maneuver_automaton.formats.plan_json import read_fleet_document
+
+    try:
+        document = read_fleet_document(file)
+    except InvalidScenario:
+        return None  # told by who reads the plan of one vehicle
+    if document is None:
+        return None
+    road, its = source_of(file, document, parts)
+    if not is_road(road):
+        raise InvalidScenario(f"{file}: {road} is no scenario of CommonRoad, need one")
+    return exports.load_road_fleet(file, beside=road, vehicle=its.beside)
 
 
 def _target(file: Path, out: Path | None, form: Format, kind: str) -> Path:

@@ -39,7 +39,7 @@ def print_fleet(name: str, result: FleetResult, *, folder: str) -> None:
 def _facts(result: FleetResult, folder: str) -> dict[str, str]:
     n, of = len(result.plans), len(result.results)
     kept = f", {result.problem.margin:g} m asked for" if result.problem.margin else ""
-    near = "; ".join(map(_pair, result.closest[:MOST_PAIRS]))
+    near = "; ".join(map(pair_text, result.closest[:MOST_PAIRS]))
     return {
         "plans": f"{n} of {of}",
         "cost": f"{result.cost:.9g}{_bound(result)}",
@@ -83,7 +83,8 @@ def _bound(result: FleetResult) -> str:
     return f" (at least {bound}{of}, gap {100 * result.gap:.2g} %)"
 
 
-def _pair(one: Closest) -> str:
+def pair_text(one: Closest) -> str:
+    """Who come nearest to each other, how near, and when."""
     return f"{' and '.join(one.pair)} {one.distance_m:.3g} m at {one.time_s:.4g} s"
 
 

@@ -8,7 +8,8 @@ CODES = {
     "plan": f"0 a plan was found and audited, 1 no plan (one line says why), {BAD}, {STOPPED}; "
     "of several vehicles: 0 all have plans, 1 some not; "
     "of a folder: 0 all found, 1 some not, 2 some file bad",
-    "mpc": f"0 the goal was reached, 1 not, or a collision, {BAD}, {STOPPED}",
+    "mpc": f"0 the goal was reached, 1 not, or a collision, {BAD}, {STOPPED}; "
+    "of several vehicles: 0 all arrived but those that broke down, and no guarantee was broken",
     "check": f"0 all holds, 1 something does not, {BAD}",
     "automaton build": f"0 all maneuvers were found, 1 some not, {BAD}, "
     "130 interrupted (called again, it goes on)",
@@ -32,6 +33,7 @@ EXAMPLES = {
         "maneuver-automaton mpc scenarios/parking_loop.yaml",
         "maneuver-automaton mpc scenarios/parking_noise.yaml --seeds 20 --jobs 2",
         "maneuver-automaton mpc scenarios --jobs 2",
+        "maneuver-automaton mpc scenarios/fleets/depot_loop.yaml --animate",
     ),
     "check": (
         "maneuver-automaton check scenarios/parking.yaml",

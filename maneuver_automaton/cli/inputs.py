@@ -42,7 +42,7 @@ def scenario_of(path: Path, parts: Parts | None = None) -> Scenario:
     found = problem_of(path, parts)
     if not isinstance(found, Scenario):
         raise InvalidScenario(
-            f"{path}: states several vehicles, which only plan, check and convert know"
+            f"{path}: states several vehicles, which only plan, mpc, check and convert know"
         )
     return found
 

@@ -33,12 +33,8 @@ def print_loop(name: str, loop: ClosedLoop, *, folder: str) -> None:
     ]
     columns = ["", "time [s]", "pose", "control", "value", "spent", "word", "deed", "plan",
                "solved [ms]"]  # fmt: skip
-    gap = ["...", *[""] * (len(columns) - 1)]
-    shown = rows if len(rows) <= MOST_ROWS else [*rows[: MOST_ROWS - 5], gap]
-    if shown is not rows:
-        shown += rows[-4:]
     if rows:
-        out.print(table(name, columns, shown, numbers=(0, 1, 4, 5, 9)))
+        out.print(table(name, columns, shortened(rows), numbers=(0, 1, 4, 5, 9)))
     else:
         out.print(Text(f"{name}\n\n  nothing to do: the start is the goal\n"))
     broken = len({number for number, _ in loop.violations})
@@ -59,6 +55,14 @@ def print_loop(name: str, loop: ClosedLoop, *, folder: str) -> None:
         )
     for what, value in facts.items():
         out.print(Text(f"  {what + ':':<16}{value}"), soft_wrap=True)
+
+
+def shortened(rows: list[list[str]]) -> list[list[str]]:
+    """The first and the last rows of a table that has many."""
+    if len(rows) <= MOST_ROWS:
+        return rows
+    gap = ["...", *[""] * (len(rows[0]) - 1)]
+    return [*rows[: MOST_ROWS - 5], gap, *rows[-4:]]
 
 
 def _clearance(loop: ClosedLoop) -> str:

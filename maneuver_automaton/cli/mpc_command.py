@@ -14,15 +14,17 @@ from maneuver_automaton._interrupts import stopped
 from maneuver_automaton.cli import road_command
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
-from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, scenario_of
+from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, problem_of
 from maneuver_automaton.cli.looks import LookOptions
 from maneuver_automaton.cli.progress import progress_bar
 from maneuver_automaton.errors import InvalidScenario
 
 if TYPE_CHECKING:
     from maneuver_automaton.cli.folder_runs import Row
+    from maneuver_automaton.fleet import FleetLog
     from maneuver_automaton.receding_horizon import ClosedLoop, Disturbance, Statistics
     from maneuver_automaton.scenario import Scenario
+    from maneuver_automaton.scenario.schema import Disturbance as DisturbancePart
 
 STEPS = 100  # at most, where neither file nor option says
 PICTURES = ("closed_loop.png", "closed_loop.gif", "closed_loop.html")
@@ -51,11 +53,17 @@ def drive_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> in
     """Close the loop of one problem into the folder `out`, print it, return the exit code."""
     if road_command.is_road(path):
         return road_command.drive_file(path, out, settings=settings, parts=parts)
-    scenario = scenario_of(path, parts)
+    from maneuver_automaton.scenario import FleetScenario
+
+    scenario = problem_of(path, parts)
     if scenario.receding_horizon is None:
         raise InvalidScenario(
             f"{path}: receding_horizon: missing, need {{step_s: ...}}, the time between two plans"
         )
+    if isinstance(scenario, FleetScenario):
+        from maneuver_automaton.cli import fleet_loops
+
+        return fleet_loops.drive(path, scenario, out, settings=settings, parts=parts)
     if settings.seeds is not None and settings.resume is not None:
         raise InvalidScenario("--resume: goes on with one loop, and --seeds runs many; need one")
     make_folder(out)
@@ -108,7 +116,7 @@ def _has_loop(path: Path, parts: Parts) -> bool:
     if road_command.is_road(path):
         return True
     try:
-        return scenario_of(path, parts).receding_horizon is not None
+        return problem_of(path, parts).receding_horizon is not None
     except Exception:  # noqa: BLE001, told when it is driven
         return True
 
@@ -140,11 +148,12 @@ def _numbers(out: Path, settings: Settings) -> dict[str, Any]:
     if settings.seeds is not None:
         return {"status": f"{settings.seeds} loops"}
     document = json.loads((out / "closed_loop.json").read_text(encoding="utf-8"))
+    least = document.get("clearance_m") or {"to_obstacles": document.get("min_clearance_m")}
     return {
         "status": document["status"],
         "cost": document["cost"],
         "duration": document["duration_s"],
-        "clearance": document["min_clearance_m"],
+        "clearance": min((one for one in least.values() if one is not None), default=None),
     }
 
 
@@ -175,6 +184,7 @@ def _loop(path: Path, scenario: Scenario, settings: Settings) -> ClosedLoop:
                 last=last,
                 stay=part.stay,
                 retimed=part.retimed,
+                pieces=part.pieces or 0,
                 gap=settings.gap,
                 progress=lambda _: advance(),
             )
@@ -213,6 +223,7 @@ def _statistics(path: Path, scenario: Scenario, out: Path, settings: Settings) -
                 time_limit=settings.time_limit or scenario.time_limit_s,
                 stay=part.stay,
                 retimed=part.retimed,
+                pieces=part.pieces or 0,
                 gap=settings.gap,
                 audit=bool(scenario.problem.obstacles),  # else nothing looks for collisions
                 jobs=settings.jobs,
@@ -244,28 +255,26 @@ def _in_file(path: Path, error: ValueError) -> InvalidScenario:
     return InvalidScenario(f"{path}: receding_horizon: {said}")
 
 
-def _disturbance(part: Any, seed: int | None) -> Disturbance | None:
-    """What a file says of disturbances, with another seed if one is given."""
-    from maneuver_automaton.receding_horizon import Disturbance
+def _disturbance(part: DisturbancePart | None, seed: int | None) -> Disturbance | None:
+    from maneuver_automaton.scenario.disturbances import disturbance_of
 
-    if part is None:
-        return None
-    return Disturbance(
-        position_m=part.position_m,
-        heading_rad=part.heading_rad,
-        measured_position_m=part.measured_position_m,
-        measured_heading_rad=part.measured_heading_rad,
-        twist_scale=part.twist_scale,
-        pushes={push.after_step: push.by for push in part.pushes},
-        delay=part.delay_steps,
-        seed=part.seed if seed is None else seed,
-    )
+    return None if part is None else disturbance_of(part, seed=seed)
 
 
 def _write(loop: ClosedLoop, name: str, out: Path, settings: Settings) -> None:
     from maneuver_automaton.formats.closed_loop_json import save_closed_loop
 
     save_closed_loop(loop, out / "closed_loop.json", name=name, interrupted=stopped())
+    draw_loop(
+        loop, name, out, settings,
+        figure="save_closed_loop_figure", film="save_closed_loop_animation",
+    )  # fmt: skip
+
+
+def draw_loop(
+    loop: ClosedLoop | FleetLog, name: str, out: Path, settings: Settings, *, figure: str, film: str
+) -> None:
+    """Write the pictures of a loop that were asked for; `figure` and `film` are of `plotting`."""
     for picture in PICTURES:
         (out / picture).unlink(missing_ok=True)  # of an earlier loop
     if stopped() or not (settings.plot or settings.animate or settings.html):
@@ -276,9 +285,8 @@ def _write(loop: ClosedLoop, name: str, out: Path, settings: Settings) -> None:
     skip_documentation()
 
     if settings.plot:
-        look = settings.look.look(name)
-        plotting.save_closed_loop_figure(loop, out / "closed_loop.png", look=look)
+        getattr(plotting, figure)(loop, out / "closed_loop.png", look=settings.look.look(name))
     if settings.animate:
-        plotting.save_closed_loop_animation(loop, out / "closed_loop.gif")
+        getattr(plotting, film)(loop, out / "closed_loop.gif")
     if settings.animate or settings.html:
         loop.player(title=settings.look.title or name).save(out / "closed_loop.html")

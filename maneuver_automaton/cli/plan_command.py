@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from maneuver_automaton._interrupts import stopped
-from maneuver_automaton.cli import road_command
+from maneuver_automaton.cli import road_command, road_fleets
 from maneuver_automaton.cli.answers import Answer, PlanTask, Task
 from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.folder_runs import Row, check_address, run_folder
@@ -26,6 +26,11 @@ PICTURES = (
 def plan_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> int:
     """Plan one problem into the folder `out`, print the plan, return the exit code."""
     if road_command.is_road(path):
+        if road_fleets.states_several(path, parts):
+            several = road_fleets.plan_file(path, out, settings=settings, parts=parts)
+            if not several.found:
+                complain(f"{path}: {road_fleets.why_not(several)}")
+            return road_fleets.code_of(several)
         found = road_command.plan_file(path, out, settings=settings, parts=parts)
         if found.plan is None:
             complain(f"{path}: {road_command.status_of(found)}: {found.reason}")
@@ -155,7 +160,11 @@ def _row(problem: tuple[Path, Parts], *, out: Path, settings: Settings, folder: 
 
 
 def _road_row(path: Path, parts: Parts, out: Path, settings: Settings) -> Row:
-    """Plan one drive on roads of a folder."""
+    """Plan one drive on roads of a folder, or the several of one file."""
+    if road_fleets.states_several(path, parts):
+        quiet = replace(settings, quiet=True)
+        several = road_fleets.plan_file(path, out, settings=quiet, parts=parts)
+        return road_fleets.row(path, several)
     result = road_command.plan_file(path, out, settings=replace(settings, quiet=True), parts=parts)
     if result.plan is None or result.verdict is None:
         status = road_command.status_of(result)

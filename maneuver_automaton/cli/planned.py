@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from maneuver_automaton.cli.inputs import Parts, problem_of
+from maneuver_automaton.cli.road_command import is_road
 from maneuver_automaton.errors import InvalidScenario
 
 if TYPE_CHECKING:
@@ -25,14 +26,16 @@ def fleet_planned(path: Path, document: Mapping[str, Any], parts: Parts) -> Flee
     """
     from maneuver_automaton.scenario import FleetScenario
 
-    file, its = _source(path, document, parts)
+    file, its = source_of(path, document, parts)
+    if is_road(file):
+        raise InvalidScenario(f"{path}: holds plans on the road of {file}, which only export reads")
     scenario = problem_of(file, its)
     if not isinstance(scenario, FleetScenario):
         raise InvalidScenario(f"{path}: holds plans of several vehicles, but {file} states one")
     return scenario
 
 
-def _source(path: Path, document: Mapping[str, Any], parts: Parts) -> tuple[Path, Parts]:
+def source_of(path: Path, document: Mapping[str, Any], parts: Parts) -> tuple[Path, Parts]:
     """The file that plans were made from, and what completes it: by --with, or as they say."""
     if parts.beside is not None:
         return parts.beside, replace(parts, beside=None)

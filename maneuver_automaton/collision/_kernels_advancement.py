@@ -94,7 +94,8 @@ def free_of_static(
     if turn_rate != 0.0:
         center_x = x - (s * v_x + c * v_y) / turn_rate
         center_y = y + (c * v_x - s * v_y) / turn_rate
-    flat = math.hypot(v_x, v_y) > FLAT * abs(turn_rate)  # a centre too far away to count from
+    # A centre too far away to count from?
+    flat = v_x * v_x + v_y * v_y > (FLAT * turn_rate) * (FLAT * turn_rate)
     # Beyond that radius the centre loses digits: poses come from `coast`, and no axis is followed.
     if flat and turn_rate != 0.0:
         turning = math.inf

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.exports.geojson import save_geojson as save_geojson
     from maneuver_automaton.exports.messages import ros_messages as ros_messages
     from maneuver_automaton.exports.reading import load_driven as load_driven
+    from maneuver_automaton.exports.reading import load_road_fleet as load_road_fleet
     from maneuver_automaton.exports.rerun_log import save_rerun as save_rerun
     from maneuver_automaton.exports.ros2_bag import save_ros2_bag as save_ros2_bag
     from maneuver_automaton.exports.table import save_csv as save_csv
@@ -21,6 +22,7 @@ _HOMES = {
     "Driven": "driven",
     "driven_of": "driven",
     "load_driven": "reading",
+    "load_road_fleet": "reading",
     "ros_messages": "messages",
     "save_commonroad_solution": "commonroad_solution",
     "save_csv": "table",

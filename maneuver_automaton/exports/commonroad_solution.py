@@ -12,8 +12,9 @@ Roads*; Althoff, Würsching (2020), *CommonRoad: Vehicle Models*, section 5.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from maneuver_automaton.exports.driven import Driven, driven_of
 
 if TYPE_CHECKING:
     from maneuver_automaton.exports.driven import Exportable
-    from maneuver_automaton.roads import RoadBenchmark, RoadScene, RoadVehicle
+    from maneuver_automaton.roads import RoadBenchmark, RoadFleetResult, RoadScene, RoadVehicle
 
 COST_FUNCTION = "SA1"
 SAME_M = 1e-3  # [m] between our vehicle and one of CommonRoad's
@@ -32,16 +33,21 @@ ON_STEP = 1e-6  # of a time step, between a time and the next step
 
 
 def save_commonroad_solution(
-    value: Exportable, path: Path | str, *, cost_function: str = COST_FUNCTION
+    value: Exportable | RoadFleetResult | Sequence[Driven],
+    path: Path | str,
+    *,
+    cost_function: str = COST_FUNCTION,
 ) -> None:
     """Write a plan or a drive on a CommonRoad scenario as a solution file (XML).
+
+    Of several vehicles it holds a solution of each planning problem.
 
     The vehicle must be one of CommonRoad's: the default one is its BMW 320i, number 2.
 
     Parameters
     ----------
-    value : RoadPlanResult or RoadDrive
-        On a scene that was read from a file of CommonRoad.
+    value : RoadPlanResult, RoadDrive, RoadFleetResult, or a sequence of Driven
+        On scenes that were read from a file of CommonRoad.
     path : Path or str
         The file.
     cost_function : str
@@ -66,28 +72,44 @@ def save_commonroad_solution(
     ...     print(str(error).split(",")[0])
     CommonRoad solution: got no drive on a CommonRoad scenario
     """
-    driven = driven_of(value)
+    drives = [_on_road(one) for one in _each(value)]
+    write_text_atomically(Path(path), _text(drives, cost_function))
+
+
+class _Drive(NamedTuple):
+    """A drive on a CommonRoad scenario."""
+
+    driven: Driven
+    scene: RoadScene
+    vehicle: RoadVehicle
+    benchmark: RoadBenchmark
+
+
+def _each(value: Exportable | RoadFleetResult | Sequence[Driven]) -> list[Driven]:
+    """The drives of one vehicle or of several."""
+    from maneuver_automaton.roads import RoadFleetResult
+
+    if isinstance(value, RoadFleetResult):
+        value = [driven_of(one) for one in value.results.values() if one.plan is not None]
+    found = list(value) if isinstance(value, Sequence) else [driven_of(value)]
+    if not found:
+        raise ValueError("CommonRoad solution: nobody has a plan, need at least one")
+    return found
+
+
+def _on_road(driven: Driven) -> _Drive:
     if driven.scene is None or driven.vehicle is None or driven.scene.benchmark is None:
         raise ValueError(
             "CommonRoad solution: got no drive on a CommonRoad scenario, need a plan or drive of "
             "its XML file"
         )
-    text = _text(driven, driven.scene, driven.vehicle, driven.scene.benchmark, cost_function)
-    write_text_atomically(Path(path), text)
+    return _Drive(driven, driven.scene, driven.vehicle, driven.scene.benchmark)
 
 
-def _text(
-    driven: Driven,
-    scene: RoadScene,
-    vehicle: RoadVehicle,
-    benchmark: RoadBenchmark,
-    cost_function: str,
-) -> str:
+def _text(drives: Sequence[_Drive], cost_function: str) -> str:
     try:
         from commonroad.common import solution
         from commonroad.scenario.scenario import ScenarioID
-        from commonroad.scenario.state import KSState
-        from commonroad.scenario.trajectory import Trajectory
     except ImportError as error:
         raise MissingExtra(
             "CommonRoad solution: commonroad-io is not installed; need pip install "
@@ -96,7 +118,25 @@ def _text(
     known = [one.name for one in solution.CostFunction]
     if cost_function not in known:
         raise ValueError(f"cost_function: got {cost_function!r}, need one of {', '.join(known)}")
-    first, states = _states(driven, scene, vehicle)
+    answers = [_answer(one, solution, cost_function) for one in drives]
+    benchmark = drives[0].benchmark
+    try:
+        name = ScenarioID.from_benchmark_id(benchmark.scenario, benchmark.version)
+    except ValueError as error:
+        raise ValueError(
+            f"CommonRoad solution: the scenario is named {benchmark.scenario!r}, need a benchmark's"
+            f" name such as DEU_Ffb-1_6_T-1: {error}"
+        ) from error
+    whole = solution.Solution(scenario_id=name, planning_problem_solutions=answers, date=None)
+    return str(solution.CommonRoadSolutionWriter(whole).dump())
+
+
+def _answer(drive: _Drive, solution: Any, cost_function: str) -> Any:
+    """The solution of one planning problem."""
+    from commonroad.scenario.state import KSState
+    from commonroad.scenario.trajectory import Trajectory
+
+    first, states = _states(drive.driven, drive.scene, drive.vehicle)
     trajectory = Trajectory(
         initial_time_step=first,
         state_list=[
@@ -110,22 +150,13 @@ def _text(
             for k, (x, y, heading, speed, steering) in enumerate(states.tolist())
         ],
     )
-    answer = solution.PlanningProblemSolution(
-        planning_problem_id=benchmark.problem,
+    return solution.PlanningProblemSolution(
+        planning_problem_id=drive.benchmark.problem,
         vehicle_model=solution.VehicleModel.KS,
-        vehicle_type=_vehicle_type(vehicle, solution.vehicle_parameters),
+        vehicle_type=_vehicle_type(drive.vehicle, solution.vehicle_parameters),
         cost_function=solution.CostFunction[cost_function],
         trajectory=trajectory,
     )
-    try:
-        name = ScenarioID.from_benchmark_id(benchmark.scenario, benchmark.version)
-    except ValueError as error:
-        raise ValueError(
-            f"CommonRoad solution: the scenario is named {benchmark.scenario!r}, need a benchmark's"
-            f" name such as DEU_Ffb-1_6_T-1: {error}"
-        ) from error
-    whole = solution.Solution(scenario_id=name, planning_problem_solutions=[answer], date=None)
-    return str(solution.CommonRoadSolutionWriter(whole).dump())
 
 
 def _states(driven: Driven, scene: RoadScene, vehicle: RoadVehicle) -> tuple[int, Array]:

@@ -16,7 +16,13 @@ from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.exports.driven import Driven, driven_of, driven_on_road
 from maneuver_automaton.formats.driven_json import load_closed_loop, read_closed_loop_document
 from maneuver_automaton.formats.plan_json import load_plan, read_plan_document
-from maneuver_automaton.scenario import FleetScenario, RoadScenario, Scenario, load_scenario
+from maneuver_automaton.scenario import (
+    FleetScenario,
+    RoadScenario,
+    Scenario,
+    load_roads,
+    load_scenario,
+)
 
 if TYPE_CHECKING:
     from maneuver_automaton.models import Model
@@ -67,6 +73,39 @@ def load_driven(
         assert problem is not None
         return replace(driven_of(load_closed_loop(path, problem.problem)), name=problem.name)
     return _planned(path, problem)
+
+
+def load_road_fleet(
+    path: Path | str, *, beside: Path | str, vehicle: Path | str | None = None
+) -> tuple[Driven, ...]:
+    """The plans of a plan.json of several vehicles on one road, in the CommonRoad file `beside`.
+
+    The `vehicle` is that of a scenario, if it is not CommonRoad's BMW 320i.
+
+    Raises
+    ------
+    InvalidScenario
+        If a file cannot be read, nobody has a plan, or a vehicle is none of the planning problems.
+    """
+    from maneuver_automaton.formats.plan_json import load_plans
+
+    scenes = {
+        str(k if one.scene.benchmark is None else one.scene.benchmark.problem): one
+        for k, one in enumerate(load_roads(beside, beside=vehicle))
+    }
+    found = []
+    for name, plan in load_plans(path).items():
+        if name not in scenes:
+            raise InvalidScenario(
+                f"{path}: vehicles: got {name!r}, need a planning problem of {beside}: "
+                f"{', '.join(scenes)}"
+            )
+        road = scenes[name]
+        _check_start(Path(path), plan, road.vehicle.rear_of(road.scene.start.middle))
+        found.append(driven_on_road(road.scene, road.vehicle, plan))
+    if not found:
+        raise InvalidScenario(f"{path}: holds no plan, nobody has one")
+    return tuple(found)
 
 
 def _planned(path: Path, scenario: Scenario | None) -> Driven:

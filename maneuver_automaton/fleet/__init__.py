@@ -9,6 +9,8 @@ from maneuver_automaton._lazy import lazily
 if TYPE_CHECKING:
     from maneuver_automaton.fleet.agreement import Message as Message
     from maneuver_automaton.fleet.asking import Workers as Workers
+    from maneuver_automaton.fleet.driven import DrivenVerdict as DrivenVerdict
+    from maneuver_automaton.fleet.driven import verify_driven as verify_driven
     from maneuver_automaton.fleet.horizon import FleetHorizon as FleetHorizon
     from maneuver_automaton.fleet.log import FleetGuarantee as FleetGuarantee
     from maneuver_automaton.fleet.log import FleetLog as FleetLog
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
 _HOMES = {
     "Message": "agreement",
     "Workers": "asking",
+    "DrivenVerdict": "driven",
+    "verify_driven": "driven",
     "FleetHorizon": "horizon",
     "FleetGuarantee": "log",
     "FleetLog": "log",

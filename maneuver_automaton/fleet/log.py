@@ -5,15 +5,20 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
+
+import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
+from maneuver_automaton._display import Player, picture, player_frame, player_page
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.cutting import NOTHING
+from maneuver_automaton.automaton.cutting import NOTHING, head_of, with_samples_at
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import Closest
+from maneuver_automaton.models import Model
+from maneuver_automaton.problem import Problem
 
 
 class FleetGuarantee(enum.Enum):
@@ -97,6 +102,14 @@ class FleetStep:
             return None
         return plan.control_at(plan.start_time)
 
+    def piece_of(self, name: str, pose: Array, until: float, model: Model) -> Plan:
+        """What a vehicle at a pose (dof,) drives of its plan until a time [s], undisturbed."""
+        plan = self.driven[name]
+        if until - plan.start_time <= NOTHING or not plan.trims:
+            return Plan(pose, (), durations=[], start_time=self.time)
+        cut = with_samples_at(plan, [until], model)
+        return replace(head_of(cut, until - plan.start_time), start=pose)
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class FleetLog:
@@ -115,6 +128,56 @@ class FleetLog:
     counts: dict[str, int] = field(default_factory=dict)
 
     __repr__ = brief
+
+    def player(self, *, title: str = "") -> Player:
+        """A page that plays all vehicles: `.html`, or `.save(path)`; `title` heads it."""
+        return player_page(self, title=title)
+
+    def _repr_html_(self) -> str:
+        return player_frame(self)
+
+    def _repr_png_(self) -> bytes | None:
+        return picture(self)
+
+    @property
+    def times(self) -> Array:
+        """When each step began, and when the last one ended: (n + 1,) [s]; the begin alone (1,)."""
+        if not self.steps:
+            return np.array([min(one.start_time for one in self.problem.problems)])
+        return np.array([*(step.time for step in self.steps), self.steps[-1].time + self.step])
+
+    def pieces_of(self, name: str) -> dict[int, Plan]:
+        """What a vehicle drove, by the number in `steps` of the step it began in."""
+        leaves = self.problem.leaves[self.problem.names.index(name)]
+        driving = (
+            k
+            for k, step in enumerate(self.steps)
+            if name in step.plans and not (leaves and name in step.arrived)
+        )
+        return dict(zip(driving, self.driven[name], strict=True))
+
+    @property
+    def values(self) -> Array:
+        """What all had left to pay when each step began (n,); inf if somebody held no such plan.
+
+        Who has broken down counts no more.
+        """
+        lost = set(self.broken_down)
+        return np.array(
+            [
+                math.fsum(
+                    value
+                    for name, value in step.values.items()
+                    if value < math.inf or name not in lost
+                )
+                for step in self.steps
+            ]
+        )
+
+    def costs_of(self, name: str) -> dict[int, float]:
+        """Cost of these pieces: a disturbed vehicle pays for what it was told to drive."""
+        problem = self.problem.problems[self.problem.names.index(name)]
+        return {k: _cost(problem, piece) for k, piece in self.pieces_of(name).items()}
 
     @property
     def reached(self) -> bool:
@@ -150,3 +213,15 @@ class FleetLog:
         for step in self.steps:
             for swap in step.swaps:
                 yield step.number, swap
+
+
+def _cost(problem: Problem, piece: Plan) -> float:
+    """Cost of a piece at the velocities of the library."""
+    if not piece.trims:
+        return 0.0
+    known = problem.automaton
+    if not piece.maneuvers:
+        trims = tuple(known[t.name] if t.name in known.trim_names else t for t in piece.trims)
+        lasting: list[float] = piece.durations.tolist()
+        piece = Plan.of_parts(piece.start, trims, lasting, start_time=piece.start_time)
+    return float(problem.cost_of(piece))

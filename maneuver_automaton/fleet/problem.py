@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -100,6 +100,23 @@ class FleetProblem:
     def __len__(self) -> int:
         """How many vehicles there are."""
         return len(self.problems)
+
+    def only(self, names: Collection[str]) -> FleetProblem:
+        """The fleet without all vehicles but those that are named.
+
+        Raises
+        ------
+        ValueError
+            If none of them is left.
+        """
+        kept = [k for k, name in enumerate(self.names) if name in names]
+        return replace(
+            self,
+            problems=tuple(self.problems[k] for k in kept),
+            names=tuple(self.names[k] for k in kept),
+            leaves=tuple(self.leaves[k] for k in kept),
+            priority=tuple(self.priority[k] for k in kept),
+        )
 
     def moved(self, by: LieGroup) -> FleetProblem:
         """The fleet moved by a group element, all around it too; bounds must be open.

@@ -43,6 +43,12 @@ def is_commonroad(path: Path) -> bool:
         return b"<commonRoad" in stream.read(4000)
 
 
+def n_problems(path: Path) -> int:
+    """How many planning problems a file states, by its text alone."""
+    with open_input(path) as stream:
+        return stream.read(MOST_BYTES).count(b"<planningProblem ")
+
+
 def read_commonroad(path: Path) -> tuple[Statement, ...]:
     """One problem of driving on roads for every planning problem of a file.
 

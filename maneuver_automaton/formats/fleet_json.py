@@ -58,17 +58,10 @@ def fleet_to_dict(result: FleetResult, *, name: str = "") -> dict[str, Any]:
         "lower_bound": float(result.lower_bound),
         "gap": None if result.gap is None else float(result.gap),
         "clearance_m": {
-            "between": _number(result.clearance_m),
-            "to_obstacles": _number(min(to_obstacles, default=math.inf)),
+            "between": finite_number(result.clearance_m),
+            "to_obstacles": finite_number(min(to_obstacles, default=math.inf)),
         },
-        "closest": [
-            {
-                "pair": list(one.pair),
-                "time_s": float(one.time_s),
-                "distance_m": float(one.distance_m),
-            }
-            for one in result.closest
-        ],
+        "closest": [closest_entry(one) for one in result.closest],
         "order": list(result.order),
         "improvements": [[float(at), float(value)] for at, value in result.improvements],
         "timing_s": {**dict.fromkeys(TIMINGS), **{k: float(v) for k, v in result.timing_s.items()}},
@@ -117,11 +110,7 @@ def save_fleet(
     """
     document = fleet_to_dict(result, name=name)
     if source is not None:
-        beside = Path(path).parent
-        document["source"] = {
-            key: relative(value, beside) if isinstance(value, Path) else value
-            for key, value in source.items()
-        }
+        document["source"] = source_entry(source, Path(path))
     write_document(document, path, interrupted=interrupted)
 
 
@@ -157,10 +146,7 @@ def load_fleet(path: Path | str, fleet: FleetProblem) -> FleetResult:
             lower_bound=float(document["lower_bound"]),
             alone_cost=float(document["alone_cost"]),
             clearance_m=math.inf if between is None else float(between),
-            closest=tuple(
-                Closest(tuple(one["pair"]), float(one["time_s"]), float(one["distance_m"]))
-                for one in document["closest"]
-            ),
+            closest=tuple(map(closest_of, document["closest"])),
             reasons={name: one.reason for name, one in results.items() if one.plan is None},
             order=tuple(document["order"]),
             improvements=tuple((float(s), float(v)) for s, v in document["improvements"]),
@@ -170,5 +156,29 @@ def load_fleet(path: Path | str, fleet: FleetProblem) -> FleetResult:
         raise InvalidScenario(f"{path}: {said}") from error
 
 
-def _number(value: float) -> float | None:
+def closest_entry(one: Closest) -> dict[str, Any]:
+    """A pair of vehicles, and where they are nearest to each other."""
+    return {
+        "pair": list(one.pair),
+        "time_s": float(one.time_s),
+        "distance_m": float(one.distance_m),
+    }
+
+
+def closest_of(entry: Mapping[str, Any]) -> Closest:
+    """A pair of vehicles from its entry."""
+    first, second = entry["pair"]
+    return Closest((first, second), float(entry["time_s"]), float(entry["distance_m"]))
+
+
+def source_entry(source: Mapping[str, Any], path: Path) -> dict[str, Any]:
+    """The files that plans in the file `path` were made from, as seen from it."""
+    return {
+        key: relative(value, path.parent) if isinstance(value, Path) else value
+        for key, value in source.items()
+    }
+
+
+def finite_number(value: float) -> float | None:
+    """A number for strict JSON; None where there is none."""
     return None if math.isinf(value) else float(value)

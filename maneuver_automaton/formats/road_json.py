@@ -13,6 +13,7 @@ import numpy as np
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.formats.plan_json import (
+    FLEET,
     SCHEMA,
     package_version,
     primitive_entries,
@@ -22,6 +23,7 @@ from maneuver_automaton.formats.plan_json import (
 from maneuver_automaton.primitives import Maneuver
 from maneuver_automaton.roads import (
     RoadDrive,
+    RoadFleetResult,
     RoadPlanner,
     RoadPlanResult,
     RoadStep,
@@ -57,6 +59,36 @@ def road_plan_to_dict(result: RoadPlanResult) -> dict[str, Any]:
         "timing_s": {"search": result.search_s},
         "counts": {},
         "improvements": [],
+    }
+
+
+def road_fleet_to_dict(result: RoadFleetResult, *, status: str, reason: str) -> dict[str, Any]:
+    """The content of plan.json for several vehicles on one road."""
+    plans = result.plans.values()
+    verdicts = [one.verdict for one in result.results.values() if one.verdict is not None]
+    return {
+        "schema": SCHEMA,
+        "version": package_version(),
+        "kind": FLEET,
+        "name": result.name,
+        "status": status,
+        "reason": reason,
+        "cost": math.fsum(one.cost or 0.0 for one in result.results.values() if one.plan),
+        "sum_s": math.fsum(plan.duration for plan in plans),
+        "last_s": max((plan.start_time + plan.duration for plan in plans), default=0.0),
+        "clearance_m": {
+            "between": _number(result.distance_m),
+            "to_obstacles": _number(min((one.clearance_m for one in verdicts), default=math.inf)),
+        },
+        "closest": [
+            {"pair": list(one.pair), "time_s": one.time_s, "distance_m": one.distance_m}
+            for one in result.pairs
+        ],
+        "order": list(result.order),
+        "timing_s": {"search": result.search_s},
+        "vehicles": {
+            name: road_plan_to_dict(one) | {"name": name} for name, one in result.results.items()
+        },
     }
 
 

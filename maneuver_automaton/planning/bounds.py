@@ -54,7 +54,7 @@ def lattice_bound(query: LatticeQuery) -> LowerBound:
 
 def speed_bound(problem: Problem) -> float:
     """No plan of whatever kind is cheaper: the straight line at the greatest speed of the model."""
-    cost, fastest = problem.cost, greatest_speed(problem.automaton.model)
+    cost, fastest = problem.cost, _greatest_speed(problem.automaton)
     if not isinstance(cost, Cost):
         return 0.0
     return _least_distance(problem) * (cost.time / fastest + cost.length)
@@ -66,6 +66,12 @@ def word_bound(problem: Problem) -> float:
     A maneuver leads as far as its displacement, so it has a price per metre like a trim.
     """
     return _least_distance(problem) * least_price_per_metre(problem.automaton, problem.cost)
+
+
+@kept_by_first
+def _greatest_speed(automaton: Automaton) -> float:
+    """Greatest speed [m/s] of the model."""
+    return greatest_speed(automaton.model)
 
 
 @kept_by_first

@@ -32,7 +32,7 @@ from maneuver_automaton.planning.polished_price import (
     polished_price,
 )
 from maneuver_automaton.primitives import Trim
-from maneuver_automaton.problem import Problem, moves
+from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.gear_sequences import gear_sequences
 from maneuver_automaton.refinement.guesses import course_guess, timed
 from maneuver_automaton.refinement.kinematic_paths import follows_paths, simpler_problem
@@ -65,7 +65,7 @@ def why_not_polished(problem: Problem) -> str:
     """Why plans of a problem cannot be polished; empty if they can."""
     if problem.automaton.lattice is not None:
         return "the vehicle moves by the maneuvers of its library alone"
-    if any(moves(obstacle) for obstacle in problem.obstacles):
+    if problem.moves:
         return "something moves"
     unlimited = problem.horizon.time is None and problem.horizon.max_time is None
     if unlimited and polished_price(problem).cost.time == 0.0:

@@ -45,6 +45,13 @@ if TYPE_CHECKING:
     from maneuver_automaton.plotting.fleet import draw_fleet as draw_fleet
     from maneuver_automaton.plotting.fleet import save_fleet_figure as save_fleet_figure
     from maneuver_automaton.plotting.fleet_animation import animate_fleet as animate_fleet
+    from maneuver_automaton.plotting.fleet_loop import draw_fleet_loop as draw_fleet_loop
+    from maneuver_automaton.plotting.fleet_loop import (
+        save_fleet_loop_figure as save_fleet_loop_figure,
+    )
+    from maneuver_automaton.plotting.fleet_loop_animation import (
+        animate_fleet_loop as animate_fleet_loop,
+    )
     from maneuver_automaton.plotting.footprint import footprint_polygons as footprint_polygons
     from maneuver_automaton.plotting.labels import control_labels as control_labels
     from maneuver_automaton.plotting.lessons import figure_shift as figure_shift
@@ -65,6 +72,9 @@ if TYPE_CHECKING:
     from maneuver_automaton.plotting.player import player_of_file as player_of_file
     from maneuver_automaton.plotting.progress import draw_progress as draw_progress
     from maneuver_automaton.plotting.progress import save_progress_figure as save_progress_figure
+    from maneuver_automaton.plotting.road_fleets import (
+        save_road_fleet_figure as save_road_fleet_figure,
+    )
     from maneuver_automaton.plotting.roads import draw_road as draw_road
     from maneuver_automaton.plotting.roads import save_road_animation as save_road_animation
     from maneuver_automaton.plotting.roads import save_road_figure as save_road_figure
@@ -107,6 +117,9 @@ _HOMES = {
     "draw_fleet": "fleet",
     "save_fleet_figure": "fleet",
     "animate_fleet": "fleet_animation",
+    "draw_fleet_loop": "fleet_loop",
+    "save_fleet_loop_figure": "fleet_loop",
+    "animate_fleet_loop": "fleet_loop_animation",
     "footprint_polygons": "footprint",
     "control_labels": "labels",
     "figure_shift": "lessons",
@@ -125,6 +138,7 @@ _HOMES = {
     "player_of_file": "player",
     "draw_progress": "progress",
     "save_progress_figure": "progress",
+    "save_road_fleet_figure": "road_fleets",
     "draw_road": "roads",
     "save_road_animation": "roads",
     "save_road_figure": "roads",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +33,21 @@ OUTLINED = 40  # so many vehicles at most have outlines
 WIDTH, LEFT, RIGHT, TOP = 6.4, 0.75, 0.2, 0.36  # [in]
 LOWEST, HIGHEST = 1.6, 5.2  # [in] of the plane
 COLOR_SAMPLES = 6  # pictures that the colours of the film are taken from
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Moving:
+    """Lines of a film that are another at every time."""
+
+    artist: LineCollection
+    show: Callable[[float], None]  # at a time [s]
+
+
+Said = Callable[[float], Sequence[str]]
+
+
+def _nothing(_: float) -> Sequence[str]:
+    return ()
 
 
 def animate_fleet(result: FleetResult, path: str | Path) -> None:
@@ -71,13 +88,19 @@ def fleet_film(result: FleetResult) -> Film:
     >>> film.moving[-1].get_text()
     '1.50 s'
     """
-    cast = cast_of(result)
+    return film_of_cast(cast_of(result))
+
+
+def film_of_cast(cast: Cast, more: Sequence[Moving] = (), said: Said = _nothing) -> Film:
+    """The film of vehicles; `more` moves beside them, and `said` is told beside the time."""
     stage = _stage(cast)
+    for one in more:
+        stage.ax.add_collection(one.artist, autolim=False)
     outlined = len(cast.members) <= OUTLINED
     trails = LineCollection([], linewidths=2.2 if outlined else 1.4, capstyle="butt", zorder=3.0)
     bodies = PolyCollection([], linewidths=0.9 if outlined else 0.0, zorder=4.0)
     extent = float(np.ptp(cast.box, axis=0).max())
-    driving = [one for one in cast.members if one.plan is not None]
+    driving = [one for one in cast.members if one.course is not None]
     small = [one for one in driving if one.reach < TINY * extent]
     dots = stage.ax.scatter([], [], s=18.0, linewidths=0.0, zorder=4.1)
     for part in (trails, bodies):
@@ -92,21 +115,24 @@ def fleet_film(result: FleetResult) -> Film:
         bodies.set_verts([ring for ring, _ in rings])
         bodies.set_facecolor([one.color for _, one in rings])
         bodies.set_edgecolor([shaded(one.color, -0.45) for _, one in rings])
-        there = [one for one in small if time <= one.gone_after]
+        there = [one for one in small if one.is_there(time)]
         places = [one.parts[0].motion.pose_at(time)[:2] for one in there]
         dots.set_offsets(np.array(places).reshape(-1, 2))
         dots.set_facecolor([one.color for one in there])
-        stage.clock.set_text(f"{time:.2f} s")
+        for one in more:
+            one.show(time)
+        stage.clock.set_text(" · ".join([f"{time:.2f} s", *said(time)]))
 
     times = picture_times(cast.begin, cast.end)
-    moving: list[Artist] = [stage.traffic, trails, bodies, dots, stage.clock]
+    beside = [one.artist for one in more]
+    moving: list[Artist] = [stage.traffic, *beside, trails, bodies, dots, stage.clock]
     samples = np.linspace(cast.begin, cast.end, COLOR_SAMPLES).tolist()
     return Film(figure=stage.figure, moving=moving, show=show, times=times, samples=samples[::-1])
 
 
 def _trail(one: Member, time: float) -> list[Array]:
     """Places (n, 2) of the pieces that it drove of late; none once it is gone."""
-    if time > one.gone_after:
+    if not one.is_there(time):
         return []
     return [places for _, places in one.track.between(time - TRAIL_S, time)]
 
@@ -121,8 +147,8 @@ def _stage(cast: Cast) -> Stage:
     figure = new_figure(WIDTH, even_height(bottom + height + TOP))
     ax = axes_at(figure, left=LEFT, bottom=bottom, width=inner, height=height)
     bottom_legend(figure, handles, names, left=LEFT, width=inner)
-    driving = [one for one in cast.members if one.plan is not None]
-    standing = [one for one in cast.members if one.plan is None]
+    driving = [one for one in cast.members if one.course is not None]
+    standing = [one for one in cast.members if one.course is None]
     hatched = [(ring, one) for one in standing for ring in one.bodies_at(one.begin)]
     goals = [(ring, one) for one in cast.members for ring in one.goal_outlines]
     ax.add_collection(

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
@@ -26,12 +28,27 @@ STEPS, STEPS_OF_MANY = 10, 5  # between the times at which bodies are shown
 REST = 1e-9  # [m/s, rad/s]: what is slower rests
 
 
+class Course(Protocol):
+    """What a vehicle drives: a plan, or piece after piece of a closed loop."""
+
+    @property
+    def start_time(self) -> float:
+        """When it may leave its start [s]."""
+
+    @property
+    def duration(self) -> float:
+        """How long it takes to arrive [s]."""
+
+    def pose_at(self, time: ArrayLike, /) -> Array:
+        """Poses (..., dof) at times (...,) [s], before and after it too."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Part:
     """One part of a vehicle, the vehicle itself or what it carries: its shapes and its motion."""
 
     shapes: tuple[Shape, ...]  # none: a point
-    motion: Plan
+    motion: Course
 
     def outlines_at(self, times: Array) -> list[Array]:
         """Outlines (n, 2) at times (m,) [s], first one shape at all times, then the next."""
@@ -57,33 +74,38 @@ class Member:
     label: str  # where there is little room
     color: Color
     problem: Problem
-    plan: Plan | None
+    course: Course | None  # what it drives; None: it has no plan
     parts: tuple[Part, ...]
     track: Track
     leaves: bool
     reason: str  # why it has no plan
+    arrives: bool = True  # its course ends at a goal
+    there_from: float = -np.inf  # [s] when it appears
 
     @property
     def begin(self) -> float:
         """When it may leave its start [s]."""
-        return self.problem.start_time if self.plan is None else self.plan.start_time
+        return self.problem.start_time if self.course is None else self.course.start_time
 
     @property
     def arrival(self) -> float:
-        """When it arrives [s]; its begin if it has no plan."""
-        return self.begin + (0.0 if self.plan is None else self.plan.duration)
+        """When its course ends [s]; its begin if it has none."""
+        return self.begin + (0.0 if self.course is None else self.course.duration)
 
     @property
     def gone_after(self) -> float:
         """When it is gone [s]; inf if it stays."""
-        return self.arrival if self.leaves and self.plan is not None else np.inf
+        there = self.leaves and self.course is not None and self.arrives
+        return self.arrival if there else np.inf
 
     @property
     def spans(self) -> list[tuple[float, float, bool]]:
         """Begin, end [s] and whether it rests, of all that it does in a row."""
         rows: list[tuple[float, float, bool]] = []
         for piece in self.track.pieces:
-            first, last = float(piece.time[0]), float(piece.time[-1])
+            first, last = float(piece.time[0]), min(float(piece.time[-1]), self.arrival)
+            if first >= self.arrival:
+                break
             rests = float(np.abs(np.diff(piece.pose, axis=0)).max(initial=0.0)) <= REST
             if rows and rows[-1][2] == rests:
                 rows[-1] = (rows[-1][0], last, rests)
@@ -107,14 +129,18 @@ class Member:
         poses = [goal.pose for goal in self.problem.goals if not goal.free_heading]
         return placed(self.outlines, np.array(poses)) if poses else []
 
+    def is_there(self, time: float) -> bool:
+        """Whether it has appeared by a time [s], and not left."""
+        return self.there_from <= time <= self.gone_after
+
     def bodies_at(self, time: float) -> list[Array]:
         """Outlines (n, 2) of all its parts at a time [s]; none where it is a point, or gone."""
-        if time > self.gone_after:
+        if not self.is_there(time):
             return []
         return [ring for part in self.parts for ring in part.outlines_at(np.array([time]))]
 
     def ends(self) -> Array:
-        """Start, end of its plan, and its goals (n, 2) [m]."""
+        """Start, end of its course, and its goals (n, 2) [m]."""
         goals = [goal.pose[:2] for goal in self.problem.goals]
         return np.array([self.track.start[:2], self.track.end[:2], *goals])
 
@@ -157,13 +183,22 @@ def cast_of(result: FleetResult) -> Cast:
     >>> [(one.name, one.arrival) for one in cast.members], cast.end
     ([('a', 3.0), ('b', 3.0)], 3.0)
     """
-    names = result.problem.names
-    short = max(map(len, names)) <= MOST_LABEL
-    colors = fleet_colors(len(names))
+    labels, colors = looks_of(result.problem.names)
     members = tuple(
-        _member(result, k, label=name if short else str(k + 1), color=colors[k])
-        for k, name in enumerate(names)
+        _member(result, k, label=labels[k], color=colors[k]) for k in range(len(labels))
     )
+    return cast_of_members(members, margin=result.problem.margin)
+
+
+def looks_of(names: Sequence[str]) -> tuple[list[str], list[Color]]:
+    """What vehicles are called where there is little room, and their colours."""
+    short = max(map(len, names)) <= MOST_LABEL
+    labels = [name if short else str(k + 1) for k, name in enumerate(names)]
+    return labels, list(fleet_colors(len(names)))
+
+
+def cast_of_members(members: tuple[Member, ...], *, margin: float) -> Cast:
+    """Vehicles, what is around them, and the box around all that; `margin` [m] is the fleet's."""
     begin, end = min(one.begin for one in members), max(one.arrival for one in members)
     problems = [one.problem for one in members]
     obstacles = _distinct_obstacles(problems)
@@ -176,12 +211,7 @@ def cast_of(result: FleetResult) -> Cast:
         bounds=_loosest([one.bounds for one in problems]),
         times=round_times(begin, end, most=STEPS_OF_MANY if few else STEPS),
     )
-    return Cast(
-        members=members,
-        scene=scene,
-        margin=result.problem.margin,
-        box=_box(members, scene),
-    )
+    return Cast(members=members, scene=scene, margin=margin, box=_box(members, scene))
 
 
 def _member(result: FleetResult, k: int, *, label: str, color: Color) -> Member:
@@ -199,7 +229,7 @@ def _member(result: FleetResult, k: int, *, label: str, color: Color) -> Member:
         label=label,
         color=color,
         problem=problem,
-        plan=plan,
+        course=plan,
         parts=tuple(parts),
         track=Track(problem.start, ()) if plan is None else track_of_plan(plan),
         leaves=fleet.leaves[k],

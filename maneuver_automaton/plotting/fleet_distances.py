@@ -50,7 +50,8 @@ def nearest_others(members: Sequence[Member], times: Array) -> Array:
         for ring, grown in part.rings
     ]
     owners = np.array([owner for owner, *_ in rows])
-    there = np.array([times <= members[owner].gone_after for owner in owners])  # (parts, n)
+    seen = [[one.is_there(time) for time in times.tolist()] for one in members]
+    there = np.array(seen)[owners]  # (parts, n)
     apart = np.full((len(times), len(members)), np.inf)
     chunk = max(1, AT_ONCE // len(rows) ** 2)
     for first in range(0, len(times), chunk):

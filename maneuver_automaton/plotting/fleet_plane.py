@@ -47,7 +47,9 @@ class FleetArtists:
     goals: PolyCollection  # filled, where plans end
     marks: tuple[PathCollection, PathCollection]  # starts and goals of those too small to be seen
     fronts: LineCollection  # where bodies look at starts and goals
-    missing: PolyCollection  # hatched, at the starts of those without a plan
+    missing: (
+        PolyCollection  # hatched, where those end that do not arrive: without a plan, at starts
+    )
     missing_marks: PathCollection  # crosses for those of them that are too small
     wanted: PolyCollection  # dashed, at their goals
     wanted_marks: PathCollection  # the same for those that are too small
@@ -63,8 +65,8 @@ def draw_fleet_plane(ax: Axes, cast: Cast, *, numbered: bool = False) -> FleetAr
     Bodies stand along the paths at the times of the scene, `numbered` in their order on request.
     """
     extent = float(np.ptp(cast.box, axis=0).max())
-    driving = [one for one in cast.members if one.plan is not None]
-    standing = [one for one in cast.members if one.plan is None]
+    driving = [one for one in cast.members if one.course is not None]
+    standing = [one for one in cast.members if one.course is None]
     lost = [one for one in standing if one.reach < TINY * extent]
     stuck = [one for one in standing if one.reach >= TINY * extent]
     seen = [one for one in driving if one.reach >= TINY * extent]
@@ -73,9 +75,10 @@ def draw_fleet_plane(ax: Axes, cast: Cast, *, numbered: bool = False) -> FleetAr
     along = [(one, time) for one in driving for time in _between(one, cast.scene.times)]
     bodies, body_colors = _bodies([(one, [time]) for one, time in along])
     starts, start_colors = _bodies([(one, [one.begin]) for one in seen])
-    goals, goal_colors = _bodies([(one, [one.arrival]) for one in seen])
-    missing, missing_colors = _bodies([(one, [one.begin]) for one in stuck])
-    wanted = [(ring, one) for one in stuck for ring in one.goal_outlines]
+    goals, goal_colors = _bodies([(one, [one.arrival]) for one in seen if one.arrives])
+    missed = [*stuck, *(one for one in seen if not one.arrives)]
+    missing, missing_colors = _bodies([(one, [one.arrival]) for one in missed])
+    wanted = [(ring, one) for one in missed for ring in one.goal_outlines]
     fronts = [_front(one, time) for one in seen for time in (one.begin, one.arrival)]
     artists = FleetArtists(
         paths=LineCollection(
@@ -100,7 +103,10 @@ def draw_fleet_plane(ax: Axes, cast: Cast, *, numbered: bool = False) -> FleetAr
         ),
         fronts=LineCollection(
             fronts, linewidths=1.2, zorder=3.7,
-            colors=[color for one in seen for color in (one.color, (1.0, 1.0, 1.0))],
+            colors=[
+                color for one in seen
+                for color in (one.color, (1.0, 1.0, 1.0) if one.arrives else one.color)
+            ],
         ),
         missing=PolyCollection(
             missing, facecolors="white", edgecolors=missing_colors, linewidths=1.0, hatch=HATCH,
@@ -141,8 +147,8 @@ def vehicle_handles(cast: Cast) -> tuple[list[Artist], list[str]]:
     named = () if cast.many else cast.members
     handles: list[Artist] = [line_handle(one.color, width=3.4) for one in named]
     names = [one.name for one in named]
-    if any(one.plan is None for one in cast.members):
-        handles.append(Patch(facecolor="white", edgecolor=INK, hatch=HATCH, linewidth=0.8))
+    if any(one.course is None for one in cast.members):
+        handles.append(_hatched())
         names.append("no plan")
     return handles, names
 
@@ -157,6 +163,9 @@ def around_handles(cast: Cast, times: Array) -> tuple[list[Artist], list[str]]:
 def plane_handles(cast: Cast) -> tuple[list[Artist], list[str]]:
     """Legend handles and names: the vehicles if they are few, and what the marks say."""
     handles, names = vehicle_handles(cast)
+    if "no plan" not in names and not all(one.arrives for one in cast.members):
+        handles.append(_hatched())
+        names.append("not arrived")
     handles += [_square(face="white"), _square(face=INK)]
     names += ["start", "goal"]
     times = cast.scene.times
@@ -227,6 +236,10 @@ def _steps(ax: Axes, along: Sequence[tuple[Member, float]], times: Array) -> tup
             )
         )  # fmt: skip
     return tuple(found)
+
+
+def _hatched() -> Patch:
+    return Patch(facecolor="white", edgecolor=INK, hatch=HATCH, linewidth=0.8)
 
 
 def _square(*, face: Any) -> Line2D:

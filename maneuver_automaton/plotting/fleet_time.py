@@ -16,6 +16,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded
 from maneuver_automaton.plotting.controls import TIME_LABEL
 from maneuver_automaton.plotting.fleet_cast import Cast, Member
+from maneuver_automaton.plotting.fleet_distances import distance_times, nearest_others
 from maneuver_automaton.plotting.fleet_plane import HATCH
 from maneuver_automaton.plotting.style import SMALL_PT, line_handle, shortened, tidy
 
@@ -47,7 +48,7 @@ class DistanceArtists:
 def draw_bars(ax: Axes, cast: Cast) -> BarArtists:
     """Draw a bar for each vehicle from when it may leave until it arrives; rests are light."""
     spans = [(k, one, span) for k, one in enumerate(cast.members) for span in one.spans]
-    none = [k for k, one in enumerate(cast.members) if one.plan is None]
+    none = [k for k, one in enumerate(cast.members) if one.course is None]
     artists = BarArtists(
         bars=PolyCollection(
             [_bar(k, first, last) for k, _, (first, last, _) in spans], linewidths=0.0,
@@ -65,8 +66,14 @@ def draw_bars(ax: Axes, cast: Cast) -> BarArtists:
     ax.set_ylim(len(cast.members) - 0.4, -0.6)
     _name_rows(ax, cast)
     ax.grid(visible=False, axis="y")
-    ax.set_xlim(*_limits(cast))
+    ax.set_xlim(*time_limits(cast))
     return artists
+
+
+def draw_nearest(ax: Axes, cast: Cast) -> DistanceArtists:
+    """Draw the least distance of any two bodies, measured by shapely every 0.05 s."""
+    times = distance_times(cast)
+    return draw_fleet_distances(ax, cast, times, nearest_others(cast.members, times).min(axis=1))
 
 
 def draw_fleet_distances(ax: Axes, cast: Cast, times: Array, least: Array) -> DistanceArtists:
@@ -88,7 +95,7 @@ def draw_fleet_distances(ax: Axes, cast: Cast, times: Array, least: Array) -> Di
     near = max(NEAR * max(one.reach for one in cast.members), float(least.min()), cast.margin)
     top = min(most, NEAR * near) or 1.0
     ax.set_ylim(-0.03 * top, 1.08 * top)
-    ax.set_xlim(*_limits(cast))
+    ax.set_xlim(*time_limits(cast))
     return DistanceArtists(least=line, margin=margin)
 
 
@@ -130,7 +137,8 @@ def _name_rows(ax: Axes, cast: Cast) -> None:
         text.set_color(shaded(cast.members[k].color, -0.2))
 
 
-def _limits(cast: Cast) -> tuple[float, float]:
+def time_limits(cast: Cast) -> tuple[float, float]:
+    """What axes over time show of a fleet [s]."""
     span = _span(cast)
     return cast.begin - 0.01 * span, cast.begin + 1.02 * span
 

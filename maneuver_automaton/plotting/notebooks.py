@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from maneuver_automaton.automaton import Automaton, Plan
-from maneuver_automaton.fleet import FleetResult
+from maneuver_automaton.fleet import FleetLog, FleetResult
 from maneuver_automaton.planning import PlanResult
 from maneuver_automaton.plotting.automata import save_automaton_figure
 from maneuver_automaton.plotting.closed_loop import save_closed_loop_figure
 from maneuver_automaton.plotting.fleet import save_fleet_figure
+from maneuver_automaton.plotting.fleet_loop import save_fleet_loop_figure
 from maneuver_automaton.plotting.pages import axes_at, new_figure, write_figure
 from maneuver_automaton.plotting.paths import draw_plan
 from maneuver_automaton.plotting.plan_figures import save_plan_figure
@@ -61,5 +62,6 @@ def _(result: RoadPlanResult, path: Path) -> None:
 
 _save.register(PlanResult, save_plan_figure)
 _save.register(FleetResult, save_fleet_figure)
+_save.register(FleetLog, save_fleet_loop_figure)
 _save.register(ClosedLoop, save_closed_loop_figure)
 _save.register(Automaton, save_automaton_figure)

@@ -17,7 +17,7 @@ from matplotlib.text import Text
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE, shaded
+from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE, Color, shaded
 from maneuver_automaton.plotting.film import Film, picture_times, write_film
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.obstacles import MOVING, SOLID
@@ -78,6 +78,16 @@ def draw_road(
     """
     begin, end = plan.switching_times[[0, -1]].tolist()
     moments = list(np.linspace(begin, end, MOMENTS) if times is None else times)
+    lanes, goals, traffic = draw_surroundings(ax, scene, moments)
+    bodies, path = draw_drive(ax, vehicle, plan, moments)
+    set_road_view(ax, *road_box(scene, vehicle, plan))
+    return RoadArtists(lanes=lanes, goals=goals, traffic=traffic, bodies=bodies, path=path)
+
+
+def draw_surroundings(
+    ax: Axes, scene: RoadScene, moments: Sequence[float]
+) -> tuple[PolyCollection, PathCollection, PathCollection]:
+    """Lanes, goals, and the other road users at some times [s], the later the darker."""
     lanes = PolyCollection(
         [lanelet.ring for lanelet in scene.lanelets],
         facecolors=[LANE],
@@ -93,25 +103,37 @@ def draw_road(
             colors.append(SOLID if one.motion is None else shaded(MOVING, _haze(k, len(moments))))
     traffic = PathCollection(paths, facecolors=colors, edgecolors=["white"], linewidths=0.5)
     traffic.set_zorder(2.0)
+    for artist in (lanes, goals, traffic):
+        ax.add_collection(artist, autolim=False)
+    return lanes, goals, traffic
+
+
+def draw_drive(
+    ax: Axes, vehicle: RoadVehicle, plan: Plan, moments: Sequence[float], *, color: Color = EGO
+) -> tuple[PolyCollection, LineCollection]:
+    """A vehicle at some times [s], the later the darker, and the path of its middle."""
     bodies = PolyCollection(
         _bodies(vehicle, plan.pose_at(moments)),
-        facecolors=[shaded(EGO, _haze(k, len(moments))) for k in range(len(moments))],
+        facecolors=[shaded(color, _haze(k, len(moments))) for k in range(len(moments))],
         edgecolors=["white"],
         linewidths=0.6,
         zorder=3.0,
     )
     path = LineCollection(
-        [vehicle.middle_of(plan.sample().pose)[:, :2]], colors=[EGO], linewidths=1.4, zorder=2.5
+        [vehicle.middle_of(plan.sample().pose)[:, :2]], colors=[color], linewidths=1.4, zorder=2.5
     )
-    for artist in (lanes, goals, traffic, bodies, path):
+    for artist in (bodies, path):
         ax.add_collection(artist, autolim=False)
-    low, high = road_box(scene, vehicle, plan)
+    return bodies, path
+
+
+def set_road_view(ax: Axes, low: Array, high: Array) -> None:
+    """Show what is between two corners (2,) [m], in equal scales and without a grid."""
     ax.set_xlim(low[0], high[0])
     ax.set_ylim(low[1], high[1])
     ax.set_aspect("equal")
     tidy(ax, x="x [m]", y="y [m]")
     ax.grid(visible=False)
-    return RoadArtists(lanes=lanes, goals=goals, traffic=traffic, bodies=bodies, path=path)
 
 
 def save_road_figure(

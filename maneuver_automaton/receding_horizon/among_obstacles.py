@@ -70,7 +70,7 @@ class AmongObstacles:
 
     def cheaper(self, kept: Candidate | None) -> list[Candidate]:
         """The plan that a search from here finds, if it is safe."""
-        known = None if kept is None or self.settings.retimed else kept.plan
+        known = None if kept is None or self.settings.continuous else kept.plan
         found = self._candidate(self._tracked(self.here, known))
         return [] if found is None else [found]
 

@@ -69,6 +69,11 @@ class RecedingHorizon:
         Drive every plan at the pace that makes its effort uniform: the controls are then
         continuous, multiples of those of the library. Needs a fixed horizon, a cost with effort, a
         vehicle without inertia whose body velocity scales with its control, and no zones.
+    pieces : int
+        Seek controls between those of the library too, constant on so many equal parts of a plan
+        (`least_effort`), and within the range of the library's. Needs what retimed plans need, a
+        body velocity that is linear in the control, a cost of effort and time alone, and no
+        `max_trims`.
     hold : bool
         Within the goal's tolerance, correct the error within a few steps, along plans that stay
         within it if there are such; otherwise, and with inertia, rest.
@@ -117,6 +122,7 @@ class RecedingHorizon:
         first: Plan | None = None,
         hold: bool = False,
         retimed: bool = False,
+        pieces: int = 0,
         gap: float | None = None,
         look_ahead: float = 60.0,
         stand: float = 2.0,
@@ -128,7 +134,8 @@ class RecedingHorizon:
             first=first,
             hold=hold,
             retimed=retimed,
-            gap=None if retimed else gap,
+            pieces=pieces,
+            gap=None if retimed or pieces else gap,
             pad=filling_rest(problem),
             at_will=switches_at_will(problem),
             look_ahead=look_ahead,
@@ -148,7 +155,7 @@ class RecedingHorizon:
         self.arrival = None if total is None or settings.pad else problem.start_time + total
         self.promises = promises(problem, step=step)
         self.most_steps: int | None = None
-        if last is not None and not retimed:  # the bound counts from the first step
+        if last is not None and not settings.continuous:  # the bound counts from the first step
             bound = self.promises.most_steps(last.value)
             self.most_steps = None if bound is None else bound + last.number
         load_search(problem)
@@ -287,7 +294,7 @@ class RecedingHorizon:
 
     def _count(self, step: Step, now: Situation) -> None:
         """Bound the number of steps, from here on if something disturbed."""
-        if (now.last is None or step.off_plan or now.changed) and not self.settings.retimed:
+        if (now.last is None or step.off_plan or now.changed) and not self.settings.continuous:
             most = self.promises.most_steps(step.value) if step.deed.leads else None
             self.most_steps = None if most is None else most + step.number
         if now.here.moves:
@@ -295,7 +302,7 @@ class RecedingHorizon:
 
     def _broken(self, step: Step, now: Situation) -> Iterator[Violation]:
         """The guarantees that a step breaks."""
-        here, last, retimed = now.here, now.last, self.settings.retimed
+        here, last, retimed = now.here, now.last, self.settings.continuous
         if last is not None and step.deed.leads and last.deed.leads:
             yield from broken(
                 self.promises,
@@ -303,7 +310,7 @@ class RecedingHorizon:
                 last,
                 step,
                 most_steps=None if retimed else self.most_steps,
-                uniform=retimed and is_uniform(step.plan, here.cost),
+                uniform=self.settings.retimed and is_uniform(step.plan, here.cost),
                 moved=here.moves or now.changed,
             )
         steady = self.promises.steady and not (here.moves or retimed)
@@ -314,7 +321,9 @@ class RecedingHorizon:
         """No plan to any goal costs less."""
         if now.exhaustive:
             return chosen.value
-        if self.settings.retimed:  # trims at another pace may cost less than those of the library
+        if (
+            self.settings.continuous
+        ):  # trims at another pace may cost less than those of the library
             here = now.here
             return min(self.promises.effort_bound(here.start, goal) for goal in here.goals)
         least, moving = search.lower_bound(), now.as_it_moves

@@ -72,6 +72,9 @@ def decide(now: Situation, search: StepSearch) -> Chosen:
         return replace(chosen, free_until=search.free_until)
     kept = _kept(now, search)
     found = [] if now.is_near_optimal(kept) else search.cheaper(kept)
+    if now.settings.pieces:
+        better = now.between_trims(kept, found)
+        found = [*found, *(one for one in better if search.is_safe(one.plan))]
     best = now.best(kept, found) or search.otherwise()
     if best is None:
         return _without_plan(now, search)

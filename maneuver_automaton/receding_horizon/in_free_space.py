@@ -63,14 +63,14 @@ class InFreeSpace:
                 goal,
                 alternatives=None if bounded(here) else alternatives,
                 budget=now.budget,
-                known=None if self.settings.retimed else known,
+                known=None if self.settings.continuous else known,
                 known_cost=cost,
                 ties=True,
                 second_opinion=SECOND_OPINION,
                 not_first=None if cost is None else self._driven(cost),
             )
             proven = any(one.exhaustive for one in results)
-            decisive = not (self.settings.retimed or bounded(here))
+            decisive = not (self.settings.continuous or bounded(here))
             now.exhaustive = now.exhaustive and proven and decisive
             if any(one.status is SearchStatus.OUT_OF_BUDGET for one in results):
                 self._over_budget()
@@ -85,7 +85,7 @@ class InFreeSpace:
 
     def _is_sole(self, cost: float, goal: Goal) -> bool:
         """Whether a plan of this cost is the cheapest, and the only one that is so cheap."""
-        searched = self.settings.retimed or bounded(self.here)
+        searched = self.settings.continuous or bounded(self.here)
         return not searched and cost <= tied(sole_bound(self.here, goal))
 
     def _driven(self, cost: float) -> int | None:
@@ -109,7 +109,7 @@ class InFreeSpace:
         if not now.rounding or now.changed or not (last.exhaustive and last.is_sole):
             return None
         left = last.value - last.applied_cost
-        if self.settings.retimed or bounded(here) or cost > tied(left):
+        if self.settings.continuous or bounded(here) or cost > tied(left):
             return None
         if not last.plan.trims or last.plan.durations[0] < last.applied - NOTHING:
             return None

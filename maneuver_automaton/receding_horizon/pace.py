@@ -13,6 +13,7 @@ from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.effort import effort_report
 from maneuver_automaton.refinement.retiming import retime
+from maneuver_automaton.refinement.shooting import least_effort
 
 PACE = re.compile(r"( x[-+.e0-9]+)+$")
 UNIFORM = 1e-9  # relative spread of an effort that counts as uniform
@@ -31,6 +32,22 @@ def at_best_pace(problem: Problem, plan: Plan) -> Plan:
         return plan
     trims = tuple(_named(problem.automaton, trim) for trim in better.after.trims)
     return replace(better.after, trims=trims)
+
+
+def between_trims(problem: Problem, plan: Plan, pieces: int) -> Plan:
+    """A plan with controls between those of the library, in the same time, where it costs less."""
+    if not any(trim.body_velocity.any() for trim in plan.trims) or not isinstance(
+        problem.cost, Cost
+    ):
+        return plan
+    model = problem.automaton.model
+    known = np.array([trim.control for trim in problem.automaton.trims])
+    most = np.asarray(model.control_limits, dtype=np.float64)
+    limits = np.stack(
+        [np.maximum(known.min(axis=0), most[:, 0]), np.minimum(known.max(axis=0), most[:, 1])],
+        axis=-1,
+    )
+    return least_effort(plan, model, cost=problem.cost, limits=limits, pieces=pieces)
 
 
 def base_name(name: str) -> str:

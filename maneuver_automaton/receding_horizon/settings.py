@@ -24,6 +24,7 @@ class Settings:
     first: Plan | None = None
     hold: bool = False
     retimed: bool = False
+    pieces: int = 0  # of equal time, with controls between those of the library; 0: its trims alone
     gap: float | None = None  # share of the cost that may be left to gain; None: nothing is proven
     pad: Trim | None = None  # the rest that prolongs a plan
     at_will: bool = True  # trims are: nothing is ever committed, and a motion may end anywhere
@@ -41,8 +42,17 @@ class Settings:
             raise ValueError(
                 f"receding horizon: gap must be a share from 0 to below 1, got {self.gap}"
             )
+        if self.pieces < 0 or self.pieces == 1:
+            raise ValueError(
+                f"receding horizon: pieces must be at least 2, or 0 for none, got {self.pieces}"
+            )
         if not self.stand >= 0.0:
             raise ValueError(f"receding horizon: stand must be at least 0, got {self.stand} s")
+
+    @property
+    def continuous(self) -> bool:
+        """Whether plans may have other controls than the library."""
+        return self.retimed or self.pieces > 0
 
     def pad_of(self, problem: Problem) -> Trim | None:
         """The rest that fills a fixed time; None where time is free."""
@@ -56,26 +66,36 @@ class Settings:
                 f"receding horizon: step is {self.step:g} s, need at most the horizon, "
                 f"{horizon:g} s"
             )
-        if not self.retimed:
-            return
+        if self.continuous:
+            self._check_continuous(problem)
+
+    def _check_continuous(self, problem: Problem) -> None:
+        """Raise ValueError if plans of a problem cannot be driven with other controls."""
+        what, cost = "plans with pieces" if self.pieces else "retimed plans", problem.cost
         if not self.at_will or problem.zones or climbs_among_obstacles(problem):
             raise ValueError(
-                "receding horizon: retimed is for vehicles without inertia, and no zones or "
-                "heights: at another pace a maneuver leads elsewhere, and a zone may forbid it"
+                f"receding horizon: {'pieces are' if self.pieces else 'retimed is'} for vehicles "
+                "without inertia, and no zones or heights: at another pace a maneuver leads "
+                "elsewhere, and a zone may forbid it"
             )
-        if horizon is None or not getattr(problem.cost, "effort", 0.0) > 0.0:
+        if problem.horizon.time is None or not getattr(cost, "effort", 0.0) > 0.0:
             raise ValueError(
-                "receding horizon: retimed plans need a fixed horizon and a cost with effort"
+                f"receding horizon: {what} need a fixed horizon and a cost with effort"
             )
         if self.pad is None:
             raise ValueError(
-                "receding horizon: retimed plans need a rest trim, which fills the time they "
+                f"receding horizon: {what} need a rest trim, which fills the time they "
                 "gain; the library has none"
             )
         if problem.moves:
             raise ValueError(
-                "receding horizon: retimed plans meet what moves at other times; need obstacles "
+                f"receding horizon: {what} meet what moves at other times; need obstacles "
                 "that stand still"
+            )
+        if self.pieces and (self.retimed or problem.horizon.max_trims is not None):
+            raise ValueError(
+                "receding horizon: plans with pieces have as many trims as pieces, at the best "
+                "pace; need retimed and max_trims left out"
             )
 
 

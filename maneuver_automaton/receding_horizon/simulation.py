@@ -43,6 +43,7 @@ def simulate(
     first: Plan | None = None,
     stay: bool = False,
     retimed: bool = False,
+    pieces: int = 0,
     gap: float | None = None,
     look_ahead: float = 60.0,
     stand: float = 2.0,
@@ -62,7 +63,7 @@ def simulate(
         At most so many.
     disturbance : Disturbance, optional
         None: the vehicle moves as its model says.
-    margin, time_limit, first, retimed, gap, look_ahead, stand
+    margin, time_limit, first, retimed, pieces, gap, look_ahead, stand
         As in `RecedingHorizon`.
     last : Step, optional
         To go on from the last step of another loop; the problem's start is where that led.
@@ -110,6 +111,7 @@ def simulate(
         first=first,
         hold=stay,
         retimed=retimed,
+        pieces=pieces,
         gap=gap,
         look_ahead=look_ahead,
         stand=stand,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -15,6 +15,7 @@ from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem, apart
 from maneuver_automaton.receding_horizon.candidates import Candidate, candidate, within
 from maneuver_automaton.receding_horizon.log import Deed, Guarantee, Origin, Step, Violation
+from maneuver_automaton.receding_horizon.pace import between_trims
 from maneuver_automaton.receding_horizon.reanchoring import (
     distance,
     missed,
@@ -25,6 +26,7 @@ from maneuver_automaton.receding_horizon.settings import EXACT, Settings
 from maneuver_automaton.receding_horizon.shifting import moves_on, rest_of, rested
 from maneuver_automaton.search.alternatives import TIE
 
+FINISHED = 2  # candidates of a step for which controls between those of the library are sought
 ROUNDING = 1e-13  # relative, of a pose that was computed from a plan
 
 
@@ -293,6 +295,16 @@ class Situation:
         tied = [one for one in everything if one.cost <= least + TIE * (1.0 + abs(least))]
         self.is_sole = len(tied) == 1
         return tied[0] if self.is_sole else min(tied, key=lambda one: one.preference)
+
+    def between_trims(self, kept: Candidate | None, found: Sequence[Candidate]) -> list[Candidate]:
+        """The cheapest of some candidates again, with controls between those of the library."""
+        everything = [*found] if kept is None else [kept, *found]
+        better: list[Candidate] = []
+        for one in sorted(everything, key=lambda one: one.cost)[:FINISHED]:
+            plan = between_trims(self.here, one.plan, self.settings.pieces)
+            if plan is not one.plan:
+                better.append(self.candidate(plan, one.goal_index, one.origin))
+        return better
 
     def candidate(self, plan: Plan, index: int, origin: Origin) -> Candidate:
         """A plan from here, with the costs by which it is compared."""

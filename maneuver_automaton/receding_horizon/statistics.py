@@ -93,6 +93,7 @@ def simulate_many(
     time_limit: float = 5.0,
     stay: bool = False,
     retimed: bool = False,
+    pieces: int = 0,
     gap: float | None = None,
     audit: bool = False,
     jobs: int = 1,
@@ -108,7 +109,7 @@ def simulate_many(
         Poses to start from; the problem's own start if omitted.
     seeds : sequence of int
         Each start is tried with each of them.
-    step, steps, disturbance, margin, time_limit, stay, retimed, gap, audit
+    step, steps, disturbance, margin, time_limit, stay, retimed, pieces, gap, audit
         As in `simulate`; the seed of `disturbance` is replaced.
     jobs : int
         Processes at a time.
@@ -158,6 +159,7 @@ def simulate_many(
         time_limit=time_limit,
         stay=stay,
         retimed=retimed,
+        pieces=pieces,
         gap=gap,
         audit=audit,
     )
@@ -182,6 +184,7 @@ class _Settings:
     time_limit: float
     stay: bool
     retimed: bool
+    pieces: int
     gap: float | None
     audit: bool
 
@@ -214,6 +217,7 @@ def _outcome(problem: Problem, pose: Array, seed: int, settings: _Settings) -> O
         time_limit=settings.time_limit,
         stay=settings.stay,
         retimed=settings.retimed,
+        pieces=settings.pieces,
         gap=settings.gap,
         audit=settings.audit,
     )

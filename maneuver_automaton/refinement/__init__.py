@@ -15,10 +15,12 @@ if TYPE_CHECKING:
     from maneuver_automaton.refinement.polish import polish_guesses as polish_guesses
     from maneuver_automaton.refinement.retiming import Retiming as Retiming
     from maneuver_automaton.refinement.retiming import retime as retime
+    from maneuver_automaton.refinement.shooting import least_effort as least_effort
 
 _HOMES = {
     "EffortReport": "effort",
     "effort_report": "effort",
+    "least_effort": "shooting",
     "PolishedMotion": "polish",
     "PolishResult": "polish",
     "PolishTask": "polish",

@@ -105,10 +105,11 @@ def retime(
     cost = Cost(effort=1.0) if cost is None else cost
     if not cost.effort > 0.0:
         raise ValueError("retime: the cost has no effort, need one with effort > 0")
-    box = _box(model, limits)
+    box = control_box(model, limits)
     moving = np.flatnonzero(moving_trims(plan))
     trims, durations = [plan.trims[k] for k in moving], plan.durations[moving]
-    _check_model(trims, model)
+    driftless(trims, model)
+    _check_scaling(trims, model, paces=np.full(len(trims), HALF))
     quadratic = Cost(effort=1.0, effort_matrix=cost.effort_matrix)
     lengths = np.sqrt(cost_rates(plan, quadratic)[moving]) * durations
     fastest = np.array([_fastest(trim, box, model) for trim in trims])
@@ -186,39 +187,38 @@ def shared_time(lengths: Array, *, least: Array, total: float) -> Array:
     return least.copy()
 
 
-def _box(model: Model, limits: ArrayLike | None) -> Array:
-    """Least and greatest controls (n_u, 2), around zero."""
+def control_box(model: Model, limits: ArrayLike | None, *, asks: str = "retime") -> Array:
+    """Least and greatest controls (n_u, 2), around zero; ValueError if they are not."""
     names = model.control_names
     box = np.array(model.control_limits if limits is None else limits, dtype=np.float64)
     if box.shape != (len(names), 2):
         raise ValueError(
-            f"retime: limits have shape {box.shape}, need ({len(names)}, 2): least and greatest "
+            f"{asks}: limits have shape {box.shape}, need ({len(names)}, 2): least and greatest "
             f"{', '.join(names)}"
         )
     for name, (low, high) in zip(names, box, strict=True):
         if not low <= 0.0 <= high:
             raise ValueError(
-                f"retime: limits: {name} needs least <= 0 <= greatest, got ({low:.6g}, {high:.6g})"
+                f"{asks}: limits: {name} needs least <= 0 <= greatest, got ({low:.6g}, {high:.6g})"
             )
     return box
 
 
-def _check_model(trims: Sequence[Trim], model: Model) -> None:
+def driftless(trims: Sequence[Trim], model: Model, *, asks: str = "retime") -> None:
     """Refuse a model that is not driftless, or that these are no trims of."""
     if model.reduced_names:
         raise ValueError(
-            f"retime: the {model.name} has the reduced state {', '.join(model.reduced_names)}, "
+            f"{asks}: the {model.name} has the reduced state {', '.join(model.reduced_names)}, "
             "so it cannot change its pace at will; need a driftless vehicle"
         )
     for trim in trims:
         twist = model.body_velocity(np.zeros(0), trim.control)
         if not _same_twist(twist, trim.body_velocity):
             raise ValueError(
-                f"retime: trim {trim.name!r} moves with {vector_text(trim.body_velocity)}, but at "
+                f"{asks}: trim {trim.name!r} moves with {vector_text(trim.body_velocity)}, but at "
                 f"its control the {model.name} moves with {vector_text(twist)}; need the vehicle "
                 "of the plan"
             )
-    _check_scaling(trims, model, paces=np.full(len(trims), HALF))
 
 
 def _check_scaling(trims: Sequence[Trim], model: Model, *, paces: Array) -> None:

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from maneuver_automaton.roads.scene import RoadBenchmark as RoadBenchmark
     from maneuver_automaton.roads.scene import RoadScene as RoadScene
     from maneuver_automaton.roads.scene import RoadStart as RoadStart
+    from maneuver_automaton.roads.several import RoadFleetResult as RoadFleetResult
+    from maneuver_automaton.roads.several import RoadPair as RoadPair
+    from maneuver_automaton.roads.several import plan_roads as plan_roads
     from maneuver_automaton.roads.single_plan import RoadPlanResult as RoadPlanResult
     from maneuver_automaton.roads.single_plan import drive_road as drive_road
     from maneuver_automaton.roads.single_plan import plan_before as plan_before
@@ -42,6 +45,9 @@ _HOMES = {
     "RoadBenchmark": "scene",
     "RoadScene": "scene",
     "RoadStart": "scene",
+    "RoadFleetResult": "several",
+    "RoadPair": "several",
+    "plan_roads": "several",
     "RoadPlanResult": "single_plan",
     "drive_road": "single_plan",
     "plan_before": "single_plan",

@@ -113,6 +113,7 @@ class Part(BaseModel):
 
     one_of: ClassVar[tuple[str, ...]] = ()  # exactly one of these keys
     goes_with: ClassVar[Mapping[str, tuple[str, ...]]] = {}  # a key, and those it needs one of
+    instead: ClassVar[Mapping[str, str]] = {}  # keys of other parts, and what is needed here
 
     @model_validator(mode="before")
     @classmethod
@@ -121,6 +122,8 @@ class Part(BaseModel):
         if not isinstance(value, dict):
             raise need(f"a mapping with the keys {', '.join(keys)}")
         for key in value:
+            if key in cls.instead:
+                raise PydanticCustomError("at_key", "", {"key": key, "need": cls.instead[key]})
             if key not in keys:
                 raise PydanticCustomError(
                     "unknown_key",

@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Automaton
@@ -16,12 +16,28 @@ from maneuver_automaton.formats.statement import MapFile, Statement
 from maneuver_automaton.formats.yaml_source import Document, Where, shown
 from maneuver_automaton.models import Model
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.scenario.checks import Part
 from maneuver_automaton.scenario.combining import combined, own_scenario
-from maneuver_automaton.scenario.fleet_schema import OWN, SHARED, FleetFile, FleetPart, VehicleEntry
+from maneuver_automaton.scenario.disturbances import check_disturbance, disturbances_of
+from maneuver_automaton.scenario.fleet_schema import (
+    OWN,
+    SHARED,
+    FleetFile,
+    FleetLoopPart,
+    FleetPart,
+    VehicleEntry,
+    VehicleLoopPart,
+)
 from maneuver_automaton.scenario.places import at
 from maneuver_automaton.scenario.reading import check_schema, checked
 from maneuver_automaton.scenario.scenario import Made, Scenario, scenario_of_document
-from maneuver_automaton.scenario.schema import RecedingHorizonPart, ScenarioFile
+from maneuver_automaton.scenario.schema import ScenarioFile
+
+if TYPE_CHECKING:
+    from maneuver_automaton.receding_horizon import Disturbance
+
+LOOP = "receding_horizon"
+Kind = TypeVar("Kind", bound=Part)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -32,7 +48,8 @@ class FleetScenario:
     fleet: FleetProblem
     vehicles: tuple[Scenario, ...]  # each alone, in the order of the file
     settings: FleetPart = field(default_factory=FleetPart)
-    receding_horizon: RecedingHorizonPart | None = None
+    receding_horizon: FleetLoopPart | None = None
+    loops: Mapping[str, VehicleLoopPart] = field(default_factory=dict)  # of those that state more
     maps: tuple[MapFile, ...] = ()  # files of the maps among the obstacles of any
     path: Path | None = None
     timing_s: Mapping[str, float] = field(default_factory=dict)  # load, automaton [s]
@@ -48,6 +65,24 @@ class FleetScenario:
     def problems(self) -> tuple[Problem, ...]:
         """Those of all vehicles."""
         return self.fleet.problems
+
+    @property
+    def joins_s(self) -> dict[str, float]:
+        """When those that join in closed loop appear, by name [s]."""
+        return {name: one.joins_s for name, one in self.loops.items() if one.joins_s is not None}
+
+    @property
+    def breaks_s(self) -> dict[str, float]:
+        """When those that break down in closed loop do, by name [s]."""
+        return {name: one.breaks_s for name, one in self.loops.items() if one.breaks_s is not None}
+
+    @property
+    def disturbances(self) -> dict[str, Disturbance]:
+        """What disturbs each vehicle in closed loop, by name; their own, or else that of the top.
+
+        The seed of the top is that of the loop: each vehicle has numbers of its own.
+        """
+        return disturbances_of(self.fleet.names, self.receding_horizon, self.loops)
 
 
 def states_several(document: Document) -> bool:
@@ -100,12 +135,19 @@ def fleet_of_document(
             leaves=[one.leaves for one in file.vehicles],
             priority=[one.priority for one in file.vehicles],
         )
+    loops = {
+        name: one.receding_horizon
+        for name, one in zip(names, file.vehicles, strict=True)
+        if one.receding_horizon is not None
+    }
+    _check_loop(document, file, fleet)
     return FleetScenario(
         name=(path.stem if path else document.name) if file.name is None else file.name,
         fleet=fleet,
         vehicles=tuple(replace(one, name=name) for one, name in zip(alone, names, strict=True)),
         settings=file.fleet,
         receding_horizon=file.receding_horizon,
+        loops=loops,
         maps=_maps(alone),
         path=path,
         timing_s={"load": time.perf_counter() - begin - making, "automaton": making},
@@ -118,6 +160,7 @@ def fleet_of_statement(
     *,
     path: Path,
     settings: FleetPart | None = None,
+    loop: FleetLoopPart | None = None,
 ) -> FleetScenario:
     """The fleet that a file `path` of another format states, with the scenario `beside` it.
 
@@ -152,25 +195,67 @@ def fleet_of_statement(
         fleet=fleet,
         vehicles=tuple(alone),
         settings=settings,
-        receding_horizon=alone[0].receding_horizon,
+        receding_horizon=loop,
         maps=_maps(alone),
         path=path,
     )
 
 
-def without_fleet(document: Document) -> tuple[Document, FleetPart]:
-    """A scenario beside a fleet, and what it says of how to plan one.
+def without_fleet(document: Document) -> tuple[Document, FleetPart, FleetLoopPart | None]:
+    """A scenario beside a fleet, and what it says of how to plan one and to close its loop.
 
     Raises
     ------
     InvalidScenario
-        If that part cannot be used.
+        If one of these parts cannot be used.
     """
-    if not (isinstance(document.value, dict) and "fleet" in document.value):
-        return document, FleetPart()
-    value = {key: value for key, value in document.value.items() if key != "fleet"}
-    inside = replace(document, value=document.value["fleet"], homes={(): ("fleet",)})
-    return replace(document, value=value), checked(inside, FleetPart)
+    whole = document.value
+    if not isinstance(whole, dict):
+        return document, FleetPart(), None
+
+    def part(key: str, kind: type[Kind]) -> Kind | None:
+        if key not in whole:
+            return None
+        inside = replace(document, value=whole[key], homes={(): (key,)})
+        return checked(inside, kind)
+
+    rest = {key: value for key, value in whole.items() if key not in ("fleet", LOOP)}
+    settings = part("fleet", FleetPart) or FleetPart()
+    return replace(document, value=rest), settings, part(LOOP, FleetLoopPart)
+
+
+def _check_loop(document: Document, file: FleetFile, fleet: FleetProblem) -> None:
+    """Raise where the loop of a file does not suit its vehicles."""
+    loop = file.receding_horizon
+    for k, one in enumerate(file.vehicles):
+        if one.receding_horizon is not None and loop is None:
+            raise document.error(
+                ("vehicles", k, LOOP),
+                "stands alone, need receding_horizon: {step_s: ...} at the top",
+            )
+    if loop is None:
+        return
+    most = 0.5 * fleet.margin
+    if loop.tube_m is not None and loop.tube_m > most:
+        raise document.error(
+            (LOOP, "tube_m"),
+            f"got {loop.tube_m:g}, need at most {most:g}, half of between_m: two bodies may both "
+            "be beside their plans",
+        )
+    if loop.group_size > 1 and loop.delay_steps:
+        raise document.error(
+            (LOOP, "group_size"),
+            f"got {loop.group_size}, need 1 where answers are late (delay_steps): those of several "
+            "would have to come at once",
+        )
+    for k, (one, problem) in enumerate(zip(file.vehicles, fleet.problems, strict=True)):
+        own = None if one.receding_horizon is None else one.receding_horizon.disturbance
+        noise = loop.disturbance if own is None else own
+        if noise is not None:
+            where: Where = (LOOP, "disturbance")
+            where = where if own is None else ("vehicles", k, *where)
+            with at(document, where):
+                check_disturbance(noise, problem)
 
 
 def _maps(alone: Sequence[Scenario]) -> tuple[MapFile, ...]:

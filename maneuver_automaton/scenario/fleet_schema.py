@@ -6,8 +6,9 @@ entry is together with the top is checked as a file of one vehicle; here, what s
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
+from annotated_types import Ge
 from pydantic import Field, Strict
 
 from maneuver_automaton.scenario.checks import (
@@ -27,9 +28,10 @@ from maneuver_automaton.scenario.schema import (
     CostPart,
     Goals,
     HorizonPart,
+    Noise,
     Obstacle,
-    RecedingHorizonPart,
     SearchPart,
+    Seed,
     Start,
     ZonePart,
 )
@@ -53,6 +55,55 @@ class FleetPart(Part):
     time_limit_s: Positive = Field(10.0, description="upper bound for planning them all")
 
 
+class FleetNoise(Noise):
+    """What vehicles of a fleet do beside their plans; random numbers come from the seed."""
+
+    instead: ClassVar = {
+        "delay_steps": "no such key: answers of a fleet are late by delay_steps of receding_horizon"
+    }
+
+    seed: Seed = Field(0, description="seed of the random numbers")
+
+
+class FleetLoopPart(Part):
+    """Closed loop of several vehicles, for mpc."""
+
+    instead: ClassVar = {
+        "retimed": "no such key: vehicles of a fleet drive at the pace that others know of",
+        "stay": "no such key: who has arrived stays at its goal, or leaves",
+    }
+
+    step_s: Positive = Field(description="time between two steps")
+    steps: Count | None = Field(None, description="largest number of steps; left out: 100")
+    time_limit_s: Positive = Field(1.0, description="upper bound for all searches of a step")
+    margin: NotNegative = Field(0.0, description="another plan must cost less by more than this")
+    tube_m: NotNegative | None = Field(
+        None, description="how far a body may be beside its plan; left out: half of between_m"
+    )
+    swaps_per_step: Count | None = Field(
+        None, description="vehicles that look for another plan in a step; left out: all"
+    )
+    group_size: Count = Field(1, description="so many exchange their plans at once, at most")
+    delay_steps: Annotated[int, Strict(), Ge(0), Need("a whole number of at least 0")] = Field(
+        0, description="how many steps late an answer comes"
+    )
+    disturbance: FleetNoise | None = Field(
+        None, description="of every vehicle that states none: {position_m, heading_rad, seed, ...}"
+    )
+
+
+class VehicleLoopPart(Part):
+    """What happens to one of several vehicles in closed loop, for mpc."""
+
+    joins_s: Number | None = Field(
+        None, description="when it appears at its start, and joins as soon as there is room"
+    )
+    breaks_s: Number | None = Field(
+        None, description="when it breaks down: it stops as soon as it can, and stays there"
+    )
+    disturbance: FleetNoise | None = Field(None, description=AT_TOP)
+
+
 class VehicleEntry(Part):
     """One of several vehicles: what it has of its own, and what differs from the top."""
 
@@ -73,6 +124,9 @@ class VehicleEntry(Part):
     obstacles: Obstacles | None = Field(None, description=AT_TOP)
     zones: Zones | None = Field(None, description=AT_TOP)
     search: SearchPart | None = Field(None, description=AT_TOP)
+    receding_horizon: VehicleLoopPart | None = Field(
+        None, description="only for mpc: {joins_s, breaks_s, disturbance}"
+    )
 
 
 class FleetFile(Part):
@@ -93,8 +147,8 @@ class FleetFile(Part):
         tuple[VehicleEntry, ...], Several("a list of at least one vehicle", at_least=1)
     ] = Field(description="a list of {name, start, goal, ...}")
     fleet: FleetPart = Field(default_factory=FleetPart, description="how they are planned")
-    receding_horizon: RecedingHorizonPart | None = Field(None, description="only for mpc")
+    receding_horizon: FleetLoopPart | None = Field(None, description="only for mpc")
 
 
 SHARED = ("name", "vehicles", "fleet", "receding_horizon")  # keys of the top that no entry has
-OWN = ("name", "priority", "leaves", "start_time_s")  # keys of an entry that no file has
+OWN = ("name", "priority", "leaves", "start_time_s", "receding_horizon")  # keys of an entry alone

@@ -100,13 +100,13 @@ def load_scenario(
     if statement.road is not None:
         vehicle = RoadVehicle() if beside is None else _road_vehicle(Path(beside))
         return RoadScenario(name=statement.name, scene=statement.road, vehicle=vehicle)
-    rest, settings = None, None
+    rest, settings, loop = None, None, None
     if beside is not None:
         stated = statement.fleet[0] if statement.fleet else statement
         document = _beside(Path(beside), start=stated.start, goal=stated.goal)
         with _told_of_beside():
             if statement.fleet:
-                document, settings = without_fleet(document)
+                document, settings, loop = without_fleet(document)
             rest = scenario_of_document(document, path=Path(beside), begin=begin, own=model)
     elif model is not None:
         raise InvalidScenario(
@@ -114,12 +114,32 @@ def load_scenario(
         )
     scenario: Scenario | FleetScenario
     if statement.fleet:
-        scenario = fleet_of_statement(statement, rest, path=path, settings=settings)
+        scenario = fleet_of_statement(statement, rest, path=path, settings=settings, loop=loop)
     else:
         scenario = combined(statement, rest, path=path)
     made = scenario.timing_s.get("automaton", 0.0)
     load = time.perf_counter() - begin - made
     return replace(scenario, timing_s={"load": load, "automaton": made})
+
+
+def load_roads(path: Path | str, *, beside: Path | str | None = None) -> tuple[RoadScenario, ...]:
+    """The drives on roads of a CommonRoad file, one for each of its planning problems.
+
+    `plan_roads` takes their scenes.
+
+    Raises
+    ------
+    InvalidScenario
+        As `load_scenario`.
+    """
+    from maneuver_automaton.formats.commonroad import read_commonroad
+
+    vehicle = RoadVehicle() if beside is None else _road_vehicle(Path(beside))
+    return tuple(
+        RoadScenario(name=one.name, scene=one.road, vehicle=vehicle)
+        for one in read_commonroad(Path(path))
+        if one.road is not None
+    )
 
 
 def _road_vehicle(beside: Path) -> RoadVehicle:

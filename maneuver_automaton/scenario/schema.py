@@ -331,8 +331,11 @@ class PushPart(Part):
     by: Pose = Field(description="[x, y, heading] seen from the vehicle")
 
 
-class Disturbance(Part):
-    """What the vehicle does beside its plan; random numbers come from the seed."""
+Seed = Annotated[int, Strict(), Ge(0), Need("a whole number of at least 0")]
+
+
+class Noise(Part):
+    """What a vehicle does beside its plan."""
 
     position_m: NotNegative = Field(0.0, description="standard deviation per axis and step")
     heading_rad: NotNegative = Field(0.0, description="standard deviation per step")
@@ -344,12 +347,6 @@ class Disturbance(Part):
     pushes: Annotated[tuple[PushPart, ...], Several("a list of pushes", at_least=0)] = Field(
         (), description="a list of {after_step, by}"
     )
-    delay_steps: Annotated[Literal[0, 1], Need("0 or 1")] = Field(
-        0, description="how late the controller sees the pose"
-    )
-    seed: Annotated[int, Strict(), Ge(0), Need("a whole number of at least 0")] = Field(
-        0, description="seed of the random numbers"
-    )
 
     @field_validator("pushes")
     @classmethod
@@ -357,6 +354,15 @@ class Disturbance(Part):
         if len({push.after_step for push in pushes}) < len(pushes):
             raise need("pushes after different steps")
         return pushes
+
+
+class Disturbance(Noise):
+    """What the vehicle does beside its plan; random numbers come from the seed."""
+
+    delay_steps: Annotated[Literal[0, 1], Need("0 or 1")] = Field(
+        0, description="how late the controller sees the pose"
+    )
+    seed: Seed = Field(0, description="seed of the random numbers")
 
 
 class RecedingHorizonPart(Part):
@@ -368,6 +374,9 @@ class RecedingHorizonPart(Part):
         0.0, description="a new word must be cheaper by more than this; 0: the optimum"
     )
     retimed: bool = Field(False, description="drive plans at the pace of uniform effort")
+    pieces: Count | None = Field(
+        None, description="parts of a plan with controls between those of the library; left out: 0"
+    )
     stay: bool = Field(False, description="go on within the goal's tolerance for all steps")
     disturbance: Disturbance | None = Field(
         None, description="{position_m, heading_rad, seed, ...}"

@@ -140,6 +140,7 @@ def _several(
             **({"priority": priority} if priority else {}),
             **({"leaves": True} if leaves else {}),
             **{key: value for key, value in one.items() if written.get(key) != _flow(value)},
+            **_loop_of(scenario, name),
         }
         for name, priority, leaves, one in zip(
             fleet.names, fleet.priority, fleet.leaves, alone, strict=True
@@ -147,6 +148,13 @@ def _several(
     ]
     settings = scenario.settings.model_dump() | {"between_m": fleet.margin}
     return {"vehicles": rows, "fleet": settings}
+
+
+def _loop_of(scenario: FleetScenario, name: str) -> dict[str, Any]:
+    """What happens to a vehicle in closed loop, if that is stated."""
+    if name not in scenario.loops:
+        return {}
+    return {"receding_horizon": scenario.loops[name].model_dump(exclude_none=True)}
 
 
 def _vehicle(scenario: Scenario) -> dict[str, Any]:
@@ -169,14 +177,19 @@ def json_schema() -> dict[str, Any]:
     one = _without_null(ScenarioFile.model_json_schema(by_alias=True))
     several = _without_null(FleetFile.model_json_schema(by_alias=True))
     kinds = [kind["required"] for kind in (one, several)]
+    loops = [kind["properties"]["receding_horizon"] for kind in (one, several)]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         **one,
         "$defs": several["$defs"] | one["$defs"],
         "properties": one["properties"]
-        | {key: several["properties"][key] for key in ("vehicles", "fleet")},
+        | {key: several["properties"][key] for key in ("vehicles", "fleet")}
+        | {"receding_horizon": {"anyOf": loops, "description": "only for mpc"}},
         "required": [key for key in kinds[0] if key in kinds[1]],
-        "oneOf": [{"required": keys} for keys in kinds],
+        "oneOf": [
+            {"required": keys, "properties": {"receding_horizon": loop}}
+            for keys, loop in zip(kinds, loops, strict=True)
+        ],
         "dependentRequired": {"fleet": ["vehicles"]},
     }
 

@@ -15,8 +15,10 @@ if TYPE_CHECKING:
     from maneuver_automaton.search.distance_grid import DistanceGrid
 
 BLOCKED, SETTLED, REACHED = 1, 2, 3  # marks of a cell; 0 is one that nothing is known of
-NARROW = 4.0  # how much dearer a cell is whose middle is no place for the vehicle
-QUEUED, N_SETTLED, AT_RIM = range(3)  # places in `grid.state`
+STRAIGHT, DIAGONAL = 29, 41  # a step to a neighbour, in units: 41 / 29 is 0.03 % below sqrt(2)
+NARROW = 4  # how much dearer a cell is whose middle is no place for the vehicle
+BUCKETS = 256  # a power of two, more than ``NARROW * DIAGONAL + DIAGONAL``, see `_queue`
+LISTED, N_SETTLED, AT_RIM, FAR, WRITTEN, NOW = range(6)  # places in `grid.state`
 
 
 @bare_inner_kernel
@@ -74,6 +76,54 @@ def blocked_cell(grid: DistanceGrid, field: Field, i: int, j: int) -> bool:
 
 
 @bare_inner_kernel
+def _octile(i: int, j: int) -> int:
+    """Length of the shortest way over `i` columns and `j` rows of cells, in units."""
+    i, j = abs(i), abs(j)
+    return STRAIGHT * max(i, j) + (DIAGONAL - STRAIGHT) * min(i, j)
+
+
+@bare_inner_kernel
+def _queue(grid: DistanceGrid, key: int, item: int) -> None:
+    """Put a cell into the open list."""
+    # Keys are whole numbers, and none is below that of the cell that is settled at the time: the
+    # octile way to where the grid is aimed at, which they add to a rank, is no longer than a step
+    # and the way from there. So those of the next `BUCKETS` units need no order but their number.
+    # Only what is behind a thin wall is farther away than that; it waits in a binary heap.
+    state = grid.state
+    if key - state[NOW] < BUCKETS:
+        bucket, place = key & (BUCKETS - 1), grid.items.shape[0] - 1 - state[WRITTEN]
+        grid.items[place], grid.links[place] = item, grid.heads[bucket]
+        grid.heads[bucket] = place + 1  # 0: none
+        state[WRITTEN] += 1
+        state[LISTED] += 1
+    else:
+        push(grid.keys, grid.items, state[FAR], float(key), item)
+        state[FAR] += 1
+
+
+@bare_inner_kernel
+def _next_cell(grid: DistanceGrid) -> int:
+    """Take a cell of the least key out of the open list; -1 if that is empty."""
+    state, heads = grid.state, grid.heads
+    now = state[NOW]
+    if state[LISTED] > 0:
+        while heads[now & (BUCKETS - 1)] == 0:
+            now += 1
+    if state[FAR] > 0 and (state[LISTED] == 0 or grid.keys[0] <= now):
+        state[NOW] = int(grid.keys[0])
+        item = pop(grid.keys, grid.items, state[FAR])
+        state[FAR] -= 1
+        return item
+    if state[LISTED] == 0:
+        return -1
+    place = heads[now & (BUCKETS - 1)] - 1
+    heads[now & (BUCKETS - 1)] = grid.links[place]
+    state[LISTED] -= 1
+    state[NOW] = now
+    return grid.items[place]
+
+
+@bare_inner_kernel
 def distance_at(grid: DistanceGrid, field: Field, x: float, y: float) -> float:
     """Distance [m] from the nearest seed to the cell of (x, y); inf if there is no path.
 
@@ -81,16 +131,16 @@ def distance_at(grid: DistanceGrid, field: Field, x: float, y: float) -> float:
     may pass between the middles of two cells although neither is blocked (the body is small and
     the wall thin), a path through costs `grid.detour` more in `rank`, by which paths are compared.
     `value` keeps the length alone: it is compared with costs, and is finite behind every gap that
-    the cells cannot show.
+    the cells cannot show. Both are whole numbers: the same whatever was asked for before.
 
-    Grows until that cell is settled, in the order of the rank plus the straight line to where the
+    Grows until that cell is settled, in the order of the rank plus the octile way to where the
     grid is aimed at, so that cells far from the path are not looked at. The state of the search is
     kept in the grid: the next call goes on from it.
     """
     # Of the arrays of the grid, one entry a cell: `mark`; `rank` and `value`, the least known so
     # far, final once the cell is settled. Neither holds anything before the mark says so: a large
-    # grid of which little is used is not filled first. `keys` and `items` are the open list, a
-    # binary heap in which a cell may stand several times.
+    # grid of which little is used is not filled first. A cell may stand in the open list several
+    # times.
     i = math.floor((x - grid.origin_x) / grid.cell)
     j = math.floor((y - grid.origin_y) / grid.cell)
     if not (0 <= i < grid.columns and 0 <= j < grid.rows):
@@ -99,11 +149,9 @@ def distance_at(grid: DistanceGrid, field: Field, x: float, y: float) -> float:
     if grid.mark[wanted] == BLOCKED or blocked_cell(grid, field, i, j):
         return math.inf
     while grid.mark[wanted] != SETTLED:
-        size = grid.state[QUEUED]
-        if size == 0:
+        here = _next_cell(grid)
+        if here < 0:
             return math.inf
-        here = pop(grid.keys, grid.items, size)
-        grid.state[QUEUED] = size - 1
         if grid.mark[here] == SETTLED:
             continue
         grid.mark[here] = SETTLED
@@ -126,19 +174,15 @@ def distance_at(grid: DistanceGrid, field: Field, x: float, y: float) -> float:
                 if room < grid.inflation:
                     grid.mark[there] = BLOCKED
                     continue
-                step = grid.cell * (1.4142135623730951 if a != 0 and b != 0 else 1.0)
+                step = DIAGONAL if a != 0 and b != 0 else STRAIGHT
                 if room < grid.wanted:
                     step *= NARROW
-                ranked = rank + step + (grid.detour if room < grid.cut else 0.0)
+                ranked = rank + step + (grid.detour if room < grid.cut else 0)
                 if mark != REACHED or ranked < grid.rank[there]:
                     grid.mark[there] = REACHED
                     grid.rank[there], grid.value[there] = ranked, value + step
-                    e_x, e_y = (n_i - grid.aim_i) * grid.cell, (n_j - grid.aim_j) * grid.cell
-                    key = ranked + math.sqrt(e_x * e_x + e_y * e_y)
-                    if grid.state[QUEUED] < grid.keys.shape[0]:
-                        push(grid.keys, grid.items, grid.state[QUEUED], key, there)
-                        grid.state[QUEUED] += 1
-    return grid.value[wanted]
+                    _queue(grid, ranked + _octile(n_i - grid.aim_i, n_j - grid.aim_j), there)
+    return grid.value[wanted] * (grid.cell / STRAIGHT)
 
 
 @bare_kernel
@@ -151,11 +195,11 @@ def seed(grid: DistanceGrid, points: Array) -> None:
             here = j * grid.columns + i
             if grid.mark[here] != REACHED:  # no seed has its cell yet
                 grid.mark[here] = REACHED
-                grid.rank[here], grid.value[here] = 0.0, 0.0
-                e_x, e_y = (i - grid.aim_i) * grid.cell, (j - grid.aim_j) * grid.cell
-                key = math.sqrt(e_x * e_x + e_y * e_y)
-                push(grid.keys, grid.items, grid.state[QUEUED], key, here)
-                grid.state[QUEUED] += 1
+                grid.rank[here], grid.value[here] = 0, 0
+                key = _octile(i - grid.aim_i, j - grid.aim_j)
+                # Which of them is the nearest, and so the first, is not known yet.
+                push(grid.keys, grid.items, grid.state[FAR], float(key), here)
+                grid.state[FAR] += 1
 
 
 @kernel

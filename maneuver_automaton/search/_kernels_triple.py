@@ -114,6 +114,7 @@ def solve_triple(
         (z, heading),
         tolerance,
         out,
+        -math.inf,
     )
 
 

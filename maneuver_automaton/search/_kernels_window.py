@@ -26,6 +26,15 @@ def inside_window(
     c, s = window[6], window[7]
     d_x, d_y = x - window[4], y - window[5]
     a_x, a_y = c * d_x - s * d_y, s * d_x + c * d_y
+    # Most motions are too short to reach a side.
+    reach = math.sqrt(v_x * v_x + v_y * v_y) * abs(t)
+    if (
+        a_x - reach > window[0]
+        and a_y - reach > window[1]
+        and a_x + reach < window[2]
+        and a_y + reach < window[3]
+    ):
+        return True
     a_heading = heading + math.atan2(s, c)
     m_x, m_y, angle = coast(v_x, v_y, turn, t)
     e_x, e_y, _ = compose(a_x, a_y, a_heading, m_x, m_y, angle)
@@ -36,7 +45,7 @@ def inside_window(
         cos, sin = math.cos(a_heading), math.sin(a_heading)
         m_x = a_x + cos * radius_x - sin * radius_y
         m_y = a_y + sin * radius_x + cos * radius_y
-        radius = math.hypot(radius_x, radius_y)
+        radius = math.sqrt(radius_x * radius_x + radius_y * radius_y)
         # (m_x, m_y) is the centre. The proof: along an axis an arc is extreme at its ends or at a
         # multiple of a quarter turn, and four of these in a row are all there are.
         begin = math.atan2(a_y - m_y, a_x - m_x)

@@ -11,24 +11,27 @@ from numpy.typing import NDArray
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.world import World
 from maneuver_automaton.search import _kernels_distance
+from maneuver_automaton.search._kernels_distance import BUCKETS, STRAIGHT
 from maneuver_automaton.search.prepared import RECENT, Prepared
 
 MOST_CELLS = 1_000_000
 OCTILE = 1.0823922002923938  # 1 / cos(pi / 8): most of a path along cells over a straight one
 COARSER = 3  # field cells along a side of a coarse cell
 COARSEST = 1.05  # half diagonals of a coarse cell over the body's inscribed radius, at most
-DETOUR = 4.0  # [sides of the grid] that are preferred to a path through a wall thinner than a cell
+DETOUR = 4  # [sides of the grid] that are preferred to a path through a wall thinner than a cell
 
 
 class DistanceGrid(NamedTuple):
     """The grid as the kernels see it; its cells coincide with those of the world's field."""
 
-    value: Array  # (cells,) [m] length of the path that ranks first, where one is known
-    rank: Array  # (cells,) [m] that length with a detour for every cell that a wall may cut
+    value: IntArray  # (cells,) [units] length of the path that ranks first, where one is known
+    rank: IntArray  # (cells,) [units] that length with a detour for every cell a wall may cut
     mark: NDArray[np.uint8]  # (cells,) 0 nothing is known, 1 blocked, 2 settled, 3 reached
-    keys: Array  # (8 cells + 8,) of the open list, a binary heap
-    items: IntArray  # its cells
-    state: IntArray  # (3,) heap size, settled cells, whether the rim was reached
+    keys: Array  # (8 cells + 8,) of the part of the open list that is far away, a binary heap
+    items: IntArray  # its cells; from the other end on those of the rest of the open list
+    links: IntArray  # the places before them in their bucket, plus 1; 0: none
+    heads: IntArray  # (BUCKETS,) the last place of each bucket, plus 1
+    state: IntArray  # (6,) as numbered by the kernels
     origin_x: float
     origin_y: float
     cell: float
@@ -40,7 +43,7 @@ class DistanceGrid(NamedTuple):
     inflation: float  # [m] clearance of a cell's centre below which the pose cannot be in it
     wanted: float  # [m] clearance of a cell's centre below which the vehicle cannot be there
     cut: float  # [m] clearance of a cell's centre below which a wall may cut the cell; -inf: none
-    detour: float  # [m] how much longer a path is preferred to one through such a cell
+    detour: int  # [units] how much longer a path is preferred to one through such a cell
     aim_i: int  # cell towards which it grows first
     aim_j: int
 
@@ -83,13 +86,18 @@ def distance_grid(
     n = columns * rows
     half_diagonal = cell * math.sqrt(0.5)
     aim_x, aim_y = aim[:2].tolist()
+    most = 8 * n + 8  # each cell is reached once from each of its neighbours at most
+    memory = prepared.room(2 * n + 3 * most, np.int64)
+    keys, items, links = (memory[2 * n + k * most : 2 * n + (k + 1) * most] for k in range(3))
     grid = DistanceGrid(
-        value=prepared.room(n, np.float64),
-        rank=prepared.room(n, np.float64),
+        value=memory[:n],
+        rank=memory[n : 2 * n],
         mark=np.zeros(n, dtype=np.uint8),
-        keys=prepared.room(8 * n + 8, np.float64),
-        items=prepared.room(8 * n + 8, np.int64),
-        state=np.zeros(3, dtype=np.int64),
+        keys=keys.view(np.float64),
+        items=items,
+        links=links,
+        heads=np.zeros(BUCKETS, dtype=np.int64),
+        state=np.zeros(6, dtype=np.int64),
         origin_x=start_x,
         origin_y=start_y,
         cell=cell,
@@ -101,7 +109,7 @@ def distance_grid(
         inflation=world.body.inscribed - half_diagonal,
         wanted=world.body.inscribed,
         cut=half_diagonal if world.body.inscribed < 2.0 * half_diagonal else -math.inf,
-        detour=DETOUR * (columns + rows) * cell,
+        detour=DETOUR * (columns + rows) * STRAIGHT,
         aim_i=math.floor((aim_x - start_x) / cell),
         aim_j=math.floor((aim_y - start_y) / cell),
     )
@@ -128,14 +136,16 @@ def stride_of(area: float, cell: float) -> int:
 
 def _none() -> DistanceGrid:
     """A grid without cells, where no obstacle is static: the straight line is as good."""
-    empty, none = np.zeros(0), np.zeros(0, dtype=np.int64)
+    none = np.zeros(0, dtype=np.int64)
     return DistanceGrid(
-        value=empty,
-        rank=empty,
+        value=none,
+        rank=none,
         mark=np.zeros(0, dtype=np.uint8),
-        keys=empty,
+        keys=np.zeros(0),
         items=none,
-        state=np.zeros(3, dtype=np.int64),
+        links=none,
+        heads=none,
+        state=np.zeros(6, dtype=np.int64),
         origin_x=0.0,
         origin_y=0.0,
         cell=1.0,
@@ -147,7 +157,7 @@ def _none() -> DistanceGrid:
         inflation=0.0,
         wanted=0.0,
         cut=-math.inf,
-        detour=0.0,
+        detour=0,
         aim_i=0,
         aim_j=0,
     )

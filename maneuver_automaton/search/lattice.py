@@ -203,7 +203,7 @@ def _grid(query: LatticeQuery, sign: float, *, coarse: bool) -> DistanceGrid:
 
 def _enclosed(query: LatticeQuery, grids: Grids) -> str:
     """Why no plan can exist: the plane around the goals, or the start, is closed."""
-    from maneuver_automaton.search._kernels_distance import distances
+    from maneuver_automaton.search._kernels_distance import AT_RIM, distances
 
     for grid, name, far in (
         (grids[0], "goal", query.start[None]),
@@ -212,7 +212,7 @@ def _enclosed(query: LatticeQuery, grids: Grids) -> str:
         if not grid.columns:
             continue
         lengths = distances(grid, query.world.arrays.field, np.ascontiguousarray(far[:, :2]))
-        if np.isinf(lengths).all() and (query.bounded or not grid.state[2]):
+        if np.isinf(lengths).all() and (query.bounded or not grid.state[AT_RIM]):
             return f"obstacles enclose the {name}"
     return ""
 

@@ -11,14 +11,16 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array
-
 MOST = 16  # values of each kind
-LARGEST = 1 << 21  # numbers in a block of memory that is kept, 16 MiB
+LARGEST = 1 << 22  # numbers in a block of memory that is kept, 32 MiB
 
 _T = TypeVar("_T")
 _P = ParamSpec("_P")
 _Number = TypeVar("_Number", np.float64, np.int64)
+
+
+class _Block(np.ndarray[Any, Any]):
+    """Memory that is lent: an array of a kind of its own, whose parts views keep alive."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,7 +40,7 @@ class Prepared:
     """
 
     _makers: dict[Callable[..., Any], Callable[..., Any]] = field(default_factory=dict, init=False)
-    _blocks: list[Array] = field(default_factory=list, init=False)  # that nobody uses now
+    _blocks: list[_Block] = field(default_factory=list, init=False)  # that nobody uses now
 
     def once(self, make: Callable[_P, _T], *args: _P.args, **more: _P.kwargs) -> _T:
         """The result of `make` for these arguments, which are values: made at the first call."""
@@ -52,8 +54,8 @@ class Prepared:
         """An array (n,) of numbers that mean nothing, in memory that is used again after it.
 
         The system hands out fresh memory page by page, which for the arrays of a first plan takes
-        longer than a millisecond. The memory is free again once the array is gone: a view of it
-        must not outlive it. A number of its `kind` has 64 bits.
+        longer than a millisecond. The memory is free again once the array and all views of it are
+        gone. A number of its `kind` has 64 bits.
 
         Examples
         --------
@@ -67,13 +69,13 @@ class Prepared:
         try:
             block = self._blocks.pop()
         except IndexError:  # asked for before, another thread might take the last one
-            block = np.empty(0)
+            block = _Block(0)
         if block.size < n:
-            block = np.empty(n)
-        array = block.view(kind)[:n]
+            block = _Block(n)
+        lent = block[:n]
         if n <= LARGEST:
-            weakref.finalize(array, self._blocks.append, block).atexit = False
-        return array
+            weakref.finalize(lent, self._blocks.append, block).atexit = False
+        return lent.view(np.ndarray).view(kind)
 
 
 RECENT = Prepared()

@@ -27,7 +27,7 @@ from maneuver_automaton.words._kernels_library import (
     step_of,
     time_between,
 )
-from maneuver_automaton.words._kernels_steering import steer, steer_one, steer_two
+from maneuver_automaton.words._kernels_steering import length, steer, steer_one, steer_two
 
 if TYPE_CHECKING:
     from maneuver_automaton._arrays import Array, IntArray
@@ -166,7 +166,7 @@ def candidates(
         e_x, e_y, e_heading = g_x, g_y, g_heading
         h_x, h_y, h_heading = g_x, g_y, g_heading
         rel = seen(s_x, s_y, s_heading, e_x, e_y, e_heading)
-        distance = abs(rel[0])
+        distance = length(rel[0])
         for row in range(n_words):
             a, b, c = words[row, 0], words[row, 1], words[row, 2]
             n_trims = 3 if c >= 0 else 2 if b >= 0 else 1 if a >= 0 else 0
@@ -190,7 +190,7 @@ def candidates(
                 if climb >= 0:
                     e_x, e_y, e_heading = before_climb(lib, (h_x, h_y, h_heading), last, climb, 0.0)
                 rel = seen(s_x, s_y, s_heading, e_x, e_y, e_heading)
-                distance = abs(rel[0])
+                distance = length(rel[0])
             fixed = cost_in + cost_out
             slope = 0.0
             if climbing >= lib.n_upright:  # it drives as it climbs: its time is known before
@@ -205,7 +205,7 @@ def candidates(
                     continue
                 e_x, e_y, e_heading = before_climb(lib, (h_x, h_y, h_heading), last, climb, slope)
                 rel = seen(s_x, s_y, s_heading, e_x, e_y, e_heading)
-                distance = abs(rel[0])
+                distance = length(rel[0])
                 fixed += slope * lib.rates[climb]
             # A word costs at least the distance at the price per metre of its cheapest trim: what
             # cannot be cheaper than the bound is left out before it is steered. For one class this
@@ -226,7 +226,8 @@ def candidates(
             if n_trims == 3 and one_class:  # displacements known to be none cost no time
                 nothing = (0j, 0.0)
                 first, second, third = motion_of(lib, a), motion_of(lib, b), motion_of(lib, c)
-                steer(first, nothing, second, nothing, third, rel, lib.tolerance, branches)
+                least = -lib.tolerance  # no branch with a time below is of use
+                steer(first, nothing, second, nothing, third, rel, lib.tolerance, branches, least)
                 n_branches = 2
             elif n_trims == 3:
                 steer(
@@ -238,6 +239,7 @@ def candidates(
                     rel,
                     lib.tolerance,
                     branches,
+                    -lib.tolerance,
                 )
                 n_branches = 2
             elif n_trims == 2:

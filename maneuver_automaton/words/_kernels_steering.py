@@ -24,6 +24,20 @@ def unit(angle: float) -> complex:
 
 
 @inner_kernel
+def length(z: complex) -> float:
+    """Length of a complex number that is neither huge nor tiny, where `abs` takes no chances."""
+    return math.sqrt(z.real * z.real + z.imag * z.imag)
+
+
+@inner_kernel
+def radius_of(velocity: complex, turn_rate: float) -> complex:
+    """From the centre of a turn to the pose, in the frame of the pose; 0 for a straight."""
+    if turn_rate == 0.0:
+        return 0j
+    return complex(velocity.imag / turn_rate, -velocity.real / turn_rate)
+
+
+@inner_kernel
 def phase(z: complex) -> float:
     """Angle of a complex number."""
     return math.atan2(z.imag, z.real)
@@ -46,7 +60,7 @@ def two_circles(
 
     The half-angle of the triangle with sides |a|, |b|, |d|, exact near both tangencies.
     """
-    length_a, length_b, length_d = abs(a), abs(b), abs(d)
+    length_a, length_b, length_d = length(a), length(b), length(d)
     scale = length_a + length_b + length_d
     nothing = (math.nan, math.nan, math.nan, math.nan)
     if min(length_a, length_b, length_d) <= tolerance * scale:
@@ -74,10 +88,10 @@ def line_and_circle(
 ) -> tuple[float, float]:
     """Times (later, earlier) at which ``|point - velocity t| = radius``; NaN if never."""
     # The foot of the perpendicular on the line, then half the chord on either side of it.
-    speed = abs(velocity)
+    speed = length(velocity)
     along = (point * velocity.conjugate()).real / speed
     aside = (point * velocity.conjugate()).imag / speed
-    scale = abs(point) + radius
+    scale = length(point) + radius
     # A product, not a difference of squares: exact where the line touches the circle.
     square = (radius - aside) * (radius + aside)
     if square < -tolerance * scale * scale:
@@ -92,7 +106,7 @@ def two_lines(
 ) -> tuple[float, float]:
     """Times (s, t) with ``first s + second t = point``; NaN if the two are parallel."""
     area = (first.conjugate() * second).imag
-    if abs(area) <= tolerance * abs(first) * abs(second):
+    if abs(area) <= tolerance * length(first) * length(second):
         return math.nan, math.nan
     return (point.conjugate() * second).imag / area, (first.conjugate() * point).imag / area
 
@@ -131,22 +145,22 @@ def steer_two(
     z, heading = goal
     out[0], out[1], out[2] = math.nan, math.nan, 0.0
     if w_a != 0.0 and w_b != 0.0:
-        r_a, r_b = -1j * v_a / w_a, -1j * v_b / w_b
+        r_a, r_b = radius_of(v_a, w_a), radius_of(v_b, w_b)
         arm, aim = r_a + d - r_b * unit(e), z + r_a - r_b * unit(heading)
-        if abs(arm) > tolerance * (abs(r_a) + abs(r_b) + abs(d)):
+        if length(arm) > tolerance * (length(r_a) + length(r_b) + length(d)):
             angle = phase(aim) - phase(arm)
             out[0] = turn_time(angle, w_a)
             out[1] = turn_time(heading - e - angle, w_b)
-    elif w_a != 0.0 and abs(v_b) > 0.0:
+    elif w_a != 0.0 and length(v_b) > 0.0:
         angle = heading - e
-        r_a = -1j * v_a / w_a
+        r_a = radius_of(v_a, w_a)
         out[0] = turn_time(angle, w_a)
         out[1] = straight_time(z - r_a * (unit(angle) - 1.0) - d * unit(angle), v_b * unit(heading))
-    elif w_b != 0.0 and abs(v_a) > 0.0:
-        r_b = -1j * v_b / w_b
+    elif w_b != 0.0 and length(v_a) > 0.0:
+        r_b = radius_of(v_b, w_b)
         out[0] = straight_time(z - d - r_b * (unit(heading) - unit(e)), v_a)
         out[1] = turn_time(heading - e, w_b)
-    elif w_a == 0.0 and w_b == 0.0 and abs(v_a) > 0.0 and abs(v_b) > 0.0:
+    elif w_a == 0.0 and w_b == 0.0 and length(v_a) > 0.0 and length(v_b) > 0.0:
         out[0], out[1] = two_lines(z - d, v_a, v_b * unit(heading), tolerance)
 
 
@@ -160,11 +174,13 @@ def steer(
     goal: tuple[complex, float],
     tolerance: float,
     out: Array,
+    least: float,
 ) -> None:
     """Fill `out` (2, 3) with the coasting times that carry the identity to `goal`, NaN where none.
 
     Row 0 and row 1 are two branches, each continuous in all arguments. Turning times lie in
-    [0, one turn); straight times may be negative, which the caller rejects.
+    [0, one turn); straight times may be negative, which the caller rejects. Between two turns, or
+    beside them, one below `least` counts as none at all.
     """
     v_a, w_a = a
     d_1, e_1 = step_ab
@@ -177,11 +193,8 @@ def steer(
             out[row, k] = math.nan
     turn_1 = unit(e_1) if e_1 != 0.0 else 1.0 + 0j
     turn_3 = unit(heading)
-    # The radius of each turn as a vector: from its centre to the pose, in the frame of the pose; 0
-    # for a straight. A turn by the angle h moves the pose by ``r (e^{i h} - 1)``.
-    r_a = -1j * v_a / w_a if w_a != 0.0 else 0j
-    r_b = -1j * v_b / w_b if w_b != 0.0 else 0j
-    r_c = -1j * v_c / w_c if w_c != 0.0 else 0j
+    # A turn by the angle h, of radius r as a vector, moves the pose by ``r (e^{i h} - 1)``.
+    r_a, r_b, r_c = radius_of(v_a, w_a), radius_of(v_b, w_b), radius_of(v_c, w_c)
     # The end of the word, with the centres collected: ``at_1 e^{i h_1} + at_2 e^{i h_2}`` plus what
     # straights add is `d`, h_1 and h_2 the headings after the first trim and after the second one.
     # A known heading turns its term into a known point, which leaves two circles, a line and a
@@ -208,22 +221,22 @@ def steer(
         # length of what it turns has to be that of `d`, and that gives the time of the straight.
         still = at_1 + at_2 * turn_1
         along = v_b * turn_1
-        if abs(along) > 0.0 and abs(d) > tolerance * (abs(still) + abs(d)):
-            later, earlier = line_and_circle(-still, along, abs(d), tolerance)
+        if length(along) > 0.0 and length(d) > tolerance * (length(still) + length(d)):
+            later, earlier = line_and_circle(-still, along, length(d), tolerance)
             for row in range(2):
                 time = later if row == 0 else earlier
-                if not math.isnan(time):
+                if time >= least:
                     angle = phase(d) - phase(still + along * time)
                     out[row, 0] = turn_time(angle, w_a)
                     out[row, 1] = time
                     out[row, 2] = turn_time(before_c - angle - e_1, w_c)
     elif w_b != 0.0 and w_c != 0.0:  # straight, turn, turn
         point = d - at_1
-        if abs(v_a) > 0.0 and abs(at_2) > tolerance * (abs(point) + abs(at_2)):
-            later, earlier = line_and_circle(point, v_a, abs(at_2), tolerance)
+        if length(v_a) > 0.0 and length(at_2) > tolerance * (length(point) + length(at_2)):
+            later, earlier = line_and_circle(point, v_a, length(at_2), tolerance)
             for row in range(2):
                 time = later if row == 0 else earlier
-                if not math.isnan(time):
+                if time >= least:
                     angle = phase(point - v_a * time) - phase(at_2)
                     out[row, 0] = time
                     out[row, 1] = turn_time(angle - e_1, w_b)
@@ -231,18 +244,18 @@ def steer(
     elif w_a != 0.0 and w_b != 0.0:  # turn, turn, straight
         point = d - at_2 * unit(before_c)
         along = v_c * turn_3
-        if abs(v_c) > 0.0 and abs(at_1) > tolerance * (abs(point) + abs(at_1)):
-            later, earlier = line_and_circle(point, along, abs(at_1), tolerance)
+        if length(v_c) > 0.0 and length(at_1) > tolerance * (length(point) + length(at_1)):
+            later, earlier = line_and_circle(point, along, length(at_1), tolerance)
             for row in range(2):
                 time = later if row == 0 else earlier
-                if not math.isnan(time):
+                if time >= least:
                     angle = phase(point - along * time) - phase(at_1)
                     out[row, 0] = turn_time(angle, w_a)
                     out[row, 1] = turn_time(before_c - angle - e_1, w_b)
                     out[row, 2] = time
     elif w_b != 0.0:  # straight, turn, straight
         point = d - at_1 - at_2 * unit(before_c)
-        if abs(v_a) > 0.0 and abs(v_c) > 0.0:
+        if length(v_a) > 0.0 and length(v_c) > 0.0:
             first, last = two_lines(point, v_a, v_c * turn_3, tolerance)
             if not math.isnan(first):
                 out[0, 0] = first
@@ -250,7 +263,7 @@ def steer(
                 out[0, 2] = last
     elif w_c != 0.0:  # straight, straight, turn
         point = d - at_1 - at_2 * turn_1
-        if abs(v_a) > 0.0 and abs(v_b) > 0.0:
+        if length(v_a) > 0.0 and length(v_b) > 0.0:
             first, second = two_lines(point, v_a, v_b * turn_1, tolerance)
             if not math.isnan(first):
                 out[0, 0] = first
@@ -259,7 +272,7 @@ def steer(
     elif w_a != 0.0:  # turn, straight, straight
         angle = before_c - e_1
         point = d - at_1 * unit(angle) - at_2 * unit(before_c)
-        if abs(v_b) > 0.0 and abs(v_c) > 0.0:
+        if length(v_b) > 0.0 and length(v_c) > 0.0:
             second, last = two_lines(point, v_b * unit(before_c), v_c * turn_3, tolerance)
             if not math.isnan(second):
                 out[0, 0] = turn_time(angle, w_a)
@@ -286,5 +299,6 @@ def steer_batch(
             (complex(goals[row, 0], goals[row, 1]), goals[row, 2]),
             tolerance,
             times[row],
+            -math.inf,
         )
     return times

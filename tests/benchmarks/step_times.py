@@ -2,11 +2,12 @@
 
 ``python tests/benchmarks/step_times.py [--starts N] [--intervals K ...] [--steps N]``: random
 initially feasible starts (|x|, |y| <= 2 m, any heading), |u|^2, the goal at the origin, a step of
-1 s; five trims (Table 2 of the paper) with T = 8 and free, 1681 trims with T = 8, and continuous
-controls in [-2, 2]^2 with T = 8 on K intervals: RK4, exact derivatives, the solver built once, the
-start a parameter, all variables and multipliers of the last solution shifted. All drive from one
-start before any goes on to the next, so that a busy machine slows all alike. Then what the first
-plans cost: IPOPT starts from a straight line, and again from our plan.
+1 s; five trims (Table 2 of the paper) with T = 8 and free, 1681 trims with T = 8, the same with
+controls between them, and continuous controls in [-2, 2]^2 with T = 8 on K intervals: RK4, exact
+derivatives, the solver built once, the start a parameter, all variables and multipliers of the
+last solution shifted. All drive from one start before any goes on to the next, so that a busy
+machine slows all alike. Then what the first plans cost: IPOPT starts from a straight line, and
+again from our plans.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ MOST = 2.0  # of both controls
 ARRIVED = 1e-9  # [m, rad]
 SAME = 1e-3  # relative, between costs
 QUICK, MANY = (1.0, np.inf), (10.0, 30.0)  # [ms] median and 99th percentile asked for
+PIECES = 24  # with controls between those of the 1681 trims
 EARLY = 8  # steps of a loop that are looked at alone: later ones are near the goal
 WARM = {
     "ipopt.warm_start_init_point": "yes",
@@ -77,8 +79,8 @@ class Contestant:
         return np.array([one.first_value for one in self.drives])
 
 
-def by_trims(problem: Problem, start: np.ndarray, steps: int) -> Drive:
-    controller = RecedingHorizon(replace(problem, start=start), step=STEP)
+def by_trims(problem: Problem, start: np.ndarray, steps: int, pieces: int = 0) -> Drive:
+    controller = RecedingHorizon(replace(problem, start=start), step=STEP, pieces=pieces)
     pose, logs, ms = start, [], []
     while len(logs) < steps and np.abs(pose).max() > ARRIVED:
         began = time.perf_counter()
@@ -228,6 +230,7 @@ def contestants(intervals: Sequence[int], steps: int) -> tuple[list[Contestant],
         Contestant("five trims, T = 8", lambda start: by_trims(five, start, steps), QUICK),
         Contestant("five trims, free T", lambda start: by_trims(free, start, steps), QUICK),
         Contestant("1681 trims, T = 8", lambda start: by_trims(many, start, steps), MANY),
+        Contestant("and between them", lambda start: by_trims(many, start, steps, PIECES)),
     ]
     solvers = [MultipleShooting(k) for k in intervals]
     peers = [
@@ -265,18 +268,18 @@ def show_costs(
     everyone: Sequence[Contestant], peer: Contestant, starts: np.ndarray, k: int
 ) -> None:
     """First values against the best continuous optimum met from any guess."""
-    solver, five, many = MultipleShooting(k), everyone[0], everyone[2]
+    solver, five, many, between = MultipleShooting(k), everyone[0], everyone[2], everyone[3]
     best, from_line = peer.first_values.copy(), peer.first_values
     for row in range(len(starts)):
-        for one in (five, many):
+        for one in (five, many, between):
             plan = one.drives[row].first
             assert plan is not None
             value, _, solved, _ = solver.solve(*solver.along(plan))
             if solved:
                 best[row] = min(best[row], value)
     print(f"  first value / best optimum of IPOPT ({k} intervals) from a line and from our plans:")
-    for name, values in ((five.name, five.first_values), (many.name, many.first_values)):
-        print_ratio(name, values / best)
+    for one in (five, many, between):
+        print_ratio(one.name, one.first_values / best)
     print_ratio("IPOPT from a line", from_line / best)
     worse = from_line > many.first_values * (1.0 + SAME)
     print(
@@ -286,7 +289,7 @@ def show_costs(
     below = many.first_values < best * (1.0 - SAME)
     print(f"  1681 trims below the best of IPOPT: {below.sum()} (its controls change {k} times)")
     print("  cost of the closed loop, with the value left at the end, median and sum:")
-    for one in (five, many, peer):
+    for one in (five, many, between, peer):
         costs = np.array([drive.cost for drive in one.drives])
         print(f"    {one.name:<22} {np.median(costs):9.4f} {costs.sum():9.2f}")
 

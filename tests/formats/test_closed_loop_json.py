@@ -136,13 +136,15 @@ class TestReading:
             assert one.violations == other.violations
 
     @pytest.mark.slow
-    @pytest.mark.parametrize("retimed", [False, True])
-    def test_a_loop_goes_on_from_any_step(self, tmp_path, retimed):
+    @pytest.mark.parametrize("how", [{}, {"retimed": True}, {"pieces": 8}])
+    def test_a_loop_goes_on_from_any_step(self, tmp_path, how):
         problem = parking_loop(goal=NEAR)
+        if "pieces" in how:
+            problem = replace(problem, horizon=replace(problem.horizon, max_trims=None))
         settings = {
             "step": 0.5,
             "disturbance": Disturbance(position_m=0.02, heading_rad=0.02, seed=3),
-            "retimed": retimed,
+            **how,
         }
         whole = simulate(problem, steps=9, **settings)
         save_closed_loop(whole, tmp_path / "x.json")

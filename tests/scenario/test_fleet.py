@@ -24,6 +24,7 @@ from maneuver_automaton.scenario import (
 from maneuver_automaton.scenario.fleet import fleet_of_document
 from maneuver_automaton.scenario.fleet_schema import FleetPart
 from tests.formats.outside import message_of
+from tests.formats.test_cl_cbs import PROBLEM
 from tests.scenario.test_scenario import assert_same, scenarios
 
 FLEET = """\
@@ -79,7 +80,7 @@ TOP = (
 )
 ENTRY = (
     "name, priority, leaves, start_time_s, vehicle, automaton, start, goal, cost, horizon, "
-    "bounds_m, margin_m, obstacles, zones, search"
+    "bounds_m, margin_m, obstacles, zones, search, receding_horizon"
 )
 
 
@@ -285,3 +286,109 @@ def test_the_schema_takes_one_or_several(capsys):
     assert not check.is_valid(several | {"start": one["start"], "goal": one["goal"]})
     assert not check.is_valid(one | {"fleet": {}})
     assert not check.is_valid(several | {"fleat": {}})
+
+
+LOOP = "receding_horizon: {step_s: 0.5}"
+
+
+def refused(text):
+    """What is said of a file that cannot be used."""
+    with pytest.raises(InvalidScenario) as error:
+        read(text)
+    return str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("loop", "message"),
+    [
+        ("stay: true", "stay: got true, need no such key: who has arrived stays at its goal, or "
+         "leaves"),
+        ("retimed: false", "retimed: got false, need no such key: vehicles of a fleet drive at the "
+         "pace that others know of"),
+        ("tube_m: 0.06", "tube_m: got 0.06, need at most 0.05, half of between_m: two bodies may "
+         "both be beside their plans"),
+        ("group_size: 2, delay_steps: 1", "group_size: got 2, need 1 where answers are late "
+         "(delay_steps): those of several would have to come at once"),
+        ("delay_steps: -1", "delay_steps: got -1, need a whole number of at least 0"),
+        ("disturbance: {delay_steps: 1}", "disturbance.delay_steps: got 1, need no such key: "
+         "answers of a fleet are late by delay_steps of receding_horizon"),
+        ("disturbance: {twist_scale: [1, 1, 1, 1]}", "disturbance: twist_scale: got shape (4,), "
+         "need 3 components last"),
+        ("steps_s: 3", "steps_s: unknown key; did you mean 'step_s'? Known keys: step_s, steps, "
+         "time_limit_s, margin, tube_m, swaps_per_step, group_size, delay_steps, disturbance"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_a_loop(loop, message):
+    said = refused(but(LOOP, LOOP.replace("0.5", f"0.5, {loop}")))
+    assert said == f"fleet:27: receding_horizon.{message}"
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ("{joins_s: soon}", ".joins_s: got 'soon', need a finite number"),
+        ("{breaks: 1}", ".breaks: unknown key; did you mean 'breaks_s'? Known keys: joins_s, "
+         "breaks_s, disturbance"),
+        ("{disturbance: {pushes: [{after_step: 1, by: [1, 1, 1, 1]}]}}", ".disturbance: push after "
+         "step 1: got shape (4,), need 3 components last"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_the_loop_of_a_vehicle(entry, message):
+    text = but("priority: 1", f"priority: 1, receding_horizon: {entry}")
+    said = refused(text)
+    assert said == f"fleet:17: vehicles[1].receding_horizon{message}"
+
+
+def test_a_vehicle_needs_the_loop_of_all():
+    text = but("priority: 1", "priority: 1, receding_horizon: {joins_s: 2}").replace(LOOP, "")
+    assert refused(text) == (
+        "fleet:17: vehicles[1].receding_horizon: stands alone, need receding_horizon: "
+        "{step_s: ...} at the top"
+    )
+
+
+def test_a_maneuver_is_driven_as_its_model_says():
+    folder = Path(__file__).parents[2] / "scenarios/fleets"
+    text = (folder / "airfield.yaml").read_text()
+    text = text.split("receding_horizon:")[0]
+    own = "receding_horizon: {disturbance: {twist_scale: [1.1, 1.0, 1.0, 1.0]}}"
+    text = text.replace("name: helicopter\n", f"name: helicopter\n    {own}\n")
+    text += "receding_horizon: {step_s: 1.0}\n"
+    with pytest.raises(InvalidScenario, match="need no such key for a vehicle with inertia"):
+        fleet_of_document(parse(text, name="x"), path=folder / "x.yaml", begin=0.0)
+
+
+def test_a_loop_there_and_back():
+    text = but(LOOP, LOOP.replace("0.5", "0.5, steps: 7, tube_m: 0.02, disturbance: {seed: 4}"))
+    own = "{joins_s: 2, breaks_s: 9, disturbance: {position_m: 0.1, seed: 5}}"
+    scenario = read(text.replace("priority: 1", f"priority: 1, receding_horizon: {own}"))
+    assert scenario.joins_s == {"b": 2.0}
+    assert scenario.breaks_s == {"b": 9.0}
+    found = scenario.disturbances
+    assert (found["a"].position_m, found["b"].position_m) == (0.0, 0.1)
+    assert (found["a"].seed, found["b"].seed) == (0, 5)  # the top's is that of the loop
+    again = read(to_yaml(scenario))
+    assert again.receding_horizon == scenario.receding_horizon
+    assert again.loops == scenario.loops
+
+
+def test_the_schema_knows_two_kinds_of_loops(capsys):
+    jsonschema = pytest.importorskip("jsonschema")
+    assert run(["schema"]) == 0
+    check = jsonschema.Draft202012Validator(json.loads(capsys.readouterr().out))
+    one, several = parse(ALONE, name="x").value, parse(FLEET, name="x").value
+    of_one, of_several = {"step_s": 1, "stay": True}, {"step_s": 1, "tube_m": 0.01}
+    assert check.is_valid(one | {"receding_horizon": of_one})
+    assert check.is_valid(several | {"receding_horizon": of_several})
+    assert not check.is_valid(one | {"receding_horizon": of_several})
+    assert not check.is_valid(several | {"receding_horizon": of_one})
+
+
+def test_a_scenario_beside_states_the_loop(tmp_path):
+    """For a format that states several vehicles, and nothing of a loop."""
+    (tmp_path / "cars.yaml").write_text(PROBLEM)
+    beside = ALONE.split("start:")[0] + "fleet: {between_m: 0.2}\n"
+    (tmp_path / "with.yaml").write_text(beside + "receding_horizon: {step_s: 0.5, tube_m: 0.1}\n")
+    scenario = load_scenario(tmp_path / "cars.yaml", beside=tmp_path / "with.yaml")
+    assert isinstance(scenario, FleetScenario)
+    assert scenario.receding_horizon.tube_m == 0.1

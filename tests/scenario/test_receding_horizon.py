@@ -28,7 +28,7 @@ receding_horizon:
     delay_steps: 1
     seed: 7
 """
-KEYS = "step_s, steps, margin, retimed, stay, disturbance"
+KEYS = "step_s, steps, margin, retimed, pieces, stay, disturbance"
 OF_DISTURBANCE = (
     "position_m, heading_rad, measured_position_m, measured_heading_rad, twist_scale, pushes, "
     "delay_steps, seed"

@@ -307,9 +307,9 @@ def test_what_a_file_cannot_state():
 
 def test_the_json_schema_knows_every_key():
     schema = json_schema()
-    assert schema["oneOf"] == [
-        {"required": ["schema", "vehicle", "automaton", "start", "goal"]},
-        {"required": ["schema", "vehicles"]},
+    assert [kind["required"] for kind in schema["oneOf"]] == [
+        ["schema", "vehicle", "automaton", "start", "goal"],
+        ["schema", "vehicles"],
     ]
     assert "null" not in str(schema)
     assert schema["$defs"]["HorizonPart"]["properties"].keys() == {

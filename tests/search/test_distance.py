@@ -59,6 +59,10 @@ def test_asked_in_any_order_it_is_dijkstra(seed):
         finite = np.isfinite(got)
         assert got[finite] == pytest.approx(expected[batch][finite], abs=1e-9)
     assert grid.state[1] <= len(expected)
+    anew, _, _ = grid_and_world(footprint, obstacles, ends[:2], ends[2])
+    places = centres(grid)
+    in_order = distances(anew, field, places)
+    assert in_order.tolist() == distances(grid, field, places).tolist()  # to the last bit
 
 
 def test_little_is_looked_at_where_little_is_asked():

@@ -2,48 +2,113 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.fleet import FleetResult
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.fleet import FleetLog, FleetResult
 from maneuver_automaton.plotting.fleet_cast import Cast, Member, cast_of
 from maneuver_automaton.plotting.fleet_distances import distance_times, nearest_others, thinned
+from maneuver_automaton.plotting.fleet_loop_cast import (
+    fleet_values,
+    held_tracks,
+    loop_cast_of,
+    vehicle_values,
+)
 from maneuver_automaton.plotting.motions import track_colors
 from maneuver_automaton.plotting.player.clearances import MOST_SAMPLES
 from maneuver_automaton.plotting.player.composing import Fact, around, played, trim_entries
 from maneuver_automaton.plotting.player.local import POSE_DIGITS, Local, hex_color, rounded
+from maneuver_automaton.plotting.player.motions import motion_entry
 from maneuver_automaton.plotting.player.surroundings import body_entries, goal_entries
-from maneuver_automaton.plotting.scene import BODIES, LEAST_MARK, plan_scene
+from maneuver_automaton.plotting.scene import BODIES, LEAST_MARK, scene_of
+from maneuver_automaton.plotting.track import track_of_plan
 
 
 def fleet_content(result: FleetResult) -> dict[str, Any]:
-    """Every vehicle's motion with its controls, its clearance and its distance from the others.
-
-    Trims have the colours of their vehicle's own automaton: two kinds may name theirs alike.
-    """
+    """Every vehicle's motion with its controls, its clearance and its distance from the others."""
     cast = cast_of(result)
+    return cast_content(cast, trims_of(cast), title="Fleet", facts=_facts(result))
+
+
+def loop_content(log: FleetLog) -> dict[str, Any]:
+    """What every vehicle drove in closed loop, its value, and the plans that it held."""
+    cast = loop_cast_of(log)
+    times = np.minimum(log.times, cast.end)
+    trims = trims_of(cast, plans=[plan for step in log.steps for plan in step.driven.items()])
+    content = cast_content(cast, trims, title="Closed loop of a fleet", facts=_loop_facts(log))
+    local = Local(cast.members[0].track.start[:2])
+    for entry, one in zip(content["motions"], cast.members, strict=True):
+        values = vehicle_values(log, one.name)
+        known = np.isfinite(values)
+        entry["curves"].append(
+            {"label": "value", "t": rounded(times[known]), "v": rounded(values[known])}
+        )
+        entry["held"] = [
+            {"t": time, "plan": motion_entry(track, local, trims.numbers[one.name])}
+            for time, track in held_tracks(log, one.name)
+        ]
+        entry["joins"] = bool(np.isfinite(one.there_from))
+    total = fleet_values(log)
+    known = np.isfinite(total)
+    content["fleet"]["value"] = {"t": rounded(times[known]), "v": rounded(total[known])}
+    content["fleet"]["steps"] = [
+        {
+            "t": float(step.time),
+            "swaps": [" and ".join(swap.names) for swap in step.swaps],
+            "broken": [str(one) for one in step.violations],
+        }
+        for step in log.steps
+    ]
+    content["ending"] = "all have arrived" if log.reached else log.reason
+    return content
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Trims:
+    """The trims of all kinds on a page: those of two kinds may have one name."""
+
+    entries: list[dict[str, str]]
+    numbers: Mapping[str, dict[str, int]]  # of the trims, by the name of the vehicle
+
+
+def trims_of(cast: Cast, plans: Sequence[tuple[str, Plan]] = ()) -> Trims:
+    """Trims that vehicles drive, in the colours of their own automata, and those of more plans."""
+    entries: list[dict[str, str]] = []
+    of_kind: dict[int, dict[str, int]] = {}
+    planned: dict[str, dict[str, Array]] = {}
+    for name, plan in plans:
+        planned.setdefault(name, {}).update(track_of_plan(plan).twists)
+    for one in cast.members:
+        kind = id(one.problem.automaton)
+        if kind in of_kind:
+            continue
+        alike = [other for other in cast.members if id(other.problem.automaton) == kind]
+        every: dict[str, Array] = {}
+        for other in alike:
+            every |= other.track.twists | planned.get(other.name, {})
+        colors = track_colors(every)
+        of_kind[kind] = {name: len(entries) + k for k, name in enumerate(colors)}
+        entries += trim_entries(colors)
+    numbers = {one.name: of_kind[id(one.problem.automaton)] for one in cast.members}
+    return Trims(entries=entries, numbers=numbers)
+
+
+def cast_content(cast: Cast, trims: Trims, *, title: str, facts: list[Fact]) -> dict[str, Any]:
+    """The page of vehicles that drive at once."""
     local = Local(cast.members[0].track.start[:2])
     times = distance_times(cast)
     nearest = nearest_others(cast.members, times)
-    trims: list[dict[str, str]] = []
-    names_of_kind: dict[int, dict[str, int]] = {}
-    for one in cast.members:
-        kind = id(one.problem.automaton)
-        if kind not in names_of_kind:
-            alike = [other for other in cast.members if id(other.problem.automaton) == kind]
-            every = {name: xi for other in alike for name, xi in other.track.twists.items()}
-            colors = track_colors(every)
-            names_of_kind[kind] = {name: len(trims) + k for k, name in enumerate(colors)}
-            trims += trim_entries(colors)
     return {
-        "title": "Fleet",
-        "facts": _facts(result),
-        "trims": trims,
+        "title": title,
+        "facts": facts,
+        "trims": trims.entries,
         "motions": [
-            _vehicle(one, local, names_of_kind[id(one.problem.automaton)])
-            | {"others": _curve(times, nearest[:, k])}
+            _vehicle(one, local, trims.numbers[one.name]) | {"others": _curve(times, nearest[:, k])}
             for k, one in enumerate(cast.members)
         ],
         "bodies": [],
@@ -58,7 +123,10 @@ def fleet_content(result: FleetResult) -> dict[str, Any]:
 
 
 def _vehicle(one: Member, local: Local, names: dict[str, int]) -> dict[str, Any]:
-    scene = plan_scene(one.problem, one.plan)
+    scene = scene_of(one.problem, one.begin, one.arrival)
+    if one.course is not None and one.arrives:
+        off = [sum(goal.off(one.track.end)) for goal in one.problem.goals]
+        scene = replace(scene, reached=int(np.argmin(off)))
     return {
         **played(one.track, local, names, scene=scene, problem=one.problem),
         "name": one.name,
@@ -66,7 +134,7 @@ def _vehicle(one: Member, local: Local, names: dict[str, int]) -> dict[str, Any]
         "color": hex_color(one.color),
         "bodies": body_entries(one.problem.footprint, one.problem.parts),
         "goals": goal_entries(one.problem.goals, local, scene.reached),
-        "leaves": one.leaves and one.plan is not None,
+        "leaves": one.leaves and one.course is not None,
         "reason": one.reason,
     }
 
@@ -100,3 +168,20 @@ def _facts(result: FleetResult) -> list[Fact]:
     if result.problem.margin > 0.0:
         facts.append(("margin", f"{result.problem.margin:g} m"))
     return facts
+
+
+def _loop_facts(log: FleetLog) -> list[Fact]:
+    """The numbers that head a closed loop, those that are known."""
+    broken, swaps = len(list(log.violations)), len(list(log.swaps))
+    facts = [
+        ("vehicles", f"{len(log.arrived_s)} of {len(log.problem)} arrived"),
+        ("sum", f"{log.sum_s:.5g} s"),
+        ("last", f"{log.last_s:.5g} s"),
+        ("cost", f"{log.cost:.6g}"),
+        ("steps", f"{len(log.steps)}, {swaps} exchange{'' if swaps == 1 else 's'}"),
+    ]
+    if np.isfinite(log.distance_m):
+        facts.append(("nearest", f"{log.distance_m:.3g} m"))
+    if log.problem.margin > 0.0:
+        facts.append(("margin", f"{log.problem.margin:g} m"))
+    return [*facts, ("guarantees", f"{broken} broken" if broken else "all kept")]

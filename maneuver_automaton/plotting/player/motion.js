@@ -72,6 +72,7 @@ class Motion {
     Object.assign(this, entry); // times, poses, twists, trims, and what was measured along them
     this.parts = entry.parts || [];
     this.curves = entry.curves || [];
+    this.held = (entry.held || []).map(({ t, plan }) => ({ t, plan: new Motion(plan) }));
     this.begin = this.times[0];
     this.end = this.times[this.times.length - 1];
     this.runs = this.trimRuns();
@@ -148,7 +149,13 @@ class Motion {
 
   /** Whether it is there at a time: it may leave once it has arrived. */
   isThere(time) {
-    return !(this.leaves && time > this.end);
+    return !(this.leaves && time > this.end) && !(this.joins && time < this.begin);
+  }
+
+  /** The plan that it holds at a time of a closed loop; null if it holds none. */
+  heldAt(time) {
+    const k = lastNotAfter(this.held.map(({ t }) => t), time);
+    return k < 0 ? null : this.held[k].plan;
   }
 
   /** Time at which the path passes next to a place, and how far that is [m]. */

@@ -66,10 +66,11 @@ function buildBar() {
     bar.append(part);
   }
   bar.append(element("div", "past"), element("div", "hover"), element("div", "now"));
-  for (const entry of steps ? steps.entries : []) {
-    if (!entry.replanned && !entry.broken.length) continue;
+  for (const entry of steps ? steps.entries : (fleet && fleet.steps) || []) {
+    const other = entry.replanned || (entry.swaps || []).length > 0;
+    if (!other && !entry.broken.length) continue;
     const mark = element("div", entry.broken.length ? "mark broken" : "mark");
-    mark.style.left = `${(100 * (entry.t - now.begin)) / length}%`;
+    mark.style.left = `${(100 * (entry.t - begin)) / length}%`;
     bar.append(mark);
   }
   find("legend").replaceChildren(...(manyTrims() ? [] : trimsShown().map(legendItem)));
@@ -153,6 +154,10 @@ function quantities() {
   if (others) {
     const label = now === overview ? "nearest two [m]" : "nearest other [m]";
     list.push({ ...curve(label, others), value: (time) => curveAt(others, time), level: fleet.margin });
+  }
+  if (now === overview && fleet.value) {
+    const value = (time) => curveAt(fleet.value, time);
+    list.push({ ...curve("value of all", fleet.value), value });
   }
   if (now === overview) return list;
   if (!now.curves.some((one) => /^speed\b/.test(one.label))) {

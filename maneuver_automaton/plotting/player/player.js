@@ -48,7 +48,7 @@ function valuesAt(time) {
   }
   if (now === overview) return rows;
   if (fleet && !now.drivesAt(time)) {
-    const done = time > now.end ? "arrived" : "has not left";
+    const done = time > now.end ? now.reason || "arrived" : "has not left";
     rows.push(["state", now.runs.length ? done : now.reason]);
     return rows;
   }
@@ -116,8 +116,10 @@ function drawClock() {
   find("clock").hidden = !motions.some((one) => one.runs.length);
   const parts = [`${state.time.toFixed(2)} s`];
   if (fleet) {
-    const done = motions.filter((one) => one.runs.length && state.time >= one.end - 1e-6).length;
+    const done = motions.filter((one) =>
+      one.runs.length && !one.reason && state.time >= one.end - 1e-6).length;
     parts.push(`${done} of ${motions.length} arrived`);
+    if (fleet.steps && state.time < fleet.end) parts.push(...fleetStep(state.time));
   } else if (steps) {
     const entry = steps.entries[steps.at(state.time)];
     if (state.time >= motion().end) parts.push(data.ending);
@@ -128,6 +130,16 @@ function drawClock() {
     }
   } else if (state.time >= motion().end && data.ending) parts.push(data.ending);
   find("clock").textContent = parts.join(" · ");
+}
+
+/** What a fleet's closed loop does at a time, in words. */
+function fleetStep(time) {
+  const k = Math.max(0, lastNotAfter(fleet.steps.map((one) => one.t), time));
+  const { swaps, broken } = fleet.steps[k], parts = [`step ${k}`];
+  parts.push(`value ${shownNumber(curveAt(fleet.value, time))}`);
+  if (swaps.length) parts.push(`exchanged: ${swaps.join(", ")}`);
+  if (broken.length) parts.push("guarantee broken");
+  return parts;
 }
 
 function seek(time) {
@@ -290,7 +302,7 @@ function listenAll() {
     stage.canvas.style.cursor = other >= 0 ? "pointer" : "";
     if (other < 0 || other === state.choice) return hoverAt(time, event);
     const one = motions[other], rows = [["vehicle", one.name]];
-    if (one.reason) rows.push(["no plan", one.reason]);
+    if (one.reason) rows.push([one.runs.length ? "not arrived" : "no plan", one.reason]);
     else rows.push(["arrives", `${shownNumber(one.end)} s`]);
     state.hover = null;
     showTip(rows, event);

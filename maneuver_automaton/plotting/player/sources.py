@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.fleet import FleetResult
+from maneuver_automaton.fleet import FleetLog, FleetResult
 from maneuver_automaton.planning import PlanResult
 from maneuver_automaton.plotting.closed_loop_track import (
     driven_track,
@@ -29,7 +29,7 @@ from maneuver_automaton.plotting.player.composing import (
     trim_entries,
 )
 from maneuver_automaton.plotting.player.drives import drive_content
-from maneuver_automaton.plotting.player.fleets import fleet_content
+from maneuver_automaton.plotting.player.fleets import fleet_content, loop_content
 from maneuver_automaton.plotting.player.local import Local, rounded
 from maneuver_automaton.plotting.player.motions import motion_entry
 from maneuver_automaton.plotting.player.page import Player
@@ -47,7 +47,7 @@ def player_of(value: Any, *, title: str = "") -> Player:
 
     Parameters
     ----------
-    value : Plan, PlanResult, FleetResult, ClosedLoop, RoadPlanResult or RoadDrive
+    value : Plan, PlanResult, FleetResult, ClosedLoop, FleetLog, RoadPlanResult or RoadDrive
         What to play.
     title : str
         Heads the page; the kind of `value` if left out.
@@ -99,11 +99,12 @@ def content_of(value: Any) -> dict[str, Any]:
     """Title, facts, motions, and what is around them, as plain values."""
     raise TypeError(
         f"player: got {type(value).__name__}, need a Plan, PlanResult, FleetResult, ClosedLoop, "
-        "RoadPlanResult or RoadDrive"
+        "FleetLog, RoadPlanResult or RoadDrive"
     )
 
 
 content_of.register(FleetResult, fleet_content)
+content_of.register(FleetLog, loop_content)
 
 
 @content_of.register

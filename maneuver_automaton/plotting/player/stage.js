@@ -86,6 +86,8 @@ class Stage {
     }));
     this.inMetres(sheet.context, () => {
       if (fleet) {
+        [...others, motion].forEach((one) =>
+          this.held(sheet.context, one, time, picked && one !== motion));
         others.filter((one) => one.isThere(time)).forEach((one) =>
           this.fellow(sheet.context, colors, one, time, { picked, many: others.length > MOST_LABELS }));
         if (!picked) return;
@@ -112,6 +114,14 @@ class Stage {
     context.fillStyle = withAlpha(motion.color, 0.35 * alpha);
     context.fill(this.placed(motion, motion.end));
     context.stroke(this.placed(motion, motion.end));
+  }
+
+  /** What is left of the plan that a vehicle of a fleet holds in closed loop. */
+  held(context, motion, time, faint) {
+    const plan = motion.isThere(time) && time < motion.end ? motion.heldAt(time) : null;
+    if (!plan) return;
+    const alpha = faint ? 0.35 : 0.9;
+    this.path(context, plan, { width: 1.6, from: time, dash: [6, 4], color: motion.color, alpha });
   }
 
   /** The body of a vehicle of a fleet that is not picked: a dot where it is tiny on the page. */

@@ -10,9 +10,11 @@ import pytest
 from maneuver_automaton.bounds import Narrowest
 from maneuver_automaton.cli import run
 from maneuver_automaton.collision import Box, Zone
+from maneuver_automaton.fleet import simulate_fleet
 from maneuver_automaton.formats.plan_json import load_plan
 from maneuver_automaton.planning import LowerBound, PlanResult, PlanStatus
 from maneuver_automaton.problem import Bounds
+from tests.fleet.robots import crossing as robots
 from tests.plotting.cases import flight_plan, parking_plan, plan_of, result_of, slalom_problem
 from tests.plotting.fleets import crossing
 from tests.plotting.loops import pushed_loop
@@ -211,3 +213,22 @@ def test_a_drive_is_played_as_its_file_says(tmp_path):
         shown = poses(page, [step["time_s"] for step in steps[::7]])
         there = [step["pose"] for step in steps[::7]]
         np.testing.assert_allclose(shown, there, rtol=0.0, atol=MILLIMETRE)
+
+
+def test_the_page_of_a_fleets_loop_plays_what_was_driven(tmp_path):
+    log = simulate_fleet(
+        robots(tolerance=0.1), step=0.5, steps=40, first_time_limit=1.0, joins_s={"b": 1.0}
+    )
+    log.player(title="Loop").save(tmp_path / "loop.html")
+    with browser() as running, opened(running, tmp_path / "loop.html") as page:
+        for step in (3, 7):
+            pieces = [log.pieces_of(name)[step] for name in log.problem.names]
+            time = float(log.times[step]) + 0.2
+            shown = page.evaluate("time => player.posesAt(time)", time)
+            np.testing.assert_allclose(
+                shown, [piece.pose_at(time) for piece in pieces], atol=MILLIMETRE
+            )
+        page.evaluate("player.seek(1.7)")
+        clock = page.inner_text("#clock")
+        assert clock.startswith("1.70 s · 0 of 2 arrived · step 3 · value ")
+        assert [row[0] for row in page.evaluate("player.valuesAt(1.7)")] == ["time", "nearest two"]

@@ -1,0 +1,184 @@
+"""Several planning problems of one CommonRoad file, planned together."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+
+import maneuver_automaton as ma
+from maneuver_automaton.cli import run
+from maneuver_automaton.formats import load_plans
+from maneuver_automaton.formats.commonroad import n_problems, read_commonroad
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.roads import RoadVehicle, judged, plan_roads
+from maneuver_automaton.roads.several import driving
+from tests.roads.files import GOAL, LANES, car, commonroad, problem
+
+LEFT, RIGHT = GOAL, GOAL.replace('lanelet ref="2"', 'lanelet ref="1"')
+PROBLEMS = (
+    problem(100, x=10.0, y=2.0, speed=14.0),
+    problem(101, x=30.0, y=2.0, speed=9.0),
+    problem(102, x=12.0, y=6.0, speed=10.0, goal=RIGHT),
+)
+SLOW = car(7, x=60.0, y=2.0, speed=6.0, steps=60)
+quiet = pytest.mark.filterwarnings("ignore")  # of the library that writes solutions
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """The current folder, with a road for three."""
+    monkeypatch.chdir(tmp_path)
+    Path("road.xml").write_text(commonroad(*LANES, SLOW, *PROBLEMS))
+    return tmp_path
+
+
+def scenes_of(path):
+    return {str(one.road.benchmark.problem): one.road for one in read_commonroad(Path(path))}
+
+
+def least_by_shapely(plans, step=0.005):
+    """Least distance of any two while both are there."""
+    body, least = RoadVehicle().footprint.corners, math.inf
+    for one, other in itertools.combinations(plans, 2):
+        begin = max(one.start_time, other.start_time)
+        end = min(p.start_time + p.duration for p in (one, other))
+        times = np.arange(begin, end, step)
+        solids = [
+            shapely.polygons(SE2(plan.pose_at(times)[:, None, :3]).act(body))
+            for plan in (one, other)
+        ]
+        least = min(least, float(shapely.distance(*solids).min()))
+    return least
+
+
+def test_plans_keep_apart(folder):
+    scenes = scenes_of("road.xml")
+    result = plan_roads(scenes, name="road")
+    assert result.found
+    assert list(result.plans) == ["100", "101", "102"]
+    assert sorted(result.order) == ["100", "101", "102"]
+    slow = least_by_shapely(result.plans.values())
+    assert 0.0 < result.distance_m <= slow
+    assert slow <= result.distance_m + 0.05
+    vehicle = RoadVehicle()
+    for name, one in result.results.items():
+        others = [driving(vehicle, plan, n) for n, plan in result.plans.items() if n != name]
+        verdict = judged(one.planner.scene, vehicle, one.plan)
+        assert verdict.clean
+        assert one.verdict.clearance_m >= result.distance_m - 1e-3
+        assert len(others) == 2
+
+
+def test_a_moved_road_has_the_moved_plans(folder):
+    by = SE2(np.array([30.0, -20.0, 1.1]))
+    scenes = scenes_of("road.xml")
+    one = plan_roads(scenes)
+    other = plan_roads({name: scene.moved(by) for name, scene in scenes.items()})
+    assert other.order == one.order
+    for name, plan in one.plans.items():
+        there = (by @ SE2(plan.switching_poses)).pose
+        np.testing.assert_allclose(
+            other.plans[name].switching_poses[:, :2], there[:, :2], atol=1e-6
+        )
+
+
+def test_alone_is_as_one_vehicle(folder):
+    scenes = scenes_of("road.xml")
+    several = plan_roads({"100": scenes["100"]})
+    alone = ma.plan_road(scenes["100"])
+    assert several.results["100"].cost == alone.cost
+    assert several.distance_m == math.inf
+
+
+def test_who_has_no_plan_is_told(folder, capsys):
+    """Two at one place: whoever is planned later hits the other at the start."""
+    both = (problem(100, x=10.0), problem(101, x=11.0))
+    Path("road.xml").write_text(commonroad(*LANES, *both))
+    assert run(["plan", "road.xml", "--quiet", "--no-plot", "--time-limit", "2"]) == 1
+    document = json.loads(Path("out/plan.json").read_text())
+    assert document["status"] == "partial"
+    assert sum(one["status"] == "found" for one in document["vehicles"].values()) == 1
+    assert capsys.readouterr().err.startswith("road.xml: partial: 10")
+
+
+def test_nothing_to_plan():
+    with pytest.raises(ValueError, match="there is no vehicle"):
+        plan_roads({})
+
+
+class TestCommands:
+    def test_plan(self, folder, capsys):
+        assert n_problems(Path("road.xml")) == 3
+        assert run(["plan", "road.xml"]) == 0
+        printed = capsys.readouterr()
+        assert printed.err == ""
+        assert "plans:          3 of 3" in printed.out
+        document = json.loads(Path("out/plan.json").read_text())
+        assert (document["kind"], document["status"]) == ("fleet", "found")
+        assert list(document["vehicles"]) == ["100", "101", "102"]
+        assert document["source"]["file"] == "../road.xml"
+        assert document["clearance_m"]["between"] > 0.0
+        assert Path("out/plan.png").stat().st_size > 10_000
+        assert list(load_plans("out/plan.json")) == ["100", "101", "102"]
+
+    def test_one_of_them(self, folder):
+        assert run(["plan", "road.xml", "--case", "1", "--quiet", "--no-plot"]) == 0
+        document = json.loads(Path("out/plan.json").read_text())
+        assert "kind" not in document
+        assert document["name"].endswith("case 1")
+
+    def test_a_folder(self, folder, capsys):
+        Path("files").mkdir()
+        Path("road.xml").rename("files/road.xml")
+        assert run(["plan", "files", "--no-plot"]) == 0
+        assert "found" in capsys.readouterr().out
+        assert Path("out/road/plan.json").exists()
+
+    @pytest.mark.parametrize("option", ["--animate", "--html"])
+    def test_what_is_for_one(self, folder, capsys, option):
+        assert run(["plan", "road.xml", option]) == 2
+        assert capsys.readouterr().err == (
+            f"{option}: is not for several vehicles on roads; leave it out, or pick one with "
+            "--case\n"
+        )
+
+    def test_ids_are_distinct(self, folder, capsys):
+        Path("road.xml").write_text(commonroad(*LANES, problem(5), problem(5, x=30.0)))
+        assert run(["plan", "road.xml"]) == 2
+        said = "road.xml: two planning problems have one id, need distinct ids\n"
+        assert capsys.readouterr().err == said
+
+    def test_other_commands_do_not_read_it(self, folder, capsys):
+        assert run(["plan", "road.xml", "--quiet", "--no-plot"]) == 0
+        for command in ("check", "plot"):
+            assert run([command, "out/plan.json"]) == 2
+            assert capsys.readouterr().err == (
+                "out/plan.json: holds plans on the road of road.xml, which only export reads\n"
+            )
+
+    @quiet
+    def test_a_solution_of_all(self, folder):
+        pytest.importorskip("commonroad.common.solution")
+        text = Path("road.xml").read_text().replace("TST_Lanes", "ZAM_Lanes")
+        Path("road.xml").write_text(text)
+        assert run(["plan", "road.xml", "--quiet", "--no-plot"]) == 0
+        assert run(["export", "out/plan.json", "--to", "commonroad"]) == 0
+        root = ElementTree.parse("out/plan_commonroad.xml").getroot()
+        assert [one.get("planningProblem") for one in root] == ["100", "101", "102"]
+        plans = load_plans("out/plan.json")
+        for one, plan in zip(root, plans.values(), strict=True):
+            x, y = (float(one[0].find(tag).text) for tag in ("x", "y"))
+            np.testing.assert_allclose([x, y], RoadVehicle().middle_of(plan.start)[:2], atol=1e-9)
+
+    def test_a_solution_of_others(self, folder, capsys):
+        assert run(["plan", "road.xml", "--quiet", "--no-plot"]) == 0
+        Path("road.xml").write_text(commonroad(*LANES, problem(100), problem(200, x=30.0)))
+        assert run(["export", "out/plan.json", "--to", "commonroad"]) == 2
+        assert "need a planning problem of" in capsys.readouterr().err

@@ -1,0 +1,322 @@
+"""`mpc` of several vehicles, and `plot` and `check` of what it writes."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from maneuver_automaton import fleet
+from maneuver_automaton.cli import run
+from maneuver_automaton.fleet import plan_fleet, simulate_fleet
+from maneuver_automaton.formats.fleet_loop_reading import load_fleet_loop
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.receding_horizon import Disturbance
+from maneuver_automaton.scenario import load_scenario, to_yaml
+from tests.scenario.files import SCENARIO
+from tests.test_cli_fleets import FLEET, SCENARIOS
+from tests.test_cli_mpc import LOOP as ONE
+
+NEAR = "tolerance_m: 0.05, tolerance_rad: 0.05}"
+LOOP = (
+    FLEET.replace("goal: {pose: [4, 0, 0]}", "goal: {pose: [4, 0, 0], " + NEAR)
+    .replace("goal: {pose: [0.0, 2.0, 1.5]}", "goal: {pose: [0.0, 2.0, 1.5], " + NEAR)
+    .replace("time_limit_s: 1}", "time_limit_s: 0.5}")
+    + "receding_horizon: {step_s: 0.5, disturbance: {position_m: 0.003, seed: 3}}\n"
+)
+STARTED = "receding_horizon: {step_s: 0.5"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """The current folder, with a fleet in it."""
+    monkeypatch.chdir(tmp_path)
+    Path("x.yaml").write_text(LOOP)
+    return tmp_path
+
+
+@pytest.fixture
+def driven(folder):
+    """The document of a loop."""
+    assert run(["mpc", "x.yaml", "--quiet", "--no-plot"]) == 0
+    return document()
+
+
+def document(out="out"):
+    return json.loads((Path(out) / "closed_loop.json").read_text(encoding="utf-8"))
+
+
+def frames_of(path):
+    with Image.open(path) as film:
+        return film.n_frames
+
+
+def poses(log):
+    return {name: [one.start for one in log.driven[name]] for name in log.problem.names}
+
+
+def assert_same_poses(one, other):
+    for name, found in poses(one).items():
+        np.testing.assert_array_equal(found, poses(other)[name])
+
+
+class TestMpc:
+    def test_files_and_table(self, folder, capsys):
+        assert run(["mpc", "x.yaml"]) == 0
+        printed = capsys.readouterr()
+        assert printed.err == ""
+        found = document()
+        assert (found["kind"], found["status"], found["reached"]) == ("fleet", "reached", True)
+        assert found["source"] == {"file": "../x.yaml", "with": None, "case": None}
+        assert found["clearance_m"]["between"] > 0.0
+        assert Path("out/closed_loop.png").stat().st_size > 10_000
+        assert not Path("out/closed_loop.gif").exists()
+        for said in (
+            "A crossing",
+            "guarantees:     hold in every step",
+            "collisions:     none",
+            "goals:          reached",
+            "sum:",
+            "last arrival:",
+        ):
+            assert said in printed.out
+
+    def test_the_loop_is_that_of_the_library(self, driven, monkeypatch):
+        """Bit for bit, from the same first plans: these go by the clock."""
+        scenario = load_scenario("x.yaml")
+        first = plan_fleet(scenario.fleet, time_limit=20.0, max_rounds=2)
+        monkeypatch.setattr(fleet, "plan_fleet", lambda *_, **__: first, raising=False)
+        assert run(["mpc", "x.yaml", "--quiet", "--no-plot", "--time-limit", "20"]) == 0
+        written = load_fleet_loop("out/closed_loop.json", scenario.fleet)
+        log = simulate_fleet(
+            scenario.fleet,
+            step=0.5,
+            steps=100,
+            disturbance=Disturbance(position_m=0.003),
+            seed=3,
+            first=first,
+            time_limit=20.0,
+        )
+        assert_same_poses(written, log)
+        assert document()["cost"] == log.cost
+        assert [one.names for _, one in written.swaps] == [one.names for _, one in log.swaps]
+
+    def test_a_moved_file_has_the_moved_loop(self, folder, monkeypatch):
+        calm = LOOP.replace(", disturbance: {position_m: 0.003, seed: 3}", "")
+        Path("x.yaml").write_text(calm)
+        scenario = load_scenario("x.yaml")
+        by = SE2(np.array([30.0, -20.0, 1.1]))
+        first = plan_fleet(scenario.fleet, time_limit=20.0, max_rounds=2)
+        monkeypatch.setattr(
+            fleet, "plan_fleet", lambda one, **_: plan_fleet(one, time_limit=20.0, max_rounds=2)
+        )
+        text = to_yaml(scenario)
+        Path("moved.yaml").write_text(_moved(scenario, by))
+        assert text != Path("moved.yaml").read_text()
+        assert run(["mpc", "x.yaml", "--quiet", "--no-plot", "--time-limit", "20"]) == 0
+        one = document()
+        assert run(["mpc", "moved.yaml", "--quiet", "--no-plot", "--time-limit", "20"]) == 0
+        other = document()
+        assert first.plans.keys() == one["vehicles"].keys()
+        assert other["cost"] == pytest.approx(one["cost"], rel=1e-9)
+        for name in one["vehicles"]:
+            ways = [
+                [step["vehicle_pose"] for step in found["vehicles"][name]["steps"]]
+                for found in (one, other)
+            ]
+            there = (by @ SE2(np.array(ways[0]))).pose
+            np.testing.assert_allclose(np.cos(ways[1]), np.cos(there), atol=1e-6)
+
+    def test_the_seed(self, driven):
+        assert run(["mpc", "x.yaml", "--quiet", "--no-plot", "--seed", "4"]) == 0
+        other = document()
+        ends = [one["vehicles"]["east"]["steps"][-1]["pose"] for one in (driven, other)]
+        assert ends[0] != ends[1]
+
+    def test_joins_and_breaks(self, folder):
+        text = LOOP.replace("name: east,", "name: east, receding_horizon: {breaks_s: 2.0},")
+        text = text.replace("name: north,", "name: north, receding_horizon: {joins_s: 1.0},")
+        Path("x.yaml").write_text(text)
+        assert run(["mpc", "x.yaml", "--quiet", "--no-plot"]) == 0
+        found = document()["vehicles"]
+        assert found["east"]["status"] == "broken_down"
+        assert found["north"]["steps"][0]["time_s"] == 1.0
+        assert found["north"]["reached"]
+
+    def test_steps_spent(self, folder, capsys):
+        assert run(["mpc", "x.yaml", "--quiet", "--no-plot", "--steps", "2"]) == 1
+        assert capsys.readouterr().err == (
+            "x.yaml: steps_spent: east, north did not arrive in 2 steps\n"
+        )
+        found = document()
+        assert (found["reached"], len(found["steps"])) == (False, 3)
+
+    def test_a_broken_guarantee_is_no_success(self, driven, capsys):
+        """One is pushed onto the other."""
+        east, north = (driven["vehicles"][name]["steps"][5] for name in ("east", "north"))
+        here, there = SE2(np.array(north["vehicle_pose"])), SE2(np.array(east["vehicle_pose"]))
+        push = (here.inverse() @ there).pose.tolist()
+        onto = f"{{disturbance: {{pushes: [{{after_step: 4, by: {push}}}]}}}}"
+        Path("x.yaml").write_text(
+            LOOP.replace("name: north,", f"name: north, receding_horizon: {onto},")
+        )
+        assert run(["mpc", "x.yaml", "--quiet", "--no-plot"]) == 1
+        printed = capsys.readouterr().err
+        assert "broke a guarantee: " in printed
+        assert "east and north touch at " in printed
+
+    def test_page_and_film(self, folder):
+        assert run(["mpc", "x.yaml", "--quiet", "--no-plot", "--animate", "--steps", "4"]) == 1
+        assert not Path("out/closed_loop.png").exists()
+        assert frames_of("out/closed_loop.gif") > 10
+        assert "A crossing" in Path("out/closed_loop.html").read_text(encoding="utf-8")
+        assert run(["mpc", "x.yaml", "--quiet", "--no-plot", "--steps", "4"]) == 1
+        assert not Path("out/closed_loop.gif").exists()  # of an earlier loop
+
+    @pytest.mark.parametrize("option", [["--seeds", "3"], ["--gap", "0.1"], ["--resume", "l.json"]])
+    def test_options_of_one_vehicle(self, folder, capsys, option):
+        assert run(["mpc", "x.yaml", *option]) == 2
+        said = f"{option[0]}: is for one vehicle, but x.yaml states several; leave it out\n"
+        assert capsys.readouterr().err == said
+
+    def test_a_file_without_a_loop(self, folder, capsys):
+        Path("x.yaml").write_text(FLEET)
+        assert run(["mpc", "x.yaml"]) == 2
+        said = "x.yaml: receding_horizon: missing, need {step_s: ...}, the time between two plans\n"
+        assert capsys.readouterr().err == said
+
+    def test_a_folder(self, folder, capsys):
+        Path("files").mkdir()
+        Path("files/fleet.yaml").write_text(LOOP)
+        Path("files/one.yaml").write_text(ONE)
+        Path("files/none.yaml").write_text(FLEET)
+        Path("files/plan.yaml").write_text(SCENARIO)
+        assert run(["mpc", "files", "--no-plot"]) == 0
+        printed = capsys.readouterr().out
+        rows = [row.split()[:2] for row in printed.splitlines() if ".yaml " in row]
+        assert rows == [["fleet.yaml", "reached"], ["one.yaml", "reached"]]
+        assert document("out/fleet")["kind"] == "fleet"
+
+
+@pytest.mark.parametrize(
+    "file",
+    [one for one in SCENARIOS if "receding_horizon:" in one.read_text()],
+    ids=lambda f: f.stem,
+)
+def test_every_scenario_with_a_loop(file, folder):
+    text = re.sub(r"(fleet: .*time_limit_s: )[0-9.]+", r"\g<1>1.0", file.read_text())
+    Path("y.yaml").write_text(text)
+    assert run(["mpc", "y.yaml", "--quiet", "--no-plot", "--time-limit", "1"]) == 0
+    assert run(["check", "out/closed_loop.json"]) == 0
+
+
+def _moved(scenario, by):
+    """The file of a fleet that is moved, without obstacles' shapes that have no place for it."""
+    text = to_yaml(scenario)
+    for problem in scenario.fleet.problems:
+        for pose in (problem.start, problem.goals[0].pose):
+            text = text.replace(f"pose: {pose.tolist()}", f"pose: {(by @ SE2(pose)).pose.tolist()}")
+    disc = scenario.fleet.problems[0].obstacles[0].shape
+    there = by.act(np.asarray(disc.center))
+    return text.replace(f"center: {np.asarray(disc.center).tolist()}", f"center: {there.tolist()}")
+
+
+class TestCheck:
+    def test_what_was_driven_is_found_good(self, driven, capsys):
+        assert run(["check", "out/closed_loop.json"]) == 0
+        printed = capsys.readouterr().out
+        assert ": apart" in printed
+        assert "east: goal" in printed
+        assert " NO " not in printed
+
+    def test_a_falsified_log_is_caught(self, driven, capsys):
+        """One vehicle is shifted onto the other for a step."""
+        east, north = (driven["vehicles"][name]["steps"] for name in ("east", "north"))
+        for step in east[8:10]:
+            step["vehicle_pose"] = next(
+                one["vehicle_pose"] for one in north if one["time_s"] == step["time_s"]
+            )
+        Path("out/closed_loop.json").write_text(json.dumps(driven))
+        assert run(["check", "out/closed_loop.json"]) == 1
+        rows = [row for row in capsys.readouterr().out.splitlines() if " NO " in row]
+        assert any(row.split("NO")[0].strip() == "east and north: apart" for row in rows)
+
+    @pytest.mark.parametrize(
+        ("change", "said"),
+        [
+            (lambda east: east.update(cost=east["cost"] - 1.0), "but the file says"),
+            (lambda east: east["steps"][0].update(vehicle_pose=[-3.9, 0, 0]), "beside its start"),
+            (
+                lambda east: east["steps"][-1].update(vehicle_pose=[3.0, 0.5, 0]),
+                "the file says so, but it is elsewhere",
+            ),
+        ],
+    )
+    def test_other_claims_that_do_not_hold(self, driven, capsys, change, said):
+        change(driven["vehicles"]["east"])
+        Path("out/closed_loop.json").write_text(json.dumps(driven))
+        assert run(["check", "out/closed_loop.json"]) == 1
+        rows = [row for row in capsys.readouterr().out.splitlines() if " NO " in row]
+        assert any(said in row for row in rows)
+
+    def test_less_than_the_file_says(self, driven, capsys):
+        driven["clearance_m"]["between"] += 0.5
+        Path("out/closed_loop.json").write_text(json.dumps(driven))
+        assert run(["check", "out/closed_loop.json"]) == 1
+        assert "least distance: as the file says" in capsys.readouterr().out
+
+    def test_an_obstacle_that_was_hit(self, driven, capsys):
+        Path("x.yaml").write_text(LOOP.replace("center: [0.0, 3.0]", "center: [2.0, 0.0]"))
+        assert run(["check", "out/closed_loop.json"]) == 1
+        assert "an obstacle is hit" in capsys.readouterr().out
+
+    def test_the_file_it_was_driven_from(self, driven, capsys):
+        Path("x.yaml").rename("y.yaml")
+        assert run(["check", "out/closed_loop.json"]) == 2
+        said = "out/closed_loop.json: source: there is no x.yaml, need --with and that file\n"
+        assert capsys.readouterr().err == said
+        assert run(["check", "out/closed_loop.json", "--with", "y.yaml"]) == 0
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda d: d["clearance_m"].update(between={}),
+        lambda d: d["vehicles"]["east"]["steps"][0].update(vehicle_pose=[1e300, 0, 0]),
+        lambda d: d["vehicles"]["east"]["steps"][-1].pop("vehicle_pose"),
+        lambda d: d.update(step_s=-1.0),
+        lambda d: d["vehicles"]["east"].update(steps=[]),
+        lambda d: d.update(vehicles=3),
+    ],
+)
+def test_a_damaged_file_is_told_in_one_line(driven, capsys, change):
+    change(driven)
+    Path("out/closed_loop.json").write_text(json.dumps(driven))
+    assert run(["check", "out/closed_loop.json"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("out/closed_loop.json: ")
+    assert said.count("\n") == 1
+    assert "internal error" not in said
+
+
+class TestPlot:
+    def test_picture_film_and_page(self, driven):
+        assert run(["mpc", "x.yaml", "--quiet"]) == 0
+        drawn = Path("out/closed_loop.png").read_bytes()
+        assert run(["plot", "out/closed_loop.json", "--out", "again.png"]) == 0
+        assert Path("again.png").read_bytes() == drawn
+        assert run(["plot", "out/closed_loop.json", "--html", "--out", "y.html"]) == 0
+        assert "A crossing" in Path("y.html").read_text(encoding="utf-8")
+        assert run(["plot", "out/closed_loop.json", "--animate", "--out", "y.gif"]) == 0
+        assert frames_of("y.gif") > 10
+
+    def test_a_damaged_file(self, driven, capsys):
+        driven["vehicles"]["east"]["steps"][0].pop("plan")
+        Path("out/closed_loop.json").write_text(json.dumps(driven))
+        assert run(["plot", "out/closed_loop.json"]) == 2
+        said = "out/closed_loop.json: vehicles.east: misses the key 'plan'\n"
+        assert capsys.readouterr().err == said
